@@ -63,8 +63,11 @@ def time_constant(A: float, B: float, C: float) -> float:
 
     With D = B + 2 A V_ss and p = 1 - 1/e, Tau = (2/D) artanh(p D / (D + (1 - p) B)).
     """
-    D = B + 2.0 * A * abs(steady_velocity(A, B, C))
-    if D == 0.0 or isinf(D):
+    V = steady_velocity(A, B, C)
+    if isinf(V):
+        return inf
+    D = B + 2.0 * A * abs(V)
+    if D == 0.0:
         return inf
     q = 1.0 / e
     return 2.0 * atanh((1.0 - q) * D / (D + q * B)) / D
