@@ -1,0 +1,1 @@
+"""What goes into the FMU and what puts it there."""

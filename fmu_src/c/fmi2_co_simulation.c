@@ -1,0 +1,121 @@
+/* Co-Simulation (FMI 2.0, section 4.2). */
+#include "fmi2_instance.h"
+
+FMI2_Export fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                                   const fmi2Integer order[], const fmi2Real value[])
+{
+    OPEN("fmi2SetRealInputDerivatives", INSTANTIATED | INITIALIZATION | STEP);
+    ONLY_CS("fmi2SetRealInputDerivatives");
+    (void)vr;
+    (void)order;
+    (void)value;
+    REQUIRE("fmi2SetRealInputDerivatives", nvr == 0, "inputs are held over a step (canInterpolateInputs = false).");
+    return fmi2OK;
+}
+
+static bool is_output(fmi2ValueReference vr)
+{
+    const bool derivative = vr >= FIRST_CALCULATED && vr < FIRST_CALCULATED + N_STATES;
+    return vr < N_VARIABLES && !derivative && (VARIABLES[vr].kind == STATE || VARIABLES[vr].kind == CALCULATED);
+}
+
+FMI2_Export fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                                    const fmi2Integer order[], fmi2Real value[])
+{
+    OPEN("fmi2GetRealOutputDerivatives", STEP | TERMINATED | FAILED);
+    ONLY_CS("fmi2GetRealOutputDerivatives");
+    REQUIRE("fmi2GetRealOutputDerivatives", nvr == 0 || (vr != NULL && order != NULL && value != NULL),
+            "vr, order or value is NULL.");
+    for (size_t i = 0; i < nvr; i++) {
+        REQUIRE("fmi2GetRealOutputDerivatives", is_output(vr[i]), "value reference %u is no output.", vr[i]);
+        REQUIRE("fmi2GetRealOutputDerivatives", order[i] == 1, "order %d of %s is not available, only 1.", order[i],
+                VARIABLES[vr[i]].name);
+    }
+    calculate(f);
+    for (size_t i = 0; i < nvr; i++) { /* thrust is constant between steps, as the commands are */
+        const double rate = vr[i] < FIRST_CALCULATED ? f->now.values.at[vr[i] + N_STATES] : 0.0;
+        REQUIRE("fmi2GetRealOutputDerivatives", isfinite(rate), "the derivative of %s overflows.",
+                VARIABLES[vr[i]].name);
+        value[i] = rate;
+    }
+    return fmi2OK;
+}
+
+/* Rounding of communication points, relative to their size. */
+static const double TIME_TOLERANCE = 1e-9;
+
+FMI2_Export fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
+                                  fmi2Real communicationStepSize, fmi2Boolean noSetFMUStatePriorToCurrentPoint)
+{
+    OPEN("fmi2DoStep", STEP);
+    (void)noSetFMUStatePriorToCurrentPoint;
+    const double t = currentCommunicationPoint, h = communicationStepSize, end = t + h;
+    REQUIRE("fmi2DoStep", h > 0.0 && isfinite(end), "communicationStepSize = %g at t = %g is not a step forward.", h, t);
+    REQUIRE("fmi2DoStep", !f->now.stop_defined || end <= f->now.stop + TIME_TOLERANCE * (fabs(f->now.stop) + h),
+            "a step of %g s from t = %.15g passes stopTime = %.15g.", h, t, f->now.stop);
+    rov_variables *const v = &f->now.values.named;
+    variable_values next;
+    rov_step(&v->coefficients, &f->gains, &v->inputs, &v->state, h, &next.named.state);
+    double sum = 0.0; /* not finite if one is not: zero times it is NaN */
+    for (size_t i = FIRST_STATE; i < FIRST_STATE + N_STATES; i++) {
+        sum += 0.0 * next.at[i];
+    }
+    if (sum != 0.0) {
+        f->now.mode = FAILED;
+        FAIL(f, "fmi2DoStep: the motion overflows within %g s from t = %g; the state from before is kept.", h, t);
+    }
+    v->state = next.named.state;
+    f->now.time = end; /* the model is autonomous: whatever t says, h seconds have passed */
+    return fmi2OK;
+}
+
+FMI2_Export fmi2Status fmi2CancelStep(fmi2Component c)
+{
+    OPEN("fmi2CancelStep", EVERYWHERE);
+    FAIL(f, "fmi2CancelStep: no step is pending.");
+}
+
+/* Opens fmi2GetXXXStatus; steps are never pending, so most of what can be asked for does not exist. */
+#define OPEN_STATUS(function)                                   \
+    OPEN(function, STEP | TERMINATED);                          \
+    ONLY_CS(function);                                          \
+    REQUIRE(function, value != NULL, "value is NULL.")
+#define NO_STATUS(function) DISCARD(f, "%s: status kind %d is not available, steps are never pending.", function, (int)s)
+
+FMI2_Export fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
+{
+    OPEN_STATUS("fmi2GetStatus");
+    NO_STATUS("fmi2GetStatus");
+}
+
+FMI2_Export fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
+{
+    OPEN_STATUS("fmi2GetRealStatus");
+    if (s == fmi2LastSuccessfulTime) {
+        *value = f->now.time;
+        return fmi2OK;
+    }
+    NO_STATUS("fmi2GetRealStatus");
+}
+
+FMI2_Export fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value)
+{
+    OPEN_STATUS("fmi2GetIntegerStatus");
+    NO_STATUS("fmi2GetIntegerStatus");
+}
+
+FMI2_Export fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
+{
+    OPEN_STATUS("fmi2GetBooleanStatus");
+    if (s == fmi2Terminated) {
+        *value = fmi2False;
+        return fmi2OK;
+    }
+    NO_STATUS("fmi2GetBooleanStatus");
+}
+
+FMI2_Export fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value)
+{
+    OPEN_STATUS("fmi2GetStringStatus");
+    NO_STATUS("fmi2GetStringStatus");
+}
