@@ -1,0 +1,151 @@
+"""Everything that goes into the FMU, and the archive: the same bytes for the same inputs."""
+
+import hashlib
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+
+from models.vehicle import Vehicle
+
+from .compile import C_SOURCES, UNITY_FILE, BuildError, fmi_headers
+from .description import NATIVE, PYTHON, model_description
+from .documentation import documentation_page
+from .icon import model_icon
+from .interface import Variable, interface_header, model_header, variables
+from .python_flavour import python_files, python_sources
+
+TOOL = f"videoray-fmu {version('videoray-fmu')}"
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+_LICENSE = Path(__file__).parent.parent / "LICENSE"
+
+
+@dataclass(frozen=True)
+class Content:
+    """What an FMU is made of but its compiled binaries."""
+
+    identifier: str
+    guid: str
+    files: Mapping[str, bytes]
+    """Path in the archive to content."""
+    sources: Mapping[str, str]
+    """The C files to compile; none in pure Python."""
+
+
+def native_content(vehicle: Vehicle) -> Content:
+    """The FMU in C, for Co-Simulation and Model Exchange."""
+    declared = variables(vehicle.coefficients)
+    sources = {path.name: path.read_text(encoding="utf-8") for path in sorted(C_SOURCES.iterdir())}
+    sources["model.h"] = model_header()
+    describe = partial(_describe, vehicle, declared, interfaces=NATIVE, source_files=(UNITY_FILE,))
+    guid = _guid(describe(guid=""), sources)
+    sources["interface.h"] = interface_header(declared, vehicle.identifier, guid)
+    files = {
+        **_common_files(vehicle, declared),
+        "modelDescription.xml": describe(guid=guid),
+        "documentation/licenses/fmi-headers.txt": _fmi_license(),
+        **{f"sources/{name}": text.encode() for name, text in sources.items()},
+    }
+    return Content(vehicle.identifier, guid, files, sources)
+
+
+def python_content(vehicle: Vehicle) -> Content:
+    """The FMU in pure Python, for Co-Simulation."""
+    declared = variables(vehicle.coefficients)
+    sources = python_sources(vehicle, declared)
+    describe = partial(_describe, vehicle, declared, interfaces=PYTHON)
+    guid = _guid(describe(guid=""), sources)
+    files = {
+        **_common_files(vehicle, declared),
+        "modelDescription.xml": describe(guid=guid),
+        **python_files(vehicle, sources),
+    }
+    return Content(vehicle.identifier, guid, files, {})
+
+
+def _describe(
+    vehicle: Vehicle,
+    declared: tuple[Variable, ...],
+    *,
+    guid: str,
+    interfaces: Mapping[str, Mapping[str, str]],
+    source_files: tuple[str, ...] = (),
+) -> bytes:
+    return model_description(
+        declared,
+        identifier=vehicle.identifier,
+        guid=guid,
+        description=vehicle.description,
+        version=vehicle.version,
+        tool=TOOL,
+        interfaces=interfaces,
+        source_files=source_files,
+        author=vehicle.source,
+        license="MIT, see documentation/licenses/license.txt",
+    )
+
+
+def _guid(description: bytes, sources: Mapping[str, str]) -> str:
+    """A GUID that stands for the interface and the code behind it, so a binary refuses another one's description."""
+    digest = hashlib.sha256(description)
+    for name, text in sorted(sources.items()):
+        digest.update(name.encode() + b"\0" + text.encode() + b"\0")
+    d = digest.hexdigest()
+    return f"{{{d[:8]}-{d[8:12]}-{d[12:16]}-{d[16:20]}-{d[20:32]}}}"
+
+
+def _common_files(vehicle: Vehicle, declared: tuple[Variable, ...]) -> dict[str, bytes]:
+    return {
+        "model.png": model_icon(vehicle),
+        "documentation/index.html": documentation_page(vehicle, declared).encode(),
+        "documentation/licenses/license.txt": _LICENSE.read_bytes(),
+    }
+
+
+def _fmi_license() -> bytes:
+    """The licence in the comment of the FMI headers that the binaries are compiled with."""
+    text = (fmi_headers() / "fmi2Functions.h").read_text(encoding="utf-8")
+    start = text.index("Copyright (C)")
+    lines = text[start : text.index("*/", start)].splitlines()
+    return ("\n".join(line.strip() for line in lines).strip() + "\n").encode()
+
+
+def write_fmu(path: Path, files: Mapping[str, bytes], check: Callable[[Path], None]) -> None:
+    """Write the archive to path, whole or not at all: only what passes `check` replaces a file that is there.
+
+    Raises BuildError where path cannot be written.
+    """
+    descriptor = -1
+    draft: Path | None = None
+    try:
+        descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+        draft = Path(name)
+        with os.fdopen(descriptor, "wb") as stream:
+            with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+                # the description comes first, so that importers which stream find it at once
+                for member in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
+                    archive.writestr(_entry(member), files[member], compresslevel=9)
+            stream.flush()
+            os.fsync(stream.fileno())
+        check(draft)
+        draft.chmod(0o644)
+        draft.replace(path)
+    except OSError as error:
+        raise BuildError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        if draft is not None:
+            with suppress(FileNotFoundError):
+                draft.unlink()
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name, _EPOCH)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    info.create_system = 3  # the same on Windows
+    info.external_attr = 0o644 << 16
+    return info
