@@ -1,0 +1,29 @@
+"""The FMU under test: built once a session by the exporter's own command line, for this machine."""
+
+from pathlib import Path
+
+import fmpy
+import pytest
+
+import build_fmu
+from models.vehicle import VIDEORAY, Vehicle, load_vehicle
+
+
+@pytest.fixture(scope="session")
+def vehicle() -> Vehicle:
+    return load_vehicle(VIDEORAY)
+
+
+@pytest.fixture(scope="session")
+def videoray_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    # a path with a space and an umlaut, as users have them
+    path = tmp_path_factory.mktemp("FMU für Tests") / "videoray.fmu"
+    assert build_fmu.main(["--platform", "host", "-o", str(path)]) == 0
+    return path
+
+
+@pytest.fixture(scope="session")
+def videoray_dir(videoray_fmu: Path) -> Path:
+    folder = videoray_fmu.with_suffix("")
+    fmpy.extract(str(videoray_fmu), unzipdir=str(folder))
+    return folder
