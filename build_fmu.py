@@ -1,18 +1,19 @@
 """Build an FMI 2.0 FMU of an identified ROV from its vehicle file."""
 
 import argparse
+import asyncio
+import signal
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from fmu_src.compile import PLATFORMS, BuildError, compile_platform, host_platform
+from fmu_src.compile import PLATFORMS, BuildError, compile_all, host_platform
 from models.tables import DataFileError
 from models.vehicle import VIDEORAY, Vehicle, VehicleFileError, load_vehicle
 
@@ -35,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _say(str(error), 2)
     except BuildError as error:
         return _say(str(error), 1)
+    except OSError as error:
+        return _say(f"{error.filename or 'a temporary file'}: {error.strerror or error}", 1)
     except KeyboardInterrupt:
         return _say("interrupted, nothing written", 130)
     return 0
@@ -52,10 +55,11 @@ def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None) -> No
     content = python_content(vehicle) if platforms is None else native_content(vehicle)
     binaries, seconds = _compile(content, platforms or [], console)
     notes: list[str] = []
-    write_fmu(output, {**content.files, **binaries}, lambda draft: notes.append(_check_fmu(draft, platforms)))
+    files = {_binary(name, content.identifier): library for name, library in binaries.items()}
+    write_fmu(output, {**content.files, **files}, lambda draft: notes.append(_check_fmu(draft, platforms)))
     console.print(f"[bold]{output}[/]  {output.stat().st_size / 1000:.0f} kB  {content.guid}", highlight=False)
     for name in platforms or []:
-        size = len(binaries[_binary(name, content.identifier)]) / 1000
+        size = len(binaries[name]) / 1000
         console.print(f"  {name:<14}{size:6.0f} kB{seconds[name]:7.1f} s", highlight=False)
     for note in notes:
         console.print(f"  {note}", highlight=False)
@@ -65,24 +69,18 @@ def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None) -> No
 def _compile(
     content: "Content", platforms: Sequence[str], console: Console
 ) -> tuple[dict[str, bytes], dict[str, float]]:
-    """The binaries by their path in the FMU and the seconds that each platform took, compiled side by side."""
-    progress = Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console, transient=True
-    )
-    tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
+    """The binaries by platform, compiled side by side, and after how many seconds each was there."""
+    start = time.perf_counter()
+    seconds: dict[str, float] = {}
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=console, transient=True) as progress:
+        tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
 
-    def compile_one(name: str) -> tuple[bytes, float]:
-        start = time.perf_counter()
-        library = compile_platform(name, content.sources, content.identifier)
-        progress.update(tasks[name], completed=1)
-        return library, time.perf_counter() - start
+        def done(name: str) -> None:
+            seconds[name] = time.perf_counter() - start
+            progress.update(tasks[name], completed=1)
 
-    with progress, ThreadPoolExecutor() as pool:
-        results = dict(zip(platforms, pool.map(compile_one, platforms), strict=True))
-    return (
-        {_binary(name, content.identifier): library for name, (library, _) in results.items()},
-        {name: seconds for name, (_, seconds) in results.items()},
-    )
+        return asyncio.run(compile_all(platforms, content.sources, content.identifier, done)), seconds
 
 
 def _binary(name: str, identifier: str) -> str:
@@ -141,4 +139,5 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended from outside, it cleans up as at Ctrl-C
     sys.exit(main())

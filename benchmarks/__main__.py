@@ -1,5 +1,6 @@
 """What fmi2DoStep costs in a plain C loop, by step size, straight and turning (Linux)."""
 
+import asyncio
 import platform
 import subprocess
 import sys
@@ -9,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from fmu_src.compile import PLATFORMS, compile_platform, fmi_headers
+from fmu_src.compile import PLATFORMS, compile_all, compiler, fmi_headers
 from fmu_src.package import native_content
 from models.vehicle import VIDEORAY, load_vehicle
 
@@ -22,11 +23,12 @@ def main() -> int:
     content = native_content(load_vehicle(VIDEORAY))
     with tempfile.TemporaryDirectory() as folder:
         library = f"{content.identifier}{PLATFORMS['linux64'].suffix}"
-        Path(folder, library).write_bytes(compile_platform("linux64", content.sources, content.identifier))
+        built = asyncio.run(compile_all(["linux64"], content.sources, content.identifier))
+        Path(folder, library).write_bytes(built["linux64"])
         source = Path(__file__).with_name("do_step.c")
-        compiler = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-linux-gnu.2.17", "-std=c11", "-O2"]
+        command = [*compiler(), "-target", *PLATFORMS["linux64"].targets, "-std=c11", "-O2"]
         flags = ["-I", str(fmi_headers()), str(source), f"./{library}", "-ldl", "-Wl,-rpath,$ORIGIN", "-o", "do_step"]
-        subprocess.run([*compiler, *flags], cwd=folder, check=True)
+        subprocess.run([*command, *flags], cwd=folder, check=True)
         output = subprocess.run([Path(folder, "do_step"), content.guid], check=True, capture_output=True, text=True)
     rows = [line.split() for line in output.stdout.splitlines()]
     sizes = list(dict.fromkeys(h for _, h, _, _ in rows))

@@ -1,11 +1,13 @@
 """C sources to one shared library per platform, with the C compiler of the ziglang package: no other one is needed."""
 
+import asyncio
 import importlib.util
+import os
 import platform
+import signal
 import subprocess
-import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,6 +62,14 @@ def host_platform() -> str | None:
     }.get((platform.system(), processor))
 
 
+def compiler() -> list[str]:
+    """The C compiler's command. Raises BuildError where it is not installed."""
+    spec = importlib.util.find_spec("ziglang")
+    if spec is None or spec.origin is None:
+        raise BuildError("the C compiler is missing: pip install ziglang")
+    return [str(Path(spec.origin).with_name("zig.exe" if os.name == "nt" else "zig")), "cc"]
+
+
 def fmi_headers() -> Path:
     """The folder with the FMI headers, which come with FMPy."""
     spec = importlib.util.find_spec("fmpy")
@@ -68,17 +78,46 @@ def fmi_headers() -> Path:
     return Path(spec.origin).with_name("c-code")
 
 
-def compile_platform(name: str, sources: Mapping[str, str], identifier: str) -> bytes:
-    """Compile sources (file name to text) for one platform; the shared library's bytes. Raises BuildError."""
+async def compile_all(
+    platforms: Sequence[str],
+    sources: Mapping[str, str],
+    identifier: str,
+    on_done: Callable[[str], None] = lambda _: None,
+) -> dict[str, bytes]:
+    """Compile sources (file name to text) for all platforms side by side; the shared libraries' bytes.
+
+    Raises BuildError. Interrupted or failed, it leaves no process and no file behind.
+    """
+    turns = asyncio.Semaphore(os.cpu_count() or 1)
+
+    async def one(name: str) -> bytes:
+        async with turns:
+            library = await _compile(name, sources, identifier)
+        on_done(name)
+        return library
+
+    tasks = [asyncio.create_task(one(name)) for name in platforms]
+    try:
+        return dict(zip(platforms, await asyncio.gather(*tasks), strict=True))
+    except OSError as error:
+        raise BuildError(f"cannot compile: {error.strerror or error}") from error
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _compile(name: str, sources: Mapping[str, str], identifier: str) -> bytes:
     target_platform = PLATFORMS[name]
     with tempfile.TemporaryDirectory(prefix="fmu-") as folder:
         for file, text in sources.items():
-            (Path(folder) / file).write_text(text, encoding="utf-8")
-        library = Path(folder) / f"{identifier}{target_platform.suffix}"
+            Path(folder, file).write_text(text, encoding="utf-8")
+        library = Path(folder, f"{identifier}{target_platform.suffix}")
         install_name = (f"-Wl,-install_name,@rpath/{library.name}",) if library.suffix == ".dylib" else ()
         slices = []
         for target in target_platform.targets:
-            _run_compiler(name, target, [*target_platform.flags, *install_name, "-o", library.name], folder)
+            flags = [*target_platform.flags, *install_name, "-o", library.name]
+            await _run_compiler(name, target, flags, folder)
             slices.append(library.read_bytes())
         if len(slices) > 1:
             universal = FatWriter()  # type: ignore[no-untyped-call]
@@ -88,11 +127,9 @@ def compile_platform(name: str, sources: Mapping[str, str], identifier: str) -> 
         return library.read_bytes()
 
 
-def _run_compiler(name: str, target: str, flags: list[str], folder: str) -> None:
-    if importlib.util.find_spec("ziglang") is None:
-        raise BuildError("the compiler is missing: pip install ziglang")
-    command = [
-        *(sys.executable, "-m", "ziglang", "cc", "-target", target),
+async def _run_compiler(name: str, target: str, flags: list[str], folder: str) -> None:
+    process = await asyncio.create_subprocess_exec(
+        *(*compiler(), "-target", target),
         *("-std=c11", "-O2", "-g0", "-s", "-shared", "-fvisibility=hidden"),
         # the same rounding on every processor; no errno and unwinding in the mathematics
         *("-ffp-contract=off", "-fno-math-errno", "-fno-asynchronous-unwind-tables"),
@@ -101,7 +138,19 @@ def _run_compiler(name: str, target: str, flags: list[str], folder: str) -> None
         f"-I{fmi_headers()}",
         UNITY_FILE,
         *flags,
-    ]
-    result = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if result.returncode != 0:
-        raise BuildError(f"{name}: the compiler failed for {target}\n{result.stderr.strip()}")
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,  # the compiler has children of its own, which must end with it
+    )
+    try:
+        output, _ = await process.communicate()
+    finally:
+        if process.returncode is None:
+            if os.name == "posix":
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+            await process.wait()
+    if process.returncode != 0:
+        raise BuildError(f"{name}: the compiler failed for {target}\n{output.decode(errors='replace').strip()}")

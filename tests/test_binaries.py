@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import build_fmu
-from fmu_src.compile import PLATFORMS, fmi_headers
+from fmu_src.compile import PLATFORMS, compiler, fmi_headers
 from models.dynamics import Inputs
 
 lief.logging.disable()
@@ -156,10 +156,10 @@ def _run(binaries: Path, name: str, folder: Path, guid: str) -> np.ndarray:
         pytest.skip(f"{name}: {reason}")
     source = Path(__file__).parent / "native" / "host.c"
     program = folder / f"host-{name}{machine.suffix}"
-    compiler = [sys.executable, "-m", "ziglang", "cc", "-target", machine.target, "-std=c11", "-O1"]
+    command = [*compiler(), "-target", machine.target, "-std=c11", "-O1"]
     libraries = [] if machine.suffix else ["-ldl"]
     headers = ["-I", str(fmi_headers())]
-    subprocess.run([*compiler, *headers, str(source), "-o", str(program), *libraries], check=True, cwd=folder)
+    subprocess.run([*command, *headers, str(source), "-o", str(program), *libraries], check=True, cwd=folder)
     library = shutil.copy(_binary(binaries, name), folder / f"{name}{PLATFORMS[name].suffix}")
     environment = os.environ | {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
     result = subprocess.run(

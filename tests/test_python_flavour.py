@@ -63,11 +63,6 @@ def test_its_modules_bear_the_name_of_the_vehicle(python_fmu: Path) -> None:
     }
 
 
-def test_the_same_inputs_give_the_same_bytes(python_fmu: Path, tmp_path: Path) -> None:
-    assert build_fmu.main(["--backend", "pythonfmu", "-o", str(tmp_path / "again.fmu")]) == 0
-    assert (tmp_path / "again.fmu").read_bytes() == python_fmu.read_bytes()
-
-
 def _by_kind(declared: tuple[Variable, ...], **wanted: str) -> list[Variable]:
     return [v for v in declared if all(getattr(v, key) == value for key, value in wanted.items())]
 

@@ -1,9 +1,9 @@
 """The C sources that travel in the FMU: compiled by an importer, linked into a program, free of warnings."""
 
 import os
+import shlex
 import shutil
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,11 +11,9 @@ import fmpy
 import pytest
 from fmpy.build import build_platform_binary
 
-from fmu_src.compile import WARNINGS, fmi_headers
+from fmu_src.compile import WARNINGS, compiler, fmi_headers
 from fmu_src.package import Content, native_content
 from models.vehicle import Vehicle
-
-_CC = [sys.executable, "-m", "ziglang", "cc"]
 
 
 def _write_sources(content: Content, folder: Path) -> Path:
@@ -31,7 +29,7 @@ def zig_as_cc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if os.name == "nt":
         pytest.skip("FMPy asks for Visual Studio on Windows")
     cc = tmp_path / "cc"
-    cc.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m ziglang cc "$@"\n', encoding="utf-8")
+    cc.write_text(f'#!/bin/sh\nexec {shlex.join(compiler())} "$@"\n', encoding="utf-8")
     cc.chmod(0o755)
     monkeypatch.setenv("CC", str(cc))
     monkeypatch.setenv("CXX", str(cc))  # CMake asks for one; nothing is compiled with it
@@ -70,7 +68,7 @@ def test_two_models_link_into_one_program_under_their_prefixes(vehicle: Vehicle,
         content = native_content(replace(vehicle, identifier=identifier))
         _write_sources(content, tmp_path / identifier)
         subprocess.run(
-            [*_CC, "-std=c11", "-c", "-I", str(headers), "fmu.c", "-o", "../" + identifier + ".o"],
+            [*compiler(), "-std=c11", "-c", "-I", str(headers), "fmu.c", "-o", "../" + identifier + ".o"],
             cwd=tmp_path / identifier,
             check=True,
         )
@@ -86,7 +84,9 @@ def test_two_models_link_into_one_program_under_their_prefixes(vehicle: Vehicle,
         encoding="utf-8",
     )
     subprocess.run(
-        [*_CC, "-I", str(headers), "main.c", "videoray.o", "sister.o", "-lm", "-o", "main"], cwd=tmp_path, check=True
+        [*compiler(), "-I", str(headers), "main.c", "videoray.o", "sister.o", "-lm", "-o", "main"],
+        cwd=tmp_path,
+        check=True,
     )
     pointers = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.split()
     assert len(pointers) == len(set(pointers)) == 2
@@ -98,5 +98,5 @@ def test_no_warning_under_the_strictest_flags(vehicle: Vehicle, tmp_path: Path, 
     folder = _write_sources(native_content(vehicle), tmp_path / "c")
     more = ["-Wshadow", "-Wundef", "-Wstrict-prototypes", "-Wcast-qual", "-Wvla"]
     flags = ["-std=c11", *WARNINGS, *more, optimization, "-c", "-isystem", str(fmi_headers())]
-    result = subprocess.run([*_CC, *flags, "fmu.c"], cwd=folder, capture_output=True, text=True, check=False)
+    result = subprocess.run([*compiler(), *flags, "fmu.c"], cwd=folder, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (0, "")
