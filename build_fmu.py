@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None) -> None:
+def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None, console: Console | None = None) -> None:
     """Compile, write, validate and run the FMU of a vehicle, and print what was built. Raises BuildError.
 
     Platforms None is the flavour in pure Python.
@@ -51,7 +51,7 @@ def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None) -> No
     from fmu_src.package import native_content, python_content, write_fmu
 
     started = time.perf_counter()
-    console = Console()
+    console = console or Console()
     content = python_content(vehicle) if platforms is None else native_content(vehicle)
     binaries, seconds = _compile(content, platforms or [], console)
     notes: list[str] = []

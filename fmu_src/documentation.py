@@ -24,7 +24,7 @@ from matplotlib.figure import Figure
 
 from models.dynamics import COEFFICIENTS, Coefficients, Inputs, State, axes, step
 from models.tables import EXPERIMENTS, Cell, Experiment, ResponseTable, load_tables, untuned
-from models.vehicle import Alternative, VIDEORAY, Vehicle, load_vehicle
+from models.vehicle import VIDEORAY, Alternative, Vehicle, load_vehicle
 
 from . import icon
 from .interface import Variable
@@ -84,8 +84,11 @@ _P = 1.0 - 1.0 / e  # of V_ss, reached after Tau (17)
 # ---- The page ------------------------------------------------------------------------------------------------------
 
 
-def documentation_page(vehicle: Vehicle, variables: tuple[Variable, ...]) -> str:
-    """The page of a vehicle as HTML; without a data folder it goes without tables and measurements."""
+def documentation_page(vehicle: Vehicle, variables: tuple[Variable, ...], *, native: bool = True) -> str:
+    """The page of a vehicle as HTML, of the native FMU or the one in pure Python.
+
+    Without a data folder it goes without tables and measurements.
+    """
     tables = load_tables(vehicle) if vehicle.data else ()
     measured = _by_axis(tables)
     commands = _commands(vehicle, tables)
@@ -99,6 +102,7 @@ def documentation_page(vehicle: Vehicle, variables: tuple[Variable, ...]) -> str
     environment.filters |= {"number": number, "unit": pretty_unit, "percent": percent, "fixed": fixed}
     return environment.get_template("index.html.j2").render(
         vehicle=vehicle,
+        native=native,
         groups=[list(group) for _, group in groupby(variables, lambda v: (v.causality, v.variability, v.initial))],
         coefficients=[(name, meta, getattr(vehicle.coefficients, name)) for name, meta in COEFFICIENTS.items()],
         alternatives=[_alternative(a) for a in vehicle.alternatives.values()],

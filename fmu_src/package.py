@@ -46,7 +46,7 @@ def native_content(vehicle: Vehicle) -> Content:
     guid = _guid(describe(guid=""), sources)
     sources["interface.h"] = interface_header(declared, vehicle.identifier, guid)
     files = {
-        **_common_files(vehicle, declared),
+        **_common_files(vehicle, declared, native=True),
         "modelDescription.xml": describe(guid=guid),
         "documentation/licenses/fmi-headers.txt": _fmi_license(),
         **{f"sources/{name}": text.encode() for name, text in sources.items()},
@@ -61,7 +61,7 @@ def python_content(vehicle: Vehicle) -> Content:
     describe = partial(_describe, vehicle, declared, interfaces=PYTHON)
     guid = _guid(describe(guid=""), sources)
     files = {
-        **_common_files(vehicle, declared),
+        **_common_files(vehicle, declared, native=False),
         "modelDescription.xml": describe(guid=guid),
         **python_files(vehicle, sources),
     }
@@ -99,10 +99,10 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
     return f"{{{d[:8]}-{d[8:12]}-{d[12:16]}-{d[16:20]}-{d[20:32]}}}"
 
 
-def _common_files(vehicle: Vehicle, declared: tuple[Variable, ...]) -> dict[str, bytes]:
+def _common_files(vehicle: Vehicle, declared: tuple[Variable, ...], *, native: bool) -> dict[str, bytes]:
     return {
         "model.png": model_icon(vehicle),
-        "documentation/index.html": documentation_page(vehicle, declared).encode(),
+        "documentation/index.html": documentation_page(vehicle, declared, native=native).encode(),
         "documentation/licenses/license.txt": _LICENSE.read_bytes(),
     }
 

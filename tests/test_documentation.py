@@ -196,3 +196,11 @@ def test_picture_of_the_readme(tmp_path: Path) -> None:
     assert text.count("measured</text>") == 3
     documentation.main([str(tmp_path)])
     assert (tmp_path / "videoray.svg").read_text(encoding="utf-8") == text
+
+
+def test_the_page_of_the_python_flavour_claims_no_more_than_it_does(vehicle: Vehicle) -> None:
+    declared = variables(vehicle.coefficients)
+    native, python = (documentation_page(vehicle, declared, native=native) for native in (True, False))
+    for claim in ("Model Exchange", "fmi2Discard", "Directional derivatives", "First derivatives"):
+        assert claim in native
+        assert claim not in python
