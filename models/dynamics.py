@@ -215,6 +215,7 @@ _GAUSS_8 = (
     (0.96028985649753623, 0.10122853629037626),
 )
 _EPS = 2.0**-52
+_MOST_PIECES = 20_000  # of a part: five times what has been seen, short of overflow
 _ORDER = 8  # terms of the expansion at the ends of a fast turn
 
 
@@ -224,13 +225,16 @@ def turning_step(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> tuple[
     The distance is the integral of u e^(i turn). It is cut where surge or yaw come to rest, and each part into
     Gauss-Legendre panels on the exact velocity and turn, short against the time constants and the turn rate. Where the
     vehicle turns fast against the changes of velocity (in a steady turn at the latest) the two ends of the part are
-    enough, by parts over the heading.
+    enough, by parts over the heading. What cannot be computed, for it overflows, is NaN.
     """
     ahead = aside = turn = 0.0
-    cuts = sorted(t for t in (surge.turning_time(u), yaw.turning_time(r)) if t < h)
+    surge_turns, yaw_turns = surge.turning_time(u), yaw.turning_time(r)
+    cuts = sorted(t for t in (surge_turns, yaw_turns) if t < h)
     for start, end in pairwise([0.0, *cuts, h]):
         rest = end - start
-        while rest > 0.0:
+        for _ in range(_MOST_PIECES):
+            if rest == 0.0:
+                break
             length = rest
             r_end, angle = yaw.advance(r, rest)
             u_end, left = surge.advance(u, rest)
@@ -244,24 +248,28 @@ def turning_step(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> tuple[
             c, d = cos(turn), sin(turn)
             ahead, aside = ahead + (a * c - b * d), aside + (a * d + b * c)
             u, r, turn = u_end, r_end, turn + angle
-            rest = rest - length if length > 0.0 else nan  # only overflow makes a piece that short
-        if rest != 0.0:
+            rest -= length
+        else:
             ahead = nan
+        # At rest to the last digit, or what follows would take the branch of before the turn.
+        u = 0.0 if end == surge_turns else u
+        r = 0.0 if end == yaw_turns else r
     return ahead, aside, u, r, turn
 
 
 def _longest_piece(surge: Axis, yaw: Axis, u: float, r: float, rest: float) -> tuple[float, tuple[float, float]]:
     """The start of the remaining time that one formula covers, and the integral of u e^(i turn) over it."""
     panel = _panel_length(surge, yaw, u, r)
-    if panel < rest and (at_start := _radius_derivatives(surge, yaw, u, r)):
+    drag = _drag(surge, u), _drag(yaw, r)
+    if panel < rest and (at_start := _radius_derivatives(surge, yaw, drag, u, r)):
         length = rest
         while length > panel:
-            after = surge.velocity(u, length), yaw.velocity(r, length)
+            u_end, r_end = surge.velocity(u, length), yaw.velocity(r, length)
             # While the turn slows down, two good ends vouch for what lies between them only if it does not slow much.
-            if abs(after[1]) >= 0.5 * abs(r) and (at_end := _radius_derivatives(surge, yaw, *after)):
+            if abs(r_end) >= 0.5 * abs(r) and (at_end := _radius_derivatives(surge, yaw, drag, u_end, r_end)):
                 (a, b), (c, d) = _by_parts(at_start, 0.0), _by_parts(at_end, yaw.distance(r, length))
                 return length, (c - a, d - b)
-            length *= 0.25
+            length = 0.25 * length if length < 1e6 * panel else sqrt(length) * sqrt(panel)
     length = min(rest, panel)
     return length, _panel(surge, yaw, u, r, length)
 
@@ -311,14 +319,14 @@ def _by_parts(g: list[float], turn: float) -> tuple[float, float]:
     return real * c - imag * d, real * d + imag * c
 
 
-def _radius_derivatives(surge: Axis, yaw: Axis, u: float, r: float) -> list[float] | None:
+def _radius_derivatives(surge: Axis, yaw: Axis, drag: tuple[float, float], u: float, r: float) -> list[float] | None:
     """The radius of the turn g = u/r and its derivatives by the heading; None where they do not fall off.
 
     They come from the Taylor series of u and r in time: d/d(heading) = (1/r) d/dt.
     """
     if abs(r) <= max(_rate(surge, u), _rate(yaw, r)):
         return None
-    series, turning = _taylor(surge, u), _taylor(yaw, r)
+    series, turning = _taylor(surge, drag[0], u), _taylor(yaw, drag[1], r)
     g: list[float] = []
     for _ in range(_ORDER + 1):
         quotient: list[float] = []
@@ -330,11 +338,15 @@ def _radius_derivatives(surge: Axis, yaw: Axis, u: float, r: float) -> list[floa
     return g if max(abs(g[-1]), abs(g[-2])) <= _EPS * max(map(abs, g)) else None
 
 
-def _taylor(axis: Axis, v: float) -> list[float]:
-    """Taylor coefficients of v(t), orders 0 ... _ORDER, from v' = C - B v ∓ A v^2; a settled axis is constant."""
+def _drag(axis: Axis, v: float) -> float:
+    """Quadratic drag with the sign that it has in the direction of v, or of the start from rest."""
+    return axis.A if v > 0.0 or (v == 0.0 and axis.C >= 0.0) else -axis.A
+
+
+def _taylor(axis: Axis, A: float, v: float) -> list[float]:
+    """Taylor coefficients of v(t), orders 0 ... _ORDER, from v' = C - B v - A v^2; a settled axis is constant."""
     if _settled(axis, v):
         return [v] + [0.0] * _ORDER
-    A = axis.A if v > 0.0 or (v == 0.0 and axis.C >= 0.0) else -axis.A
     c = [v]
     for n in range(_ORDER):
         square = sum(c[j] * c[n - j] for j in range(n + 1))

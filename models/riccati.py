@@ -39,13 +39,15 @@ def time_to_rest(A: float, B: float, C: float, v0: float) -> float:
     """Return the time (s) at which a force C < 0 stops a motion v0 > 0."""
     D2 = B * B + 4.0 * A * C
     S = v0 / (B * v0 - 2.0 * C)
+    D = sqrt(abs(D2))
+    x = D * S
+    if x == 0.0:  # D2 = 0, or an underflow
+        return 2.0 * S
     if D2 < 0.0:
-        D = sqrt(-D2)
-        return 2.0 * atan(D * S) / D
-    D = sqrt(D2)
-    if D * S > 0.5:  # artanh would lose the distance of its argument from 1
+        return 2.0 * S * (atan(x) / x)
+    if x > 0.5:  # artanh would lose the distance of its argument from 1
         return log1p(D * v0 / (-2.0 * A * C / (B + D) * v0 - C)) / D
-    return 2.0 * (atanh(D * S) / D if D > 0.0 else S)
+    return 2.0 * S * (atanh(x) / x)
 
 
 def steady_velocity(A: float, B: float, C: float) -> float:

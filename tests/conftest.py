@@ -8,6 +8,8 @@ import pytest
 import build_fmu
 from models.vehicle import VIDEORAY, Vehicle, load_vehicle
 
+from .fmi2 import Fmu
+
 
 @pytest.fixture(scope="session")
 def vehicle() -> Vehicle:
@@ -27,3 +29,9 @@ def videoray_dir(videoray_fmu: Path) -> Path:
     folder = videoray_fmu.with_suffix("")
     fmpy.extract(str(videoray_fmu), unzipdir=str(folder))
     return folder
+
+
+@pytest.fixture(scope="module")
+def fmu(videoray_dir: Path) -> Fmu:
+    """The shared library, loaded for one file of tests."""
+    return Fmu(videoray_dir)

@@ -41,8 +41,11 @@ FMI2_Export fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2V
     return fmi2OK;
 }
 
-/* Rounding of communication points, relative to their size. */
-static const double TIME_TOLERANCE = 1e-9;
+/* Rounding of communication points, relative to their size, but never more than half a step. */
+static double time_tolerance(double stop, double h)
+{
+    return fmin(1e-9 * (fabs(stop) + h), 0.5 * h);
+}
 
 FMI2_Export fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                                   fmi2Real communicationStepSize, fmi2Boolean noSetFMUStatePriorToCurrentPoint)
@@ -51,7 +54,7 @@ FMI2_Export fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunication
     (void)noSetFMUStatePriorToCurrentPoint;
     const double t = currentCommunicationPoint, h = communicationStepSize, end = t + h;
     REQUIRE("fmi2DoStep", h > 0.0 && isfinite(end), "communicationStepSize = %g at t = %g is not a step forward.", h, t);
-    REQUIRE("fmi2DoStep", !f->now.stop_defined || end <= f->now.stop + TIME_TOLERANCE * (fabs(f->now.stop) + h),
+    REQUIRE("fmi2DoStep", !f->now.stop_defined || end <= f->now.stop + time_tolerance(f->now.stop, h),
             "a step of %g s from t = %.15g passes stopTime = %.15g.", h, t, f->now.stop);
     rov_variables *const v = &f->now.values.named;
     variable_values next;
@@ -62,7 +65,7 @@ FMI2_Export fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunication
     }
     if (sum != 0.0) {
         f->now.mode = FAILED;
-        FAIL(f, "fmi2DoStep: the motion overflows within %g s from t = %g; the state from before is kept.", h, t);
+        FAIL(f, "fmi2DoStep: the motion over %g s from t = %g overflows; the state from before is kept.", h, t);
     }
     v->state = next.named.state;
     f->now.time = end; /* the model is autonomous: whatever t says, h seconds have passed */

@@ -217,7 +217,7 @@ FMI2_Export fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[
         const variable_info *const info = &VARIABLES[vr[i]];
         f->now.values.at[vr[i]] = value[i];
         if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)
-            && !f->saturation_logged[vr[i]]) {
+            && !f->saturation_logged[vr[i]] && f->log_enabled[logStatusWarning]) {
             f->saturation_logged[vr[i]] = true;
             LOG(f, fmi2Warning, logStatusWarning, "fmi2SetReal: %s = %.15g saturates at %g; said once.", info->name,
                 value[i], value[i] < 0.0 ? info->minimum : info->maximum);
@@ -301,6 +301,10 @@ FMI2_Export fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2V
                 exists ? VARIABLES[vUnknown_ref[i]].name : "an unknown value reference");
     }
     rov_tangent(&f->now.values.named, &d.named);
+    for (size_t i = 0; i < nUnknown; i++) {
+        REQUIRE("fmi2GetDirectionalDerivative", isfinite(d.at[vUnknown_ref[i]]),
+                "that of %s is not a finite number.", VARIABLES[vUnknown_ref[i]].name);
+    }
     for (size_t i = 0; i < nUnknown; i++) {
         dvUnknown[i] = d.at[vUnknown_ref[i]];
     }

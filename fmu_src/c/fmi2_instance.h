@@ -73,9 +73,14 @@ static void emit(const fmi2CallbackFunctions *callbacks, const char *name, fmi2S
     char text[320], message[2 * sizeof text];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    size_t length = (size_t)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    size_t length = 0; /* the logger formats again: a percent sign is doubled */
+    if (length >= sizeof text) { /* cut before a character of UTF-8, not inside it */
+        for (length = sizeof text - 1; length > 0 && (text[length - 1] & 0x80) != 0; length--) {
+        }
+        text[length] = '\0';
+    }
+    length = 0; /* the logger formats again: a percent sign is doubled */
     for (const char *c = text; *c != '\0'; c++) {
         message[length++] = *c;
         if (*c == '%') {

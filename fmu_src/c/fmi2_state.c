@@ -54,9 +54,9 @@ static uint64_t checksum(const unsigned char *bytes, size_t size) /* FNV-1a */
 /* Whether a state read from bytes could have been reached by calls. */
 static bool is_valid(const fmu_state *s)
 {
-    const int modes = s->type == fmi2ModelExchange ? EVENT | CONTINUOUS : STEP;
+    const int modes = s->type == fmi2ModelExchange ? EVENT | CONTINUOUS : STEP | FAILED;
     const int mode = (int)s->mode;
-    bool valid = (mode & (modes | INSTANTIATED | INITIALIZATION | TERMINATED | FAILED)) != 0
+    bool valid = (mode & (modes | INSTANTIATED | INITIALIZATION | TERMINATED)) != 0
                  && (mode & (mode - 1)) == 0 && isfinite(s->time) && !isnan(s->stop)
                  && (s->experiment_defined || mode == INSTANTIATED);
     for (size_t i = 0; i < N_VARIABLES; i++) {

@@ -18,14 +18,17 @@ static double riccati_time_to_rest(double A, double B, double C, double v0)
 {
     const double D2 = B * B + 4.0 * A * C;
     const double S = v0 / (B * v0 - 2.0 * C);
-    const double D = sqrt(fabs(D2));
-    if (D2 < 0.0) {
-        return 2.0 * atan(D * S) / D;
+    const double D = sqrt(fabs(D2)), x = D * S;
+    if (x == 0.0) { /* D2 = 0, or an underflow */
+        return 2.0 * S;
     }
-    if (D * S > 0.5) { /* artanh would lose the distance of its argument from 1 */
+    if (D2 < 0.0) {
+        return 2.0 * S * (atan(x) / x);
+    }
+    if (x > 0.5) { /* artanh would lose the distance of its argument from 1 */
         return log1p(D * v0 / (-2.0 * A * C / (B + D) * v0 - C)) / D;
     }
-    return 2.0 * (D > 0.0 ? atanh(D * S) / D : S);
+    return 2.0 * S * (atanh(x) / x);
 }
 
 static double riccati_turning_time(const riccati *axis, double v0)

@@ -4,7 +4,10 @@
 #include <math.h>
 #include <stdbool.h>
 
-enum { ORDER = 8 }; /* terms of the expansion at the ends of a fast turn */
+enum {
+    ORDER = 8,           /* terms of the expansion at the ends of a fast turn */
+    MOST_PIECES = 20000 /* of a part of a turn: five times what has been seen, short of overflow */
+};
 
 typedef struct {
     double ahead, aside;
@@ -116,11 +119,16 @@ static planar panel_integral(const rov_gains *now, double u, double r, double h,
     return sum;
 }
 
-/* Taylor coefficients of v(t); a settled axis is constant. */
-static void taylor(const riccati *axis, double v, double c[ORDER + 1])
+/* Quadratic drag with the sign that it has in the direction of v, or of the start from rest. */
+static double signed_drag(const riccati *axis, double v)
+{
+    return v > 0.0 || (v == 0.0 && axis->C >= 0.0) ? axis->A : -axis->A;
+}
+
+/* Taylor coefficients of v(t) from v' = C - B v - A v^2; a settled axis is constant. */
+static void taylor(const riccati *axis, double A, double v, double c[ORDER + 1])
 {
     const bool constant = settled(axis, v);
-    const double A = v > 0.0 || (v == 0.0 && axis->C >= 0.0) ? axis->A : -axis->A;
     c[0] = v;
     for (int n = 0; n < ORDER; n++) {
         double square = 0.0;
@@ -133,14 +141,14 @@ static void taylor(const riccati *axis, double v, double c[ORDER + 1])
 
 /* The radius of the turn g = u/r and its derivatives by the heading, d/d(heading) = (1/r) d/dt; false where they do
  * not fall off. Two orders are looked at, for at rest every other one vanishes. */
-static bool radius_derivatives(const rov_gains *now, double u, double r, double g[ORDER + 1])
+static bool radius_derivatives(const rov_gains *now, const double drag[2], double u, double r, double g[ORDER + 1])
 {
     if (!(fabs(r) > fmax(bending_rate(&now->surge, u), bending_rate(&now->yaw, r)))) {
         return false;
     }
     double series[ORDER + 1], turning[ORDER + 1], largest = 0.0;
-    taylor(&now->surge, u, series);
-    taylor(&now->yaw, r, turning);
+    taylor(&now->surge, drag[0], u, series);
+    taylor(&now->yaw, drag[1], r, turning);
     for (int k = 0; k <= ORDER; k++) {
         for (int n = 0; n <= ORDER - k; n++) { /* series / turning, in place */
             for (int j = 0; j < n; j++) {
@@ -174,13 +182,14 @@ static planar longest_piece(const rov_gains *now, double u, double r, double res
     const double bending = fmax(bending_rate(&now->surge, u), bending_rate(&now->yaw, r));
     const double turning = turning_rate(&now->yaw, r);
     const double panel = fmin(1.0 / bending, 2.0 / turning);
+    const double drag[2] = {signed_drag(&now->surge, u), signed_drag(&now->yaw, r)};
     double at_start[ORDER + 1], at_end[ORDER + 1];
-    if (panel < rest && radius_derivatives(now, u, r, at_start)) {
-        for (double t = rest; t > panel; t *= 0.25) {
+    if (panel < rest && radius_derivatives(now, drag, u, r, at_start)) {
+        for (double t = rest; t > panel; t = t < 1e6 * panel ? 0.25 * t : sqrt(t) * sqrt(panel)) {
             const double after = riccati_velocity(&now->yaw, r, t);
             /* While the turn slows down, two good ends vouch for what lies between only if it does not slow much. */
             if (fabs(after) >= 0.5 * fabs(r)
-                && radius_derivatives(now, riccati_velocity(&now->surge, u, t), after, at_end)) {
+                && radius_derivatives(now, drag, riccati_velocity(&now->surge, u, t), after, at_end)) {
                 const planar a = by_parts(at_start, 0.0), b = by_parts(at_end, riccati_distance(&now->yaw, r, t));
                 *length = t;
                 return (planar){b.ahead - a.ahead, b.aside - a.aside};
@@ -196,7 +205,8 @@ static planar longest_piece(const rov_gains *now, double u, double r, double res
  * the two ends are enough; the rest is cut into Gauss-Legendre panels. u, r and the turn are moved to the end. */
 static void planar_leg(const rov_gains *now, double *u, double *r, double *turn, double rest, planar *sum)
 {
-    while (rest > 0.0) {
+    int pieces = 0;
+    for (; rest != 0.0 && pieces < MOST_PIECES; pieces++) {
         double length = rest, angle, r_end, left;
         riccati_advance(&now->yaw, *r, rest, &r_end, &angle);
         const double path = fabs(sum->ahead) + fabs(sum->aside);
@@ -217,10 +227,10 @@ static void planar_leg(const rov_gains *now, double *u, double *r, double *turn,
         }
         *turn += angle;
         *r = r_end;
-        rest = length > 0.0 ? rest - length : NAN; /* only overflow makes a piece that short */
+        rest -= length;
     }
-    if (isnan(rest)) {
-        sum->ahead = rest;
+    if (pieces == MOST_PIECES) {
+        sum->ahead = NAN;
     }
 }
 
@@ -234,11 +244,15 @@ static void rov_step(const rov_coefficients *k, const rov_gains *gains, const ro
         riccati_advance(&now.surge, s->u, h, &u, &sum.ahead);
     } else {
         const double surge_turns = riccati_turning_time(&now.surge, s->u), yaw_turns = riccati_turning_time(&now.yaw, r);
-        const double first = fmin(h, fmin(surge_turns, yaw_turns)), second = fmin(h, fmax(surge_turns, yaw_turns));
+        const double ends[] = {fmin(h, fmin(surge_turns, yaw_turns)), fmin(h, fmax(surge_turns, yaw_turns)), h};
+        double start = 0.0;
         u = s->u;
-        planar_leg(&now, &u, &r, &turn, first, &sum);
-        planar_leg(&now, &u, &r, &turn, second - first, &sum);
-        planar_leg(&now, &u, &r, &turn, h - second, &sum);
+        for (int i = 0; i < 3; start = ends[i++]) {
+            planar_leg(&now, &u, &r, &turn, ends[i] - start, &sum);
+            /* at rest to the last digit, or what follows would take the branch of before the turn */
+            u = ends[i] == surge_turns ? 0.0 : u;
+            r = ends[i] == yaw_turns ? 0.0 : r;
+        }
     }
     riccati_advance(&now.heave, s->w, h, &w, &depth);
     sum = rotated(sum, s->psi);
