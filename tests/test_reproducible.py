@@ -39,10 +39,10 @@ def test_built_in_another_folder(here: dict[str, str], tmp_path: Path) -> None:
 
 def _interpreter(version: str) -> str | None:
     """An interpreter of a version, if there is one that starts."""
-    candidates = [shutil.which(f"python{version}"), *Path.home().glob(f".pyenv/versions/{version}.*/bin/python")]
-    for candidate in filter(None, candidates):
-        if subprocess.run([candidate, "--version"], capture_output=True, check=False).returncode == 0:
-            return str(candidate)
+    installed = [str(path) for path in Path.home().glob(f".pyenv/versions/{version}.*/bin/python")]
+    for candidate in [shutil.which(f"python{version}"), *installed]:
+        if candidate and subprocess.run([candidate, "--version"], capture_output=True, check=False).returncode == 0:
+            return candidate
     return None
 
 

@@ -1,0 +1,249 @@
+"""The FMU's steps are exact: against models.dynamics, 50 digits, SciPy's integration of the equations, and itself."""
+
+import random
+from collections.abc import Mapping
+from dataclasses import asdict, astuple, fields, replace
+from functools import partial
+from itertools import product
+from math import cos, hypot, pi, sin
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import pytest
+from scipy.integrate import solve_ivp
+
+from models import dynamics
+from models.dynamics import Axis, Coefficients, Inputs, State
+from models.vehicle import Vehicle
+
+from . import reference
+from .fmi2 import OK, Fmu
+
+Case = tuple[Coefficients, Inputs, State, float]
+
+STATES = [f.name for f in fields(State)]
+VELOCITIES = ("u", "w", "r")
+POSE = ("x", "y", "z", "psi")
+ROUNDING = 2.0**-52
+
+
+@pytest.fixture(scope="module")
+def fmu(videoray_dir: Path) -> Fmu:
+    return Fmu(videoray_dir)
+
+
+def run(fmu: Fmu, k: Coefficients, i: Inputs, s: State, h: float, steps: int = 1) -> State:
+    """The state of a new instance after equal steps that last h together."""
+    with fmu.instance() as rov:
+        rov.start({**asdict(k), **asdict(i), **asdict(s)})
+        for n in range(steps):
+            assert rov.step(n * h / steps, h / steps) == OK, rov.log
+        return State(*rov.get(STATES))
+
+
+# ---- Random vehicles, commands and steps ----
+
+
+def random_case(rng: random.Random) -> Case:
+    """A, B of (18) zero or 1e-4 ... 1e3, forces of 1e-4 ... 1e4 m/s2 by thrust, load or both, motions of any sign."""
+
+    def size(low: float, high: float, zero: float = 0.0) -> float:
+        return 0.0 if rng.random() < zero else float(10.0 ** rng.uniform(low, high))
+
+    def signed(low: float, high: float, zero: float = 0.2) -> float:
+        return rng.choice((-1.0, 1.0)) * size(low, high, zero)
+
+    m, inertia = size(0, 2), size(-2, 1)
+    beta_u, beta_w, beta_r = (size(-1, 1) for _ in range(3))
+    u, w, r = ((effective * size(-4, 3, 0.15), effective * size(-4, 3, 0.15)) for effective in
+               (m / beta_u, m / beta_w, inertia / beta_r))  # fmt: skip
+    k = Coefficients(
+        m_rov=m, I_r=inertia, R=size(-2, 0), gamma=rng.uniform(0.0, pi / 2),
+        a_t_rear=signed(-2, 4), b_t_rear=signed(-2, 3), a_t_top=signed(-2, 4), b_t_top=signed(-2, 3),
+        a_d_u=u[0], b_d_u=u[1], a_d_w=w[0], b_d_w=w[1], a_d_r=r[0], b_d_r=r[1],
+        alpha_u=size(-1, 1), beta_u=beta_u, alpha_w=size(-1, 1), beta_w=beta_w, alpha_r=size(-1, 1), beta_r=beta_r,
+    )  # fmt: skip
+    both = rng.uniform(-1.1, 1.1)
+    commands = rng.choice([(0.0, 0.0), (both, both), (both, rng.uniform(-1.1, 1.1))])
+    loads = (m / beta_u * signed(-4, 4, 0.5), m / beta_w * signed(-4, 4, 0.5), inertia / beta_r * signed(-4, 4, 0.5))
+    inputs = Inputs(*commands, rng.uniform(-1.1, 1.1), *loads, signed(-2, 1), signed(-2, 1))
+    state = State(*(signed(-2, 2) for _ in VELOCITIES), *(signed(-1, 3) for _ in range(4)))
+    return k, inputs, state, size(-5, 3)
+
+
+def worst(found: State, expected: Mapping[str, Any], scales: Mapping[str, Any], before: State) -> tuple[float, float]:
+    """Largest error of the velocities and of the pose, beyond the rounding of a pose that is far from zero."""
+    relative = {}
+    for name in STATES:
+        error = abs(getattr(found, name) - expected[name])
+        if name not in VELOCITIES:
+            error = max(0.0, error - 2.0 * ROUNDING * abs(getattr(before, name)))
+        relative[name] = float(error / scales[name]) if scales[name] else float(error)
+    return max(relative[name] for name in VELOCITIES), max(relative[name] for name in POSE)
+
+
+def path(axis: Axis, v: float, h: float) -> float:
+    """There and back."""
+    forth = axis.distance(v, rest) if (rest := axis.turning_time(v)) < h else 0.0
+    return abs(forth) + abs(axis.distance(v, h) - forth)
+
+
+@pytest.mark.parametrize(("seed", "cases"), [(1, 1000), pytest.param(2, 20_000, marks=pytest.mark.long)])
+def test_the_fmu_steps_as_the_python_model_does(fmu: Fmu, seed: int, cases: int) -> None:
+    """Over 20,000 cases the velocities are equal and poses differ by 1e-16: the libraries' exp, sin and the like."""
+    rng = random.Random(seed)
+    for _ in range(cases):
+        k, i, before, h = case = random_case(rng)
+        expected = dynamics.step(*case)
+        surge, heave, yaw = dynamics.axes(k, i)
+        way = path(surge, before.u, h) + hypot(i.V_N, i.V_E) * h
+        scales = {v: max(abs(getattr(before, v)), abs(getattr(expected, v))) for v in VELOCITIES}
+        scales |= {"x": way, "y": way, "z": path(heave, before.w, h), "psi": path(yaw, before.r, h)}
+        assert max(worst(run(fmu, *case), asdict(expected), scales, before)) <= 1e-14, case
+
+
+@pytest.mark.parametrize(("seed", "cases"), [(3, 50), pytest.param(4, 400, marks=pytest.mark.long)])
+def test_a_step_is_exact_over_random_vehicles_and_motions(fmu: Fmu, seed: int, cases: int) -> None:
+    """What is left is that of the forces, where load and thrust or the terms of (9) nearly cancel."""
+    rng = random.Random(seed)
+    for _ in range(cases):
+        case = random_case(rng)
+        exact = reference.step(*case)
+        velocity, pose = worst(run(fmu, *case), exact.state, exact.scale, case[2])
+        assert velocity <= 1e-12, case
+        assert pose <= 1e-12, case
+
+
+def test_extreme_vehicles_are_exact(fmu: Fmu, vehicle: Vehicle) -> None:
+    """A gram of mass and as much drag as a vehicle file may hold: up to 1e12/m and 1e12/s."""
+    light = replace(vehicle.coefficients, m_rov=1e-3, beta_w=1e3)
+    drags, loads = (0.0, 1.0, 1e6), (-1e12, -1.0, 0.0, 1e9)
+    for a_d, b_d, Z_ext, w, h in product(drags, drags, loads, (0.0, 1.0, 1e6), (1e-5, 1.0, 1e3)):
+        k, i = replace(light, a_d_w=a_d, b_d_w=b_d), Inputs(Z_ext=Z_ext)
+        found, heave = run(fmu, k, i, State(w=w), h), dynamics.axes(k, i)[1]
+        exact = reference.axis(heave.A, heave.B, heave.C, w, h)
+        assert abs(found.w - exact.velocity) <= 2e-15 * exact.scale, (heave, w, h)
+        assert abs(found.z - exact.distance) <= 4e-15 * exact.path, (heave, w, h)
+
+
+# Axes of surge and yaw, u, r. Surge turns about, where its third derivative jumps, while the vehicle turns so fast
+# that the shortcut for fast turns starts and ends there; rounding may leave the stop on either side of it.
+REVERSALS = [
+    *((Axis(1.0, 0.0, 0.01), Axis(0.0, 1.0, r), -0.01, r) for r in (20.0, 50.0, 70.0, 100.0, 150.0, 300.0)),
+    (Axis(0.144, 1e-4, 0.39), Axis(0.104, 0.0, -9173.0), -2.16, -0.87),
+    (Axis(0.122, 0.15, 0.11), Axis(0.085, 0.074, 7886.0), -1.07, 80.9),
+    (Axis(1.35, 0.3, 0.11), Axis(0.0079, 0.9, 2407.0), -5.84, 10.7),
+    (Axis(4.16, 0.09, 0.425), Axis(8.7e-4, 1.3, 9785.0), -1.11, 6.9),
+]
+
+
+@pytest.mark.parametrize("after", [0.9, 1.0, 1.3, 2.5])
+@pytest.mark.parametrize(("surge", "yaw", "u", "r"), REVERSALS)
+def test_turning_about_while_spinning_is_exact(
+    fmu: Fmu, surge: Axis, yaw: Axis, u: float, r: float, after: float
+) -> None:
+    ones = Coefficients(*[1.0] * len(fields(Coefficients)))
+    k = replace(ones, a_d_u=surge.A, b_d_u=surge.B, a_d_r=yaw.A, b_d_r=yaw.B)
+    i, before, h = Inputs(X_ext=surge.C, N_ext=yaw.C), State(u=u, r=r), after * surge.turning_time(u)
+    exact = reference.step(k, i, before, h)
+    for found in (run(fmu, k, i, before, h), dynamics.step(k, i, before, h)):
+        assert max(worst(found, exact.state, exact.scale, before)) <= 1e-14
+
+
+# ---- The VideoRay, against an integration of the equations as the paper prints them ----
+
+AHEAD = Inputs(u_l=0.5, u_r=0.5)
+MANOEUVRES = {
+    "ahead": (AHEAD, State()),
+    "astern": (Inputs(u_l=-0.7, u_r=-0.7), State()),
+    "reversing": (Inputs(u_l=-0.5, u_r=-0.5), State(u=1.2)),
+    "turning": (Inputs(u_l=0.6, u_r=0.3), State(psi=1.0)),
+    "turning back": (Inputs(u_l=0.3, u_r=0.6), State(u=0.8, r=1.5)),
+    "spinning": (Inputs(u_l=0.7, u_r=-0.7), State(u=0.5)),
+    "diving": (Inputs(u_t=0.7), State(w=-0.3, z=5.0)),
+    "against loads": (Inputs(0.4, 0.2, -0.3, -3.0, 1.5, 0.1), State(u=0.5, w=0.2, r=-1.0)),
+    "in a current": (replace(AHEAD, u_r=0.45, V_N=0.3, V_E=-0.8), State(x=10.0, y=-20.0, psi=-2.0)),
+    "coasting": (Inputs(), State(u=1.5, w=-0.4, r=3.0)),
+}
+
+
+def integrated(k: Coefficients, i: Inputs, s: State, h: float) -> State:
+    """(18), (2), (4) and the kinematics by DOP853."""
+    F_l, F_r = ((k.a_t_rear * abs(c) * c + k.b_t_rear * c) / 2.0 for c in (i.u_l, i.u_r))  # half of (9) each
+    F_t = k.a_t_top * abs(i.u_t) * i.u_t + k.b_t_top * i.u_t
+    torque = F_l * k.R * sin(k.gamma) + F_r * k.R * sin(-k.gamma)
+
+    def rates(_t: float, state: Any) -> list[float]:
+        u, w, r, _x, _y, _z, psi = state
+        return [
+            k.beta_u * (k.alpha_u * (F_r + F_l) + i.X_ext - (k.a_d_u * u * abs(u) + k.b_d_u * u)) / k.m_rov,
+            k.beta_w * (k.alpha_w * F_t + i.Z_ext - (k.a_d_w * w * abs(w) + k.b_d_w * w)) / k.m_rov,
+            k.beta_r * (k.alpha_r * torque + i.N_ext - (k.a_d_r * r * abs(r) + k.b_d_r * r)) / k.I_r,
+            u * cos(psi) + i.V_N,
+            u * sin(psi) + i.V_E,
+            w,
+            r,
+        ]
+
+    solution = solve_ivp(rates, (0.0, h), astuple(s), method="DOP853", rtol=1e-12, atol=1e-12)
+    return State(*solution.y[:, -1])
+
+
+@pytest.mark.parametrize("h", [0.1, 1.0, 20.0])
+@pytest.mark.parametrize("manoeuvre", MANOEUVRES)
+def test_a_step_solves_the_equations_of_the_paper(fmu: Fmu, vehicle: Vehicle, manoeuvre: str, h: float) -> None:
+    inputs, before = MANOEUVRES[manoeuvre]
+    found, expected = (way(vehicle.coefficients, inputs, before, h) for way in (partial(run, fmu), integrated))
+    assert astuple(found) == pytest.approx(astuple(expected), rel=1e-10, abs=1e-10)
+
+
+@pytest.mark.parametrize("manoeuvre", MANOEUVRES)
+def test_one_step_of_ten_seconds_is_a_thousand_of_ten_milliseconds(fmu: Fmu, vehicle: Vehicle, manoeuvre: str) -> None:
+    inputs, before = MANOEUVRES[manoeuvre]
+    once = run(fmu, vehicle.coefficients, inputs, before, 10.0)
+    often = run(fmu, vehicle.coefficients, inputs, before, 10.0, steps=1000)
+    assert astuple(often)[:3] == pytest.approx(astuple(once)[:3], rel=1e-13, abs=1e-15)
+    assert astuple(often)[3:] == pytest.approx(astuple(once)[3:], rel=1e-12, abs=1e-12)
+
+
+# ---- Long steps and far headings ----
+
+
+@pytest.mark.parametrize("manoeuvre", MANOEUVRES)
+def test_a_step_of_a_thousand_seconds_is_exact_and_takes_no_time(fmu: Fmu, vehicle: Vehicle, manoeuvre: str) -> None:
+    inputs, before = MANOEUVRES[manoeuvre]
+    exact = reference.step(vehicle.coefficients, inputs, before, 1000.0)
+    started = perf_counter()
+    found = run(fmu, vehicle.coefficients, inputs, before, 1000.0)
+    assert perf_counter() - started < 0.1  # some 0.1 ms, most of them not the step's
+    assert max(worst(found, exact.state, exact.scale, before)) <= 1e-14
+
+
+@pytest.mark.parametrize("psi", [1e3, -1e6, 1e9])
+def test_a_heading_far_from_zero_is_as_good_as_one_near_it(fmu: Fmu, vehicle: Vehicle, psi: float) -> None:
+    inputs = Inputs(u_l=0.6, u_r=0.3)
+    near, far = (run(fmu, vehicle.coefficients, inputs, State(u=0.5, psi=start), 10.0) for start in (0.0, psi))
+    assert (far.u, far.r) == (near.u, near.r)
+    c, d = cos(psi), sin(psi)
+    assert (far.x, far.y) == pytest.approx((near.x * c - near.y * d, near.x * d + near.y * c), rel=1e-13, abs=1e-15)
+    assert far.psi == psi + near.psi
+
+
+@pytest.mark.parametrize("u_l", [0.6, -0.6])
+def test_port_and_starboard_are_mirror_images_to_the_last_bit(fmu: Fmu, vehicle: Vehicle, u_l: float) -> None:
+    starboard = run(fmu, vehicle.coefficients, Inputs(u_l=u_l, u_r=0.2), State(u=-0.1, r=0.7), 3.0)
+    port = run(fmu, vehicle.coefficients, Inputs(u_l=0.2, u_r=u_l), State(u=-0.1, r=-0.7), 3.0)
+    assert port == replace(starboard, y=-starboard.y, r=-starboard.r, psi=-starboard.psi)
+
+
+@pytest.mark.parametrize(("h", "steps"), [(1e6, 1), (1e6, 1000)])
+def test_a_steady_turn_stays_on_its_circle(fmu: Fmu, vehicle: Vehicle, h: float, steps: int) -> None:
+    inputs = Inputs(u_l=0.6, u_r=0.3)
+    start = run(fmu, vehicle.coefficients, inputs, State(), 100.0)
+    end = run(fmu, vehicle.coefficients, inputs, start, h, steps)
+    assert (end.u, end.r) == pytest.approx((start.u, start.r), rel=1e-15)
+    assert end.psi - start.psi == pytest.approx(start.r * h, rel=1e-13)
+    radius = start.u / start.r
+    centres = [(s.x - radius * sin(s.psi), s.y + radius * cos(s.psi)) for s in (start, end)]
+    assert centres[1] == pytest.approx(centres[0], abs=1e-9 * radius)  # psi of 1e6 rad has 1e-10 rad of rounding
