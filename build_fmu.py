@@ -14,7 +14,9 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from fmu_src.compile import PLATFORMS, BuildError, compile_all, host_platform
-from models.tables import DataFileError
+from fmu_src.interface import variables
+from fmu_src.osp import osp_path, write_osp_model_description
+from models.csvfile import DataFileError
 from models.vehicle import VIDEORAY, Vehicle, VehicleFileError, load_vehicle
 
 if TYPE_CHECKING:
@@ -30,8 +32,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if python and options.platform:
             raise BuildError("--platform: the PythonFMU flavour is the same for all platforms")
         output: Path = options.output or Path(f"{vehicle.identifier}{'-python' if python else ''}.fmu")
-        _check_output(output)
+        beside = osp_path(output, vehicle.identifier) if options.osp else None
+        for path in filter(None, (output, beside)):
+            _check_output(path)
         build(vehicle, output, None if python else _chosen_platforms(options.platform))
+        if beside:
+            write_osp_model_description(beside, variables(vehicle.coefficients))
+            Console().print(f"[bold]{beside}[/]", highlight=False)
     except (VehicleFileError, DataFileError) as error:
         return _say(str(error), 2)
     except BuildError as error:
@@ -135,6 +142,8 @@ def _parser() -> argparse.ArgumentParser:
                         help="compiled C (default), or pure Python with PythonFMU")  # fmt: skip
     parser.add_argument("--platform", action="append", choices=["host", *PLATFORMS], metavar="NAME",
                         help=f"host, {', '.join(PLATFORMS)}; may be repeated (default: all)")  # fmt: skip
+    parser.add_argument("--osp", action="store_true",
+                        help="also write <identifier>_OspModelDescription.xml beside it (OSP-IS 1.0.1)")  # fmt: skip
     return parser
 
 

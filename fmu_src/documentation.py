@@ -4,80 +4,33 @@
 """
 
 import argparse
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from decimal import ROUND_DOWN, Decimal
 from functools import partial
-from io import BytesIO
 from itertools import groupby
 from math import ceil, e, isfinite
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from lxml import etree
 from markupsafe import Markup
-from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from models.dynamics import COEFFICIENTS, Coefficients, Inputs, State, axes, step
+from models.figures import LIGHT, PALETTE, inline_svg, svg_file
+from models.pages import RAISED, pretty_unit
 from models.tables import EXPERIMENTS, Cell, Experiment, ResponseTable, load_tables, untuned
 from models.vehicle import VIDEORAY, Alternative, Vehicle, load_vehicle
 
 from . import icon
 from .interface import Variable
 
-# Role: colour on a light and on a dark page. In the page a plot refers to the role, so it follows the page.
-PALETTE = {
-    "page": ("#fcfdfe", "#11171d"),
-    "panel": ("#f1f5f9", "#1a222b"),
-    "ink": ("#1c2733", "#e3e9ee"),
-    "muted": ("#566572", "#a3b2bf"),
-    "rule": ("#d3dce3", "#33404c"),
-    "band": ("#e7f0f7", "#1d2c39"),
-    "grey": ("#84919c", "#8796a3"),
-    "teal": ("#12877b", "#4fd0c0"),
-    "blue": (icon.FORCE, "#6db3f2"),
-    "violet": ("#8444b8", "#c99af0"),
-    "orange": ("#c43e12", "#ff9468"),
-    "steel": (icon.DARK, "#4d6172"),
-    "metal": (icon.METAL, "#8497a6"),
-}
-_FONTS = "system-ui, sans-serif"
-_LIGHT = {role: light for role, (light, _) in PALETTE.items()}
 _STEPS = ("teal", "blue", "violet", "orange")
-_STYLE: Any = {
-    "svg.fonttype": "none",
-    "font.family": "DejaVu Sans",
-    "mathtext.fontset": "dejavusans",
-    "font.size": 9.5,
-    "axes.facecolor": "none",
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.8,
-    "axes.edgecolor": _LIGHT["muted"],
-    "axes.labelcolor": _LIGHT["muted"],
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.titlecolor": _LIGHT["ink"],
-    "grid.color": _LIGHT["rule"],
-    "grid.linewidth": 0.6,
-    "xtick.bottom": False,
-    "ytick.left": False,
-    "xtick.color": _LIGHT["muted"],
-    "ytick.color": _LIGHT["muted"],
-    "text.color": _LIGHT["ink"],
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "legend.handlelength": 1.8,
-}
 _PANEL, _FRAME = (3.7, 2.9), (3.7, 2.45)  # inches
 _SHOWN = sorted(EXPERIMENTS, key=lambda x: "uwr".index(x.velocity))
-_SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
+REPORT = "identification.html"
+"""Beside the page, where the vehicle file names a report."""
 _P = 1.0 - 1.0 / e  # of V_ss, reached after Tau (17)
 
 
@@ -103,6 +56,7 @@ def documentation_page(vehicle: Vehicle, variables: tuple[Variable, ...], *, nat
     return environment.get_template("index.html.j2").render(
         vehicle=vehicle,
         native=native,
+        report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
         groups=[list(group) for _, group in groupby(variables, lambda v: (v.causality, v.variability, v.initial))],
         coefficients=[(name, meta, getattr(vehicle.coefficients, name)) for name, meta in COEFFICIENTS.items()],
         alternatives=[_alternative(a) for a in vehicle.alternatives.values()],
@@ -140,7 +94,7 @@ def number(value: float | None) -> str:
     mantissa, _, exponent = (f"{value:g}" if abs(value) >= 1e5 else text).partition("e")
     if exponent:
         mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")
-        text = f"{mantissa}10{str(int(exponent)).translate(_SUPERSCRIPT)}"
+        text = f"{mantissa}10{str(int(exponent)).translate(RAISED)}"
     return text.replace("-", "−")
 
 
@@ -152,16 +106,6 @@ def fixed(value: float, digits: int) -> str:
 def percent(value: float | None) -> str:
     """A deviation, signed."""
     return "" if value is None else f"{100.0 * value:+.1f} %".replace("-", "−").replace("inf", "∞")
-
-
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def pretty_unit(unit: str) -> str:
-    """A unit as one writes it: N.m.s2/rad2 is N·m·s²/rad²."""
-    if unit == "1":
-        return "1"
-    return re.sub(r"\d", lambda digit: digit[0].translate(_SUPERSCRIPT), unit).replace(".", "·")
 
 
 def _by_axis(tables: Iterable[ResponseTable]) -> dict[str, ResponseTable]:
@@ -251,17 +195,17 @@ def _reversing(values: Mapping[str, float]) -> list[tuple[str, float]]:
 def plot_steady(ax: Axes, vehicle: Vehicle, x: Experiment, table: ResponseTable | None) -> None:
     """V_ss over the command: both models, the measured points, and the range of the identification."""
     low, high = (100.0 * end for end in vehicle.command_range)
-    ax.axvspan(low, high, label="identified range", facecolor=_LIGHT["band"], edgecolor="none", zorder=0)
+    ax.axvspan(low, high, label="identified range", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     commands = range(0, 101, 2)
     for label, k, color, dashes in (
         ("non-linear, α = β = 1", untuned(vehicle.coefficients), "grey", "--"),
         ("scaled, tuned α and β", vehicle.coefficients, "blue", "-"),
     ):
         V_ss = [x.response(k, Decimal(c))[0] for c in commands]
-        ax.plot(commands, V_ss, dashes, label=label, color=_LIGHT[color], linewidth=1.8)
+        ax.plot(commands, V_ss, dashes, label=label, color=LIGHT[color], linewidth=1.8)
     if table and table.steady:
         points = [(float(c), float(V)) for c, V in table.steady.items()]
-        ax.plot(*zip(*points, strict=True), "o", label="measured", color=_LIGHT["orange"], markersize=5.0, zorder=5)
+        ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
     _scale(ax, 100, "command (%)")
     ax.set_title(rf"{x.axis.capitalize()}: $V_{{ss}}$ ({x.unit})", loc="left")
     ax.legend(loc="upper left")
@@ -276,7 +220,7 @@ def plot_steps(
     times += [float(T) for c in commands if c in rows and (T := rows[c].Tau.measured) is not None]
     end = ceil(3.3 * max((t for t in times if isfinite(t)), default=3.0))
     for role, c in zip(_STEPS, commands, strict=False):
-        color = _LIGHT[role]
+        color = LIGHT[role]
         axis = axes(k, x.inputs(c))["uwr".index(x.velocity)]
         t = [end * (n / 45) ** 1.5 for n in range(46)]  # closer where the curve bends
         v = [0.0, *(axis.velocity(0.0, moment) for moment in t[1:])]
@@ -302,7 +246,7 @@ def frame_from_above(ax: Axes) -> None:
     """The horizontal plane: x and y, surge and yaw, the rear thrusters."""
     _body_axes(ax, "$y$")
     icon.from_above(ax)
-    icon.arrow(ax, (20.5, -8.0), (20.5, 8.0), color=_LIGHT["ink"], bend=-0.25)
+    icon.arrow(ax, (20.5, -8.0), (20.5, 8.0), color=LIGHT["ink"], bend=-0.25)
     _label(ax, 22.5, 10.0, "$ψ, r$")
     for y, name in ((-10.6, "l"), (10.6, "r")):
         icon.arrow(ax, (-1.0, y), (9.0, y), width=2.2)
@@ -320,12 +264,12 @@ def frame_from_starboard(ax: Axes) -> None:
 def _body_axes(ax: Axes, down: str) -> None:
     icon.bare(ax, (-26.0, 36.0), (22.5, -18.5))
     for tip in ((28.0, 0.0), (3.5, 18.0)):
-        icon.arrow(ax, (3.5, 0.0), tip, color=_LIGHT["ink"])
+        icon.arrow(ax, (3.5, 0.0), tip, color=LIGHT["ink"])
     _label(ax, 32.5, 0.0, "$x, u$")
     _label(ax, 3.5, 20.5, down)
 
 
-def _label(ax: Axes, x: float, y: float, text: str, color: str = _LIGHT["ink"]) -> None:
+def _label(ax: Axes, x: float, y: float, text: str, color: str = LIGHT["ink"]) -> None:
     ax.text(x, y, text, color=color, ha="center", va="center", fontsize=11, zorder=10)
 
 
@@ -337,65 +281,11 @@ def steady_picture(vehicle: Vehicle) -> str:
         for ax, x in zip(figure.subplots(1, 3), _SHOWN, strict=True):
             plot_steady(ax, vehicle, x, measured.get(x.axis))
 
-    return _svg(draw, (3 * _PANEL[0], _PANEL[1]), salt="steady", background="white", margin=0.1) + "\n"
+    return svg_file(draw, (3 * _PANEL[0], _PANEL[1]), salt="steady") + "\n"
 
 
 def _plot(label: str, draw: Callable[[Axes], None], size: tuple[float, float] = _PANEL) -> Markup:
-    """A plot as part of the page: named for readers of screens, in the colours and the type of the page."""
-    svg = _svg(lambda figure: draw(figure.subplots()), size, salt=label, background="none", margin=0.02)
-    svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', rf'<svg \1 role="img" aria-label="{label}">', svg, count=1)
-    svg = svg.replace(f"font-family:{_FONTS};", "")
-    for role, color in _LIGHT.items():
-        svg = svg.replace(color, f"var(--{role})")
-    return Markup(svg)
-
-
-def _svg(
-    draw: Callable[[Figure], None], size: tuple[float, float], *, salt: str, background: str, margin: float
-) -> str:
-    """A figure as SVG, the same at every call and whatever the user's Matplotlib is set to."""
-    file = BytesIO()
-    margins = {f"figure.constrained_layout.{side}_pad": margin for side in "wh"}
-    with style.context(["default", _STYLE, {"svg.hashsalt": salt, **margins}]):
-        figure = Figure(figsize=size, layout="constrained", facecolor=background)
-        draw(figure)
-        figure.savefig(file, format="svg", metadata={"Date": None})
-    return _without_ballast(file.getvalue()).replace("'DejaVu Sans'", _FONTS)
-
-
-def _without_ballast(svg: bytes) -> str:
-    """The same picture without metadata, groups and ids that nothing refers to, and digits that no one sees."""
-    parser = etree.XMLParser(remove_comments=True, remove_blank_text=True)
-    root = etree.fromstring(svg, parser)
-    root.set("stroke-linejoin", "round")
-    used = set(re.findall(rb'(?:href="|url\()#(\w+)', svg))
-    for element in list(root.iter()):
-        if element.get("id", "").encode() not in used:
-            element.attrib.pop("id", None)
-        if element.get("transform", "").startswith("rotate(-0 "):
-            del element.attrib["transform"]
-        if link := element.attrib.pop(_XLINK, None):
-            element.set("href", link)
-        if "style" in element.attrib:
-            element.set("style", element.get("style").replace(": ", ":").replace("; ", ";"))
-        for name in ("d", "x", "y", "transform"):
-            if name in element.attrib:
-                element.set(name, _rounded(element.get(name)))
-    for element in reversed(list(root.iter(*(_SVG + tag for tag in ("g", "defs", "style", "metadata"))))):
-        parent = element.getparent()
-        if element.tag == f"{_SVG}g" and not element.attrib:
-            for child in list(element):
-                element.addprevious(child)
-        if not len(element) or element.tag == f"{_SVG}metadata":
-            parent.remove(element)
-    etree.cleanup_namespaces(root)
-    return str(etree.tostring(root, encoding="unicode"))
-
-
-def _rounded(text: str) -> str:
-    """Coordinates to a fiftieth of a point."""
-    text = re.sub(r"-?\d+\.\d+", lambda x: f"{float(x[0]):.2f}".rstrip("0").rstrip("."), text)
-    return " ".join(text.split())
+    return inline_svg(label, lambda figure: draw(figure.subplots()), size)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -15,7 +15,7 @@ from models.vehicle import Vehicle
 
 from .compile import C_SOURCES, UNITY_FILE, BuildError, fmi_headers
 from .description import NATIVE, PYTHON, model_description
-from .documentation import documentation_page
+from .documentation import REPORT, documentation_page
 from .icon import model_icon
 from .interface import Variable, interface_header, model_header, variables
 from .python_flavour import python_files, python_sources
@@ -100,7 +100,9 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
 
 
 def _common_files(vehicle: Vehicle, declared: tuple[Variable, ...], *, native: bool) -> dict[str, bytes]:
+    report = vehicle.provenance.report if vehicle.provenance else None
     return {
+        **({f"documentation/{REPORT}": report.read_bytes()} if report else {}),
         "model.png": model_icon(vehicle),
         "documentation/index.html": documentation_page(vehicle, declared, native=native).encode(),
         "documentation/licenses/license.txt": _LICENSE.read_bytes(),

@@ -1,19 +1,18 @@
-"""Command line: python -m models tables [VEHICLE.toml]."""
+"""Command line: python -m models tables | identify | tune | figures."""
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
-from decimal import Decimal
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from rich import box
-from rich.console import Console
-from rich.table import Table
+from .csvfile import DataFileError
+from .manoeuvres import MANOEUVRES
+from .vehicle import VIDEORAY, VehicleFileError, load_vehicle
 
-from .tables import Cell, DataFileError, ResponseTable, load_tables
-from .vehicle import VIDEORAY, Vehicle, VehicleFileError, load_vehicle
 
-_MIN_WIDTH = 100  # rich takes 80 columns in a pipe, and cuts digits off to fit a table into them
+class _OptionError(ValueError):
+    """Options that do not go together."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -21,8 +20,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         options.run(options)
-    except (VehicleFileError, DataFileError) as error:
+    except (VehicleFileError, DataFileError, _OptionError) as error:
         print(f"models: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"models: {error.filename}: {error.strerror}", file=sys.stderr)
         return 2
     return 0
 
@@ -30,74 +32,90 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m models", description="What is known of a vehicle.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
     tables = commands.add_parser("tables", help="Tables 6-8 of the paper: printed, computed, measured")
     tables.add_argument("vehicle", nargs="?", type=Path, default=VIDEORAY, metavar="VEHICLE.toml",
                         help="vehicle file (default: the VideoRay Pro 4)")  # fmt: skip
-    tables.set_defaults(run=_print_tables)
+    tables.set_defaults(run=_tables)
+
+    identify = commands.add_parser("identify", help="a folder of tank tests to a vehicle file")
+    identify.add_argument("folder", type=Path, metavar="FOLDER", help="rov.toml and thrust_, steady_, ... .csv")
+    identify.add_argument("-o", "--output", type=Path, metavar="VEHICLE.toml", help="vehicle file to write")
+    identify.add_argument("--report", type=Path, metavar="REPORT.html",
+                          help="report to write; build_fmu.py puts it into the FMU of the vehicle file")  # fmt: skip
+    identify.set_defaults(run=_identify)
+
+    tune = commands.add_parser("tune", help="alpha and beta for a wanted response")
+    tune.add_argument("vehicle", type=Path, metavar="VEHICLE.toml", help="vehicle file")
+    tune.add_argument("--axis", required=True, choices=list(MANOEUVRES))
+    tune.add_argument("--command", type=float, help="fraction of full thrust: 30 %% is 0.3")
+    tune.add_argument("--v-ss", type=float, help="wanted steady velocity at this command, m/s or rad/s")
+    tune.add_argument("--tau", type=float, help="wanted time constant at this command, s; without it beta stays")
+    tune.add_argument("--points", type=Path, metavar="POINTS.csv",
+                      help="many wanted points instead: command, velocity, time constant")  # fmt: skip
+    tune.add_argument("-o", "--output", type=Path, metavar="TUNED.toml", help="vehicle file to write")
+    tune.set_defaults(run=_tune)
+
+    figures = commands.add_parser("figures", help="the paper's figures, redrawn as far as it prints their data")
+    figures.add_argument("folder", type=Path, metavar="FOLDER", help="where to write paper_figures.svg")
+    figures.set_defaults(run=_figures)
     return parser
 
 
-def _print_tables(options: argparse.Namespace) -> None:
+def _tables(options: argparse.Namespace) -> None:
+    from .printing import print_tables
+    from .tables import load_tables
+
     vehicle = load_vehicle(options.vehicle)
-    tables = load_tables(vehicle)
-    console = Console(markup=False, highlight=False, emoji=False)
-    console.width = max(console.width, _MIN_WIDTH)
-    console.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
-    for table in tables:
-        console.print()
-        console.print(_side_by_side(vehicle, table))
-    console.print(
-        "\nnon-linear: every alpha and beta is 1; scaled: those of the vehicle file; computed in closed form.\n"
-        "dev.: the computed value against the printed one; under test, the scaled model against the test.\n"
-        "*: the printed value is not the computed one rounded to its digits. -: not printed, not measured."
-    )
+    print_tables(vehicle, load_tables(vehicle))
 
 
-def _side_by_side(vehicle: Vehicle, table: ResponseTable) -> Table:
-    tuning = (f"{name}_{table.velocity}" for name in ("alpha", "beta"))
-    values = ", ".join(f"{name} = {getattr(vehicle.coefficients, name):g}" for name in tuning)
-    result = Table(
-        title=f"Table {table.number}. {table.axis.capitalize()}, {values}",
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-    )
-    result.add_column("\ncommand", no_wrap=True)
-    for header in (
-        "non-linear\nprinted", "\ncomputed", "\ndev.",
-        "scaled\nprinted", "\ncomputed", "\ndev.",
-        "test\nmeasured", "\ndev.",
-    ):  # fmt: skip
-        result.add_column(header, justify="right", no_wrap=True)
-    for quantity, unit in (("V_ss", table.unit), ("Tau", "s")):
-        result.add_section()
-        result.add_row(f"{quantity} [{unit}]")
-        for row in table.rows:
-            scaled: Cell = getattr(row.scaled, quantity)
-            result.add_row(
-                f"{row.command} %",
-                *_model(getattr(row.non_linear, quantity)),
-                *_model(scaled),
-                _text(scaled.measured),
-                _percent(scaled.from_measured),
-            )
-    return result
+def _identify(options: argparse.Namespace) -> None:
+    from .experiments import load_experiments
+    from .identification import identify
+    from .printing_results import print_identification
+    from .writer import write_vehicle
+
+    identification = identify(load_experiments(options.folder))
+    vehicle = identification.vehicle
+    if options.report:
+        from .report import write_report
+
+        write_report(identification, options.report)
+        assert vehicle.provenance
+        vehicle = replace(vehicle, provenance=replace(vehicle.provenance, report=options.report))
+    if options.output:
+        write_vehicle(vehicle, options.output)
+    print_identification(identification)
 
 
-def _model(cell: Cell) -> Iterator[str]:
-    """Printed, computed, deviation."""
-    yield _text(cell.printed)
-    yield f"{cell.computed:.4f}"
-    yield _percent(cell.from_printed) + (" " if cell.rounds_to_printed else "*")
+def _tune(options: argparse.Namespace) -> None:
+    from .printing_results import print_tuning
+    from .tuning import TuningError, read_points, tune, tune_over
+    from .writer import write_tuned
+
+    single = (options.command, options.v_ss)
+    if options.points is None and None in single:
+        raise _OptionError("tune: give --command and --v-ss (and --tau), or --points")
+    if options.points is not None and (*single, options.tau) != (None, None, None):
+        raise _OptionError("tune: --points stands instead of --command, --v-ss and --tau")
+    vehicle, manoeuvre = load_vehicle(options.vehicle), MANOEUVRES[options.axis]
+    try:
+        if options.points is None:
+            tuning = tune(vehicle.coefficients, manoeuvre, *single, options.tau)
+        else:
+            tuning = tune_over(vehicle.coefficients, manoeuvre, read_points(options.points, manoeuvre))
+    except TuningError as error:
+        raise _OptionError(f"tune: {error}") from error
+    if options.output:
+        write_tuned(options.vehicle, options.output, tuning)
+    print_tuning(tuning)
 
 
-def _text(value: Decimal | None) -> str:
-    return "-" if value is None else str(value)
+def _figures(options: argparse.Namespace) -> None:
+    from .paper_figures import write_figures
 
-
-def _percent(ratio: float | None) -> str:
-    return "-" if ratio is None else f"{ratio:+.1%}"
+    print(write_figures(options.folder))
 
 
 if __name__ == "__main__":

@@ -4,28 +4,21 @@ The printed numbers are the CSV files of the vehicle's data folder; the computed
 closed form. Where the two differ, that is shown as it is.
 """
 
-import csv
-import io
-import re
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import zip_longest
-from math import isfinite
 from pathlib import Path
 
-from .dynamics import COEFFICIENTS, Coefficients, Inputs, axes
+from .csvfile import DataFileError, csv_lines, number
+from .dynamics import COEFFICIENTS, Coefficients, Inputs
+from .manoeuvres import HEAVE, SURGE, YAW, Manoeuvre
 from .vehicle import Vehicle
 
 Cells = tuple[Decimal | None, ...]
 
 COMMAND = "command [%]"
 _SOURCES = ("non-linear", "scaled", "experiment")
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
-
-
-class DataFileError(ValueError):
-    """A table that cannot be used: one line with file, line, column and reason."""
 
 
 @dataclass(frozen=True)
@@ -78,15 +71,9 @@ class ResponseRow:
 class Experiment:
     """How the responses of one axis were recorded."""
 
+    manoeuvre: Manoeuvre
     number: int
     """Of the table of responses."""
-    axis: str
-    velocity: str
-    """Symbol: u, w or r. The tuning of the axis is alpha_<velocity> and beta_<velocity>."""
-    unit: str
-    """Of the velocity."""
-    signs: Mapping[str, float]
-    """Of the thruster commands that the test holds."""
     steady_number: int
     """Of the table of measured steady velocities."""
     steady_columns: tuple[str, ...]
@@ -94,14 +81,33 @@ class Experiment:
     direction: str
     """The one that the responses belong to."""
 
+    @property
+    def axis(self) -> str:
+        """surge, heave or yaw."""
+        return self.manoeuvre.axis
+
+    @property
+    def velocity(self) -> str:
+        """Symbol: u, w or r. The tuning of the axis is alpha_<velocity> and beta_<velocity>."""
+        return self.manoeuvre.velocity
+
+    @property
+    def unit(self) -> str:
+        """Of the velocity."""
+        return self.manoeuvre.unit
+
+    @property
+    def signs(self) -> Mapping[str, float]:
+        """Of the thruster commands that the test holds."""
+        return self.manoeuvre.signs
+
     def inputs(self, command: Decimal) -> Inputs:
         """The inputs that hold a command given in %."""
-        return Inputs(**{name: sign * float(command) / 100.0 for name, sign in self.signs.items()})
+        return self.manoeuvre.inputs(float(command) / 100.0)
 
     def response(self, coefficients: Coefficients, command: Decimal) -> tuple[float, float]:
         """V_ss and Tau (s) in closed form for a command given in %."""
-        axis = axes(coefficients, self.inputs(command))["uwr".index(self.velocity)]
-        return axis.steady_velocity(), axis.time_constant()
+        return self.manoeuvre.response(coefficients, float(command) / 100.0)
 
 
 @dataclass(frozen=True)
@@ -113,9 +119,9 @@ class ResponseTable(Experiment):
 
 
 EXPERIMENTS = (
-    Experiment(6, "heave", "w", "m/s", {"u_t": 1.0}, 3, ("upward", "downward"), "downward"),
-    Experiment(7, "yaw", "r", "rad/s", {"u_l": 1.0, "u_r": -1.0}, 5, ("yaw",), "yaw"),
-    Experiment(8, "surge", "u", "m/s", {"u_l": 1.0, "u_r": 1.0}, 4, ("forward",), "forward"),
+    Experiment(HEAVE, 6, 3, ("upward", "downward"), "downward"),
+    Experiment(YAW, 7, 5, ("yaw",), "yaw"),
+    Experiment(SURGE, 8, 4, ("forward",), "forward"),
 )
 
 
@@ -141,7 +147,7 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[Decimal, Cells]:
     """
     columns = [COMMAND, *columns]
     rows: dict[Decimal, Cells] = {}
-    lines = _lines(path)
+    lines = csv_lines(path)
     line, header = next(lines, (1, []))
     for place, (name, found) in enumerate(zip_longest(columns, header), 1):
         if name != found:
@@ -196,23 +202,6 @@ def _load_table(folder: Path, coefficients: Coefficients, experiment: Experiment
     return ResponseTable(**vars(e), rows=rows, steady=steady)
 
 
-def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Number and cells of every line that is not blank."""
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise DataFileError(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise DataFileError(f"{path}: not UTF-8 text, at byte {error.start}") from error
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        for cells in reader:
-            if any(map(str.strip, cells)):
-                yield reader.line_num, [cell.strip() for cell in cells]
-    except csv.Error as error:
-        raise DataFileError(f"{path}, line {reader.line_num}: {error}") from error
-
-
 def _cell(column: str | None, text: str | None, commands: Container[Decimal]) -> Decimal | None:
     """The value of one cell; `commands` are those of the rows above. Raises ValueError with the reason alone."""
     if column is None:
@@ -221,8 +210,7 @@ def _cell(column: str | None, text: str | None, commands: Container[Decimal]) ->
         raise ValueError("this cell is missing")
     if not text:
         return None
-    if not _NUMBER.fullmatch(text) or not isfinite(float(text)):
-        raise ValueError("must be a number")
+    number(text)
     value = Decimal(text)
     if column == COMMAND and not 0 < value <= 100:
         raise ValueError("must be above 0 and at most 100")

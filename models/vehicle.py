@@ -4,11 +4,20 @@ import os
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    create_model,
+    model_validator,
+)
 
 from .dynamics import COEFFICIENTS, Coefficients, Meta
 
@@ -33,6 +42,20 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class Provenance:
+    """What made a vehicle file, how, and from which files."""
+
+    tool: str
+    method: str
+    inputs: Mapping[str, str]
+    """SHA-256 of every input file, by its name."""
+    warnings: tuple[str, ...] = ()
+    """What the data do not determine, in words."""
+    report: Path | None = None
+    """The page on the identification."""
+
+
+@dataclass(frozen=True)
 class Vehicle:
     """An identified ROV."""
 
@@ -51,22 +74,34 @@ class Vehicle:
     """Coefficients published beside the ones used."""
     data: Path | None
     """The folder with the published tables."""
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """95 % confidence intervals of the coefficients that have one."""
+    provenance: Provenance | None = None
+
+
+class Strict(BaseModel):
+    """A table of a TOML file: no keys but these, no number in quotes."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+Checked = TypeVar("Checked", bound=Strict)
 
 
 def load_vehicle(path: Path) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError."""
-    document = _read_toml(path)
-    try:
-        checked = _File.model_validate(document)
-    except ValidationError as error:
-        raise VehicleFileError(f"{path}: {_first_problem(error)}") from error
+    checked = read_checked(path, _File)
     head, low, high = checked.vehicle, checked.validity.command_min, checked.validity.command_max
     if low >= high:
         raise VehicleFileError(f"{path}: validity.command_min = {low}: must be less than command_max = {high}")
     data = path.parent / head.data if head.data else None
     if data and not os.path.isdir(data):  # noqa: PTH112 (Path.is_dir raises on names that cannot be)
         raise VehicleFileError(f"{path}: vehicle.data = {_shown(head.data)}: there is no such folder beside the file")
-    quantities: dict[str, _Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
+    named = checked.provenance.report if checked.provenance else None
+    report = path.parent / named if named else None
+    if report and not os.path.isfile(report):  # noqa: PTH113 (as above)
+        raise VehicleFileError(f"{path}: provenance.report = {_shown(named)}: there is no such file beside this one")
+    quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
     return Vehicle(
         name=head.name,
         identifier=head.identifier,
@@ -78,7 +113,18 @@ def load_vehicle(path: Path) -> Vehicle:
         command_range=(low, high),
         alternatives={name: a.plain() for name, a in checked.alternatives.items()},
         data=data,
+        intervals={name: q.interval for name, q in quantities.items() if q.interval},
+        provenance=Provenance(**dict(checked.provenance) | {"report": report}) if checked.provenance else None,
     )
+
+
+def read_checked(path: Path, model: type[Checked]) -> Checked:
+    """Read a TOML file of the given form. Raises VehicleFileError."""
+    document = _read_toml(path)
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        raise VehicleFileError(f"{path}: {_first_problem(error)}") from error
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -92,17 +138,32 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise VehicleFileError(f"{path}: not TOML: {_on_one_line(str(error))}") from error
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
 _Text = Annotated[str, Field(min_length=1)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class _Quantity(_Strict):
+def pair(value: object) -> object:
+    """TOML knows lists, not tuples."""
+    return tuple(value) if isinstance(value, list) else value
+
+
+Interval = Annotated[tuple[Finite, Finite], BeforeValidator(pair)]
+"""[low, high] in a TOML file."""
+
+
+class Quantity(Strict):
+    """The value of a coefficient, and its 95 % confidence interval if it has one."""
+
     value: float
     unit: str
     source: _Text
+    interval: Interval | None = None
+
+    @model_validator(mode="after")
+    def _encloses(self) -> "Quantity":
+        if self.interval and not self.interval[0] <= self.value <= self.interval[1]:
+            raise ValueError("interval: must be [low, high] around the value")
+        return self
 
 
 def _quantity(name: str, meta: Meta) -> Any:
@@ -114,17 +175,17 @@ def _quantity(name: str, meta: Meta) -> Any:
         return value
 
     fields: dict[str, Any] = {
-        "value": (Annotated[float, Field(allow_inf_nan=False), AfterValidator(within)], ...),
+        "value": (Annotated[Finite, AfterValidator(within)], ...),
         "unit": (Literal[meta.unit], ...),
     }
-    return create_model(name, __base__=_Quantity, **fields)
+    return create_model(name, __base__=Quantity, **fields)
 
 
-_QUANTITIES = {name: _quantity(name, meta) for name, meta in COEFFICIENTS.items()}
-_REQUIRED: dict[str, Any] = {name: (q, ...) for name, q in _QUANTITIES.items()}
-_OPTIONAL: dict[str, Any] = {name: (q | None, None) for name, q in _QUANTITIES.items()}
-_Coefficients = create_model("_Coefficients", __base__=_Strict, **_REQUIRED)
-_Some = create_model("_Some", __base__=_Strict, **_OPTIONAL)
+QUANTITIES = {name: _quantity(name, meta) for name, meta in COEFFICIENTS.items()}
+_REQUIRED: dict[str, Any] = {name: (q, ...) for name, q in QUANTITIES.items()}
+_OPTIONAL: dict[str, Any] = {name: (q | None, None) for name, q in QUANTITIES.items()}
+_Coefficients = create_model("_Coefficients", __base__=Strict, **_REQUIRED)
+_Some = create_model("_Some", __base__=Strict, **_OPTIONAL)
 
 
 class _Alternative(_Some):  # type: ignore[misc, valid-type]
@@ -144,25 +205,41 @@ def _identifier(text: str) -> str:
 _Command = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-class _Head(_Strict):
+class Head(Strict):
+    """What a vehicle is called and where it comes from."""
+
     name: _Text
     identifier: Annotated[str, AfterValidator(_identifier)]
     version: _Text
     description: _Text
     source: _Text
+
+
+class _FileHead(Head):
     data: str | None = None
 
 
-class _Validity(_Strict):
+class Validity(Strict):
+    """Thruster commands over which the model holds."""
+
     command_min: _Command
     command_max: _Command
 
 
-class _File(_Strict):
-    vehicle: _Head
-    validity: _Validity
+class _Provenance(Strict):
+    tool: _Text
+    method: _Text
+    inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
+    warnings: Annotated[tuple[str, ...], BeforeValidator(pair)] = ()
+    report: _Text | None = None
+
+
+class _File(Strict):
+    vehicle: _FileHead
+    validity: Validity
     coefficients: _Coefficients  # type: ignore[valid-type]
     alternatives: dict[str, _Alternative] = {}
+    provenance: _Provenance | None = None
 
 
 def _first_problem(error: ValidationError) -> str:

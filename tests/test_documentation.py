@@ -9,9 +9,10 @@ import pytest
 from lxml import html
 
 from fmu_src import documentation
-from fmu_src.documentation import documentation_page, number, pretty_unit
+from fmu_src.documentation import documentation_page, number
 from fmu_src.icon import model_icon
 from fmu_src.interface import variables
+from models.pages import pretty_unit
 from models.tables import load_tables
 from models.vehicle import Vehicle
 

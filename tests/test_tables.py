@@ -18,7 +18,8 @@ import pytest
 from scipy.optimize import brentq
 
 from models.__main__ import main
-from models.tables import EXPERIMENTS, Cell, DataFileError, ResponseTable, load_tables
+from models.csvfile import DataFileError
+from models.tables import EXPERIMENTS, Cell, ResponseTable, load_tables
 from models.vehicle import VIDEORAY, Vehicle, load_vehicle
 
 DATA = VIDEORAY.with_suffix("")

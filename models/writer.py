@@ -1,0 +1,120 @@
+"""`Vehicle` to vehicle file (TOML), whole or not at all."""
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.items import InlineTable
+
+from .dynamics import COEFFICIENTS
+from .tuning import Tuning
+from .vehicle import Provenance, Vehicle, VehicleFileError, load_vehicle
+
+_DIGITS = 6  # significant ones: more than any tank test has, few enough to be the same on every machine
+
+
+def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
+    """The vehicle file, in a folder, of a vehicle without tables and alternatives."""
+    document = tomlkit.document()
+    if vehicle.provenance:
+        document.add(
+            tomlkit.comment("Made from tank tests: [provenance] tells how, and `interval` is 95 % confidence.")
+        )
+        document.add(tomlkit.nl())
+    head = tomlkit.table()
+    for key in ("name", "identifier", "version", "description", "source"):
+        head.add(key, getattr(vehicle, key))
+    document.add("vehicle", head)
+    validity = tomlkit.table()
+    for key, value in zip(("command_min", "command_max"), vehicle.command_range, strict=True):
+        validity.add(key, _rounded(value))
+    document.add("validity", validity)
+    coefficients = tomlkit.table()
+    for name in COEFFICIENTS:
+        coefficients.add(name, _quantity(vehicle, name))
+    document.add("coefficients", coefficients)
+    if vehicle.provenance:
+        document.add("provenance", _provenance(vehicle.provenance, folder))
+    return tomlkit.dumps(document)
+
+
+def write_vehicle(vehicle: Vehicle, path: Path) -> None:
+    """Write the vehicle file. Raises VehicleFileError where it could not be read again, OSError where not written."""
+    replace_text(path, vehicle_text(vehicle, path.parent))
+
+
+def write_tuned(source: Path, path: Path, tuning: Tuning) -> None:
+    """Write the vehicle file `source` with another α and β, all else in it as it is. Raises as write_vehicle."""
+    document: Any = tomlkit.parse(source.read_text(encoding="utf-8-sig"))
+    m = tuning.manoeuvre
+    wanted = ", ".join(f"{p.quantity} = {p.value:g} at {p.command:.0%}" for p in tuning.points[:2])
+    for name in (m.coefficient("alpha"), m.coefficient("beta")):
+        entry = document["coefficients"][name]
+        if (value := _rounded(getattr(tuning.coefficients, name))) == entry["value"]:
+            continue
+        entry["value"], entry["source"] = value, f"Tuned to {wanted}{', ...' if len(tuning.points) > 2 else ''}"
+        entry.pop("interval", None)
+    for table, key in (("vehicle", "data"), ("provenance", "report")):
+        if key in document.get(table, {}):
+            document[table][key] = _seen_from(path.parent, source.parent / document[table][key])
+    replace_text(path, tomlkit.dumps(document))
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Put the text of a vehicle file in place of whatever was there, once it has proved to be one."""
+    if not path.parent.is_dir() or path.is_dir():
+        reason = "this is a folder" if path.is_dir() else f"there is no folder {path.parent}"
+        raise VehicleFileError(f"{path}: {reason}")
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    temporary = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        try:
+            load_vehicle(temporary)
+        except VehicleFileError as error:
+            raise VehicleFileError(str(error).replace(str(temporary), str(path))) from error
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)  # as if it had been opened like any file
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
+    value, interval = _rounded(getattr(vehicle.coefficients, name)), vehicle.intervals.get(name)
+    entry = tomlkit.inline_table()
+    entry.append("value", value)
+    entry.append("unit", COEFFICIENTS[name].unit)
+    if interval:
+        entry.append("interval", [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)])
+    entry.append("source", vehicle.sources[name])
+    return entry
+
+
+def _provenance(provenance: Provenance, folder: Path) -> Any:
+    table = tomlkit.table()
+    table.add("tool", provenance.tool)
+    table.add("method", provenance.method)
+    if provenance.report:
+        table.add("report", _seen_from(folder, provenance.report))
+    if provenance.warnings:
+        warnings = tomlkit.array().multiline(True)
+        warnings.extend(provenance.warnings)
+        table.add("warnings", warnings)
+    inputs = tomlkit.table()
+    for name, digest in provenance.inputs.items():
+        inputs.add(name, digest)
+    table.add("inputs", inputs)
+    return table
+
+
+def _seen_from(folder: Path, path: Path) -> str:
+    return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
