@@ -1,0 +1,1 @@
+"""The VideoRay under depth hold and heading hold, in three co-simulation engines."""

@@ -1,0 +1,124 @@
+"""The importers: how each is called, what it is to agree to, and how to tell that it is installed."""
+
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).parent
+RUNNERS = HERE / "runners"
+
+EXACT = 1e-9
+"""Tolerance where the FMU itself takes the steps."""
+SOLVER = 1e-5
+"""Tolerance of a solver with error control, in Model Exchange."""
+EULER = 1e-3
+"""Tolerance of forward Euler with steps of 0.1 ms."""
+
+
+@dataclass(frozen=True)
+class Importer:
+    """One row of the matrix."""
+
+    name: str
+    """On the command line."""
+    title: str
+    interface: str
+    kit: str
+    """What installs it: python, java or rust."""
+    pin: tuple[str, str]
+    """The file that pins the version, and the package."""
+    proof: str
+    """A file among the tools that exists where this version is installed."""
+    command: tuple[str, ...]
+    """Run in a folder with videoray.fmu and the manoeuvre."""
+    tolerance: float | None = EXACT
+    """Of any output at any communication point, in SI units; None: it checks the FMU and runs nothing."""
+    programs: tuple[str, ...] = ()
+    """From the system, beside what its kit takes."""
+
+    @property
+    def version(self) -> str:
+        """The version that is pinned."""
+        return pinned(*self.pin)
+
+    def is_installed(self, tools: Path) -> bool:
+        """Whether this version is among the tools."""
+        return any(tools.glob(self.proof.format(version=self.version)))
+
+    def command_line(self, tools: Path) -> list[str]:
+        """The command with all paths filled in."""
+        paths = {"tools": tools, "runners": RUNNERS, "python": sys.executable}
+        return [part.format(version=self.version, **paths) for part in self.command]
+
+
+def pinned(file: str, package: str) -> str:
+    """The version of a package in a requirements.txt, pom.xml or Cargo.toml."""
+    pattern = rf"^\W*(?:artifactId>)?{re.escape(package)}(?:==|</artifactId>\s*<version>|\s*=\s*\"=)([\w.]+)"
+    match = re.search(pattern, (HERE / file).read_text(), re.MULTILINE)
+    if match is None:
+        raise LookupError(f"{file} does not pin {package}")
+    return match[1]
+
+
+def _python(name: str, title: str, interface: str, package: str, tolerance: float | None = EXACT,
+            command: tuple[str, ...] = (), programs: tuple[str, ...] = ()) -> Importer:  # fmt: skip
+    proof = f"python/lib/python3*/site-packages/{package.replace('-', '_')}-{{version}}.dist-info"
+    command = command or ("{tools}/python/bin/python", "-m", f"interop.runners.{name.replace('-', '_')}")
+    pin = "requirements.txt", package
+    return Importer(name, title, interface, "python", pin, proof, command, tolerance, programs)
+
+
+def _java(name: str, title: str, interface: str, package: str, proof: str, command: tuple[str, ...],
+          tolerance: float | None = EXACT) -> Importer:  # fmt: skip
+    pin = f"runners/{name}/pom.xml", package
+    return Importer(name, title, interface, "java", pin, f"java/{name}/{proof}", command, tolerance)
+
+
+def _source(name: str, *options: str) -> tuple[str, ...]:
+    return ("java", *options, "-cp", f"{{tools}}/java/{name}/*", f"{{runners}}/{name}/Fly.java")
+
+
+_CARGO = "runners/fmu_runner/Cargo.toml"
+_FMI_SIM = "rust/fmi-sim-{version}/bin/fmi-sim"
+
+IMPORTERS = (
+    _python("fmpy-cs", "FMPy", "CS, state restored", "fmpy"),
+    _python("fmpy-me", "FMPy", "ME, CVode", "fmpy", SOLVER),
+    _python("fmpy-compile", "FMPy", "CS, built by fmpy compile", "fmpy", programs=("cc", "c++", "make")),
+    _python("libcosim-cs", "libcosim", "CS", "libcosimpy"),
+    _python("libcosim-ssp", "libcosim", "CS, SSP", "libcosimpy"),
+    _python("libcosim-osp", "libcosim", "CS, OSP", "libcosimpy"),
+    _python("ecos-cs", "Ecos", "CS", "ecospy"),
+    _python("ecos-ssp", "Ecos", "CS, SSP", "ecospy"),
+    _python("casadi-me", "CasADi", "ME, DaeBuilder, CVODES", "casadi", SOLVER),
+    _python("pathsim-cs", "PathSim", "CS", "pathsim-fmi"),
+    _python("pathsim-me", "PathSim", "ME, RKDP87", "pathsim-fmi", SOLVER),
+    _python("fmucontainer", "fmutool", "CS, container of two ROVs", "fmu-manipulation-toolbox"),
+    _python("fmutool", "fmutool", "-check: schema, rules", "fmu-manipulation-toolbox", None,
+            ("sh", "{runners}/fmutool.sh")),
+    _java("fmi4j", "FMI4j", "CS", "fmi-import", "fmi-import-{version}.jar", _source("fmi4j")),
+    _java("javafmi", "JavaFMI", "CS, state restored", "fmu-wrapper", "fmu-wrapper-{version}.jar",
+          _source("javafmi", "--add-opens", "java.prefs/java.util.prefs=ALL-UNNAMED")),
+    _java("maestro", "Maestro", "CS, MaBL, state restored", "maestro", "maestro-{version}-jar-with-dependencies.jar",
+          ("{python}", "-m", "interop.runners.maestro.fly",
+           "{tools}/java/maestro/maestro-{version}-jar-with-dependencies.jar")),
+    _java("vdmcheck", "VDMCheck", "static rules", "vdmcheck2", "vdmcheck-{version}/VDMCheck2.sh",
+          ("sh", "{runners}/vdmcheck/check.sh", "{tools}/java/vdmcheck/vdmcheck-{version}"), None),
+    Importer("fmi-sim-cs", "fmi-sim", "CS", "rust", (_CARGO, "fmi-sim"), _FMI_SIM,
+             ("sh", "{runners}/fmi_sim.sh", "cs")),
+    Importer("fmi-sim-me", "fmi-sim", "ME, forward Euler", "rust", (_CARGO, "fmi-sim"), _FMI_SIM,
+             ("sh", "{runners}/fmi_sim.sh", "me"), EULER),
+    Importer("fmu-runner", "fmu-runner", "CS, state restored", "rust", (_CARGO, "fmu-runner"),
+             "rust/fmu-runner-{version}/debug/fly", ("{tools}/rust/fmu-runner-{version}/debug/fly",)),
+)  # fmt: skip
+
+KITS = tuple(dict.fromkeys(importer.kit for importer in IMPORTERS))
+
+
+def chosen(names: list[str]) -> list[Importer]:
+    """The importers of these names or kits; all without names. Raises LookupError."""
+    known = {*KITS, *(importer.name for importer in IMPORTERS)}
+    if unknown := [name for name in names if name not in known]:
+        raise LookupError(f"{unknown[0]}: no such importer; there are {', '.join(sorted(known))}")
+    return [i for i in IMPORTERS if not names or i.name in names or i.kit in names]

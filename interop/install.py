@@ -1,0 +1,91 @@
+"""Install the importers: Python ones into an environment of their own, Java and Rust ones beside it."""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from .importers import HERE, IMPORTERS, RUNNERS, Importer
+from .run import without_places
+
+# What each kit takes from the system, and the Debian packages that have it.
+PROGRAMS: dict[str, tuple[tuple[str, ...], str]] = {
+    "python": ((), "python3-venv"),
+    "java": (("java", "javac", "mvn"), "openjdk-17-jdk-headless maven"),
+    "rust": (("cargo",), "cargo libclang-dev"),
+}
+MAVEN = "org.apache.maven.plugins:maven-dependency-plugin:3.8.1"
+ATTEMPTS = 3
+
+
+class InstallError(Exception):
+    """A kit that cannot be installed, with what the tool said."""
+
+
+def install(kit: str, tools: Path, say: Callable[[str], None]) -> None:
+    """Install what is missing of a kit. Raises InstallError."""
+    programs, packages = PROGRAMS[kit]
+    try:
+        _install(kit, programs, tools, say)
+    except InstallError as error:
+        raise InstallError(f"{kit}: {error}\nDebian has what it takes: apt-get install {packages}") from error
+
+
+def _install(kit: str, programs: tuple[str, ...], tools: Path, say: Callable[[str], None]) -> None:
+    if missing := [name for name in programs if shutil.which(name) is None]:
+        raise InstallError(f"there is no {missing[0]}")
+    wanted = {i.pin: i for i in IMPORTERS if i.kit == kit and not i.is_installed(tools)}
+    if not wanted:
+        say(f"{kit}: all is there")
+    elif kit == "python":
+        say(f"{kit}: requirements.txt")
+        _install_python(tools)
+    else:
+        for importer in wanted.values():
+            say(f"{kit}: {importer.title} {importer.version}")
+            (_install_java if kit == "java" else _install_rust)(importer, tools)
+    if absent := [i.title for i in wanted.values() if not i.is_installed(tools)]:
+        raise InstallError(f"{absent[0]} was installed, but is not where it is looked for")
+
+
+def _install_python(tools: Path) -> None:
+    environment = tools / "python"
+    _call([sys.executable, "-m", "venv", "--clear", str(environment)], tools)
+    pip = [str(environment / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    _call([*pip, "-r", str(HERE / "requirements.txt")], tools)
+
+
+def _install_java(importer: Importer, tools: Path) -> None:
+    goal = "unpack-dependencies" if importer.name == "vdmcheck" else "copy-dependencies"
+    project = RUNNERS / importer.name / "pom.xml"
+    folder = tools / "java" / importer.name
+    places = [f"-DoutputDirectory={folder}", f"-DmarkersDirectory={folder}"]
+    _call(["mvn", "-q", "-B", "-f", str(project), f"{MAVEN}:{goal}", *places], tools)
+
+
+def _install_rust(importer: Importer, tools: Path) -> None:
+    package = importer.pin[1]
+    folder = tools / "rust" / f"{package}-{importer.version}"
+    # Not optimized: that takes longer than it saves.
+    options = ["--quiet", "--config", "profile.dev.debug=false"]
+    if package == "fmi-sim":  # the lock file of the crate pins all that it is built of
+        program = f"{package}@{importer.version}"
+        _call(["cargo", "install", *options, "--debug", "--locked", program, "--root", str(folder)], tools)
+        return
+    with tempfile.TemporaryDirectory() as name:  # Cargo.lock names the registry: it stays out of the sources
+        project = shutil.copytree(RUNNERS / "fmu_runner", Path(name) / "fmu_runner") / "Cargo.toml"
+        _call(["cargo", "build", *options, "--manifest-path", str(project), "--target-dir", str(folder)], tools)
+
+
+def _call(command: list[str], tools: Path) -> None:
+    for attempt in range(1, ATTEMPTS + 1):
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+        if done.returncode == 0:
+            return
+        if attempt < ATTEMPTS:  # registries fail now and then
+            time.sleep(5.0 * attempt)
+    said = without_places(done.stdout.decode(errors="replace"), Path(tempfile.gettempdir()), tools)
+    raise InstallError("\n".join([f"{Path(command[0]).name} failed", *said.strip().splitlines()[-15:]]))
