@@ -15,8 +15,9 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from fmu_src.compile import PLATFORMS, BuildError, compile_all, host_platform
 from fmu_src.interface import variables
-from fmu_src.osp import osp_path, write_osp_model_description
+from fmu_src.osp import osp_model_description, osp_path
 from models.csvfile import DataFileError
+from models.files import write_whole
 from models.vehicle import VIDEORAY, Vehicle, VehicleFileError, load_vehicle
 
 if TYPE_CHECKING:
@@ -37,14 +38,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _check_output(path)
         build(vehicle, output, None if python else _chosen_platforms(options.platform))
         if beside:
-            write_osp_model_description(beside, variables(vehicle.coefficients))
+            write_whole(beside, osp_model_description(variables(vehicle.coefficients)))
             Console().print(f"[bold]{beside}[/]", highlight=False)
     except (VehicleFileError, DataFileError) as error:
         return _say(str(error), 2)
     except BuildError as error:
         return _say(str(error), 1)
     except OSError as error:
-        return _say(f"{error.filename or 'a temporary file'}: {error.strerror or error}", 1)
+        return _say(f"{error.filename or 'a temporary file'}: cannot be written: {error.strerror or error}", 1)
     except KeyboardInterrupt:
         return _say("interrupted, nothing written", 130)
     return 0
@@ -55,7 +56,7 @@ def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None, conso
 
     Platforms None is the flavour in pure Python.
     """
-    from fmu_src.package import native_content, python_content, write_fmu
+    from fmu_src.package import archive, native_content, python_content
 
     started = time.perf_counter()
     console = console or Console()
@@ -63,7 +64,7 @@ def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None, conso
     binaries, seconds = _compile(content, platforms or [], console)
     notes: list[str] = []
     files = {_binary(name, content.identifier): library for name, library in binaries.items()}
-    write_fmu(output, {**content.files, **files}, lambda draft: notes.append(_check_fmu(draft, platforms)))
+    write_whole(output, archive({**content.files, **files}), lambda draft: notes.append(_check_fmu(draft, platforms)))
     console.print(f"[bold]{output}[/]  {output.stat().st_size / 1000:.0f} kB  {content.guid}", highlight=False)
     for name in platforms or []:
         size = len(binaries[name]) / 1000

@@ -12,14 +12,13 @@ from itertools import groupby
 from math import ceil, e, isfinite
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from models.dynamics import COEFFICIENTS, Coefficients, Inputs, State, axes, step
 from models.figures import LIGHT, PALETTE, inline_svg, svg_file
-from models.pages import RAISED, pretty_unit
+from models.pages import RAISED, environment, pretty_unit
 from models.tables import EXPERIMENTS, Cell, Experiment, ResponseTable, load_tables, untuned
 from models.vehicle import VIDEORAY, Alternative, Vehicle, load_vehicle
 
@@ -45,15 +44,8 @@ def documentation_page(vehicle: Vehicle, variables: tuple[Variable, ...], *, nat
     tables = load_tables(vehicle) if vehicle.data else ()
     measured = _by_axis(tables)
     commands = _commands(vehicle, tables)
-    environment = Environment(
-        loader=PackageLoader(__package__),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": number, "unit": pretty_unit, "percent": percent, "fixed": fixed}
-    return environment.get_template("index.html.j2").render(
+    templates = environment("fmu_src", number=number, unit=pretty_unit, percent=percent, fixed=fixed)
+    return templates.get_template("index.html.j2").render(
         vehicle=vehicle,
         native=native,
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,

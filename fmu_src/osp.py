@@ -3,15 +3,11 @@
 libcosim and the OSP tools look for it beside the FMU. The variables stay what modelDescription.xml says they are.
 """
 
-import os
-import tempfile
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 
 from lxml import etree
 
-from .compile import BuildError
 from .interface import Variable
 
 _NAMESPACE = "https://open-simulation-platform.com/OspModelDescription/1.0.1"
@@ -70,21 +66,3 @@ def _unit(names: Mapping[str, str | None], by_name: Mapping[str, Variable]) -> s
 def osp_path(fmu: Path, identifier: str) -> Path:
     """Where the tools look for the description of an FMU."""
     return fmu.with_name(f"{identifier}_OspModelDescription.xml")
-
-
-def write_osp_model_description(path: Path, variables: tuple[Variable, ...]) -> None:
-    """Write the document to path, whole or not at all. Raises BuildError where path cannot be written."""
-    draft: Path | None = None
-    try:
-        descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-        draft = Path(name)
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(osp_model_description(variables))
-        draft.chmod(0o644)
-        draft.replace(path)
-    except OSError as error:
-        raise BuildError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        if draft is not None:
-            with suppress(FileNotFoundError):
-                draft.unlink()

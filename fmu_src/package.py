@@ -1,19 +1,17 @@
 """Everything that goes into the FMU, and the archive: the same bytes for the same inputs."""
 
 import hashlib
-import os
-import tempfile
 import zipfile
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 
 from models.vehicle import Vehicle
 
-from .compile import C_SOURCES, UNITY_FILE, BuildError, fmi_headers
+from .compile import C_SOURCES, UNITY_FILE, fmi_headers
 from .description import NATIVE, PYTHON, model_description
 from .documentation import REPORT, documentation_page
 from .icon import model_icon
@@ -117,32 +115,14 @@ def _fmi_license() -> bytes:
     return ("\n".join(line.strip() for line in lines).strip() + "\n").encode()
 
 
-def write_fmu(path: Path, files: Mapping[str, bytes], check: Callable[[Path], None]) -> None:
-    """Write the archive to path, whole or not at all: only what passes `check` replaces a file that is there.
-
-    Raises BuildError where path cannot be written.
-    """
-    descriptor = -1
-    draft: Path | None = None
-    try:
-        descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-        draft = Path(name)
-        with os.fdopen(descriptor, "wb") as stream:
-            with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-                # the description comes first, so that importers which stream find it at once
-                for member in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
-                    archive.writestr(_entry(member), files[member], compresslevel=9)
-            stream.flush()
-            os.fsync(stream.fileno())
-        check(draft)
-        draft.chmod(0o644)
-        draft.replace(path)
-    except OSError as error:
-        raise BuildError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        if draft is not None:
-            with suppress(FileNotFoundError):
-                draft.unlink()
+def archive(files: Mapping[str, bytes]) -> bytes:
+    """The FMU: path in the archive to content, zipped, the same bytes for the same files."""
+    packed = BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as zipped:
+        # the description comes first, so that importers which stream find it at once
+        for member in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
+            zipped.writestr(_entry(member), files[member], compresslevel=9)
+    return packed.getvalue()
 
 
 def _entry(name: str) -> zipfile.ZipInfo:

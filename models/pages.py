@@ -1,28 +1,32 @@
-"""What pages are made with: templates, numbers as one writes them, and a file written whole or not at all."""
+"""What pages are made with: templates, and numbers as one writes them."""
 
-import errno
-import os
 import re
-import tempfile
+from collections.abc import Callable
 from math import isfinite
-from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def page(template: str, **content: object) -> str:
-    """A page from its template; what comes from files is escaped."""
-    environment = Environment(
-        loader=PackageLoader(__package__),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+def environment(package: str, **filters: Callable[..., str]) -> Environment:
+    """The templates of a package; what comes from files is escaped, and a name misspelt is an error."""
+    templates = Environment(
+        loader=PackageLoader(package), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"number": number, "percent": percent, "deviation": deviation, "unit": pretty_unit}
-    return environment.get_template(template).render(**content)
+    templates.filters |= filters
+    return templates
+
+
+def page(template: str, **content: object) -> str:
+    """A page from a template of this package."""
+    filters: dict[str, Callable[..., str]] = {
+        "number": number,
+        "percent": percent,
+        "deviation": deviation,
+        "unit": pretty_unit,
+    }
+    return environment("models", **filters).get_template(template).render(**content)
 
 
 def number(value: float | None, digits: int = 4) -> str:
@@ -49,26 +53,3 @@ def pretty_unit(unit: str) -> str:
     if unit == "1":
         return "1"
     return re.sub(r"\d", lambda digit: digit[0].translate(RAISED), unit).replace(".", "·")
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Put a text in place of whatever file was there. Raises OSError, about this path."""
-    if path.is_dir():
-        raise OSError(errno.EISDIR, "is a folder, not a file to write", str(path))
-    if not path.parent.is_dir():
-        raise OSError(errno.ENOENT, f"there is no folder {path.parent}", str(path))
-    temporary: Path | None = None
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        temporary = Path(name)
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)  # as if it had been opened like any file
-        temporary.replace(path)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error
-    finally:
-        if temporary:
-            temporary.unlink(missing_ok=True)

@@ -14,9 +14,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .figures import LIGHT, svg_file
+from .files import write_whole
 from .fits import fit_quadratic
 from .manoeuvres import SURGE
-from .pages import write_whole
 from .tables import ResponseTable, load_tables, untuned
 from .vehicle import VIDEORAY, Vehicle, load_vehicle
 
@@ -36,7 +36,7 @@ _NOT_PRINTED = (
 def write_figures(folder: Path) -> Path:
     """Write the figures as one SVG file. Raises OSError."""
     path = folder / NAME
-    write_whole(path, svg_file(_draw, _SIZE, salt=NAME) + "\n")
+    write_whole(path, (svg_file(_draw, _SIZE, salt=NAME) + "\n").encode())
     return path
 
 

@@ -11,8 +11,9 @@ from .dynamics import COEFFICIENTS
 from .estimation import Array, Estimate, rms
 from .experiments import ROV_FILE, THRUSTERS, Experiments
 from .figures import PALETTE, inline_svg
+from .files import write_whole
 from .fits import QuadraticFit
-from .pages import page, percent, write_whole
+from .pages import page, percent
 from .report_plots import plot_drag, plot_recording, plot_response, plot_steps, plot_thrust
 from .results import AxisResult, Comparison, Identification, compare
 
@@ -21,7 +22,7 @@ _PLOT, _WIDE = (3.7, 3.5), (5.6, 3.1)  # inches
 
 def write_report(results: Identification, path: Path) -> None:
     """Write the report of an identification, whole or not at all. Raises OSError."""
-    write_whole(path, report_page(results))
+    write_whole(path, report_page(results).encode())
 
 
 def report_page(results: Identification) -> str:

@@ -1,7 +1,6 @@
 """`Vehicle` to vehicle file (TOML), whole or not at all."""
 
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ import tomlkit
 from tomlkit.items import InlineTable
 
 from .dynamics import COEFFICIENTS
+from .files import write_whole
 from .tuning import Tuning
 from .vehicle import Provenance, Vehicle, VehicleFileError, load_vehicle
 
@@ -42,7 +42,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
 
 def write_vehicle(vehicle: Vehicle, path: Path) -> None:
     """Write the vehicle file. Raises VehicleFileError where it could not be read again, OSError where not written."""
-    replace_text(path, vehicle_text(vehicle, path.parent))
+    _write_checked(path, vehicle_text(vehicle, path.parent))
 
 
 def write_tuned(source: Path, path: Path, tuning: Tuning) -> None:
@@ -59,29 +59,19 @@ def write_tuned(source: Path, path: Path, tuning: Tuning) -> None:
     for table, key in (("vehicle", "data"), ("provenance", "report")):
         if key in document.get(table, {}):
             document[table][key] = _seen_from(path.parent, source.parent / document[table][key])
-    replace_text(path, tomlkit.dumps(document))
+    _write_checked(path, tomlkit.dumps(document))
 
 
-def replace_text(path: Path, text: str) -> None:
-    """Put the text of a vehicle file in place of whatever was there, once it has proved to be one."""
-    if not path.parent.is_dir() or path.is_dir():
-        reason = "this is a folder" if path.is_dir() else f"there is no folder {path.parent}"
-        raise VehicleFileError(f"{path}: {reason}")
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    temporary = Path(name)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+def _write_checked(path: Path, text: str) -> None:
+    """Write the text of a vehicle file, once it has proved to be one."""
+
+    def check(draft: Path) -> None:
         try:
-            load_vehicle(temporary)
+            load_vehicle(draft)
         except VehicleFileError as error:
-            raise VehicleFileError(str(error).replace(str(temporary), str(path))) from error
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)  # as if it had been opened like any file
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+            raise VehicleFileError(str(error).replace(str(draft), str(path))) from error
+
+    write_whole(path, text.encode(), check)
 
 
 def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
