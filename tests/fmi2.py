@@ -279,3 +279,9 @@ class Instance:
         status = self.call("fmi2SetFMUstate", state)
         self.expect("fmi2FreeFMUstate", ctypes.byref(state))
         return status
+
+
+def keep_loaded(folder: Path) -> None:
+    """Hold the library of a PythonFMU FMU: to unload it and load it again may crash the interpreter it shares."""
+    for library in (folder / "binaries" / fmpy.platform).iterdir():
+        ctypes.CDLL(str(library))

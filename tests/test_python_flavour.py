@@ -13,6 +13,8 @@ import build_fmu
 from fmu_src.interface import Variable, variables
 from models.vehicle import Vehicle
 
+from .fmi2 import keep_loaded
+
 
 @pytest.fixture(scope="session")
 def python_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -25,6 +27,7 @@ def python_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def python_dir(python_fmu: Path) -> Path:
     fmpy.extract(str(python_fmu), unzipdir=str(python_fmu.with_suffix("")))
+    keep_loaded(python_fmu.with_suffix(""))
     return python_fmu.with_suffix("")
 
 

@@ -18,6 +18,8 @@ from examples.station_keeping.engines import ENGINES, NAMES, Trajectory, plain
 from examples.station_keeping.system import DEFAULT, GROUPS, MISSION, SEA, STEP, build_system, parameter_sets
 from models.dynamics import thruster_force
 
+from .fmi2 import keep_loaded
+
 SETS = tuple(parameter_sets())
 
 
@@ -72,6 +74,7 @@ Start = Callable[..., Fmu]
 def unzipped(folder: Path) -> Path:
     for name in ("Autopilot", "videoray"):
         fmpy.extract(str(folder / f"{name}.fmu"), unzipdir=str(folder / name))
+    keep_loaded(folder / "Autopilot")
     return folder
 
 
