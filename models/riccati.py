@@ -78,36 +78,47 @@ def time_constant(A: float, B: float, C: float) -> float:
 def _leg(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
     """v(h) and its integral for v0 >= 0 where v keeps its sign.
 
-    v = (v0 (1 - b f) + C h f) / (1 + (b + A h v0) f) with f = tanh(r)/r, r^2 = q, and the distance is
-    ln(1 + A X)/A with X = h (v0 Y + C h W), both free of cancellation.
+    v is that of `_end_velocity` with f = tanh(r)/r, r^2 = q, and the distance is ln(1 + A X)/A with
+    X = h (v0 Y + C h W), both free of cancellation.
     """
     a, b, c = A * h, 0.5 * B * h, C * h
     q = b * b + a * c
     if abs(q) < _SMALL_Q:
         # f = N/M, its continued fraction in q: exact to the last digit here
-        N = 135135.0 + q * (17325.0 + q * (378.0 + q))
-        M = 135135.0 + q * (62370.0 + q * (3150.0 + q * 28.0))
-        v = (v0 * (M - b * N) + c * N) / (M + (b + a * v0) * N)
+        N = 1.0 + q * (17325.0 / 135135.0 + q * (378.0 / 135135.0 + q * (1.0 / 135135.0)))
+        M = 1.0 + q * (62370.0 / 135135.0 + q * (3150.0 / 135135.0 + q * (28.0 / 135135.0)))
+        v = _end_velocity(a, b, c, v0, N, M, M - b * N)
         Y, W = _means(b, a * c)
     elif q < 0.0:
         root = sqrt(-q)
         x, y, fade = cos(root), sin(root) / root, exp(-b)
-        v = (v0 * (x - b * y) + c * y) / (x + (b + a * v0) * y)
+        v = _end_velocity(a, b, c, v0, y, x, x - b * y)
         Y, W = fade * y, (fade * (x + b * y) - 1.0) / (a * c)
     else:
         root = sqrt(q) if q < 1e300 else hypot(b, sqrt(a) * sqrt(c))
         l1, l2 = a * (c / (root + b)), -(root + b)  # root - b without cancellation, and -root - b
         decay = exp(-2.0 * root)
         gain = 1.0 - decay
-        growth = root * (1.0 + decay) + (b + a * v0) * gain
-        v = (v0 * (l1 - decay * l2) + c * gain) / growth
+        M = root * (1.0 + decay)
+        v = _end_velocity(a, b, c, v0, gain, M, l1 - decay * l2)
         if l1 > 1.0:  # exp(l1) may overflow
-            return v, h * (l1 + log(0.5 * growth / root)) / a
+            return v, h * (l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a
         Y = exp(l1) * gain / (2.0 * root)
         W = ((expm1(l1) / l1 if l1 != 0.0 else 1.0) - expm1(l2) / l2) / (2.0 * root)
     X = v0 * Y + c * W
     p = a * X
     return v, h * X * (log1p(p) / p if p > 0.0 else 1.0)
+
+
+def _end_velocity(a: float, b: float, c: float, v0: float, N: float, M: float, keep: float) -> float:
+    """v = (v0 (1 - b f) + c f) / (1 + (b + a v0) f), f = N/M, keep = M - b N.
+
+    Taken as the change from v0, unless that is most of v0: rounding then never makes drag push, and what is steady
+    stays.
+    """
+    growth = M + (b + a * v0) * N
+    change = (c - (2.0 * b + a * v0) * v0) * N
+    return v0 + change / growth if change > -0.5 * v0 * growth else (v0 * keep + c * N) / growth
 
 
 def _means(b: float, k: float) -> tuple[float, float]:

@@ -77,10 +77,18 @@ static inline void riccati_means(double b, double k, double *Y, double *W)
     *W = w;
 }
 
+/* v = (v0 (1 - b f) + c f) / (1 + (b + a v0) f), f = N/M, keep = M - b N. Taken as the change from v0, unless that is
+ * most of v0: rounding then never makes drag push, and what is steady stays. */
+static inline double riccati_end_velocity(double a, double b, double c, double v0, double N, double M, double keep)
+{
+    const double growth = M + (b + a * v0) * N;
+    const double change = (c - (2.0 * b + a * v0) * v0) * N;
+    return change > -0.5 * v0 * growth ? v0 + change / growth : (v0 * keep + c * N) / growth;
+}
+
 /* One leg, v0 >= 0 and v keeps its sign: v(h) into *v and its integral into *s, where they are not NULL.
  *
- * v = (v0 (1 - b f) + C h f) / (1 + (b + A h v0) f) with f = tanh(r)/r, r^2 = q; s = ln(1 + A X)/A, X = h (v0 Y + C h W),
- * both free of cancellation. */
+ * v with f = tanh(r)/r, r^2 = q; s = ln(1 + A X)/A, X = h (v0 Y + C h W), both free of cancellation. */
 static inline void riccati_leg_advance(double A, double B, double C, double v0, double h, double *v, double *s)
 {
     const double a = A * h, b = 0.5 * B * h, c = C * h;
@@ -89,9 +97,9 @@ static inline void riccati_leg_advance(double A, double B, double C, double v0, 
     if (fabs(q) < 0.2) {
         if (v != NULL) {
             /* f = N/M, its continued fraction in q: exact to the last digit here */
-            const double N = 135135.0 + q * (17325.0 + q * (378.0 + q));
-            const double M = 135135.0 + q * (62370.0 + q * (3150.0 + q * 28.0));
-            *v = (v0 * (M - b * N) + c * N) / (M + (b + a * v0) * N);
+            const double N = 1.0 + q * (17325.0 / 135135.0 + q * (378.0 / 135135.0 + q * (1.0 / 135135.0)));
+            const double M = 1.0 + q * (62370.0 / 135135.0 + q * (3150.0 / 135135.0 + q * (28.0 / 135135.0)));
+            *v = riccati_end_velocity(a, b, c, v0, N, M, M - b * N);
         }
         if (s == NULL) {
             return;
@@ -100,7 +108,7 @@ static inline void riccati_leg_advance(double A, double B, double C, double v0, 
     } else if (q < 0.0) {
         const double root = sqrt(-q), x = cos(root), y = sin(root) / root;
         if (v != NULL) {
-            *v = (v0 * (x - b * y) + c * y) / (x + (b + a * v0) * y);
+            *v = riccati_end_velocity(a, b, c, v0, y, x, x - b * y);
         }
         const double fade = exp(-b);
         Y = fade * y;
@@ -109,15 +117,15 @@ static inline void riccati_leg_advance(double A, double B, double C, double v0, 
         const double root = q < 1e300 ? sqrt(q) : hypot(b, sqrt(a) * sqrt(c));
         const double l1 = a * (c / (root + b)), l2 = -(root + b); /* root - b without cancellation, and -root - b */
         const double decay = exp(-2.0 * root), gain = 1.0 - decay;
-        const double growth = root * (1.0 + decay) + (b + a * v0) * gain;
+        const double M = root * (1.0 + decay);
         if (v != NULL) {
-            *v = (v0 * (l1 - decay * l2) + c * gain) / growth;
+            *v = riccati_end_velocity(a, b, c, v0, gain, M, l1 - decay * l2);
         }
         if (s == NULL) {
             return;
         }
         if (l1 > 1.0) { /* exp(l1) may overflow */
-            *s = h * (l1 + log(0.5 * growth / root)) / a;
+            *s = h * (l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a;
             return;
         }
         Y = exp(l1) * gain / (2.0 * root);
