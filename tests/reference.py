@@ -165,7 +165,7 @@ class _Plane:
             return self.along(a, b)
         slowest = min(abs(self.yaw.velocity(t)) for t in (a, b))
         room = min(leg.room(t) for leg in (self.surge, self.yaw) for t in (a, b))
-        if slowest * room > 5:
+        if slowest * room > 80:  # up is shorter than room: no singularity on the way
             up = mp.mpc(0, 64 * self.yaw.sign) / slowest
             limit = 1e-25 * max(abs(self.surge.velocity(t)) for t in (a, b))
             near = all(abs(self.yaw.distance(t + up) - self.yaw.distance(t)) < 600 for t in (a, b))
