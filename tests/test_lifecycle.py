@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 from fmpy.fmi2 import fmi2EventInfo
 
+from fuzz import legal
+
 from .fmi2 import (
     CO_SIMULATION,
     CONTINUOUS,
@@ -34,69 +36,14 @@ from .fmi2 import (
     strings,
 )
 
-# The tables of FMI 2.0, 3.2.3 and 4.2.4: x where a call is allowed. The columns are those of `MODES`. + where the
-# standard does not allow it and importers do it all the same. A function that is not listed belongs to the other one.
-_COMMON = """
-    fmi2SetDebugLogging                 x x x x x
-    fmi2SetupExperiment                 x . . . .
-    fmi2EnterInitializationMode         x . . . .
-    fmi2ExitInitializationMode          . x . . .
-    fmi2Reset                           x x x x x
-    fmi2GetReal                         . x x x x
-    fmi2GetInteger                      . x x x x
-    fmi2GetBoolean                      . x x x x
-    fmi2GetString                       . x x x x
-    fmi2GetFMUstate                     x x x x x
-    fmi2SetFMUstate                     x x x x x
-    fmi2FreeFMUstate                    x x x x x
-    fmi2SerializedFMUstateSize          x x x x x
-    fmi2SerializeFMUstate               x x x x x
-    fmi2DeSerializeFMUstate             x x x x x
-    fmi2GetDirectionalDerivative        . x x x x
-"""
-_ONLY = {
-    CO_SIMULATION: """
-    fmi2Terminate                       . . x . .
-    fmi2SetReal                         x x x . .
-    fmi2SetInteger                      x x x . .
-    fmi2SetBoolean                      x x x . .
-    fmi2SetString                       x x x . .
-    fmi2SetRealInputDerivatives         x x x . .
-    fmi2GetRealOutputDerivatives        . . x x x
-    fmi2DoStep                          . . x . .
-    fmi2GetStatus                       . . x x .
-    fmi2GetRealStatus                   . . x x .
-    fmi2GetIntegerStatus                . . x x .
-    fmi2GetBooleanStatus                . . x x .
-    fmi2GetStringStatus                 . . x x .
-""",
-    MODEL_EXCHANGE: """
-    fmi2Terminate                       . . x x .
-    fmi2SetReal                         x x x x .
-    fmi2SetInteger                      x x x . .
-    fmi2SetBoolean                      x x x . .
-    fmi2SetString                       x x x . .
-    fmi2EnterEventMode                  . . x x .
-    fmi2NewDiscreteStates               . . x . .
-    fmi2EnterContinuousTimeMode         . . x . .
-    fmi2CompletedIntegratorStep         . . . x .
-    fmi2SetTime                         . . + x .
-    fmi2SetContinuousStates             . . . x .
-    fmi2GetEventIndicators              . x x x x
-    fmi2GetContinuousStates             . x x x x
-    fmi2GetDerivatives                  . x x x x
-    fmi2GetNominalsOfContinuousStates   x x x x x
-""",
+# The modes of the standard's tables as the log names them.
+_MODE = {column: mode for kind in MODES for column, mode in zip(legal.MODES[kind], MODES[kind], strict=True)}
+LEGAL = {
+    (kind, function, _MODE[column])
+    for kind in MODES
+    for function, columns in legal.legal_modes(kind).items()
+    for column in columns
 }
-
-
-def _table(kind: int) -> set[tuple[str, str]]:
-    """The (function, mode) pairs that are legal."""
-    rows = [line.split() for line in (_COMMON + _ONLY[kind]).splitlines() if line.strip()]
-    return {(name, mode) for name, *marks in rows for mode, mark in zip(MODES[kind], marks, strict=True) if mark != "."}
-
-
-LEGAL = {(kind, *pair) for kind in MODES for pair in _table(kind)}
 EVERY_CALL = [(kind, mode, function) for kind, mode in EVERY_MODE for function in SIGNATURES]
 
 # Calls that lead elsewhere: from any mode to this one.

@@ -1,0 +1,97 @@
+"""python -m fuzz: random calls of the FMI functions, under sanitizers, until there are enough of them."""
+
+import argparse
+import shutil
+import sys
+import tempfile
+import time
+from os import cpu_count
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from fmu_src.package import native_content
+from models.vehicle import VIDEORAY, load_vehicle
+
+from .campaign import Counts, FindingError, build_target, fuzz, pack_corpus, replay, unpack_corpus
+from .sanitized import clang
+
+_ROUND = 60  # s
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m fuzz",
+        description="Turn random bytes into calls of the FMI functions on several instances, and look after each call "
+        "whether it kept its promises, under AddressSanitizer and UndefinedBehaviorSanitizer (clang).",
+    )
+    parser.add_argument("inputs", nargs="*", type=Path, help="run these inputs once, instead of fuzzing")
+    parser.add_argument("--calls", type=float, help="go on until so many calls were made, e.g. 1e8")
+    parser.add_argument("--seconds", type=int, help="go on for so long; without either, a minute")
+    parser.add_argument("--jobs", type=int, default=cpu_count(), help="processes (default: one a processor)")
+    parser.add_argument("--keep", action="store_true", help="put what led to new places into the corpus")
+    return parser
+
+
+def main() -> int:
+    """Run the command line; 0 where nothing was found, 1 with a finding, 2 where it cannot run."""
+    options = _parser().parse_args()
+    console = Console()
+    if clang() is None:
+        print("fuzz: clang with its sanitizers is missing: apt-get install clang libclang-rt-dev", file=sys.stderr)
+        return 2
+    if missing := [path for path in options.inputs if not path.exists()]:
+        print(f"fuzz: {missing[0]}: there is no such file", file=sys.stderr)
+        return 2
+    with tempfile.TemporaryDirectory(prefix="fuzz-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        target, corpus = folder / "target", folder / "corpus"
+        build_target(native_content(load_vehicle(VIDEORAY)).sources, target)
+        unpack_corpus(corpus)
+        try:
+            if options.inputs:
+                counts = replay(target, options.inputs, folder)
+                console.print(f"{counts.calls:,} calls, nothing found", highlight=False)
+                return 0
+            counts, seconds = _campaign(console, target, corpus, folder, options)
+        except FindingError as finding:
+            print(f"fuzz: {finding.words}", file=sys.stderr)
+            for path in finding.inputs:
+                print(f"again with: python -m fuzz {shutil.copy(path, '.')}", file=sys.stderr)
+            return 1
+        _print_counts(console, counts, seconds)
+        if options.keep:
+            console.print(f"the corpus now has {pack_corpus(target, corpus)} inputs")
+    return 0
+
+
+def _campaign(
+    console: Console, target: Path, corpus: Path, folder: Path, options: argparse.Namespace
+) -> tuple[Counts, float]:
+    total, start = Counts(), time.monotonic()
+    limit = options.seconds or (None if options.calls else _ROUND)
+    while True:
+        spent = time.monotonic() - start
+        length = _ROUND if limit is None else max(1, min(_ROUND, round(limit - spent)))
+        counts = fuzz(target, corpus, folder, length, options.jobs)
+        total.refused.update(counts.refused)
+        total.accepted.update(counts.accepted)
+        spent = time.monotonic() - start
+        console.print(f"{spent:6.0f} s {total.calls:15,} calls, nothing found", highlight=False)
+        if (limit is not None and spent >= limit - 0.5) or (options.calls and total.calls >= options.calls):
+            return total, spent
+
+
+def _print_counts(console: Console, counts: Counts, seconds: float) -> None:
+    table = Table(title=f"{counts.calls:,} calls in {seconds:.0f} s, nothing found", title_justify="left")
+    table.add_column("function")
+    table.add_column("accepted", justify="right")
+    table.add_column("refused", justify="right")
+    for name in counts.refused:
+        table.add_row(name, f"{counts.accepted[name]:,}", f"{counts.refused[name]:,}")
+    console.print(table)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,207 @@
+/* The functions of Model Exchange (section 3.2) and of Co-Simulation (section 4.2), with any arguments. */
+#ifndef INTERFACE_CALLS_H
+#define INTERFACE_CALLS_H
+
+#include "common_calls.h"
+#include "laws.h"
+
+/* ---- Model Exchange ---- */
+
+static void call_fmi2EnterEventMode(slot *s)
+{
+    go(s, CALL_fmi2EnterEventMode, fmi2EnterEventMode, true, EVENT);
+}
+
+static void call_fmi2EnterContinuousTimeMode(slot *s)
+{
+    go(s, CALL_fmi2EnterContinuousTimeMode, fmi2EnterContinuousTimeMode, true, CONTINUOUS);
+}
+
+static void call_fmi2NewDiscreteStates(slot *s)
+{
+    const bool given = take_byte() < 240;
+    fmi2EventInfo *const info = exactly(1, sizeof *info);
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2NewDiscreteStates, given);
+    if (after_call(s, CALL_fmi2NewDiscreteStates, wanted, fmi2NewDiscreteStates(s->f, given ? info : NULL), false)) {
+        PROPERTY(info->newDiscreteStatesNeeded == fmi2False && info->terminateSimulation == fmi2False
+                     && info->nextEventTimeDefined == fmi2False, "an event of the model's own");
+    }
+    free(info);
+}
+
+static void call_fmi2CompletedIntegratorStep(slot *s)
+{
+    const bool given = take_byte() < 240;
+    fmi2Boolean event = 7, stop = 7;
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2CompletedIntegratorStep, given);
+    const fmi2Status status = fmi2CompletedIntegratorStep(s->f, take_bool(), given ? &event : NULL, &stop);
+    const fmi2Boolean told = after_call(s, CALL_fmi2CompletedIntegratorStep, wanted, status, false) ? fmi2False : 7;
+    PROPERTY(event == told && stop == told, "an event %d or an end %d", event, stop);
+}
+
+static void call_fmi2SetTime(slot *s)
+{
+    const double time = take_real();
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2SetTime, isfinite(time));
+    if (after_call(s, CALL_fmi2SetTime, wanted, fmi2SetTime(s->f, time), true)) {
+        s->at.time = time;
+    }
+}
+
+static size_t take_number_of_states(void)
+{
+    const unsigned n = take_byte();
+    return n < 240 ? N_STATES : n % (2 * N_STATES);
+}
+
+static void call_fmi2SetContinuousStates(slot *s)
+{
+    const size_t n = take_number_of_states();
+    double *const x = take_reals(n);
+    bool good = n == N_STATES && x != NULL;
+    for (size_t i = 0; i < n && good; i++) {
+        good = isfinite(x[i]);
+    }
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2SetContinuousStates, good);
+    if (after_call(s, CALL_fmi2SetContinuousStates, wanted, fmi2SetContinuousStates(s->f, x, n), true)) {
+        PROPERTY(memcmp(&s->f->now.values.at[FIRST_STATE], x, n * sizeof *x) == 0, "not set");
+    }
+    free(x);
+}
+
+static void get_states(slot *s, call which, fmi2Status (*function)(fmi2Component, fmi2Real *, size_t), bool overflows)
+{
+    const size_t n = take_number_of_states();
+    double *const x = take_byte() < 253 ? exactly(n, sizeof *x) : NULL;
+    before_call();
+    verdict wanted = legal(s, which, n == N_STATES && x != NULL);
+    wanted = wanted == ACCEPTED && overflows && !is_moderate(s->f) ? EITHER : wanted;
+    check_results(CALL_NAMES[which], after_call(s, which, wanted, function(s->f, x, n), false), x, n);
+    free(x);
+}
+
+static void call_fmi2GetDerivatives(slot *s)
+{
+    get_states(s, CALL_fmi2GetDerivatives, fmi2GetDerivatives, true);
+}
+
+static void call_fmi2GetContinuousStates(slot *s)
+{
+    get_states(s, CALL_fmi2GetContinuousStates, fmi2GetContinuousStates, false);
+}
+
+static void call_fmi2GetNominalsOfContinuousStates(slot *s)
+{
+    get_states(s, CALL_fmi2GetNominalsOfContinuousStates, fmi2GetNominalsOfContinuousStates, false);
+}
+
+static void call_fmi2GetEventIndicators(slot *s)
+{
+    const size_t n = take_byte() % 4;
+    double *const indicators = exactly(n, sizeof *indicators);
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2GetEventIndicators, n == 0);
+    after_call(s, CALL_fmi2GetEventIndicators, wanted, fmi2GetEventIndicators(s->f, indicators, n), false);
+    free(indicators);
+}
+
+/* ---- Co-Simulation ---- */
+
+static void call_fmi2SetRealInputDerivatives(slot *s)
+{
+    const size_t n = take_count();
+    fmi2ValueReference *const vr = take_references(n);
+    fmi2Integer *const order = exactly(n, sizeof *order);
+    double *const values = take_reals(n);
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2SetRealInputDerivatives, n == 0);
+    const fmi2Status status = fmi2SetRealInputDerivatives(s->f, vr, n, order, values);
+    after_call(s, CALL_fmi2SetRealInputDerivatives, wanted, status, false);
+    free(vr);
+    free(order);
+    free(values);
+}
+
+static void call_fmi2GetRealOutputDerivatives(slot *s)
+{
+    const size_t n = take_count();
+    fmi2ValueReference *const vr = take_references(n);
+    fmi2Integer *const order = exactly(n, sizeof *order);
+    double *const values = exactly(n, sizeof *values);
+    bool good = n == 0 || vr != NULL;
+    for (size_t i = 0; i < n; i++) {
+        const unsigned any = take_byte();
+        order[i] = any < 240 ? 1 : (int)any - 248;
+        good = good && order[i] == 1 && vr[i] >= FIRST_STATE && vr[i] < N_VARIABLES
+               && (vr[i] < FIRST_CALCULATED || (vr[i] >= FIRST_CALCULATED + N_STATES && VARIABLES[vr[i]].kind == CALCULATED));
+    }
+    before_call();
+    verdict wanted = legal(s, CALL_fmi2GetRealOutputDerivatives, good);
+    wanted = wanted == ACCEPTED && !is_moderate(s->f) ? EITHER : wanted;
+    const fmi2Status status = fmi2GetRealOutputDerivatives(s->f, vr, n, order, values);
+    const bool accepted = after_call(s, CALL_fmi2GetRealOutputDerivatives, wanted, status, false);
+    if (accepted) {
+        check_results("fmi2GetRealOutputDerivatives", accepted, values, n);
+    }
+    free(vr);
+    free(order);
+    free(values);
+}
+
+static void call_fmi2DoStep(slot *s)
+{
+    static const double usual[] = {1e-3, 1e-2, 0.1, 1.0, 100.0, 1000.0};
+    const unsigned any = take_byte();
+    const double h = any < 160 ? usual[any % 6] : take_real(), t = any < 250 ? s->at.time : take_real(), end = t + h;
+    verdict good = h > 0.0 && isfinite(end) ? ACCEPTED : REFUSED;
+    if (good == ACCEPTED && s->at.stop_defined && !(end <= s->at.stop)) {
+        good = end > s->at.stop + 0.5 * h ? REFUSED : EITHER; /* rounding of the stop time */
+    }
+    before_call();
+    verdict wanted = legal(s, CALL_fmi2DoStep, good != REFUSED);
+    axes_before before = {0};
+    if (wanted == ACCEPTED) {
+        wanted = good == ACCEPTED && is_moderate(s->f) && h <= 1e30 ? ACCEPTED : EITHER;
+        before = axes_of(s->f);
+    }
+    const fmi2Status status = fmi2DoStep(s->f, t, h, take_bool());
+    if (wanted == EITHER && s->f->now.mode == FAILED) { /* it overflows: nothing else may have changed */
+        PROPERTY(status == fmi2Error, "a failed step returns %d", (int)status);
+        s->at.mode = ((fmu *)(void *)instances_before[s - slots])->now.mode = FAILED;
+    }
+    if (after_call(s, CALL_fmi2DoStep, wanted, status, true)) {
+        s->at.time = end;
+        check_step(s->f, &before, end);
+    }
+}
+
+static void call_fmi2CancelStep(slot *s)
+{
+    before_call();
+    after_call(s, CALL_fmi2CancelStep, REFUSED, fmi2CancelStep(s->f), false);
+}
+
+#define CALL_OF_STATUS(function, type, known)                                                              \
+    static void call_##function(slot *s)                                                                   \
+    {                                                                                                      \
+        const int kind = (int)(take_byte() % 6) - 1;                                                       \
+        const bool given = take_byte() < 240;                                                              \
+        type *const value = exactly(1, sizeof(type));                                                      \
+        before_call();                                                                                     \
+        const verdict wanted = legal(s, CALL_##function, given && kind == (known));                        \
+        after_call(s, CALL_##function, wanted, function(s->f, (fmi2StatusKind)kind, given ? value : NULL), false); \
+        free(value);                                                                                       \
+    }
+
+enum { NOTHING = -100 };
+CALL_OF_STATUS(fmi2GetStatus, fmi2Status, NOTHING)
+CALL_OF_STATUS(fmi2GetRealStatus, fmi2Real, fmi2LastSuccessfulTime)
+CALL_OF_STATUS(fmi2GetIntegerStatus, fmi2Integer, NOTHING)
+CALL_OF_STATUS(fmi2GetBooleanStatus, fmi2Boolean, fmi2Terminated)
+CALL_OF_STATUS(fmi2GetStringStatus, fmi2String, NOTHING)
+
+#endif

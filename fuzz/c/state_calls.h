@@ -1,0 +1,145 @@
+/* The functions of section 2.1.8, with states and bytes of any origin. */
+#ifndef STATE_CALLS_H
+#define STATE_CALLS_H
+
+#include "world.h"
+
+static void *foreign[8]; /* memory that is no state */
+
+static saved_slot *take_saved(void)
+{
+    return &saves[take_byte() % N_SAVED];
+}
+
+static void call_fmi2GetFMUstate(slot *s)
+{
+    saved_slot *const to = take_saved();
+    const unsigned n = take_byte();
+    fmi2FMUstate other = foreign;
+    fmi2FMUstate *const at = n < 240 ? &to->state : n < 248 ? &other : NULL;
+    before_call();
+    memory_is_full = n >= 230 && n < 240;
+    const verdict wanted = legal(s, CALL_fmi2GetFMUstate, n < 240 && !(memory_is_full && to->state == NULL));
+    if (after_call(s, CALL_fmi2GetFMUstate, wanted, fmi2GetFMUstate(s->f, at), false)) {
+        to->at = s->at;
+    }
+    memory_is_full = false;
+    PROPERTY(other == foreign, "memory that is no state is taken");
+}
+
+static void call_fmi2SetFMUstate(slot *s)
+{
+    saved_slot *const from = take_saved();
+    const bool own = take_byte() < 240;
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2SetFMUstate, own && from->state != NULL && from->at.type == s->at.type);
+    if (after_call(s, CALL_fmi2SetFMUstate, wanted, fmi2SetFMUstate(s->f, own ? from->state : foreign), true)) {
+        s->at = from->at;
+    }
+}
+
+static void call_fmi2FreeFMUstate(slot *s)
+{
+    saved_slot *const from = take_saved();
+    const unsigned n = take_byte();
+    fmi2FMUstate other = foreign;
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2FreeFMUstate, n < 240 || n >= 248);
+    const fmi2Status status = fmi2FreeFMUstate(s->f, n < 240 ? &from->state : n < 248 ? &other : NULL);
+    const bool accepted = after_call(s, CALL_fmi2FreeFMUstate, wanted, status, false);
+    PROPERTY(!accepted || n >= 240 || from->state == NULL, "a freed state is still there");
+}
+
+static void call_fmi2SerializedFMUstateSize(slot *s)
+{
+    const saved_slot *const from = take_saved();
+    const unsigned n = take_byte();
+    size_t size = 12345;
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2SerializedFMUstateSize, from->state != NULL && n < 240);
+    const fmi2Status status = fmi2SerializedFMUstateSize(s->f, from->state, n < 240 ? &size : NULL);
+    const bool accepted = after_call(s, CALL_fmi2SerializedFMUstateSize, wanted, status, false);
+    PROPERTY(size == (accepted ? SERIALIZED_SIZE : 12345), "%zu bytes", size);
+}
+
+static void call_fmi2SerializeFMUstate(slot *s)
+{
+    const saved_slot *const from = take_saved();
+    buffer *const to = &buffers[take_byte() % N_BUFFERS];
+    const unsigned n = take_byte();
+    const size_t size = n < 200 ? SERIALIZED_SIZE : n < 250 ? SERIALIZED_SIZE - 2 + n % 5 : take_word(1);
+    fmi2Byte *const bytes = exactly(size, 1);
+    before_call();
+    const verdict wanted = legal(s, CALL_fmi2SerializeFMUstate, from->state != NULL && size >= SERIALIZED_SIZE);
+    const fmi2Status status = fmi2SerializeFMUstate(s->f, from->state, bytes, size);
+    if (after_call(s, CALL_fmi2SerializeFMUstate, wanted, status, false)) {
+        free(to->bytes);
+        *to = (buffer){bytes, size, checksum((unsigned char *)bytes, size), false, from->at};
+    } else {
+        for (size_t i = 0; i < size; i++) {
+            PROPERTY((unsigned char)bytes[i] == 0xa5, "a refused call writes bytes");
+        }
+        free(bytes);
+    }
+}
+
+/* Bytes are damaged; or given values that a run may or may not reach, with the checksum that belongs to them. */
+static void damage(void)
+{
+    buffer *const b = &buffers[take_byte() % N_BUFFERS];
+    if (b->bytes == NULL || b->size != SERIALIZED_SIZE) {
+        return;
+    }
+    unsigned char *const bytes = (unsigned char *)b->bytes;
+    const bool forge = take_bool();
+    const size_t at = (size_t)take_word(2) % SERIALIZED_SIZE;
+    if (forge) {
+        const double value = take_real();
+        const size_t word = MAGIC_SIZE + GUID_SIZE + 8 * (at % (N_HEADER_WORDS + N_VARIABLES));
+        unsigned char *to = bytes + word;
+        if (at % (N_HEADER_WORDS + N_VARIABLES) < 3) {
+            put_word(&to, take_byte());
+        } else {
+            put_double(&to, value);
+        }
+        to = bytes + SERIALIZED_SIZE - 8;
+        put_word(&to, checksum(bytes, SERIALIZED_SIZE - 8));
+        b->sum = checksum(bytes, SERIALIZED_SIZE);
+        b->forged = true;
+    } else {
+        bytes[at] ^= (unsigned char)take_byte();
+    }
+}
+
+/* What an instance is in after a state that was accepted. */
+static expected found(const fmu_state *s)
+{
+    return (expected){s->type, s->mode, s->experiment_defined, s->stop_defined, s->time, s->stop};
+}
+
+static void call_fmi2DeSerializeFMUstate(slot *s)
+{
+    const buffer *const from = &buffers[take_byte() % N_BUFFERS];
+    saved_slot *const to = take_saved();
+    const bool whole = from->bytes != NULL && from->size == SERIALIZED_SIZE
+                       && checksum((unsigned char *)from->bytes, from->size) == from->sum;
+    before_call();
+    memory_is_full = take_byte() >= 250;
+    verdict wanted = legal(s, CALL_fmi2DeSerializeFMUstate, whole && !(memory_is_full && to->state == NULL));
+    wanted = wanted == ACCEPTED && from->forged ? EITHER : wanted;
+    const fmi2Status status = fmi2DeSerializeFMUstate(s->f, from->bytes, from->size, &to->state);
+    memory_is_full = false;
+    if (!after_call(s, CALL_fmi2DeSerializeFMUstate, wanted, status, false)) {
+        return;
+    }
+    const fmu_state *const state = &((saved_state *)to->state)->state;
+    to->at = from->forged ? found(state) : from->at;
+    const int modes = state->type == fmi2ModelExchange ? EVERYWHERE & ~(STEP | FAILED) : EVERYWHERE & ~(EVENT | CONTINUOUS);
+    const int mode = (int)state->mode;
+    PROPERTY((modes & mode) != 0 && (mode & (mode - 1)) == 0, "a state in mode %d", mode);
+    for (int i = 0; i < N_VARIABLES; i++) {
+        PROPERTY(isfinite(state->values.at[i]), "a state with %s = %g", VARIABLES[i].name, state->values.at[i]);
+    }
+}
+
+#endif

@@ -1,0 +1,240 @@
+/* What the fuzzer plays with: bytes to take values from, instances, states, and what the standard expects of each. */
+#ifndef WORLD_H
+#define WORLD_H
+
+#include <float.h>
+#include <stdbool.h>
+#include <stdlib.h>
+
+static bool memory_is_full;
+
+static void *calloc_or_not(size_t count, size_t size)
+{
+    return memory_is_full ? NULL : calloc(count, size);
+}
+
+#define calloc calloc_or_not
+#include "fmu.c"
+#undef calloc
+#include "legal.h"
+
+enum { N_SLOTS = 4, N_SAVED = 3, N_BUFFERS = 3 };
+
+/* What an instance is in after the calls so far, by the standard. */
+typedef struct {
+    fmi2Type type;
+    lifecycle mode;
+    bool set_up, stop_defined;
+    double time, stop;
+} expected;
+
+typedef struct {
+    fmu *f;
+    bool logs; /* has a logger */
+    expected at;
+} slot;
+
+typedef struct {
+    fmi2FMUstate state;
+    expected at;
+} saved_slot;
+
+/* Serialized bytes, and the sum of them that tells whether they are as they were. */
+typedef struct {
+    fmi2Byte *bytes;
+    size_t size;
+    uint64_t sum;
+    bool forged; /* what is in it is not known */
+    expected at;
+} buffer;
+
+static slot slots[N_SLOTS];
+static saved_slot saves[N_SAVED];
+static buffer buffers[N_BUFFERS];
+
+/* Ends the program where a property is broken: the fuzzer keeps the input. */
+#define PROPERTY(holds, ...)                                             \
+    do {                                                                 \
+        if (!(holds)) {                                                  \
+            fprintf(stderr, "broken property (%s): ", #holds);           \
+            fprintf(stderr, __VA_ARGS__);                                \
+            fprintf(stderr, "\n");                                       \
+            abort();                                                     \
+        }                                                                \
+    } while (0)
+
+/* ---- Values from the fuzzer's bytes; zeros where they end ---- */
+
+static const unsigned char *input;
+static size_t input_size, position;
+
+static unsigned take_byte(void)
+{
+    return position < input_size ? input[position++] : 0;
+}
+
+static bool take_bool(void)
+{
+    return (take_byte() & 1) != 0;
+}
+
+static uint64_t take_word(int bytes)
+{
+    uint64_t word = 0;
+    for (int i = 0; i < bytes; i++) {
+        word = word << 8 | take_byte();
+    }
+    return word;
+}
+
+static double take_real(void)
+{
+    static const double special[] = {
+        0.0, -0.0, 1.0, -1.0, 1.0 + DBL_EPSILON, -1.0 - DBL_EPSILON, 0.3, 1e-3, 1e-9, 1e3, 1e9, -1e9, 1e-300, 1e150,
+        -1e150, 1e300, DBL_MIN, -DBL_MIN, 4.9406564584124654e-324, -4.9406564584124654e-324, DBL_MAX, -DBL_MAX,
+        INFINITY, -INFINITY, NAN};
+    const unsigned form = take_byte();
+    double value;
+    uint64_t word;
+    switch (form % 4) {
+    case 0:
+        return special[take_byte() % (sizeof special / sizeof special[0])];
+    case 1: /* any bits */
+        word = take_word(8);
+        memcpy(&value, &word, sizeof value);
+        return value;
+    case 2: /* any magnitude, exactly */
+        return ldexp((double)take_byte() - 127.0, (int)take_byte() - 127);
+    default: /* as a user sets it */
+        return ((double)take_byte() - 127.0) / 100.0;
+    }
+}
+
+/* Memory of exactly this size, so that a byte beyond it is seen. */
+static void *exactly(size_t count, size_t size)
+{
+    void *const memory = malloc(count * size);
+    PROPERTY(memory != NULL, "out of memory");
+    memset(memory, 0xa5, count * size);
+    return memory;
+}
+
+static void *copy_of(const void *from, size_t count, size_t size)
+{
+    void *const memory = exactly(count, size);
+    memcpy(memory, from, count * size);
+    return memory;
+}
+
+static size_t take_count(void)
+{
+    const unsigned n = take_byte();
+    return n < 240 ? n % 4 : n % (N_VARIABLES + 3);
+}
+
+static fmi2ValueReference take_reference(void)
+{
+    const unsigned n = take_byte();
+    if (n < 100) {
+        return n % FIRST_STATE; /* an input */
+    }
+    if (n < 150) {
+        return N_VARIABLES - 1 - n % 8; /* a tuning parameter */
+    }
+    if (n < 245) {
+        return n % N_VARIABLES;
+    }
+    return n < 253 ? N_VARIABLES + n % 4 : (fmi2ValueReference)take_word(4);
+}
+
+/* ---- One call: was it right to accept or refuse it, and did it leave alone what it must ---- */
+
+typedef enum { REFUSED, ACCEPTED, EITHER } verdict;
+
+static unsigned long long counts[N_CALLS][2]; /* refused, accepted */
+static uint64_t trace;                        /* of all that was returned; two runs of the same bytes give the same */
+static unsigned messages;                     /* logged during the call */
+static _Alignas(fmu) unsigned char instances_before[N_SLOTS][sizeof(fmu)];
+static saved_state saves_before[N_SAVED];
+
+static void note(const void *bytes, size_t size)
+{
+    for (size_t i = 0; i < size; i++) {
+        trace = (trace ^ ((const unsigned char *)bytes)[i]) * 1099511628211u;
+    }
+}
+
+/* The bytes of an instance but for the calculated variables, which follow from the rest. */
+static void copy_instance(unsigned char *to, const fmu *from)
+{
+    memcpy(to, from, sizeof *from);
+    memset(&((fmu *)(void *)to)->now.values.at[FIRST_CALCULATED], 0, sizeof(rov_state) + sizeof(rov_thrust));
+}
+
+static bool is_same(const slot *s)
+{
+    if (s->f == NULL) {
+        return true;
+    }
+    _Alignas(fmu) unsigned char now[sizeof(fmu)];
+    copy_instance(now, s->f);
+    return memcmp(now, instances_before[s - slots], sizeof now) == 0;
+}
+
+static void before_call(void)
+{
+    messages = 0;
+    for (int i = 0; i < N_SLOTS; i++) {
+        if (slots[i].f != NULL) {
+            copy_instance(instances_before[i], slots[i].f);
+        }
+    }
+    for (int i = 0; i < N_SAVED; i++) {
+        if (saves[i].state != NULL) {
+            memcpy(&saves_before[i], saves[i].state, sizeof saves_before[i]);
+        }
+    }
+}
+
+static verdict legal(const slot *s, call which, bool arguments)
+{
+    return s->f != NULL && arguments && (LEGAL[s->at.type][which] & (int)s->at.mode) != 0 ? ACCEPTED : REFUSED;
+}
+
+/* Whether the call was accepted. `changes`: it may change its instance, if accepted. */
+static bool after_call(const slot *s, call which, verdict wanted, fmi2Status status, bool changes)
+{
+    const char *const name = CALL_NAMES[which];
+    const bool accepted = status == fmi2OK;
+    PROPERTY(accepted || status == fmi2Error || status == fmi2Discard, "%s returns %d", name, (int)status);
+    PROPERTY(wanted == EITHER || accepted == (wanted == ACCEPTED), "%s: %s in %s returns %d", name,
+             wanted == ACCEPTED ? "legal" : "illegal", s->f == NULL ? "no instance" : mode_name(s->at.mode), (int)status);
+    for (int i = 0; i < N_SLOTS; i++) {
+        PROPERTY((s == &slots[i] && accepted && changes) || is_same(&slots[i]), "%s changes instance %d", name, i);
+    }
+    for (int i = 0; i < N_SAVED; i++) {
+        PROPERTY(accepted || saves[i].state == NULL
+                     || memcmp(&saves_before[i], saves[i].state, sizeof saves_before[i]) == 0,
+                 "%s is refused and changes a saved state", name);
+    }
+    if (!accepted && s->f != NULL && s->logs) {
+        const bool enabled = s->f->log_enabled[status == fmi2Discard ? logStatusDiscard : logStatusError];
+        PROPERTY(messages == (enabled ? 1u : 0u), "%s is refused with %u messages", name, messages);
+    }
+    note(&status, sizeof status);
+    counts[which][accepted]++;
+    return accepted;
+}
+
+/* Far from where a result can overflow. */
+static bool is_moderate(const fmu *f)
+{
+    for (int i = 0; i < FIRST_CALCULATED; i++) {
+        if (fabs(f->now.values.at[i]) > 1e30) {
+            return false;
+        }
+    }
+    return true;
+}
+
+#endif

@@ -1,0 +1,125 @@
+"""The fuzzer: built, run on several processors at once, its findings and its corpus kept."""
+
+import os
+import subprocess
+import zipfile
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+
+from .legal import legal_header
+from .sanitized import build_sanitized
+
+TARGET_SOURCE = Path(__file__).with_name("c") / "target.c"
+CORPUS = Path(__file__).with_name("corpus.zip")
+_LONGEST_INPUT = 2000  # bytes, some hundred calls
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+class FindingError(Exception):
+    """A sanitizer's report or a broken property: what was said, and the input that leads there."""
+
+    def __init__(self, words: str, inputs: Sequence[Path]) -> None:
+        super().__init__(words)
+        self.words = words
+        self.inputs = inputs
+
+
+@dataclass
+class Counts:
+    """Calls by function: refused, accepted."""
+
+    refused: Counter[str] = field(default_factory=Counter)
+    accepted: Counter[str] = field(default_factory=Counter)
+
+    def add(self, file: Path) -> None:
+        for line in file.read_text(encoding="utf-8").splitlines():
+            name, refused, accepted = line.split()
+            self.refused[name] += int(refused)
+            self.accepted[name] += int(accepted)
+
+    @property
+    def calls(self) -> int:
+        return self.refused.total() + self.accepted.total()
+
+
+def build_target(sources: Mapping[str, str], output: Path) -> None:
+    """Compile the fuzzer for the sources of an FMU, with AddressSanitizer and UndefinedBehaviorSanitizer."""
+    everything = {**sources, "legal.h": legal_header()}
+    build_sanitized(everything, TARGET_SOURCE, output, "fuzzer,address,undefined")
+
+
+def unpack_corpus(folder: Path) -> None:
+    """Write the inputs that are kept, one file each, into a folder."""
+    with zipfile.ZipFile(CORPUS) as kept:
+        kept.extractall(folder)
+
+
+def pack_corpus(target: Path, folder: Path) -> int:
+    """Keep of a folder of inputs those that together reach all that it reaches; how many."""
+    smaller = folder.with_name(f"{folder.name}.smaller")
+    smaller.mkdir()
+    _finish(_start(target, folder.parent, ["-merge=1", "-use_counters=0", str(smaller), str(folder)]), folder.parent)
+    packed = BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(smaller.iterdir()):
+            archive.writestr(zipfile.ZipInfo(path.name, _EPOCH), path.read_bytes(), zipfile.ZIP_DEFLATED)
+    CORPUS.write_bytes(packed.getvalue())
+    return len(list(smaller.iterdir()))
+
+
+def replay(target: Path, inputs: Sequence[Path], folder: Path) -> Counts:
+    """Run files of input, or folders of them, once each. Raises FindingError."""
+    return _finish(_start(target, folder, ["-runs=0", *map(str, inputs)]), folder)
+
+
+def fuzz(target: Path, corpus: Path, folder: Path, seconds: int, jobs: int) -> Counts:
+    """Fuzz for so long in so many processes that share a corpus. Raises FindingError."""
+    arguments = [str(corpus), f"-max_total_time={seconds}", "-len_control=0", f"-max_len={_LONGEST_INPUT}", "-reload=1"]
+    started = [_start(target, folder, arguments, name=f"counts-{i}") for i in range(jobs)]
+    counts = Counts()
+    try:
+        for job in started:
+            done = _finish(job, folder)
+            counts.refused.update(done.refused)
+            counts.accepted.update(done.accepted)
+    finally:
+        for process, _, _ in started:
+            process.kill()
+            process.wait()
+    return counts
+
+
+_Job = tuple[subprocess.Popen[bytes], Path, Path]
+
+
+def _start(target: Path, folder: Path, arguments: Sequence[str], name: str = "counts") -> _Job:
+    counts, log = folder / name, folder / f"{name}.log"
+    counts.unlink(missing_ok=True)
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            [target, *arguments, f"-artifact_prefix={folder}{os.sep}finding-"],
+            env={**os.environ, "FUZZ_COUNTS": str(counts)},
+            stdout=subprocess.DEVNULL,
+            stderr=output,
+        )
+    return process, counts, log
+
+
+def _finish(job: _Job, folder: Path) -> Counts:
+    process, file, log = job
+    if process.wait() != 0:
+        words = log.read_text(encoding="utf-8", errors="replace").splitlines()
+        raise FindingError("\n".join(_essence(words)), sorted(folder.glob("finding-*")))
+    counts = Counts()
+    if file.exists():
+        counts.add(file)
+    return counts
+
+
+def _essence(words: Sequence[str]) -> Iterator[str]:
+    """Of a log of libFuzzer what was found, without how it went there."""
+    telling = ("broken property", "ERROR:", "runtime error", "SUMMARY", "    #")
+    yield from [line for line in words if any(word in line for word in telling) and not line.startswith("#")][:40]

@@ -1,0 +1,110 @@
+"""The fuzzer's corpus finds nothing in the FMU's C, and finds what is planted there. The long run is python -m fuzz."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from fmu_src.package import native_content
+from fuzz.campaign import FindingError, build_target, fuzz, replay, unpack_corpus
+from fuzz.legal import MODES, legal_modes
+from fuzz.sanitized import clang
+from models.vehicle import Vehicle
+
+pytestmark = pytest.mark.skipif(clang() is None, reason="clang with its sanitizers is not installed")
+
+
+@pytest.fixture
+def corpus(tmp_path: Path) -> Path:
+    unpack_corpus(tmp_path / "corpus")
+    return tmp_path / "corpus"
+
+
+def test_the_corpus_reaches_every_function_and_finds_nothing(vehicle: Vehicle, corpus: Path, tmp_path: Path) -> None:
+    build_target(native_content(vehicle).sources, tmp_path / "target")
+    counts = replay(tmp_path / "target", [corpus], tmp_path)
+    legal = {name for kind in MODES for name in legal_modes(kind)}
+    never = {"fmi2GetStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus"}  # no step is ever pending
+    assert {name for name, count in counts.accepted.items() if count} == legal - never
+    assert {name for name, count in counts.refused.items() if count} == legal | {"fmi2CancelStep"}
+
+
+# A line of C, what it is made into, and how the fuzzer tells.
+PLANTED = {
+    "a bound is not looked at": (
+        "fmi2_common.c",
+        "if (value[i] < info->minimum || value[i] > info->maximum) {",
+        "if (value[i] < info->minimum) {",
+        "fmi2SetReal: illegal",
+    ),
+    "a refused value stays": (
+        "fmi2_common.c",
+        "        if (!isfinite(value[i])) {",
+        "        f->now.values.at[vr[i]] = isfinite(value[i]) ? value[i] : old;\n        if (!isfinite(value[i])) {",
+        "fmi2SetReal changes instance",
+    ),
+    "a value reference is not looked at": (
+        "fmi2_common.c",
+        'REQUIRE("fmi2GetReal", vr[i] < N_VARIABLES,',
+        'REQUIRE("fmi2GetReal", vr[i] < N_VARIABLES + 2,',
+        "runtime error: index 46 out of bounds",
+    ),
+    "a call is legal in a mode too many": (
+        "fmi2_model_exchange.c",
+        'OPEN("fmi2SetContinuousStates", CONTINUOUS);',
+        'OPEN("fmi2SetContinuousStates", CONTINUOUS | EVENT);',
+        "fmi2SetContinuousStates: illegal in Event Mode",
+    ),
+    "the last byte of a state is not there": (
+        "fmi2_state.c",
+        "size >= SERIALIZED_SIZE,",
+        "size >= SERIALIZED_SIZE - 1,",
+        "AddressSanitizer: heap-buffer-overflow",
+    ),
+    "the time is not in the bytes": (
+        "fmi2_state.c",
+        "put_double(&to, s->time);",
+        "put_double(&to, 0.0);",
+        "a state restored from bytes goes another way",
+    ),
+    "damaged bytes are taken": (
+        "fmi2_state.c",
+        "get_word(&from) == checksum(bytes, SERIALIZED_SIZE - 8),",
+        "get_word(&from) + 1 > 0,",
+        "fmi2DeSerializeFMUstate: illegal",
+    ),
+    "a restored state steps with the coefficients from before": (
+        "fmi2_state.c",
+        "    rov_prepare(&f->now.values.named.coefficients, &f->gains);\n",
+        "",
+        "the gains are those of other coefficients|goes another way",
+    ),
+    "a state is not freed": ("fmi2_state.c", "    free(saved);\n", "", "LeakSanitizer: detected memory leaks"),
+    "overflow is not looked at": ("fmi2_co_simulation.c", "if (sum != 0.0) {", "if (sum > 0.0) {", "broken property"),
+    "fast motion is pushed by its drag": (
+        "riccati.c",
+        "const double change = (c - (2.0 * b + a * v0) * v0) * N;",
+        "const double change = (c - (2.0 * b - a * v0) * v0) * N;",
+        "without force|beyond its equilibrium",
+    ),
+    "a thrust turns the vehicle past its steady rate": (
+        "riccati.c",
+        "const double growth = M + (b + a * v0) * N;",
+        "const double growth = M + (b + a * v0) * N * 0.999;",
+        "beyond its equilibrium",
+    ),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_defect_is_found_within_a_minute(vehicle: Vehicle, corpus: Path, tmp_path: Path, name: str) -> None:
+    file, line, planted, told = PLANTED[name]
+    sources = dict(native_content(vehicle).sources)
+    assert sources[file].count(line) == 1
+    sources[file] = sources[file].replace(line, planted)
+    build_target(sources, tmp_path / "target")
+    with pytest.raises(FindingError) as found:
+        fuzz(tmp_path / "target", corpus, tmp_path, seconds=60, jobs=2)
+    assert re.search(told, found.value.words)
+    assert found.value.inputs
