@@ -20,6 +20,16 @@ from .sanitized import clang
 _ROUND = 60  # s
 
 
+def _positive(text: str) -> int:
+    try:
+        number = int(float(text))
+    except (ValueError, OverflowError):
+        number = 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 on")
+    return number
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m fuzz",
@@ -27,9 +37,9 @@ def _parser() -> argparse.ArgumentParser:
         "whether it kept its promises, under AddressSanitizer and UndefinedBehaviorSanitizer (clang).",
     )
     parser.add_argument("inputs", nargs="*", type=Path, help="run these inputs once, instead of fuzzing")
-    parser.add_argument("--calls", type=float, help="go on until so many calls were made, e.g. 1e8")
-    parser.add_argument("--seconds", type=int, help="go on for so long; without either, a minute")
-    parser.add_argument("--jobs", type=int, default=cpu_count(), help="processes (default: one a processor)")
+    parser.add_argument("--calls", type=_positive, help="go on until so many calls were made, e.g. 1e8")
+    parser.add_argument("--seconds", type=_positive, help="go on for so long; without either, a minute")
+    parser.add_argument("--jobs", type=_positive, default=cpu_count() or 1, help="processes (default: one a processor)")
     parser.add_argument("--keep", action="store_true", help="put what led to new places into the corpus")
     return parser
 

@@ -112,7 +112,9 @@ def _finish(job: _Job, folder: Path) -> Counts:
     process, file, log = job
     if process.wait() != 0:
         words = log.read_text(encoding="utf-8", errors="replace").splitlines()
-        raise FindingError("\n".join(_essence(words)), sorted(folder.glob("finding-*")))
+        # libFuzzer's progress begins with #, and has names of the log categories in it
+        told = _essence([line for line in words if not line.startswith("#")])
+        raise FindingError("\n".join(told), sorted(folder.glob("finding-*")))
     counts = Counts()
     if file.exists():
         counts.add(file)
@@ -120,6 +122,12 @@ def _finish(job: _Job, folder: Path) -> Counts:
 
 
 def _essence(words: Sequence[str]) -> Iterator[str]:
-    """Of a log of libFuzzer what was found, without how it went there."""
-    telling = ("broken property", "ERROR:", "runtime error", "SUMMARY", "    #")
-    yield from [line for line in words if any(word in line for word in telling) and not line.startswith("#")][:40]
+    """Of a log of libFuzzer what was found and where in our C, without how it went there."""
+    for line in words:
+        if line.startswith("    #"):
+            _, _, place = line.partition(" in ")
+            if ".sources/" in place or "fuzz/c/" in place:
+                function, _, path = place.partition(" ")
+                yield f"    {function} {Path(path).name}"
+        elif any(word in line for word in ("broken property", "ERROR:", "runtime error", "SUMMARY")):
+            yield line
