@@ -14,10 +14,11 @@ Notation (b, k and q are pure numbers), for a motion that keeps its sign, v >= 0
 The linear equation y'' + B y' = A C y with y(0) = 1, y'(0) = A v0 gives v = y'/(A y) and the distance ln(y)/A.
 """
 
-from math import atan, atanh, cos, e, exp, expm1, factorial, hypot, inf, isinf, log, log1p, sin, sqrt
+from math import atan, atanh, cos, e, exp, expm1, hypot, inf, isinf, log, log1p, sin, sqrt
 
-# Below this |q| expansions in q stand for the hyperbolic functions; they need no branch on its sign.
-_SMALL_Q = 0.2
+# Below this |q|, and by half the argument below four times as much, a fraction in q stands for the hyperbolic and the
+# circular functions; it needs no branch on the sign.
+_MODERATE = 0.8
 
 
 def advance(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
@@ -72,42 +73,44 @@ def time_constant(A: float, B: float, C: float) -> float:
     if D == 0.0:
         return inf
     q = 1.0 / e
-    return 2.0 * atanh((1.0 - q) * D / (D + q * B)) / D
+    return 2.0 * atanh((1.0 - q) / (1.0 + q * (B / D))) / D
 
 
 def _leg(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
     """v(h) and its integral for v0 >= 0 where v keeps its sign.
 
-    v is that of `_end_velocity` with f = tanh(r)/r, r^2 = q, and the distance is ln(1 + A X)/A with
-    X = h (v0 Y + C h W), both free of cancellation.
+    v is that of `_end_velocity` with f = tanh(r)/r, r^2 = q, and the distance is ln(1 + A X)/A with X linear in v0
+    and C, X = h (v0 Y + C h W); Y and W are the divided differences of exp and of (exp(l) - 1)/l over l1 and l2. Both
+    are free of cancellation.
     """
     a, b, c = A * h, 0.5 * B * h, C * h
     q = b * b + a * c
-    if abs(q) < _SMALL_Q:
-        # f = N/M, its continued fraction in q: exact to the last digit here
-        N = 1.0 + q * (17325.0 / 135135.0 + q * (378.0 / 135135.0 + q * (1.0 / 135135.0)))
-        M = 1.0 + q * (62370.0 / 135135.0 + q * (3150.0 / 135135.0 + q * (28.0 / 135135.0)))
+    if -_MODERATE < q < 4.0 * _MODERATE:
+        x = 0.25 * q
+        n, m = _tanh(x)
+        # f = g/(1 + x g^2), g = tanh(r/2)/(r/2) = n/m
+        N, M = _tanh(q) if q < _MODERATE else (n * m, m * m + x * n * n)
         v = _end_velocity(a, b, c, v0, N, M, M - b * N)
-        Y, W = _means(b, a * c)
+        mean = _mean(b, c, x, v0, n, m)
     elif q < 0.0:
         root = sqrt(-q)
         x, y, fade = cos(root), sin(root) / root, exp(-b)
         v = _end_velocity(a, b, c, v0, y, x, x - b * y)
-        Y, W = fade * y, (fade * (x + b * y) - 1.0) / (a * c)
+        mean = v0 * fade * y + (fade * (x + b * y) - 1.0) / a
     else:
         root = sqrt(q) if q < 1e300 else hypot(b, sqrt(a) * sqrt(c))
         l1, l2 = a * (c / (root + b)), -(root + b)  # root - b without cancellation, and -root - b
-        decay = exp(-2.0 * root)
-        gain = 1.0 - decay
-        M = root * (1.0 + decay)
+        is_settled = root > 20.0 and root - b > 2.0  # nothing is left of the start
+        decay = 0.0 if is_settled else exp(-2.0 * root)
+        gain, M = 1.0 - decay, root * (1.0 + decay)
         v = _end_velocity(a, b, c, v0, gain, M, l1 - decay * l2)
         if l1 > 1.0:  # exp(l1) may overflow
             return v, h * (l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a
-        Y = exp(l1) * gain / (2.0 * root)
-        W = ((expm1(l1) / l1 if l1 != 0.0 else 1.0) - expm1(l2) / l2) / (2.0 * root)
-    X = v0 * Y + c * W
-    p = a * X
-    return v, h * X * (log1p(p) / p if p > 0.0 else 1.0)
+        rise = expm1(l1)  # exp - 1 at l1, and at l2
+        fall = decay * (1.0 + rise) - 1.0
+        mean = (v0 * (rise - fall) + c * ((rise / l1 if l1 != 0.0 else 1.0) - fall / l2)) / (2.0 * root)
+    p = a * mean
+    return v, h * mean * (log1p(p) / p if p > 0.0 else 1.0)
 
 
 def _end_velocity(a: float, b: float, c: float, v0: float, N: float, M: float, keep: float) -> float:
@@ -116,25 +119,48 @@ def _end_velocity(a: float, b: float, c: float, v0: float, N: float, M: float, k
     Taken as the change from v0, unless that is most of v0: rounding then never makes drag push, and what is steady
     stays.
     """
-    growth = M + (b + a * v0) * N
-    change = (c - (2.0 * b + a * v0) * v0) * N
-    return v0 + change / growth if change > -0.5 * v0 * growth else (v0 * keep + c * N) / growth
+    drag = b + a * v0
+    growth = M + drag * N
+    change = (c - (b + drag) * v0) * N / growth
+    return v0 + change if change > -0.5 * v0 else (v0 * keep + c * N) / growth
 
 
-def _means(b: float, k: float) -> tuple[float, float]:
-    """Divided differences over l1, l2 of exp (Y) and of (exp(l) - 1)/l (W), for |l1|, |l2| <= 1.5.
+def _mean(b: float, c: float, x: float, v0: float, n: float, m: float) -> float:
+    """X/h = v0 Y + c W where |q| is moderate, x = q/4.
 
-    Y = sum H_n/(n+1)!, W = sum H_n/(n+2)! with H_n the complete homogeneous polynomial of l1, l2.
+    With g = tanh(r/2)/(r/2) = n/m, the same for r = b, and t = r g/2, t_b = b g_b/2,
+
+        exp(-b) = (1 - t_b)/(1 + t_b),    cosh(r) = (1 + t^2)/(1 - t^2),    sinh(r)/r = g/(1 - t^2)
+        Y = (1 - t_b) g / ((1 + t_b) (1 - t^2))
+        W = (g^2 + b (2 + b g) dg) / (2 (1 + t_b) (1 - t^2)),   dg = (g - g_b)/(q - b^2)
+
+    and dg is that of n and m, where no difference is left.
     """
-    previous, current = 0.0, 1.0
-    Y = W = 0.0
-    for n in range(24):
-        if (abs(current) + abs(previous)) * _INVERSE_FACTORIAL[n] <= 1e-17:
-            break
-        Y += current * _INVERSE_FACTORIAL[n]
-        W += current * _INVERSE_FACTORIAL[n + 1]
-        previous, current = current, k * previous - 2.0 * b * current
-    return Y, W
+    y, half = 0.25 * b * b, 0.5 * b
+    n_b, m_b = _tanh(y)
+    dn, dm = _tanh_difference(x, y)
+    coasting = (m_b - half * n_b) * (n * m)
+    pushed = 0.5 * (m_b * n * n + half * (m + half * n) * (dn * m_b - n_b * dm))
+    return (v0 * coasting + c * pushed) / ((m_b + half * n_b) * (m * m - x * n * n))
 
 
-_INVERSE_FACTORIAL = [1.0 / factorial(n + 1) for n in range(25)]
+def _tanh(x: float) -> tuple[float, float]:
+    """n, m with tanh(sqrt(x))/sqrt(x) = n/m, the continued fraction of tanh: exact to the last digit for |x| < 0.9."""
+    x2 = x * x
+    n = (_N[0] + _N[1] * x) + x2 * ((_N[2] + _N[3] * x) + x2 * _N[4])
+    m = (_M[0] + _M[1] * x) + x2 * ((_M[2] + _M[3] * x) + x2 * _M[4])
+    return n, m
+
+
+def _tanh_difference(x: float, y: float) -> tuple[float, float]:
+    """The divided differences of n and m over x and y."""
+    first, product = x + y, x * y
+    second = first * first - product
+    third = first * (second - product)
+    dn = (_N[1] + _N[2] * first) + (_N[3] * second + _N[4] * third)
+    dm = (_M[1] + _M[2] * first) + (_M[3] * second + _M[4] * third)
+    return dn, dm
+
+
+_N = [k / 34459425.0 for k in (34459425.0, 4729725.0, 135135.0, 990.0, 1.0)]
+_M = [k / 34459425.0 for k in (34459425.0, 16216200.0, 945945.0, 13860.0, 45.0)]

@@ -1,6 +1,7 @@
 #include "riccati.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 
 /* A motion mirrored to v0 >= 0, and the first leg of it: until it turns, or longer than asked for. */
@@ -54,69 +55,92 @@ static riccati_leg riccati_first_leg(const riccati *axis, double v0, double h)
     return leg;
 }
 
-/* Divided differences over l1, l2 = -b +- sqrt(b^2 + k) of exp (Y) and of (exp(l) - 1)/l (W), for |l1|, |l2| <= 1.5:
- * Y = sum H_n/(n+1)!, W = sum H_n/(n+2)! with H_n the complete homogeneous polynomial of l1, l2. */
-static inline void riccati_means(double b, double k, double *Y, double *W)
+/* tanh(sqrt(x))/sqrt(x) = n/m by the continued fraction of tanh: exact to the last digit for |x| < 0.9. */
+typedef struct {
+    double n, m;
+} riccati_fraction;
+
+static const riccati_fraction riccati_terms[] = {{1.0, 1.0},
+                                                 {4729725.0 / 34459425.0, 16216200.0 / 34459425.0},
+                                                 {135135.0 / 34459425.0, 945945.0 / 34459425.0},
+                                                 {990.0 / 34459425.0, 13860.0 / 34459425.0},
+                                                 {1.0 / 34459425.0, 45.0 / 34459425.0}};
+
+static inline riccati_fraction riccati_tanh(double x)
 {
-    static const double inverse_factorial[] = {
-        1.0, 1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0, 1.0 / 40320.0, 1.0 / 362880.0,
-        1.0 / 3628800.0, 1.0 / 39916800.0, 1.0 / 479001600.0, 1.0 / 6227020800.0, 1.0 / 87178291200.0,
-        1.0 / 1307674368000.0, 1.0 / 20922789888000.0, 1.0 / 355687428096000.0, 1.0 / 6402373705728000.0,
-        1.0 / 121645100408832000.0, 1.0 / 2432902008176640000.0, 1.0 / 51090942171709440000.0,
-        1.0 / 1124000727777607680000.0, 1.0 / 25852016738884976640000.0, 1.0 / 620448401733239439360000.0,
-        1.0 / 15511210043330985984000000.0};
-    double previous = 0.0, current = 1.0, y = 0.0, w = 0.0;
-    for (int n = 0; n < 24 && (fabs(current) + fabs(previous)) * inverse_factorial[n] > 1e-17; n++) {
-        y += current * inverse_factorial[n];
-        w += current * inverse_factorial[n + 1];
-        const double next = k * previous - 2.0 * b * current;
-        previous = current;
-        current = next;
-    }
-    *Y = y;
-    *W = w;
+    const riccati_fraction *const c = riccati_terms;
+    const double x2 = x * x;
+    return (riccati_fraction){(c[0].n + c[1].n * x) + x2 * ((c[2].n + c[3].n * x) + x2 * c[4].n),
+                              (c[0].m + c[1].m * x) + x2 * ((c[2].m + c[3].m * x) + x2 * c[4].m)};
+}
+
+/* The divided differences of n and m over x and y. */
+static inline riccati_fraction riccati_difference(double x, double y)
+{
+    const riccati_fraction *const c = riccati_terms;
+    const double first = x + y, product = x * y, second = first * first - product, third = first * (second - product);
+    return (riccati_fraction){(c[1].n + c[2].n * first) + (c[3].n * second + c[4].n * third),
+                              (c[1].m + c[2].m * first) + (c[3].m * second + c[4].m * third)};
 }
 
 /* v = (v0 (1 - b f) + c f) / (1 + (b + a v0) f), f = N/M, keep = M - b N. Taken as the change from v0, unless that is
  * most of v0: rounding then never makes drag push, and what is steady stays. */
 static inline double riccati_end_velocity(double a, double b, double c, double v0, double N, double M, double keep)
 {
-    const double growth = M + (b + a * v0) * N;
-    const double change = (c - (2.0 * b + a * v0) * v0) * N;
-    return change > -0.5 * v0 * growth ? v0 + change / growth : (v0 * keep + c * N) / growth;
+    const double drag = b + a * v0, growth = M + drag * N;
+    const double change = (c - (b + drag) * v0) * N / growth;
+    return change > -0.5 * v0 ? v0 + change : (v0 * keep + c * N) / growth;
+}
+
+/* X/h where |q| is moderate: models/riccati.py derives it. g = tanh(r/2)/(r/2), also at r = b; n, m are those of g. */
+static inline double riccati_mean(double b, double c, double x, double v0, double n, double m)
+{
+    const double y = 0.25 * b * b, half = 0.5 * b;
+    const riccati_fraction at_b = riccati_tanh(y), d = riccati_difference(x, y);
+    const double coasting = (at_b.m - half * at_b.n) * (n * m);
+    const double pushed = 0.5 * (at_b.m * n * n + half * (m + half * n) * (d.n * at_b.m - at_b.n * d.m));
+    return (v0 * coasting + c * pushed) / ((at_b.m + half * at_b.n) * (m * m - x * n * n));
 }
 
 /* One leg, v0 >= 0 and v keeps its sign: v(h) into *v and its integral into *s, where they are not NULL.
  *
- * v with f = tanh(r)/r, r^2 = q; s = ln(1 + A X)/A, X = h (v0 Y + C h W), both free of cancellation. */
+ * v with f = tanh(r)/r, r^2 = q; s = ln(1 + A X)/A, X linear in v0 and C, both free of cancellation. */
 static inline void riccati_leg_advance(double A, double B, double C, double v0, double h, double *v, double *s)
 {
     const double a = A * h, b = 0.5 * B * h, c = C * h;
     const double q = b * b + a * c;
-    double Y, W;
-    if (fabs(q) < 0.2) {
-        if (v != NULL) {
-            /* f = N/M, its continued fraction in q: exact to the last digit here */
-            const double N = 1.0 + q * (17325.0 / 135135.0 + q * (378.0 / 135135.0 + q * (1.0 / 135135.0)));
-            const double M = 1.0 + q * (62370.0 / 135135.0 + q * (3150.0 / 135135.0 + q * (28.0 / 135135.0)));
+    double mean; /* X/h */
+    if (q > -0.8 && q < 0.8 && v != NULL) {
+        const riccati_fraction f = riccati_tanh(q);
+        *v = riccati_end_velocity(a, b, c, v0, f.n, f.m, f.m - b * f.n);
+        v = NULL;
+        if (s == NULL) {
+            return;
+        }
+    }
+    if (q > -0.8 && q < 3.2) {
+        const double x = 0.25 * q;
+        const riccati_fraction g = riccati_tanh(x);
+        if (v != NULL) { /* f = g/(1 + x g^2) */
+            const double N = g.n * g.m, M = g.m * g.m + x * g.n * g.n;
             *v = riccati_end_velocity(a, b, c, v0, N, M, M - b * N);
         }
         if (s == NULL) {
             return;
         }
-        riccati_means(b, a * c, &Y, &W);
+        mean = riccati_mean(b, c, x, v0, g.n, g.m);
     } else if (q < 0.0) {
         const double root = sqrt(-q), x = cos(root), y = sin(root) / root;
         if (v != NULL) {
             *v = riccati_end_velocity(a, b, c, v0, y, x, x - b * y);
         }
         const double fade = exp(-b);
-        Y = fade * y;
-        W = (fade * (x + b * y) - 1.0) / (a * c);
+        mean = v0 * fade * y + (fade * (x + b * y) - 1.0) / a;
     } else {
         const double root = q < 1e300 ? sqrt(q) : hypot(b, sqrt(a) * sqrt(c));
         const double l1 = a * (c / (root + b)), l2 = -(root + b); /* root - b without cancellation, and -root - b */
-        const double decay = exp(-2.0 * root), gain = 1.0 - decay;
+        const bool is_settled = root > 20.0 && root - b > 2.0;    /* nothing is left of the start */
+        const double decay = is_settled ? 0.0 : exp(-2.0 * root), gain = 1.0 - decay;
         const double M = root * (1.0 + decay);
         if (v != NULL) {
             *v = riccati_end_velocity(a, b, c, v0, gain, M, l1 - decay * l2);
@@ -128,12 +152,12 @@ static inline void riccati_leg_advance(double A, double B, double C, double v0, 
             *s = h * (l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a;
             return;
         }
-        Y = exp(l1) * gain / (2.0 * root);
-        W = ((l1 != 0.0 ? expm1(l1) / l1 : 1.0) - expm1(l2) / l2) / (2.0 * root);
+        const double rise = expm1(l1), fall = decay * (1.0 + rise) - 1.0; /* exp - 1 at l1 and l2 */
+        mean = (v0 * (rise - fall) + c * ((l1 != 0.0 ? rise / l1 : 1.0) - fall / l2)) / (2.0 * root);
     }
     if (s != NULL) {
-        const double X = v0 * Y + c * W, p = a * X;
-        *s = h * X * (p > 0.0 ? log1p(p) / p : 1.0);
+        const double p = a * mean;
+        *s = h * mean * (p > 0.0 ? log1p(p) / p : 1.0);
     }
 }
 
