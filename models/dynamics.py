@@ -130,7 +130,7 @@ class Axis:
 
     def turning_time(self, v: float) -> float:
         """When the force brings the motion to rest and turns it; infinite where it does not."""
-        if v * self.C >= 0.0:
+        if (v <= 0.0 or self.C >= 0.0) and (v >= 0.0 or self.C <= 0.0):  # a product would underflow
             return inf
         return riccati.time_to_rest(self.A, self.B, -abs(self.C), abs(v))
 

@@ -14,7 +14,7 @@ Notation (b, k and q are pure numbers), for a motion that keeps its sign, v >= 0
 The linear equation y'' + B y' = A C y with y(0) = 1, y'(0) = A v0 gives v = y'/(A y) and the distance ln(y)/A.
 """
 
-from math import atan, atanh, cos, e, exp, expm1, hypot, inf, isinf, log, log1p, sin, sqrt
+from math import atan, atanh, copysign, cos, e, exp, expm1, hypot, inf, isinf, log, log1p, sin, sqrt
 
 # Below this |q|, and by half the argument below four times as much, a fraction in q stands for the hyperbolic and the
 # circular functions; it needs no branch on the sign.
@@ -38,17 +38,25 @@ def advance(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, f
 
 def time_to_rest(A: float, B: float, C: float, v0: float) -> float:
     """Return the time (s) at which a force C < 0 stops a motion v0 > 0."""
-    D2 = B * B + 4.0 * A * C
+    D = _signed_root(A, B, C)
     S = v0 / (B * v0 - 2.0 * C)
-    D = sqrt(abs(D2))
     x = D * S
-    if x == 0.0:  # D2 = 0, or an underflow
+    if x == 0.0:  # D = 0, or an underflow
         return 2.0 * S
-    if D2 < 0.0:
+    if x < 0.0:
         return 2.0 * S * (atan(x) / x)
     if x > 0.5:  # artanh would lose the distance of its argument from 1
-        return log1p(D * v0 / (-2.0 * A * C / (B + D) * v0 - C)) / D
+        return log1p(D * v0 / (-C * (1.0 + 2.0 * A / (B + D) * v0))) / D
     return 2.0 * S * (atanh(x) / x)
+
+
+def _signed_root(A: float, B: float, C: float) -> float:
+    """The root of |D^2|, D^2 = B^2 + 4 A C with C < 0, with the sign of D^2."""
+    D2 = B * B + 4.0 * A * C
+    if abs(D2) > 1e-290:
+        return copysign(sqrt(abs(D2)), D2)
+    root = 2.0 * sqrt(A) * sqrt(-C)  # B^2 and A C may have underflowed
+    return copysign(sqrt(abs(B - root)) * sqrt(B + root), B - root)
 
 
 def steady_velocity(A: float, B: float, C: float) -> float:

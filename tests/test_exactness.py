@@ -230,13 +230,6 @@ def test_a_heading_far_from_zero_is_as_good_as_one_near_it(fmu: Fmu, vehicle: Ve
     assert far.psi == psi + near.psi
 
 
-@pytest.mark.parametrize("u_l", [0.6, -0.6])
-def test_port_and_starboard_are_mirror_images_to_the_last_bit(fmu: Fmu, vehicle: Vehicle, u_l: float) -> None:
-    starboard = run(fmu, vehicle.coefficients, Inputs(u_l=u_l, u_r=0.2), State(u=-0.1, r=0.7), 3.0)
-    port = run(fmu, vehicle.coefficients, Inputs(u_l=0.2, u_r=u_l), State(u=-0.1, r=-0.7), 3.0)
-    assert port == replace(starboard, y=-starboard.y, r=-starboard.r, psi=-starboard.psi)
-
-
 @pytest.mark.parametrize(("h", "steps"), [(1e6, 1), (1e6, 1000)])
 def test_a_steady_turn_stays_on_its_circle(fmu: Fmu, vehicle: Vehicle, h: float, steps: int) -> None:
     inputs = Inputs(u_l=0.6, u_r=0.3)

@@ -5,8 +5,6 @@ from itertools import product
 from math import e, inf, nextafter, pi
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from mpmath import mp
 from scipy.optimize import brentq
 
@@ -77,9 +75,9 @@ def test_exact_without_drag_force_or_motion() -> None:
             check((*motion, h))
 
 
-@pytest.mark.parametrize("q", [0.2, -0.2])
-def test_exact_on_both_sides_of_the_expansions(q: float) -> None:
-    """|q| = 0.2 is where they end, q = (B h/2)^2 + A C h^2: no jump, for both sides are exact."""
+@pytest.mark.parametrize("q", [0.8, -0.8, 3.2])
+def test_exact_on_both_sides_of_the_fractions(q: float) -> None:
+    """There they end, q = (B h/2)^2 + A C h^2: no jump, for both sides are exact."""
     for A, B, v0 in product((1e-3, 0.3, 50.0), (0.0, 1e-3, 1.0), (0.0, 0.1, 20.0)):
         for offset in (-1e-3, -1e-15, 0.0, 1e-15, 1e-3):
             check((A, B, (q * (1.0 + offset) - 0.25 * B * B) / A, v0, 1.0))
@@ -157,51 +155,3 @@ def test_a_stop_from_any_velocity_takes_less_than_a_bounded_time() -> None:
     """Quadratic drag alone: time to rest is atan(v sqrt(A/F))/sqrt(A F), at most pi/2 of the unit."""
     assert time_to_rest(4.0, 0.0, -1.0, 1e300) == pytest.approx(pi / 4.0, rel=1e-15)
     assert time_to_rest(0.0, 0.0, -2.0, 3.0) == 1.5
-
-
-# ---- Laws that hold for every motion ----
-
-
-def magnitude(low: float, high: float) -> st.SearchStrategy[float]:
-    return st.just(0.0) | st.floats(low, high)
-
-
-def signed(low: float, high: float) -> st.SearchStrategy[float]:
-    return st.builds(lambda sign, size: sign * size, st.sampled_from((-1.0, 1.0)), magnitude(low, high))
-
-
-DRAG = st.tuples(magnitude(1e-4, 1e3), magnitude(1e-4, 1e3))
-FORCE = signed(1e-4, 1e4)
-VELOCITIES = signed(1e-4, 1e2)
-TIME = st.floats(1e-5, 1e3)
-
-
-@given(DRAG, FORCE, VELOCITIES, TIME)
-def test_left_and_right_are_mirror_images_to_the_last_bit(
-    drag: tuple[float, float], C: float, v0: float, h: float
-) -> None:
-    velocity, distance = advance(*drag, C, v0, h)
-    assert advance(*drag, -C, -v0, h) == (-velocity, -distance)
-
-
-@given(DRAG, FORCE, VELOCITIES, TIME)
-def test_two_half_steps_are_one_step(drag: tuple[float, float], C: float, v0: float, h: float) -> None:
-    velocity, distance = advance(*drag, C, v0, h)
-    middle, first = advance(*drag, C, v0, 0.5 * h)
-    end, second = advance(*drag, C, middle, 0.5 * h)
-    # over 400,000 random motions at most 1.0e-15 and 1.4e-15
-    assert abs(end - velocity) <= 4e-15 * max(abs(v0), abs(velocity), abs(middle))
-    assert abs(first + second - distance) <= 4e-15 * (abs(first) + abs(second))
-
-
-@given(DRAG, FORCE, VELOCITIES, TIME, st.floats(1.0, 10.0))
-def test_the_velocity_approaches_the_steady_one_and_never_passes_it(
-    drag: tuple[float, float], C: float, v0: float, h: float, longer: float
-) -> None:
-    V = steady_velocity(*drag, C)
-    early, late = (advance(*drag, C, v0, time)[0] for time in (h, h * longer))
-    rounding = VELOCITY * max(abs(v0), abs(early), abs(late))
-    low, high = min(v0, V) - rounding, max(v0, V) + rounding
-    assert low <= early <= high
-    assert low <= late <= high
-    assert early <= late + rounding if v0 < V else late <= early + rounding

@@ -14,20 +14,30 @@ static double riccati_acceleration(const riccati *axis, double v)
     return axis->C - (axis->B + axis->A * fabs(v)) * v;
 }
 
+/* The root of |D^2|, D^2 = B^2 + 4 A C with C < 0, with the sign of D^2. */
+static double riccati_signed_root(double A, double B, double C)
+{
+    const double D2 = B * B + 4.0 * A * C;
+    if (fabs(D2) > 1e-290) {
+        return copysign(sqrt(fabs(D2)), D2);
+    }
+    const double root = 2.0 * sqrt(A) * sqrt(-C); /* B^2 and A C may have underflowed */
+    return copysign(sqrt(fabs(B - root)) * sqrt(B + root), B - root);
+}
+
 /* Time at which C < 0 stops v0 > 0. */
 static double riccati_time_to_rest(double A, double B, double C, double v0)
 {
-    const double D2 = B * B + 4.0 * A * C;
-    const double S = v0 / (B * v0 - 2.0 * C);
-    const double D = sqrt(fabs(D2)), x = D * S;
-    if (x == 0.0) { /* D2 = 0, or an underflow */
+    const double D = riccati_signed_root(A, B, C);
+    const double S = v0 / (B * v0 - 2.0 * C), x = D * S;
+    if (x == 0.0) { /* D = 0, or an underflow */
         return 2.0 * S;
     }
-    if (D2 < 0.0) {
+    if (x < 0.0) {
         return 2.0 * S * (atan(x) / x);
     }
     if (x > 0.5) { /* artanh would lose the distance of its argument from 1 */
-        return log1p(D * v0 / (-2.0 * A * C / (B + D) * v0 - C)) / D;
+        return log1p(D * v0 / (-C * (1.0 + 2.0 * A / (B + D) * v0))) / D;
     }
     return 2.0 * S * (atanh(x) / x);
 }
