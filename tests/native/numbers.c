@@ -1,0 +1,287 @@
+/* Counts bytes: many instances at once, long lives, and the FMU's shared library loaded again and again (glibc).
+ *
+ * Usage: numbers LIBRARY GUID INSTANCES CYCLES LOADS. Each line of output is a name and a number.
+ *
+ * Memory is counted twice, neither estimated: bytes allocated, and pages of address space, where all that does not come
+ * from malloc shows. Growth is what is there after the last of several equal rounds, less that after the first. */
+#define _GNU_SOURCE
+#include "fmi2FunctionTypes.h"
+#include "model.h"
+
+#include <dlfcn.h>
+#include <malloc.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    N_ROUNDS = 4,
+    N_STEPS = 5, /* of each of many instances */
+    N_INPUTS = sizeof(rov_inputs) / sizeof(double),
+    N_STATES = sizeof(rov_state) / sizeof(double),
+    FIRST_STATE = offsetof(rov_variables, state) / sizeof(double),
+    FIRST_DERIVATIVE = offsetof(rov_variables, derivative) / sizeof(double),
+    FIRST_COEFFICIENT = offsetof(rov_variables, coefficients) / sizeof(double)
+};
+
+#define FUNCTIONS(F)                                                                                                \
+    F(Instantiate) F(FreeInstance) F(SetupExperiment) F(EnterInitializationMode) F(ExitInitializationMode) F(Reset)  \
+    F(SetReal) F(GetReal) F(DoStep) F(GetFMUstate) F(SetFMUstate) F(FreeFMUstate) F(SerializedFMUstateSize)          \
+    F(SerializeFMUstate) F(DeSerializeFMUstate) F(GetDirectionalDerivative)
+
+#define DECLARE(name) fmi2##name##TYPE *name;
+typedef struct {
+    void *handle;
+    FUNCTIONS(DECLARE)
+} library;
+
+static const char *path, *guid;
+static library fmu;
+static size_t messages;
+
+static void check(int ok, const char *what)
+{
+    if (!ok) {
+        fprintf(stderr, "numbers: %s failed\n", what);
+        exit(1);
+    }
+}
+
+static void load(void)
+{
+    fmu.handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    check(fmu.handle != NULL, "dlopen");
+    void *symbol;
+#define FIND(name)                             \
+    symbol = dlsym(fmu.handle, "fmi2" #name);  \
+    check(symbol != NULL, "fmi2" #name);       \
+    memcpy(&fmu.name, &symbol, sizeof symbol);
+    FUNCTIONS(FIND)
+}
+
+static void unload(void)
+{
+    check(dlclose(fmu.handle) == 0, "dlclose");
+    check(dlopen(path, RTLD_NOW | RTLD_NOLOAD) == NULL, "unloading the library");
+}
+
+/* ---- Memory ---- */
+
+typedef struct {
+    long long allocated, pages;
+} memory;
+
+static memory memory_now(void)
+{
+    const struct mallinfo2 info = mallinfo2();
+    char text[32] = "";
+    FILE *const file = fopen("/proc/self/statm", "r");
+    check(file != NULL && fgets(text, sizeof text, file) != NULL, "reading /proc/self/statm");
+    fclose(file);
+    return (memory){(long long)(info.uordblks + info.hblkhd), strtoll(text, NULL, 10)};
+}
+
+static void report_growth(const char *name, memory first, memory last)
+{
+    printf("%s.allocated %lld\n", name, last.allocated - first.allocated);
+    printf("%s.pages %lld\n", name, last.pages - first.pages);
+}
+
+/* ---- One instance ---- */
+
+static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
+                   fmi2String message, ...)
+{
+    (void)environment, (void)name, (void)status, (void)category, (void)message;
+    messages++;
+}
+
+static void start(fmi2Component c)
+{
+    check(fmu.SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK, "fmi2SetupExperiment");
+    check(fmu.EnterInitializationMode(c) == fmi2OK, "fmi2EnterInitializationMode");
+    check(fmu.ExitInitializationMode(c) == fmi2OK, "fmi2ExitInitializationMode");
+}
+
+static fmi2Component instance(int number)
+{
+    static const fmi2CallbackFunctions callbacks = {logger, NULL, NULL, NULL, NULL};
+    char name[32];
+    snprintf(name, sizeof name, "vehicle %d", number);
+    fmi2Component const c = fmu.Instantiate(name, fmi2CoSimulation, guid, NULL, &callbacks, fmi2False, fmi2False);
+    check(c != NULL, "fmi2Instantiate");
+    start(c);
+    return c;
+}
+
+/* A step with inputs of its own for every instance and step; the command beyond 1 saturates. */
+static void step(fmi2Component c, int number, int n)
+{
+    fmi2ValueReference vr[N_INPUTS];
+    double values[N_INPUTS];
+    for (unsigned i = 0; i < N_INPUTS; i++) {
+        vr[i] = i;
+        values[i] = ((number * 31 + n * 7 + (int)i * 13) % 100 - 50) / 48.0;
+    }
+    check(fmu.SetReal(c, vr, N_INPUTS, values) == fmi2OK, "fmi2SetReal");
+    check(fmu.DoStep(c, 0.1 * n, 0.1, fmi2True) == fmi2OK, "fmi2DoStep");
+}
+
+static rov_state state_of(fmi2Component c)
+{
+    fmi2ValueReference vr[N_STATES];
+    double values[N_STATES];
+    rov_state state;
+    for (unsigned i = 0; i < N_STATES; i++) {
+        vr[i] = FIRST_STATE + i;
+    }
+    check(fmu.GetReal(c, vr, N_STATES, values) == fmi2OK, "fmi2GetReal");
+    memcpy(&state, values, sizeof state);
+    return state;
+}
+
+/* ---- Many instances at once ---- */
+
+static void crowd(int n)
+{
+    fmi2Component *const instances = calloc((size_t)n, sizeof *instances);
+    check(instances != NULL, "calloc");
+    long long bytes = 0;
+    int different = 0;
+    memory freed[N_ROUNDS];
+    for (int round = 0; round < N_ROUNDS; round++) {
+        const memory before = memory_now();
+        for (int i = 0; i < n; i++) {
+            instances[i] = instance(i);
+        }
+        for (int k = 0; k < N_STEPS; k++) {
+            for (int i = 0; i < n; i++) {
+                step(instances[i], i, k);
+            }
+        }
+        bytes = memory_now().allocated - before.allocated;
+        fmi2Component const alone = instance(n);
+        for (int i = 0; i < n; i++) {
+            check(fmu.Reset(alone) == fmi2OK, "fmi2Reset");
+            start(alone);
+            for (int k = 0; k < N_STEPS; k++) {
+                step(alone, i, k);
+            }
+            const rov_state a = state_of(instances[i]), b = state_of(alone);
+            different += memcmp(&a, &b, sizeof a) != 0;
+            fmu.FreeInstance(instances[i]);
+        }
+        fmu.FreeInstance(alone);
+        freed[round] = memory_now();
+    }
+    free(instances);
+    printf("different %d\nbytes_of_an_instance %.1f\n", different, (double)bytes / n);
+    report_growth("instances", freed[0], freed[N_ROUNDS - 1]);
+}
+
+/* ---- One instance for long ---- */
+
+static void steps(fmi2Component c, int n)
+{
+    step(c, n % 100, n);
+}
+
+static void resets(fmi2Component c, int n)
+{
+    check(fmu.Reset(c) == fmi2OK, "fmi2Reset");
+    start(c);
+    step(c, n % 100, n);
+}
+
+/* Saved, serialized, read into a second state, restored, both freed. */
+static void saves(fmi2Component c, int n)
+{
+    fmi2FMUstate saved = NULL, read = NULL;
+    size_t size;
+    fmi2Byte bytes[1024];
+    step(c, n % 100, n);
+    check(fmu.GetFMUstate(c, &saved) == fmi2OK, "fmi2GetFMUstate");
+    check(fmu.SerializedFMUstateSize(c, saved, &size) == fmi2OK && size <= sizeof bytes, "fmi2SerializedFMUstateSize");
+    check(fmu.SerializeFMUstate(c, saved, bytes, size) == fmi2OK, "fmi2SerializeFMUstate");
+    check(fmu.DeSerializeFMUstate(c, bytes, size, &read) == fmi2OK, "fmi2DeSerializeFMUstate");
+    check(fmu.SetFMUstate(c, read) == fmi2OK, "fmi2SetFMUstate");
+    bytes[size / 2] ^= 1;
+    check(fmu.DeSerializeFMUstate(c, bytes, size, &read) == fmi2Error, "refusing damaged bytes");
+    check(fmu.FreeFMUstate(c, &saved) == fmi2OK && fmu.FreeFMUstate(c, &read) == fmi2OK, "fmi2FreeFMUstate");
+}
+
+/* Each of them logged. */
+static void refusals(fmi2Component c, int n)
+{
+    const fmi2ValueReference coefficient = FIRST_COEFFICIENT, derivative = FIRST_DERIVATIVE, input = 0;
+    const double infinite = 1e308 * 10.0, one = 1.0;
+    double change;
+    const size_t before = messages;
+    check(fmu.SetReal(c, &coefficient, 1, &one) == fmi2Error, "refusing a fixed parameter");
+    check(fmu.SetReal(c, &input, 1, &infinite) == fmi2Discard, "refusing infinity");
+    check(fmu.DoStep(c, 0.0, -1.0, fmi2True) == fmi2Error, "refusing a step back");
+    check(fmu.EnterInitializationMode(c) == fmi2Error, "refusing a second initialization");
+    check(fmu.SetFMUstate(c, NULL) == fmi2Error, "refusing no state");
+    check(fmu.GetDirectionalDerivative(c, &derivative, 1, &derivative, 1, &one, &change) == fmi2Error,
+          "refusing a derivative as a known");
+    check(messages == before + 6, "logging");
+    (void)n;
+}
+
+static void lives(fmi2Component c, int n)
+{
+    (void)c;
+    fmi2Component const other = instance(n);
+    step(other, n % 100, 0);
+    fmu.FreeInstance(other);
+}
+
+static void endure(const char *name, void (*cycle)(fmi2Component, int), int cycles)
+{
+    fmi2Component const c = instance(0);
+    memory after[N_ROUNDS];
+    for (int round = 0; round < N_ROUNDS; round++) {
+        for (int n = 0; n < cycles / N_ROUNDS; n++) {
+            cycle(c, n);
+        }
+        after[round] = memory_now();
+    }
+    fmu.FreeInstance(c);
+    report_growth(name, after[0], after[N_ROUNDS - 1]);
+}
+
+/* ---- Loaded again and again ---- */
+
+static void reload(int loads)
+{
+    memory after[N_ROUNDS];
+    for (int round = 0; round < N_ROUNDS; round++) {
+        for (int n = 0; n < loads / N_ROUNDS; n++) {
+            load();
+            lives(NULL, n);
+            unload();
+        }
+        after[round] = memory_now();
+    }
+    report_growth("loads", after[0], after[N_ROUNDS - 1]);
+}
+
+int main(int argc, char *argv[])
+{
+    check(argc == 6, "usage: numbers LIBRARY GUID INSTANCES CYCLES LOADS;");
+    path = argv[1];
+    guid = argv[2];
+    const int instances = atoi(argv[3]), cycles = atoi(argv[4]), loads = atoi(argv[5]);
+    check(instances > 0 && cycles >= 10 * N_ROUNDS && loads >= N_ROUNDS, "enough of each");
+    memory_now(); /* what it allocates itself for good is there before anything is counted */
+    reload(loads);
+    load();
+    crowd(instances);
+    endure("steps", steps, cycles);
+    endure("lives", lives, cycles / 10);
+    endure("resets", resets, cycles / 10);
+    endure("saves", saves, cycles / 10);
+    endure("refusals", refusals, cycles / 10);
+    unload();
+    return 0;
+}
