@@ -2,8 +2,6 @@
 
 import argparse
 import asyncio
-import signal
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -12,13 +10,15 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
 from fmu_src.compile import PLATFORMS, BuildError, compile_all, host_platform
 from fmu_src.interface import variables
 from fmu_src.osp import osp_model_description, osp_path
-from models.csvfile import DataFileError
-from models.files import write_whole
-from models.vehicle import VIDEORAY, Vehicle, VehicleFileError, load_vehicle
+from models.command_line import exit_code, run_process
+from models.files import Output, check_targets, write_whole
+from models.messages import FileError
+from models.vehicle import VIDEORAY, Vehicle, load_vehicle
 
 if TYPE_CHECKING:
     from fmu_src.package import Content
@@ -26,35 +26,34 @@ if TYPE_CHECKING:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code: 0 built, 1 the build failed, 2 bad input, 130 interrupted."""
+    return exit_code("build_fmu", lambda: _run(arguments), {FileError: 2, BuildError: 1, OSError: 1})
+
+
+def _run(arguments: Sequence[str] | None) -> None:
     options = _parser().parse_args(arguments)
-    try:
-        vehicle = load_vehicle(options.vehicle)
-        python = options.backend == "pythonfmu"
-        if python and options.platform:
-            raise BuildError("--platform: the PythonFMU flavour is the same for all platforms")
-        output: Path = options.output or Path(f"{vehicle.identifier}{'-python' if python else ''}.fmu")
-        beside = osp_path(output, vehicle.identifier) if options.osp else None
-        for path in filter(None, (output, beside)):
-            _check_output(path)
-        build(vehicle, output, None if python else _chosen_platforms(options.platform))
-        if beside:
-            write_whole(beside, osp_model_description(variables(vehicle.coefficients)))
-            Console().print(f"[bold]{beside}[/]", highlight=False)
-    except (VehicleFileError, DataFileError) as error:
-        return _say(str(error), 2)
-    except BuildError as error:
-        return _say(str(error), 1)
-    except OSError as error:
-        return _say(f"{error.filename or 'a temporary file'}: cannot be written: {error.strerror or error}", 1)
-    except KeyboardInterrupt:
-        return _say("interrupted, nothing written", 130)
-    return 0
+    vehicle = load_vehicle(options.vehicle)
+    python = options.backend == "pythonfmu"
+    if python and options.platform:
+        raise BuildError("--platform: the PythonFMU flavour is the same for all platforms")
+    output: Path = options.output or Path(f"{vehicle.identifier}{'-python' if python else ''}.fmu")
+    beside = []
+    if options.osp:
+        description = osp_model_description(variables(vehicle.coefficients))
+        beside = [Output(osp_path(output, vehicle.identifier), description)]
+    check_targets([output, *(other.path for other in beside)], [options.vehicle, *vehicle.files])
+    build(vehicle, output, None if python else _chosen_platforms(options.platform), beside=beside)
 
 
-def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None, console: Console | None = None) -> None:
+def build(
+    vehicle: Vehicle,
+    output: Path,
+    platforms: Sequence[str] | None,
+    console: Console | None = None,
+    beside: Sequence[Output] = (),
+) -> None:
     """Compile, write, validate and run the FMU of a vehicle, and print what was built. Raises BuildError.
 
-    Platforms None is the flavour in pure Python.
+    Platforms None is the flavour in pure Python. What is to stand beside the FMU is written with it or not at all.
     """
     from fmu_src.package import archive, native_content, python_content
 
@@ -64,13 +63,18 @@ def build(vehicle: Vehicle, output: Path, platforms: Sequence[str] | None, conso
     binaries, seconds = _compile(content, platforms or [], console)
     notes: list[str] = []
     files = {_binary(name, content.identifier): library for name, library in binaries.items()}
-    write_whole(output, archive({**content.files, **files}), lambda draft: notes.append(_check_fmu(draft, platforms)))
-    console.print(f"[bold]{output}[/]  {output.stat().st_size / 1000:.0f} kB  {content.guid}", highlight=False)
+    packed = archive({**content.files, **files})
+    write_whole(Output(output, packed, lambda draft: notes.append(_check_fmu(draft, platforms))), *beside)
+    console.print(
+        Text.assemble((str(output), "bold"), f"  {len(packed) / 1000:.0f} kB  {content.guid}"), soft_wrap=True
+    )
     for name in platforms or []:
         size = len(binaries[name]) / 1000
         console.print(f"  {name:<14}{size:6.0f} kB{seconds[name]:7.1f} s", highlight=False)
     for note in notes:
         console.print(f"  {note}", highlight=False)
+    for other in beside:
+        console.print(Text(str(other.path), "bold"), soft_wrap=True)
     console.print(f"  built in {time.perf_counter() - started:.1f} s", highlight=False)
 
 
@@ -120,19 +124,6 @@ def _chosen_platforms(names: Sequence[str] | None) -> list[str]:
     return list(dict.fromkeys(host if name == "host" and host else name for name in names))
 
 
-def _check_output(output: Path) -> None:
-    """Fail before the long work, not after it."""
-    if output.is_dir():
-        raise BuildError(f"{output}: is a folder, not a file to write")
-    if not output.parent.is_dir():
-        raise BuildError(f"{output}: there is no folder {output.parent}")
-
-
-def _say(message: str, code: int) -> int:
-    print(f"build_fmu: {message}", file=sys.stderr)
-    return code
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="build_fmu.py", description=__doc__)
     parser.add_argument("vehicle", nargs="?", type=Path, default=VIDEORAY, metavar="VEHICLE.toml",
@@ -149,5 +140,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended from outside, it cleans up as at Ctrl-C
-    sys.exit(main())
+    run_process(main)

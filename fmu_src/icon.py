@@ -6,6 +6,7 @@ The drawings are in centimetres in the body frame (x forward, y starboard or z d
 from io import BytesIO
 from math import cos, pi, sin
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 from matplotlib import style
 from matplotlib.axes import Axes
@@ -25,7 +26,8 @@ _WIDTH, _HEIGHT = 400, 300
 def model_icon(vehicle: Vehicle) -> bytes:
     """The picture as PNG, 400 by 300 pixels, the same bytes at every call."""
     drawn = BytesIO()
-    with style.context("default"):  # whatever the user's Matplotlib is set to
+    with style.context("default"), catch_warnings():  # whatever the user's Matplotlib is set to
+        simplefilter("ignore", UserWarning)  # of a script that the font does not have
         _draw(vehicle.name).savefig(drawn, format="png")
     # A palette is a third of the size, and names no software.
     png = BytesIO()

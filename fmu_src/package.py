@@ -9,7 +9,7 @@ from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
 
-from models.vehicle import Vehicle
+from models.vehicle import Vehicle, VehicleFileError
 
 from .compile import C_SOURCES, UNITY_FILE, fmi_headers
 from .description import NATIVE, PYTHON, model_description
@@ -99,8 +99,12 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
 
 def _common_files(vehicle: Vehicle, declared: tuple[Variable, ...], *, native: bool) -> dict[str, bytes]:
     report = vehicle.provenance.report if vehicle.provenance else None
+    try:
+        page = {f"documentation/{REPORT}": report.read_bytes()} if report else {}
+    except OSError as error:
+        raise VehicleFileError(f"{report}: {error.strerror}") from error
     return {
-        **({f"documentation/{REPORT}": report.read_bytes()} if report else {}),
+        **page,
         "model.png": model_icon(vehicle),
         "documentation/index.html": documentation_page(vehicle, declared, native=native).encode(),
         "documentation/licenses/license.txt": _LICENSE.read_bytes(),

@@ -1,14 +1,15 @@
 """Command line: python -m models tables | identify | tune | figures."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from .csvfile import DataFileError
+from .command_line import exit_code, run_process
+from .files import check_targets, write_whole
 from .manoeuvres import MANOEUVRES
-from .vehicle import VIDEORAY, VehicleFileError, load_vehicle
+from .messages import FileError
+from .vehicle import VIDEORAY, load_vehicle
 
 
 class _OptionError(ValueError):
@@ -16,17 +17,13 @@ class _OptionError(ValueError):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code: 0 done, 2 bad input."""
-    options = _parser().parse_args(arguments)
-    try:
+    """Run the command line; the exit code: 0 done, 2 bad input, 130 interrupted."""
+
+    def run() -> None:
+        options = _parser().parse_args(arguments)
         options.run(options)
-    except (VehicleFileError, DataFileError, _OptionError) as error:
-        print(f"models: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"models: {error.filename}: {error.strerror}", file=sys.stderr)
-        return 2
-    return 0
+
+    return exit_code("models", run, {FileError: 2, _OptionError: 2, OSError: 2})
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -74,18 +71,21 @@ def _identify(options: argparse.Namespace) -> None:
     from .experiments import load_experiments
     from .identification import identify
     from .printing_results import print_identification
-    from .writer import write_vehicle
+    from .writer import vehicle_output
 
-    identification = identify(load_experiments(options.folder))
-    vehicle = identification.vehicle
+    experiments = load_experiments(options.folder)
+    check_targets(filter(None, (options.output, options.report)), experiments.files)
+    identification = identify(experiments)
+    vehicle, outputs = identification.vehicle, []
     if options.report:
-        from .report import write_report
+        from .report import report_output
 
-        write_report(identification, options.report)
+        outputs.append(report_output(identification, options.report))
         assert vehicle.provenance
         vehicle = replace(vehicle, provenance=replace(vehicle.provenance, report=options.report))
     if options.output:
-        write_vehicle(vehicle, options.output)
+        outputs.append(vehicle_output(vehicle, options.output))
+    write_whole(*outputs)
     print_identification(identification)
 
 
@@ -100,6 +100,7 @@ def _tune(options: argparse.Namespace) -> None:
     if options.points is not None and (*single, options.tau) != (None, None, None):
         raise _OptionError("tune: --points stands instead of --command, --v-ss and --tau")
     vehicle, manoeuvre = load_vehicle(options.vehicle), MANOEUVRES[options.axis]
+    check_targets(filter(None, (options.output,)), filter(None, (options.points,)))
     try:
         if options.points is None:
             tuning = tune(vehicle.coefficients, manoeuvre, *single, options.tau)
@@ -119,4 +120,4 @@ def _figures(options: argparse.Namespace) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_process(main)

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 
+from .messages import FileError, shown
+
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 _HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]+)\]")
 
 
-class DataFileError(ValueError):
+class DataFileError(FileError):
     """A file of data that cannot be used: one line with file, line, column, value and reason."""
 
 
@@ -27,6 +29,8 @@ class Column:
     minimum: float | None = None
     maximum: float | None = None
     """In the first unit."""
+    least: float = 0.0
+    """Magnitude, of a number other than zero; in the first unit."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ class Columns:
         """The one line for a number that cannot be."""
         header, per = self.headers[column]
         value = self.values[column][row] * per
-        return DataFileError(f"{self.path}, line {self.lines[row]}, column {header!r} = {value:g}: {reason}")
+        return DataFileError(f"{self.path}, line {self.lines[row]}, column {shown(header)} = {value:g}: {reason}")
 
 
 def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = False) -> Columns:
@@ -59,7 +63,7 @@ def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = Fa
             if found := _column(title, columns, [name for name, *_ in read.values()], others):
                 read[place] = found
         except ValueError as error:
-            raise DataFileError(f"{path}, line {line}, column {place + 1} = {title!r}: {error}") from None
+            raise DataFileError(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}") from None
     names = [name for name, *_ in read.values()]
     for name, column in columns.items():
         if name not in names and not column.optional:
@@ -69,14 +73,16 @@ def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = Fa
     for line, texts in lines:
         if len(texts) > len(header):
             text = texts[len(header)]
-            raise DataFileError(f"{path}, line {line}, column {len(header) + 1} = {text!r}: there is no such column")
+            raise DataFileError(
+                f"{path}, line {line}, column {len(header) + 1} = {shown(text)}: there is no such column"
+            )
         for place, (name, per, column) in read.items():
             text = texts[place] if place < len(texts) else ""
             try:
                 values[name].append(_value(text, per, column))
             except ValueError as error:
-                shown = f" = {text!r}" if text else ""
-                raise DataFileError(f"{path}, line {line}, column {header[place]!r}{shown}: {error}") from None
+                value = f" = {shown(text)}" if text else ""
+                raise DataFileError(f"{path}, line {line}, column {shown(header[place])}{value}: {error}") from None
         numbers.append(line)
     if not numbers:
         raise DataFileError(f"{path}, line {line}: no rows below the header")
@@ -142,4 +148,6 @@ def _value(text: str, per: float, column: Column) -> float:
         raise ValueError(f"must be at least {column.minimum * per:g}")
     if column.maximum is not None and value > column.maximum:
         raise ValueError(f"must be at most {column.maximum * per:g}")
+    if 0.0 < abs(value) < column.least:
+        raise ValueError(f"must be 0, or {column.least * per:g} at least, or {-column.least * per:g} at most")
     return value

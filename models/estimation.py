@@ -68,9 +68,10 @@ class Estimate:
         if not isfinite(error) or not self.freedom > 0.0:
             return None
         reach = float(student.ppf(0.5 + 0.5 * LEVEL, self.freedom)) * error
-        if is_factor(name):
-            return value * exp(-reach / value), value * exp(reach / value)
         meta = COEFFICIENTS[name]
+        if is_factor(name):
+            ratio = exp(min(reach / value, 100.0))
+            return value / ratio, min(meta.maximum, value * ratio)
         return max(meta.minimum, value - reach), min(meta.maximum, value + reach)
 
     @property

@@ -14,7 +14,7 @@ both rear thrusters, opposite in yaw. Numbers leave this module in SI units, com
 import hashlib
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from pathlib import Path
 from typing import Annotated, Any
@@ -101,6 +101,11 @@ class Experiments:
     inputs: Mapping[str, str]
     """SHA-256 of every file read, by its name."""
 
+    @property
+    def files(self) -> list[Path]:
+        """Every file that the identification reads."""
+        return [*(self.folder / name for name in self.inputs), *filter(None, (self.rov.against,))]
+
 
 def load_experiments(folder: Path) -> Experiments:
     """Read a folder. Raises DataFileError, VehicleFileError."""
@@ -113,10 +118,10 @@ def load_experiments(folder: Path) -> Experiments:
     inputs = {ROV_FILE: _hash(folder / ROV_FILE)}
     for path in sorted(folder.glob("*.csv")):
         match = _KINDS.fullmatch(path.name)
-        if not match:
+        if not match or not path.name.isprintable():
             raise DataFileError(
                 f"{path}: no name of a test; thrust_ begins one, then rear or top, or steady_, time_constant_ or log_, "
-                "then surge, heave or yaw"
+                "then surge, heave or yaw, then _ and any printable characters"
             )
         if match["thrust"]:
             thrust[match["thruster"]] += _thrust(path)
@@ -170,23 +175,33 @@ def _load_rov(path: Path) -> Rov:
 
 # ---- CSV files -------------------------------------------------------------------------------------------------------
 
-COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
+# The bounds are far beyond any vehicle; what passes them is a slip, and numbers without any would overflow in a fit.
+_COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
+HELD_COMMAND = replace(_COMMAND, least=1e-4)
 _LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 _ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
-TIMES = {"s": 1.0, "ms": 1000.0}
-_FORCES = {"N": 1.0}
+_TIMES = {"s": 1.0, "ms": 1000.0}
+_FORCE = Column({"N": 1.0}, minimum=-1e6, maximum=1e6)
+_TIME = Column(_TIMES, minimum=-1e10, maximum=1e10)  # a logger's may count from 1970
+LEAST_VELOCITY, MOST_VELOCITY = 1e-5, 1e3
+_MOST_POSITION = 1e7
 
 
-def velocity_column(manoeuvre: Manoeuvre, *, optional: bool = False) -> Column:
+def velocity_column(manoeuvre: Manoeuvre, *, optional: bool = False, least: float = LEAST_VELOCITY) -> Column:
     """A column of velocities along the axis; an optional one may have blanks."""
     lengths = _ANGLES if manoeuvre.unit == "rad/s" else _LENGTHS
     units = {f"{unit}/s": per for unit, per in lengths.items()}
-    return Column(units, optional=optional, blanks=optional)
+    return Column(units, optional, optional, -MOST_VELOCITY, MOST_VELOCITY, least)
+
+
+def time_constant_column(*, optional: bool = False) -> Column:
+    """A column of time constants; an optional one may have blanks."""
+    return Column(_TIMES, optional, optional, maximum=1e5, least=1e-4)
 
 
 def _thrust(path: Path) -> Iterator[Row]:
     """Rows of command and force."""
-    table = read_columns(path, {"command": COMMAND, "force": Column(_FORCES)})
+    table = read_columns(path, {"command": HELD_COMMAND, "force": _FORCE})
     noise = 0.05 * max(map(abs, table.values["force"]))
     for n, row in enumerate(_rows(table, "force")):
         if row.command * row.value < 0.0 and abs(row.value) > noise:
@@ -198,7 +213,7 @@ def _thrust(path: Path) -> Iterator[Row]:
 
 def _steady(path: Path, manoeuvre: Manoeuvre) -> Iterator[Row]:
     """Rows of command and velocity."""
-    table = read_columns(path, {"command": COMMAND, "velocity": velocity_column(manoeuvre)})
+    table = read_columns(path, {"command": HELD_COMMAND, "velocity": velocity_column(manoeuvre)})
     for n, row in enumerate(_rows(table, "velocity")):
         if row.command == 0.0:
             raise table.error(n, "command", "must not be zero, for nothing moves")
@@ -209,7 +224,7 @@ def _steady(path: Path, manoeuvre: Manoeuvre) -> Iterator[Row]:
 
 def _time_constant(path: Path, manoeuvre: Manoeuvre) -> Iterator[Row]:  # noqa: ARG001 (as _steady)
     """Rows of command and time constant."""
-    table = read_columns(path, {"command": COMMAND, "time constant": Column(TIMES)})
+    table = read_columns(path, {"command": HELD_COMMAND, "time constant": time_constant_column()})
     for n, row in enumerate(_rows(table, "time constant")):
         if row.command == 0.0:
             raise table.error(n, "command", "must not be zero, for nothing moves")
@@ -228,12 +243,12 @@ def _rows(table: Columns, column: str) -> Iterator[Row]:
 
 def _recording(path: Path, manoeuvre: Manoeuvre) -> Recording:
     """Time, command and motion; the position where there are both position and velocity."""
-    position = Column(_ANGLES if manoeuvre.position_unit == "rad" else _LENGTHS, optional=True, blanks=True)
+    units = _ANGLES if manoeuvre.position_unit == "rad" else _LENGTHS
     columns = {
-        "time": Column(TIMES),
-        "command": COMMAND,
-        manoeuvre.position: position,
-        "velocity": velocity_column(manoeuvre, optional=True),
+        "time": _TIME,
+        "command": _COMMAND,
+        manoeuvre.position: Column(units, True, True, -_MOST_POSITION, _MOST_POSITION),
+        "velocity": velocity_column(manoeuvre, optional=True, least=0.0),
     }
     table = read_columns(path, columns, others=True)
     quantity = next((name for name in (manoeuvre.position, "velocity") if name in table.values), None)

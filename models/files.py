@@ -3,38 +3,79 @@
 import errno
 import os
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 
-def write_whole(path: Path, content: bytes, check: Callable[[Path], None] = lambda _: None) -> None:
-    """Put content in place of whatever file was there, once `check` has passed a draft of it.
+@dataclass(frozen=True)
+class Output:
+    """A file to write."""
 
-    Raises OSError about this path where it cannot be written, and what `check` raises.
+    path: Path
+    content: bytes
+    check: Callable[[Path], None] = lambda _: None
+    """What a draft of it must pass."""
+
+
+def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
+    """Raise OSError about the first path that no file can be put at, or that is an input or another target."""
+    taken = list(inputs)
+    for path in targets:
+        if path.is_dir():
+            raise OSError(errno.EISDIR, "is a folder, not a file to write", str(path))
+        if not path.parent.is_dir():
+            raise OSError(errno.ENOENT, f"there is no folder {path.parent}", str(path))
+        if path.exists() and not path.is_file():
+            raise OSError(errno.EINVAL, "is a device or a pipe, which no file can take the place of", str(path))
+        if path.exists() and not os.access(path, os.W_OK):
+            raise OSError(errno.EACCES, "is read-only", str(path))
+        if not os.access(path.parent, os.W_OK):
+            raise OSError(errno.EACCES, "its folder is read-only", str(path))
+        for other in taken:
+            if _is_same(path, other):
+                raise OSError(errno.EEXIST, f"is {other} too, which must be another file", str(path))
+        taken.append(path)
+
+
+def write_whole(*outputs: Output) -> None:
+    """Put every content in place of whatever file was there, once all drafts have passed their checks: all or none.
+
+    A link is replaced, and what it leads to stays. Raises OSError about the path that cannot be written, and what a
+    check raises.
     """
-    if path.is_dir():
-        raise OSError(errno.EISDIR, "is a folder, not a file to write", str(path))
-    if not path.parent.is_dir():
-        raise OSError(errno.ENOENT, f"there is no folder {path.parent}", str(path))
-    draft: Path | None = None
-    try:
-        with _errors_about(path):
-            descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-            draft = Path(name)
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-        check(draft)
-        with _errors_about(path):
-            mask = os.umask(0)
-            os.umask(mask)
-            draft.chmod(0o666 & ~mask)  # as if it had been opened like any file
-            draft.replace(path)
-    finally:
-        if draft is not None:
-            draft.unlink(missing_ok=True)
+    check_targets(output.path for output in outputs)
+    with ExitStack() as drafts:
+        ready = [(output.path, _draft(output, drafts)) for output in outputs]
+        for path, draft in ready:
+            with _errors_about(path):
+                draft.replace(path)
+
+
+def _draft(output: Output, drafts: ExitStack) -> Path:
+    """A file beside the target, checked and ready to take its place; gone with the stack."""
+    path = output.path
+    with _errors_about(path):
+        descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".part", dir=path.parent)
+        draft = Path(name)
+        drafts.callback(draft.unlink, missing_ok=True)
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(output.content)
+            file.flush()
+            os.fsync(file.fileno())
+    output.check(draft)
+    with _errors_about(path):
+        mask = os.umask(0)
+        os.umask(mask)
+        draft.chmod(0o666 & ~mask)  # as if it had been opened like any file
+    return draft
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    if path.exists() and other.exists():
+        return path.samefile(other)
+    return os.path.realpath(path) == os.path.realpath(other)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ one without, from the measured points V_ss and Tau. The points, of tables and of
 so the two can be set side by side.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 
@@ -16,13 +17,14 @@ from . import advice
 from .csvfile import DataFileError
 from .dynamics import COEFFICIENTS, Coefficients
 from .estimation import LEVEL, Estimate
-from .experiments import THRUSTERS, Experiments, Recording, Row
+from .experiments import LEAST_VELOCITY, MOST_VELOCITY, THRUSTERS, Experiments, Recording, Row
 from .fits import QuadraticFit, fit_quadratic
 from .manoeuvres import MANOEUVRES, Manoeuvre
 from .output_error import RecordingsFit, fit_recordings
 from .responses import Point, fit_response, free_coefficients
 from .results import AxisResult, Identification, count
 from .signals import AGAINST, StepResponse, steps
+from .simulation import prepare
 from .vehicle import Provenance, Vehicle, load_vehicle
 
 
@@ -119,6 +121,13 @@ def _recordings(
         still = "command" if not recording.command.any() else recording.quantity if np.ptp(values) == 0.0 else None
         if still:
             raise DataFileError(f"{experiments.folder / recording.file}: {still} never changes: nothing can be learnt")
+        _check_thrust(experiments, recording.manoeuvre, base, [1.0])
+        speed = prepare(recording, base).speed
+        if not LEAST_VELOCITY <= speed <= MOST_VELOCITY:
+            raise DataFileError(
+                f"{experiments.folder / recording.file}: {recording.quantity} tells of a velocity of {speed:.3g} "
+                f"{recording.manoeuvre.unit}: must be {LEAST_VELOCITY:g} at least and {MOST_VELOCITY:g} at most"
+            )
         found = steps(recording)
         if found and all(step.note == AGAINST for step in found):
             raise DataFileError(
@@ -128,6 +137,16 @@ def _recordings(
         return {}
     fits = fit_recordings(recordings, base, experiments.rov.known, _uncertain(thrust))
     return {fit.manoeuvre.axis: fit for fit in fits}
+
+
+def _check_thrust(experiments: Experiments, m: Manoeuvre, base: Coefficients, commands: Sequence[float]) -> None:
+    """Where the vehicle moves, the thruster must push it there, at one command at least."""
+    forces = [m.force(base, command) for command in commands]
+    if commands and all(force * command <= 0.0 for force, command in zip(forces, commands, strict=True)):
+        raise DataFileError(
+            f"{experiments.folder}: the thrust curve of {m.thruster} gives {forces[0]:.3g} {m.load} at a command of "
+            f"{commands[0]:.0%}, where {m.axis} needs a push that way"
+        )
 
 
 def _uncertain(thrust: QuadraticFit | None) -> Estimate | None:
@@ -158,6 +177,7 @@ def _axis(
     if fitted and uncertain:
         of_thrust = fitted.estimate.of(m.thrust_names).covariance
     used = [p for p in points if p.weight > 0.0]
+    _check_thrust(experiments, m, base, [p.command for p in used])
     steady = [p for p in used if p.quantity == "V_ss"]
     told = free_coefficients(m, used, known)[0] if steady or wanted <= {m.coefficient("beta")} else ()
     response = fit_response(m, points, base, known, of_thrust) if told else None

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .figures import LIGHT, svg_file
-from .files import write_whole
+from .files import Output, check_targets, write_whole
 from .fits import fit_quadratic
 from .manoeuvres import SURGE
 from .tables import ResponseTable, load_tables, untuned
@@ -36,7 +36,8 @@ _NOT_PRINTED = (
 def write_figures(folder: Path) -> Path:
     """Write the figures as one SVG file. Raises OSError."""
     path = folder / NAME
-    write_whole(path, (svg_file(_draw, _SIZE, salt=NAME) + "\n").encode())
+    check_targets([path])
+    write_whole(Output(path, (svg_file(_draw, _SIZE, salt=NAME) + "\n").encode()))
     return path
 
 

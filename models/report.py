@@ -11,7 +11,7 @@ from .dynamics import COEFFICIENTS
 from .estimation import Array, Estimate, rms
 from .experiments import ROV_FILE, THRUSTERS, Experiments
 from .figures import PALETTE, inline_svg
-from .files import write_whole
+from .files import Output
 from .fits import QuadraticFit
 from .pages import page, percent
 from .report_plots import plot_drag, plot_recording, plot_response, plot_steps, plot_thrust
@@ -20,9 +20,9 @@ from .results import AxisResult, Comparison, Identification, compare
 _PLOT, _WIDE = (3.7, 3.5), (5.6, 3.1)  # inches
 
 
-def write_report(results: Identification, path: Path) -> None:
-    """Write the report of an identification, whole or not at all. Raises OSError."""
-    write_whole(path, report_page(results).encode())
+def report_output(results: Identification, path: Path) -> Output:
+    """The report of an identification, to write."""
+    return Output(path, report_page(results).encode())
 
 
 def report_page(results: Identification) -> str:

@@ -138,7 +138,8 @@ def response_band(
         for n, name in enumerate(names):
             h = 1e-5 * (found[name] or min(found.errors[name], 1.0))
             moved = replace(coefficients, **{name: found[name] + h})
-            slopes[n] = (np.array([manoeuvre.response(moved, c) for c in commands.tolist()]) - curve) / h
+            with np.errstate(invalid="ignore"):  # without any drag both are infinite
+                slopes[n] = (np.array([manoeuvre.response(moved, c) for c in commands.tolist()]) - curve) / h
         variance = np.einsum("pcq,pr,rcq->cq", slopes, found.covariance, slopes)
         reach = float(student.ppf(0.5 + 0.5 * LEVEL, found.freedom)) * np.sqrt(np.maximum(variance, 0.0))
         low, high = curve - reach, curve + reach
@@ -187,7 +188,7 @@ def _start(manoeuvre: Manoeuvre, used: Sequence[Point], base: Coefficients, name
     a_d, b_d, beta = (manoeuvre.coefficient(kind) for kind in ("a_d", "b_d", "beta"))
     alpha = getattr(base, manoeuvre.coefficient("alpha"))
     steady = [p for p in used if p.quantity == "V_ss"]
-    drag = [alpha * manoeuvre.force(base, p.command) / p.value for p in steady]
+    drag = [d for p in steady if (d := alpha * manoeuvre.force(base, p.command) / p.value) > 0.0]
     speed = float(np.mean([abs(p.value) for p in steady])) if steady else 1.0
     mean = float(np.mean(drag)) if drag else 1.0
     start = {a_d: 0.5 * mean / speed, b_d: 0.5 * mean, beta: 1.0}

@@ -26,6 +26,7 @@ _SAME_COMMAND = 0.005  # fraction of full thrust
 _LEAST = 20  # samples of a hold, and of its steady part
 _WINDOW = 0.5  # s, before the time constant is known
 _BIAS = 0.002  # of Tau: what the filter bends off at most
+_MOST = 1_000_000  # samples, evenly spaced
 _ORDER = 3  # of the local polynomials: a quadratic would cut the bend at Tau
 
 
@@ -81,7 +82,7 @@ def velocity(
     time: Array, values: Array, *, is_position: bool, window: float = _WINDOW, method: Method = "savitzky-golay"
 ) -> tuple[Array, Array]:
     """Smoothed velocity on evenly spaced times (s), from position or velocity at any times; the window is in s."""
-    step = float(np.median(np.diff(time)))
+    step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST)  # in spite of a gap of days
     even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
     samples = np.interp(even, time, values)
     n = _odd(window / step, len(samples))

@@ -13,6 +13,7 @@ from pathlib import Path
 from .csvfile import DataFileError, csv_lines, number
 from .dynamics import COEFFICIENTS, Coefficients, Inputs
 from .manoeuvres import HEAVE, SURGE, YAW, Manoeuvre
+from .messages import shown
 from .vehicle import Vehicle
 
 Cells = tuple[Decimal | None, ...]
@@ -152,7 +153,7 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[Decimal, Cells]:
     for place, (name, found) in enumerate(zip_longest(columns, header), 1):
         if name != found:
             wanted = f"must be {name!r}" if name else "there is no such column"
-            raise DataFileError(f"{path}, line {line}, column {place} = {found or ''!r}: {wanted}")
+            raise DataFileError(f"{path}, line {line}, column {place} = {shown(found or '')}: {wanted}")
     for line, texts in lines:
         cells: list[Decimal | None] = []
         for name, text in zip_longest(columns, texts):
@@ -160,7 +161,7 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[Decimal, Cells]:
                 cells.append(_cell(name, text, rows))
             except ValueError as error:
                 column = repr(name) if name else len(columns) + 1
-                value = f" = {text!r}" if text else ""
+                value = f" = {shown(text)}" if text else ""
                 raise DataFileError(f"{path}, line {line}, column {column}{value}: {error}") from None
         command, *others = cells
         assert command is not None  # _cell demands it

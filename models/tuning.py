@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .csvfile import Column, read_columns
+from .csvfile import read_columns
 from .dynamics import COEFFICIENTS, Coefficients
 from .estimation import Array, Estimate, bounds, covariance, estimate, external, internal, minimize
-from .experiments import COMMAND, TIMES, velocity_column
+from .experiments import HELD_COMMAND, time_constant_column, velocity_column
 from .manoeuvres import Manoeuvre
 from .responses import Point, predict
 
@@ -99,9 +99,9 @@ def read_points(path: Path, manoeuvre: Manoeuvre) -> tuple[Point, ...]:
     Raises DataFileError.
     """
     columns = {
-        "command": COMMAND,
+        "command": HELD_COMMAND,
         "velocity": velocity_column(manoeuvre, optional=True),
-        "time constant": Column(TIMES, optional=True, blanks=True),
+        "time constant": time_constant_column(optional=True),
     }
     table = read_columns(path, columns)
     points = []

@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from .dynamics import COEFFICIENTS, Coefficients, Meta
+from .messages import FileError, brief, shown
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -29,7 +30,7 @@ else:
 VIDEORAY = Path(__file__).with_name("videoray.toml")
 
 
-class VehicleFileError(ValueError):
+class VehicleFileError(FileError):
     """A vehicle file that cannot be used: one line with file, key, value and what is allowed."""
 
 
@@ -78,6 +79,12 @@ class Vehicle:
     """95 % confidence intervals of the coefficients that have one."""
     provenance: Provenance | None = None
 
+    @property
+    def files(self) -> list[Path]:
+        """Every file that the vehicle file names."""
+        report = self.provenance.report if self.provenance else None
+        return [*(self.data.glob("*") if self.data else ()), *filter(None, (report,))]
+
 
 class Strict(BaseModel):
     """A table of a TOML file: no keys but these, no number in quotes."""
@@ -88,19 +95,19 @@ class Strict(BaseModel):
 Checked = TypeVar("Checked", bound=Strict)
 
 
-def load_vehicle(path: Path) -> Vehicle:
-    """Read a vehicle file. Raises VehicleFileError."""
+def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
+    """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
     checked = read_checked(path, _File)
     head, low, high = checked.vehicle, checked.validity.command_min, checked.validity.command_max
     if low >= high:
         raise VehicleFileError(f"{path}: validity.command_min = {low}: must be less than command_max = {high}")
     data = path.parent / head.data if head.data else None
     if data and not os.path.isdir(data):  # noqa: PTH112 (Path.is_dir raises on names that cannot be)
-        raise VehicleFileError(f"{path}: vehicle.data = {_shown(head.data)}: there is no such folder beside the file")
+        raise VehicleFileError(f"{path}: vehicle.data = {shown(head.data)}: there is no such folder beside the file")
     named = checked.provenance.report if checked.provenance else None
     report = path.parent / named if named else None
-    if report and not os.path.isfile(report):  # noqa: PTH113 (as above)
-        raise VehicleFileError(f"{path}: provenance.report = {_shown(named)}: there is no such file beside this one")
+    if report and not _is_there(report, coming):
+        raise VehicleFileError(f"{path}: provenance.report = {shown(named)}: there is no such file beside this one")
     quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
     return Vehicle(
         name=head.name,
@@ -116,6 +123,12 @@ def load_vehicle(path: Path) -> Vehicle:
         intervals={name: q.interval for name, q in quantities.items() if q.interval},
         provenance=Provenance(**dict(checked.provenance) | {"report": report}) if checked.provenance else None,
     )
+
+
+def _is_there(path: Path, coming: Path | None) -> bool:
+    if os.path.isfile(path):  # noqa: PTH113 (as above)
+        return True
+    return coming is not None and os.path.realpath(path) == os.path.realpath(coming)
 
 
 def read_checked(path: Path, model: type[Checked]) -> Checked:
@@ -135,10 +148,17 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise VehicleFileError(f"{path}: not UTF-8 text, at byte {error.start}") from error
     except (ValueError, RecursionError) as error:
-        raise VehicleFileError(f"{path}: not TOML: {_on_one_line(str(error))}") from error
+        raise VehicleFileError(f"{path}: not TOML: {brief(str(error))}") from error
 
 
-_Text = Annotated[str, Field(min_length=1)]
+def _printable(text: str) -> str:
+    if found := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
+        raise ValueError(f"must be without the control character {found[0]!a}")
+    return text
+
+
+_Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_printable)]
+_Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"), AfterValidator(_printable)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -189,7 +209,7 @@ _Some = create_model("_Some", __base__=Strict, **_OPTIONAL)
 
 
 class _Alternative(_Some):  # type: ignore[misc, valid-type]
-    description: str
+    description: _Text
 
     def plain(self) -> Alternative:
         values = {n: q.value for n in COEFFICIENTS if (q := getattr(self, n)) is not None}
@@ -197,8 +217,8 @@ class _Alternative(_Some):  # type: ignore[misc, valid-type]
 
 
 def _identifier(text: str) -> str:
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", text):
-        raise ValueError("must be a C identifier: letters, digits and underscores, no digit first")
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,99}", text):
+        raise ValueError("must be a C identifier: at most 100 letters, digits and underscores, no digit first")
     return text
 
 
@@ -208,9 +228,9 @@ _Command = Annotated[float, Field(ge=0.0, le=1.0)]
 class Head(Strict):
     """What a vehicle is called and where it comes from."""
 
-    name: _Text
+    name: _Name
     identifier: Annotated[str, AfterValidator(_identifier)]
-    version: _Text
+    version: _Name
     description: _Text
     source: _Text
 
@@ -230,7 +250,7 @@ class _Provenance(Strict):
     tool: _Text
     method: _Text
     inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
-    warnings: Annotated[tuple[str, ...], BeforeValidator(pair)] = ()
+    warnings: Annotated[tuple[_Text, ...], BeforeValidator(pair)] = ()
     report: _Text | None = None
 
 
@@ -245,23 +265,13 @@ class _File(Strict):
 def _first_problem(error: ValidationError) -> str:
     """The first problem of the file in one line: key, value, what is allowed."""
     problem = error.errors()[0]
-    key = _on_one_line(".".join(map(str, problem["loc"])))
+    key = brief(".".join(map(str, problem["loc"])))
     match problem["type"]:
         case "missing":
             return f"{key}: this key is missing"
         case "extra_forbidden":
             return f"{key}: there is no such key"
         case "model_type":
-            return f"{key} = {_shown(problem['input'])}: must be a table of keys and values"
+            return f"{key} = {shown(problem['input'])}: must be a table of keys and values"
     reason = problem["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-    return f"{key} = {_shown(problem['input'])}: {reason}"
-
-
-def _shown(value: object) -> str:
-    return _on_one_line(repr(value))
-
-
-def _on_one_line(text: str) -> str:
-    """Text for a message: no line breaks or other control characters, and not endless."""
-    clean = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-    return clean if len(clean) <= 80 else f"{clean[:77]}..."
+    return f"{key} = {shown(problem['input'])}: {reason}"

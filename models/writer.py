@@ -8,7 +8,8 @@ import tomlkit
 from tomlkit.items import InlineTable
 
 from .dynamics import COEFFICIENTS
-from .files import write_whole
+from .files import Output, write_whole
+from .messages import shown
 from .tuning import Tuning
 from .vehicle import Provenance, Vehicle, VehicleFileError, load_vehicle
 
@@ -40,14 +41,22 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     return tomlkit.dumps(document)
 
 
+def vehicle_output(vehicle: Vehicle, path: Path) -> Output:
+    """The vehicle file to write, perhaps together with its report. Raises VehicleFileError."""
+    report = vehicle.provenance.report if vehicle.provenance else None
+    return _checked(path, vehicle_text(vehicle, path.parent), coming=report)
+
+
 def write_vehicle(vehicle: Vehicle, path: Path) -> None:
     """Write the vehicle file. Raises VehicleFileError where it could not be read again, OSError where not written."""
-    _write_checked(path, vehicle_text(vehicle, path.parent))
+    write_whole(vehicle_output(vehicle, path))
 
 
 def write_tuned(source: Path, path: Path, tuning: Tuning) -> None:
     """Write the vehicle file `source` with another α and β, all else in it as it is. Raises as write_vehicle."""
     document: Any = tomlkit.parse(source.read_text(encoding="utf-8-sig"))
+    if "coefficients" not in document:
+        raise VehicleFileError(f"{source}: cannot be read a second time, as it must be to write it tuned")
     m = tuning.manoeuvre
     wanted = ", ".join(f"{p.quantity} = {p.value:g} at {p.command:.0%}" for p in tuning.points[:2])
     for name in (m.coefficient("alpha"), m.coefficient("beta")):
@@ -59,19 +68,23 @@ def write_tuned(source: Path, path: Path, tuning: Tuning) -> None:
     for table, key in (("vehicle", "data"), ("provenance", "report")):
         if key in document.get(table, {}):
             document[table][key] = _seen_from(path.parent, source.parent / document[table][key])
-    _write_checked(path, tomlkit.dumps(document))
+    write_whole(_checked(path, tomlkit.dumps(document)))
 
 
-def _write_checked(path: Path, text: str) -> None:
-    """Write the text of a vehicle file, once it has proved to be one."""
+def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
+    """The text of a vehicle file, to write once it has proved to be one."""
 
     def check(draft: Path) -> None:
         try:
-            load_vehicle(draft)
+            load_vehicle(draft, coming=coming)
         except VehicleFileError as error:
             raise VehicleFileError(str(error).replace(str(draft), str(path))) from error
 
-    write_whole(path, text.encode(), check)
+    try:
+        return Output(path, text.encode(), check)
+    except UnicodeEncodeError as error:
+        part = shown(text[max(error.start - 20, 0) : error.end])
+        raise VehicleFileError(f"{path}: {part}: the name of a file that is not Unicode cannot stand here") from error
 
 
 def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
@@ -103,7 +116,9 @@ def _provenance(provenance: Provenance, folder: Path) -> Any:
 
 
 def _seen_from(folder: Path, path: Path) -> str:
-    return Path(os.path.relpath(path, folder)).as_posix()
+    """The path from a folder; as a whole where they are on two drives of Windows."""
+    path, folder = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
+    return Path(os.path.relpath(path, folder)).as_posix() if path.drive == folder.drive else path.as_posix()
 
 
 def _rounded(value: float) -> float:

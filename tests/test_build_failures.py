@@ -160,6 +160,6 @@ def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
     process.send_signal(signal_)
     _, error = process.communicate(timeout=10)
     assert process.returncode == 130
-    assert error == "build_fmu: interrupted, nothing written\n"
+    assert error == "build_fmu: interrupted, no file is half-written\n"
     assert list((tmp_path / "tmp").iterdir()) == []
     assert _untouched(old)

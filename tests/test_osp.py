@@ -133,7 +133,7 @@ def test_another_vehicle_has_its_own(tmp_path: Path) -> None:
 def test_a_folder_in_its_place_stops_the_build(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "videoray_OspModelDescription.xml").mkdir()
     assert _build(tmp_path / "rov.fmu", "--osp") == 1
-    assert "videoray_OspModelDescription.xml: is a folder" in capsys.readouterr().err
+    assert "videoray_OspModelDescription.xml: cannot be written: is a folder" in capsys.readouterr().err
     assert not (tmp_path / "rov.fmu").exists()
 
 

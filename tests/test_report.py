@@ -16,9 +16,10 @@ from models.__main__ import main
 from models.dynamics import COEFFICIENTS
 from models.estimation import Array
 from models.experiments import load_experiments
+from models.files import write_whole
 from models.identification import identify
 from models.manoeuvres import HEAVE, SURGE, YAW
-from models.report import report_page, write_report
+from models.report import report_output, report_page
 from models.results import Identification, compare
 from models.vehicle import VIDEORAY, load_vehicle
 
@@ -183,7 +184,7 @@ def test_nothing_is_left_half_written(
 
     monkeypatch.setattr(Path, "replace", fail)
     with pytest.raises(OSError, match="No space left") as caught:
-        write_report(of_tables, path)
+        write_whole(report_output(of_tables, path))
     assert caught.value.filename == str(path)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
     assert path.read_text(encoding="utf-8") == "before"
