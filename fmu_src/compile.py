@@ -15,6 +15,8 @@ from fat_macho import FatWriter
 
 C_SOURCES = Path(__file__).with_name("c")
 UNITY_FILE = "fmu.c"
+# What the numbers depend on, and their cost: the same rounding on every processor, no errno in the mathematics.
+C_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 
 
@@ -130,9 +132,8 @@ async def _compile(name: str, sources: Mapping[str, str], identifier: str) -> by
 async def _run_compiler(name: str, target: str, flags: list[str], folder: str) -> None:
     process = await asyncio.create_subprocess_exec(
         *(*compiler(), "-target", target),
-        *("-std=c11", "-O2", "-g0", "-s", "-shared", "-fvisibility=hidden"),
-        # the same rounding on every processor; no errno and unwinding in the mathematics
-        *("-ffp-contract=off", "-fno-math-errno", "-fno-asynchronous-unwind-tables"),
+        *C_FLAGS,
+        *("-g0", "-s", "-shared", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables"),
         *WARNINGS,
         "-DFMI2_OVERRIDE_FUNCTION_PREFIX",
         f"-I{fmi_headers()}",

@@ -2,20 +2,22 @@
 
 import argparse
 import shutil
-import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from os import cpu_count
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
+from fmu_src.compile import BuildError
 from fmu_src.package import native_content
+from models.command_line import exit_code, run_process
+from models.messages import FileError
 from models.vehicle import VIDEORAY, load_vehicle
 
 from .campaign import Counts, FindingError, build_target, fuzz, pack_corpus, replay, unpack_corpus
-from .sanitized import clang
 
 _ROUND = 60  # s
 
@@ -44,41 +46,34 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main() -> int:
-    """Run the command line; 0 where nothing was found, 1 with a finding, 2 where it cannot run."""
-    options = _parser().parse_args()
-    console = Console()
-    if clang() is None:
-        print("fuzz: clang with its sanitizers is missing: apt-get install clang libclang-rt-dev", file=sys.stderr)
-        return 2
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code: 0 nothing was found, 1 a finding, 2 bad input, 130 interrupted."""
+    return exit_code("fuzz", lambda: _run(arguments), {FindingError: 1, FileError: 2, BuildError: 2, OSError: 2})
+
+
+def _run(arguments: Sequence[str] | None) -> None:
+    options = _parser().parse_args(arguments)
     if missing := [path for path in options.inputs if not path.exists()]:
-        print(f"fuzz: {missing[0]}: there is no such file", file=sys.stderr)
-        return 2
+        raise FileError(f"{missing[0]}: there is no such file")
     with tempfile.TemporaryDirectory(prefix="fuzz-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         target, corpus = folder / "target", folder / "corpus"
         build_target(native_content(load_vehicle(VIDEORAY)).sources, target)
-        unpack_corpus(corpus)
         try:
             if options.inputs:
-                counts = replay(target, options.inputs, folder)
-                console.print(f"{counts.calls:,} calls, nothing found", highlight=False)
-                return 0
-            counts, seconds = _campaign(console, target, corpus, folder, options)
+                print(f"{replay(target, options.inputs, folder).calls:,} calls, nothing found")
+            else:
+                unpack_corpus(corpus)
+                _print_counts(*_campaign(target, corpus, folder, options))
         except FindingError as finding:
-            print(f"fuzz: {finding.words}", file=sys.stderr)
-            for path in finding.inputs:
-                print(f"again with: python -m fuzz {shutil.copy(path, '.')}", file=sys.stderr)
-            return 1
-        _print_counts(console, counts, seconds)
-        if options.keep:
-            console.print(f"the corpus now has {pack_corpus(target, corpus)} inputs")
-    return 0
+            copies = [shutil.copy(path, ".") for path in finding.inputs]
+            again = [f"again with: python -m fuzz {copy}" for copy in copies]
+            raise FindingError("\n".join([str(finding), *again])) from None
+        if options.keep and not options.inputs:
+            print(f"the corpus now has {pack_corpus(target, corpus)} inputs")
 
 
-def _campaign(
-    console: Console, target: Path, corpus: Path, folder: Path, options: argparse.Namespace
-) -> tuple[Counts, float]:
+def _campaign(target: Path, corpus: Path, folder: Path, options: argparse.Namespace) -> tuple[Counts, float]:
     total, start = Counts(), time.monotonic()
     limit = options.seconds or (None if options.calls else _ROUND)
     while True:
@@ -88,20 +83,20 @@ def _campaign(
         total.refused.update(counts.refused)
         total.accepted.update(counts.accepted)
         spent = time.monotonic() - start
-        console.print(f"{spent:6.0f} s {total.calls:15,} calls, nothing found", highlight=False)
+        print(f"{spent:6.0f} s {total.calls:15,} calls, nothing found", flush=True)
         if (limit is not None and spent >= limit - 0.5) or (options.calls and total.calls >= options.calls):
             return total, spent
 
 
-def _print_counts(console: Console, counts: Counts, seconds: float) -> None:
+def _print_counts(counts: Counts, seconds: float) -> None:
     table = Table(title=f"{counts.calls:,} calls in {seconds:.0f} s, nothing found", title_justify="left")
     table.add_column("function")
     table.add_column("accepted", justify="right")
     table.add_column("refused", justify="right")
     for name in counts.refused:
         table.add_row(name, f"{counts.accepted[name]:,}", f"{counts.refused[name]:,}")
-    console.print(table)
+    Console().print(table)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_process(main)

@@ -19,11 +19,10 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 class FindingError(Exception):
-    """A sanitizer's report or a broken property: what was said, and the input that leads there."""
+    """A sanitizer's report or a broken property: what was said, and the inputs that lead there."""
 
-    def __init__(self, words: str, inputs: Sequence[Path]) -> None:
+    def __init__(self, words: str, inputs: Sequence[Path] = ()) -> None:
         super().__init__(words)
-        self.words = words
         self.inputs = inputs
 
 

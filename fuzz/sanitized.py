@@ -6,10 +6,9 @@ import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
-from fmu_src.compile import WARNINGS, fmi_headers
+from fmu_src.compile import C_FLAGS, WARNINGS, BuildError, fmi_headers
 
-# Every report ends the program: nothing that a sanitizer finds goes by.
-_FLAGS = ("-std=c11", "-O2", "-g", "-ffp-contract=off", "-fno-math-errno", "-fno-omit-frame-pointer", *WARNINGS)
+_FLAGS = (*C_FLAGS, "-g", "-fno-omit-frame-pointer", *WARNINGS)
 
 
 def clang() -> str | None:
@@ -27,17 +26,17 @@ def build_sanitized(
     """Compile a program that includes "fmu.c" with the FMU's sources (file name to text), which go beside output.
 
     `sanitizers` is what -fsanitize takes: "address,undefined", "thread", "fuzzer,address,undefined". Raises
-    FileNotFoundError without a compiler, CalledProcessError where it does not compile without a warning.
+    BuildError without a compiler, CalledProcessError where it does not compile without a warning.
     """
     command = clang()
     if command is None:
-        raise FileNotFoundError("clang with its sanitizers is missing: apt-get install clang libclang-rt-dev")
+        raise BuildError("clang with its sanitizers is missing: apt-get install clang libclang-rt-dev")
     folder = output.with_name(f"{output.name}.sources")
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in sources.items():
         (folder / name).write_text(text, encoding="utf-8")
     include = ("-I", os.fspath(folder), "-isystem", os.fspath(fmi_headers()))
-    sanitize = (f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all")
+    sanitize = (f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all")  # every report ends the program
     subprocess.run(
         [command, *_FLAGS, *sanitize, *include, os.fspath(program), *flags, "-lm", "-o", os.fspath(output)],
         check=True,

@@ -44,7 +44,7 @@ def _succeeds(arguments: list[str]) -> None:
     assert process.returncode == 0
 
 
-@pytest.mark.parametrize("kills", [1, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [1, pytest.param(20, marks=pytest.mark.long)])
 def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(kills: int, tmp_path: Path) -> None:
     reference, target = tmp_path / "reference.fmu", tmp_path / "target" / "rov.fmu"
     target.parent.mkdir()
@@ -60,7 +60,7 @@ def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(kills: int,
     assert target.read_bytes() == reference.read_bytes()
 
 
-@pytest.mark.parametrize("kills", [1, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [1, pytest.param(20, marks=pytest.mark.long)])
 def test_a_killed_identification_leaves_whole_files(kills: int, tmp_path: Path) -> None:
     def arguments(folder: Path) -> list[str]:
         folder.mkdir()

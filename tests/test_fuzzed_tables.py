@@ -57,7 +57,7 @@ def check_line(text: str, folder: Path) -> None:
     assert len(text.replace(str(folder), "")) < 350
 
 
-@pytest.mark.parametrize("examples", [150, pytest.param(5000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [150, pytest.param(2000, marks=pytest.mark.long)])
 def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_path: Path) -> None:
     folder = tmp_path / "changed"
 
@@ -77,7 +77,7 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [8, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [8, pytest.param(30, marks=pytest.mark.long)])
 @pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", "time_constant_yaw.csv", "thrust_top.csv", LOG])
 def test_any_folder_is_identified_or_one_clear_line(
     only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys
@@ -165,7 +165,7 @@ def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [150, pytest.param(5000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [150, pytest.param(2000, marks=pytest.mark.long)])
 def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     tuned = tmp_path / "tuned.toml"
     words = st.one_of(NUMBERS.filter(lambda x: abs(x) < 10**400), CELLS, st.floats(0.0, 10.0)).map(str)

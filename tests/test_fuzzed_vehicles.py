@@ -62,7 +62,7 @@ def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
     return read_model_description(str(fmu), validate=True)
 
 
-@pytest.mark.parametrize("examples", [100, pytest.param(3000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [100, pytest.param(1000, marks=pytest.mark.long)])
 def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int, path: Path) -> None:
     usable = 0
 
@@ -84,7 +84,7 @@ def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int
     assert usable > examples / 20, "the changes must leave some files as good as they were"
 
 
-@pytest.mark.parametrize("examples", [20, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [20, pytest.param(300, marks=pytest.mark.long)])
 def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> None:
     def check(data: st.DataObject) -> None:
         path.write_bytes(changed_toml(data.draw(st.sampled_from(SOURCES)), data))
@@ -102,7 +102,7 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [15, pytest.param(300, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [15, pytest.param(100, marks=pytest.mark.long)])
 def test_every_command_says_the_same_line_and_writes_nothing(
     examples: int, path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,0 +1,75 @@
+"""The one table: sections that share five columns, and how numbers look in it."""
+
+import os
+import platform
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from fmu_src.compile import compiler
+
+_COLUMNS = 5
+_WIDTH = 118
+
+
+class Page:
+    """Rows of a name and up to four cells, under headings that name the cells."""
+
+    def __init__(self) -> None:
+        self._table = Table(show_header=False, show_edge=False, box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        self._table.add_column(min_width=46)
+        for _ in range(1, _COLUMNS):
+            self._table.add_column(justify="right", min_width=15)
+
+    def section(self, title: str, *headings: str) -> None:
+        """Begin a section."""
+        if self._table.row_count:
+            self._table.add_row()
+        self._table.add_row(*(f"[bold]{escape(text)}[/]" for text in (title, *headings)))
+
+    def row(self, name: str, *cells: str) -> None:
+        """Add a row to the section."""
+        self._table.add_row(escape(name), *map(escape, cells))
+
+    def print(self) -> None:
+        """Print the table, as wide as it is where no terminal limits it."""
+        console = Console()
+        (console if console.is_terminal else Console(width=_WIDTH)).print(self._table, highlight=False)
+
+
+def digits(value: float, count: int = 3) -> str:
+    """So many significant digits, thousands apart."""
+    if value == 0.0:
+        return "0"
+    exponent = int(f"{value:.{count - 1}e}".partition("e")[2])
+    return f"{value:,.{max(0, count - 1 - exponent)}f}"
+
+
+def duration(seconds: float) -> str:
+    """In ns, µs, ms or s."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= 0.9995 * size:
+            return f"{digits(seconds / size)} {unit}"
+    return f"{digits(seconds / 1e-9)} ns"
+
+
+def error(value: float) -> str:
+    """A power of ten and a digit."""
+    return f"{value:.0e}".replace("e-0", "e-") if value else "0"
+
+
+def machine() -> str:
+    """The machine and what runs on it, in two lines."""
+    model = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        lines = cpuinfo.read_text(encoding="utf-8").splitlines()
+        model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), model)
+    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
+    clang = subprocess.run([*compiler(), "--version"], check=True, capture_output=True, text=True).stdout.split("\n")[0]
+    tools = f"Python {platform.python_version()}, FMPy {version('fmpy')}, ziglang {version('ziglang')} ({clang})"
+    return f"{model}, {os.cpu_count()} cores{load}; {platform.system()} {platform.release()}\n{tools}"

@@ -1,0 +1,57 @@
+"""The picture of the README: cost against error of a held command, on logarithmic axes."""
+
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from models.figures import LIGHT, svg_file
+
+from .page import digits, duration
+from .steps import BDF, CLOSED, EULER, FIXED_POINT, NAMES, RK4, TARGET, Measured, Plan, cost_at
+
+NAME = "cost_error.svg"
+_SIZE = (9.4, 4.7)  # inches
+_CURVES = {EULER: ("forward Euler", "grey"), RK4: ("RK4", "blue"), FIXED_POINT: (NAMES[FIXED_POINT], "violet"),
+           BDF: (NAMES[BDF], "teal")}  # fmt: skip
+
+
+def cost_error_picture(plan: Plan, measured: Measured) -> str:
+    """Two panels as SVG: the velocities, and the whole state while turning."""
+    return svg_file(partial(_draw, plan, measured), _SIZE, salt=NAME) + "\n"
+
+
+def _draw(plan: Plan, measured: Measured, figure: Figure) -> None:
+    left, right = figure.subplots(1, 2, sharey=True)
+    _panel(left, plan, measured, 3, "Velocities")
+    _panel(right, plan, measured, 7, "Velocities and pose, turning")
+    left.set_ylabel("processor time of a command of 1 s")
+    left.set_ylim(3e-8, 2e-2)
+    left.set_yticks([1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2], ["100 ns", "1 µs", "10 µs", "100 µs", "1 ms", "10 ms"])
+
+
+def _panel(ax: Axes, plan: Plan, measured: Measured, states: int, title: str) -> None:
+    unit = "m/s, rad/s" if states == 3 else "m/s, rad/s, m, rad"
+    ax.set(xscale="log", yscale="log", xlabel=f"error after a command of 1 s ({unit})")
+    ax.set_xlim(3e-17, 3.0)
+    ax.set_xticks([1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1.0])
+    ax.minorticks_off()
+    ax.set_title(title, loc="left")
+    ours, top = plan.job(CLOSED, states, 1.0), 0.0
+    cost = measured.cost(ours)
+    for method, (name, role) in _CURVES.items():
+        jobs, color = plan.sweeps[states, method], LIGHT[role]
+        errors, costs = [measured.error(job) for job in jobs], [measured.cost(job) for job in jobs]
+        times = ""
+        if min(errors) < TARGET:
+            reached = cost_at(measured, jobs)
+            times = f": {digits(float(np.median(reached / measured.seconds[ours])), 2)} times ours"
+            top = max(top, float(np.median(reached)))
+            ax.plot(TARGET, np.median(reached), "o", color="white", markeredgecolor=color, markersize=6.0, zorder=6)
+        ax.plot(errors, costs, ".-", color=color, linewidth=1.6, markersize=4.0, label=name + times)
+    ax.plot(measured.error(ours), cost, "o", color=LIGHT["orange"], markersize=8.0, zorder=5,
+            label=f"this FMU: {duration(cost)}")  # fmt: skip
+    ax.plot([measured.error(ours), TARGET, TARGET], [cost, cost, top], ":", color=LIGHT["muted"], linewidth=1.0)
+    ax.legend(loc="upper left", title="cost at an error of $10^{-9}$", title_fontsize=8.5, alignment="left",
+              frameon=True, facecolor="white", edgecolor="none", framealpha=1.0)  # fmt: skip

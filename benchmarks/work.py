@@ -1,0 +1,65 @@
+"""The same work for all: seeded commands, held, and where each ends to 50 digits."""
+
+import random
+from dataclasses import astuple, dataclass
+from functools import cached_property
+
+from models import dynamics
+from models.dynamics import Coefficients, Inputs, State
+from tests import reference
+
+SEED = 1
+_STATES = ("u", "w", "r", "x", "y", "z", "psi")
+Ends = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Work:
+    """Commands (u_l, u_r, u_t) of -1 ... 1, each held for `hold` s; the first `starts` of them from known states."""
+
+    coefficients: Coefficients
+    straight: bool
+    """u_l = u_r, so that the heading stays."""
+    hold: float
+    commands: int
+    starts: int
+    ahead: bool = False
+    """All commands positive, so that nothing turns back."""
+
+    @cached_property
+    def sequence(self) -> list[Inputs]:
+        """The commands: with another length of the sequence the same ones."""
+        rng = random.Random(SEED)
+        drawn = ([rng.uniform(-1.0, 1.0) for _ in range(3)] for _ in range(self.commands))
+        signed = ([abs(c) for c in commands] if self.ahead else commands for commands in drawn)
+        return [Inputs(left, left if self.straight else right, top) for left, right, top in signed]
+
+    @cached_property
+    def states(self) -> list[State]:
+        """Where the first commands start: each where the one before ends after a second, the first at rest."""
+        states = [State()]
+        for command in self.sequence[: self.starts - 1]:
+            states.append(dynamics.step(self.coefficients, command, states[-1], 1.0))
+        return states
+
+    @cached_property
+    def ends(self) -> list[dict[str, reference.Number]]:
+        """The states at the ends of the first commands, to 50 digits."""
+        return [
+            reference.step(self.coefficients, command, start, self.hold).state
+            for command, start in zip(self.sequence, self.states, strict=False)
+        ]
+
+    def error(self, found: Ends) -> float:
+        """The largest difference of any state (m/s, rad/s, m, rad) of the three or seven that were found."""
+        return max(
+            abs(float(end[name] - value))
+            for end, values in zip(self.ends, found, strict=True)
+            for name, value in zip(_STATES, values, strict=False)
+        )
+
+    def text(self) -> str:
+        """For the C program."""
+        commands = [f"{c.u_l.hex()} {c.u_r.hex()} {c.u_t.hex()}" for c in self.sequence]
+        states = [" ".join(value.hex() for value in astuple(state)) for state in self.states]
+        return "\n".join([f"{len(commands)} {len(states)}", *commands, *states, ""])
