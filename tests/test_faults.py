@@ -60,8 +60,8 @@ def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(kills: int,
     assert target.read_bytes() == reference.read_bytes()
 
 
-@pytest.mark.parametrize("kills", [1, pytest.param(20, marks=pytest.mark.long)])
-def test_a_killed_identification_leaves_whole_files(kills: int, tmp_path: Path) -> None:
+@pytest.mark.long
+def test_a_killed_identification_leaves_whole_files(tmp_path: Path) -> None:
     def arguments(folder: Path) -> list[str]:
         folder.mkdir()
         return ["models", "identify", str(TESTS), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
@@ -69,7 +69,7 @@ def test_a_killed_identification_leaves_whole_files(kills: int, tmp_path: Path) 
     started = time.monotonic()
     _succeeds(arguments(tmp_path / "reference"))
     took = time.monotonic() - started
-    for n, moment in enumerate(_moments(kills, took)):
+    for n, moment in enumerate(_moments(20, took)):
         folder = tmp_path / str(n)
         process = start(arguments(folder), stdout=subprocess.DEVNULL)
         for name in ("rov.toml", "r.html"):
@@ -79,6 +79,7 @@ def test_a_killed_identification_leaves_whole_files(kills: int, tmp_path: Path) 
             assert (folder / name).read_bytes() in (OLD, (tmp_path / "reference" / name).read_bytes())
 
 
+@pytest.mark.long
 def test_of_two_builds_at_once_one_is_whole(tmp_path: Path) -> None:
     target, guids, builds = tmp_path / "target" / "rov.fmu", [], []
     target.parent.mkdir()
