@@ -35,7 +35,7 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
             raise OSError(errno.EACCES, "its folder is read-only", str(path))
         for other in taken:
             if _is_same(path, other):
-                raise OSError(errno.EEXIST, f"is {other} too, which must be another file", str(path))
+                raise OSError(errno.EEXIST, f"would overwrite {other}, an input or another output", str(path))
         taken.append(path)
 
 
