@@ -194,7 +194,11 @@ def trajectory(binaries: Path, folder: Path, guid: str) -> np.ndarray:
     return _run(binaries, "linux64", folder, guid)
 
 
-@pytest.mark.parametrize("name", [name for name in MACHINES if name != "linux64"])
+# The compiler makes Windows' start-up code for a program anew, which takes a minute.
+@pytest.mark.parametrize(
+    "name",
+    [*LINUX[1:], *(pytest.param(name, marks=pytest.mark.long) for name in WINDOWS)],
+)
 def test_every_platform_runs_as_linux64_does(
     binaries: Path, folder: Path, guid: str, trajectory: np.ndarray, name: str
 ) -> None:
