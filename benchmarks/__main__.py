@@ -14,6 +14,7 @@ from fmu_src.compile import BuildError, host_platform
 from models.command_line import exit_code, run_process
 from models.files import Output, check_targets, write_whole
 from models.vehicle import VIDEORAY, Vehicle, load_vehicle
+from tests.fmi2 import fmpy_slave
 
 from . import archive, fleet, importer, picture, promises, sections
 from .page import Page, machine
@@ -92,7 +93,7 @@ def _measure(page: Page, vehicle: Vehicle, folder: Path, effort: Effort, picture
         if programs:
             instances, runs["plain C"] = fleet.in_c(programs, variations, effort.repetitions)
             sections.instances(page, instances)
-        slave = archive.instance(folders[importer.NATIVE])
+        slave = fmpy_slave(folders[importer.NATIVE])
         runs["FMPy"] = fleet.through_fmpy(slave, variations, effort.runs_in_fmpy, effort.manoeuvres)
         slave.freeInstance()
         sections.variations(page, runs)

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
-from fmpy.fmi2 import FMU2Slave
 
 import build_fmu
+from tests.fmi2 import fmpy_slave
 
 _CACHES = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR")
 
@@ -53,19 +53,6 @@ def build(output: Path, platforms: list[str]) -> Built:
     return Built(output.stat().st_size, *seconds)
 
 
-def instance(folder: Path) -> FMU2Slave:
-    """Of an extracted FMU, for Co-Simulation."""
-    description = fmpy.read_model_description(str(folder))
-    slave = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=str(folder),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="rov",
-    )
-    slave.instantiate()
-    return slave
-
-
 def load(archive: Path, folder: Path, repetitions: int) -> Loaded:
     """Load the archive again and again through FMPy."""
     fmpy.extract(str(archive), str(folder))
@@ -83,7 +70,7 @@ def load(archive: Path, folder: Path, repetitions: int) -> Loaded:
     return Loaded(
         _median(extract, repetitions),
         _median(lambda: fmpy.read_model_description(str(folder)), repetitions),
-        _median(lambda: instance(folder).freeInstance(), repetitions),
+        _median(lambda: fmpy_slave(folder).freeInstance(), repetitions),
         _median(load_library, repetitions),
     )
 

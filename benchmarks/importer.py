@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from models import dynamics
 from models.dynamics import Inputs, State
-from tests.fmi2 import keep_loaded
+from tests.fmi2 import fmpy_slave, keep_loaded
 
-from .archive import instance
 from .work import Work
 
 STOP, INTERVAL = 100.0, 0.01
@@ -64,14 +63,15 @@ def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> 
 def step_through(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, NDArray[Any]]:
     """Seconds of processor time in each repetition for the same, with nothing but the functions of a step."""
     keep_loaded(folders[PYTHONFMU])
-    slaves = {name: instance(folders[name]) for name in (NATIVE, PYTHONFMU)}
+    slaves = {name: fmpy_slave(folders[name]) for name in (NATIVE, PYTHONFMU)}
     seconds = defaultdict(list)
+    # both flavours have the same references
+    description = fmpy.read_model_description(str(folders[NATIVE]))
+    references = {variable.name: variable.valueReference for variable in description.modelVariables}
+    commands = [references[name] for name in ("u_l", "u_r", "u_t")]
+    velocities = [references[name] for name in ("u", "w", "r")]
     for _ in range(repetitions):
         for name, slave in slaves.items():
-            description = fmpy.read_model_description(str(folders[name]))
-            references = {variable.name: variable.valueReference for variable in description.modelVariables}
-            commands = [references[name] for name in ("u_l", "u_r", "u_t")]
-            velocities = [references[name] for name in ("u", "w", "r")]
             slave.reset()
             slave.setupExperiment(startTime=0.0)
             slave.enterInitializationMode()

@@ -79,9 +79,7 @@ def _campaign(target: Path, corpus: Path, folder: Path, options: argparse.Namesp
     while True:
         spent = time.monotonic() - start
         length = _ROUND if limit is None else max(1, min(_ROUND, round(limit - spent)))
-        counts = fuzz(target, corpus, folder, length, options.jobs)
-        total.refused.update(counts.refused)
-        total.accepted.update(counts.accepted)
+        total.include(fuzz(target, corpus, folder, length, options.jobs))
         spent = time.monotonic() - start
         print(f"{spent:6.0f} s {total.calls:15,} calls, nothing found", flush=True)
         if (limit is not None and spent >= limit - 0.5) or (options.calls and total.calls >= options.calls):

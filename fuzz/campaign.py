@@ -39,6 +39,10 @@ class Counts:
             self.refused[name] += int(refused)
             self.accepted[name] += int(accepted)
 
+    def include(self, other: "Counts") -> None:
+        self.refused.update(other.refused)
+        self.accepted.update(other.accepted)
+
     @property
     def calls(self) -> int:
         return self.refused.total() + self.accepted.total()
@@ -81,9 +85,7 @@ def fuzz(target: Path, corpus: Path, folder: Path, seconds: int, jobs: int) -> C
     counts = Counts()
     try:
         for job in started:
-            done = _finish(job, folder)
-            counts.refused.update(done.refused)
-            counts.accepted.update(done.accepted)
+            counts.include(_finish(job, folder))
     finally:
         for process, _, _ in started:
             process.kill()

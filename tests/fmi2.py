@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 import fmpy
-from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2EventInfo
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2EventInfo
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 MODEL_EXCHANGE, CO_SIMULATION = range(2)
@@ -279,6 +279,19 @@ class Instance:
         status = self.call("fmi2SetFMUstate", state)
         self.expect("fmi2FreeFMUstate", ctypes.byref(state))
         return status
+
+
+def fmpy_slave(folder: Path) -> FMU2Slave:
+    """An instance of an unzipped FMU for Co-Simulation, as FMPy drives it."""
+    description = fmpy.read_model_description(str(folder))
+    slave = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=str(folder),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="rov",
+    )
+    slave.instantiate()
+    return slave
 
 
 def keep_loaded(folder: Path) -> None:

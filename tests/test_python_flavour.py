@@ -13,7 +13,7 @@ import build_fmu
 from fmu_src.interface import Variable, variables
 from models.vehicle import Vehicle
 
-from .fmi2 import keep_loaded
+from .fmi2 import fmpy_slave, keep_loaded
 
 
 @pytest.fixture(scope="session")
@@ -32,14 +32,7 @@ def python_dir(python_fmu: Path) -> Path:
 
 
 def _instance(folder: Path) -> FMU2Slave:
-    description = fmpy.read_model_description(str(folder))
-    slave = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=str(folder),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="rov",
-    )
-    slave.instantiate()
+    slave = fmpy_slave(folder)
     slave.setupExperiment(startTime=0.0)
     return slave
 
