@@ -6,7 +6,7 @@ north-east-down; u, w, r are surge, heave and yaw velocity through the water. He
 
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
-from math import cos, inf, nan, pi, sin, sqrt
+from math import cos, inf, isfinite, nan, pi, remainder, sin, sqrt, tau
 
 from . import riccati
 
@@ -215,11 +215,14 @@ _GAUSS_8 = (
     (0.96028985649753623, 0.10122853629037626),
 )
 _EPS = 2.0**-52
-_MOST_PIECES = 20_000  # of a part: five times what has been seen, short of overflow
+_MOST_PIECES = 100_000  # of a part of a turn: 12,900 seen on the way from 1e30 rad/s to 1e-28 rad/s
 _ORDER = 8  # terms of the expansion at the ends of a fast turn
 
 
-def turning_step(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> tuple[float, float, float, float, float]:
+_Motion = tuple[float, float, float, float, float]  # distance ahead and aside, u, r, angle turned
+
+
+def turning_step(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> _Motion:
     """Distance covered in h seconds ahead and to starboard of the first heading, then u, r and the angle turned.
 
     The distance is the integral of u e^(i turn). It is cut where surge or yaw come to rest, and each part into
@@ -231,52 +234,63 @@ def turning_step(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> tuple[
     surge_turns, yaw_turns = surge.turning_time(u), yaw.turning_time(r)
     cuts = sorted(t for t in (surge_turns, yaw_turns) if t < h)
     for start, end in pairwise([0.0, *cuts, h]):
-        rest = end - start
-        for _ in range(_MOST_PIECES):
-            if rest == 0.0:
-                break
-            length = rest
-            r_end, angle = yaw.advance(r, rest)
-            u_end, left = surge.advance(u, rest)
-            if abs(angle) < _EPS / 4 or abs(left) < _EPS / 16 * (abs(ahead) + abs(aside)):
-                a, b = left, 0.0
-            else:
-                length, (a, b) = _longest_piece(surge, yaw, u, r, rest)
-            if length < rest:
-                u_end = surge.velocity(u, length)
-                r_end, angle = yaw.advance(r, length)
-            c, d = cos(turn), sin(turn)
-            ahead, aside = ahead + (a * c - b * d), aside + (a * d + b * c)
-            u, r, turn = u_end, r_end, turn + angle
-            rest -= length
-        else:
-            ahead = nan
+        if end > start:
+            ahead, aside, u, r, turn = _planar_leg(surge, yaw, (ahead, aside, u, r, turn), end - start)
         # At rest to the last digit, or what follows would take the branch of before the turn.
         u = 0.0 if end == surge_turns else u
         r = 0.0 if end == yaw_turns else r
     return ahead, aside, u, r, turn
 
 
+def _planar_leg(surge: Axis, yaw: Axis, motion: _Motion, rest: float) -> _Motion:
+    """The part of a turning step in which surge and yaw keep their signs."""
+    ahead, aside, u, r, turned = motion
+    u_end, left = surge.advance(u, rest)
+    r_end, angle = yaw.advance(r, rest)
+    turn = turned + angle
+    for _ in range(_MOST_PIECES):
+        if not (isfinite(left) and isfinite(angle)):
+            break
+        if abs(angle) < _EPS / 4 or abs(left) <= _EPS / 16 * (abs(ahead) + abs(aside)):
+            length, (a, b) = rest, (left, 0.0)
+        else:
+            length, (a, b) = _longest_piece(surge, yaw, u, r, rest)
+        c, d = cos(turned), sin(turned)
+        ahead, aside = ahead + (a * c - b * d), aside + (a * d + b * c)
+        if length == rest:
+            return ahead, aside, u_end, r_end, turn
+        rest -= length
+        u = surge.velocity(u, length)
+        r, gone = yaw.advance(r, length)
+        turned = remainder(turned + gone, tau)  # rounded as a small angle
+        left, angle = surge.distance(u, rest), yaw.distance(r, rest)
+    return nan, aside, u_end, r_end, turn
+
+
 def _longest_piece(surge: Axis, yaw: Axis, u: float, r: float, rest: float) -> tuple[float, tuple[float, float]]:
-    """The start of the remaining time that one formula covers, and the integral of u e^(i turn) over it."""
+    """The start of the remaining time that one formula covers, and the integral of u e^(i turn) over it.
+
+    Two good ends vouch for what lies between them only if the turn does not slow down much.
+    """
     panel = _panel_length(surge, yaw, u, r)
     drag = _drag(surge, u), _drag(yaw, r)
     if panel < rest and (at_start := _radius_derivatives(surge, yaw, drag, u, r)):
-        length = rest
+        length = min(rest, _slowing_time(yaw, r))
         while length > panel:
             u_end, r_end = surge.velocity(u, length), yaw.velocity(r, length)
-            # While the turn slows down, two good ends vouch for what lies between them only if it does not slow much.
-            if abs(r_end) >= 0.5 * abs(r) and (at_end := _radius_derivatives(surge, yaw, drag, u_end, r_end)):
+            if at_end := _radius_derivatives(surge, yaw, drag, u_end, r_end):
                 (a, b), (c, d) = _by_parts(at_start, 0.0), _by_parts(at_end, yaw.distance(r, length))
                 return length, (c - a, d - b)
-            length = 0.25 * length if length < 1e6 * panel else sqrt(length) * sqrt(panel)
+            length *= 0.25
     length = min(rest, panel)
     return length, _panel(surge, yaw, u, r, length)
 
 
 def _settled(axis: Axis, v: float) -> bool:
-    """Whether v is the steady velocity, up to rounding."""
-    return abs(axis.acceleration(v)) <= 16.0 * _EPS * abs(axis.C)
+    """Whether v is the steady velocity, up to rounding; that of a subnormal v is told at 2^1000 times its size."""
+    rate = abs(axis.acceleration(v))
+    slope = axis.B + 2.0 * axis.A * abs(v)
+    return rate <= 16.0 * _EPS * abs(axis.C) or 2.0**1000 * rate <= 2.0**-72 * (1.0 + slope)
 
 
 def _rate(axis: Axis, v: float) -> float:
@@ -286,7 +300,13 @@ def _rate(axis: Axis, v: float) -> float:
 
 def _turning_rate(yaw: Axis, r: float) -> float:
     """How fast the direction changes (rad/s): by the turn rate, and by its growth from rest, turn ~ r' t^2/2."""
-    return abs(r) + 2.0 * sqrt(abs(yaw.acceleration(r)))
+    return abs(r) + (0.0 if _settled(yaw, r) else 2.0 * sqrt(abs(yaw.acceleration(r))))
+
+
+def _slowing_time(yaw: Axis, r: float) -> float:
+    """A time (s) in which the turn rate keeps half of its size: what slows it down is strongest at the start."""
+    rate = yaw.acceleration(r)
+    return inf if _settled(yaw, r) or (r > 0.0) == (rate > 0.0) else 0.5 * abs(r / rate)
 
 
 def _panel_length(surge: Axis, yaw: Axis, u: float, r: float) -> float:
@@ -322,20 +342,22 @@ def _by_parts(g: list[float], turn: float) -> tuple[float, float]:
 def _radius_derivatives(surge: Axis, yaw: Axis, drag: tuple[float, float], u: float, r: float) -> list[float] | None:
     """The radius of the turn g = u/r and its derivatives by the heading; None where they do not fall off.
 
-    They come from the Taylor series of u and r in time: d/d(heading) = (1/r) d/dt.
+    They come from the Taylor series of u and r in time: d/d(heading) = (1/r) d/dt. Time is counted in radians at the
+    turn rate of the start, in which no coefficient overflows that matters.
     """
     if abs(r) <= max(_rate(surge, u), _rate(yaw, r)):
         return None
-    series, turning = _taylor(surge, drag[0], u), _taylor(yaw, drag[1], r)
+    series, turning = _taylor(surge, drag[0], u, r), [c / r for c in _taylor(yaw, drag[1], r, r)]
     g: list[float] = []
     for _ in range(_ORDER + 1):
         quotient: list[float] = []
         for n, c in enumerate(series):
-            quotient.append((c - sum(quotient[j] * turning[n - j] for j in range(n))) / r)
-        g.append(quotient[0])
+            quotient.append(c - sum(quotient[j] * turning[n - j] for j in range(n)))
+        g.append(quotient[0] / r)
         series = [n * c for n, c in enumerate(quotient)][1:]
     # Two orders are looked at, for at rest every other one vanishes.
-    return g if max(abs(g[-1]), abs(g[-2])) <= _EPS * max(map(abs, g)) else None
+    largest = max(map(abs, g))
+    return g if isfinite(largest) and all(abs(last) <= _EPS * largest for last in g[-2:]) else None
 
 
 def _drag(axis: Axis, v: float) -> float:
@@ -343,12 +365,12 @@ def _drag(axis: Axis, v: float) -> float:
     return axis.A if v > 0.0 or (v == 0.0 and axis.C >= 0.0) else -axis.A
 
 
-def _taylor(axis: Axis, A: float, v: float) -> list[float]:
-    """Taylor coefficients of v(t), orders 0 ... _ORDER, from v' = C - B v - A v^2; a settled axis is constant."""
+def _taylor(axis: Axis, A: float, v: float, rate: float) -> list[float]:
+    """Taylor coefficients of v by rate t from v' = C - B v - A v^2; a settled axis is constant."""
     if _settled(axis, v):
         return [v] + [0.0] * _ORDER
-    c = [v]
+    c, a, b = [v], A / rate, axis.B / rate
     for n in range(_ORDER):
-        square = sum(c[j] * c[n - j] for j in range(n + 1))
-        c.append(((axis.C if n == 0 else 0.0) - axis.B * c[n] - A * square) / (n + 1))
+        square = sum(a * c[j] * c[n - j] for j in range(n + 1))
+        c.append(((axis.C / rate if n == 0 else 0.0) - b * c[n] - square) / (n + 1))
     return c

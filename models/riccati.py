@@ -113,7 +113,7 @@ def _leg(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, floa
         gain, M = 1.0 - decay, root * (1.0 + decay)
         v = _end_velocity(a, b, c, v0, gain, M, l1 - decay * l2)
         if l1 > 1.0:  # exp(l1) may overflow
-            return v, h * (l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a
+            return v, h * ((l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a)
         rise = expm1(l1)  # exp - 1 at l1, and at l2
         fall = decay * (1.0 + rise) - 1.0
         mean = (v0 * (rise - fall) + c * ((rise / l1 if l1 != 0.0 else 1.0) - fall / l2)) / (2.0 * root)

@@ -139,32 +139,40 @@ def test_the_quadrature_rules_are_gauss_legendre_to_the_last_digit(
     assert len({node for node, _ in rule}) == order // 2
 
 
-def wild_axis(rng: random.Random) -> Axis:
-    A, B = (rng.choice([0.0, *[10.0 ** rng.uniform(-4, 3)] * 5]) for _ in range(2))
-    return Axis(A, B, rng.choice([-1.0, 1.0, 0.0]) * 10.0 ** rng.uniform(-4, 4))
+@pytest.fixture
+def pieces(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Lengths of the pieces that turns are cut into, except for straight ones."""
+    lengths: list[float] = []
+    longest_piece = dynamics._longest_piece
+
+    def noted(surge: Axis, yaw: Axis, u: float, r: float, rest: float) -> tuple[float, tuple[float, float]]:
+        length, piece = longest_piece(surge, yaw, u, r, rest)
+        lengths.append(length)
+        return length, piece
+
+    monkeypatch.setattr(dynamics, "_longest_piece", noted)
+    return lengths
 
 
-@pytest.mark.parametrize(("seed", "cases"), [(1, 500), pytest.param(2, 5000, marks=pytest.mark.long)])
-def test_no_step_needs_more_than_some_thousand_panels(seed: int, cases: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Over 5,000 wild axes, steps of up to 1e6 s and up to 1e12 rad at most 3,235: yaw creeps towards its force."""
-    panels = 0
-    panel = dynamics._panel
+def wild_axis(rng: random.Random, widest: float) -> Axis:
+    A, B = (rng.choice([0.0, *[10.0 ** rng.uniform(-widest, 3)] * 5]) for _ in range(2))
+    return Axis(A, B, rng.choice([-1.0, 1.0, 0.0]) * 10.0 ** rng.uniform(-widest, widest))
 
-    def counted(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> tuple[float, float]:
-        nonlocal panels
-        panels += 1
-        return panel(surge, yaw, u, r, h)
 
-    monkeypatch.setattr(dynamics, "_panel", counted)
-    rng = random.Random(seed)
+@pytest.mark.parametrize(
+    ("widest", "cases"), [(4, 500), (12, 500), *(pytest.param(n, 5000, marks=pytest.mark.long) for n in (5, 13, 30))]
+)
+def test_no_turn_needs_more_than_some_thousand_pieces(widest: float, cases: int, pieces: list[float]) -> None:
+    """Turns of up to 1e60 rad at 1e30 rad/s; most pieces where drag takes a hundredth of the turn rate in a radian."""
+    rng = random.Random(widest)
     for _ in range(cases):
-        surge, yaw = wild_axis(rng), wild_axis(rng)
-        u, r = (rng.choice([-1.0, 0.0, 1.0]) * 10.0 ** rng.uniform(-2, 2) for _ in range(2))
-        h = 10.0 ** rng.uniform(-5, 6)
-        panels = 0
+        surge, yaw = wild_axis(rng, widest), wild_axis(rng, widest)
+        u, r = (rng.choice([-1.0, 0.0, 1.0]) * 10.0 ** rng.uniform(-2, widest) for _ in range(2))
+        h = 10.0 ** rng.uniform(-5, widest)
+        pieces.clear()
         motion = turning_step(surge, yaw, u, r, h)
-        assert all(map(isfinite, motion))
-        assert panels < 10_000, (surge, yaw, u, r, h)
+        assert all(map(isfinite, motion)), (surge, yaw, u, r, h)
+        assert len(pieces) < 20_000, (surge, yaw, u, r, h)
 
 
 def test_a_turn_is_as_exact_as_the_straight_run_it_grows_from() -> None:

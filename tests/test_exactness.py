@@ -5,12 +5,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, astuple, fields, replace
 from functools import partial
 from itertools import product
-from math import cos, hypot, pi, sin
+from math import copysign, cos, hypot, isfinite, pi, sin
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import pytest
+from mpmath import mp
 from scipy.integrate import solve_ivp
 
 from models import dynamics
@@ -18,7 +19,7 @@ from models.dynamics import Axis, Coefficients, Inputs, State
 from models.vehicle import Vehicle
 
 from . import reference
-from .fmi2 import OK, Fmu
+from .fmi2 import ERROR, OK, Fmu
 
 Case = tuple[Coefficients, Inputs, State, float]
 
@@ -138,17 +139,86 @@ REVERSALS = [
 ]
 
 
+def turning_case(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> Case:
+    ones = Coefficients(*[1.0] * len(fields(Coefficients)))
+    k = replace(ones, a_d_u=surge.A, b_d_u=surge.B, a_d_r=yaw.A, b_d_r=yaw.B)
+    return k, Inputs(X_ext=surge.C, N_ext=yaw.C), State(u=u, r=r), h
+
+
 @pytest.mark.parametrize("after", [0.9, 1.0, 1.3, 2.5])
 @pytest.mark.parametrize(("surge", "yaw", "u", "r"), REVERSALS)
 def test_turning_about_while_spinning_is_exact(
     fmu: Fmu, surge: Axis, yaw: Axis, u: float, r: float, after: float
 ) -> None:
-    ones = Coefficients(*[1.0] * len(fields(Coefficients)))
-    k = replace(ones, a_d_u=surge.A, b_d_u=surge.B, a_d_r=yaw.A, b_d_r=yaw.B)
-    i, before, h = Inputs(X_ext=surge.C, N_ext=yaw.C), State(u=u, r=r), after * surge.turning_time(u)
+    k, i, before, h = turning_case(surge, yaw, u, r, after * surge.turning_time(u))
     exact = reference.step(k, i, before, h)
     for found in (run(fmu, k, i, before, h), dynamics.step(k, i, before, h)):
         assert max(worst(found, exact.state, exact.scale, before)) <= 1e-14
+
+
+@pytest.mark.parametrize("A", [1e-12, 1e-6, 1e-3, 4.9e-3, 0.01, 0.3, 3.0])
+@pytest.mark.parametrize("r", [-1.0, 1e6, 1e18])
+@pytest.mark.parametrize("h", [0.01, 1.0, 1e3, 1e12])
+def test_a_spin_that_drag_slows_down_is_exact(fmu: Fmu, A: float, r: float, h: float) -> None:
+    """With a steady u, and A alone in yaw: x + iy = u ((1 + A r h)^(1 + i/A) - 1)/(r (A + i)), whatever it turns."""
+    case = turning_case(Axis(0.0, 2.0, 1.0), Axis(A, 0.0, 0.0), 0.5, r, h)
+    with mp.workdps(60):
+        growth = 1 + mp.mpf(A) * abs(r) * h
+        turn = mp.log(growth) / A
+        exact = (growth * mp.expj(turn) - 1) / (2 * abs(r) * mp.mpc(A, 1))
+        size = min(h, growth / abs(r)) / 2
+        for found in (run(fmu, *case), dynamics.step(*case)):
+            # the direction cannot be better than the rounding of the turn
+            assert abs(mp.mpc(found.x, copysign(found.y, r * found.y)) - exact) <= size * 2e-15 * (1 + turn)
+            assert abs(abs(found.psi) - turn) <= 4e-16 * turn
+
+
+# As above, and h: turns in which something is huge, next to nothing, or both. The fuzzer found them.
+FAR = {
+    "drag takes all but a millionth of a spin": (Axis(1e-12, 30.0, -1e-19), Axis(1.9e-12, 1.1, 0.0), 0.1, 3e18, 1.0),
+    "a spin fades evenly": (Axis(1e-12, 30.0, -1e-19), Axis(0.0, 1.14, 0.0), 0.09, 2.7e18, 1.0),
+    "a vehicle without drag to speak of": (Axis(0.042, 0.7, 4.5), Axis(1.2e-12, 1e-12, 2.4e-11), 0.0, 4e12, 500.0),
+    "a steady turn longer than the age of the universe": (Axis(0.5, 1.4, 0.27), Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1e24),
+    "no surge but the smallest number": (Axis(0.5, 1.4, 0.0), Axis(0.14, 0.12, 1e-3), -5e-324, 0.0, 1e9),
+    "a subnormal force": (Axis(0.5, 152.0, -1e-311), Axis(0.14, 0.12, -1e-12), 0.0, 0.0, 500.0),
+    "a torque on a turn that is next to nothing": (Axis(0.0, 1e-190, -1e-160), Axis(0.0, 0.0, 1.5e9), 0.0, 5e-27, 1e15),
+    "surge fades as slowly as it turns": (Axis(0.22, 0.0, 0.0), Axis(1e-30, 1.14, 4e-25), 1.7e5, -7e-11, 4e29),
+    "a surge to the fifth power overflows": (Axis(0.5, 1.4, 0.0), Axis(0.1, 0.0, -1e130), -1e66, -2e65, 0.5),
+}
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_no_turn_goes_too_far(fmu: Fmu, name: str) -> None:
+    k, i, before, h = case = turning_case(*FAR[name])
+    start = perf_counter()
+    found = run(fmu, *case)
+    assert perf_counter() - start < 0.1  # it takes at most some thousand pieces
+    assert all(map(isfinite, astuple(found)))
+    expected = dynamics.step(*case)
+    assert [getattr(found, v) for v in VELOCITIES] == [getattr(expected, v) for v in VELOCITIES]
+    assert abs(found.psi - expected.psi) <= 4.0 * ROUNDING * abs(expected.psi)
+    way = path(dynamics.axes(k, i)[0], before.u, h)
+    assert hypot(found.x, found.y) <= way * (1.0 + 1e-14) + 1e-320
+    off = hypot(found.x - expected.x, found.y - expected.y)
+    assert off <= way * (1e-14 + 4.0 * ROUNDING * abs(expected.psi)) + 1e-320
+
+
+def test_what_overflows_is_said_at_once(fmu: Fmu) -> None:
+    """Turns of more than 1e308 rad, and ways of more than 1e308 m."""
+    calm = Axis(0.5, 1.4, 0.27)
+    for surge, yaw, u, r, h in [
+        (calm, Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1.79e308),
+        (calm, Axis(0.0055, 0.0, 0.0), 0.0, 1.7e308, 1e308),
+        (Axis(0.0, 0.0, 1e300), calm, 0.0, 1.0, 1e8),
+    ]:
+        k, i, before, _ = case = turning_case(surge, yaw, u, r, h)
+        assert not all(map(isfinite, astuple(dynamics.step(*case))))
+        with fmu.instance() as rov:
+            rov.start({**asdict(k), **asdict(i), **asdict(before)})
+            start = perf_counter()
+            assert rov.step(0.0, h) == ERROR
+            assert perf_counter() - start < 0.1
+            assert "overflows" in rov.log[-1].text
 
 
 # ---- The VideoRay, against an integration of the equations as the paper prints them ----

@@ -159,7 +159,7 @@ static inline void riccati_leg_advance(double A, double B, double C, double v0, 
             return;
         }
         if (l1 > 1.0) { /* exp(l1) may overflow */
-            *s = h * (l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a;
+            *s = h * ((l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a);
             return;
         }
         const double rise = expm1(l1), fall = decay * (1.0 + rise) - 1.0; /* exp - 1 at l1 and l2 */

@@ -6,8 +6,10 @@
 
 enum {
     ORDER = 8,           /* terms of the expansion at the ends of a fast turn */
-    MOST_PIECES = 20000 /* of a part of a turn: five times what has been seen, short of overflow */
+    MOST_PIECES = 100000 /* of a part of a turn: 12,900 seen on the way from 1e30 rad/s to 1e-28 rad/s */
 };
+
+static const double FULL_TURN = 6.283185307179586;
 
 typedef struct {
     double ahead, aside;
@@ -73,10 +75,12 @@ static void rov_derivatives(const rov_coefficients *k, const rov_gains *gains, c
     };
 }
 
-/* v is the steady velocity, up to rounding. */
+/* v is the steady velocity, up to rounding; that of a subnormal v is told at 2^1000 times its size, where it is fast. */
 static bool settled(const riccati *axis, double v)
 {
-    return fabs(riccati_acceleration(axis, v)) <= 16.0 * DBL_EPSILON * fabs(axis->C);
+    const double rate = fabs(riccati_acceleration(axis, v));
+    return rate <= 16.0 * DBL_EPSILON * fabs(axis->C)
+           || 0x1p1000 * rate <= 0x1p-72 * (1.0 + axis->B + 2.0 * axis->A * fabs(v));
 }
 
 /* How fast the velocity bends (1/s): its solution is analytic within 2/rate. */
@@ -88,7 +92,7 @@ static double bending_rate(const riccati *axis, double v)
 /* How fast the direction changes (rad/s): by the turn rate, and by its growth from rest, turn ~ r' t^2/2. */
 static double turning_rate(const riccati *yaw, double r)
 {
-    return fabs(r) + 2.0 * sqrt(fabs(riccati_acceleration(yaw, r)));
+    return fabs(r) + (settled(yaw, r) ? 0.0 : 2.0 * sqrt(fabs(riccati_acceleration(yaw, r))));
 }
 
 static planar rotated(planar p, double turn)
@@ -125,44 +129,48 @@ static double signed_drag(const riccati *axis, double v)
     return v > 0.0 || (v == 0.0 && axis->C >= 0.0) ? axis->A : -axis->A;
 }
 
-/* Taylor coefficients of v(t) from v' = C - B v - A v^2; a settled axis is constant. */
-static void taylor(const riccati *axis, double A, double v, double c[ORDER + 1])
+/* Taylor coefficients of v by rate t, from v' = C - B v - A v^2; a settled axis is constant. */
+static void taylor(const riccati *axis, double A, double v, double rate, double c[ORDER + 1])
 {
     const bool constant = settled(axis, v);
+    const double a = A / rate, b = axis->B / rate;
     c[0] = v;
     for (int n = 0; n < ORDER; n++) {
-        double square = 0.0;
+        double change = (n == 0 ? axis->C / rate : 0.0) - b * c[n];
         for (int j = 0; j <= n; j++) {
-            square += c[j] * c[n - j];
+            change -= a * c[j] * c[n - j];
         }
-        c[n + 1] = constant ? 0.0 : ((n == 0 ? axis->C : 0.0) - axis->B * c[n] - A * square) / (n + 1);
+        c[n + 1] = constant ? 0.0 : change / (n + 1);
     }
 }
 
 /* The radius of the turn g = u/r and its derivatives by the heading, d/d(heading) = (1/r) d/dt; false where they do
- * not fall off. Two orders are looked at, for at rest every other one vanishes. */
+ * not fall off. Two orders are looked at, for at rest every other one vanishes. Time is counted in radians at the turn
+ * rate of the start, in which no coefficient overflows that matters. */
 static bool radius_derivatives(const rov_gains *now, const double drag[2], double u, double r, double g[ORDER + 1])
 {
     if (!(fabs(r) > fmax(bending_rate(&now->surge, u), bending_rate(&now->yaw, r)))) {
         return false;
     }
     double series[ORDER + 1], turning[ORDER + 1], largest = 0.0;
-    taylor(&now->surge, drag[0], u, series);
-    taylor(&now->yaw, drag[1], r, turning);
+    taylor(&now->surge, drag[0], u, r, series);
+    taylor(&now->yaw, drag[1], r, r, turning);
+    for (int n = 0; n <= ORDER; n++) {
+        turning[n] /= r;
+    }
     for (int k = 0; k <= ORDER; k++) {
         for (int n = 0; n <= ORDER - k; n++) { /* series / turning, in place */
             for (int j = 0; j < n; j++) {
                 series[n] -= series[j] * turning[n - j];
             }
-            series[n] /= r;
         }
-        g[k] = series[0];
+        g[k] = series[0] / r;
         largest = fmax(largest, fabs(g[k]));
         for (int n = 0; n < ORDER - k; n++) {
             series[n] = (n + 1) * series[n + 1];
         }
     }
-    return fmax(fabs(g[ORDER]), fabs(g[ORDER - 1])) <= DBL_EPSILON * largest;
+    return isfinite(largest) && fabs(g[ORDER]) <= DBL_EPSILON * largest && fabs(g[ORDER - 1]) <= DBL_EPSILON * largest;
 }
 
 /* The antiderivative of u e^(i turn) by parts over the heading: e^(i turn) (-i g + g' + i g'' - g''' - ...). */
@@ -176,7 +184,15 @@ static planar by_parts(const double g[ORDER + 1], double turn)
     return rotated(p, turn);
 }
 
-/* The integral of u e^(i turn) over the start of the remaining time that one formula covers; its length in *length. */
+/* A time in which the turn rate keeps half of its size: what slows it down is strongest at the start. */
+static double slowing_time(const riccati *yaw, double r)
+{
+    const double rate = riccati_acceleration(yaw, r);
+    return settled(yaw, r) || (r > 0.0) == (rate > 0.0) ? INFINITY : 0.5 * fabs(r / rate);
+}
+
+/* The integral of u e^(i turn) over the start of the remaining time that one formula covers; its length in *length.
+ * Two good ends vouch for what lies between them only if the turn does not slow down much. */
 static planar longest_piece(const rov_gains *now, double u, double r, double rest, double *length)
 {
     const double bending = fmax(bending_rate(&now->surge, u), bending_rate(&now->yaw, r));
@@ -185,11 +201,9 @@ static planar longest_piece(const rov_gains *now, double u, double r, double res
     const double drag[2] = {signed_drag(&now->surge, u), signed_drag(&now->yaw, r)};
     double at_start[ORDER + 1], at_end[ORDER + 1];
     if (panel < rest && radius_derivatives(now, drag, u, r, at_start)) {
-        for (double t = rest; t > panel; t = t < 1e6 * panel ? 0.25 * t : sqrt(t) * sqrt(panel)) {
-            const double after = riccati_velocity(&now->yaw, r, t);
-            /* While the turn slows down, two good ends vouch for what lies between only if it does not slow much. */
-            if (fabs(after) >= 0.5 * fabs(r)
-                && radius_derivatives(now, drag, riccati_velocity(&now->surge, u, t), after, at_end)) {
+        for (double t = fmin(rest, slowing_time(&now->yaw, r)); t > panel; t *= 0.25) {
+            const double u_end = riccati_velocity(&now->surge, u, t), r_end = riccati_velocity(&now->yaw, r, t);
+            if (radius_derivatives(now, drag, u_end, r_end, at_end)) {
                 const planar a = by_parts(at_start, 0.0), b = by_parts(at_end, riccati_distance(&now->yaw, r, t));
                 *length = t;
                 return (planar){b.ahead - a.ahead, b.aside - a.aside};
@@ -200,38 +214,35 @@ static planar longest_piece(const rov_gains *now, double u, double r, double res
     return panel_integral(now, u, r, *length, *length * bending < 0.08 && *length * turning < 0.14);
 }
 
-/* Distance covered ahead and to starboard of the heading at the start while surge and yaw keep their signs: added to
- * *sum after the turn so far. Straight runs are exact; where the vehicle turns fast against the changes of velocity,
- * the two ends are enough; the rest is cut into Gauss-Legendre panels. u, r and the turn are moved to the end. */
+/* A part of a step in which surge and yaw keep their signs: the distance covered ahead and to starboard of the heading at
+ * the start is added to *sum; u, r and the turn so far are moved to the end. Straight runs are exact; where the vehicle
+ * turns fast against the changes of velocity, the two ends are enough; the rest is cut into Gauss-Legendre panels. */
 static void planar_leg(const rov_gains *now, double *u, double *r, double *turn, double rest, planar *sum)
 {
-    int pieces = 0;
-    for (; rest != 0.0 && pieces < MOST_PIECES; pieces++) {
-        double length = rest, angle, r_end, left;
-        riccati_advance(&now->yaw, *r, rest, &r_end, &angle);
-        const double path = fabs(sum->ahead) + fabs(sum->aside);
-        planar piece;
-        if (fabs(angle) < DBL_EPSILON / 4.0
-            || (path > 0.0 && fabs(riccati_distance(&now->surge, *u, rest)) < DBL_EPSILON / 16.0 * path)) {
-            riccati_advance(&now->surge, *u, rest, u, &left);
-            piece = (planar){left, 0.0};
-        } else {
-            piece = longest_piece(now, *u, *r, rest, &length);
-            *u = riccati_velocity(&now->surge, *u, length);
+    double u_at = *u, r_at = *r, turned = *turn, left, angle, gone;
+    riccati_advance(&now->surge, u_at, rest, u, &left);
+    riccati_advance(&now->yaw, r_at, rest, r, &angle);
+    *turn += angle;
+    for (int pieces = 0; isfinite(left) && isfinite(angle) && pieces < MOST_PIECES; pieces++) {
+        double length = rest;
+        planar piece = {left, 0.0};
+        if (fabs(angle) >= DBL_EPSILON / 4.0 && fabs(left) > DBL_EPSILON / 16.0 * (fabs(sum->ahead) + fabs(sum->aside))) {
+            piece = longest_piece(now, u_at, r_at, rest, &length);
         }
-        piece = rotated(piece, *turn);
+        piece = rotated(piece, turned);
         sum->ahead += piece.ahead;
         sum->aside += piece.aside;
-        if (length < rest) {
-            riccati_advance(&now->yaw, *r, length, &r_end, &angle);
+        if (length == rest) {
+            return;
         }
-        *turn += angle;
-        *r = r_end;
         rest -= length;
+        u_at = riccati_velocity(&now->surge, u_at, length);
+        riccati_advance(&now->yaw, r_at, length, &r_at, &gone);
+        turned = remainder(turned + gone, FULL_TURN); /* rounded as a small angle */
+        left = riccati_distance(&now->surge, u_at, rest);
+        angle = riccati_distance(&now->yaw, r_at, rest);
     }
-    if (pieces == MOST_PIECES) {
-        sum->ahead = NAN;
-    }
+    sum->ahead = NAN; /* it overflows */
 }
 
 static void rov_step(const rov_coefficients *k, const rov_gains *gains, const rov_inputs *in,
@@ -248,7 +259,9 @@ static void rov_step(const rov_coefficients *k, const rov_gains *gains, const ro
         double start = 0.0;
         u = s->u;
         for (int i = 0; i < 3; start = ends[i++]) {
-            planar_leg(&now, &u, &r, &turn, ends[i] - start, &sum);
+            if (ends[i] > start) {
+                planar_leg(&now, &u, &r, &turn, ends[i] - start, &sum);
+            }
             /* at rest to the last digit, or what follows would take the branch of before the turn */
             u = ends[i] == surge_turns ? 0.0 : u;
             r = ends[i] == yaw_turns ? 0.0 : r;
