@@ -4,6 +4,7 @@ import argparse
 import shutil
 import tempfile
 import time
+from base64 import b64encode
 from collections.abc import Sequence
 from os import cpu_count
 from pathlib import Path
@@ -66,11 +67,15 @@ def _run(arguments: Sequence[str] | None) -> None:
                 unpack_corpus(corpus)
                 _print_counts(*_campaign(target, corpus, folder, options))
         except FindingError as finding:
-            copies = [shutil.copy(path, ".") for path in finding.inputs]
-            again = [f"again with: python -m fuzz {copy}" for copy in copies]
-            raise FindingError("\n".join([str(finding), *again])) from None
+            raise FindingError("\n".join([str(finding), *map(_keep, finding.inputs)])) from None
         if options.keep and not options.inputs:
             print(f"the corpus now has {pack_corpus(target, corpus)} inputs")
+
+
+def _keep(found: Path) -> str:
+    """Copy an input here, and say what is in it: on a machine that is thrown away, what is printed is what is left."""
+    copy = shutil.copy(found, ".")
+    return f"again with: python -m fuzz {copy}, in base64:\n{b64encode(found.read_bytes()).decode()}"
 
 
 def _campaign(target: Path, corpus: Path, folder: Path, options: argparse.Namespace) -> tuple[Counts, float]:

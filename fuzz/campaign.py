@@ -15,6 +15,7 @@ from .sanitized import build_sanitized
 TARGET_SOURCE = Path(__file__).with_name("c") / "target.c"
 CORPUS = Path(__file__).with_name("corpus.zip")
 _LONGEST_INPUT = 2000  # bytes, some hundred calls
+_LONGEST_TIME = 60  # s for one of them
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -80,7 +81,15 @@ def replay(target: Path, inputs: Sequence[Path], folder: Path) -> Counts:
 
 def fuzz(target: Path, corpus: Path, folder: Path, seconds: int, jobs: int) -> Counts:
     """Fuzz for so long in so many processes that share a corpus. Raises FindingError."""
-    arguments = [str(corpus), f"-max_total_time={seconds}", "-len_control=0", f"-max_len={_LONGEST_INPUT}", "-reload=1"]
+    arguments = [
+        str(corpus),
+        f"-max_total_time={seconds}",
+        f"-max_len={_LONGEST_INPUT}",
+        f"-timeout={_LONGEST_TIME}",
+        f"-report_slow_units={_LONGEST_TIME}",  # no file for what is slow but ends
+        "-len_control=0",
+        "-reload=1",
+    ]
     started = [_start(target, folder, arguments, name=f"counts-{i}") for i in range(jobs)]
     counts = Counts()
     try:

@@ -1,11 +1,14 @@
 """The fuzzer's corpus finds nothing in the FMU's C, and finds what is planted there. The long run is python -m fuzz."""
 
 import re
+from base64 import b64decode
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from fmu_src.package import native_content
+from fuzz import __main__ as command
 from fuzz.campaign import FindingError, build_target, fuzz, replay, unpack_corpus
 from fuzz.legal import MODES, legal_modes
 from fuzz.sanitized import clang
@@ -93,7 +96,37 @@ PLANTED = {
         "growth = M + drag * N * 0.999;",
         "beyond its equilibrium",
     ),
+    "a dive goes further than its fastest": (
+        "rov.c",
+        ".z = s->z + depth,",
+        ".z = s->z + 1.000001 * depth,",
+        "broken property .*: z goes from",
+    ),
+    "a turn makes the way longer": (
+        "rov.c",
+        ".x = s->x + sum.ahead + in->V_N * h,",
+        ".x = s->x + 1.000001 * sum.ahead + in->V_N * h,",
+        "at no more than",
+    ),
 }
+
+
+def test_a_finding_can_be_made_again(
+    vehicle: Vehicle, corpus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From the file that is kept, or from what is printed of it."""
+    file, line, planted, told = PLANTED["the time is not in the bytes"]
+    content = native_content(vehicle)
+    content = replace(content, sources={**content.sources, file: content.sources[file].replace(line, planted)})
+    monkeypatch.setattr(command, "native_content", lambda _vehicle: content)
+    monkeypatch.chdir(tmp_path)
+    assert command.main([str(corpus)]) == 1
+    assert told in (words := capsys.readouterr().err)
+    (kept,) = tmp_path.glob("finding-*")
+    assert f"again with: python -m fuzz ./{kept.name}, in base64:\n" in words
+    assert b64decode(words.splitlines()[-1]) == kept.read_bytes()
+    assert command.main([kept.name]) == 1
+    assert told in capsys.readouterr().err
 
 
 def test_every_defect_has_a_place_to_be_planted(vehicle: Vehicle) -> None:

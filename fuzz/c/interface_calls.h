@@ -163,10 +163,10 @@ static void call_fmi2DoStep(slot *s)
     }
     before_call();
     verdict wanted = legal(s, CALL_fmi2DoStep, good != REFUSED);
-    axes_before before = {0};
+    start_of_step start = {0};
     if (wanted == ACCEPTED) {
         wanted = good == ACCEPTED && is_moderate(s->f) && h <= 1e30 ? ACCEPTED : EITHER;
-        before = axes_of(s->f);
+        start = start_of(s->f, h, end);
     }
     const fmi2Status status = fmi2DoStep(s->f, t, h, take_bool());
     if (wanted == EITHER && s->f->now.mode == FAILED) { /* it overflows: nothing else may have changed */
@@ -175,7 +175,7 @@ static void call_fmi2DoStep(slot *s)
     }
     if (after_call(s, CALL_fmi2DoStep, wanted, status, true)) {
         s->at.time = end;
-        check_step(s->f, &before, end);
+        check_step(s->f, &start);
     }
 }
 

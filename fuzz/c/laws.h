@@ -6,17 +6,18 @@
 
 enum { N_AXES = 3 };
 
-/* The axes with the forces of the moment, and their velocities. */
+/* The axes with the forces of the moment, the state, and the step that is asked for. */
 typedef struct {
     riccati axis[N_AXES];
-    double v[N_AXES];
-} axes_before;
+    rov_state state;
+    double h, end;
+} start_of_step;
 
-static axes_before axes_of(const fmu *f)
+static start_of_step start_of(const fmu *f, double h, double end)
 {
     const rov_variables *const v = &f->now.values.named;
     const rov_gains now = rov_axes(&v->coefficients, &f->gains, &v->inputs);
-    return (axes_before){{now.surge, now.heave, now.yaw}, {v->state.u, v->state.w, v->state.r}};
+    return (start_of_step){{now.surge, now.heave, now.yaw}, v->state, h, end};
 }
 
 /* Where drag balances the force. */
@@ -27,13 +28,13 @@ static double equilibrium(const riccati *axis)
 }
 
 /* Each velocity has gone from where it was towards its equilibrium and not beyond; without force, to the last bit. */
-static void check_step(const fmu *f, const axes_before *before, double end)
+static void check_velocities(const start_of_step *start, const rov_state *after)
 {
-    const rov_state *const state = &f->now.values.named.state;
-    const double after[N_AXES] = {state->u, state->w, state->r};
+    const double from[N_AXES] = {start->state.u, start->state.w, start->state.r};
+    const double to[N_AXES] = {after->u, after->w, after->r};
     for (int i = 0; i < N_AXES; i++) {
-        const riccati *const axis = &before->axis[i];
-        const double v0 = before->v[i], v = after[i], limit = equilibrium(axis);
+        const riccati *const axis = &start->axis[i];
+        const double v0 = from[i], v = to[i], limit = equilibrium(axis);
         PROPERTY(isfinite(v), "axis %d moves at %g", i, v);
         if (axis->C == 0.0) {
             PROPERTY(fabs(v) <= fabs(v0) && v * v0 >= 0.0, "axis %d without force: from %a to %a", i, v0, v);
@@ -45,7 +46,44 @@ static void check_step(const fmu *f, const axes_before *before, double end)
                      "axis %d: from %a to %a, beyond its equilibrium %a", i, v0, v, limit);
         }
     }
-    PROPERTY(f->now.time == end, "a step to t = %a ends at %a", end, f->now.time);
+}
+
+/* What rounding may add to a distance that v covers from one place to another. */
+static double rounding_of_way(double v, double h, double from, double to)
+{
+    return 64.0 * DBL_EPSILON * (fabs(v) * h + fabs(from) + fabs(to)) + DBL_MIN * (1.0 + h);
+}
+
+/* What changes evenly from v0 to v covers no less than the slower of the two and no more than the faster one. */
+static void check_way(const char *name, double v0, double v, double h, double from, double to)
+{
+    const double low = fmin(v0, v) * h, high = fmax(v0, v) * h;
+    const double rounding = rounding_of_way(fmax(fabs(v0), fabs(v)), h, from, to);
+    PROPERTY(!isfinite(rounding) || (to - from >= low - rounding && to - from <= high + rounding),
+             "%s goes from %a to %a in %a, at %a to %a", name, from, to, h, v0, v);
+}
+
+/* A turn does not make the way longer. */
+static void check_track(const start_of_step *start, const rov_inputs *in, const rov_state *to)
+{
+    const rov_state *const from = &start->state;
+    const double h = start->h, fastest = fmax(fabs(from->u), fabs(to->u));
+    const double north = in->V_N * h, east = in->V_E * h;
+    const double way = hypot(to->x - from->x - north, to->y - from->y - east);
+    const double rounding = rounding_of_way(fastest, h, hypot(from->x, from->y), hypot(to->x, to->y))
+                            + rounding_of_way(hypot(in->V_N, in->V_E), h, 0.0, 0.0);
+    PROPERTY(!isfinite(rounding) || way <= fastest * h + rounding, "%a at no more than %a for %a", way, fastest, h);
+}
+
+static void check_step(const fmu *f, const start_of_step *start)
+{
+    const rov_variables *const now = &f->now.values.named;
+    const rov_state *const from = &start->state, *const to = &now->state;
+    check_velocities(start, to);
+    check_way("z", from->w, to->w, start->h, from->z, to->z);
+    check_way("psi", from->r, to->r, start->h, from->psi, to->psi);
+    check_track(start, &now->inputs, to);
+    PROPERTY(f->now.time == start->end, "a step to t = %a ends at %a", start->end, f->now.time);
 }
 
 /* What a step uses belongs to the coefficients of now. */
