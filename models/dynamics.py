@@ -264,7 +264,7 @@ def _planar_leg(surge: Axis, yaw: Axis, motion: _Motion, rest: float) -> _Motion
         r, gone = yaw.advance(r, length)
         turned = remainder(turned + gone, tau)  # rounded as a small angle
         left, angle = surge.distance(u, rest), yaw.distance(r, rest)
-    return nan, aside, u_end, r_end, turn
+    return nan, nan, u_end, r_end, nan
 
 
 def _longest_piece(surge: Axis, yaw: Axis, u: float, r: float, rest: float) -> tuple[float, tuple[float, float]]:

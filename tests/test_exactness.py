@@ -210,6 +210,7 @@ def test_what_overflows_is_said_at_once(fmu: Fmu) -> None:
         (calm, Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1.79e308),
         (calm, Axis(0.0055, 0.0, 0.0), 0.0, 1.7e308, 1e308),
         (Axis(0.0, 0.0, 1e300), calm, 0.0, 1.0, 1e8),
+        (Axis(0.0, 0.0, -1.0), Axis(0.0, 0.0, 0.0), 1e10, 1e300, 1e10 + 10.0),
     ]:
         k, i, before, _ = case = turning_case(surge, yaw, u, r, h)
         assert not all(map(isfinite, astuple(dynamics.step(*case))))

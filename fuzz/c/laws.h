@@ -54,7 +54,7 @@ static double rounding_of_way(double v, double h, double from, double to)
     return 64.0 * DBL_EPSILON * (fabs(v) * h + fabs(from) + fabs(to)) + DBL_MIN * (1.0 + h);
 }
 
-/* What changes evenly from v0 to v covers no less than the slower of the two and no more than the faster one. */
+/* A velocity that only rises or only falls covers no less than the lower of its ends would, no more than the higher. */
 static void check_way(const char *name, double v0, double v, double h, double from, double to)
 {
     const double low = fmin(v0, v) * h, high = fmax(v0, v) * h;
