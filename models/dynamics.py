@@ -203,6 +203,8 @@ def step(k: Coefficients, i: Inputs, s: State, h: float) -> State:
     )
 
 
+_Rule = tuple[tuple[float, float], ...]
+
 # Gauss-Legendre rules on [-1, 1], positive nodes: the short one for panels over which little changes.
 _GAUSS_4 = (
     (0.33998104358485626, 0.6521451548625461),
@@ -272,7 +274,10 @@ def _longest_piece(surge: Axis, yaw: Axis, u: float, r: float, rest: float) -> t
 
     Two good ends vouch for what lies between them only if the turn does not slow down much.
     """
-    panel = _panel_length(surge, yaw, u, r)
+    bending = max(_rate(surge, u), _rate(yaw, r))
+    turning = _turning_rate(yaw, r)
+    # a time over which eight nodes give the integral to rounding
+    panel = min(1.0 / bending if bending > 0.0 else inf, 2.0 / turning if turning > 0.0 else inf)
     drag = _drag(surge, u), _drag(yaw, r)
     if panel < rest and (at_start := _radius_derivatives(surge, yaw, drag, u, r)):
         length = min(rest, _slowing_time(yaw, r))
@@ -283,7 +288,8 @@ def _longest_piece(surge: Axis, yaw: Axis, u: float, r: float, rest: float) -> t
                 return length, (c - a, d - b)
             length *= 0.25
     length = min(rest, panel)
-    return length, _panel(surge, yaw, u, r, length)
+    is_short = length * bending < 0.08 and length * turning < 0.14
+    return length, _panel(surge, yaw, u, r, length, _GAUSS_4 if is_short else _GAUSS_8)
 
 
 def _settled(axis: Axis, v: float) -> bool:
@@ -309,17 +315,8 @@ def _slowing_time(yaw: Axis, r: float) -> float:
     return inf if _settled(yaw, r) or (r > 0.0) == (rate > 0.0) else 0.5 * abs(r / rate)
 
 
-def _panel_length(surge: Axis, yaw: Axis, u: float, r: float) -> float:
-    """A time (s) over which eight nodes give the integral to rounding."""
-    rate = max(_rate(surge, u), _rate(yaw, r))
-    turning = _turning_rate(yaw, r)
-    return min(1.0 / rate if rate > 0.0 else inf, 2.0 / turning if turning > 0.0 else inf)
-
-
-def _panel(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> tuple[float, float]:
+def _panel(surge: Axis, yaw: Axis, u: float, r: float, h: float, rule: _Rule) -> tuple[float, float]:
     """The integral of u e^(i turn) over one panel by Gauss-Legendre quadrature."""
-    short = h * max(_rate(surge, u), _rate(yaw, r)) < 0.08 and h * _turning_rate(yaw, r) < 0.14
-    rule = _GAUSS_4 if short else _GAUSS_8
     half = 0.5 * h
     ahead = aside = 0.0
     for node, weight in rule:

@@ -34,7 +34,7 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
         if not os.access(path.parent, os.W_OK):
             raise OSError(errno.EACCES, "its folder is read-only", str(path))
         for other in taken:
-            if _is_same(path, other):
+            if is_same(path, other):
                 raise OSError(errno.EEXIST, f"would overwrite {other}, an input or another output", str(path))
         taken.append(path)
 
@@ -72,7 +72,8 @@ def _draft(output: Output, drafts: ExitStack) -> Path:
     return draft
 
 
-def _is_same(path: Path, other: Path) -> bool:
+def is_same(path: Path, other: Path) -> bool:
+    """Whether two paths lead to the same file, be it there or not."""
     if path.exists() and other.exists():
         return path.samefile(other)
     return os.path.realpath(path) == os.path.realpath(other)

@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from .dynamics import COEFFICIENTS, Coefficients, Meta
+from .files import is_same
 from .messages import FileError, brief, shown
 
 if sys.version_info >= (3, 11):
@@ -106,7 +107,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         raise VehicleFileError(f"{path}: vehicle.data = {shown(head.data)}: there is no such folder beside the file")
     named = checked.provenance.report if checked.provenance else None
     report = path.parent / named if named else None
-    if report and not _is_there(report, coming):
+    if report and not (os.path.isfile(report) or (coming and is_same(report, coming))):  # noqa: PTH113 (as above)
         raise VehicleFileError(f"{path}: provenance.report = {shown(named)}: there is no such file beside this one")
     quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
     return Vehicle(
@@ -123,12 +124,6 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         intervals={name: q.interval for name, q in quantities.items() if q.interval},
         provenance=Provenance(**dict(checked.provenance) | {"report": report}) if checked.provenance else None,
     )
-
-
-def _is_there(path: Path, coming: Path | None) -> bool:
-    if os.path.isfile(path):  # noqa: PTH113 (as above)
-        return True
-    return coming is not None and os.path.realpath(path) == os.path.realpath(coming)
 
 
 def read_checked(path: Path, model: type[Checked]) -> Checked:
