@@ -11,11 +11,10 @@ from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 from fmu_src.interface import variables
-from models import dynamics
-from models.dynamics import COEFFICIENTS, Coefficients, State
+from models.dynamics import COEFFICIENTS, Coefficients
 
 from .plain_c import Programs
-from .work import Work
+from .work import STATES, Work, flight
 
 PARAMETERS = tuple(name for name, meta in COEFFICIENTS.items() if meta.tunable)
 """Those that vary: every α and β."""
@@ -51,17 +50,15 @@ class Variations:
         declared = {variable.name: variable.value_reference for variable in variables(k)}
         self.references = [declared[name] for name in PARAMETERS]
         self.inputs = [declared[name] for name in ("u_l", "u_r", "u_t")]
-        self.outputs = [declared[name] for name in State.__dataclass_fields__]
+        self.outputs = [declared[name] for name in STATES]
 
     def error(self, ends: list[list[float]]) -> float:
         """Of the first runs."""
         worst = 0.0
         for values, end in zip(self.values, ends, strict=False):
             k = replace(self.coefficients, **dict(zip(PARAMETERS, values.tolist(), strict=True)))
-            state = State()
-            for command in self.commands:
-                state = dynamics.step(k, command, state, _HOLD)
-            worst = max([worst, *(abs(a - b) for a, b in zip(astuple(state), end, strict=True))])
+            state = astuple(flight(k, self.commands, _HOLD)[-1])
+            worst = max([worst, *(abs(a - b) for a, b in zip(state, end, strict=True))])
         return worst
 
 

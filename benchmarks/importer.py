@@ -11,16 +11,14 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
-from models import dynamics
-from models.dynamics import Inputs, State
+from models.dynamics import Inputs
 from tests.fmi2 import fmpy_slave, keep_loaded
 
-from .work import Work
+from .work import STATES, Work, flight
 
 STOP, INTERVAL = 100.0, 0.01
 NATIVE, PYTHONFMU, MODEL_EXCHANGE = "native", "PythonFMU", "Model Exchange"
 RELATIVE_TOLERANCE = 1e-6
-_STATES = tuple(field.name for field in fields(State))
 
 
 @dataclass(frozen=True)
@@ -33,9 +31,7 @@ class Simulated:
 
 def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, Simulated]:
     """Simulate the extracted FMUs in turn: commands that change every second, the state recorded every 10 ms."""
-    end = State()
-    for command in manoeuvre.sequence:
-        end = dynamics.step(manoeuvre.coefficients, command, end, manoeuvre.hold)
+    end = astuple(flight(manoeuvre.coefficients, manoeuvre.sequence, manoeuvre.hold)[-1])
     keep_loaded(folders[PYTHONFMU])
     signals = _signals(manoeuvre.sequence, manoeuvre.hold)
     ways: dict[str, tuple[Path, dict[str, Any]]] = {
@@ -52,11 +48,11 @@ def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> 
             description = fmpy.read_model_description(str(folder))
             start = time.process_time()
             result = fmpy.simulate_fmu(
-                str(folder), stop_time=STOP, output_interval=INTERVAL, input=signals, output=_STATES, validate=False,
+                str(folder), stop_time=STOP, output_interval=INTERVAL, input=signals, output=STATES, validate=False,
                 model_description=description, **options,
             )  # fmt: skip
             seconds[name].append(time.process_time() - start)
-            errors[name] = max(abs(result[n][-1] - value) for n, value in zip(_STATES, astuple(end), strict=True))
+            errors[name] = max(abs(result[n][-1] - value) for n, value in zip(STATES, end, strict=True))
     return {name: Simulated(np.array(times), float(errors[name])) for name, times in seconds.items()}
 
 

@@ -10,8 +10,22 @@ from .archive import Built, Loaded
 from .fleet import Instances, Runs
 from .importer import INTERVAL, MODEL_EXCHANGE, NATIVE, PYTHONFMU, RELATIVE_TOLERANCE, STOP, Simulated
 from .page import Page, digits, duration, error
-from .steps import BDF, CLOSED, EULER, FIXED_POINT, FMU, NAMES, RK4, SUBSTEP, TARGET, TOLERANCES, H, Measured, Plan
-from .steps import cost_at as cost_of
+from .steps import (
+    BDF,
+    CLOSED,
+    EULER,
+    FIXED_POINT,
+    FMU,
+    NAMES,
+    RK4,
+    SUBSTEP,
+    TARGET,
+    TOLERANCES,
+    H,
+    Measured,
+    Plan,
+    compared,
+)
 
 _HEADINGS = tuple(f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H)
 
@@ -55,9 +69,8 @@ def at_equal_error(page: Page, plan: Plan, measured: Measured) -> None:
         cells = []
         for states, job in ours.items():
             if (states, method) in plan.sweeps:
-                cost = cost_of(measured, plan.sweeps[states, method])
-                ratio = float(np.median(cost / measured.seconds[job]))
-                cells += [duration(float(np.median(cost))), digits(ratio)]
+                cost, times = compared(measured, plan.sweeps[states, method], job)
+                cells += [duration(cost), digits(times)]
         page.row(name, *cells)
 
 

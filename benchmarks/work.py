@@ -1,16 +1,23 @@
 """The same work for all: seeded commands, held, and where each ends to 50 digits."""
 
 import random
-from dataclasses import astuple, dataclass
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields
 from functools import cached_property
+from itertools import accumulate
 
 from models import dynamics
 from models.dynamics import Coefficients, Inputs, State
 from tests import reference
 
 SEED = 1
-_STATES = ("u", "w", "r", "x", "y", "z", "psi")
+STATES = tuple(field.name for field in fields(State))
 Ends = tuple[tuple[float, ...], ...]
+
+
+def flight(k: Coefficients, commands: Sequence[Inputs], hold: float) -> list[State]:
+    """From rest, and after each command, held for so many s."""
+    return list(accumulate(commands, lambda state, command: dynamics.step(k, command, state, hold), initial=State()))
 
 
 @dataclass(frozen=True)
@@ -37,10 +44,7 @@ class Work:
     @cached_property
     def states(self) -> list[State]:
         """Where the first commands start: each where the one before ends after a second, the first at rest."""
-        states = [State()]
-        for command in self.sequence[: self.starts - 1]:
-            states.append(dynamics.step(self.coefficients, command, states[-1], 1.0))
-        return states
+        return flight(self.coefficients, self.sequence[: self.starts - 1], 1.0)
 
     @cached_property
     def ends(self) -> list[dict[str, reference.Number]]:
@@ -55,7 +59,7 @@ class Work:
         return max(
             abs(float(end[name] - value))
             for end, values in zip(self.ends, found, strict=True)
-            for name, value in zip(_STATES, values, strict=False)
+            for name, value in zip(STATES, values, strict=False)
         )
 
     def text(self) -> str:

@@ -18,6 +18,8 @@ from .test_experiments import TESTS
 ROOT = Path(build_fmu.__file__).parent
 _TUNE = ["tune", str(VIDEORAY), "--axis", "heave", "--command", "0.3", "--v-ss", "0.2"]
 MAINS = {"build_fmu": build_fmu.main, "models": models_main}
+REFUSED = {"build_fmu": 1, "models": 2}
+"""The exit code of each where it cannot write."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +31,11 @@ class Command:
     """Of the file that it writes."""
     arguments: Callable[[Path], Sequence[str]]
     """By the path of that file."""
-    refused: int
-    """Its exit code where it cannot write."""
+
+    @property
+    def refused(self) -> int:
+        """Its exit code where it cannot write."""
+        return REFUSED[self.program]
 
     def run(self, target: Path) -> int:
         """Run it in this process."""
@@ -38,17 +43,16 @@ class Command:
 
 
 COMMANDS = {
-    "the FMU": Command("build_fmu", "rov.fmu", lambda path: ["--platform", "host", "-o", str(path)], 1),
+    "the FMU": Command("build_fmu", "rov.fmu", lambda path: ["--platform", "host", "-o", str(path)]),
     "its OSP description": Command(
         "build_fmu",
         "videoray_OspModelDescription.xml",
         lambda path: ["--platform", "host", "--osp", "-o", str(path.with_name("rov.fmu"))],
-        1,
     ),
-    "the vehicle": Command("models", "rov.toml", lambda path: ["identify", str(TESTS), "-o", str(path)], 2),
-    "the report": Command("models", "report.html", lambda path: ["identify", str(TESTS), "--report", str(path)], 2),
-    "the tuned vehicle": Command("models", "tuned.toml", lambda path: [*_TUNE, "-o", str(path)], 2),
-    "the figures": Command("models", "paper_figures.svg", lambda path: ["figures", str(path.parent)], 2),
+    "the vehicle": Command("models", "rov.toml", lambda path: ["identify", str(TESTS), "-o", str(path)]),
+    "the report": Command("models", "report.html", lambda path: ["identify", str(TESTS), "--report", str(path)]),
+    "the tuned vehicle": Command("models", "tuned.toml", lambda path: [*_TUNE, "-o", str(path)]),
+    "the figures": Command("models", "paper_figures.svg", lambda path: ["figures", str(path.parent)]),
 }
 
 _DRIVER = """

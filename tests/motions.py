@@ -7,6 +7,7 @@ from typing import Any
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from models.dynamics import Axis
 from models.riccati import advance, time_to_rest
 
 from .test_riccati import DISTANCE, SMALLEST, TINY, VELOCITY, Case
@@ -123,6 +124,11 @@ def path(A: float, B: float, C: float, v0: float, h: float) -> float:
     rest = time_to_rest(A, B, -abs(C), abs(v0)) if against else inf
     forth = advance(A, B, C, v0, rest)[1] if rest < h else 0.0
     return abs(forth) + abs(advance(A, B, C, v0, h)[1] - forth)
+
+
+def path_of(axis: Axis, v0: float, h: float) -> float:
+    """There and back on one axis of the vehicle."""
+    return path(axis.A, axis.B, axis.C, v0, h)
 
 
 def rounding_of_velocity(*velocities: float) -> float:

@@ -20,6 +20,7 @@ from models.vehicle import Vehicle
 
 from . import reference
 from .fmi2 import ERROR, OK, Fmu
+from .motions import path_of
 
 Case = tuple[Coefficients, Inputs, State, float]
 
@@ -84,12 +85,6 @@ def worst(found: State, expected: Mapping[str, Any], scales: Mapping[str, Any], 
     return max(relative[name] for name in VELOCITIES), max(relative[name] for name in POSE)
 
 
-def path(axis: Axis, v: float, h: float) -> float:
-    """There and back."""
-    forth = axis.distance(v, rest) if (rest := axis.turning_time(v)) < h else 0.0
-    return abs(forth) + abs(axis.distance(v, h) - forth)
-
-
 @pytest.mark.parametrize(("seed", "cases"), [(1, 1000), pytest.param(2, 20_000, marks=pytest.mark.long)])
 def test_the_fmu_steps_as_the_python_model_does(fmu: Fmu, seed: int, cases: int) -> None:
     """Over 20,000 cases the velocities are equal and poses differ by 1e-16: the libraries' exp, sin and the like."""
@@ -98,9 +93,9 @@ def test_the_fmu_steps_as_the_python_model_does(fmu: Fmu, seed: int, cases: int)
         k, i, before, h = case = random_case(rng)
         expected = dynamics.step(*case)
         surge, heave, yaw = dynamics.axes(k, i)
-        way = path(surge, before.u, h) + hypot(i.V_N, i.V_E) * h
+        way = path_of(surge, before.u, h) + hypot(i.V_N, i.V_E) * h
         scales = {v: max(abs(getattr(before, v)), abs(getattr(expected, v))) for v in VELOCITIES}
-        scales |= {"x": way, "y": way, "z": path(heave, before.w, h), "psi": path(yaw, before.r, h)}
+        scales |= {"x": way, "y": way, "z": path_of(heave, before.w, h), "psi": path_of(yaw, before.r, h)}
         assert max(worst(run(fmu, *case), asdict(expected), scales, before)) <= 1e-14, case
 
 
@@ -197,7 +192,7 @@ def test_no_turn_goes_too_far(fmu: Fmu, name: str) -> None:
     expected = dynamics.step(*case)
     assert [getattr(found, v) for v in VELOCITIES] == [getattr(expected, v) for v in VELOCITIES]
     assert abs(found.psi - expected.psi) <= 4.0 * ROUNDING * abs(expected.psi)
-    way = path(dynamics.axes(k, i)[0], before.u, h)
+    way = path_of(dynamics.axes(k, i)[0], before.u, h)
     assert hypot(found.x, found.y) <= way * (1.0 + 1e-14) + 1e-320
     off = hypot(found.x - expected.x, found.y - expected.y)
     assert off <= way * (1e-14 + 4.0 * ROUNDING * abs(expected.psi)) + 1e-320

@@ -13,7 +13,7 @@ import pytest
 from fmu_src.package import native_content
 from models.vehicle import VIDEORAY, load_vehicle
 
-from .commands import COMMANDS, MAINS, start
+from .commands import COMMANDS, MAINS, REFUSED, start
 from .test_experiments import TESTS
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
@@ -187,7 +187,7 @@ def test_output_that_has_no_room_is_one_line(case: str) -> None:
         _, said = process.communicate(timeout=30)
     program = PRINTING[case][0]
     assert said == f"{program}: the output, or a temporary file: cannot be written: No space left on device\n"
-    assert process.returncode == {"models": 2, "build_fmu": 1}[program]
+    assert process.returncode == REFUSED[program]
 
 
 def test_a_command_without_any_output_works(tmp_path: Path) -> None:

@@ -1,21 +1,22 @@
 """Laws of the whole vehicle, pose included: a step of models.dynamics and of the FMU, judged by itself."""
 
 from collections.abc import Callable
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
+from functools import partial
 from math import cos, hypot, sin, ulp
 
 import pytest
 from hypothesis import strategies as st
 
 from models import dynamics
-from models.dynamics import Axis, Coefficients, Inputs, State
+from models.dynamics import Coefficients, Inputs, State
 from models.vehicle import VIDEORAY, load_vehicle
 
-from .fmi2 import OK, Fmu
-from .motions import hold, memory, path, power, signed, size
+from .fmi2 import Fmu
+from .motions import hold, memory, path_of, power, signed, size
+from .test_exactness import Case, run
 from .test_riccati import DISTANCE, TINY, VELOCITY
 
-Case = tuple[Coefficients, Inputs, State, float]
 Step = Callable[[Coefficients, Inputs, State, float], State]
 
 POSITION = 1e-14  # of the path: what test_exactness.py promises
@@ -58,13 +59,7 @@ CASES = rov_cases() | bare_cases()
 
 @pytest.fixture(params=["model", "FMU"])
 def step(request: pytest.FixtureRequest, fmu: Fmu) -> Step:
-    def by_fmu(k: Coefficients, i: Inputs, s: State, h: float) -> State:
-        with fmu.instance() as rov:
-            rov.start({**asdict(k), **asdict(i), **asdict(s)})
-            assert rov.step(0.0, h) == OK, rov.log
-            return State(*rov.get(fmu.states))
-
-    return by_fmu if request.param == "FMU" else dynamics.step
+    return partial(run, fmu) if request.param == "FMU" else dynamics.step
 
 
 def for_every(law: Callable[[Step, Case], None]) -> Callable[[Step, int], None]:
@@ -126,11 +121,6 @@ def test_without_force_no_velocity_gains_one_bit_or_changes_its_sign(step: Step,
 # ---- The same anywhere, in any direction ----
 
 
-def way(axis: Axis, v: float, h: float) -> float:
-    """There and back on one axis."""
-    return path(axis.A, axis.B, axis.C, v, h)
-
-
 def drift(i: Inputs, h: float) -> float:
     return hypot(i.V_N, i.V_E) * h
 
@@ -158,7 +148,7 @@ def test_a_step_is_the_same_in_every_direction(step: Step, case: Case) -> None:
     b = step(k, still, replace(s, x=0.0, y=0.0, psi=s.psi + turned), h)
     assert replace(b, x=a.x, y=a.y, psi=a.psi) == a
     assert abs(b.psi - (a.psi + turned)) <= 2.0 * ulp(abs(s.psi) + abs(a.psi) + turned)
-    length = way(dynamics.axes(k, i)[0], s.u, h)
+    length = path_of(dynamics.axes(k, i)[0], s.u, h)
     allowed = length * (ulp(abs(s.psi) + turned) + 8.0 * ulp(1.0)) + TINY
     assert abs(b.x - (a.x * c - a.y * d)) <= allowed
     assert abs(b.y - (a.x * d + a.y * c)) <= allowed
@@ -192,7 +182,7 @@ def test_two_half_steps_are_one_step(step: Step, case: Case) -> None:
         rounding = VELOCITY * max(abs(first), abs(last)) + TINY
         assert abs(getattr(twice, name) - last) <= 3.0 * rounding
         passed_on[name] = rounding * memory(axis.A, axis.B, half)
-        ways[name] = way(axis, first, h)
+        ways[name] = path_of(axis, first, h)
     depth = 2.0 * DISTANCE * ways["w"] + passed_on["w"] + 2.0 * ulp(abs(s.z) + ways["w"])
     assert abs(twice.z - once.z) <= depth
     heading = 2.0 * DISTANCE * ways["r"] + passed_on["r"] + 2.0 * ulp(abs(s.psi) + ways["r"])

@@ -14,7 +14,7 @@ import build_fmu
 from models.__main__ import main
 from models.vehicle import VIDEORAY, load_vehicle
 
-from .commands import COMMANDS, Command, run_elsewhere
+from .commands import COMMANDS, MAINS, REFUSED, Command, run_elsewhere
 from .test_experiments import TESTS
 from .test_refit import REFIT
 
@@ -168,7 +168,7 @@ def test_two_files_are_written_both_or_neither(
 
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full)
-        assert run() == {"models": 2, "build_fmu": 1}[program]
+        assert run() == REFUSED[program]
     assert "No space left" in one_line(capsys)
     assert list(tmp_path.iterdir()) == [second]
     assert second.read_bytes() == OLD
@@ -182,7 +182,7 @@ def test_two_files_are_written_both_or_neither(
 
 def _refused(arguments: list[str], program: str, folder: Path, capsys: Capsys) -> None:
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    assert {"models": main, "build_fmu": build_fmu.main}[program](arguments) == {"models": 2, "build_fmu": 1}[program]
+    assert MAINS[program](arguments) == REFUSED[program]
     assert "would overwrite" in one_line(capsys)
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
 

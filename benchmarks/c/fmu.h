@@ -12,16 +12,13 @@
 
 #define REFERENCE(member) (fmi2ValueReference)(offsetof(rov_variables, member) / sizeof(double))
 
+#define FUNCTIONS(F)                                                                            \
+    F(Instantiate) F(FreeInstance) F(Reset) F(SetupExperiment) F(EnterInitializationMode)       \
+    F(ExitInitializationMode) F(SetReal) F(GetReal) F(DoStep)
+
+#define DECLARE(name) fmi2##name##TYPE *name;
 static struct {
-    fmi2InstantiateTYPE *Instantiate;
-    fmi2FreeInstanceTYPE *FreeInstance;
-    fmi2ResetTYPE *Reset;
-    fmi2SetupExperimentTYPE *SetupExperiment;
-    fmi2EnterInitializationModeTYPE *EnterInitializationMode;
-    fmi2ExitInitializationModeTYPE *ExitInitializationMode;
-    fmi2SetRealTYPE *SetReal;
-    fmi2GetRealTYPE *GetReal;
-    fmi2DoStepTYPE *DoStep;
+    FUNCTIONS(DECLARE)
 } fmi2;
 
 static const fmi2ValueReference COMMANDS[] = {REFERENCE(inputs.u_l), REFERENCE(inputs.u_r), REFERENCE(inputs.u_t)};
@@ -32,16 +29,8 @@ static const fmi2ValueReference STATES[] = {REFERENCE(state.u), REFERENCE(state.
 static void load_fmu(const char *path)
 {
     void *const library = load(path);
-#define FIND(name) find(library, "fmi2" #name, &fmi2.name)
-    FIND(Instantiate);
-    FIND(FreeInstance);
-    FIND(Reset);
-    FIND(SetupExperiment);
-    FIND(EnterInitializationMode);
-    FIND(ExitInitializationMode);
-    FIND(SetReal);
-    FIND(GetReal);
-    FIND(DoStep);
+#define FIND(name) find(library, "fmi2" #name, &fmi2.name);
+    FUNCTIONS(FIND)
 #undef FIND
 }
 
