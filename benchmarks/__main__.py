@@ -9,12 +9,13 @@ from pathlib import Path
 import fmpy
 from rich.console import Console
 
-from build_fmu import build
-from fmu_src.compile import BuildError, host_platform
-from models.command_line import exit_code, run_process
-from models.files import Output, check_targets, write_whole
-from models.vehicle import VIDEORAY, Vehicle, load_vehicle
-from tests.fmi2 import fmpy_slave
+from checks.fmi2 import fmpy_slave
+from rov_fmu.build import build
+from rov_fmu.export.compile import BuildError, host_platform
+from rov_fmu.files.output import Output, check_targets, write_whole
+from rov_fmu.process import exit_code, run_process
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 from . import archive, fleet, importer, picture, promises, sections
 from .page import Page, machine
@@ -104,7 +105,7 @@ def _measure(page: Page, vehicle: Vehicle, folder: Path, effort: Effort, picture
 
 def _build(vehicle: Vehicle, folder: Path, effort: Effort) -> dict[str, archive.Built]:
     """native.fmu for this machine and python.fmu in the folder; what was measured of the native ones."""
-    build(vehicle, folder / "python.fmu", None, Console(quiet=True))
+    build(vehicle, folder / "python.fmu", backend="pythonfmu")
     builds = {"for this machine": archive.build(folder / "native.fmu", ["host"])}
     if effort.all_platforms:
         builds["for all platforms"] = archive.build(folder / "all.fmu", [])

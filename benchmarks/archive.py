@@ -13,8 +13,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
-import build_fmu
-from tests.fmi2 import fmpy_slave
+from checks.fmi2 import fmpy_slave
 
 _CACHES = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR")
 
@@ -43,7 +42,7 @@ def build(output: Path, platforms: list[str]) -> Built:
     """Build the FMU twice with the exporter's command line, first with an empty cache."""
     seconds = []
     with tempfile.TemporaryDirectory(prefix="cache-", ignore_cleanup_errors=True) as cache:
-        command = [sys.executable, str(Path(build_fmu.__file__)), "-o", str(output)]
+        command = [sys.executable, "-m", "rov_fmu", "build", "-o", str(output)]
         command += [word for name in platforms for word in ("--platform", name)]
         for _ in range(2):
             start = time.perf_counter()

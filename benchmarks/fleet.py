@@ -10,8 +10,8 @@ import numpy as np
 from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
-from fmu_src.interface import variables
-from models.dynamics import COEFFICIENTS, Coefficients
+from rov_fmu.export.interface import variables
+from rov_fmu.motion.rov import COEFFICIENTS, Coefficients
 
 from .plain_c import Programs
 from .work import STATES, Work, flight

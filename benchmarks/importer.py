@@ -11,8 +11,8 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
-from models.dynamics import Inputs
-from tests.fmi2 import fmpy_slave, keep_loaded
+from checks.fmi2 import fmpy_slave, keep_loaded
+from rov_fmu.motion.rov import Inputs
 
 from .work import STATES, Work, flight
 

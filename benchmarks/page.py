@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from fmu_src.compile import compiler
+from rov_fmu.export.compile import compiler
 
 _COLUMNS = 5
 _WIDTH = 118

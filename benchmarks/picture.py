@@ -5,7 +5,7 @@ from functools import partial
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from models.figures import LIGHT, svg_file
+from rov_fmu.pages.svg import LIGHT, svg_file
 
 from .page import digits, duration
 from .steps import BDF, CLOSED, EULER, FIXED_POINT, NAMES, RK4, TARGET, Measured, Plan, compared

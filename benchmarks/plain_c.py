@@ -8,9 +8,9 @@ from pathlib import Path
 
 import fmpy.sundials
 
-from fmu_src.compile import C_FLAGS, PLATFORMS, WARNINGS, compile_all, compiler, fmi_headers
-from fmu_src.package import native_content
-from models.vehicle import Vehicle
+from rov_fmu.export.archive import native_content
+from rov_fmu.export.compile import C_FLAGS, PLATFORMS, WARNINGS, compile_all, compiler, fmi_headers
+from rov_fmu.vehicle.vehicle import Vehicle
 
 PLATFORM = "linux64"
 _SOURCES = Path(__file__).with_name("c")

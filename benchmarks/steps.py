@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.dynamics import Coefficients
+from rov_fmu.motion.rov import Coefficients
 
 from .plain_c import Programs, sundials_folder
 from .work import Ends, Work

@@ -6,9 +6,9 @@ from dataclasses import astuple, dataclass, fields
 from functools import cached_property
 from itertools import accumulate
 
-from models import dynamics
-from models.dynamics import Coefficients, Inputs, State
-from tests import reference
+from checks import reference
+from rov_fmu.motion import rov
+from rov_fmu.motion.rov import Coefficients, Inputs, State
 
 SEED = 1
 STATES = tuple(field.name for field in fields(State))
@@ -17,7 +17,7 @@ Ends = tuple[tuple[float, ...], ...]
 
 def flight(k: Coefficients, commands: Sequence[Inputs], hold: float) -> list[State]:
     """From rest, and after each command, held for so many s."""
-    return list(accumulate(commands, lambda state, command: dynamics.step(k, command, state, hold), initial=State()))
+    return list(accumulate(commands, lambda state, command: rov.step(k, command, state, hold), initial=State()))
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from fmu_src.compile import BuildError
-from fmu_src.package import native_content
-from models.command_line import exit_code, run_process
-from models.messages import FileError
-from models.vehicle import VIDEORAY, load_vehicle
+from rov_fmu.export.archive import native_content
+from rov_fmu.export.compile import BuildError
+from rov_fmu.files.messages import FileError
+from rov_fmu.process import exit_code, run_process
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 from .campaign import Counts, FindingError, build_target, fuzz, pack_corpus, replay, unpack_corpus
 

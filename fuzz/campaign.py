@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 
-from .legal import legal_header
-from .sanitized import build_sanitized
+from checks.legal import legal_header
+from checks.sanitized import build_sanitized
 
 TARGET_SOURCE = Path(__file__).with_name("c") / "target.c"
 CORPUS = Path(__file__).with_name("corpus.zip")

@@ -1,4 +1,4 @@
-"""Run videoray.fmu through independent importers with one manoeuvre, and compare them with models.dynamics."""
+"""Run videoray.fmu through independent importers with one manoeuvre, and compare them with rov_fmu.motion.rov."""
 
 import argparse
 import sys
@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-import build_fmu
+from rov_fmu import cli
 
 from .importers import HERE, KITS, chosen
 from .install import InstallError, install
@@ -67,7 +67,7 @@ def _install(kits: Iterable[str], tools: Path, console: Console) -> int:
 def _built(folder: Path) -> Path:
     fmu = folder / "videoray.fmu"
     with redirect_stdout(StringIO()):
-        code = build_fmu.main(["--platform", "host", "-o", str(fmu)])
+        code = cli.main(["build", "--platform", "host", "-o", str(fmu)])
     if code:
         raise SystemExit(code)
     return fmu

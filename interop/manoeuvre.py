@@ -1,4 +1,4 @@
-"""The manoeuvre that every importer flies, declared once, and what `models.dynamics` makes of it.
+"""The manoeuvre that every importer flies, declared once, and what `rov_fmu.motion.rov` makes of it.
 
 Inputs are held over each communication step. A runner finds three files:
 
@@ -17,8 +17,9 @@ from dataclasses import asdict, fields, replace
 from math import isfinite
 from pathlib import Path
 
-from models.dynamics import Inputs, State, Thrust, step, thrust
-from models.vehicle import VIDEORAY, load_vehicle
+from rov_fmu.motion.rov import Inputs, State, Thrust, step, thrust
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 POINTS = 301
 POINTS_A_SECOND = 10
@@ -82,7 +83,7 @@ def write_files(folder: Path) -> None:
 
 
 def reference() -> list[dict[str, float]]:
-    """Time and outputs at each communication point by `models.dynamics`."""
+    """Time and outputs at each communication point by `rov_fmu.motion.rov`."""
     coefficients = replace(load_vehicle(VIDEORAY).coefficients, **PARAMETERS)
     state, inputs = State(), Inputs()
     rows = []

@@ -5,10 +5,10 @@ from pathlib import Path
 import fmpy
 import pytest
 
-import build_fmu
-from models.vehicle import VIDEORAY, Vehicle, load_vehicle
-
-from .fmi2 import Fmu
+from checks.fmi2 import Fmu
+from rov_fmu.cli import main
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 
 @pytest.fixture(scope="session")
@@ -20,7 +20,7 @@ def vehicle() -> Vehicle:
 def videoray_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # a path with a space and an umlaut, as users have them
     path = tmp_path_factory.mktemp("FMU für Tests") / "videoray.fmu"
-    assert build_fmu.main(["--platform", "host", "-o", str(path)]) == 0
+    assert main(["build", "--platform", "host", "-o", str(path)]) == 0
     return path
 
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models import dynamics
+from rov_fmu.motion import rov
 
 from .autopilot import Autopilot
 from .system import DEFAULT, OUTPUTS, STEP, STEPS, STOP, parameter_sets
@@ -26,17 +26,17 @@ NAMES = [(component, name) for component, names in OUTPUTS.items() for name in n
 
 
 def plain(folder: Path, parameters: str, *, sequential: bool = False) -> Trajectory:  # noqa: ARG001
-    """`models.dynamics` and the autopilot's class in a loop; sequential: the ROV gets the commands without delay."""
+    """`rov_fmu.motion.rov` and the autopilot's class in a loop; sequential: the ROV gets the commands without delay."""
     values = parameter_sets()[parameters]
-    names = dynamics.COEFFICIENTS
-    coefficients = dynamics.Coefficients(**{n: v for n, v in values["rov"].items() if n in names})
-    inputs = dynamics.Inputs(**{n: v for n, v in values["rov"].items() if n not in names})
-    state = dynamics.State()
+    names = rov.COEFFICIENTS
+    coefficients = rov.Coefficients(**{n: v for n, v in values["rov"].items() if n in names})
+    inputs = rov.Inputs(**{n: v for n, v in values["rov"].items() if n not in names})
+    state = rov.State()
     autopilot = Autopilot(instance_name="autopilot")
     for name, value in values["autopilot"].items():
         setattr(autopilot, name, value)
 
-    def commands() -> dynamics.Inputs:
+    def commands() -> rov.Inputs:
         return replace(inputs, u_l=autopilot.u_l, u_r=autopilot.u_r, u_t=autopilot.u_t)
 
     rows = []
@@ -44,7 +44,7 @@ def plain(folder: Path, parameters: str, *, sequential: bool = False) -> Traject
         autopilot.z, autopilot.psi = state.z, state.psi
         before = commands()
         autopilot.do_step(n * STEP, STEP)
-        state = dynamics.step(coefficients, commands() if sequential else before, state, STEP)
+        state = rov.step(coefficients, commands() if sequential else before, state, STEP)
         now = {"rov": asdict(state), "autopilot": vars(autopilot)}
         rows.append([now[component][name] for component, name in NAMES])
     return _trajectory(rows)

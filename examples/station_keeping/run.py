@@ -15,7 +15,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from models.figures import PALETTE
+from rov_fmu.pages.svg import PALETTE
 
 from .engines import ENGINES, Trajectory, plain
 from .system import DEFAULT, MISSION, STEP, STEPS, build_system, parameter_sets

@@ -13,8 +13,9 @@ from zipfile import ZipFile
 from lxml import etree
 from lxml.builder import ElementMaker
 
-import build_fmu
-from models.vehicle import VIDEORAY, load_vehicle
+from rov_fmu.cli import main
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 HERE = Path(__file__).parent
 STOP = 60.0  # s
@@ -60,7 +61,7 @@ def parameter_sets() -> dict[str, dict[str, Values]]:
 def build_system(folder: Path) -> None:
     """Write all files. Raises RuntimeError where an FMU cannot be built."""
     folder.mkdir(parents=True, exist_ok=True)
-    if build_fmu.main(["--platform", "host", "--osp", "-o", str(folder / "videoray.fmu")]):
+    if main(["build", "--platform", "host", "--osp", "-o", str(folder / "videoray.fmu")]):
         raise RuntimeError("videoray.fmu was not built")
     build = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "autopilot.py"), "-d", str(folder)]
     subprocess.run(build, check=True)

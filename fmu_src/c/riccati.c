@@ -102,7 +102,7 @@ static inline double riccati_end_velocity(double a, double b, double c, double v
     return change > -0.5 * v0 ? v0 + change : (v0 * keep + c * N) / growth;
 }
 
-/* X/h where |q| is moderate: models/riccati.py derives it. g = tanh(r/2)/(r/2), also at r = b; n, m are those of g. */
+/* X/h where |q| is moderate: rov_fmu/motion/riccati.py derives it. g = tanh(r/2)/(r/2), also at r = b; n, m are those of g. */
 static inline double riccati_mean(double b, double c, double x, double v0, double n, double m)
 {
     const double y = 0.25 * b * b, half = 0.5 * b;

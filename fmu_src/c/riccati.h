@@ -1,5 +1,5 @@
 /* Exact motion of one axis under a held force: v' = C - B v - A |v| v with A, B >= 0.
- * The same formulas as models/riccati.py, which derives them. No state, no allocation, no errno. */
+ * The same formulas as rov_fmu/motion/riccati.py, which derives them. No state, no allocation, no errno. */
 #ifndef RICCATI_H
 #define RICCATI_H
 

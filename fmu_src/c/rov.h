@@ -1,4 +1,4 @@
-/* The ROV: thrust, surge, heave, yaw and pose, stepped exactly. The same formulas as models/dynamics.py.
+/* The ROV: thrust, surge, heave, yaw and pose, stepped exactly. The same formulas as rov_fmu/motion/rov.py.
  * Units, signs and the structs (generated into model.h) are those of that module. No state, no allocation. */
 #ifndef ROV_H
 #define ROV_H

@@ -1,0 +1,89 @@
+"""Every command that writes a file, to run in this process or, many of them, in one other."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rov_fmu.cli import main
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+
+ROOT = Path(__file__).parent.parent
+REFIT = SHIPPED["videoray_refit"]
+TESTS = REFIT.parent / "tank_tests"
+"""The tank tests that ship."""
+ALONE = re.sub(r"^(data|pictures) = .*\n", "", VIDEORAY.read_text(encoding="utf-8"), flags=re.M)
+"""The VideoRay's vehicle file without the folders beside it."""
+_TUNE = ["tune", str(VIDEORAY), "--axis", "heave", "--command", "0.3", "--v-ss", "0.2"]
+
+
+@dataclass(frozen=True)
+class Command:
+    """How a command is told what to write."""
+
+    name: str
+    """Of the file that it writes."""
+    arguments: Callable[[Path], Sequence[str]]
+    """By the path of that file."""
+
+    def run(self, target: Path) -> int:
+        """Run it in this process."""
+        return main(list(self.arguments(target)))
+
+
+COMMANDS = {
+    "the FMU": Command("rov.fmu", lambda path: ["build", "--platform", "host", "-o", str(path)]),
+    "its OSP description": Command(
+        "videoray_OspModelDescription.xml",
+        lambda path: ["build", "--platform", "host", "--osp", "-o", str(path.with_name("rov.fmu"))],
+    ),
+    "the vehicle": Command("rov.toml", lambda path: ["identify", str(TESTS), "-o", str(path)]),
+    "the report": Command("report.html", lambda path: ["identify", str(TESTS), "--report", str(path)]),
+    "the tuned vehicle": Command("tuned.toml", lambda path: [*_TUNE, "-o", str(path)]),
+    "the figures": Command("paper_figures.svg", lambda path: ["figures", str(path.parent)]),
+}
+
+_DRIVER = """
+import contextlib, io, json, sys
+from rov_fmu.cli import main
+ends = []
+for arguments in json.loads(sys.argv[1]):
+    error = io.StringIO()
+    with contextlib.redirect_stderr(error), contextlib.redirect_stdout(io.StringIO()):
+        code = main(arguments)
+    ends.append((code, error.getvalue()))
+print(json.dumps(ends))
+"""
+
+
+def run_elsewhere(
+    commands: Sequence[tuple[Command, Path]], folder: Path, prefix: Sequence[str] = (), **how: Any
+) -> list[tuple[int, str]]:
+    """Run commands in one other process, its temporary files in a folder: their exit codes and what they say."""
+    asked = json.dumps([list(command.arguments(target)) for command, target in commands])
+    result = subprocess.run(
+        [*prefix, sys.executable, "-c", _DRIVER, asked],
+        cwd=ROOT,
+        env=os.environ | {"TMPDIR": str(folder)},
+        capture_output=True,
+        text=True,
+        check=True,
+        **how,
+    )
+    return [(code, error) for code, error in json.loads(result.stdout)]
+
+
+def start(
+    arguments: Sequence[str], *, environment: Mapping[str, str] | None = None, **how: Any
+) -> subprocess.Popen[str]:
+    """Start a command line as a process of its own."""
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    return subprocess.Popen(
+        [sys.executable, "-m", "rov_fmu", *arguments],
+        cwd=ROOT, env=inherited | dict(environment or {}), stderr=subprocess.PIPE, text=True, **how,
+    )  # fmt: skip

@@ -1,0 +1,145 @@
+"""Motions to try laws on, over all that models.riccati takes and where its formulas change; what rounding may do."""
+
+from collections.abc import Callable, Sequence
+from math import copysign, inf
+from typing import Any
+
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from rov_fmu.motion.riccati import Riccati, advance, time_to_rest
+from tests.motion.test_riccati import DISTANCE, SMALLEST, TINY, VELOCITY, Case
+
+
+def hold(
+    law: Callable[..., None], examples: int, *strategies: st.SearchStrategy[Any], at: Sequence[tuple[Any, ...]] = ()
+) -> None:
+    """Try a law at these places and on examples, the same ones in every run."""
+    check = given(*strategies)(law)
+    for place in at:
+        check = example(*place)(check)
+    slow = [HealthCheck.too_slow, HealthCheck.filter_too_much]
+    settings(max_examples=examples, derandomize=True, deadline=None, suppress_health_check=slow)(check)()
+
+
+# ---- Motions ----
+
+
+def _spread(n: int) -> float:
+    """Numbers to [0, 1), neighbours far apart: Hypothesis likes few, this makes the most of each."""
+    return abs(n) * 0.6180339887498949 % 1.0
+
+
+_NUMBERS = st.integers(0, 2**16)
+
+
+def power(low: float, high: float) -> st.SearchStrategy[float]:
+    """10^low ... 10^high, all powers alike."""
+    return _NUMBERS.map(lambda n: 10.0 ** (low + (high - low) * _spread(n)))
+
+
+def size(low: float, high: float) -> st.SearchStrategy[float]:
+    """The same, and now and then zero."""
+    return _NUMBERS.map(lambda n: 10.0 ** (low + (high - low) * _spread(n)) if n % 10 else 0.0)
+
+
+def signed(low: float, high: float) -> st.SearchStrategy[float]:
+    """The same of either sign."""
+    return st.integers(-(2**16), 2**16).map(
+        lambda n: copysign(10.0 ** (low + (high - low) * _spread(n)), n) if n % 10 else 0.0
+    )
+
+
+PURE, SIGNED = size(-3.0, 3.0), signed(-3.0, 3.0)
+OFFSET = st.sampled_from((0.0, 2.0**-52, -(2.0**-52), 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6))
+
+# The smallest double and some more are 10^-323.
+WIDE = st.tuples(size(-323.0, 15.0), size(-323.0, 15.0), signed(-323.0, 18.0), signed(-323.0, 18.0), power(-9.0, 9.0))
+
+
+@st.composite
+def similar(draw: st.DrawFn) -> Case:
+    """Drag, force and time that matter to each other, whatever the units: pure numbers times those of V and h."""
+    V, h = draw(power(-3.0, 3.0)), draw(power(-9.0, 9.0))
+    A, B, C, v0 = draw(PURE), draw(PURE), draw(SIGNED), draw(SIGNED)
+    return A / (V * h), B / h, C * V / h, v0 * V, h
+
+
+@st.composite
+def faint(draw: st.DrawFn) -> Case:
+    """Drag that is lost in the last digits, or nearly."""
+    (A, B, C, v0, h), share = draw(similar()), draw(power(-18.0, -3.0))
+    return A * share, B * share, C, v0, h
+
+
+@st.composite
+def coinciding(draw: st.DrawFn) -> Case:
+    """At and beside D^2 = 0, where tanh becomes tan; a force of -B^2/(4 A) without rounding."""
+    A, B = 2.0 ** draw(st.integers(-20, 20)), draw(st.integers(1, 1023)) * 2.0 ** draw(st.integers(-20, 20))
+    C = -B * B / (4.0 * A) * (1.0 + draw(OFFSET))
+    return A, B, C, draw(PURE) * B / A, draw(power(-3.0, 3.0)) / B
+
+
+@st.composite
+def at_the_fractions(draw: st.DrawFn) -> Case:
+    """At and beside q = -0.8, 0.8 and 3.2, where the fractions end."""
+    A, B, _, v0, h = draw(similar())
+    A = A or 1.0 / h
+    q = draw(st.sampled_from((0.8, -0.8, 3.2))) * (1.0 + draw(OFFSET))
+    return A, B, (q - (0.5 * B * h) ** 2) / (A * h * h), v0, h
+
+
+@st.composite
+def turning(draw: st.DrawFn) -> Case:
+    """A force against the motion, for the time to the turn, twice that, or a little less or more."""
+    A, B, C, v0, h = draw(similar())
+    C, v0 = -(abs(C) or 1.0 / h), abs(v0) or 1.0
+    h = time_to_rest(A, B, C, v0) * draw(st.sampled_from((1.0, 2.0, 2.0**10))) * (1.0 + draw(OFFSET))
+    return A, B, C, v0, h
+
+
+CASES: st.SearchStrategy[Case] = st.one_of(similar(), faint(), WIDE, coinciding(), at_the_fractions(), turning())
+BOUNDARIES: list[Case] = [
+    (1.0, 2.0, -1.0, 1.0, 1.0),  # D^2 = 0, and turns at half the time
+    (0.0, 0.0, -1.0, 1.0, 2.0),  # no drag, turns at half the time
+    (1.0, 0.0, 0.8, 0.0, 1.0),  # q = 0.8
+    (1.0, 0.0, -0.8, 1.0, 1.0),  # q = -0.8
+    (1.0, 0.0, 3.2, 0.0, 1.0),  # q = 3.2
+    (0.3, 1.7, 0.0, 0.0, 1.0),
+    (0.3, 1.7, 0.0, 2.0, 1e9),
+    (0.3, 1.7, -2.0, 0.0, 1.0),
+    (SMALLEST, SMALLEST, -SMALLEST, SMALLEST, 1.0),
+    (1e15, 1e15, -1e18, 1e18, 1e9),
+]
+
+
+# ---- What rounding may do ----
+
+
+def path(A: float, B: float, C: float, v0: float, h: float) -> float:
+    """There and back."""
+    against = C < 0.0 < v0 or v0 < 0.0 < C
+    rest = time_to_rest(A, B, -abs(C), abs(v0)) if against else inf
+    forth = advance(A, B, C, v0, rest)[1] if rest < h else 0.0
+    return abs(forth) + abs(advance(A, B, C, v0, h)[1] - forth)
+
+
+def path_of(axis: Riccati, v0: float, h: float) -> float:
+    """There and back on one axis of the vehicle."""
+    return path(axis.A, axis.B, axis.C, v0, h)
+
+
+def rounding_of_velocity(*velocities: float) -> float:
+    """What test_riccati.py promises: relative to the largest velocity on the way, which is the first or the last."""
+    return VELOCITY * max(map(abs, velocities)) + TINY
+
+
+def rounding_of_distance(case: Case) -> float:
+    """What test_riccati.py promises: relative to the path; a velocity that is subnormal is off by TINY all the time."""
+    return DISTANCE * path(*case) + TINY * max(1.0, case[4])
+
+
+def memory(A: float, B: float, h: float, slowest: float = 0.0) -> float:
+    """For how long (s) a change of the velocity is felt: it dies out at the rate B + 2 A |v| at least."""
+    rate = B + 2.0 * A * slowest
+    return min(h, 1.0 / rate) if rate * h > 1.0 else h

@@ -1,0 +1,83 @@
+"""Recordings of a vehicle with known coefficients, as its sensors would make them: the exact step, and noise on top."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+
+import numpy as np
+
+from rov_fmu.identify.least_squares import Array
+from rov_fmu.identify.tank_tests import Recording
+from rov_fmu.motion.rov import HEAVE, SURGE, YAW, Axis, Coefficients
+
+NOISE = {"heave": 0.005, "yaw": radians(0.5), "surge": 0.02}
+"""Depth in m, heading in rad, velocity (a camera's) in m/s."""
+
+# Command and how long it is held, s: 60 s each. The vehicle moves up and down, to and fro, steps from rest and others.
+PLANS: dict[str, Sequence[Sequence[tuple[float, float]]]] = {
+    "heave": (
+        ((0.0, 4.0), (0.3, 16.0), (-0.3, 16.0), (0.5, 12.0), (-0.5, 12.0)),
+        ((0.0, 4.0), (0.2, 18.0), (-0.2, 18.0), (0.4, 10.0), (-0.4, 10.0)),
+        ((0.0, 4.0), (0.7, 10.0), (-0.7, 10.0), (0.6, 10.0), (-0.6, 10.0), (0.0, 16.0)),
+    ),
+    "yaw": (
+        ((0.0, 4.0), (0.3, 14.0), (-0.3, 14.0), (0.5, 14.0), (-0.5, 14.0)),
+        ((0.0, 4.0), (0.2, 16.0), (-0.2, 16.0), (0.4, 12.0), (0.0, 12.0)),
+        ((0.0, 4.0), (0.7, 10.0), (-0.7, 10.0), (0.6, 10.0), (-0.6, 10.0), (0.0, 16.0)),
+    ),
+    "surge": (
+        ((0.0, 4.0), (0.3, 14.0), (0.0, 14.0), (0.5, 14.0), (0.0, 14.0)),
+        ((0.0, 4.0), (0.2, 16.0), (0.0, 14.0), (0.4, 13.0), (0.0, 13.0)),
+        ((0.0, 4.0), (0.7, 10.0), (0.0, 10.0), (0.6, 10.0), (0.0, 10.0), (-0.5, 16.0)),
+    ),
+}
+AXES = (SURGE, HEAVE, YAW)
+
+
+@dataclass(frozen=True, eq=False)
+class Clean:
+    """A recording without noise."""
+
+    axis: Axis
+    time: Array
+    command: Array
+    velocity: Array
+    position: Array
+
+    def noisy(self, random: np.random.Generator, file: str = "log.csv", noise: float | None = None) -> Recording:
+        """What the sensor of the axis makes of it: depth, heading, or the velocity in surge."""
+        quantity = "velocity" if self.axis is SURGE else self.axis.position
+        values = self.velocity if quantity == "velocity" else self.position
+        spread = NOISE[self.axis.name] if noise is None else noise
+        values = values + spread * random.standard_normal(len(values))
+        return Recording(file, self.axis, quantity, self.time, self.command, values)
+
+
+def write_log(folder: Path, name: str, recording: Recording) -> Path:
+    """The recording as a logger saves it: commands in %, headings in degrees from 0 to 360."""
+    heading = recording.quantity == "heading"
+    values = np.degrees(recording.values) % 360.0 if heading else recording.values
+    unit = "deg" if heading else "m" if recording.is_position else recording.axis.unit
+    rows = [f"time [s],command [%],{recording.quantity} [{unit}]"]
+    rows += [
+        f"{t:.4f},{100.0 * c:g},{'' if np.isnan(v) else f'{v:.5f}'}"
+        for t, c, v in zip(recording.time.tolist(), recording.command.tolist(), values.tolist(), strict=True)
+    ]
+    path = folder / f"log_{recording.axis.name}_{name}.csv"
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+def clean(k: Coefficients, axis: Axis, plan: Sequence[tuple[float, float]], rate: float = 100.0) -> Clean:
+    """Run a plan from rest, one exact step per sample."""
+    command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
+    v, s = 0.0, 0.0
+    velocity, position = [], []
+    axes = {c: axis.held(k, c) for c, _ in plan}
+    for c in command.tolist():
+        velocity.append(v)
+        position.append(s)
+        v, covered = axes[c].advance(v, 1.0 / rate)
+        s += covered
+    return Clean(axis, np.arange(len(command)) / rate, command, np.array(velocity), np.array(position))

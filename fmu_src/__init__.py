@@ -1,1 +1,0 @@
-"""What goes into the FMU and what puts it there."""

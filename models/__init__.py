@@ -1,1 +1,0 @@
-"""Vehicles and their mathematics; knows nothing of FMI."""

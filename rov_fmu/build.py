@@ -1,0 +1,127 @@
+"""From a vehicle to its FMU: page and content made, compiled, written, validated and run."""
+
+import asyncio
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+from rov_fmu.export.archive import Content, archive, native_content, python_content
+from rov_fmu.export.compile import PLATFORMS, BuildError, compile_all, host_platform
+from rov_fmu.export.interface import variables
+from rov_fmu.export.osp import osp_model_description, osp_path
+from rov_fmu.files.output import Output, check_targets, write_whole
+from rov_fmu.pages.fmu_page import documentation
+from rov_fmu.vehicle.vehicle import Vehicle
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Built:
+    """What a build made."""
+
+    path: Path
+    size: int
+    """Of the archive in bytes."""
+    guid: str
+    binaries: Mapping[str, int]
+    """Size in bytes by platform; none in the flavour in pure Python."""
+    seconds: Mapping[str, float]
+    """Until each platform was compiled."""
+    note: str
+    """What was found when the FMU was validated and run."""
+    beside: Sequence[Path] = field(default_factory=tuple)
+    """What was written beside it."""
+
+
+def build(
+    vehicle: Vehicle,
+    output: Path | None = None,
+    *,
+    platforms: Sequence[str] | None = None,
+    backend: str = "native",
+    osp: bool = False,
+    on_compiled: Progress = lambda _: None,
+) -> Built:
+    """Build the FMU of a vehicle, validate it and run it; it is written whole or not at all.
+
+    `output` is <identifier>.fmu in this folder by default, `platforms` all of PLATFORMS; `host` is this machine's. The
+    backend `pythonfmu` makes the flavour in pure Python, for all platforms at once. `osp` also writes
+    <identifier>_OspModelDescription.xml beside it. `on_compiled` is told of every platform that is done.
+
+    Raises BuildError; VehicleFileError where a file of the vehicle cannot be read; OSError about a path that cannot be
+    written.
+    """
+    native = backend == "native"
+    output = output or default_output(vehicle, backend)
+    beside = []
+    if osp:
+        description = osp_model_description(variables(vehicle.coefficients))
+        beside = [Output(osp_path(output, vehicle.identifier), description)]
+    check_targets([output, *(other.path for other in beside)], vehicle.files)
+    chosen = chosen_platforms(platforms) if native else []
+    content = (native_content if native else python_content)(vehicle, documentation(vehicle, native=native))
+    binaries, seconds = _compiled(content, chosen, on_compiled)
+    libraries = {f"binaries/{name}/{content.identifier}{PLATFORMS[name].suffix}": b for name, b in binaries.items()}
+    packed = archive({**content.files, **libraries})
+    notes: list[str] = []
+    draft = Output(output, packed, lambda path: notes.append(_check(path, chosen if native else None)))
+    write_whole(draft, *beside)
+    sizes = {name: len(library) for name, library in binaries.items()}
+    return Built(output, len(packed), content.guid, sizes, seconds, notes[0], [other.path for other in beside])
+
+
+def default_output(vehicle: Vehicle, backend: str) -> Path:
+    """<identifier>.fmu in this folder, or <identifier>-python.fmu."""
+    return Path(f"{vehicle.identifier}{'' if backend == 'native' else '-python'}.fmu")
+
+
+def chosen_platforms(names: Sequence[str] | None) -> list[str]:
+    """Platforms by name, `host` resolved; all where none is named. Raises BuildError."""
+    if not names:
+        return list(PLATFORMS)
+    host = host_platform()
+    if "host" in names and host is None:
+        raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")
+    return list(dict.fromkeys(host if name == "host" and host else name for name in names))
+
+
+def _compiled(
+    content: Content, platforms: Sequence[str], on_compiled: Progress
+) -> tuple[dict[str, bytes], dict[str, float]]:
+    """The binaries by platform, compiled side by side, and after how many seconds each was there."""
+    start = perf_counter()
+    seconds: dict[str, float] = {}
+
+    def done(name: str) -> None:
+        seconds[name] = perf_counter() - start
+        on_compiled(name)
+
+    def compile_here() -> dict[str, bytes]:
+        return asyncio.run(compile_all(platforms, content.sources, content.identifier, done))
+
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return compile_here(), seconds
+    with ThreadPoolExecutor(1) as thread:  # a notebook's own loop runs in this one
+        return thread.submit(compile_here).result(), seconds
+
+
+def _check(path: Path, platforms: Sequence[str] | None) -> str:
+    """Validate and run an FMU; what to tell. Raises BuildError."""
+    import fmpy
+    from fmpy.validation import validate_fmu
+
+    if problems := validate_fmu(str(path)):
+        raise BuildError(f"the FMU is not valid: {problems[0]}")
+    host = host_platform()
+    if platforms is not None and (host not in platforms or host != fmpy.platform):
+        return "valid; not run, for it has no binary that FMPy loads on this machine"
+    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+        fmpy.extract(str(path), unzipdir=folder)
+        result = fmpy.simulate_fmu(folder, start_values={"u_l": 0.3, "u_r": 0.3})
+    return f"valid; runs: u_l = u_r = 0.3 gives u = {result['u'][-1]:.4f} m/s after {result['time'][-1]:g} s"

@@ -1,0 +1,187 @@
+"""The command rov-fmu: build | identify | tune | tables | figures."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial, wraps
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NoReturn
+
+import click
+from click.shell_completion import CompletionItem
+
+from rov_fmu import __version__
+from rov_fmu.export.compile import PLATFORMS, BuildError
+from rov_fmu.files.messages import FileError
+from rov_fmu.files.output import check_targets, write_whole
+from rov_fmu.motion.rov import AXES
+from rov_fmu.process import exit_code, run_process
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+_EXIT_CODES = {FileError: 2, OSError: 2, click.ClickException: 2, BuildError: 1}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code: 0 done, 1 a build failed, 2 bad input, 130 interrupted."""
+
+    def action() -> None:
+        chosen = _commands.main(arguments, "rov-fmu", standalone_mode=False)
+        if callable(chosen):  # and not the exit code of --help
+            chosen()
+
+    return exit_code("rov-fmu", action, _EXIT_CODES)
+
+
+def run(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line as a process of its own."""
+    run_process(partial(main, arguments))
+
+
+def _after_parsing(command: Callable[..., None]) -> Callable[..., Callable[[], None]]:
+    """Do nothing yet: errors and interrupts of the work itself are not click's to handle."""
+
+    @wraps(command)
+    def chosen(**options: Any) -> Callable[[], None]:
+        return partial(command, **options)
+
+    return chosen
+
+
+class _Vehicle(click.ParamType[Path]):
+    """A vehicle file, or the name of a vehicle that ships."""
+
+    name = "VEHICLE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:  # noqa: ARG002
+        return find_vehicle(value)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
+        names = [CompletionItem(name) for name in SHIPPED if name.startswith(incomplete)]
+        return [*names, CompletionItem(incomplete, type="file")]
+
+
+_FILE = click.Path(path_type=Path)
+
+
+@click.group(no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="rov-fmu")
+def _commands() -> None:
+    """An identified underwater vehicle (ROV) as an FMU.
+
+    VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships.
+    """
+
+
+@_commands.command("build")
+@click.argument("vehicle", type=_Vehicle(), default=str(VIDEORAY), metavar="[VEHICLE]")
+@click.option("-o", "--output", type=_FILE, metavar="FILE.fmu", help="Where to write it; <identifier>.fmu by default.")
+@click.option("--backend", type=click.Choice(["native", "pythonfmu"]), default="native", show_default=True,
+              help="Compiled C, or pure Python with PythonFMU.")  # fmt: skip
+@click.option("--platform", "platforms", multiple=True, type=click.Choice(["host", *PLATFORMS]), metavar="NAME",
+              help=f"host, {', '.join(PLATFORMS)}; may be repeated (default: all).")  # fmt: skip
+@click.option("--osp", is_flag=True, help="Also write <identifier>_OspModelDescription.xml beside it (OSP-IS 1.0.1).")
+@_after_parsing
+def _build(vehicle: Path, output: Path | None, backend: str, platforms: tuple[str, ...], osp: bool) -> None:
+    """Build the FMU of a vehicle: the VideoRay Pro 4 by default."""
+    if backend == "pythonfmu" and platforms:
+        raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
+    from rov_fmu.build import build, chosen_platforms, default_output
+    from rov_fmu.export.osp import osp_path
+    from rov_fmu.pages.console import build_progress, print_built
+
+    started = perf_counter()
+    loaded = load_vehicle(vehicle)
+    output = output or default_output(loaded, backend)
+    check_targets([output, *([osp_path(output, loaded.identifier)] if osp else [])], [vehicle])
+    with build_progress(chosen_platforms(platforms) if backend == "native" else []) as on_compiled:
+        built = build(loaded, output, platforms=platforms, backend=backend, osp=osp, on_compiled=on_compiled)
+    print_built(built, perf_counter() - started)
+
+
+@_commands.command("identify")
+@click.argument("folder", type=_FILE)
+@click.option("-o", "--output", type=_FILE, metavar="VEHICLE.toml", help="Vehicle file to write.")
+@click.option("--report", type=_FILE, metavar="REPORT.html",
+              help="Report to write; a build puts it into the FMU of the vehicle file.")  # fmt: skip
+@_after_parsing
+def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
+    """Identify a vehicle from FOLDER of tank tests: rov.toml and thrust_, steady_, ... .csv."""
+    from rov_fmu.identify.identify import identify
+    from rov_fmu.identify.tank_tests import load_tank_tests
+    from rov_fmu.pages.console_results import print_identification
+    from rov_fmu.vehicle.writer import vehicle_output
+
+    tests = load_tank_tests(folder)
+    check_targets(filter(None, (output, report)), tests.files)
+    identification = identify(tests)
+    identified, outputs = identification.vehicle, []
+    if report:
+        from rov_fmu.pages.report import report_output
+
+        outputs.append(report_output(identification, report))
+        assert identified.provenance
+        identified = replace(identified, provenance=replace(identified.provenance, report=report))
+    if output:
+        outputs.append(vehicle_output(identified, output))
+    write_whole(*outputs)
+    print_identification(identification)
+
+
+@_commands.command("tune")
+@click.argument("vehicle", type=_Vehicle())
+@click.option("--axis", required=True, type=click.Choice(list(AXES)))
+@click.option("--command", type=float, help="Fraction of full thrust: 30 % is 0.3.")
+@click.option("--v-ss", type=float, help="Wanted steady velocity at this command, m/s or rad/s.")
+@click.option("--tau", type=float, help="Wanted time constant at this command, s; without it beta stays.")
+@click.option("--points", type=_FILE, metavar="POINTS.csv",
+              help="Many wanted points instead: command, velocity, time constant.")  # fmt: skip
+@click.option("-o", "--output", type=_FILE, metavar="TUNED.toml", help="Vehicle file to write.")
+@_after_parsing
+def _tune(
+    vehicle: Path, axis: str, command: float | None, v_ss: float | None, tau: float | None,
+    points: Path | None, output: Path | None,
+) -> None:  # fmt: skip
+    """Find alpha and beta of an axis for a wanted response."""
+    from rov_fmu.identify.tuning import TuningError, read_points, tune, tune_over, tuned_values
+    from rov_fmu.pages.console_results import print_tuning
+    from rov_fmu.vehicle.writer import write_tuned
+
+    if points is not None and (command, v_ss, tau) != (None, None, None):
+        raise click.UsageError("tune: --points stands instead of --command, --v-ss and --tau")
+    loaded, tested = load_vehicle(vehicle), AXES[axis]
+    check_targets(filter(None, (output,)), filter(None, (points,)))
+    try:
+        if points is not None:
+            tuning = tune_over(loaded.coefficients, tested, read_points(points, tested))
+        elif command is not None and v_ss is not None:
+            tuning = tune(loaded.coefficients, tested, command, v_ss, tau)
+        else:
+            raise click.UsageError("tune: give --command and --v-ss (and --tau), or --points")
+    except TuningError as error:
+        raise click.UsageError(f"tune: {error}") from error
+    if output:
+        write_tuned(vehicle, output, *tuned_values(tuning))
+    print_tuning(tuning)
+
+
+@_commands.command("tables")
+@click.argument("vehicle", type=_Vehicle(), default=str(VIDEORAY), metavar="[VEHICLE]")
+@_after_parsing
+def _tables(vehicle: Path) -> None:
+    """Print Tables 6-8 of the paper: printed, computed, measured."""
+    from rov_fmu.pages.console import print_tables
+    from rov_fmu.vehicle.published import load_tables
+
+    loaded = load_vehicle(vehicle)
+    print_tables(loaded, load_tables(loaded))
+
+
+@_commands.command("figures")
+@click.argument("folder", type=_FILE)
+@_after_parsing
+def _figures(folder: Path) -> None:
+    """Redraw the paper's figures into FOLDER, as far as it prints their data."""
+    from rov_fmu.pages.paper_figures import write_figures
+
+    print(*write_figures(folder), sep="\n")

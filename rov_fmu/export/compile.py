@@ -1,0 +1,159 @@
+"""C sources to one shared library per platform, with the C compiler of the ziglang package: no other one is needed."""
+
+import asyncio
+import importlib.util
+import os
+import platform
+import signal
+import subprocess
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fat_macho import FatWriter
+
+from rov_fmu.files.places import FMU_SRC
+
+C_SOURCES = FMU_SRC / "c"
+UNITY_FILE = "fmu.c"
+# What the numbers depend on, and their cost: the same rounding on every processor, no errno in the mathematics.
+C_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+
+
+class BuildError(Exception):
+    """A build that cannot go on: one line, and the compiler's own output below it where it has one."""
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A folder of binaries/ (FMI 2.0, section 2.3) and what the compiler is asked for.
+
+    Several targets are joined into one universal file.
+    """
+
+    suffix: str
+    targets: tuple[str, ...]
+    flags: tuple[str, ...] = ()
+
+
+# GLIBC 2.17 is that of CentOS 7 (2012); 4 KiB pages in the file keep it small.
+_LINUX = ("-lm", "-Wl,-z,max-page-size=4096", "-Wl,-z,common-page-size=4096")
+
+# FMPy and FMILibrary load darwin64 on Apple Silicon too, hence both processors in one file; the standard has a folder
+# of its own for it (2.3). No importer known looks for x86_64-linux, -windows or -darwin in an FMI 2.0 archive.
+PLATFORMS: dict[str, Platform] = {
+    "linux64": Platform(".so", ("x86_64-linux-gnu.2.17",), _LINUX),
+    "linux32": Platform(".so", ("x86-linux-gnu.2.17",), _LINUX),
+    "aarch64-linux": Platform(".so", ("aarch64-linux-gnu.2.17",), _LINUX),
+    "win64": Platform(".dll", ("x86_64-windows-gnu",)),
+    "win32": Platform(".dll", ("x86-windows-gnu",)),
+    "darwin64": Platform(".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0")),
+    "aarch64-darwin": Platform(".dylib", ("aarch64-macos.11.0",)),
+}
+
+
+def host_platform() -> str | None:
+    """The platform of this machine; None where there is no binary for it."""
+    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
+    return {
+        ("Linux", "x86_64"): "linux64",
+        ("Linux", "aarch64"): "aarch64-linux",
+        ("Windows", "x86_64"): "win64",
+        ("Darwin", "x86_64"): "darwin64",
+        ("Darwin", "aarch64"): "darwin64",
+    }.get((platform.system(), processor))
+
+
+def compiler() -> list[str]:
+    """The C compiler's command. Raises BuildError where it is not installed."""
+    spec = importlib.util.find_spec("ziglang")
+    if spec is None or spec.origin is None:
+        raise BuildError("the C compiler is missing: pip install ziglang")
+    return [str(Path(spec.origin).with_name("zig.exe" if os.name == "nt" else "zig")), "cc"]
+
+
+def fmi_headers() -> Path:
+    """The folder with the FMI headers, which come with FMPy."""
+    spec = importlib.util.find_spec("fmpy")
+    if spec is None or spec.origin is None:
+        raise BuildError("the package fmpy, which has the FMI headers, is not installed")
+    return Path(spec.origin).with_name("c-code")
+
+
+async def compile_all(
+    platforms: Sequence[str],
+    sources: Mapping[str, str],
+    identifier: str,
+    on_done: Callable[[str], None] = lambda _: None,
+) -> dict[str, bytes]:
+    """Compile sources (file name to text) for all platforms side by side; the shared libraries' bytes.
+
+    Raises BuildError. Interrupted or failed, it leaves no process and no file behind.
+    """
+    turns = asyncio.Semaphore(os.cpu_count() or 1)
+
+    async def one(name: str) -> bytes:
+        async with turns:
+            library = await _compile(name, sources, identifier)
+        on_done(name)
+        return library
+
+    tasks = [asyncio.create_task(one(name)) for name in platforms]
+    try:
+        return dict(zip(platforms, await asyncio.gather(*tasks), strict=True))
+    except OSError as error:
+        raise BuildError(f"cannot compile: {error.strerror or error}") from error
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def _compile(name: str, sources: Mapping[str, str], identifier: str) -> bytes:
+    target_platform = PLATFORMS[name]
+    with tempfile.TemporaryDirectory(prefix="fmu-") as folder:
+        for file, text in sources.items():
+            Path(folder, file).write_text(text, encoding="utf-8")
+        library = Path(folder, f"{identifier}{target_platform.suffix}")
+        install_name = (f"-Wl,-install_name,@rpath/{library.name}",) if library.suffix == ".dylib" else ()
+        slices = []
+        for target in target_platform.targets:
+            flags = [*target_platform.flags, *install_name, "-o", library.name]
+            await _run_compiler(name, target, flags, folder)
+            slices.append(library.read_bytes())
+        if len(slices) > 1:
+            universal = FatWriter()  # type: ignore[no-untyped-call]
+            for part in slices:
+                universal.add(part)
+            universal.write_to(str(library))
+        return library.read_bytes()
+
+
+async def _run_compiler(name: str, target: str, flags: list[str], folder: str) -> None:
+    process = await asyncio.create_subprocess_exec(
+        *(*compiler(), "-target", target),
+        *C_FLAGS,
+        *("-g0", "-s", "-shared", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables"),
+        *WARNINGS,
+        "-DFMI2_OVERRIDE_FUNCTION_PREFIX",
+        f"-I{fmi_headers()}",
+        UNITY_FILE,
+        *flags,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,  # the compiler has children of its own, which must end with it
+    )
+    try:
+        output, _ = await process.communicate()
+    finally:
+        if process.returncode is None:
+            if os.name == "posix":
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+            await process.wait()
+    if process.returncode != 0:
+        raise BuildError(f"{name}: the compiler failed for {target}\n{output.decode(errors='replace').strip()}")

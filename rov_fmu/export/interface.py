@@ -1,0 +1,251 @@
+"""Every FMU variable, declared once.
+
+modelDescription.xml, the C structs and value references, the documentation and the PythonFMU registration are all
+derived from `variables`. The order is that of the C struct `rov_variables`: inputs, state, derivative, thrust,
+coefficients; the value reference of a variable is its place in it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import degrees, isfinite
+from typing import Any
+
+from rov_fmu.motion.rov import (
+    AXES,
+    COEFFICIENTS,
+    HEAVE,
+    SURGE,
+    YAW,
+    Coefficients,
+    Inputs,
+    Meta,
+    State,
+    Thrust,
+    declared,
+)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """An SI unit: its exponents of the FMI base units, and the unit a person reads, value times factor."""
+
+    exponents: Mapping[str, int]
+    display: str | None = None
+    factor: float = 1.0
+
+
+_KNOT = 1852.0 / 3600.0  # m/s
+
+UNITS: dict[str, Unit] = {
+    "1": Unit({}, "%", 100.0),
+    "kg": Unit({"kg": 1}),
+    "m": Unit({"m": 1}),
+    "rad": Unit({"rad": 1}, "deg", degrees(1.0)),
+    "m/s": Unit({"m": 1, "s": -1}, "knot", 1.0 / _KNOT),
+    "rad/s": Unit({"rad": 1, "s": -1}, "deg/s", degrees(1.0)),
+    "m/s2": Unit({"m": 1, "s": -2}),
+    "rad/s2": Unit({"rad": 1, "s": -2}),
+    "N": Unit({"kg": 1, "m": 1, "s": -2}),
+    "N.m": Unit({"kg": 1, "m": 2, "s": -2}),
+    "kg.m2": Unit({"kg": 1, "m": 2}),
+    "N.s/m": Unit({"kg": 1, "s": -1}),
+    "N.s2/m2": Unit({"kg": 1, "m": -1}),
+    "N.m.s/rad": Unit({"kg": 1, "m": 2, "s": -1, "rad": -1}),
+    "N.m.s2/rad2": Unit({"kg": 1, "m": 2, "rad": -2}),
+}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One scalar variable as FMI 2.0 describes it. Every one is a Real.
+
+    `dependencies` maps each known that the variable depends on to its dependenciesKind, for outputs and derivatives.
+    """
+
+    name: str
+    value_reference: int
+    description: str
+    unit: str
+    causality: str
+    variability: str
+    initial: str | None = None
+    start: float | None = None
+    display_unit: str | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    derivative_of: str | None = None
+    dependencies: Mapping[str, str] | None = None
+
+    @property
+    def index(self) -> int:
+        """Position in <ModelVariables>, from 1."""
+        return self.value_reference + 1
+
+
+# What is calculated from the state, and the knowns that it depends on with their dependenciesKind: derivatives ...
+_DERIVATIVES = {
+    axis.velocity: (
+        f"{axis.name.capitalize()} acceleration, {axis.equations[1]}",
+        f"{axis.unit}2",
+        {**dict.fromkeys(axis.signs, "dependent"), axis.external: "tunable", axis.velocity: "dependent"},
+    )
+    for axis in AXES.values()
+} | {
+    "x": (
+        "Velocity over ground northward, u cos ψ + V_N",
+        "m/s",
+        {"V_N": "constant", "u": "dependent", "psi": "dependent"},
+    ),
+    "y": (
+        "Velocity over ground eastward, u sin ψ + V_E",
+        "m/s",
+        {"V_E": "constant", "u": "dependent", "psi": "dependent"},
+    ),
+    "z": ("Rate of change of depth, w", "m/s", {"w": "constant"}),
+    "psi": ("Rate of change of heading, r", "rad/s", {"r": "constant"}),
+}
+# ... and thrust: its commands.
+_COMMANDS_OF = {"F_l": ("u_l",), "F_r": ("u_r",), "F_t": ("u_t",), "tau_rear": tuple(YAW.signs)}
+
+# Which coefficients each calculated variable depends on during initialization.
+_ARM = ("R", "gamma")
+PARAMETERS_OF: dict[str, tuple[str, ...]] = {
+    "F_l": SURGE.thrust_names,
+    "F_r": SURGE.thrust_names,
+    "F_t": HEAVE.thrust_names,
+    "tau_rear": YAW.thrust_names + _ARM,
+} | {
+    f"der({axis.velocity})": (
+        *axis.thrust_names,
+        *(_ARM if axis is YAW else ()),
+        axis.inertia,
+        *(axis.coefficient(kind) for kind in ("a_d", "b_d", "alpha", "beta")),
+    )
+    for axis in AXES.values()
+}
+
+
+def variables(coefficients: Coefficients) -> tuple[Variable, ...]:
+    """All variables of the FMU of a vehicle, in the order of their value references."""
+    result: list[Variable] = []
+
+    def add(name: str, meta: Meta, causality: str, variability: str, **rest: Any) -> None:
+        given: dict[str, Any] = {"minimum": _finite(meta.minimum), "maximum": _finite(meta.maximum)}
+        given |= {"display_unit": UNITS[meta.unit].display} | rest
+        result.append(Variable(name, len(result), meta.description, meta.unit, causality, variability, **given))
+
+    for name, meta in declared(Inputs).items():
+        add(name, meta, "input", "continuous", start=0.0, nominal=meta.nominal)
+    for name, meta in declared(State).items():
+        add(name, meta, "output", "continuous", initial="exact", start=0.0, nominal=meta.nominal,
+            dependencies={name: "constant"})  # fmt: skip
+    for name in declared(State):
+        description, unit, known = _DERIVATIVES[name]
+        add(f"der({name})", Meta(unit, description), "local", "continuous", initial="calculated", derivative_of=name,
+            dependencies=known)  # fmt: skip
+    for name, meta in declared(Thrust).items():
+        add(name, meta, "output", "continuous", initial="calculated", display_unit=None,
+            dependencies=dict.fromkeys(_COMMANDS_OF[name], "dependent"))  # fmt: skip
+    for name, meta in COEFFICIENTS.items():
+        add(name, meta, "parameter", "tunable" if meta.tunable else "fixed", initial="exact",
+            start=getattr(coefficients, name),
+            display_unit=None if meta.unit == "1" else UNITS[meta.unit].display)  # fmt: skip
+    return tuple(result)
+
+
+def _finite(bound: float) -> float | None:
+    """What the XML says of a bound: nothing where there is none."""
+    return bound if isfinite(bound) else None
+
+
+# Names by the standard (2.2.4) and what is said in each.
+LOG_CATEGORIES = {
+    "logEvents": "Changes of mode: initialization, event mode, reset, termination",
+    "logStatusWarning": "A command beyond ±1 that saturates",
+    "logStatusDiscard": "A value refused by fmi2SetReal or by a solver's state: not finite, or outside min ... max",
+    "logStatusError": "Illegal calls and arguments, steps past stopTime, results that overflow",
+}
+
+# ---- The same declaration for the C compiler -----------------------------------------------------------------------
+
+
+def model_header() -> str:
+    """model.h: the structs of the mathematics, members in the order of the value references."""
+    structs = {
+        "rov_inputs": Inputs,
+        "rov_state": State,
+        "rov_thrust": Thrust,
+        "rov_coefficients": Coefficients,
+    }
+    lines = [
+        "/* Generated by rov_fmu/export/interface.py: the variables of the model. */",
+        "#ifndef MODEL_H",
+        "#define MODEL_H",
+        "",
+    ]
+    for name, struct in structs.items():
+        lines += ["typedef struct {", *(f"    double {member};" for member in declared(struct)), f"}} {name};", ""]
+    lines += [
+        "typedef struct {",
+        "    rov_inputs inputs;",
+        "    rov_state state;",
+        "    rov_state derivative;",
+        "    rov_thrust thrust;",
+        "    rov_coefficients coefficients;",
+        "} rov_variables;",
+        "",
+        "#endif",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def interface_header(variables: tuple[Variable, ...], identifier: str, guid: str) -> str:
+    """interface.h: what the FMI layer knows of the variables, and the names of the functions in a static library."""
+    kinds = {
+        "input": "INPUT",
+        "output": "CALCULATED",
+        "local": "CALCULATED",
+        "parameter": "FIXED",
+    }
+    rows = []
+    for v in variables:
+        kind = "STATE" if v.causality == "output" and v.initial == "exact" else kinds[v.causality]
+        kind = "TUNABLE" if v.variability == "tunable" else kind
+        low = "-INFINITY" if v.minimum is None else repr(v.minimum)
+        high = "INFINITY" if v.maximum is None else repr(v.maximum)
+        rows.append(f'    {{"{v.name}", {kind}, {v.start or 0.0!r}, {low}, {high}, {v.nominal or 1.0!r}}},')
+    return "\n".join(
+        [
+            "/* Generated by rov_fmu/export/interface.py: the FMI interface of the model. */",
+            "#ifndef INTERFACE_H",
+            "#define INTERFACE_H",
+            "",
+            f"#define FMI2_FUNCTION_PREFIX {identifier}_",
+            '#include "fmi2Functions.h"',
+            '#include "variable.h"',
+            "",
+            "#include <math.h>",
+            "",
+            f'#define MODEL_GUID "{guid}"',
+            f"#define N_VARIABLES {len(variables)}",
+            f"#define N_STATES {len(declared(State))}",
+            f"#define FIRST_STATE {len(declared(Inputs))}",
+            f"#define FIRST_CALCULATED {len(declared(Inputs)) + len(declared(State))}",
+            "",
+            f"typedef enum {{ {', '.join(LOG_CATEGORIES)}, N_LOG_CATEGORIES }} log_category;",
+            "",
+            "static const char *const LOG_CATEGORIES[N_LOG_CATEGORIES] = {",
+            *(f'    "{name}",' for name in LOG_CATEGORIES),
+            "};",
+            "",
+            "/* by value reference */",
+            "static const variable_info VARIABLES[N_VARIABLES] = {",
+            *rows,
+            "};",
+            "",
+            "#endif",
+            "",
+        ]
+    )

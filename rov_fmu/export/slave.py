@@ -1,0 +1,111 @@
+"""The FMU in pure Python: rov_fmu/motion/rov.py behind PythonFMU's Fmi2Slave.
+
+In the FMU this file is the slave module, beside variables.json (the declaration) and its copy of the model. PythonFMU
+knows no fmi2Discard: a value that is refused is logged so, the old one is kept, and the call returns fmi2OK.
+"""
+
+import json
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
+from pythonfmu.enums import Fmi2Status
+
+from rov_fmu.motion import rov
+
+_INPUTS = len(rov.Inputs.__dataclass_fields__)
+_STATE = _INPUTS + len(rov.State.__dataclass_fields__)
+_DERIVATIVE = _STATE + _STATE - _INPUTS
+_THRUST = _DERIVATIVE + len(rov.Thrust.__dataclass_fields__)
+
+
+class Rov(Fmi2Slave):  # type: ignore[misc]
+    """All values by value reference: inputs, state, derivative, thrust, coefficients."""
+
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        declaration = json.loads(Path(arguments["resources"], "variables.json").read_text(encoding="utf-8"))
+        self.modelName = declaration["identifier"]
+        self.log_categories = declaration["log_categories"]
+        self.declared: list[dict[str, Any]] = declaration["variables"]
+        self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
+        self.stop_time: float | None = None
+        self.saturated: set[int] = set()
+        for reference, v in enumerate(self.declared):
+            self.register_variable(
+                Real(
+                    v["name"],
+                    start=v["start"],
+                    description=v["description"],
+                    causality=Fmi2Causality[v["causality"]],
+                    variability=Fmi2Variability[v["variability"]],
+                    initial=Fmi2Initial[v["initial"]] if v["initial"] else None,
+                    getter=lambda reference=reference: self.get_real([reference])[0],
+                    setter=lambda value, reference=reference: self.set_real([reference], [value]),
+                ),
+                nested=False,
+            )
+
+    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:  # noqa: ARG002
+        """Keep the stop time: steps past it are errors."""
+        self.stop_time = stop_time
+
+    def set_real(self, references: list[int], values: list[float]) -> None:
+        """Set all values, or none where one is refused."""
+        for reference, value in zip(references, values, strict=True):
+            v = self.declared[reference]
+            if _STATE <= reference < _THRUST:
+                raise ValueError(f"{v['name']} is calculated and must not be set")
+            parameter = v["causality"] == "parameter"
+            if not isfinite(value) or (parameter and not v["minimum"] <= value <= v["maximum"]):
+                self.log(
+                    f"{v['name']} = {value!r} is refused; it stays {self.values[reference]!r}.", Fmi2Status.discard
+                )
+                return
+        for reference, value in zip(references, values, strict=True):
+            v = self.declared[reference]
+            self.values[reference] = value
+            if v["causality"] == "input" and v["minimum"] is not None and reference not in self.saturated:
+                if v["minimum"] <= value <= v["maximum"]:
+                    continue
+                self.saturated.add(reference)
+                limit = max(v["minimum"], min(v["maximum"], value))
+                self.log(f"{v['name']} = {value!r} saturates at {limit:g}; said once.", Fmi2Status.warning)
+
+    def get_real(self, references: list[int]) -> list[float]:
+        """Values, the calculated ones from the others."""
+        if any(_STATE <= reference < _THRUST for reference in references):
+            k, inputs, state = self._model()
+            rates, thrust = rov.derivatives(k, inputs, state), rov.thrust(k, inputs)
+            self.values[_STATE:_THRUST] = [*vars(rates).values(), *vars(thrust).values()]
+        return [self.values[reference] for reference in references]
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """One exact step; False past the stop time."""
+        end = current_time + step_size
+        if not (step_size > 0.0 and isfinite(end)):
+            self.log(f"step size {step_size!r} at t = {current_time!r} is not a step forward.", Fmi2Status.error)
+            return False
+        if self.stop_time is not None and end > self.stop_time + 1e-9 * (abs(self.stop_time) + step_size):
+            self.log(f"a step of {step_size!r} s passes the stop time {self.stop_time!r}.", Fmi2Status.error)
+            return False
+        after = list(vars(rov.step(*self._model(), step_size)).values())
+        if not all(map(isfinite, after)):
+            self.log(f"the motion overflows within {step_size!r} s.", Fmi2Status.error)
+            return False
+        self.values[_INPUTS:_STATE] = after
+        return True
+
+    def _model(self) -> tuple[rov.Coefficients, rov.Inputs, rov.State]:
+        return (
+            rov.Coefficients(*self.values[_THRUST:]),
+            rov.Inputs(*self.values[:_INPUTS]),
+            rov.State(*self.values[_INPUTS:_STATE]),
+        )
+
+    def _get_fmu_state(self) -> dict[str, Any]:
+        return {"values": list(self.values), "stop_time": self.stop_time}
+
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        self.values, self.stop_time = list(state["values"]), state["stop_time"]

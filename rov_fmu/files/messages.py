@@ -1,0 +1,41 @@
+"""Messages to the user: whatever they tell of, one line that can be printed anywhere."""
+
+import reprlib
+
+
+class FileError(ValueError):
+    """A file that cannot be used: a line for each reason, with file, place in it, value and what is allowed."""
+
+    def __init__(self, *reasons: str) -> None:
+        super().__init__("\n".join(map(one_line, reasons)))
+
+
+def one_line(text: str) -> str:
+    """Line breaks, other control characters and undecodable bytes of a file's name as Python writes them."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def brief(text: str) -> str:
+    """On one line, and not endless."""
+    clean = one_line(text[:100])
+    return clean if len(clean) <= 80 else f"{clean[:77]}..."
+
+
+class _Repr(reprlib.Repr):
+    """A few levels and entries of a value; the defaults would cut what fits into a message."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxstring = self.maxother = 80
+
+    def repr_int(self, x: int, level: int) -> str:
+        """Python refuses to write very long numbers in decimals."""
+        return super().repr_int(x, level) if x.bit_length() < 1000 else hex(x)
+
+
+_REPR = _Repr()
+
+
+def shown(value: object) -> str:
+    """Any value as a message shows it."""
+    return brief(_REPR.repr(value))

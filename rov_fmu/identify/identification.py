@@ -1,0 +1,118 @@
+"""What an identification yields: per thruster and axis the data, the fits, the warnings, and the vehicle they make."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rov_fmu.identify.least_squares import Array, Estimate
+from rov_fmu.identify.output_error import RecordingsFit
+from rov_fmu.identify.quadratic_fit import QuadraticFit
+from rov_fmu.identify.response_fit import Point, ResponseFit, predict, relative_rms
+from rov_fmu.identify.step_responses import StepResponse
+from rov_fmu.identify.tank_tests import TankTests
+from rov_fmu.motion.rov import Axis
+from rov_fmu.vehicle.vehicle import Vehicle
+
+Kind = Literal["recordings", "points", "known"]
+
+
+@dataclass(frozen=True, eq=False)
+class AxisResult:
+    """One axis: what was measured, what was fitted, what is taken."""
+
+    axis: Axis
+    points: tuple[Point, ...]
+    """Of the tables and of the recordings."""
+    steps: tuple[StepResponse, ...]
+    """Held commands of the recordings."""
+    drag: QuadraticFit | None
+    """Force over measured V_ss as in (11)-(16), for comparison."""
+    response: ResponseFit | None
+    """By the points."""
+    recordings: RecordingsFit | None
+    """By the recordings."""
+    held: Mapping[str, str]
+    """Coefficients that nothing tells, and what is taken instead."""
+    warnings: tuple[str, ...]
+
+    @property
+    def chosen(self) -> Kind:
+        """Which fit the vehicle takes."""
+        return "recordings" if self.recordings else "points" if self.response else "known"
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """The chosen one."""
+        fit = self.recordings or self.response
+        return fit.estimate if fit else None
+
+    @property
+    def method(self) -> str:
+        """The chosen one in words."""
+        if self.recordings:
+            return f"output error over {count(len(self.recordings.simulations), 'recording')}"
+        if self.response:
+            used = [p.quantity for p in self.response.points if p.weight > 0.0]
+            counts = " and ".join(f"{n} {q}" for q in ("V_ss", "Tau") if (n := used.count(q)))
+            return f"least squares of the relative errors of {counts}"
+        return "given"
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """A vehicle, and all that it was made of."""
+
+    experiments: TankTests
+    vehicle: Vehicle
+    thrust: Mapping[str, QuadraticFit]
+    """By thruster, where it was tested; force (N) over command."""
+    axes: tuple[AxisResult, ...]
+    against: Vehicle | None
+    """A vehicle to set beside."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the data cannot determine, and what speaks against the model."""
+        assert self.vehicle.provenance
+        return self.vehicle.provenance.warnings
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The measured points of one quantity of an axis beside models; n points, NaN where there is no number."""
+
+    result: AxisResult
+    quantity: str
+    """V_ss or Tau."""
+    points: tuple[Point, ...]
+    model: Array
+    left_out: Array
+    """By the fit to the points without those of the same thrust."""
+    against: Array
+
+    def rms(self, model: Array) -> float:
+        """RMS relative error over the points that count."""
+        return relative_rms(self.points, model, self.quantity)
+
+
+def compare(identification: Identification) -> tuple[Comparison, ...]:
+    """Every measured V_ss and Tau beside the vehicle, the fit without its thrust, and the vehicle to compare with."""
+    found = []
+    for axis in identification.axes:
+        for quantity in ("V_ss", "Tau"):
+            place = [n for n, p in enumerate(axis.points) if p.quantity == quantity]
+            points = tuple(axis.points[n] for n in place)
+            model = predict(axis.axis, identification.vehicle.coefficients, points)
+            other = identification.against
+            against = predict(axis.axis, other.coefficients, points) if other else np.full(len(points), np.nan)
+            left_out = axis.response.left_out[place] if axis.response else np.full(len(points), np.nan)
+            if points:
+                found.append(Comparison(axis, quantity, points, model, left_out, against))
+    return tuple(found)
+
+
+def count(n: int, what: str) -> str:
+    """1 force, 2 forces."""
+    return f"{n} {what}{'' if n == 1 else 's'}"

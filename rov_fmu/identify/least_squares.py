@@ -1,0 +1,167 @@
+"""What a least-squares fit tells of its parameters: covariance, correlation and 95 % intervals.
+
+The fits themselves are SciPy's. Tuning α and β, positive factors, are fitted by their logarithms, all else as it is.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, isfinite, log, nan
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from rov_fmu.motion.rov import COEFFICIENTS
+
+Array = NDArray[np.float64]
+LEVEL = 0.95
+_RANK = 1e-6  # singular values below this fraction of the largest belong to what the data cannot tell
+_LEAST_FACTOR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Fitted coefficients in the units of dynamics.COEFFICIENTS, p of them."""
+
+    names: tuple[str, ...]
+    values: Array
+    """p."""
+    covariance: Array
+    """p x p; infinite where the data do not determine a coefficient."""
+    freedom: float
+    """Degrees of freedom left: independent numbers less parameters."""
+    noise: float
+    """Standard deviation of the residuals, in their unit."""
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)])
+
+    @property
+    def named(self) -> dict[str, float]:
+        """Values by name."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
+    def of(self, names: Sequence[str]) -> "Estimate":
+        """The part of some of the coefficients."""
+        place = [self.names.index(name) for name in names]
+        return replace(
+            self, names=tuple(names), values=self.values[place], covariance=self.covariance[np.ix_(place, place)]
+        )
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Standard errors by name."""
+        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def correlation(self) -> Array:
+        """p x p; NaN where the data do not determine a coefficient."""
+        error = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.covariance / np.outer(error, error))
+
+    def interval(self, name: str) -> tuple[float, float] | None:
+        """95 % interval, cut where the coefficient ceases to be physical; None where the data do not bound it."""
+        value, error = self[name], self.errors[name]
+        if not isfinite(error) or not self.freedom > 0.0:
+            return None
+        reach = float(student.ppf(0.5 + 0.5 * LEVEL, self.freedom)) * error
+        meta = COEFFICIENTS[name]
+        if is_factor(name):
+            ratio = exp(min(reach / value, 100.0))
+            return value / ratio, min(meta.maximum, value * ratio)
+        return max(meta.minimum, value - reach), min(meta.maximum, value + reach)
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """95 % intervals by name, of the coefficients that have one."""
+        return {name: found for name in self.names if (found := self.interval(name))}
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The end of a nonlinear fit in internal parameters (logarithms of factors)."""
+
+    x: Array
+    residuals: Array
+    jacobian: Array
+    """Of the residuals without the loss."""
+
+
+def is_factor(name: str) -> bool:
+    """Whether the coefficient is fitted by its logarithm."""
+    return name.startswith(("alpha_", "beta_"))
+
+
+def internal(names: Sequence[str], values: Mapping[str, float]) -> Array:
+    """Internal parameters of named coefficients."""
+    return np.array([log(values[n]) if is_factor(n) else values[n] for n in names])
+
+
+def external(names: Sequence[str], x: Array) -> dict[str, float]:
+    """Named coefficients of internal parameters; x may go on with others."""
+    return {n: exp(value) if is_factor(n) else value for n, value in zip(names, x.tolist(), strict=False)}
+
+
+def bounds(names: Sequence[str], free: int = 0) -> tuple[Array, Array]:
+    """Lower and upper bounds of internal parameters, and of so many free ones after them."""
+    low = [log(_LEAST_FACTOR) if is_factor(n) else COEFFICIENTS[n].minimum for n in names]
+    high = [log(COEFFICIENTS[n].maximum) if is_factor(n) else COEFFICIENTS[n].maximum for n in names]
+    return np.array(low + [-np.inf] * free), np.array(high + [np.inf] * free)
+
+
+def minimize(
+    residuals: Callable[[Array], Array],
+    start: Array,
+    limits: tuple[Array, Array],
+    *,
+    jacobian: Callable[[Array], Array] | None = None,
+    scale: Array | None = None,
+    loss: Literal["linear", "soft_l1", "huber"] = "linear",
+    threshold: float = 1.0,
+) -> Solution:
+    """Bounded least squares by SciPy; with a robust loss residuals beyond the threshold count less than squared."""
+    low, high = limits
+    options: dict[str, Any] = {"jac": jacobian or "3-point", "bounds": limits, "method": "dogbox"}
+    tolerances = {"xtol": 1e-10, "ftol": 1e-12, "gtol": 1e-12}
+    result = least_squares(
+        residuals, np.clip(start, low, high), x_scale="jac" if scale is None else scale,
+        loss=loss, f_scale=threshold, max_nfev=200, **options, **tolerances,
+    )  # fmt: skip
+    plain = least_squares(residuals, result.x, max_nfev=1, **options)
+    return Solution(result.x, plain.fun, plain.jac)
+
+
+def covariance(gram: Array, meat: Array | None = None) -> Array:
+    """G^-1 M G^-1, or G^-1 without M, of G = J'J; infinite variance where J does not tell a parameter."""
+    scale = np.sqrt(np.diag(gram))
+    scale[scale == 0.0] = 1.0
+    squares, V = np.linalg.eigh(gram / np.outer(scale, scale))
+    told = squares > _RANK**2 * max(squares.max(initial=0.0), 1e-300)
+    inverse = (V[:, told] / squares[told]) @ V[:, told].T / np.outer(scale, scale)
+    result = inverse if meat is None else inverse @ meat @ inverse
+    for n in np.flatnonzero(np.linalg.norm(V[:, told], axis=1) < 1.0 - 1e-6):
+        result[n, :] = result[:, n] = 0.0
+        result[n, n] = np.inf
+    return np.asarray(result)
+
+
+def propagated(jacobian: Array, of_known: Array, of_known_covariance: Array) -> Array:
+    """Covariance of the parameters that comes from numbers taken as known: their residuals' Jacobian, covariance."""
+    gain = -np.linalg.pinv(jacobian) @ of_known
+    return np.asarray(gain @ of_known_covariance @ gain.T)
+
+
+def estimate(names: Sequence[str], x: Array, of_x: Array, freedom: float, noise: float) -> Estimate:
+    """The estimate of the first parameters, named, from internal ones and their covariance."""
+    p = len(names)
+    values = np.array([external(names, x)[n] for n in names])
+    slope = np.array([value if is_factor(n) else 1.0 for n, value in zip(names, values, strict=True)])
+    return Estimate(tuple(names), values, of_x[:p, :p] * np.outer(slope, slope), freedom, noise)
+
+
+def rms(errors: Array) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(errors**2))) if errors.size else nan

@@ -1,0 +1,196 @@
+"""Drag and β of one axis from measured V_ss and Tau: least squares of their relative errors, in closed form (17)."""
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, nan, sqrt
+
+import numpy as np
+from scipy.stats import t as student
+
+from rov_fmu.identify.least_squares import (
+    LEVEL,
+    Array,
+    Estimate,
+    Solution,
+    bounds,
+    covariance,
+    estimate,
+    external,
+    internal,
+    minimize,
+    propagated,
+    rms,
+)
+from rov_fmu.motion.rov import Axis, Coefficients
+
+
+@dataclass(frozen=True)
+class Point:
+    """One measured V_ss (m/s, rad/s) or Tau (s) of an axis at a held command, signs as in the test."""
+
+    quantity: str
+    """V_ss or Tau."""
+    command: float
+    value: float
+    weight: float
+    source: str
+    """File and line, or file and time."""
+    error: float | None = None
+    """Standard error, where a recording tells it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseFit:
+    """Drag and β of one axis by least squares of the relative errors of V_ss and Tau over n points."""
+
+    axis: Axis
+    points: tuple[Point, ...]
+    coefficients: Coefficients
+    estimate: Estimate
+    given_thrust: Estimate
+    """The same, were the thrust curve certain; V_ss and Tau are hardly less so if it is not, for drag bends with it."""
+    held: Mapping[str, str]
+    """Coefficients that the points do not tell, and what is taken instead."""
+    left_out: Array
+    """n: prediction of every point by a fit without the points of its thrust; NaN where too few are left."""
+
+    @property
+    def model(self) -> Array:
+        """n: the fitted model at every point."""
+        return predict(self.axis, self.coefficients, self.points)
+
+    def rms(self, quantity: str, *, left_out: bool = False) -> float:
+        """RMS relative error over the points of V_ss or Tau that count."""
+        return relative_rms(self.points, self.left_out if left_out else self.model, quantity)
+
+    def band(self, commands: Array) -> tuple[Array, Array, Array, Array]:
+        """95 % confidence band of the curves over commands: V_ss low and high, Tau low and high."""
+        return response_band(self.axis, self.coefficients, self.given_thrust, commands)
+
+
+def fit_response(
+    axis: Axis,
+    points: Sequence[Point],
+    base: Coefficients,
+    known: Collection[str] = (),
+    thrust_covariance: Array | None = None,
+) -> ResponseFit:
+    """Fit what is not known of a_d, b_d and β of the axis; `base` holds the rest, α included.
+
+    The thrust coefficients' covariance (2 x 2, a_t and b_t), where they were fitted, widens the intervals.
+    """
+    used = [p for p in points if p.weight > 0.0]
+    names, held = free_coefficients(axis, used, known)
+    base = replace(base, **{name: value for name, (value, _) in held.items()})
+    solution = _solve(axis, used, base, names)
+    freedom = float(len(used) - len(names))
+    noise = sqrt(float(solution.residuals @ solution.residuals) / freedom) if freedom > 0.0 else nan
+    of_x = covariance(solution.jacobian.T @ solution.jacobian) * (noise**2 if freedom > 0.0 else np.inf)
+    given_thrust = estimate(names, solution.x, of_x, freedom, noise)
+    if thrust_covariance is not None and names:
+        of_thrust = _thrust_jacobian(axis, base, lambda k: _residuals(axis, used, k, external(names, solution.x)))
+        of_x = of_x + propagated(solution.jacobian, of_thrust, thrust_covariance)
+    left_out = np.full(len(points), np.nan)
+    levels = [round(abs(p.command), 6) for p in points]
+    for level in set(levels):
+        rest = [p for p, at in zip(points, levels, strict=True) if at != level and p.weight > 0.0]
+        out = [n for n, at in enumerate(levels) if at == level]
+        if set(free_coefficients(axis, rest, known)[0]) >= set(names) and len(rest) >= len(names):
+            other = replace(base, **external(names, _solve(axis, rest, base, names).x))
+            left_out[out] = predict(axis, other, [points[n] for n in out])
+    return ResponseFit(
+        axis,
+        tuple(points),
+        replace(base, **external(names, solution.x)),
+        estimate(names, solution.x, of_x, freedom, noise),
+        given_thrust,
+        {name: reason for name, (_, reason) in held.items()},
+        left_out,
+    )
+
+
+def predict(axis: Axis, coefficients: Coefficients, points: Iterable[Point]) -> Array:
+    """V_ss or Tau of the model at every point."""
+    responses = (axis.response(coefficients, p.command)[p.quantity == "Tau"] for p in points)
+    return np.fromiter(responses, float)
+
+
+def relative_rms(points: Sequence[Point], model: Array, quantity: str) -> float:
+    """RMS relative error over the points of one quantity that count; NaN without any."""
+    errors = [m / p.value - 1.0 for p, m in zip(points, model.tolist(), strict=True)
+              if p.quantity == quantity and p.weight > 0.0 and isfinite(m)]  # fmt: skip
+    return rms(np.array(errors))
+
+
+def response_band(
+    axis: Axis, coefficients: Coefficients, found: Estimate, commands: Array
+) -> tuple[Array, Array, Array, Array]:
+    """95 % confidence band of V_ss and Tau over commands, to first order in the estimate."""
+    names = found.names
+    curve = np.array([axis.response(coefficients, c) for c in commands.tolist()])
+    if found.freedom <= 0.0 or not np.isfinite(found.covariance).all():
+        low, high = np.full_like(curve, -np.inf), np.full_like(curve, np.inf)
+    else:
+        slopes = np.empty((len(names), *curve.shape))
+        for n, name in enumerate(names):
+            h = 1e-5 * (found[name] or min(found.errors[name], 1.0))
+            moved = replace(coefficients, **{name: found[name] + h})
+            with np.errstate(invalid="ignore"):  # without any drag both are infinite
+                slopes[n] = (np.array([axis.response(moved, c) for c in commands.tolist()]) - curve) / h
+        variance = np.einsum("pcq,pr,rcq->cq", slopes, found.covariance, slopes)
+        reach = float(student.ppf(0.5 + 0.5 * LEVEL, found.freedom)) * np.sqrt(np.maximum(variance, 0.0))
+        low, high = curve - reach, curve + reach
+    return low[:, 0], high[:, 0], low[:, 1], high[:, 1]
+
+
+def _thrust_jacobian(axis: Axis, base: Coefficients, residuals: Callable[[Coefficients], Array]) -> Array:
+    """n x 2: derivative of residuals (a function of the coefficients) by a_t and b_t of the axis."""
+    columns = []
+    for name in axis.thrust_names:
+        value = getattr(base, name)
+        h = 1e-5 * max(abs(value), 0.1)
+        up, down = (residuals(replace(base, **{name: value + step})) for step in (h, -h))
+        columns.append((up - down) / (2.0 * h))
+    return np.column_stack(columns)
+
+
+def free_coefficients(
+    axis: Axis, used: Sequence[Point], known: Collection[str]
+) -> tuple[tuple[str, ...], dict[str, tuple[float, str]]]:
+    """Coefficients to fit, and those held: value and reason."""
+    a_d, b_d, beta = (axis.coefficient(kind) for kind in ("a_d", "b_d", "beta"))
+    held: dict[str, tuple[float, str]] = {}
+    if b_d not in known and a_d not in known and len({round(abs(p.command), 6) for p in used}) < 2:
+        held[b_d] = (0.0, "one thrust alone cannot tell linear from quadratic drag; taken as 0")
+    if beta not in known and not any(p.quantity == "Tau" for p in used):
+        held[beta] = (1.0, f"V_ss alone never fixes {axis.inertia}/{beta}; taken as 1")
+    return tuple(n for n in (a_d, b_d, beta) if n not in known and n not in held), held
+
+
+def _solve(axis: Axis, used: Sequence[Point], base: Coefficients, names: tuple[str, ...]) -> Solution:
+    def residuals(x: Array) -> Array:
+        return _residuals(axis, used, base, external(names, x))
+
+    return minimize(residuals, internal(names, _start(axis, used, base, names)), bounds(names))
+
+
+def _residuals(axis: Axis, used: Sequence[Point], base: Coefficients, values: Mapping[str, float]) -> Array:
+    model = predict(axis, replace(base, **values), used)
+    measured, weights = np.array([p.value for p in used]), np.array([p.weight for p in used])
+    return np.asarray(np.sqrt(weights) * (model / measured - 1.0))
+
+
+def _start(axis: Axis, used: Sequence[Point], base: Coefficients, names: tuple[str, ...]) -> dict[str, float]:
+    """Where to begin: half of the drag linear, half quadratic, at the mean V_ss; then β by the mean Tau."""
+    a_d, b_d, beta = (axis.coefficient(kind) for kind in ("a_d", "b_d", "beta"))
+    alpha = getattr(base, axis.coefficient("alpha"))
+    steady = [p for p in used if p.quantity == "V_ss"]
+    drag = [d for p in steady if (d := alpha * axis.force(base, p.command) / p.value) > 0.0]
+    speed = float(np.mean([abs(p.value) for p in steady])) if steady else 1.0
+    mean = float(np.mean(drag)) if drag else 1.0
+    start = {a_d: 0.5 * mean / speed, b_d: 0.5 * mean, beta: 1.0}
+    k = replace(base, **{name: start[name] for name in names})
+    ratios = [axis.response(k, p.command)[1] / p.value for p in used if p.quantity == "Tau"]
+    if ratios:
+        start[beta] = float(np.median(ratios)) * getattr(k, beta)
+    return {name: start[name] for name in names}

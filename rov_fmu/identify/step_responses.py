@@ -1,0 +1,225 @@
+"""From recordings to V_ss and Tau, sections 4.1-4.3: smooth, differentiate, find the steady state, apply (17).
+
+Velocity comes from SciPy's filters: a local cubic (Savitzky-Golay) or the paper's moving average. V_ss itself is read
+off the raw samples, as the slope of the position over the steady part of a hold, or the mean of the velocity: there no
+filter has correlated the sensor's noise yet, and what correlation is left (turbulence) is measured and counted.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import hypot, sqrt
+from typing import Literal
+
+import numpy as np
+from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.signal import correlate, savgol_coeffs, savgol_filter
+
+from rov_fmu.identify.least_squares import Array
+from rov_fmu.identify.tank_tests import Recording
+from rov_fmu.motion.riccati import RISE
+
+Method = Literal["savitzky-golay", "moving average"]
+
+AGAINST = "moves against the command: no V_ss"
+_SAME_COMMAND = 0.005  # fraction of full thrust
+_LEAST = 20  # samples of a hold, and of its steady part
+_WINDOW = 0.5  # s, before the time constant is known
+_BIAS = 0.002  # of Tau: what the filter bends off at most
+_MOST = 1_000_000  # samples, evenly spaced
+_ORDER = 3  # of the local polynomials: a quadratic would cut the bend at Tau
+
+
+@dataclass(frozen=True)
+class StepResponse:
+    """One held command of a recording, other than zero, and what it tells. Velocities in m/s or rad/s, signed."""
+
+    file: str
+    start: float
+    """s, of the hold."""
+    end: float
+    before: float | None
+    """Command before; None at the start of the recording."""
+    command: float
+    V_ss: float | None = None
+    V_ss_error: float | None = None
+    """Standard error."""
+    steady: tuple[float, float] | None = None
+    """s, the part that V_ss is taken from."""
+    Tau: float | None = None
+    """s by (17), of steps from rest."""
+    Tau_error: float | None = None
+    note: str = ""
+    """Why there is no V_ss or no Tau."""
+
+
+def steps(recording: Recording) -> tuple[StepResponse, ...]:
+    """The held commands of a recording, other than zero, one after the other."""
+    there = np.isfinite(recording.values)
+    time, values = recording.time[there], without_spikes(recording.values[there])
+    found = []
+    for start, end, before, command in _holds(recording):
+        if command == 0.0:
+            continue
+        step = StepResponse(recording.file, start, end, before, command)
+        inside = (time >= start) & (time <= end)
+        if inside.sum() < _LEAST:
+            found.append(replace(step, note="too short"))
+            continue
+        step = _steady(step, time[inside], values[inside], recording.is_position)
+        if step.V_ss is not None:
+            past = (time >= start - 1.0) & (time <= start)
+            resting = past.sum() >= _LEAST // 2 and _rests(time[past], values[past], recording.is_position, step.V_ss)
+            if resting:
+                step = _rising(step, time[inside], values[inside], recording.is_position)
+            else:
+                step = replace(step, note="not from rest: no Tau")
+        found.append(step)
+    return tuple(found)
+
+
+def velocity(
+    time: Array, values: Array, *, is_position: bool, window: float = _WINDOW, method: Method = "savitzky-golay"
+) -> tuple[Array, Array]:
+    """Smoothed velocity on evenly spaced times (s), from position or velocity at any times; the window is in s."""
+    step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST)  # in spite of a gap of days
+    even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
+    samples = np.interp(even, time, values)
+    n = _odd(window / step, len(samples))
+    if method == "moving average":
+        smooth = uniform_filter1d(samples, n, mode="nearest")
+        return even, np.gradient(smooth, step) if is_position else smooth
+    return even, savgol_filter(samples, n, min(_ORDER, n - 1), deriv=int(is_position), delta=step, mode="interp")
+
+
+def without_spikes(values: Array) -> Array:
+    """The values, those far off their neighbours replaced by the median of five."""
+    median = median_filter(values, 5, mode="nearest")
+    return np.asarray(np.where(np.abs(values - median) > 8.0 * white_noise(values), median, values))
+
+
+def white_noise(values: Array) -> float:
+    """About the standard deviation of the sensor's noise, from second differences: motion is smooth beside it."""
+    return spread(np.diff(values, 2)) / sqrt(6.0)
+
+
+def spread(values: Array) -> float:
+    """Standard deviation, robust."""
+    return float(1.4826 * np.median(np.abs(values - np.median(values))))
+
+
+def correlation_time(residuals: Array) -> float:
+    """How many correlated samples tell as much as one independent: 1 + 2 (sum of autocorrelation), 1 for white noise.
+
+    The sum ends where the autocorrelation falls into what white noise has by chance.
+    """
+    n = len(residuals)
+    centred = residuals - residuals.mean()
+    lags = correlate(centred, centred, mode="full", method="fft")[n - 1 :]
+    if n < 3 or lags[0] <= 0.0:
+        return 1.0
+    rho = lags[1:] / lags[0]
+    chance = np.flatnonzero(rho < 2.0 / sqrt(n))
+    return 1.0 + 2.0 * float(rho[: chance[0] if chance.size else n].sum())
+
+
+def _holds(recording: Recording) -> Iterator[tuple[float, float, float | None, float]]:
+    """Start and end (s), the command before, and the command of every stretch over which it stays the same."""
+    changes = np.flatnonzero(np.abs(np.diff(recording.command)) > _SAME_COMMAND) + 1
+    before = None
+    for first, last in pairwise([0, *changes.tolist(), len(recording.time)]):
+        command = float(np.median(recording.command[first:last]))
+        end = recording.time[min(last, len(recording.time) - 1)]
+        yield float(recording.time[first]), float(end), before, command
+        before = command
+
+
+def _steady(step: StepResponse, time: Array, values: Array, is_position: bool) -> StepResponse:
+    """Take the longest end of the hold over which the velocity does not change, but for noise."""
+    even, v = velocity(time, values, is_position=is_position)
+    tail = v[int(0.7 * len(v)) :]
+    level = float(np.median(tail))
+    off = np.flatnonzero(np.abs(v - level)[: len(v) - len(tail)] > max(0.02 * abs(level), 3.0 * spread(tail)))
+    earliest = int(np.searchsorted(time, even[off[-1]])) + 1 if off.size else 0
+    latest = len(time) - max(_LEAST, len(time) // 4)
+    for first in np.unique(np.linspace(min(earliest, latest), latest, 15).astype(int)).tolist():
+        V, error, drift, drift_error = _level(time[first:], values[first:], is_position)
+        if abs(drift) < max(1.5 * drift_error, 0.005 * abs(V)):
+            break
+    else:
+        return replace(step, note="the velocity still changes at the end: no V_ss")
+    if drift_error > 0.05 * abs(V):
+        return replace(step, note="too short, or too noisy, to tell whether the velocity still changes: no V_ss")
+    if V * step.command <= 0.0:
+        return replace(step, note=AGAINST)
+    hidden = hypot(drift, drift_error) / sqrt(12.0)  # as much as may still change without being seen
+    return replace(step, V_ss=V, V_ss_error=hypot(error, hidden), steady=(float(time[first]), float(time[-1])))
+
+
+def _level(time: Array, values: Array, is_position: bool) -> tuple[float, float, float, float]:
+    """Mean velocity and its standard error; the change of velocity from start to end, and its standard error."""
+    half = 0.5 * float(time[-1] - time[0])
+    s = (time - 0.5 * (time[-1] + time[0])) / half  # -1 ... 1
+    order = int(is_position)
+    legendre = np.polynomial.legendre.legvander(s, order + 1)
+    regression = _regression(legendre, values)
+    (c, error), (d, d_error) = regression[order], regression[order + 1]
+    per_time = 1.0 / half if is_position else 1.0
+    growth = (6.0 if is_position else 2.0) * per_time  # of dP2/ds from -1 to 1, or of P1
+    return c * per_time, error * per_time, d * growth, d_error * growth
+
+
+def _regression(M: Array, y: Array) -> list[tuple[float, float]]:
+    """Coefficients of a linear regression with standard errors that count correlated residuals."""
+    coefficients, *_ = np.linalg.lstsq(M, y, rcond=None)
+    residuals = y - M @ coefficients
+    variance = float(residuals @ residuals) / max(len(y) - M.shape[1], 1) * correlation_time(residuals)
+    errors = np.sqrt(np.diag(np.linalg.inv(M.T @ M)) * variance)
+    return list(zip(coefficients.tolist(), errors.tolist(), strict=True))
+
+
+def _rests(time: Array, values: Array, is_position: bool, V_ss: float) -> bool:
+    """Whether nothing moves before the step, as far as the noise lets one tell."""
+    V, error, *_ = _level(time, values, is_position)
+    return error < 0.1 * abs(V_ss) and abs(V) < max(0.03 * abs(V_ss), 2.0 * error)
+
+
+def _rising(step: StepResponse, time: Array, values: Array, is_position: bool) -> StepResponse:
+    """The time at which the smoothed velocity reaches (1 - 1/e) V_ss, (17); the window follows the time constant."""
+    assert step.V_ss is not None
+    assert step.V_ss_error is not None
+    window, Tau = max(_WINDOW, 0.1 * (step.end - step.start)), None
+    for _ in range(4):
+        even, v = velocity(time, values, is_position=is_position, window=window)
+        Tau = _crossing(even - step.start, v / step.V_ss)
+        if Tau is None:
+            return replace(step, note="no clear rise to V_ss: no Tau")
+        window = min(Tau, 0.5 * (step.end - step.start))
+    assert Tau is not None
+    interval = float(even[1] - even[0])
+    n = _odd(window / interval, len(even))
+    kernel = savgol_coeffs(n, min(_ORDER, n - 1), deriv=int(is_position), delta=interval)
+    _, fitted = velocity(time, values, is_position=False, window=window)
+    noise = spread(np.interp(even, time, values) - fitted)
+    at = int(np.searchsorted(even - step.start, Tau))
+    near = slice(max(at - n // 4 - 1, 0), at + n // 4 + 2)
+    rise = float(np.polyfit(even[near], v[near], 1)[0])
+    error = hypot(noise * float(np.linalg.norm(kernel)), RISE * step.V_ss_error) / abs(rise) if rise else np.inf
+    return replace(step, Tau=Tau, Tau_error=hypot(error, _BIAS * Tau))
+
+
+def _crossing(time: Array, rise: Array) -> float | None:
+    """When a noisy rise passes 1 - 1/e: the mean of the first and the last time it does on its way to 1."""
+    high = np.flatnonzero(rise > 0.95)
+    top = int(high[0]) + 1 if high.size else len(rise)
+    up = np.maximum.accumulate(rise[:top])
+    down = np.minimum.accumulate(rise[:top][::-1])[::-1]
+    if rise[0] > RISE or up[-1] < RISE:
+        return None
+    return 0.5 * float(np.interp(RISE, up, time[:top]) + np.interp(RISE, down, time[:top]))
+
+
+def _odd(samples: float, most: int) -> int:
+    """An odd number of samples, five at least where there are so many."""
+    n = min(max(round(samples), 5), most)
+    return n if n % 2 else n - 1

@@ -1,0 +1,289 @@
+"""A folder of tank tests (CSV) and what no test tells (rov.toml), read and checked.
+
+The name of a file says what it holds and of which thruster or axis, what follows an underscore is free:
+
+    thrust_<rear|top>*.csv                     command, force                  bollard pull, (6)-(10)
+    steady_<surge|heave|yaw>*.csv              command, velocity               Tables 3-5
+    time_constant_<surge|heave|yaw>*.csv       command, time constant          (17), Tables 6-8
+    log_<surge|heave|yaw>*.csv                 time, command, and distance, depth or heading, or velocity
+
+Every column has its unit in its header: `command [%]`. Commands are those of axes.py; a rear command is that of
+both rear thrusters, opposite in yaw. Numbers leave this module in SI units, commands as fractions of full thrust.
+"""
+
+import hashlib
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import pi
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, create_model
+
+from rov_fmu.files.csv_table import Column, Columns, DataFileError, read_columns
+from rov_fmu.files.messages import shown
+from rov_fmu.motion.rov import AXES, Axis
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import QUANTITIES, Finite, Head, Quantity, Strict, Validity, pair, read_checked
+
+ROV_FILE = "rov.toml"
+THRUSTERS = ("rear", "top")
+_KINDS = re.compile(
+    rf"(?:(?P<thrust>thrust)_(?P<thruster>{'|'.join(THRUSTERS)})"
+    rf"|(?P<kind>steady|time_constant|log)_(?P<axis>{'|'.join(AXES)}))(?:_.*)?\.csv"
+)
+_REQUIRED = ("m_rov", "I_r", "R", "gamma")  # geometry and mass: no test in the tank tells them
+_LEAST_SAMPLES = 20
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured number: force (N), velocity (m/s, rad/s) or time constant (s) at a held command."""
+
+    file: str
+    line: int
+    command: float
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Command and motion over time, n samples; SI units, the heading unwrapped."""
+
+    file: str
+    axis: Axis
+    quantity: str
+    """`velocity`, or the position whose rate it is: distance, depth, heading."""
+    time: NDArray[np.float64]
+    """s, ascending, from 0."""
+    command: NDArray[np.float64]
+    """Held from its time to the next one."""
+    values: NDArray[np.float64]
+    """NaN where the sensor has none."""
+
+    @property
+    def is_position(self) -> bool:
+        """Whether the velocity is the rate of the values."""
+        return self.quantity != "velocity"
+
+
+@dataclass(frozen=True)
+class Rov:
+    """What no test tells."""
+
+    name: str
+    identifier: str
+    version: str
+    description: str
+    source: str
+    known: Mapping[str, Quantity]
+    """Coefficients that are given, not identified: mass, moment of inertia, geometry, maybe more."""
+    windows: Mapping[str, tuple[float, float]]
+    """Of thrust_rear, thrust_top, surge, heave, yaw: rows at commands outside weigh nothing, (7)."""
+    command_range: tuple[float, float] | None
+    against: Path | None
+    """A vehicle file to set beside."""
+    limits: tuple[str, ...] = ()
+    """What was found of the vehicle that the model leaves out, in sentences."""
+
+
+@dataclass(frozen=True)
+class TankTests:
+    """All tests of a folder."""
+
+    folder: Path
+    rov: Rov
+    thrust: Mapping[str, tuple[Row, ...]]
+    """By thruster."""
+    steady: Mapping[str, tuple[Row, ...]]
+    """By axis, as the next two."""
+    time_constants: Mapping[str, tuple[Row, ...]]
+    recordings: Mapping[str, tuple[Recording, ...]]
+    inputs: Mapping[str, str]
+    """SHA-256 of every file read, by its name."""
+
+    @property
+    def files(self) -> list[Path]:
+        """Every file that the identification reads."""
+        return [*(self.folder / name for name in self.inputs), *filter(None, (self.rov.against,))]
+
+
+def load_tank_tests(folder: Path) -> TankTests:
+    """Read a folder. Raises DataFileError, VehicleFileError."""
+    if not folder.is_dir():
+        raise DataFileError(f"{folder}: there is no such folder")
+    rov = _load_rov(folder / ROV_FILE)
+    thrust: dict[str, list[Row]] = {thruster: [] for thruster in THRUSTERS}
+    rows: dict[str, dict[str, list[Row]]] = {kind: {axis: [] for axis in AXES} for kind in _READ}
+    recordings: dict[str, list[Recording]] = {axis: [] for axis in AXES}
+    inputs = {ROV_FILE: _hash(folder / ROV_FILE)}
+    for path in sorted(folder.glob("*.csv")):
+        match = _KINDS.fullmatch(path.name)
+        if not match or not path.name.isprintable():
+            raise DataFileError(
+                f"{path}: no name of a test; thrust_ begins one, then rear or top, or steady_, time_constant_ or log_, "
+                "then surge, heave or yaw, then _ and any printable characters"
+            )
+        if match["thrust"]:
+            thrust[match["thruster"]] += _thrust(path)
+        elif match["kind"] == "log":
+            recordings[match["axis"]].append(_recording(path, AXES[match["axis"]]))
+        else:
+            rows[match["kind"]][match["axis"]] += _READ[match["kind"]](path, AXES[match["axis"]])
+        inputs[path.name] = _hash(path)
+    if len(inputs) == 1:
+        raise DataFileError(f"{folder}: there are no tests (*.csv) in this folder")
+    return TankTests(
+        folder=folder,
+        rov=rov,
+        thrust=_frozen(thrust),
+        steady=_frozen(rows["steady"]),
+        time_constants=_frozen(rows["time_constant"]),
+        recordings=_frozen(recordings),
+        inputs=inputs,
+    )
+
+
+# ---- rov.toml --------------------------------------------------------------------------------------------------------
+
+_Window = Annotated[tuple[Finite, Finite], BeforeValidator(pair)]
+_known: dict[str, Any] = {name: (q, ...) if name in _REQUIRED else (q | None, None) for name, q in QUANTITIES.items()}
+_Known = create_model("_Known", __base__=Strict, **_known)
+_windows: dict[str, Any] = dict.fromkeys((*(f"thrust_{t}" for t in THRUSTERS), *AXES), (_Window | None, None))
+_Windows = create_model("_Windows", __base__=Strict, **_windows)
+
+
+class _RovFile(Strict):
+    vehicle: Head
+    known: _Known  # type: ignore[valid-type]
+    windows: _Windows = _Windows()  # type: ignore[valid-type]
+    validity: Validity | None = None
+    against: str | None = None
+
+
+def _load_rov(path: Path) -> Rov:
+    checked = read_checked(path, _RovFile)
+    known = {name: q for name in QUANTITIES if (q := getattr(checked.known, name)) is not None}
+    windows = {name: w for name in _windows if (w := getattr(checked.windows, name)) is not None}
+    against = None
+    if checked.against:
+        beside = path.parent / checked.against
+        against = beside if beside.is_file() else SHIPPED.get(checked.against)
+        if not against:
+            raise DataFileError(
+                f"{path}: against = {shown(checked.against)}: must be a vehicle file, seen from this folder, or one of "
+                f"the vehicles that ship: {', '.join(SHIPPED)}"
+            )
+    return Rov(
+        **dict(checked.vehicle),
+        known=known,
+        windows=windows,
+        command_range=(checked.validity.command_min, checked.validity.command_max) if checked.validity else None,
+        against=against,
+        limits=checked.validity.limits if checked.validity else (),
+    )
+
+
+# ---- CSV files -------------------------------------------------------------------------------------------------------
+
+# The bounds are far beyond any vehicle; what passes them is a slip, and numbers without any would overflow in a fit.
+_COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
+HELD_COMMAND = replace(_COMMAND, least=1e-4)
+_LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
+_ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
+_TIMES = {"s": 1.0, "ms": 1000.0}
+_FORCE = Column({"N": 1.0}, minimum=-1e6, maximum=1e6)
+_TIME = Column(_TIMES, minimum=-1e10, maximum=1e10)  # a logger's may count from 1970
+LEAST_VELOCITY, MOST_VELOCITY = 1e-5, 1e3
+_MOST_POSITION = 1e7
+
+
+def velocity_column(axis: Axis, *, optional: bool = False, least: float = LEAST_VELOCITY) -> Column:
+    """A column of velocities along the axis; an optional one may have blanks."""
+    lengths = _ANGLES if axis.unit == "rad/s" else _LENGTHS
+    units = {f"{unit}/s": per for unit, per in lengths.items()}
+    return Column(units, optional, optional, -MOST_VELOCITY, MOST_VELOCITY, least)
+
+
+def time_constant_column(*, optional: bool = False) -> Column:
+    """A column of time constants; an optional one may have blanks."""
+    return Column(_TIMES, optional, optional, maximum=1e5, least=1e-4)
+
+
+def _thrust(path: Path) -> Iterator[Row]:
+    """Rows of command and force."""
+    table = read_columns(path, {"command": HELD_COMMAND, "force": _FORCE})
+    noise = 0.05 * max(map(abs, table.values["force"]))
+    for n, row in enumerate(_rows(table, "force")):
+        if row.command * row.value < 0.0 and abs(row.value) > noise:
+            raise table.error(
+                n, "force", "must have the sign of the command, for a thruster pushes where it is told to"
+            )
+        yield row
+
+
+def _steady(path: Path, axis: Axis) -> Iterator[Row]:
+    """Rows of command and velocity."""
+    table = read_columns(path, {"command": HELD_COMMAND, "velocity": velocity_column(axis)})
+    for n, row in enumerate(_rows(table, "velocity")):
+        if row.command == 0.0:
+            raise table.error(n, "command", "must not be zero, for nothing moves")
+        if row.command * row.value <= 0.0:
+            raise table.error(n, "velocity", "must have the sign of the command: forward, down, bow to starboard is +")
+        yield row
+
+
+def _time_constant(path: Path, axis: Axis) -> Iterator[Row]:  # noqa: ARG001 (as _steady)
+    """Rows of command and time constant."""
+    table = read_columns(path, {"command": HELD_COMMAND, "time constant": time_constant_column()})
+    for n, row in enumerate(_rows(table, "time constant")):
+        if row.command == 0.0:
+            raise table.error(n, "command", "must not be zero, for nothing moves")
+        if row.value <= 0.0:
+            raise table.error(n, "time constant", "must be above 0")
+        yield row
+
+
+_READ = {"steady": _steady, "time_constant": _time_constant}
+
+
+def _rows(table: Columns, column: str) -> Iterator[Row]:
+    for line, command, value in zip(table.lines, table.values["command"], table.values[column], strict=True):
+        yield Row(table.path.name, line, command, value)
+
+
+def _recording(path: Path, axis: Axis) -> Recording:
+    """Time, command and motion; the position where there are both position and velocity."""
+    units = _ANGLES if axis.position_unit == "rad" else _LENGTHS
+    columns = {
+        "time": _TIME,
+        "command": _COMMAND,
+        axis.position: Column(units, True, True, -_MOST_POSITION, _MOST_POSITION),
+        "velocity": velocity_column(axis, optional=True, least=0.0),
+    }
+    table = read_columns(path, columns, others=True)
+    quantity = next((name for name in (axis.position, "velocity") if name in table.values), None)
+    if not quantity:
+        wanted = " or ".join(f"'{name} [{next(iter(columns[name].units))}]'" for name in (axis.position, "velocity"))
+        raise DataFileError(f"{path}, line 1: column {wanted} is missing")
+    time, values = np.array(table.values["time"]), np.array(table.values[quantity])
+    backward = np.flatnonzero(np.diff(time) <= 0.0)
+    if backward.size:
+        raise table.error(int(backward[0]) + 1, "time", "must be later than in the row above")
+    there = np.isfinite(values)
+    if there.sum() < _LEAST_SAMPLES:
+        raise DataFileError(f"{path}: {there.sum()} samples of {quantity}, at least {_LEAST_SAMPLES} are needed")
+    if quantity == "heading":
+        values[there] = np.unwrap(values[there])
+    return Recording(path.name, axis, quantity, time - time[0], np.array(table.values["command"]), values)
+
+
+def _hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _frozen(lists: Mapping[str, list[Any]]) -> dict[str, tuple[Any, ...]]:
+    return {name: tuple(items) for name, items in lists.items() if items}

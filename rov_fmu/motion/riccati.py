@@ -1,0 +1,217 @@
+"""Exact motion of one axis under a held force (standard library only).
+
+Thrust, quadratic and linear drag on a constant inertia, equation (18), make every axis a scalar Riccati equation
+
+    v' = C - B v - A |v| v,        A >= 0, B >= 0,
+
+whose solution is elementary. All functions take A in 1/m (1/rad for yaw), B in 1/s, C in m/s2 (rad/s2), times in s,
+and are exact up to rounding for every step length, so one step of 10 s equals 1,000 steps of 10 ms.
+
+Notation (b, k and q are pure numbers), for a motion that keeps its sign, v >= 0:
+
+    b = B h/2    k = A C h^2    q = b^2 + k    l1, l2 = -b ± sqrt(q)
+
+The linear equation y'' + B y' = A C y with y(0) = 1, y'(0) = A v0 gives v = y'/(A y) and the distance ln(y)/A.
+"""
+
+from dataclasses import dataclass
+from math import atan, atanh, copysign, cos, e, exp, expm1, hypot, inf, isinf, log, log1p, sin, sqrt
+
+RISE = 1.0 - 1.0 / e
+"""Share of V_ss that is reached after Tau, (17)."""
+
+# Below this |q|, and by half the argument below four times as much, a fraction in q stands for the hyperbolic and the
+# circular functions; it needs no branch on the sign.
+_MODERATE = 0.8
+
+
+def advance(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
+    """Return the velocity after h > 0 seconds and the distance covered, both signed: v(h) and the integral of v."""
+    sign = -1.0 if v0 < 0.0 or (v0 == 0.0 and C < 0.0) else 1.0
+    C, v0 = sign * C, sign * v0
+    # Deceleration is strongest at the start, so the left side bounds the velocity that the step can take away.
+    if C < 0.0 and ((B + A * v0) * v0 - C) * h >= v0:
+        turn = time_to_rest(A, B, C, v0)
+        if turn < h:
+            forth = _leg(A, B, C, v0, turn)[1]
+            v, back = _leg(A, B, -C, 0.0, h - turn)
+            return -sign * v, sign * (forth - back)
+    v, s = _leg(A, B, C, v0, h)
+    return sign * v, sign * s
+
+
+def time_to_rest(A: float, B: float, C: float, v0: float) -> float:
+    """Return the time (s) at which a force C < 0 stops a motion v0 > 0."""
+    D = _signed_root(A, B, C)
+    S = v0 / (B * v0 - 2.0 * C)
+    x = D * S
+    if x == 0.0:  # D = 0, or an underflow
+        return 2.0 * S
+    if x < 0.0:
+        return 2.0 * S * (atan(x) / x)
+    if x > 0.5:  # artanh would lose the distance of its argument from 1
+        return log1p(D * v0 / (-C * (1.0 + 2.0 * A / (B + D) * v0))) / D
+    return 2.0 * S * (atanh(x) / x)
+
+
+def _signed_root(A: float, B: float, C: float) -> float:
+    """The root of |D^2|, D^2 = B^2 + 4 A C with C < 0, with the sign of D^2."""
+    D2 = B * B + 4.0 * A * C
+    if abs(D2) > 1e-290:
+        return copysign(sqrt(abs(D2)), D2)
+    root = 2.0 * sqrt(A) * sqrt(-C)  # B^2 and A C may have underflowed
+    return copysign(sqrt(abs(B - root)) * sqrt(B + root), B - root)
+
+
+def steady_velocity(A: float, B: float, C: float) -> float:
+    """Return the velocity V_ss at which drag balances the force, A |V| V + B V = C; infinite without drag."""
+    if C < 0.0:
+        return -steady_velocity(A, B, -C)
+    if C == 0.0:
+        return 0.0
+    root = hypot(B, 2.0 * sqrt(A) * sqrt(C))
+    return 2.0 * C / (B + root) if B + root > 0.0 else inf
+
+
+def time_constant(A: float, B: float, C: float) -> float:
+    """Return Tau of (17): the time in which a start from rest reaches (1 - 1/e) V_ss. Infinite without drag.
+
+    With D = B + 2 A V_ss and p = 1 - 1/e, Tau = (2/D) artanh(p D / (D + (1 - p) B)).
+    """
+    V = steady_velocity(A, B, C)
+    if isinf(V):
+        return inf
+    D = B + 2.0 * A * abs(V)
+    if D == 0.0:
+        return inf
+    q = 1.0 / e
+    return 2.0 * atanh((1.0 - q) / (1.0 + q * (B / D))) / D
+
+
+def _leg(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
+    """v(h) and its integral for v0 >= 0 where v keeps its sign.
+
+    v is that of `_end_velocity` with f = tanh(r)/r, r^2 = q, and the distance is ln(1 + A X)/A with X linear in v0
+    and C, X = h (v0 Y + C h W); Y and W are the divided differences of exp and of (exp(l) - 1)/l over l1 and l2. Both
+    are free of cancellation.
+    """
+    a, b, c = A * h, 0.5 * B * h, C * h
+    q = b * b + a * c
+    if -_MODERATE < q < 4.0 * _MODERATE:
+        x = 0.25 * q
+        n, m = _tanh(x)
+        # f = g/(1 + x g^2), g = tanh(r/2)/(r/2) = n/m
+        N, M = _tanh(q) if q < _MODERATE else (n * m, m * m + x * n * n)
+        v = _end_velocity(a, b, c, v0, N, M, M - b * N)
+        mean = _mean(b, c, x, v0, n, m)
+    elif q < 0.0:
+        root = sqrt(-q)
+        x, y, fade = cos(root), sin(root) / root, exp(-b)
+        v = _end_velocity(a, b, c, v0, y, x, x - b * y)
+        mean = v0 * fade * y + (fade * (x + b * y) - 1.0) / a
+    else:
+        root = sqrt(q) if q < 1e300 else hypot(b, sqrt(a) * sqrt(c))
+        l1, l2 = a * (c / (root + b)), -(root + b)  # root - b without cancellation, and -root - b
+        is_settled = root > 20.0 and root - b > 2.0  # nothing is left of the start
+        decay = 0.0 if is_settled else exp(-2.0 * root)
+        gain, M = 1.0 - decay, root * (1.0 + decay)
+        v = _end_velocity(a, b, c, v0, gain, M, l1 - decay * l2)
+        if l1 > 1.0:  # exp(l1) may overflow
+            return v, h * ((l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a)
+        rise = expm1(l1)  # exp - 1 at l1, and at l2
+        fall = decay * (1.0 + rise) - 1.0
+        mean = (v0 * (rise - fall) + c * ((rise / l1 if l1 != 0.0 else 1.0) - fall / l2)) / (2.0 * root)
+    p = a * mean
+    return v, h * mean * (log1p(p) / p if p > 0.0 else 1.0)
+
+
+def _end_velocity(a: float, b: float, c: float, v0: float, N: float, M: float, keep: float) -> float:
+    """v = (v0 (1 - b f) + c f) / (1 + (b + a v0) f), f = N/M, keep = M - b N.
+
+    Taken as the change from v0, unless that is most of v0: rounding then never makes drag push, and what is steady
+    stays.
+    """
+    drag = b + a * v0
+    growth = M + drag * N
+    change = (c - (b + drag) * v0) * N / growth
+    return v0 + change if change > -0.5 * v0 else (v0 * keep + c * N) / growth
+
+
+def _mean(b: float, c: float, x: float, v0: float, n: float, m: float) -> float:
+    """X/h = v0 Y + c W where |q| is moderate, x = q/4.
+
+    With g = tanh(r/2)/(r/2) = n/m, the same for r = b, and t = r g/2, t_b = b g_b/2,
+
+        exp(-b) = (1 - t_b)/(1 + t_b),    cosh(r) = (1 + t^2)/(1 - t^2),    sinh(r)/r = g/(1 - t^2)
+        Y = (1 - t_b) g / ((1 + t_b) (1 - t^2))
+        W = (g^2 + b (2 + b g) dg) / (2 (1 + t_b) (1 - t^2)),   dg = (g - g_b)/(q - b^2)
+
+    and dg is that of n and m, where no difference is left.
+    """
+    y, half = 0.25 * b * b, 0.5 * b
+    n_b, m_b = _tanh(y)
+    dn, dm = _tanh_difference(x, y)
+    coasting = (m_b - half * n_b) * (n * m)
+    pushed = 0.5 * (m_b * n * n + half * (m + half * n) * (dn * m_b - n_b * dm))
+    return (v0 * coasting + c * pushed) / ((m_b + half * n_b) * (m * m - x * n * n))
+
+
+def _tanh(x: float) -> tuple[float, float]:
+    """n, m with tanh(sqrt(x))/sqrt(x) = n/m, the continued fraction of tanh: exact to the last digit for |x| < 0.9."""
+    x2 = x * x
+    n = (_N[0] + _N[1] * x) + x2 * ((_N[2] + _N[3] * x) + x2 * _N[4])
+    m = (_M[0] + _M[1] * x) + x2 * ((_M[2] + _M[3] * x) + x2 * _M[4])
+    return n, m
+
+
+def _tanh_difference(x: float, y: float) -> tuple[float, float]:
+    """The divided differences of n and m over x and y."""
+    first, product = x + y, x * y
+    second = first * first - product
+    third = first * (second - product)
+    dn = (_N[1] + _N[2] * first) + (_N[3] * second + _N[4] * third)
+    dm = (_M[1] + _M[2] * first) + (_M[3] * second + _M[4] * third)
+    return dn, dm
+
+
+_N = [k / 34459425.0 for k in (34459425.0, 4729725.0, 135135.0, 990.0, 1.0)]
+_M = [k / 34459425.0 for k in (34459425.0, 16216200.0, 945945.0, 13860.0, 45.0)]
+
+
+@dataclass(frozen=True)
+class Riccati:
+    """One axis under a held force: v' = C - B v - A |v| v."""
+
+    A: float
+    B: float
+    C: float
+
+    def acceleration(self, v: float) -> float:
+        """v' (18)."""
+        return self.C - (self.B + self.A * abs(v)) * v
+
+    def advance(self, v: float, h: float) -> tuple[float, float]:
+        """Velocity after h > 0 seconds and the distance (angle) covered."""
+        return advance(self.A, self.B, self.C, v, h)
+
+    def velocity(self, v: float, h: float) -> float:
+        """Velocity after h seconds."""
+        return self.advance(v, h)[0]
+
+    def distance(self, v: float, h: float) -> float:
+        """Distance (angle) covered in h seconds."""
+        return self.advance(v, h)[1]
+
+    def steady_velocity(self) -> float:
+        """V_ss."""
+        return steady_velocity(self.A, self.B, self.C)
+
+    def time_constant(self) -> float:
+        """Tau of (17), from rest."""
+        return time_constant(self.A, self.B, self.C)
+
+    def turning_time(self, v: float) -> float:
+        """When the force brings the motion to rest and turns it; infinite where it does not."""
+        if (v <= 0.0 or self.C >= 0.0) and (v >= 0.0 or self.C <= 0.0):  # a product would underflow
+            return inf
+        return time_to_rest(self.A, self.B, -abs(self.C), abs(v))

@@ -1,0 +1,120 @@
+"""What the command line prints: a build, and the tables of the paper beside a vehicle."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from decimal import Decimal
+
+from rich import box
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from rov_fmu.build import Built
+from rov_fmu.vehicle.published import Cell, ResponseTable
+from rov_fmu.vehicle.vehicle import Vehicle
+
+_MIN_WIDTH = 110  # rich takes 80 columns in a pipe, and cuts digits off to fit a table into them
+
+
+def console() -> Console:
+    """Where to print: text as it is, wide enough for the tables."""
+    found = Console(markup=False, highlight=False, emoji=False)
+    found.width = max(found.width, _MIN_WIDTH)
+    return found
+
+
+@contextmanager
+def build_progress(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
+    """A line a platform that is being compiled, on a terminal only; yields what to call when one is done."""
+    out = console()
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=out, transient=True, disable=not out.is_terminal) as progress:
+        tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
+        yield lambda name: progress.update(tasks[name], completed=1)
+
+
+def print_built(built: Built, seconds: float) -> None:
+    """Files, sizes, times, and what the FMU showed when it was run."""
+    out = console()
+    out.print(Text.assemble((str(built.path), "bold"), f"  {built.size / 1000:.0f} kB  {built.guid}"), soft_wrap=True)
+    for name, size in built.binaries.items():
+        out.print(f"  {name:<14}{size / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
+    out.print(f"  {built.note}")
+    for path in built.beside:
+        out.print(Text(str(path), "bold"), soft_wrap=True)
+    out.print(f"  built in {seconds:.1f} s")
+
+
+def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
+    """Tables 6-8 of the paper beside what the vehicle gives."""
+    out = console()
+    out.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
+    for t in tables:
+        out.print()
+        out.print(_side_by_side(vehicle, t))
+    out.print(
+        "\nnon-linear: every alpha and beta is 1; scaled: those of the vehicle file; computed in closed form.\n"
+        "dev.: the computed value against the printed one; under test, the scaled model against the test.\n"
+        "*: the printed value is not the computed one rounded to its digits. -: not printed, not measured."
+    )
+
+
+def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
+    tuning = (f"{name}_{t.axis.velocity}" for name in ("alpha", "beta"))
+    values = ", ".join(f"{name} = {getattr(vehicle.coefficients, name):g}" for name in tuning)
+    result = table(
+        f"Table {t.number}. {t.axis.name.capitalize()}, {values}",
+        "\ncommand",
+        (
+            "non-linear\nprinted",
+            "\ncomputed",
+            "\ndev.",
+            "scaled\nprinted",
+            "\ncomputed",
+            "\ndev.",
+            "test\nmeasured",
+            "\ndev.",
+        ),
+    )
+    for quantity, unit in (("V_ss", t.axis.unit), ("Tau", "s")):
+        result.add_section()
+        result.add_row(f"{quantity} [{unit}]")
+        for row in t.rows:
+            scaled: Cell = getattr(row.scaled, quantity)
+            result.add_row(
+                f"{row.command} %",
+                *_model(getattr(row.non_linear, quantity)),
+                *_model(scaled),
+                _text(scaled.measured),
+                _percent(scaled.from_measured),
+            )
+    return result
+
+
+def _model(cell: Cell) -> Iterator[str]:
+    """Printed, computed, deviation."""
+    yield _text(cell.printed)
+    yield f"{cell.computed:.4f}"
+    yield _percent(cell.from_printed) + (" " if cell.rounds_to_printed else "*")
+
+
+def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] = ()) -> Table:
+    """An empty table: a first column, then numbers, then texts."""
+    result = Table(
+        title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False,
+    )  # fmt: skip
+    result.add_column(first, no_wrap=True)
+    for header in numbers:
+        result.add_column(header, justify="right", no_wrap=True)
+    for header in texts:
+        result.add_column(header)
+    return result
+
+
+def _text(value: Decimal | None) -> str:
+    return "-" if value is None else str(value)
+
+
+def _percent(ratio: float | None) -> str:
+    return "-" if ratio is None else f"{ratio:+.1%}"

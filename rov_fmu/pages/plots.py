@@ -1,0 +1,65 @@
+"""The plot that all pages share: steps of the command from rest, modelled and measured."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from math import ceil, isfinite
+from typing import TypeVar
+
+from matplotlib.axes import Axes
+
+from rov_fmu.motion.riccati import RISE
+from rov_fmu.motion.rov import Axis, Coefficients
+from rov_fmu.pages.svg import LIGHT
+from rov_fmu.vehicle.published import ResponseTable
+
+Number = TypeVar("Number", float, Decimal)
+
+_STEPS = ("teal", "blue", "violet", "orange")
+
+
+@dataclass(frozen=True)
+class Step:
+    """A held command (fraction of full thrust) from rest, and what was measured of its response."""
+
+    command: float
+    V_ss: Sequence[float] = ()
+    Tau: Sequence[float] = ()
+
+
+def measured_step(table: ResponseTable | None, command: Decimal) -> Step:
+    """A command (%) and what the published table has of it."""
+    rows = [row.scaled for row in table.rows if row.command == command] if table else []
+    V_ss, Tau = ([float(cell.measured) for cell in cells if cell.measured is not None]
+                 for cells in ([row.V_ss for row in rows], [row.Tau for row in rows]))  # fmt: skip
+    return Step(float(command) / 100.0, V_ss, Tau)
+
+
+def evenly(commands: Sequence[Number]) -> list[Number]:
+    """Up to four of the commands, evenly from the first to the last."""
+    last = len(_STEPS) - 1
+    return sorted({commands[round((len(commands) - 1) * n / last)] for n in range(last + 1)})
+
+
+def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Coefficients, str]]) -> None:
+    """Velocity after steps of the command, of every model (the last is the one to label): measured V_ss are dotted
+    lines, measured Tau points at 1 - 1/e of it."""
+    Taus = [axis.response(models[-1][0], step.command)[1] for step in steps]
+    Taus += [Tau for step in steps for Tau in step.Tau]
+    end = ceil(3.3 * max((Tau for Tau in Taus if isfinite(Tau)), default=3.0))
+    t = [end * (n / 45) ** 1.5 for n in range(46)]  # closer where the curve bends
+    for role, step in zip(_STEPS, steps, strict=False):
+        color = LIGHT[role]
+        for k, dashes in models:
+            motion = axis.held(k, step.command)
+            v = [0.0, *(motion.velocity(0.0, moment) for moment in t[1:])]
+            ax.plot(t, v, dashes, color=color, linewidth=1.8 if dashes == "-" else 1.0)
+        ax.text(1.015 * end, v[-1], f"{100.0 * step.command:g} %", color=color, va="center", fontsize=8.5)
+        for V in step.V_ss:
+            ax.plot([0, end], [V, V], ":", color=color, linewidth=1.2)
+        if step.V_ss:
+            at = RISE * (sum(step.V_ss) / len(step.V_ss))
+            ax.plot(step.Tau, [at] * len(step.Tau), "o", color=color, markersize=5.0, zorder=5)
+    ax.set(xlim=(0, end), xlabel="time (s)")
+    ax.set_ylim(bottom=0.0)
+    ax.locator_params(nbins=6)

@@ -1,0 +1,67 @@
+"""What pages are made with: templates, and numbers as one writes them."""
+
+import re
+from math import isfinite, isnan
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from rov_fmu.files.places import FMU_SRC
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def page(template: str, **content: object) -> str:
+    """A page from a template; what comes from files is escaped, and a name misspelt is an error."""
+    folders = [Path(__file__).parent / "templates", FMU_SRC]
+    templates = Environment(
+        loader=FileSystemLoader(folders),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters |= {
+        "number": number, "fixed": fixed, "percent": percent, "deviation": deviation, "unit": pretty_unit,
+    }  # fmt: skip
+    return templates.get_template(template).render(**content)
+
+
+def number(value: float | None, digits: int | None = None) -> str:
+    """So many significant digits, or exactly where that is short; a dash where there is no number."""
+    if value is None or not isfinite(value):
+        return "–"
+    if digits is None:
+        text = f"{value:.6g}" if len(repr(value)) > 9 else repr(value).removesuffix(".0")
+        text = f"{value:g}" if abs(value) >= 1e5 else text
+    else:
+        text = f"{value:.{digits}g}"
+    mantissa, _, exponent = text.partition("e")
+    if exponent:
+        mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")
+        text = f"{mantissa}10{str(int(exponent)).translate(RAISED)}"
+    return text.replace("-", "−")
+
+
+def fixed(value: float, digits: int) -> str:
+    """A number with so many decimals."""
+    return f"{value:.{digits}f}".replace("-", "−").replace("inf", "∞")
+
+
+def percent(value: float, digits: int = 0) -> str:
+    """A fraction; a dash where there is none."""
+    return f"{100.0 * value:.{digits}f} %".replace("-", "−") if isfinite(value) else "–"
+
+
+def deviation(value: float | None) -> str:
+    """A relative deviation, signed; a dash where there is none."""
+    if value is None or isnan(value):
+        return "–"
+    return f"{100.0 * value:+.1f} %".replace("-", "−").replace("inf", "∞")
+
+
+def pretty_unit(unit: str) -> str:
+    """A unit as one writes it: N.m.s2/rad2 is N·m·s²/rad²."""
+    if unit == "1":
+        return "1"
+    return re.sub(r"\d", lambda digit: digit[0].translate(RAISED), unit).replace(".", "·")

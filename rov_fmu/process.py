@@ -1,0 +1,64 @@
+"""How a command line ends: its exit code, and one line on what went wrong."""
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from typing import NoReturn
+
+from click import ClickException
+
+from rov_fmu.files.messages import one_line
+from rov_fmu.files.output import WriteError
+
+
+def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exception], int]) -> int:
+    """Do what is asked for: 0 done, 130 interrupted, 1 no one reads what is printed, or the code of what is raised.
+
+    OSError is among the codes. The messages of the others are printed as they are.
+    """
+    try:
+        try:
+            action()
+        finally:
+            if sys.stdout:  # --help leaves by SystemExit
+                sys.stdout.flush()
+    except KeyboardInterrupt:
+        return _say(program, "interrupted, no file is half-written", 130)
+    except BrokenPipeError:
+        _end_output()
+        return 1  # as Rich does
+    except OSError as error:
+        _end_output()
+        about = one_line(os.fsdecode(error.filename or "the output, or a temporary file"))
+        written = isinstance(error, WriteError) or not error.filename
+        reason = f"{'cannot be written: ' if written else ''}{one_line(error.strerror or str(error))}"
+        return _say(program, f"{about}: {reason}", codes[OSError])
+    except tuple(codes) as error:
+        text = error.format_message() if isinstance(error, ClickException) else str(error)
+        return _say(program, text, next(code for kind, code in codes.items() if isinstance(error, kind)))
+    return 0
+
+
+def run_process(main: Callable[[], int]) -> NoReturn:
+    """Run a command line that is a process of its own."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended from outside, it cleans up as at Ctrl-C
+    for stream in (sys.stdout, sys.stderr):
+        if stream:  # a terminal without Greek letters gets \u03b1
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    sys.exit(main())
+
+
+def _say(program: str, message: str, code: int) -> int:
+    for line in message.splitlines():
+        print(f"{program}: {line}", file=sys.stderr)
+    return code
+
+
+def _end_output() -> None:
+    """Where what is printed has no place to go, Python shall not try again as it ends."""
+    try:
+        if sys.stdout:
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,153 @@
+"""The benchmark measures what it says: every method solves the same equations, as exactly as it should."""
+
+import subprocess
+import sys
+from math import inf, log2
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from benchmarks import page
+from benchmarks.fleet import Variations, in_c
+from benchmarks.plain_c import Programs, measurable
+from benchmarks.steps import CLOSED, CVODE, EULER, FMU, RK4, TOLERANCES, Job, Measured, cost_at
+from benchmarks.work import Work
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+
+ROOT = Path(__file__).parent.parent.parent
+COMMANDS = 8
+
+in_plain_c = pytest.mark.skipif(not measurable(), reason="the C programs are written for Linux on x86-64")
+
+
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory: pytest.TempPathFactory) -> Programs:
+    return Programs(load_vehicle(VIDEORAY), tmp_path_factory.mktemp("programs"))
+
+
+class Small:
+    """All methods on a few commands: those that turn the motion back, and those that do not."""
+
+    def __init__(self, vehicle: Vehicle, programs: Programs) -> None:
+        self.work = Work(vehicle.coefficients, False, 1.0, COMMANDS, COMMANDS)
+        self.ahead = Work(vehicle.coefficients, True, 1.0, COMMANDS, COMMANDS, ahead=True)
+        self.long = Work(vehicle.coefficients, False, 100.0, COMMANDS, 4)
+        self.jobs = [
+            *(self.ours(method, states, h) for method, states in ((CLOSED, 3), (CLOSED, 7), (FMU, 7))
+              for h in (0.01, 1.0, 100.0)),
+            *(self.explicit(method, states, steps) for method in (EULER, RK4) for states in (3, 7)
+              for steps in (50, 100)),
+            *(self.solver(method, states, tolerance) for method in CVODE for states in (3, 7)
+              for tolerance in TOLERANCES),
+        ]  # fmt: skip
+        self.measured = Measured(programs, self.jobs, 2)
+
+    def ours(self, method: str, states: int, h: float) -> Job:
+        return Job(method, states, 1.0, self.long if h > 1.0 else self.work, h)
+
+    def explicit(self, method: str, states: int, steps: int) -> Job:
+        return Job(method, states, float(steps), self.ahead, 1.0)
+
+    def solver(self, method: str, states: int, tolerance: float) -> Job:
+        return Job(method, states, tolerance, self.work, 1.0)
+
+
+@pytest.fixture(scope="module")
+def small(vehicle: Vehicle, programs: Programs) -> Small:
+    return Small(vehicle, programs)
+
+
+@in_plain_c
+@pytest.mark.parametrize("h", [0.01, 1.0, 100.0])
+def test_our_velocities_are_exact_to_rounding(small: Small, h: float) -> None:
+    assert small.measured.error(small.ours(CLOSED, 3, h)) < 1e-14
+
+
+@in_plain_c
+@pytest.mark.parametrize(("h", "limit"), [(0.01, 1e-13), (1.0, 1e-14), (100.0, 1e-12)])
+def test_our_pose_is_exact_to_rounding(small: Small, h: float, limit: float) -> None:
+    """A pose is as exact as a double that is some hundred metres allows."""
+    assert small.measured.error(small.ours(FMU, 7, h)) < limit
+
+
+@in_plain_c
+@pytest.mark.parametrize("h", [0.01, 1.0, 100.0])
+def test_the_formulas_without_fmi_are_those_of_the_fmu(small: Small, h: float) -> None:
+    assert small.measured.ends[small.ours(CLOSED, 7, h)] == small.measured.ends[small.ours(FMU, 7, h)]
+
+
+@in_plain_c
+@pytest.mark.parametrize("states", [3, 7])
+@pytest.mark.parametrize(("method", "order"), [(EULER, 1), (RK4, 4)])
+def test_explicit_methods_are_of_their_order(small: Small, method: str, order: int, states: int) -> None:
+    """Where nothing turns back; the drag's kink at rest costs RK4 an order."""
+    coarse, fine = (small.measured.error(small.explicit(method, states, steps)) for steps in (50, 100))
+    assert log2(coarse / fine) == pytest.approx(order, abs=0.25)
+
+
+@in_plain_c
+@pytest.mark.parametrize("states", [3, 7])
+@pytest.mark.parametrize("method", CVODE)
+def test_cvode_keeps_near_its_tolerance(small: Small, method: str, states: int) -> None:
+    for tolerance in TOLERANCES:
+        assert 0.1 * tolerance < small.measured.error(small.solver(method, states, tolerance)) < 300.0 * tolerance
+
+
+@in_plain_c
+def test_every_job_is_timed_in_every_repetition(small: Small) -> None:
+    for job in small.jobs:
+        seconds = small.measured.seconds[job]
+        assert len(seconds) == 2
+        assert all(0.0 < s < inf for s in seconds)
+
+
+@in_plain_c
+def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, programs: Programs) -> None:
+    instances, runs = in_c(programs, Variations(vehicle.coefficients, 20), 2)
+    assert runs.count == 20
+    assert runs.error < 1e-11
+    assert list(instances) == [1, 100, 10_000]
+    assert all(0 < found.bytes < 4096 for found in instances.values())
+
+
+def test_cost_at_an_error_lies_between_the_settings() -> None:
+    """On logarithmic axes, of the settings that are worth their cost."""
+    found = {0: (1e-8, 1.0), 1: (1e-10, 100.0), 2: (1e-7, 7.0)}
+    measured = SimpleNamespace(
+        error=lambda job: found[job][0],
+        seconds={job: np.array([cost, 2.0 * cost]) for job, (_, cost) in found.items()},
+    )
+    assert cost_at(cast(Any, measured), cast(Any, list(found)), 1e-9) == pytest.approx([10.0, 20.0])
+
+
+def test_numbers_have_three_digits_and_a_unit() -> None:
+    assert [page.duration(s) for s in (1.234e-8, 9.999e-7, 0.04567, 12.3)] == [
+        "12.3 ns",
+        "1.00 µs",
+        "45.7 ms",
+        "12.3 s",
+    ]
+    assert [page.digits(x) for x in (0.0, 0.01234, 98765.4)] == ["0", "0.0123", "98,765"]
+    assert [page.error(x) for x in (0.0, 1.2e-9, 3e-16)] == ["0", "1e-9", "3e-16"]
+
+
+@pytest.mark.long
+@in_plain_c
+def test_one_command_prints_it_all(tmp_path: Path) -> None:
+    picture = tmp_path / "cost_error.svg"
+    command = [sys.executable, "-m", "benchmarks", "--quick", "--picture", str(picture)]
+    printed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, encoding="utf-8").stdout
+    for part in (
+        "Velocities u, w, r", "Velocities and pose, turning", "Velocities and pose, straight", "fmi2DoStep",
+        "forward Euler", "RK4", "CVODE BDF", "CVODE Adams", "A command of 1 s to 1e-9", "PythonFMU", "Model Exchange",
+        "10,000", "memory of each", "runs a second", "build, cold", "library alone", "Promised",
+    ):  # fmt: skip
+        assert part in printed, printed
+    times_ours = next(line.split()[4] for line in printed.splitlines() if line.startswith("CVODE BDF  "))
+    assert float(times_ours) > 50.0, printed
+    assert etree.parse(str(picture)).getroot().tag.endswith("svg")

@@ -1,0 +1,243 @@
+"""Independent importers fly the manoeuvre as `models.dynamics` does, and the harness notices where one does not."""
+
+import csv
+import re
+import subprocess
+from collections.abc import Callable
+from dataclasses import astuple, fields, replace
+from itertools import pairwise
+from math import nan
+from pathlib import Path
+
+import pytest
+
+from interop.__main__ import main
+from interop.importers import EXACT, HERE, IMPORTERS, KITS, RUNNERS, Importer, pinned
+from interop.manoeuvre import (
+    DETOUR,
+    OUTPUTS,
+    PARAMETERS,
+    PHASES,
+    ResultError,
+    difference,
+    inputs_at,
+    reference,
+    times,
+    write_files,
+)
+from interop.run import Verdict, run, without_places
+from rov_fmu.motion.rov import COEFFICIENTS, Inputs
+
+TOOLS = HERE / ".tools"
+
+# ---- The manoeuvre ---------------------------------------------------------------------------------------------------
+
+
+def test_manoeuvre_shows_what_it_promises() -> None:
+    phases = [PHASES[start] for start in sorted(PHASES)]
+    assert times()[0] == 0.0
+    assert times()[-1] == 30.0
+    assert set(PHASES) | {DETOUR} <= set(times()), "the inputs change, and the detour starts, at communication points"
+    assert phases[0] == Inputs(), "it does not matter when an importer sets the first inputs"
+    for name in (f.name for f in fields(Inputs)):
+        values = [getattr(inputs, name) for inputs in phases]
+        assert any(values), f"{name} is used"
+        if name in {"u_l", "u_r", "u_t"}:
+            changes = list(pairwise(values))
+            assert any(0.0 <= a < b for a, b in changes), f"{name} steps up"
+            assert any(a > b > 0.0 for a, b in changes), f"{name} steps down"
+            assert any(a * b < 0.0 for a, b in changes), f"{name} steps through zero"
+    rows = reference()
+    for name in ("u", "w", "r"):
+        assert min(row[name] for row in rows) < -0.1 < 0.1 < max(row[name] for row in rows), f"{name} changes sign"
+    assert {COEFFICIENTS[name].tunable for name in PARAMETERS} == {True, False}
+
+
+def test_files_say_the_same(tmp_path: Path) -> None:
+    write_files(tmp_path)
+    with (tmp_path / "manoeuvre.csv").open(newline="") as file:
+        held = [[float(value) for value in row] for row in list(csv.reader(file))[1:]]
+    with (tmp_path / "jumps.csv").open(newline="") as file:
+        corners = [[float(value) for value in row] for row in list(csv.reader(file))[1:]]
+    for time, *inputs, detour in held:
+        assert tuple(inputs) == astuple(inputs_at(time))
+        assert detour == (time == DETOUR)
+        if time < 30.0:
+            assert inputs == next(after for at, *after in reversed(corners) if at <= time)
+
+
+# ---- The comparison --------------------------------------------------------------------------------------------------
+
+
+def write_result(path: Path, rows: list[dict[str, float]]) -> Path:
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def test_reference_agrees_with_itself(tmp_path: Path) -> None:
+    expected = reference()
+    between = [row | {"time": row["time"] + 0.05, "u": 99.0} for row in expected]
+    rows = sorted(expected + between, key=lambda row: row["time"])
+    assert difference(write_result(tmp_path / "result.csv", rows), expected) == 0.0
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+@pytest.mark.parametrize("point", [0, 150, 300])
+def test_difference_is_noticed(tmp_path: Path, name: str, point: int) -> None:
+    rows = reference()
+    rows[point] = rows[point] | {name: rows[point][name] + 1e-6}
+    assert difference(write_result(tmp_path / "result.csv", rows), reference()) == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda rows: rows[:-1], "no row for t = 30.0"),
+        (lambda rows: rows[:7] + rows[8:], "no row for t = 0.7"),
+        (lambda rows: [{k: v for k, v in row.items() if k != "psi"} for row in rows], "no column psi"),
+        (lambda rows: [{k: v for k, v in row.items() if k != "time"} for row in rows], "no column time"),
+        (lambda rows: [row | {"u": "much"} for row in rows], "cannot be read"),
+        (lambda rows: [*rows[:5], rows[5] | {"y": nan}, *rows[6:]], "y = nan at t = 0.5"),
+    ],
+)
+def test_incomplete_result_is_an_error(
+    tmp_path: Path, spoil: Callable[[list[dict[str, float]]], list[dict[str, float]]], message: str
+) -> None:
+    with pytest.raises(ResultError, match=message):
+        difference(write_result(tmp_path / "result.csv", spoil(reference())), reference())
+
+
+def test_missing_result_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match=r"result\.csv cannot be read"):
+        difference(tmp_path / "result.csv", reference())
+
+
+# ---- The command -----------------------------------------------------------------------------------------------------
+
+PRETEND = Importer(
+    "pretend", "Pretend", "CS", "python", ("requirements.txt", "fmpy"), "pretend", ("{python}", "-c", "pass"), EXACT
+)  # fmt: skip
+COPY = "import shutil; shutil.copy({source!r}, 'result.csv')"
+
+
+@pytest.fixture
+def tools(tmp_path: Path) -> Path:
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "pretend").touch()
+    return tmp_path / "tools"
+
+
+@pytest.mark.parametrize(
+    ("program", "tolerance", "verdict"),
+    [
+        ("agree", EXACT, Verdict.AGREES),
+        ("differ", EXACT, Verdict.DIFFERS),
+        ("differ", 1e-5, Verdict.AGREES),
+        ("pass", None, Verdict.NO_FINDING),
+        ("pass", EXACT, Verdict.FAILED),
+        ("raise SystemExit(3)", EXACT, Verdict.FAILED),
+        ("raise SystemExit(3)", None, Verdict.FAILED),
+        ("import os; os.abort()", EXACT, Verdict.FAILED),
+    ],
+)
+def test_verdict(
+    tmp_path: Path,
+    tools: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    program: str,
+    tolerance: float | None,
+    verdict: Verdict,
+) -> None:
+    rows = reference()
+    if program == "differ":
+        rows[200] = rows[200] | {"w": rows[200]["w"] + 1e-7}
+    if program in {"agree", "differ"}:
+        program = COPY.format(source=str(write_result(tmp_path / "given.csv", rows)))
+    fmu = tmp_path / "any.fmu"
+    fmu.touch()
+    importer = replace(PRETEND, command=("{python}", "-c", program), tolerance=tolerance)
+    outcome = run(importer, fmu, tools, reference())
+    assert outcome.verdict is verdict
+    monkeypatch.setattr("interop.importers.IMPORTERS", (importer,))
+    assert main(["--fmu", str(fmu), "--tools", str(tools)]) == (0 if verdict.is_good else 1)
+
+
+def test_importer_that_is_not_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = tmp_path / "any.fmu"
+    fmu.touch()
+    monkeypatch.setattr("interop.importers.IMPORTERS", (PRETEND,))
+    arguments = ["--fmu", str(fmu), "--tools", str(tmp_path)]
+    assert main(arguments) == 0
+    assert "python -m interop --install python" in capsys.readouterr().out
+    assert main([*arguments, "pretend"]) == 1, "what is asked for by name must run"
+    assert main([*arguments, "python"]) == 1
+
+
+@pytest.mark.parametrize("arguments", [["nothing"], ["--fmu", "nothing.fmu"]])
+def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    assert capsys.readouterr().err.startswith("interop: nothing")
+
+
+def test_log_names_no_folder_and_no_host(tmp_path: Path) -> None:
+    text = f"{tmp_path}/x {Path.home()}/y {HERE}/z https://packages.example:8080/simple ftp://example.org"
+    assert without_places(text, tmp_path, TOOLS) == "./x ~/y ./interop/z https://.../simple ftp://..."
+
+
+# ---- The declarations ------------------------------------------------------------------------------------------------
+
+
+def test_names_are_unique() -> None:
+    names = [importer.name for importer in IMPORTERS]
+    assert len({*names, *KITS}) == len(names) + len(KITS)
+
+
+@pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
+def test_importer_is_pinned_and_its_runner_is_there(importer: Importer) -> None:
+    assert re.fullmatch(r"\d+(\.\d+)+", importer.version)
+    for part in importer.command_line(TOOLS):
+        if part.startswith("interop."):
+            assert Path(*part.split(".")).with_suffix(".py").is_file()
+        elif part.startswith(str(RUNNERS)):
+            assert Path(part).is_file()
+
+
+def test_every_requirement_is_pinned() -> None:
+    lines = [line for line in (HERE / "requirements.txt").read_text().splitlines() if not line.startswith("#")]
+    assert lines
+    assert all(re.fullmatch(r"[\w-]+==[\d.]+( +#.*)?", line) for line in lines)
+    with pytest.raises(LookupError):
+        pinned("requirements.txt", "fmp")
+
+
+def test_no_registry_is_named() -> None:
+    files = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "interop"],
+                           cwd=HERE.parent, capture_output=True, text=True, check=True).stdout.split()  # fmt: skip
+    assert files
+    known = {"maven.apache.org", "ssp-standard.org", "opensimulationplatform.com"}  # XML name spaces
+    for name in files:
+        hosts = set(re.findall(r"\w+://([^/\s\"']+)", (HERE.parent / name).read_text()))
+        assert Path(name).name != "Cargo.lock"
+        assert hosts <= known, name
+
+
+# ---- The matrix ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def expected() -> list[dict[str, float]]:
+    return reference()
+
+
+@pytest.mark.interop
+@pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
+def test_importer(importer: Importer, videoray_fmu: Path, expected: list[dict[str, float]]) -> None:
+    outcome = run(importer, videoray_fmu, TOOLS, expected)
+    if outcome.verdict is Verdict.NOT_RUN:
+        pytest.skip(outcome.reason)
+    assert outcome.verdict.is_good, f"{outcome.reason} {outcome.difference} {outcome.log[-2000:]}"

@@ -1,0 +1,256 @@
+"""Commands that are killed, interrupted, run side by side, or have no one to talk to: whole files, at most one line."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from checks.commands import ALONE, COMMANDS, TESTS, start
+from rov_fmu.cli import main
+from rov_fmu.export.archive import native_content
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
+OLD = b"the old one"
+
+
+# ---- Killed ----------------------------------------------------------------------------------------------------------
+
+
+def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> None:
+    """Kill after so many seconds, or as soon as a draft stands in the folder."""
+    deadline = time.monotonic() + (60.0 if after is None else after)
+    while time.monotonic() < deadline and not (after is None and list(folder.glob(".*.part"))):
+        assert after is not None or process.poll() is None
+        time.sleep(0.001)
+    process.kill()
+    process.communicate(timeout=30)
+
+
+def _moments(kills: int, seconds: float) -> list[float | None]:
+    """When to kill a command that takes so many seconds: as it writes, then more often near its end."""
+    return [None, *(seconds * (n / kills) ** 0.5 for n in range(1, kills))]
+
+
+def _succeeds(arguments: list[str]) -> None:
+    process = start(arguments, stdout=subprocess.DEVNULL)
+    assert process.communicate(timeout=120)[1] == ""
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize("kills", [1, pytest.param(20, marks=pytest.mark.long)])
+def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(kills: int, tmp_path: Path) -> None:
+    reference, target = tmp_path / "reference.fmu", tmp_path / "target" / "rov.fmu"
+    target.parent.mkdir()
+    started = time.monotonic()
+    arguments = ["build", "--platform", "host", "-o"]
+    _succeeds([*arguments, str(reference)])
+    took = time.monotonic() - started
+    for moment in _moments(kills, took):
+        target.write_bytes(OLD)
+        _kill(start([*arguments, str(target)], stdout=subprocess.DEVNULL), target.parent, moment)
+        assert target.read_bytes() in (OLD, reference.read_bytes())
+    _succeeds([*arguments, str(target)])
+    assert target.read_bytes() == reference.read_bytes()
+
+
+@pytest.mark.long
+def test_a_killed_identification_leaves_whole_files(tmp_path: Path) -> None:
+    def arguments(folder: Path) -> list[str]:
+        folder.mkdir()
+        return ["identify", str(TESTS), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
+
+    started = time.monotonic()
+    _succeeds(arguments(tmp_path / "reference"))
+    took = time.monotonic() - started
+    for n, moment in enumerate(_moments(20, took)):
+        folder = tmp_path / str(n)
+        process = start(arguments(folder), stdout=subprocess.DEVNULL)
+        for name in ("rov.toml", "r.html"):
+            (folder / name).write_bytes(OLD)
+        _kill(process, folder, moment)
+        for name in ("rov.toml", "r.html"):
+            assert (folder / name).read_bytes() in (OLD, (tmp_path / "reference" / name).read_bytes())
+
+
+@pytest.mark.long
+def test_of_two_builds_at_once_one_is_whole(tmp_path: Path) -> None:
+    target, guids, builds = tmp_path / "target" / "rov.fmu", [], []
+    target.parent.mkdir()
+    shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
+    for n in (1, 2):
+        vehicle = tmp_path / f"{n}.toml"
+        vehicle.write_text(VIDEORAY.read_text(encoding="utf-8").replace("6.57", f"6.5{n}"), encoding="utf-8")
+        guids.append(native_content(load_vehicle(vehicle)).guid)
+        arguments = ["build", str(vehicle), "--platform", "host", "-o", str(target)]
+        builds.append(start(arguments, stdout=subprocess.DEVNULL))
+    assert [build.communicate(timeout=60)[1] for build in builds] == ["", ""]
+    from fmpy import simulate_fmu
+    from fmpy.model_description import read_model_description
+
+    assert read_model_description(str(target)).guid in guids
+    assert simulate_fmu(str(target), start_values={"u_l": 0.3, "u_r": 0.3})["u"][-1] > 0.4
+    assert list(target.parent.iterdir()) == [target]
+
+
+# ---- Interrupted -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("command", ["identify", "tune"])
+def test_an_interrupted_command_says_so_and_leaves_nothing(
+    command: str, signal_: signal.Signals, tmp_path: Path
+) -> None:
+    folder = Path(shutil.copytree(TESTS, tmp_path / "tests"))
+    pipe, output = folder / "steady_surge_more.csv", tmp_path / "out" / "rov.toml"
+    output.parent.mkdir()
+    os.mkfifo(pipe)
+    arguments = {
+        "identify": ["identify", str(folder)],
+        "tune": ["tune", str(VIDEORAY), "--axis", "surge", "--points", str(pipe)],
+    }[command]
+    process = start(
+        [*arguments, "-o", str(output)],
+        stdout=subprocess.DEVNULL,
+        # a shell starts what it runs in the background with interrupts ignored, and that is inherited
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    with pipe.open("wb"):  # opens when the command reads it
+        process.send_signal(signal_)
+        _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert said == "rov-fmu: interrupted, no file is half-written\n"
+    assert not any(output.parent.iterdir())
+
+
+@pytest.mark.parametrize("name", ["the vehicle", "the report", "the tuned vehicle", "the figures"])
+def test_an_interrupt_before_the_last_move_leaves_nothing(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    command = COMMANDS[name]
+    assert command.run(tmp_path / command.name) == 130
+    assert capsys.readouterr() == ("", "rov-fmu: interrupted, no file is half-written\n")
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_vehicle_out_of_a_pipe_is_refused_where_it_must_be_read_twice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    read, write = os.pipe()
+    os.write(write, ALONE.encode())
+    os.close(write)
+    tune = ["tune", f"/dev/fd/{read}", "--axis", "yaw", "--command", "0.3", "--v-ss", "1", "-o", str(tmp_path / "x")]
+    assert main(tune) == 2
+    os.close(read)
+    assert capsys.readouterr() == (
+        "",
+        f"rov-fmu: /dev/fd/{read}: cannot be read a second time, as it must be to write it tuned\n",
+    )
+    assert not any(tmp_path.iterdir())
+
+
+# ---- What is printed -------------------------------------------------------------------------------------------------
+
+PRINTING = {
+    "tables": ["tables"],
+    "tune": ["tune", str(VIDEORAY), "--axis=yaw", "--command=0.3", "--v-ss=1"],
+    "help": ["--help"],
+    "help of build": ["build", "--help"],
+}
+
+
+@pytest.mark.parametrize("case", PRINTING)
+def test_who_does_not_read_on_gets_no_message(case: str) -> None:
+    end, start_ = os.pipe()
+    os.close(end)
+    process = start(PRINTING[case], stdout=start_)
+    os.close(start_)
+    _, said = process.communicate(timeout=30)
+    assert (process.returncode, said) == (1, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize("case", PRINTING)
+def test_output_that_has_no_room_is_one_line(case: str) -> None:
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        process = start(PRINTING[case], stdout=full)
+        _, said = process.communicate(timeout=30)
+    assert said == "rov-fmu: the output, or a temporary file: cannot be written: No space left on device\n"
+    assert process.returncode == 2
+
+
+def test_a_command_without_any_output_works(tmp_path: Path) -> None:
+    target = tmp_path / "tuned.toml"
+    arguments = COMMANDS["the tuned vehicle"].arguments(target)
+    closed = ["/bin/sh", "-c", 'exec "$@" >&- 2>&- <&-', "sh", sys.executable, "-m", "rov_fmu", *arguments]
+    assert subprocess.run(closed, check=False, cwd=VIDEORAY.parent.parent).returncode == 0
+    assert load_vehicle(target)
+
+
+@pytest.mark.parametrize("name", ["Röv α", "Röv \udcff"])
+def test_a_terminal_that_knows_ascii_alone_gets_every_line(name: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{name}.toml"
+    try:
+        path.write_text(VIDEORAY.read_text(encoding="utf-8").replace("VideoRay Pro 4", "Röv α"), encoding="utf-8")
+    except OSError:
+        pytest.skip("a file system that takes Unicode alone")
+    shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
+    ascii_ = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii", "COLUMNS": "3"}
+    process = start(["tables", str(path)], environment=ascii_, stdout=subprocess.PIPE)
+    out, said = process.communicate(timeout=30)
+    assert (process.returncode, said) == (0, "")
+    assert out.startswith("R\\xf6v \\u03b1. ")
+    assert "Table 8. Surge, alpha_u = 1.1, beta_u = 1" in out
+    process = start(["tables", str(path) + "x"], environment=ascii_, stdout=subprocess.PIPE)
+    out, said = process.communicate(timeout=30)
+    assert (process.returncode, out) == (2, "")
+    assert said.isascii()
+    assert said.startswith("rov-fmu: ")
+    assert said.endswith("No such file or directory\n")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["tune", str(VIDEORAY), "--axis", "sway"],
+        ["tune", str(VIDEORAY), "--axis", "yaw", "--command", ""],
+        [],
+        ["build", "--platform", "amiga"],
+        ["build", "--backend", ""],
+        ["build", "a", "b"],
+    ],
+)
+def test_options_that_do_not_exist_end_with_what_is_allowed(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    out, said = capsys.readouterr()
+    assert out == ""
+    assert said.startswith("rov-fmu: ")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments", [["-o", ""], ["", "-o", "x.fmu"], ["--platform", "host", "--backend", "pythonfmu"]]
+)
+def test_empty_and_clashing_options_of_the_build_are_one_line(
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["build", *arguments]) in (1, 2)
+    out, said = capsys.readouterr()
+    assert out == ""
+    assert said.startswith("rov-fmu: ")
+    assert said.count("\n") == 1
+    assert not any(tmp_path.iterdir())

@@ -1,0 +1,209 @@
+"""Each binary of the archive for all platforms: what it needs, what it exports, and that it runs as the others do."""
+
+import os
+import random
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import fmpy
+import lief
+import numpy as np
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.export.compile import PLATFORMS, compiler, fmi_headers
+from rov_fmu.motion.rov import Inputs
+
+lief.logging.disable()
+
+_HEADER = (fmi_headers() / "fmi2Functions.h").read_text(encoding="utf-8")
+FMI_FUNCTIONS = set(re.findall(r"#define (fmi2\w+)\s+fmi2FullName\(\1\)", _HEADER))
+LINUX = ["linux64", "linux32", "aarch64-linux"]
+WINDOWS = ["win64", "win32"]
+DARWIN = ["darwin64", "aarch64-darwin"]
+
+
+@pytest.fixture(scope="session")
+def binaries(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder binaries/ of the FMU that build_fmu.py writes by default."""
+    folder = tmp_path_factory.mktemp("all platforms")
+    assert main(["build", "-o", str(folder / "videoray.fmu")]) == 0
+    fmpy.extract(str(folder / "videoray.fmu"), unzipdir=str(folder / "fmu"))
+    return folder / "fmu" / "binaries"
+
+
+def _binary(binaries: Path, name: str) -> Path:
+    return binaries / name / f"videoray{PLATFORMS[name].suffix}"
+
+
+def test_one_archive_holds_all_platforms_in_700_kb(binaries: Path) -> None:
+    archive = binaries.parent.parent / "videoray.fmu"
+    assert archive.stat().st_size <= 700_000
+    with zipfile.ZipFile(archive) as content:
+        names = {n for n in content.namelist() if n.startswith("binaries/")}
+    assert names == {f"binaries/{name}/videoray{p.suffix}" for name, p in PLATFORMS.items()}
+    assert set(PLATFORMS) == {*LINUX, *WINDOWS, *DARWIN}
+
+
+def test_there_are_44_fmi_functions() -> None:
+    assert len(FMI_FUNCTIONS) == 44
+
+
+@pytest.mark.parametrize("name", LINUX)
+def test_linux_needs_libc_and_libm_of_2012_alone(binaries: Path, name: str) -> None:
+    library = lief.ELF.parse(_binary(binaries, name))
+    assert library is not None
+    assert set(library.libraries) <= {"libc.so.6", "libm.so.6"}
+    versions = re.findall(r"GLIBC_([\d.]+)", " ".join(str(s.symbol_version) for s in library.imported_symbols))
+    assert versions
+    assert max(tuple(map(int, v.split("."))) for v in versions) <= (2, 17)
+    assert {s.name for s in library.exported_symbols} == FMI_FUNCTIONS
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+def test_windows_needs_the_system_and_its_c_run_time_alone(binaries: Path, name: str) -> None:
+    library = lief.PE.parse(_binary(binaries, name))
+    assert library is not None
+    needed = {str(i.name) for i in library.imports}
+    assert "KERNEL32.dll" in needed
+    assert [n for n in needed if n != "KERNEL32.dll" and not n.startswith("api-ms-win-crt-")] == []
+    exports = library.get_export()
+    assert exports is not None
+    assert {e.name for e in exports.entries} == FMI_FUNCTIONS
+
+
+@pytest.mark.parametrize("name", DARWIN)
+def test_darwin_has_both_processors_and_needs_the_system_alone(binaries: Path, name: str) -> None:
+    universal = lief.MachO.parse(_binary(binaries, name))
+    assert universal is not None
+    slices = {str(part.header.cpu_type).rsplit(".", 1)[-1]: part for part in universal}
+    assert set(slices) == ({"X86_64", "ARM64"} if name == "darwin64" else {"ARM64"})
+    for part in slices.values():
+        assert {str(lib.name) for lib in part.libraries} == {"@rpath/videoray.dylib", "/usr/lib/libSystem.B.dylib"}
+        assert part.dyld_info is not None
+        exported = {str(e.symbol.name) for e in part.dyld_info.exports if e.symbol is not None}
+        # the linker adds two symbols of its own
+        assert exported - {"__mh_dylib_header", "___dso_handle"} == {f"_{function}" for function in FMI_FUNCTIONS}
+    assert slices["ARM64"].has_code_signature  # Apple Silicon loads nothing unsigned; ad hoc is enough
+
+
+# ---- Run for real --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Machine:
+    """How a program for a platform is run here, and why it cannot be."""
+
+    target: str
+    suffix: str
+    command: tuple[str, ...]
+    missing: Callable[[], str | None]
+
+
+def _needs_program(program: str) -> str | None:
+    return None if shutil.which(program) else f"{program} is not installed"
+
+
+def _needs_file(path: str, package: str) -> str | None:
+    return None if Path(path).exists() else f"{package} is not installed"
+
+
+def _needs_wine32() -> str | None:
+    found = any(Path("/usr/lib").glob("i386-linux-gnu/wine*")) or shutil.which("wine32")
+    return _needs_program("wine") or (None if found else "wine32 is not installed")
+
+
+_AARCH64_ROOT = "/usr/aarch64-linux-gnu"
+MACHINES = {
+    "linux64": Machine("x86_64-linux-gnu.2.17", "", (), lambda: None),
+    "linux32": Machine("x86-linux-gnu.2.17", "", (), lambda: _needs_file("/lib/ld-linux.so.2", "libc6-i386")),
+    "aarch64-linux": Machine(
+        "aarch64-linux-gnu.2.17",
+        "",
+        ("qemu-aarch64", "-L", _AARCH64_ROOT),
+        lambda: _needs_program("qemu-aarch64") or _needs_file(f"{_AARCH64_ROOT}/lib", "libc6-arm64-cross"),
+    ),
+    "win64": Machine("x86_64-windows-gnu", ".exe", ("wine",), lambda: _needs_program("wine")),
+    "win32": Machine("x86-windows-gnu", ".exe", ("wine",), _needs_wine32),
+}
+
+
+def _recorded_steps() -> str:
+    """A command sequence with every branch of the step: reversals, turns, rest, loads, current, 1e-5 s to 1e3 s."""
+    random_ = random.Random(20)
+    lines = []
+    for _ in range(400):
+        h = 10.0 ** random_.uniform(-5.0, 1.0) if random_.random() < 0.98 else 1000.0
+        commands = [random_.choice((0.0, random_.uniform(-1.2, 1.2))) for _ in range(3)]
+        loads = [random_.choice((0.0, random_.gauss(0.0, 3.0))) for _ in range(2)] + [random_.choice((0.0, 0.1))]
+        current = [random_.choice((0.0, 0.3)) for _ in range(2)]
+        values = [h, *commands, *loads, *current]
+        assert len(values) == 1 + len(fields(Inputs))
+        lines.append(" ".join(struct.pack(">d", value).hex() for value in values))
+    return "\n".join(lines) + "\n"
+
+
+def _run(binaries: Path, name: str, folder: Path, guid: str) -> np.ndarray:
+    machine = MACHINES[name]
+    if reason := machine.missing():
+        pytest.skip(f"{name}: {reason}")
+    source = Path(__file__).parent / "host.c"
+    program = folder / f"host-{name}{machine.suffix}"
+    command = [*compiler(), "-target", machine.target, "-std=c11", "-O1"]
+    libraries = [] if machine.suffix else ["-ldl"]
+    headers = ["-I", str(fmi_headers())]
+    subprocess.run([*command, *headers, str(source), "-o", str(program), *libraries], check=True, cwd=folder)
+    library = shutil.copy(_binary(binaries, name), folder / f"{name}{PLATFORMS[name].suffix}")
+    environment = os.environ | {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
+    result = subprocess.run(
+        [*machine.command, str(program), f"./{Path(library).name}", guid],
+        input=_recorded_steps(),
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    return np.array(
+        [[struct.unpack(">d", bytes.fromhex(x))[0] for x in line.split()] for line in result.stdout.splitlines()]
+    )
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("hosts")
+
+
+@pytest.fixture(scope="session")
+def guid(binaries: Path) -> str:
+    return str(fmpy.read_model_description(str(binaries.parent)).guid)
+
+
+@pytest.fixture(scope="session")
+def trajectory(binaries: Path, folder: Path, guid: str) -> np.ndarray:
+    if sys.platform != "linux":
+        pytest.skip("the programs are run on Linux")
+    return _run(binaries, "linux64", folder, guid)
+
+
+# The compiler makes Windows' start-up code for a program anew, which takes a minute.
+@pytest.mark.parametrize(
+    "name",
+    [*LINUX[1:], *(pytest.param(name, marks=pytest.mark.long) for name in WINDOWS)],
+)
+def test_every_platform_runs_as_linux64_does(
+    binaries: Path, folder: Path, guid: str, trajectory: np.ndarray, name: str
+) -> None:
+    other = _run(binaries, name, folder, guid)
+    assert trajectory.shape == (400, 11)
+    assert np.isfinite(trajectory).all()
+    scale = np.maximum.accumulate(np.abs(trajectory))
+    assert np.all(np.abs(other - trajectory) <= 1e-12 * scale + 1e-300)

@@ -1,0 +1,94 @@
+"""The archive that build_fmu.py writes."""
+
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+from checks.commands import ALONE
+from rov_fmu.cli import main
+from rov_fmu.export import compile as fmu_compile
+from rov_fmu.export.interface import UNITS, variables
+from rov_fmu.vehicle.vehicle import Vehicle
+
+
+def _build(output: Path, *arguments: str) -> int:
+    return main(["build", "--platform", "host", "-o", str(output), *arguments])
+
+
+def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(videoray_fmu: Path) -> None:
+    assert validate_fmu(str(videoray_fmu)) == []
+    result = fmpy.simulate_fmu(str(videoray_fmu), start_values={"u_l": 0.3, "u_r": 0.3})
+    assert round(float(result["u"][-1]), 4) == 0.4729
+
+
+def test_the_archive_is_one_that_every_importer_unpacks(videoray_fmu: Path) -> None:
+    with zipfile.ZipFile(videoray_fmu) as archive:
+        assert archive.testzip() is None
+        members = archive.infolist()
+    names = [m.filename for m in members]
+    assert names[0] == "modelDescription.xml"
+    assert {
+        "model.png",
+        "documentation/index.html",
+        "documentation/licenses/license.txt",
+        "sources/fmu.c",
+        "sources/interface.h",
+    } <= set(names)
+    assert not [n for n in names if Path(n).name in {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"}]
+    for m in members:
+        assert m.compress_type == zipfile.ZIP_DEFLATED
+        assert m.extract_version <= 20
+        assert m.date_time == (1980, 1, 1, 0, 0, 0)
+        assert "\\" not in m.filename
+        assert m.external_attr >> 16 == 0o644  # a file, not a link
+        assert not m.flag_bits & 0x1
+
+
+def test_the_description_says_what_the_interface_declares(videoray_dir: Path, vehicle: Vehicle) -> None:
+    description = fmpy.read_model_description(str(videoray_dir))
+    declared = variables(vehicle.coefficients)
+    assert [v.name for v in description.modelVariables] == [v.name for v in declared]
+    for read, v in zip(description.modelVariables, declared, strict=True):
+        assert read.valueReference == v.value_reference
+        assert (read.causality, read.variability) == (v.causality, v.variability)
+        assert read.unit == v.unit
+        assert read.displayUnit == v.display_unit
+        assert (None if read.start is None else float(read.start)) == v.start
+        assert read.description == v.description
+    assert {u.name for u in description.unitDefinitions} == {v.unit for v in declared} <= set(UNITS)
+    for interface in (description.coSimulation, description.modelExchange):
+        assert interface.modelIdentifier == vehicle.identifier
+        assert interface.canGetAndSetFMUstate
+        assert interface.canSerializeFMUstate
+        assert interface.providesDirectionalDerivative
+        assert not interface.needsExecutionTool
+    assert description.coSimulation.canHandleVariableCommunicationStepSize
+    assert description.coSimulation.maxOutputDerivativeOrder == 1
+
+
+def test_the_same_inputs_give_the_same_bytes(videoray_fmu: Path, tmp_path: Path) -> None:
+    again = tmp_path / "elsewhere" / "other name.fmu"
+    again.parent.mkdir()
+    assert _build(again) == 0
+    assert again.read_bytes() == videoray_fmu.read_bytes()
+
+
+def test_another_coefficient_is_another_guid(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
+    text = ALONE
+    heavier = tmp_path / "heavier.toml"
+    heavier.write_text(text.replace("6.57", "6.58"), encoding="utf-8")
+    assert _build(tmp_path / "heavier.fmu", str(heavier)) == 0
+    guids = [fmpy.read_model_description(str(f)).guid for f in (videoray_fmu, tmp_path / "heavier.fmu")]
+    assert guids[0] != guids[1]
+    assert vehicle.coefficients.m_rov == 6.57
+
+
+def test_the_command_line_says_what_it_built(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _build(tmp_path / "rov.fmu") == 0
+    told = capsys.readouterr().out
+    assert str(fmu_compile.host_platform()) in told
+    assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in told
+    assert "built in" in told

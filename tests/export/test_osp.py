@@ -1,0 +1,155 @@
+"""The OSP model description: what the interface declares, in groups as OSP-IS 1.0.1 has them."""
+
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from checks.commands import ALONE
+from rov_fmu.cli import main
+from rov_fmu.export.interface import UNITS, Variable, variables
+from rov_fmu.export.osp import osp_model_description, osp_path
+from rov_fmu.vehicle.vehicle import Vehicle
+
+NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
+
+# The sequence of the schema as far as it concerns motion, and the dimension of what each element groups.
+SEQUENCE = {
+    "Generic": {},
+    "Force": {"kg": 1, "m": 1, "s": -2},
+    "Torque": {"kg": 1, "m": 2, "s": -2},
+    "LinearVelocity": {"m": 1, "s": -1},
+    "AngularVelocity": {"rad": 1, "s": -1},
+    "LinearDisplacement": {"m": 1},
+    "AngularDisplacement": {"rad": 1},
+}
+
+
+@pytest.fixture(scope="module")
+def declared(vehicle: Vehicle) -> dict[str, Variable]:
+    return {v.name: v for v in variables(vehicle.coefficients)}
+
+
+@pytest.fixture(scope="module")
+def groups(declared: dict[str, Variable]) -> list[etree._Element]:
+    root = etree.fromstring(osp_model_description(tuple(declared.values())))
+    assert root.tag == f"{NAMESPACE}OspModelDescription"
+    assert dict(root.attrib) == {"version": "1.0"}
+    (parent,) = root
+    assert parent.tag == f"{NAMESPACE}VariableGroups"
+    return list(parent)
+
+
+def references(group: etree._Element) -> list[str]:
+    assert {variable.tag for variable in group} == {f"{NAMESPACE}Variable"}
+    return [variable.get("ref") for variable in group]
+
+
+def test_every_input_and_output_is_in_one_group(groups: list[etree._Element], declared: dict[str, Variable]) -> None:
+    grouped = sorted(name for group in groups for name in references(group))
+    assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
+
+
+def test_groups_come_in_the_order_of_the_schema(groups: list[etree._Element]) -> None:
+    elements = [group.tag.removeprefix(NAMESPACE) for group in groups]
+    assert elements == sorted(elements, key=list(SEQUENCE).index)
+    assert set(elements) == set(SEQUENCE)
+
+
+def test_names_of_groups_are_unique(groups: list[etree._Element]) -> None:
+    names = [group.get("name") for group in groups]
+    assert all(names)
+    assert len(set(names)) == len(names)
+
+
+def test_a_group_is_of_one_causality_one_unit_and_one_variable_an_axis(
+    groups: list[etree._Element], declared: dict[str, Variable]
+) -> None:
+    for group in groups:
+        members = [declared[name] for name in references(group)]
+        assert 1 <= len(members) <= 3
+        assert len({v.causality for v in members}) == 1
+        assert [v.unit for v in members] == [variable.get("unit") for variable in group]
+        (unit,) = {v.unit for v in members}
+        assert UNITS[unit].exponents == SEQUENCE[group.tag.removeprefix(NAMESPACE)]
+        axes = [axis for variable in group if (axis := variable.get("axis"))]
+        assert set(axes) <= {"x", "y", "z"}
+        assert len(set(axes)) == len(axes)
+
+
+@pytest.mark.parametrize(
+    ("name", "element", "members"),
+    [
+        ("thruster_commands", "Generic", {"u_l": None, "u_r": None, "u_t": None}),
+        ("external_force", "Force", {"X_ext": "x", "Z_ext": "z"}),
+        ("current", "LinearVelocity", {"V_N": "x", "V_E": "y"}),
+        ("velocity", "LinearVelocity", {"u": "x", "w": "z"}),
+        ("yaw_rate", "AngularVelocity", {"r": "z"}),
+        ("position", "LinearDisplacement", {"x": "x", "y": "y"}),
+        ("depth", "LinearDisplacement", {"z": "z"}),
+        ("heading", "AngularDisplacement", {"psi": "z"}),
+    ],
+)
+def test_what_systems_connect_by(
+    groups: list[etree._Element], name: str, element: str, members: dict[str, str | None]
+) -> None:
+    (group,) = [group for group in groups if group.get("name") == name]
+    assert group.tag == NAMESPACE + element
+    assert {variable.get("ref"): variable.get("axis") for variable in group} == members
+
+
+def test_a_variable_without_a_group_is_noticed(declared: dict[str, Variable]) -> None:
+    with pytest.raises(KeyError, match="psi"):
+        osp_model_description(tuple(v for v in declared.values() if v.name != "psi"))
+
+
+# ---- build_fmu.py --osp ----------------------------------------------------------------------------------------------
+
+
+def _build(path: Path, *arguments: str) -> int:
+    return main(["build", "--platform", "host", "-o", str(path), *arguments])
+
+
+def test_the_option_writes_it_beside_the_fmu(tmp_path: Path, vehicle: Vehicle, declared: dict[str, Variable]) -> None:
+    assert _build(tmp_path / "rov.fmu") == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["rov.fmu"]
+    assert _build(tmp_path / "rov.fmu", "--osp") == 0
+    # named after the model, not after the archive: that is where libcosim looks for it
+    path = tmp_path / "videoray_OspModelDescription.xml"
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "rov.fmu", path]
+    assert osp_path(tmp_path / "rov.fmu", vehicle.identifier) == path
+    assert path.read_bytes() == osp_model_description(tuple(declared.values()))
+
+
+def test_another_vehicle_has_its_own(tmp_path: Path) -> None:
+    text = ALONE
+    other = tmp_path / "other.toml"
+    other.write_text(text.replace('"videoray"\nversion', '"pilchard"\nversion'), encoding="utf-8")
+    assert _build(tmp_path / "other.fmu", "--osp", str(other)) == 0
+    assert (tmp_path / "pilchard_OspModelDescription.xml").is_file()
+
+
+def test_a_folder_in_its_place_stops_the_build(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "videoray_OspModelDescription.xml").mkdir()
+    assert _build(tmp_path / "rov.fmu", "--osp") == 2
+    assert "videoray_OspModelDescription.xml: cannot be written: is a folder" in capsys.readouterr().err
+    assert not (tmp_path / "rov.fmu").exists()
+
+
+def test_written_whole_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "videoray_OspModelDescription.xml"
+    path.write_text("as it was")
+    replace = Path.replace
+
+    def full(self: Path, target: Path) -> Path:
+        if target.suffix == ".xml":
+            raise OSError(28, "No space left on device")
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", full)
+    assert _build(tmp_path / "rov.fmu", "--osp") == 2
+    assert f"{path}: cannot be written: No space left on device" in capsys.readouterr().err
+    assert path.read_text() == "as it was"
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "rov.fmu", path]

@@ -1,0 +1,119 @@
+"""The FMU in pure Python: valid, and the same as the native one."""
+
+import random
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from fmpy.validation import validate_fmu
+
+from checks.fmi2 import fmpy_slave, keep_loaded
+from rov_fmu.cli import main
+from rov_fmu.export.interface import Variable, variables
+from rov_fmu.vehicle.vehicle import Vehicle
+
+
+@pytest.fixture(scope="session")
+def python_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    # PythonFMU's binary takes no other special character than the space in its path
+    path = tmp_path_factory.mktemp("python flavour") / "videoray-python.fmu"
+    assert main(["build", "--backend", "pythonfmu", "-o", str(path)]) == 0
+    return path
+
+
+@pytest.fixture(scope="session")
+def python_dir(python_fmu: Path) -> Path:
+    fmpy.extract(str(python_fmu), unzipdir=str(python_fmu.with_suffix("")))
+    keep_loaded(python_fmu.with_suffix(""))
+    return python_fmu.with_suffix("")
+
+
+def _instance(folder: Path) -> FMU2Slave:
+    slave = fmpy_slave(folder)
+    slave.setupExperiment(startTime=0.0)
+    return slave
+
+
+def test_it_is_valid_and_says_what_it_can_do(python_fmu: Path, vehicle: Vehicle) -> None:
+    assert validate_fmu(str(python_fmu)) == []
+    description = fmpy.read_model_description(str(python_fmu))
+    assert [v.name for v in description.modelVariables] == [v.name for v in variables(vehicle.coefficients)]
+    assert description.modelExchange is None
+    can = description.coSimulation
+    assert (can.canGetAndSetFMUstate, can.canSerializeFMUstate, can.needsExecutionTool) == (True, True, True)
+    assert not can.providesDirectionalDerivative
+    assert can.maxOutputDerivativeOrder == 0
+
+
+def test_its_modules_bear_the_name_of_the_vehicle(python_fmu: Path) -> None:
+    with zipfile.ZipFile(python_fmu) as archive:
+        ours = {n for n in archive.namelist() if n.startswith("resources/") and "/pythonfmu/" not in n}
+    assert ours == {
+        "resources/slavemodule.txt",
+        "resources/variables.json",
+        "resources/videoray_slave.py",
+        *(f"resources/videoray_model/{name}.py" for name in ("__init__", "path", "riccati", "rov")),
+    }
+
+
+def _by_kind(declared: tuple[Variable, ...], **wanted: str) -> list[Variable]:
+    return [v for v in declared if all(getattr(v, key) == value for key, value in wanted.items())]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_both_flavours_move_the_same_way(python_dir: Path, videoray_dir: Path, vehicle: Vehicle, seed: int) -> None:
+    random_ = random.Random(seed)
+    declared = variables(vehicle.coefficients)
+    both = [_instance(python_dir), _instance(videoray_dir)]
+    outputs = [v.value_reference for v in declared if v.causality != "parameter"]
+    parameters = _by_kind(declared, causality="parameter")
+
+    def set_both(chosen: list[Variable], values: list[float]) -> None:
+        for slave in both:
+            slave.setReal([v.value_reference for v in chosen], values)
+
+    def compare() -> None:
+        python, native = (slave.getReal(outputs) for slave in both)
+        assert python == pytest.approx(native, rel=1e-12, abs=1e-12)
+
+    set_both(parameters, [v.start * random_.uniform(0.5, 1.5) for v in parameters if v.start is not None])
+    for slave in both:
+        slave.enterInitializationMode()
+    compare()
+    for slave in both:
+        slave.exitInitializationMode()
+    t = 0.0
+    saved = [slave.getFMUState() for slave in both]
+    for _ in range(60):
+        inputs = _by_kind(declared, causality="input")
+        set_both(inputs, [random_.choice((0.0, random_.uniform(-1.2, 1.2))) for _ in inputs])
+        tuning = random_.choice(_by_kind(declared, variability="tunable"))
+        set_both([tuning], [random_.uniform(0.1, 2.0)])
+        h = 10.0 ** random_.uniform(-4.0, 1.0)
+        for slave in both:
+            slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+        t += h
+        compare()
+        if random_.random() < 0.1:
+            saved = [slave.getFMUState() for slave in both]
+        if random_.random() < 0.1:
+            for slave, state in zip(both, saved, strict=True):
+                as_bytes = slave.serializeFMUstate(state)
+                slave.setFMUState(slave.deSerializeFMUstate(as_bytes) if seed % 2 else state)
+            compare()
+    for slave in both:
+        slave.terminate()
+        slave.freeInstance()
+
+
+def test_what_the_native_one_refuses_is_refused(python_dir: Path, vehicle: Vehicle) -> None:
+    by_name = {v.name: v for v in variables(vehicle.coefficients)}
+    slave = _instance(python_dir)
+    slave.enterInitializationMode()
+    for name, value in (("u_l", float("nan")), ("Z_ext", float("inf")), ("m_rov", -1.0), ("beta_r", float("nan"))):
+        reference = [by_name[name].value_reference]
+        slave.setReal(reference, [value])
+        assert slave.getReal(reference) == [by_name[name].start]
+    slave.freeInstance()

@@ -1,0 +1,238 @@
+"""Derivatives are those of the values, and the model structure declares exactly those that can be non-zero."""
+
+import random
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from checks.fmi2 import (
+    CO_SIMULATION,
+    EVERY_MODE,
+    INITIALIZATION,
+    INSTANTIATED,
+    MODEL_EXCHANGE,
+    MODES,
+    OK,
+    STEP,
+    Fmu,
+    Instance,
+    integers,
+    reals,
+    references,
+)
+
+COMMANDS = ("u_l", "u_r", "u_t")
+VELOCITIES = ("u", "w", "r")
+
+
+def random_motion(fmu: Fmu, rng: random.Random) -> dict[str, float]:
+    """Inputs and states of either sign, zeros, and commands beyond full, none on the corner."""
+    values = {name: rng.uniform(-3.0, 3.0) for name in fmu.inputs + fmu.states}
+    for name in COMMANDS:
+        values[name] = rng.choice([rng.uniform(-0.99, 0.99), rng.choice([-1, 1]) * rng.uniform(1.01, 2.0)])
+    for name in (*COMMANDS, *VELOCITIES):
+        values[name] = rng.choice([values[name], values[name], 0.0])
+    return values
+
+
+def random_parameters(
+    fmu: Fmu, rng: random.Random, variability: Sequence[str] = ("fixed", "tunable")
+) -> dict[str, float]:
+    chosen = [name for name in fmu.parameters if fmu.variables[name].variability in variability]
+    return {name: float(fmu.variables[name].start) * rng.uniform(0.7, 1.3) for name in chosen}
+
+
+def points(fmu: Fmu, n: int, seed: int) -> list[dict[str, float]]:
+    rng = random.Random(seed)
+    return [random_motion(fmu, rng) | random_parameters(fmu, rng) for _ in range(n)]
+
+
+def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> Instance:
+    rov = fmu.instance(kind)
+    assert rov.set(point) == OK
+    rov.reach(mode)
+    return rov
+
+
+# ---- Directional derivatives ----
+
+
+def difference(rov: Instance, unknowns: Sequence[str], known: str, value: float) -> list[float]:
+    """Central differences by one known, extrapolated to no step: exact for the corner of |c| c at zero as well."""
+
+    def slope(step: float) -> list[float]:
+        sides = []
+        for x in (value + step, value - step):
+            assert rov.set({known: x}) == OK
+            sides.append(rov.get(unknowns))
+        return [(a - b) / (2.0 * step) for a, b in zip(*sides, strict=True)]
+
+    step = 1e-5 * max(abs(value), 1e-3)
+    wide, narrow = slope(step), slope(step / 2.0)
+    assert rov.set({known: value}) == OK
+    return [2.0 * b - a for a, b in zip(wide, narrow, strict=True)]
+
+
+@pytest.mark.parametrize("kind", MODES)
+def test_directional_derivatives_are_the_slopes_of_the_values(fmu: Fmu, kind: int) -> None:
+    unknowns = fmu.outputs + fmu.derivatives
+    for point in points(fmu, 25, seed=1):
+        with at_point(fmu, kind, INITIALIZATION, point) as rov:
+            scale = [1.0 + abs(value) for value in rov.get(unknowns)]
+            for known, value in point.items():
+                expected = difference(rov, unknowns, known, value)
+                for name, d, e, size in zip(unknowns, rov.derivatives(unknowns, known), expected, scale, strict=True):
+                    assert d == pytest.approx(e, rel=1e-6, abs=1e-6 * size), (name, known, point)
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode"), [c for c in EVERY_MODE if c[1] not in (INSTANTIATED, INITIALIZATION)], ids=str
+)
+def test_directional_derivatives_are_the_same_in_every_mode(fmu: Fmu, kind: int, mode: str) -> None:
+    unknowns = fmu.outputs + fmu.derivatives
+    for point in points(fmu, 5, seed=2):
+        with at_point(fmu, kind, INITIALIZATION, point) as rov, at_point(fmu, kind, mode, point) as later:
+            for known in fmu.inputs + fmu.states:
+                assert later.derivatives(unknowns, known) == rov.derivatives(unknowns, known)
+
+
+@pytest.mark.parametrize("corner", [-1.0, 1.0])
+@pytest.mark.parametrize(("command", "thrust"), [("u_l", "F_l"), ("u_r", "F_r"), ("u_t", "F_t")])
+def test_at_full_command_the_derivative_is_that_of_the_inside(
+    fmu: Fmu, command: str, thrust: str, corner: float
+) -> None:
+    with fmu.instance() as rov:
+        rov.reach(INITIALIZATION)
+        values = []
+        for value in (corner, corner * (1.0 - 1e-6)):
+            assert rov.set({command: value}) == OK
+            values += rov.get([thrust])
+        assert rov.set({command: corner}) == OK
+        slope = (values[0] - values[1]) / (corner * 1e-6)
+        assert rov.derivatives([thrust], command) == pytest.approx([slope], rel=1e-5)
+        assert rov.set({command: corner * (1.0 + 1e-9)}) == OK
+        assert rov.derivatives([thrust], command) == [0.0]
+
+
+def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
+    rng = random.Random(3)
+    unknowns, (point,) = fmu.outputs + fmu.derivatives, points(fmu, 1, seed=4)
+    with at_point(fmu, MODEL_EXCHANGE, INITIALIZATION, point) as rov:
+        seeds = {known: rng.uniform(-1.0, 1.0) for known in point}
+        columns = [[seed * d for d in rov.derivatives(unknowns, known)] for known, seed in seeds.items()]
+        result = reals(*[0.0] * len(unknowns))
+        rov.expect(
+            "fmi2GetDirectionalDerivative",
+            references(*(fmu.vr[name] for name in unknowns)),
+            len(unknowns),
+            references(*(fmu.vr[name] for name in seeds)),
+            len(seeds),
+            reals(*seeds.values()),
+            result,
+        )
+        for i, column in enumerate(zip(*columns, strict=True)):
+            assert result[i] == pytest.approx(sum(column), rel=1e-12, abs=1e-12 * max(map(abs, column)))
+
+
+# ---- The model structure ----
+
+Jacobian = dict[tuple[str, str], float]
+
+
+def jacobian(rov: Instance, unknowns: Sequence[str], knowns: Sequence[str]) -> Jacobian:
+    columns = {known: rov.derivatives(unknowns, known) for known in knowns}
+    return {(name, known): d for known, column in columns.items() for name, d in zip(unknowns, column, strict=True)}
+
+
+def declared(unknowns: Sequence[Any]) -> dict[tuple[str, str], str]:
+    return {
+        (unknown.variable.name, known.name): kind
+        for unknown in unknowns
+        for known, kind in zip(unknown.dependencies, unknown.dependenciesKind, strict=True)
+    }
+
+
+@pytest.mark.parametrize("structure", ["outputs", "derivatives"])
+def test_dependencies_are_declared_as_they_are(fmu: Fmu, structure: str) -> None:
+    rng = random.Random(5)
+    unknowns = [unknown.variable.name for unknown in getattr(fmu.description, structure)]
+    knowns = fmu.inputs + fmu.states
+    motions = [random_motion(fmu, rng) for _ in range(20)]
+    sets = [{}, random_parameters(fmu, rng, "fixed"), random_parameters(fmu, rng, "tunable")]
+    samples: list[list[Jacobian]] = []
+    for parameters in sets:
+        samples.append([])
+        for motion in motions:
+            with at_point(fmu, CO_SIMULATION, STEP, motion | parameters) as rov:
+                samples[-1].append(jacobian(rov, unknowns, knowns))
+
+    def strongest(pair: tuple[str, str]) -> str | None:
+        values = [{sample[pair] for sample in of_set} for of_set in samples]
+        if set.union(*values) == {0.0}:
+            return None
+        if any(len(of_set) > 1 for of_set in values):
+            return "dependent"
+        start, fixed, tunable = values
+        return "tunable" if tunable != start else "fixed" if fixed != start else "constant"
+
+    found = {(name, known): strongest((name, known)) for name in unknowns for known in knowns}
+    assert {pair: kind for pair, kind in found.items() if kind} == declared(getattr(fmu.description, structure))
+
+
+def test_initial_dependencies_are_declared_as_they_are(fmu: Fmu) -> None:
+    unknowns = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
+    samples: list[Jacobian] = []
+    for point in points(fmu, 30, seed=6):
+        with at_point(fmu, CO_SIMULATION, INITIALIZATION, point) as rov:
+            samples.append(jacobian(rov, unknowns, list(point)))
+    values = {pair: {sample[pair] for sample in samples} for pair in samples[0]}
+    found = {pair: "constant" if len(of) == 1 else "dependent" for pair, of in values.items() if of != {0.0}}
+    assert found == declared(fmu.description.initialUnknowns)
+
+
+def test_the_structure_lists_every_output_state_and_calculated_variable(fmu: Fmu) -> None:
+    variables = fmu.variables.values()
+    assert fmu.outputs == [v.name for v in variables if v.causality == "output"]
+    assert fmu.derivatives == [v.name for v in variables if v.derivative is not None]
+    initial = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
+    assert initial == [v.name for v in variables if v.initial == "calculated"]
+    assert fmu.derivatives == [f"der({name})" for name in fmu.states]
+
+
+# ---- Derivatives by time ----
+
+
+def output_derivatives(rov: Instance) -> list[float]:
+    names = rov.fmu.outputs
+    values = reals(*[0.0] * len(names))
+    vr = references(*(rov.fmu.vr[name] for name in names))
+    rov.expect("fmi2GetRealOutputDerivatives", vr, len(names), integers(*[1] * len(names)), values)
+    return list(values)
+
+
+def test_output_derivatives_are_the_slopes_of_the_outputs_over_small_steps(fmu: Fmu) -> None:
+    h = 1e-4
+    for point in points(fmu, 25, seed=7):
+        with at_point(fmu, CO_SIMULATION, STEP, point) as rov:
+            before = rov.get(fmu.outputs)
+            assert rov.step(0.0, h) == OK
+            slopes = output_derivatives(rov)
+            assert rov.step(h, h) == OK
+            for name, slope, a, b in zip(fmu.outputs, slopes, before, rov.get(fmu.outputs), strict=True):
+                assert slope == pytest.approx((b - a) / (2.0 * h), rel=1e-5, abs=1e-5), (name, point)
+            rov.expect("fmi2Terminate")
+            assert output_derivatives(rov)[0] == rov.get(["der(u)"])[0]
+
+
+@pytest.mark.parametrize("mode", MODES[MODEL_EXCHANGE][1:])
+def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu: Fmu, mode: str) -> None:
+    n = len(fmu.states)
+    for point in points(fmu, 5, seed=8):
+        with at_point(fmu, MODEL_EXCHANGE, mode, point) as rov:
+            derivatives, states = reals(*[0.0] * n), reals(*[0.0] * n)
+            rov.expect("fmi2GetDerivatives", derivatives, n)
+            rov.expect("fmi2GetContinuousStates", states, n)
+            assert bytes(derivatives) == bytes(reals(*rov.get(fmu.derivatives)))
+            assert bytes(states) == bytes(reals(*(point[name] for name in fmu.states)))
+            assert len({*derivatives}) > 3

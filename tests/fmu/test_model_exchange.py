@@ -1,0 +1,149 @@
+"""Model Exchange: an integrator of the importer gives the trajectory of the exact steps, and events pass unnoticed."""
+
+import ctypes
+from itertools import pairwise
+from math import inf, nan
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import fmi2EventInfo
+from numpy.typing import NDArray
+
+from checks.fmi2 import CONTINUOUS, DISCARD, EVENT, MODEL_EXCHANGE, OK, Fmu, integers, reals
+
+# Straight and turning, ahead and astern, commands beyond full, loads and a current; held from one time to the next.
+START = {"u": -0.5, "w": 0.2, "r": 1.5, "psi": 2.0}
+SCHEDULE: dict[float, dict[str, float]] = {
+    0.0: {"u_l": 0.3, "u_r": 0.3, "u_t": 0.4},
+    2.0: {"u_l": 0.6, "u_r": -0.2, "u_t": -0.5, "N_ext": 0.05},
+    4.0: {"u_l": -0.7, "u_r": 0.1, "Z_ext": 2.0},
+    6.0: {"u_l": 1.4, "u_r": 0.7, "u_t": -0.9, "X_ext": -3.0, "V_N": 0.3, "V_E": -0.2},
+    8.0: {},
+}
+STOP, INTERVAL = 10.0, 0.1
+
+
+def signal(fmu: Fmu) -> NDArray[np.void]:
+    """The schedule as FMPy takes it: two rows where it jumps."""
+    rows = []
+    for (t, held), end in zip(SCHEDULE.items(), [*list(SCHEDULE)[1:], STOP], strict=True):
+        values = [held.get(name, 0.0) for name in fmu.inputs]
+        rows += [(t, *values), (end, *values)]
+    return np.array(rows, dtype=[(name, float) for name in ("time", *fmu.inputs)])
+
+
+@pytest.fixture(scope="module")
+def exact(fmu: Fmu) -> NDArray[np.float64]:
+    """The outputs of Co-Simulation, a row for each interval."""
+    rows = []
+    with fmu.instance() as rov:
+        rov.start(START)
+        for i in range(round(STOP / INTERVAL)):
+            if (t := round(i * INTERVAL, 9)) in SCHEDULE:
+                assert rov.set(dict.fromkeys(fmu.inputs, 0.0) | SCHEDULE[t]) == OK
+            rows.append(rov.get(fmu.states))
+            assert rov.step(i * INTERVAL, INTERVAL) == OK
+        rows.append(rov.get(fmu.states))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_cvode_gives_the_trajectory_of_co_simulation_within_its_tolerance(
+    fmu: Fmu, exact: NDArray[np.float64], tolerance: float
+) -> None:
+    result = fmpy.simulate_fmu(
+        str(fmu.folder),
+        fmi_type="ModelExchange",
+        solver="CVode",
+        relative_tolerance=tolerance,
+        stop_time=STOP,
+        output_interval=INTERVAL,
+        start_values=START,
+        input=signal(fmu),
+        output=fmu.states,
+        record_events=False,
+    )
+    # The tolerance is that of one solver step; their errors add up to some hundred times as much.
+    error = np.abs(np.array([result[name] for name in fmu.states]).T - exact)
+    assert error.max() < 1000.0 * tolerance
+
+
+def test_the_trajectory_is_one_that_turns_and_changes_its_signs(fmu: Fmu, exact: NDArray[np.float64]) -> None:
+    for name, column in zip(fmu.states, exact.T, strict=True):
+        if name in ("u", "w", "r"):
+            assert column.min() < -0.1, name
+            assert column.max() > 0.1, name
+    assert np.ptp(exact[:, fmu.states.index("psi")]) > 6.0
+
+
+def test_there_are_no_events(fmu: Fmu) -> None:
+    assert fmu.description.numberOfEventIndicators == 0
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        rov.reach(EVENT)
+        for _ in range(2):
+            info = fmi2EventInfo(*[-1] * 5, -7.0)
+            rov.expect("fmi2NewDiscreteStates", ctypes.byref(info))
+            assert not any(getattr(info, name) for name, _ in fmi2EventInfo._fields_)
+        rov.expect("fmi2EnterContinuousTimeMode")
+        enter, terminate = integers(-1), integers(-1)
+        rov.expect("fmi2CompletedIntegratorStep", 0, enter, terminate)
+        assert (enter[0], terminate[0]) == (0, 0)
+
+
+def test_event_mode_keeps_the_states_and_takes_inputs_and_tuning(fmu: Fmu) -> None:
+    n = len(fmu.states)
+    states = reals(*(0.25 * i - 0.7 for i in range(n)))
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        rov.reach(CONTINUOUS)
+        rov.expect("fmi2SetTime", 1.5)
+        rov.expect("fmi2SetContinuousStates", states, n)
+        before, beta = rov.get(["der(w)", "beta_w"])
+        rov.expect("fmi2EnterEventMode")
+        assert rov.get(fmu.states) == list(states)
+        assert rov.set({"u_t": 0.0, "beta_w": 2.0 * beta}) == OK
+        rov.expect("fmi2NewDiscreteStates", ctypes.byref(fmi2EventInfo()))
+        rov.expect("fmi2EnterContinuousTimeMode")
+        assert rov.get(fmu.states) == list(states)
+        assert rov.get(["der(w)"]) == pytest.approx([2.0 * before])
+
+
+def test_a_solver_may_go_back_in_time(fmu: Fmu) -> None:
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        rov.start(START | {"u_l": 0.4}, stop=1.0)
+        rov.expect("fmi2EnterContinuousTimeMode")
+        results, states = [], set()
+        for t in (0.0, 0.5, 0.25, -1e-9):
+            rov.expect("fmi2SetTime", t)
+            results.append(rov.get(fmu.derivatives))
+            states.add(rov.save())
+        assert all(a == b for a, b in pairwise(results))  # the model is autonomous
+        assert len(states) == 4  # and the time is part of the state
+
+
+def test_nominals_are_those_of_the_description(fmu: Fmu) -> None:
+    n = len(fmu.states)
+    nominals = reals(*[-7.0] * n)
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        rov.expect("fmi2GetNominalsOfContinuousStates", nominals, n)
+    assert list(nominals) == [float(fmu.variables[name].nominal) for name in fmu.states]
+    assert min(nominals) > 0.0
+
+
+@pytest.mark.parametrize("value", [nan, inf, -inf])
+def test_no_solver_state_is_not_finite(fmu: Fmu, value: float) -> None:
+    n = len(fmu.states)
+    good = reals(*(0.125 * i for i in range(n)))
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        rov.reach(CONTINUOUS)
+        rov.expect("fmi2SetContinuousStates", good, n)
+        for i, name in enumerate(fmu.states):
+            bad = reals(*[1.0] * n)
+            bad[i] = value
+            rov.log.clear()
+            assert rov.call("fmi2SetContinuousStates", bad, n) == DISCARD
+            (message,) = rov.log
+            assert (message.status, message.category) == (DISCARD, "logStatusDiscard")
+            assert message.text.startswith(f"fmi2SetContinuousStates: {name} = ")
+            assert message.text.endswith(f"; it stays {good[i]:g}.")
+            assert rov.get(fmu.states) == list(good)

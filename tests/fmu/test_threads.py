@@ -1,0 +1,78 @@
+"""Instances know nothing of each other: eight threads drive their own, under ThreadSanitizer and AddressSanitizer."""
+
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from checks.sanitized import build_sanitized, clang
+from rov_fmu.export.archive import native_content
+from rov_fmu.vehicle.vehicle import Vehicle
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="the programs are run on Linux"),
+    pytest.mark.skipif(clang() is None, reason="clang with its sanitizers is missing"),
+]
+
+PROGRAM = Path(__file__).parent / "threads.c"
+
+# Some clangs find no room for their bookkeeping among addresses as random as new kernels make them: 0x0040000 is
+# ADDR_NO_RANDOMIZE; where it is not allowed the program runs as it is.
+_PLAIN_ADDRESSES = (
+    "import ctypes, os, sys; ctypes.CDLL(None).personality(0x0040000); os.execv(sys.argv[1], sys.argv[1:])"
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    counts: dict[str, int]
+    code: int
+    errors: str
+
+
+@pytest.fixture(scope="module")
+def sources(vehicle: Vehicle) -> Mapping[str, str]:
+    return native_content(vehicle).sources
+
+
+def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls: int) -> Run:
+    program = folder / "threads"
+    build_sanitized(sources, PROGRAM, program, sanitizers, ("-pthread",))
+    command = [sys.executable, "-c", _PLAIN_ADDRESSES, str(program), str(calls)]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    counts = {name: int(count) for name, count in map(str.split, result.stdout.splitlines())}
+    return Run(counts, result.returncode, result.stderr)
+
+
+@pytest.mark.parametrize("calls", [200_000, pytest.param(2_000_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("sanitizers", ["thread", "address,undefined"])
+def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
+    sources: Mapping[str, str], tmp_path: Path, sanitizers: str, calls: int
+) -> None:
+    run = run_threads(sources, tmp_path, sanitizers, calls)
+    assert run.code == 0, run.errors
+    assert run.errors == ""
+    assert run.counts["calls"] == calls
+    assert 0.8 * calls < run.counts["accepted"] < 0.99 * calls  # refused calls are driven too
+    assert run.counts["messages"] > 0.1 * calls
+
+
+@pytest.mark.parametrize(
+    ("sanitizers", "file", "line", "fault", "report"),
+    [
+        ("thread", "rov.c", "    rov_gains now = *gains;\n", "static rov_gains now; now = *gains;", "data race"),
+        ("address", "fmi2_common.c", "    free(c);\n", "(void)c;", "detected memory leaks"),
+    ],
+    ids=["shared variable", "lost instance"],
+)
+def test_a_shared_variable_or_a_lost_instance_would_be_reported(
+    sources: Mapping[str, str], tmp_path: Path, sanitizers: str, file: str, line: str, fault: str, report: str
+) -> None:
+    assert sources[file].count(line) == 1
+    faulty = {**sources, file: sources[file].replace(line, fault + "\n")}
+    run = run_threads(faulty, tmp_path, sanitizers, 8_000)
+    assert run.code != 0
+    assert report in run.errors

@@ -1,0 +1,176 @@
+"""Values that cannot be are discarded, commands beyond ±1 saturate, and the log says so once, by name."""
+
+from math import inf, nan, nextafter
+
+import pytest
+
+from checks.fmi2 import (
+    CO_SIMULATION,
+    CONTINUOUS,
+    DISCARD,
+    ERROR,
+    EVENT,
+    INITIALIZATION,
+    MODEL_EXCHANGE,
+    OK,
+    STEP,
+    WARNING,
+    Fmu,
+    Instance,
+    integers,
+    reals,
+    references,
+    strings,
+)
+
+COMMANDS = ("u_l", "u_r", "u_t")
+
+
+def settable(fmu: Fmu, mode: str) -> list[str]:
+    if mode == INITIALIZATION:
+        return fmu.inputs + fmu.states + fmu.parameters
+    if mode == CONTINUOUS:
+        return fmu.inputs + fmu.states
+    return fmu.inputs + [name for name in fmu.parameters if fmu.variables[name].variability == "tunable"]
+
+
+def assert_discarded(rov: Instance, name: str, value: float) -> None:
+    """Setting a value together with a good one sets neither, and one log line names the variable."""
+    companion = "u_l" if name != "u_l" else "u_r"
+    before = rov.save()
+    (kept,) = rov.get([name])
+    rov.log.clear()
+    assert rov.set({companion: 0.875, name: value}) == DISCARD, (name, value)
+    (message,) = rov.log
+    assert (message.status, message.category) == (DISCARD, "logStatusDiscard")
+    assert message.text.startswith(f"fmi2SetReal: {name} = ")
+    assert message.text.endswith(f"; it stays {kept:.15g}.")
+    assert rov.save() == before
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode"),
+    [
+        (CO_SIMULATION, INITIALIZATION),
+        (CO_SIMULATION, STEP),
+        (MODEL_EXCHANGE, INITIALIZATION),
+        (MODEL_EXCHANGE, EVENT),
+        (MODEL_EXCHANGE, CONTINUOUS),
+    ],
+)
+def test_no_variable_takes_a_value_that_is_not_finite(fmu: Fmu, kind: int, mode: str) -> None:
+    with fmu.instance(kind) as rov:
+        rov.reach(mode)
+        for name in settable(fmu, mode):
+            for value in (nan, inf, -inf):
+                assert_discarded(rov, name, value)
+
+
+def test_a_parameter_takes_its_bounds_and_nothing_beyond(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        rov.reach(INITIALIZATION)
+        for name in fmu.parameters:
+            low, high = float(fmu.variables[name].min), float(fmu.variables[name].max)
+            for value in (nextafter(low, -inf), nextafter(high, inf), low - 1e300, 1e308):
+                assert_discarded(rov, name, value)
+            for value in (low, high):
+                assert rov.set({name: value}) == OK
+                assert rov.get([name]) == [value]
+
+
+def test_a_tunable_parameter_is_checked_between_steps_too(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        rov.reach(STEP)
+        assert_discarded(rov, "beta_u", -0.001)
+        assert rov.set({"beta_u": 2.0}) == OK
+
+
+def test_values_that_overflow_are_told_and_not_given(fmu: Fmu) -> None:
+    n = len(fmu.states)
+    for kind, status in [(CO_SIMULATION, ERROR), (MODEL_EXCHANGE, DISCARD)]:
+        with fmu.instance(kind) as rov:
+            rov.start({"w": 1e200})
+            value = reals(-7.0)
+            assert rov.call("fmi2GetReal", references(fmu.vr["der(w)"]), 1, value) == status
+            assert list(value) == [-7.0]
+            function = "fmi2GetDerivatives" if kind == MODEL_EXCHANGE else "fmi2GetRealOutputDerivatives"
+            values = reals(*[-7.0] * n)
+            w = references(fmu.vr["w"])
+            arguments = (values, n) if kind == MODEL_EXCHANGE else (w, 1, integers(1), values)
+            assert rov.call(function, *arguments) == status
+            assert list(values) == [-7.0] * n
+            assert len(rov.log) == 2
+            assert all("der(w) overflows" in m.text or "derivative of w overflows" in m.text for m in rov.log)
+
+
+def trajectory(rov: Instance, steps: int = 5) -> bytes:
+    result = b""
+    for i in range(steps):
+        assert rov.step(0.1 * i, 0.1) == OK
+        result += bytes(reals(*rov.get(rov.fmu.outputs)))
+    return result
+
+
+@pytest.mark.parametrize("value", [nextafter(1.0, 2.0), 1.5, -1.5, 1e308, -1e308])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_beyond_full_saturates_and_is_logged_once(fmu: Fmu, command: str, value: float) -> None:
+    moving = {"u_l": 0.5, "u_r": 0.25, "u_t": -0.5, "u": 0.3, "r": -0.2}
+    with fmu.instance() as full:
+        full.start(moving | {command: 1.0 if value > 0.0 else -1.0})
+        assert full.log == []
+        expected = trajectory(full)
+    with fmu.instance() as rov:
+        rov.start(moving | {command: value})
+        assert trajectory(rov) == expected
+        for _ in range(3):
+            assert rov.set({command: -value}) == OK
+            assert rov.set({command: value}) == OK
+        (message,) = rov.log
+    assert (message.status, message.category) == (WARNING, "logStatusWarning")
+    assert message.text.startswith(f"fmi2SetReal: {command} = {value:.15g} saturates at {1 if value > 0.0 else -1}")
+
+
+def test_every_command_that_saturates_has_its_line_and_has_it_again_after_reset(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        for _ in range(2):
+            assert rov.set(dict.fromkeys(COMMANDS, 1.25)) == OK
+            assert rov.set(dict.fromkeys(COMMANDS, -1.25)) == OK
+            rov.expect("fmi2Reset")
+        assert [m.text.split()[1] for m in rov.log] == [*COMMANDS, *COMMANDS]
+
+
+def test_a_message_is_a_printf_format_that_gives_the_text_as_it_is(fmu: Fmu) -> None:
+    with fmu.instance(name="100 %s%n") as rov:
+        assert rov.call("fmi2SetDebugLogging", 1, 1, strings(b"50 %d%%n%")) == ERROR
+        (message,) = rov.log
+    assert message.instance == "100 %s%n"
+    assert "50 %d%%n%" in message.text % ()
+
+
+def refused(rov: Instance) -> list[str]:
+    """The categories that speak on a change of mode, an illegal call and a value that is not finite."""
+    rov.log.clear()
+    rov.expect("fmi2Reset")
+    assert rov.call("fmi2CancelStep") == ERROR
+    assert rov.set({"u": nan}) == DISCARD
+    return [m.category for m in rov.log]
+
+
+def test_log_categories_are_switched_on_and_off(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        assert refused(rov) == ["logStatusError", "logStatusDiscard"]
+        rov.expect("fmi2SetDebugLogging", 0, 1, strings(b"logStatusError"))
+        assert refused(rov) == ["logStatusDiscard"]
+        rov.expect("fmi2SetDebugLogging", 0, 0, None)
+        assert refused(rov) == []
+        rov.expect("fmi2SetDebugLogging", -1, 2, strings(b"logStatusError", b"logEvents"))
+        assert refused(rov) == ["logEvents", "logStatusError"]
+        assert rov.call("fmi2SetDebugLogging", 0, 2, strings(b"logStatusError", b"logNoSuch")) == ERROR
+        assert refused(rov) == ["logEvents", "logStatusError"]
+        rov.expect("fmi2SetDebugLogging", 1, 1, strings(b"logStatusDiscard"))
+        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
+        rov.expect("fmi2SetDebugLogging", 0, 1, strings(b"logEvents"))
+        assert refused(rov) == ["logStatusError", "logStatusDiscard"]
+        rov.expect("fmi2SetDebugLogging", 1, 0, None)
+        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
+        assert {c.name for c in fmu.description.logCategories} >= {"logStatusError", "logStatusDiscard", "logEvents"}

@@ -1,0 +1,268 @@
+"""Folders of tank tests with anything in them: a vehicle with finite numbers, or one clear line and nothing written."""
+
+import re
+import shutil
+from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from checks.commands import TESTS
+from checks.damage import (
+    CELLS,
+    NUMBERS,
+    changed_bytes,
+    changed_cells,
+    changed_course,
+    changed_lines,
+    changed_toml,
+    fuzz,
+)
+from checks.recordings import clean, write_log
+from rov_fmu.cli import main
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.identify.tuning import read_points
+from rov_fmu.motion.rov import AXES, HEAVE
+from rov_fmu.vehicle.published import load_tables
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+
+Capsys = pytest.CaptureFixture[str]
+LOG = "log_heave_a.csv"
+
+
+@pytest.fixture
+def tests(tmp_path: Path) -> Path:
+    """A folder of all kinds of tests, small."""
+    folder = Path(shutil.copytree(TESTS, tmp_path / "tests"))
+    rov = re.sub(r"^(against|[ab]_t_top) .*$", "", (folder / "rov.toml").read_text(encoding="utf-8"), flags=re.M)
+    (folder / "rov.toml").write_text(rov, encoding="utf-8")
+    (folder / "thrust_top.csv").write_text(
+        "command [%],force [N]\n20,0.27\n50,1.65\n70,3.2\n-50,-1.6\n", encoding="utf-8"
+    )
+    recording = clean(load_vehicle(VIDEORAY).coefficients, HEAVE, ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0)), 5.0)
+    write_log(folder, "a", recording.noisy(np.random.default_rng(1)))
+    return folder
+
+
+def mutated(folder: Path, to: Path, data: st.DataObject) -> None:
+    """A copy of the folder with one of its files changed."""
+    shutil.rmtree(to, ignore_errors=True)
+    shutil.copytree(folder, to)
+    path = to / data.draw(st.sampled_from(sorted(path.name for path in folder.glob("*.[ct][so][vm]*"))))
+    numbers = [changed_cells, changed_course] if path.suffix == ".csv" else [changed_toml]
+    change = data.draw(st.sampled_from([*numbers * 2, changed_lines, changed_bytes]))
+    path.write_bytes(change(path.read_bytes(), data))
+
+
+def check_line(text: str, folder: Path) -> None:
+    """One line that can be printed, names a file or the folder and is not endless."""
+    assert str(folder) in text
+    for line in text.splitlines():
+        assert line.isprintable()
+        assert len(line.replace(str(folder), "")) < 350
+
+
+@pytest.mark.parametrize("examples", [150, pytest.param(2000, marks=pytest.mark.long)])
+def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "changed"
+
+    def check(data: st.DataObject) -> None:
+        mutated(tests, folder, data)
+        try:
+            found = load_tank_tests(folder)
+        except (DataFileError, VehicleFileError) as error:
+            check_line(str(error), folder)
+            return
+        for rows in (*found.thrust.values(), *found.steady.values(), *found.time_constants.values()):
+            assert all(isfinite(row.value) and -1.0 <= row.command <= 1.0 for row in rows)
+        for recording in (r for recordings in found.recordings.values() for r in recordings):
+            assert np.isfinite(recording.time).all()
+            assert np.isfinite(recording.values).any()
+
+    fuzz(check, examples)
+
+
+@pytest.mark.parametrize("examples", [8, pytest.param(30, marks=pytest.mark.long)])
+@pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", "time_constant_yaw.csv", "thrust_top.csv", LOG])
+def test_any_folder_is_identified_or_one_clear_line(
+    only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys
+) -> None:
+    folder, out = tmp_path / "changed", tmp_path / "out"
+    out.mkdir()
+    if only != LOG:
+        (tests / LOG).unlink()
+    original = (tests / only).read_bytes()
+    changes = [changed_toml] if only == "rov.toml" else [changed_course, changed_course, changed_cells]
+
+    def check(data: st.DataObject) -> None:
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(tests, folder)
+        (folder / only).write_bytes(data.draw(st.sampled_from(changes))(original, data))
+        code = main(["identify", str(folder), "-o", str(out / "rov.toml")])
+        printed, said = capsys.readouterr()
+        if code == 0:
+            vehicle = load_vehicle(out / "rov.toml")
+            assert all(isfinite(value) for value in asdict(vehicle.coefficients).values())
+            assert said == ""
+            assert not re.search(r"\bnan\b", printed)
+            (out / "rov.toml").unlink()
+        else:
+            assert code == 2
+            assert printed == ""
+            check_line(said.removesuffix("\n"), folder)
+        assert not any(out.iterdir())
+
+    fuzz(check, examples)
+
+
+N = np.arange(100.0)
+HEADER = "time [s],command [%],depth [m]"
+T, STEP, RAMP = 0.1 * N, 30.0 * (N > 20.0), 0.01 * N
+# Recordings of 100 samples that no filter and no fit was made for: time, command in % and depth.
+STRANGE = {
+    "a gap of years between steps of nanoseconds": (np.where(N < 50.0, 1e-7 * N, 1e9 + N), STEP, RAMP),
+    "nanoseconds": (1e-9 * N, STEP, RAMP),
+    "years": (1e7 * N, STEP, RAMP),
+    "a spike": (T, STEP, 5.0 * (N == 50.0)),
+    "a jump": (T, STEP, 5.0 * (N > 50.0)),
+    "subnormal numbers": (T, STEP, 5e-324 * N),
+    "growth without end": (T, STEP, np.exp(0.1 * N)),
+    "noise alone": (T, 100.0 * np.sin(77.0 * N), np.sin(33.0 * N)),
+    "a command at the end alone": (T, 30.0 * (N == 99.0), RAMP),
+}
+
+
+@pytest.mark.parametrize("case", STRANGE)
+def test_a_strange_recording_is_identified_or_one_clear_line(
+    case: str, tests: Path, tmp_path: Path, capsys: Capsys
+) -> None:
+    np.savetxt(tests / LOG, np.column_stack(STRANGE[case]), "%r", ",", header=HEADER, comments="")
+    code = main(["identify", str(tests), "--report", str(tmp_path / "report.html")])
+    printed, said = capsys.readouterr()
+    assert code in (0, 2)
+    assert (tmp_path / "report.html").exists() == (code == 0)
+    if code:
+        check_line(said.removesuffix("\n"), tests)
+        assert LOG in said
+    assert "nan" not in printed
+
+
+def tuned_or_one_line(code: int, tuned: Path, capsys: Capsys) -> tuple[str, str]:
+    """A vehicle file that can be read, and is then removed, or one line; what was printed, and on what went wrong."""
+    printed, said = capsys.readouterr()
+    assert tuned.exists() == (code == 0)
+    if code == 0:
+        load_vehicle(tuned)
+        tuned.unlink()
+        assert "nan" not in printed
+    else:
+        assert (code, printed) == (2, "")
+        assert all(map(str.isprintable, said.splitlines()))
+    return printed, said
+
+
+@pytest.mark.parametrize("examples", [50, pytest.param(1000, marks=pytest.mark.long)])
+def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
+    points, tuned = tmp_path / "points.csv", tmp_path / "tuned.toml"
+    content = b"command [%],velocity [cm/s],time constant [s]\n20,11,3.2\n30,17.5,2.2\n70,37,1\n"
+
+    def check(data: st.DataObject) -> None:
+        change = data.draw(st.sampled_from([changed_cells, changed_course, changed_lines, changed_bytes]))
+        points.write_bytes(change(content, data))
+        code = main(["tune", str(VIDEORAY), "--axis", "heave", "--points", str(points), "-o", str(tuned)])
+        _, said = tuned_or_one_line(code, tuned, capsys)
+        assert len(said.replace(str(tmp_path), "")) < 300
+
+    fuzz(check, examples)
+
+
+@pytest.mark.parametrize("examples", [150, pytest.param(2000, marks=pytest.mark.long)])
+def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
+    tuned = tmp_path / "tuned.toml"
+    words = st.one_of(NUMBERS.filter(lambda x: abs(x) < 10**400), CELLS, st.floats(0.0, 10.0)).map(str)
+
+    def check(data: st.DataObject) -> None:
+        axis = data.draw(st.sampled_from(sorted(AXES)))
+        options = [
+            f"{name}={data.draw(words)}" for name in ("--command", "--v-ss", "--tau") if data.draw(st.integers(0, 5))
+        ]
+        try:
+            code = main(["tune", str(VIDEORAY), "--axis", axis, *options, "-o", str(tuned)])
+        except SystemExit:  # of argparse, which says how the command goes before what is wrong
+            assert capsys.readouterr().err.count("error:") == 1
+            return
+        printed, _ = tuned_or_one_line(code, tuned, capsys)
+        assert "inf" not in printed
+
+    fuzz(check, examples)
+
+
+@pytest.mark.parametrize("examples", [50, pytest.param(1000, marks=pytest.mark.long)])
+def test_any_published_tables_are_shown_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
+    original = VIDEORAY.parent / "tables"
+    vehicle = tmp_path / "videoray.toml"
+    shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
+    names = sorted(path.name for path in original.glob("*.csv"))
+
+    def check(data: st.DataObject) -> None:
+        folder = Path(shutil.copytree(original, tmp_path / "tables", dirs_exist_ok=True))
+        name = data.draw(st.sampled_from(names))
+        change = data.draw(st.sampled_from([changed_cells, changed_lines, changed_bytes]))
+        (folder / name).write_bytes(change((original / name).read_bytes(), data))
+        code = main(["tables", str(vehicle)])
+        printed, said = capsys.readouterr()
+        if code == 0:
+            assert "nan" not in printed
+            assert load_tables(load_vehicle(vehicle))
+        else:
+            assert (code, printed) == (2, "")
+            check_line(said.removesuffix("\n"), folder)
+            assert name in said
+
+    fuzz(check, examples)
+
+
+@pytest.mark.parametrize("forces", ["20,0\n50,0\n", "20,-0.001\n50,0.01\n70,3\n", "20,1\n50,1\n70,0.5\n100,-0.02\n"])
+@pytest.mark.parametrize("recorded", [True, False])
+def test_a_thrust_curve_that_hardly_pushes_is_one_clear_line_or_a_vehicle(
+    forces: str, recorded: bool, tests: Path, capsys: Capsys
+) -> None:
+    (tests / "thrust_top.csv").write_text(f"command [%],force [N]\n{forces}", encoding="utf-8")
+    if not recorded:
+        (tests / LOG).unlink()
+    code = main(["identify", str(tests)])
+    printed, said = capsys.readouterr()
+    assert code in (0, 2)
+    assert "nan" not in printed
+    assert code == 0 or "the thrust curve of top gives" in said
+
+
+def test_names_that_are_no_text_are_one_clear_line(tests: Path, capsys: Capsys) -> None:
+    for name in ("steady_surge_\n.csv", "steady_surge_\x1b[31m.csv", "steady_surge_\udcff.csv"):
+        try:
+            path = Path(shutil.copy(tests / "steady_surge.csv", tests / name))
+        except OSError:  # a file system that takes Unicode alone
+            continue
+        assert main(["identify", str(tests)]) == 2
+        said = capsys.readouterr().err.removesuffix("\n")
+        check_line(said, tests)
+        assert "no name of a test" in said
+        path.unlink()
+
+
+def test_a_message_quotes_a_cell_in_part(tests: Path) -> None:
+    (tests / "steady_surge.csv").write_text("command [%],velocity [m/s]\n20," + "9" * 100_000 + "\n", encoding="utf-8")
+    with pytest.raises(DataFileError, match=r"line 2, column 'velocity \[m/s\]' = '9+\.\.\.9+': must be a number"):
+        load_tank_tests(tests)
+
+
+def test_bounds_of_points_are_those_of_tests(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("command [%],velocity [m/s]\n20,10000\n", encoding="utf-8")
+    with pytest.raises(DataFileError, match="must be at most 1000"):
+        read_points(path, HEAVE)

@@ -1,0 +1,373 @@
+"""Fits to points, and a whole folder of tests to a vehicle file."""
+
+import shutil
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import linregress
+
+from checks.commands import TESTS
+from checks.recordings import AXES, PLANS, clean, write_log
+from rov_fmu.cli import main
+from rov_fmu.identify.identification import AxisResult, Identification, compare
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.least_squares import Array, Estimate
+from rov_fmu.identify.quadratic_fit import fit_quadratic
+from rov_fmu.identify.response_fit import Point, fit_response
+from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW, Axis, Coefficients
+from rov_fmu.vehicle.published import load_tables, untuned
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+
+REAR = ("a_t_rear", "b_t_rear")
+COMMANDS = np.arange(0.1, 1.01, 0.1)
+
+
+@pytest.fixture
+def k(vehicle: Vehicle) -> Coefficients:
+    """The VideoRay with every α and β at 1."""
+    return untuned(vehicle.coefficients)
+
+
+# ---- Thrust and drag, (6)-(16) ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("axis", "a_d", "b_d"), [("surge", 4.99, 8.65), ("heave", 24.7, -0.92), ("yaw", 0.0789, 0.163)]
+)
+def test_unweighted_fits_of_tables_3_to_5(axis: str, a_d: float, b_d: float, vehicle: Vehicle, k: Coefficients) -> None:
+    """Against (9) and (10) they are not (14)-(16): those have weights, or data that are in figures only."""
+    table = next(t for t in load_tables(vehicle) if t.axis.name == axis)
+    m = table.axis
+    commands, V_ss = np.array([(float(c) / 100.0, float(V)) for c, V in table.steady.items()]).T
+    forces = np.array([m.force(k, c) for c in commands.tolist()])
+    fit = fit_quadratic((m.coefficient("a_d"), m.coefficient("b_d")), V_ss, forces, groups=commands)
+    assert fit.unbounded == pytest.approx((a_d, b_d), rel=0.005)
+    if b_d > 0.0:
+        assert (fit.a, fit.b) == pytest.approx(fit.unbounded)
+        assert fit.at_bound == ()
+    else:
+        assert fit.b == 0.0, "drag that pushes is not physical"
+        assert fit.at_bound == (m.coefficient("b_d"),)
+        assert fit.estimate.intervals["b_d_w"] == pytest.approx((0.0, 3.1), rel=0.01)
+
+
+def test_window_of_weights_gives_the_lower_commands_their_curve() -> None:
+    """(7): forces that follow (9) up to 70 % and fall off above are fitted by (9) within the window."""
+    forces = 42.9 * COMMANDS**2 + 2.711 * COMMANDS - 30.0 * np.maximum(COMMANDS - 0.7, 0.0)
+    weights = (COMMANDS < 0.75).astype(float)
+    all_of_them, weighted = fit_quadratic(REAR, COMMANDS, forces), fit_quadratic(REAR, COMMANDS, forces, weights)
+    assert (weighted.a, weighted.b) == pytest.approx((42.9, 2.711))
+    assert abs(all_of_them.a - 42.9) > 3.0
+    assert weighted.r_squared == pytest.approx(1.0)
+    assert weighted.left_out_error == pytest.approx(0.0, abs=1e-9)
+    assert weighted.residuals[weights == 0.0] == pytest.approx(forces[weights == 0.0] - weighted.value(COMMANDS)[7:])
+
+
+def test_covariance_correlation_and_band_are_those_of_a_straight_line() -> None:
+    """y/x = b + a x is a straight line where the errors grow with x, which weights of 1/x^2 say."""
+    forces = 42.9 * COMMANDS**2 + 2.711 * COMMANDS + COMMANDS * np.random.default_rng(0).standard_normal(10)
+    fit, line = fit_quadratic(REAR, COMMANDS, forces, COMMANDS**-2.0), linregress(COMMANDS, forces / COMMANDS)
+    assert [fit.a, fit.b] == pytest.approx([line.slope, line.intercept])
+    assert list(fit.estimate.errors.values()) == pytest.approx([line.stderr, line.intercept_stderr])
+    assert fit.estimate.freedom == 8.0
+    assert fit.estimate.noise == pytest.approx(np.sqrt(np.sum((fit.residuals / COMMANDS) ** 2) / 8.0))
+    assert fit.estimate.correlation == pytest.approx(np.array([[1.0, -0.886], [-0.886, 1.0]]), abs=0.001)
+    low, high = fit.band(COMMANDS)
+    assert ((low < fit.value(COMMANDS)) & (fit.value(COMMANDS) < high)).all()
+
+
+def test_intervals_and_bands_of_thrust_cover_the_truth() -> None:
+    """500 seeds: 95 % within three standard deviations of their share, 1 % each."""
+    truth = 42.9 * COMMANDS**2 + 2.711 * COMMANDS
+    random = np.random.default_rng(1)
+    a, b, band = [], [], []
+    for _ in range(500):
+        fit = fit_quadratic(REAR, COMMANDS, truth + 0.5 * random.standard_normal(10))
+        (a_low, a_high), (b_low, b_high) = (fit.estimate.interval(name) or (0.0, 0.0) for name in REAR)
+        low, high = fit.band(np.array([0.5]))
+        a.append(a_low <= 42.9 <= a_high)
+        b.append(b_low <= 2.711 <= b_high)
+        band.append(low[0] <= 0.25 * 42.9 + 0.5 * 2.711 <= high[0])
+    assert [np.mean(a), np.mean(b), np.mean(band)] == pytest.approx([0.95] * 3, abs=0.03)
+
+
+def test_leaving_a_thrust_out_leaves_all_of_its_rows_out() -> None:
+    x = np.array([0.2, 0.2, 0.4, 0.6, -0.2])
+    y = 10.0 * np.abs(x) * x + np.array([0.1, 0.2, 0.0, 0.0, -0.3])
+    fit = fit_quadratic(REAR, x, y)
+    without = fit_quadratic(REAR, x[[2, 3]], y[[2, 3]])
+    assert fit.left_out[[0, 1, 4]] == pytest.approx(without.value(x[[0, 1, 4]]))
+    assert np.isnan(fit_quadratic(REAR, x[:3], y[:3]).left_out).all(), "one thrust left fixes no curve"
+
+
+def test_two_points_have_a_curve_but_no_interval() -> None:
+    fit = fit_quadratic(REAR, np.array([0.2, 0.6]), np.array([1.0, 9.0]))
+    assert fit.residuals == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert fit.estimate.intervals == {}
+    assert np.isinf(fit.band(np.array([0.4]))[0]).all()
+
+
+# ---- V_ss and Tau ----------------------------------------------------------------------------------------------------
+
+
+def points_of(m: Axis, k: Coefficients, commands: tuple[float, ...], scatter: Array | None = None) -> list[Point]:
+    """V_ss and Tau of the model, with relative errors."""
+    found = [Point(q, c, m.response(k, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
+    factors = 1.0 + (np.zeros(len(found)) if scatter is None else scatter)
+    return [replace(p, value=p.value * f) for p, f in zip(found, factors.tolist(), strict=True)]
+
+
+@pytest.mark.parametrize("m", [SURGE, HEAVE, YAW], ids=lambda m: m.name)
+def test_points_of_a_model_give_the_model(m: Axis, vehicle: Vehicle) -> None:
+    k = vehicle.coefficients
+    names = [m.coefficient(kind) for kind in ("a_d", "b_d", "beta")]
+    start = replace(k, **dict.fromkeys(names, 1.0))
+    fit = fit_response(m, points_of(m, k, (0.2, -0.3, 0.5, 0.7)), start)
+    for name in names:
+        assert getattr(fit.coefficients, name) == pytest.approx(getattr(k, name), rel=1e-5)
+    assert fit.rms("V_ss") < 1e-7
+    assert fit.rms("Tau", left_out=True) < 1e-6
+
+
+def test_intervals_of_points_cover_the_truth(vehicle: Vehicle) -> None:
+    """60 seeds of 1 % scatter: 90-99 % in the intervals, and drag never negative."""
+    k, random = vehicle.coefficients, np.random.default_rng(2)
+    hits: dict[str, list[bool]] = {}
+    for _ in range(60):
+        fit = fit_response(SURGE, points_of(SURGE, k, (0.2, 0.3, 0.5, 0.7), 0.01 * random.standard_normal(8)), k)
+        for name, (low, high) in fit.estimate.intervals.items():
+            assert low >= 0.0
+            hits.setdefault(name, []).append(low <= getattr(k, name) <= high)
+    assert all(0.9 <= np.mean(share) <= 0.99 for share in hits.values()), {n: np.mean(s) for n, s in hits.items()}
+
+
+def test_steady_velocities_alone_leave_beta(k: Coefficients) -> None:
+    fit = fit_response(SURGE, [p for p in points_of(SURGE, k, (0.2, 0.5, 0.7)) if p.quantity == "V_ss"], k)
+    assert fit.estimate.names == ("a_d_u", "b_d_u")
+    assert fit.coefficients.beta_u == 1.0
+    assert "V_ss alone never fixes m_rov/beta_u" in fit.held["beta_u"]
+
+
+def test_one_thrust_leaves_linear_drag(k: Coefficients) -> None:
+    fit = fit_response(HEAVE, points_of(HEAVE, k, (0.3,)), k)
+    assert fit.estimate.names == ("a_d_w", "beta_w")
+    assert fit.coefficients.b_d_w == 0.0
+    assert "b_d_w" in fit.held
+    assert fit.model == pytest.approx([p.value for p in fit.points])
+
+
+def test_points_without_weight_do_not_count(k: Coefficients) -> None:
+    points = points_of(YAW, k, (0.2, 0.5, 0.7))
+    wrong = [replace(p, value=3.0 * p.value, weight=0.0) for p in points[:2]]
+    assert fit_response(YAW, [*points, *wrong], k).rms("V_ss") < 1e-7
+
+
+def test_thrust_that_is_uncertain_makes_drag_uncertain(k: Coefficients) -> None:
+    thrust = np.array([k.a_t_top, k.b_t_top])
+    fit = fit_response(
+        HEAVE, points_of(HEAVE, k, (0.2, 0.5, 0.7)), k, thrust_covariance=0.01 * np.outer(thrust, thrust)
+    )
+    assert fit.estimate.errors["a_d_w"] == pytest.approx(0.1 * k.a_d_w, rel=0.01)
+    assert fit.estimate.errors["beta_w"] == pytest.approx(0.1, rel=0.01)
+
+
+# ---- A folder --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Thrust tests with noise, and nine recordings of 60 s at 100 Hz of the VideoRay with α = 1."""
+    folder, random = tmp_path_factory.mktemp("full"), np.random.default_rng(0)
+    write_rov(folder)
+    k = replace(load_vehicle(VIDEORAY).coefficients, alpha_u=1.0, alpha_w=1.0, alpha_r=1.0)
+    for thruster, m in (("rear", SURGE), ("top", HEAVE)):
+        rows = [(c, m.force(k, c) + 0.05 * random.standard_normal()) for c in np.arange(0.1, 0.81, 0.1).tolist()]
+        write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
+    for m in AXES:
+        for n, plan in enumerate(PLANS[m.name], 1):
+            recording = clean(k, m, plan)
+            assert len(recording.time) == 6000
+            write_log(folder, str(n), recording.noisy(random))
+    return folder
+
+
+def write_rov(folder: Path, **windows: tuple[float, float]) -> None:
+    """rov.toml with mass and geometry of the VideoRay."""
+    head, known = (TESTS / "rov.toml").read_text(encoding="utf-8").split("[known]")
+    lines = [line for line in known.splitlines() if line.startswith(("m_rov", "I_r", "R ", "gamma"))]
+    text = head.replace('against = "videoray"', "") + "[known]\n" + "\n".join(lines) + "\n[windows]\n"
+    text += "".join(f"{name} = [{low}, {high}]\n" for name, (low, high) in windows.items())
+    (folder / "rov.toml").write_text(text, encoding="utf-8")
+
+
+def write_csv(path: Path, header: str, rows: list[tuple[float, float]]) -> None:
+    path.write_text("\n".join([header, *(f"{x:.6g},{y:.6g}" for x, y in rows)]) + "\n", encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def full(full_folder: Path) -> Identification:
+    return identify(load_tank_tests(full_folder))
+
+
+def test_full_folder_gives_the_vehicle_back(full: Identification, full_folder: Path) -> None:
+    k, found = load_vehicle(VIDEORAY).coefficients, full.vehicle.coefficients
+    true = replace(k, alpha_u=1.0, alpha_w=1.0, alpha_r=1.0)
+    for m in AXES:
+        for command in np.linspace(0.2, 0.7, 11).tolist():
+            V_ss, Tau = m.response(true, command)
+            assert m.response(found, command) == pytest.approx((V_ss, Tau), rel=0.02)
+    for name, (low, high) in full.vehicle.intervals.items():  # that the sensors' scale errs in, all coefficients share
+        assert abs(getattr(true, name) - 0.5 * (low + high)) < 1.6 * 0.5 * (high - low), name
+    assert set(full.vehicle.intervals) == {
+        *("a_t_rear", "b_t_rear", "a_t_top", "b_t_top"),
+        *(f"{kind}_{v}" for kind in ("a_d", "b_d", "beta") for v in "uwr"),
+    }
+    assert [axis.chosen for axis in full.axes] == ["recordings"] * 3
+    assert all(axis.response for axis in full.axes), "the points of the recordings are fitted too"
+    assert full.vehicle.provenance
+    assert set(full.vehicle.provenance.inputs) == {path.name for path in full_folder.iterdir()}
+    assert full.vehicle.command_range == (0.2, 0.7)
+
+
+def test_full_folder_to_vehicle_file_in_20_seconds(
+    full_folder: Path, full: Identification, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "full.toml"
+    start = time.process_time()  # of this process alone, whatever else the machine does
+    assert main(["identify", str(full_folder), "-o", str(path)]) == 0
+    assert time.process_time() - start <= 20.0
+    assert "log_yaw_3.csv" in capsys.readouterr().out
+    read, made = load_vehicle(path), full.vehicle
+    assert [p.name for p in tmp_path.iterdir()] == ["full.toml"]
+    for name in COEFFICIENTS:
+        assert getattr(read.coefficients, name) == pytest.approx(getattr(made.coefficients, name), rel=1e-5)
+    assert read.intervals.keys() == made.intervals.keys()
+    for name, (low, high) in made.intervals.items():
+        assert read.intervals[name] == pytest.approx((low, high), rel=1e-5)
+    assert replace(read, coefficients=made.coefficients, intervals=made.intervals) == made
+    assert read.provenance
+    assert "heave: output error over 3 recordings" in read.provenance.method
+
+
+def test_points_of_a_comparison_stand_beside_the_model(full: Identification) -> None:
+    for comparison in compare(full):
+        assert len(comparison.points) == len(comparison.model) == len(comparison.left_out)
+        assert comparison.rms(comparison.model) < 0.05
+        assert np.isnan(comparison.rms(comparison.against)), "there is nothing to set beside"
+
+
+def axis_of(found: Identification, axis: str) -> AxisResult:
+    return next(result for result in found.axes if result.axis.name == axis)
+
+
+# ---- What the data do not tell, in words -----------------------------------------------------------------------------
+
+FORCES = [(c, 42.9 * c * c + 2.711 * c) for c in (0.1, 0.3, 0.5, 0.7)]
+TOP = [(c, 6.494 * c * c + 0.0513 * c) for c in (0.1, 0.3, 0.5, 0.7)]
+STEADY = {
+    "surge": [(0.2, 0.22), (0.3, 0.43), (0.5, 0.97), (0.7, 1.6)],
+    "heave": [(0.3, 0.163), (0.5, 0.28), (0.7, 0.4)],
+    "yaw": [(0.2, 0.93), (0.4, 2.0), (0.7, 3.7)],
+}
+
+
+def folder_with(
+    folder: Path, tables: Mapping[str, list[tuple[float, float]]] | None = None, **windows: tuple[float, float]
+) -> Identification:
+    """A small folder, with other tables by file name."""
+    write_rov(folder, **windows)
+    all_tables = {"thrust_rear": FORCES, "thrust_top": TOP, **{f"steady_{axis}": rows for axis, rows in STEADY.items()}}
+    for name, rows in {**all_tables, **(tables or {})}.items():
+        velocity = "velocity [rad/s]" if "yaw" in name else "velocity [m/s]"
+        kind = "force [N]" if "thrust" in name else "time constant [s]" if "time" in name else velocity
+        write_csv(folder / f"{name}.csv", f"command [1],{kind}", rows)
+    return identify(load_tank_tests(folder))
+
+
+Tables = Mapping[str, list[tuple[float, float]]]
+WORDS: dict[str, tuple[Tables, str]] = {
+    "no Tau": ({}, "surge: V_ss alone never fixes m_rov/beta_u"),
+    "no Tau in yaw": ({}, "yaw: V_ss alone never fixes I_r/beta_r"),
+    "few points": ({"steady_heave": [(0.3, 0.15), (0.5, 0.29), (0.7, 0.38)]}, "heave: the data hardly tell quadratic"),
+    "as many as coefficients": ({"steady_yaw": [(0.3, 1.5), (0.6, 3.1)]}, "yaw: as many coefficients as measurements"),
+    "drag at its bound": ({"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]}, "heave: b_d_w stops at 0"),
+    "one thrust carries": ({"steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)]}, "at a thrust that is left out"),
+    "thrust that points backward": ({"thrust_rear": [(0.3, 1.0), (0.5, 11.5), (0.7, 30.0)]}, "backward below 27%"),
+    "weak reverse thrust": ({"thrust_rear": [*FORCES, (-0.5, -8.0)]}, "rear thrust: force differs by -34%"),
+    "slow upward": ({"steady_heave": [*STEADY["heave"], (-0.5, -0.25)]}, "heave: V_ss differs by -11%"),
+    "thrust not tested": ({"thrust_top": TOP[:3]}, "but top thrust was tested from 10% to 50% only"),
+    "two thrusts": ({"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]}, "2 points fix two"),
+}
+
+
+@pytest.mark.parametrize("case", WORDS)
+def test_warnings(case: str, tmp_path: Path) -> None:
+    tables, words = WORDS[case]
+    found = folder_with(tmp_path, tables)
+    assert any(words in warning for warning in found.warnings), found.warnings
+    assert found.vehicle.provenance
+    assert found.vehicle.provenance.warnings == found.warnings
+
+
+def test_enough_good_data_raise_no_warning(tmp_path: Path, k: Coefficients) -> None:
+    tables: dict[str, list[tuple[float, float]]] = {}
+    for m in AXES:
+        for quantity, kind in enumerate(("steady", "time_constant")):
+            tables[f"{kind}_{m.name}"] = [(c, m.response(k, c)[quantity]) for c in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)]
+    assert folder_with(tmp_path, tables).warnings == ()
+
+
+def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
+    tables = {"thrust_rear": [*FORCES, (-0.5, -8.0)]}
+    both = folder_with(tmp_path, tables)
+    forward = folder_with(tmp_path, tables, thrust_rear=(0.0, 1.0))
+    assert forward.thrust["rear"].weights.tolist() == [1.0] * 4 + [0.0]
+    assert forward.vehicle.coefficients.a_t_rear == pytest.approx(42.9, rel=1e-3)
+    assert both.thrust["rear"].left_out_error > 1.0
+    assert forward.vehicle.sources["a_t_rear"] == "(7) over 4 forces"
+    assert both.vehicle.sources["a_t_rear"] == "(6) over 5 forces"
+
+
+def test_drag_as_in_the_paper_stands_beside(tmp_path: Path, k: Coefficients) -> None:
+    drag = axis_of(folder_with(tmp_path), "surge").drag
+    assert drag
+    assert drag.y == pytest.approx([SURGE.force(k, c) for c, _ in STEADY["surge"]], rel=1e-4)
+    assert drag.a == pytest.approx(k.a_d_u, rel=0.2)
+
+
+def test_tables_are_checked_against_recordings(full_folder: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(full_folder, tmp_path / "both"))
+    write_csv(folder / "steady_surge.csv", "command [1],velocity [m/s]", [(0.3, 0.6), (0.5, 1.2)])
+    for path in (*folder.glob("log_heave*"), *folder.glob("log_yaw*")):
+        path.unlink()
+    for axis in ("heave", "yaw"):
+        unit = "rad/s" if axis == "yaw" else "m/s"
+        write_csv(folder / f"steady_{axis}.csv", f"command [1],velocity [{unit}]", STEADY[axis])
+    found = identify(load_tank_tests(folder))
+    assert [axis.chosen for axis in found.axes] == ["recordings", "points", "points"]
+    assert any("surge: V_ss of the tables is" in warning for warning in found.warnings)
+
+
+def test_known_coefficients_are_kept(tmp_path: Path) -> None:
+    folder_with(tmp_path)
+    rov = tmp_path / "rov.toml"
+    known = '[known]\nbeta_u = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
+    rov.write_text(rov.read_text(encoding="utf-8").replace("[known]\n", known), encoding="utf-8")
+    vehicle = identify(load_tank_tests(tmp_path)).vehicle
+    assert (vehicle.coefficients.beta_u, vehicle.sources["beta_u"]) == (0.8, "a guess")
+    assert vehicle.intervals["beta_u"] == (0.7, 0.9)
+    assert not any("beta_u" in warning for warning in vehicle.provenance.warnings) if vehicle.provenance else False
+
+
+def test_estimate_without_freedom_has_no_interval() -> None:
+    estimate = Estimate(("a_d_u", "beta_u"), np.array([1.0, 2.0]), np.diag([np.inf, 0.04]), 5.0, 0.1)
+    assert estimate.interval("a_d_u") is None
+    low, high = estimate.interval("beta_u") or (0.0, 0.0)
+    assert low * high == pytest.approx(4.0), "a factor's interval is symmetric in its logarithm"
+    assert np.isnan(estimate.correlation[0, 0])

@@ -1,0 +1,133 @@
+"""V_ss and Tau out of recordings with known coefficients and noise (sections 4.1-4.3, (17))."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from checks.recordings import AXES, PLANS, clean
+from rov_fmu.identify.step_responses import Method, StepResponse, correlation_time, steps, velocity, without_spikes
+from rov_fmu.identify.tank_tests import Recording
+from rov_fmu.motion.rov import HEAVE, SURGE, YAW, Axis
+from rov_fmu.vehicle.vehicle import Vehicle
+
+
+def record(vehicle: Vehicle, axis: Axis, *plan: tuple[float, float], seed: int = 0, **options: float) -> Recording:
+    noise = options.pop("noise", None)
+    return clean(vehicle.coefficients, axis, plan, **options).noisy(np.random.default_rng(seed), noise=noise)
+
+
+@pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
+@pytest.mark.parametrize("command", [0.2, 0.3, 0.5, 0.7, -0.2, -0.7])
+def test_step_from_rest_gives_both(axis: Axis, command: float, vehicle: Vehicle) -> None:
+    V_ss, Tau = axis.response(vehicle.coefficients, command)
+    (step,) = steps(record(vehicle, axis, (0.0, 3.0), (command, 12.0 * Tau + 4.0)))
+    assert step.V_ss == pytest.approx(V_ss, rel=0.01)
+    assert step.Tau == pytest.approx(Tau, rel=0.1)
+    assert (step.start, step.command, step.before, step.note) == (3.0, command, 0.0, "")
+
+
+@pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
+def test_steps_up_and_down_in_both_directions(axis: Axis, vehicle: Vehicle) -> None:
+    commands = (0.3, 0.7, 0.3, -0.5, -0.7, 0.5)
+    found = steps(record(vehicle, axis, (0.0, 3.0), *((c, 20.0) for c in commands)))
+    assert [step.command for step in found] == list(commands)
+    assert [step.before for step in found] == [0.0, *commands[:-1]]
+    for step in found:
+        assert step.V_ss == pytest.approx(axis.response(vehicle.coefficients, step.command)[0], rel=0.01)
+        assert (step.Tau is None) == (step.before != 0.0), "Tau (17) is that of a start from rest"
+
+
+def test_standard_errors_tell_the_scatter(vehicle: Vehicle) -> None:
+    """Over 8 seeds: about 95 % within two standard errors, and these not far larger than the scatter."""
+    for axis in AXES:
+        recordings = [clean(vehicle.coefficients, axis, plan) for plan in PLANS[axis.name]]
+        found: list[StepResponse] = []
+        for seed in range(8):
+            random = np.random.default_rng(seed)
+            found += [step for recording in recordings for step in steps(recording.noisy(random))]
+        for deviations in (
+            [(s.V_ss - axis.response(vehicle.coefficients, s.command)[0]) / s.V_ss_error
+             for s in found if s.V_ss is not None and s.V_ss_error],
+            [(s.Tau - axis.response(vehicle.coefficients, s.command)[1]) / s.Tau_error
+             for s in found if s.Tau is not None and s.Tau_error],
+        ):  # fmt: skip
+            assert len(deviations) >= 15
+            assert np.mean(np.abs(deviations) < 2.0) > 0.85
+            assert 0.4 < np.std(deviations) < 1.3
+
+
+def test_coloured_noise_widens_the_standard_error(vehicle: Vehicle) -> None:
+    """Turbulence, correlated over some 40 samples: the error grows with it, about sqrt(39) times."""
+    white = record(vehicle, SURGE, (0.0, 3.0), (0.5, 60.0), noise=0.02)
+    random = np.random.default_rng(1)
+    rest = record(vehicle, SURGE, (0.0, 3.0), (0.5, 60.0), noise=0.0)
+    colour = lfilter([0.02 * np.sqrt(1.0 - 0.95**2)], [1.0, -0.95], random.standard_normal(len(rest.values)))
+    (plain,), (turbulent,) = steps(white), steps(replace(rest, values=rest.values + colour))
+    assert plain.V_ss_error
+    assert turbulent.V_ss_error
+    assert 3.0 < turbulent.V_ss_error / plain.V_ss_error < 12.0
+
+
+def test_hold_too_short_for_a_steady_state_has_none(vehicle: Vehicle) -> None:
+    (step,) = steps(record(vehicle, HEAVE, (0.0, 3.0), (0.3, 3.0)))
+    assert (step.V_ss, step.Tau) == (None, None)
+    assert "to tell whether the velocity still changes" in step.note
+    (step,) = steps(record(vehicle, HEAVE, (0.0, 3.0), (0.3, 3.0), noise=0.0))
+    assert step.note == "the velocity still changes at the end: no V_ss"
+    (step,) = steps(record(vehicle, HEAVE, (0.0, 3.0), (0.3, 0.1)))
+    assert step.note == "too short"
+
+
+def test_motion_against_the_command_is_no_response(vehicle: Vehicle) -> None:
+    recording = record(vehicle, HEAVE, (0.0, 3.0), (0.5, 15.0))
+    (step,) = steps(replace(recording, values=-recording.values))
+    assert step.V_ss is None
+    assert "against the command" in step.note
+
+
+def test_spikes_and_gaps_do_not_matter(vehicle: Vehicle) -> None:
+    recording = record(vehicle, HEAVE, (0.0, 3.0), (0.5, 15.0))
+    random = np.random.default_rng(7)
+    values = recording.values.copy()
+    values[random.choice(len(values), 40, replace=False)] += 3.0
+    values[random.choice(len(values), 300, replace=False)] = np.nan
+    (step,), (clear,) = steps(replace(recording, values=values)), steps(recording)
+    assert step.V_ss == pytest.approx(clear.V_ss, rel=0.005)
+    assert step.Tau == pytest.approx(clear.Tau, rel=0.05)
+
+
+@pytest.mark.parametrize("rate", [10.0, 25.0, 250.0])
+def test_any_rate(rate: float, vehicle: Vehicle) -> None:
+    V_ss, Tau = YAW.response(vehicle.coefficients, 0.5)
+    (step,) = steps(record(vehicle, YAW, (0.0, 4.0), (0.5, 16.0), rate=rate))
+    assert step.V_ss == pytest.approx(V_ss, rel=0.01)
+    assert step.Tau == pytest.approx(Tau, rel=0.05)
+
+
+@pytest.mark.parametrize("method", ["savitzky-golay", "moving average"])
+def test_velocity_of_a_ramp(method: Method) -> None:
+    time = np.sort(np.random.default_rng(3).uniform(0.0, 10.0, 1000))  # a logger without a steady clock
+    even, v = velocity(time, 0.3 * time, is_position=True, method=method)
+    assert np.ptp(np.diff(even)) < 1e-9
+    inner = slice(80, -80)  # the moving average has spikes at its ends, as the paper says of Figure 11
+    assert v[inner] == pytest.approx(0.3, abs=1e-9)
+    _, same = velocity(time, np.full_like(time, 0.3), is_position=False, method=method)
+    assert same == pytest.approx(0.3, abs=1e-12)
+
+
+def test_without_spikes_leaves_the_rest_alone() -> None:
+    values = np.sin(np.arange(500) / 30.0) + 0.01 * np.random.default_rng(0).standard_normal(500)
+    spiked = values.copy()
+    spiked[[50, 51, 200]] += 2.0
+    found = without_spikes(spiked)
+    assert found[[50, 51, 200]] == pytest.approx(values[[50, 51, 200]], abs=0.1)
+    assert np.mean(found != spiked) < 0.02
+    assert without_spikes(np.zeros(30)).tolist() == [0.0] * 30
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
+def test_correlation_time_of_first_order_noise(rho: float) -> None:
+    noise = lfilter([1.0], [1.0, -rho], np.random.default_rng(2).standard_normal(50_000))
+    assert correlation_time(noise) == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.12)

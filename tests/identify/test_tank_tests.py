@@ -1,0 +1,267 @@
+"""A folder of tank tests: what is read from it, and one clear line for whatever is wrong with it."""
+
+import hashlib
+import shutil
+from collections.abc import Callable
+from math import pi, radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from checks.commands import TESTS
+from rov_fmu.cli import main
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.identify.tank_tests import Row, TankTests, load_tank_tests
+from rov_fmu.vehicle.published import load_tables
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A copy of the VideoRay's tests."""
+    return Path(shutil.copytree(TESTS, tmp_path / "tests"))
+
+
+# ---- What is read ----------------------------------------------------------------------------------------------------
+
+
+def test_the_folder_of_the_videoray_holds_the_measurements_of_tables_3_to_7(vehicle: Vehicle) -> None:
+    found = load_tank_tests(TESTS)
+    tables = {table.axis.name: table for table in load_tables(vehicle)}
+    for axis, table in tables.items():
+        forward = {row.command: row.value for row in found.steady[axis] if row.command > 0.0}
+        assert forward == {float(c) / 100.0: float(V) for c, V in table.steady.items()}
+        Taus = {row.command: row.value for row in found.time_constants.get(axis, ())}
+        assert Taus == {
+            float(row.command) / 100.0: float(Tau)
+            for row in table.rows if (Tau := row.scaled.Tau.measured) is not None
+        }  # fmt: skip
+    upward = [(row.command, row.value) for row in found.steady["heave"] if row.command < 0.0]
+    assert upward == [(-0.7, -0.37), (-0.5, -0.25), (-0.3, -0.17), (-0.2, -0.13)][::-1]
+
+
+def test_what_no_test_tells_is_table_9s(vehicle: Vehicle) -> None:
+    known = load_tank_tests(TESTS).rov.known
+    assert {name: q.value for name, q in known.items()} == {
+        name: getattr(vehicle.coefficients, name)
+        for name in ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top")
+    }
+    assert all("Table 9" in q.source for q in known.values())
+
+
+def test_every_input_has_its_hash() -> None:
+    inputs = load_tank_tests(TESTS).inputs
+    assert inputs == {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in TESTS.iterdir() if path.suffix == ".csv" or path.name == "rov.toml"
+    }  # fmt: skip
+
+
+def test_columns_in_any_order_and_unit(folder: Path) -> None:
+    (folder / "steady_yaw.csv").write_text("velocity [deg/s],command [1]\n90,0.2\n-180,-.4\n", encoding="utf-8")
+    (folder / "thrust_rear_a.csv").write_text("command [%],force [N]\n50,12.5\n0,0\n", encoding="utf-8")
+    (folder / "thrust_rear_b.csv").write_text("force [N],command [%]\n-3,-20\n", encoding="utf-8")
+    (folder / "time_constant_yaw.csv").write_text("command [%],time constant [ms]\n20,3050\n", encoding="utf-8")
+    found = load_tank_tests(folder)
+    assert [(row.command, row.value) for row in found.steady["yaw"]] == [(0.2, pytest.approx(pi / 2)), (-0.4, -pi)]
+    assert found.thrust["rear"] == (
+        Row("thrust_rear_a.csv", 2, 0.5, 12.5),
+        Row("thrust_rear_a.csv", 3, 0.0, 0.0),
+        Row("thrust_rear_b.csv", 2, -0.2, -3.0),
+    )
+    assert found.time_constants["yaw"][0].value == pytest.approx(3.05)
+
+
+def log(folder: Path, axis: str, header: str, rows: list[str]) -> TankTests:
+    (folder / f"log_{axis}.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    return load_tank_tests(folder)
+
+
+def test_recording_with_heading_of_a_compass_and_blanks(folder: Path) -> None:
+    rows = [f"{100 + n / 10},30,{(350 + 2 * n) % 360 if n % 2 == 0 else ''},1013" for n in range(60)]
+    (recording,) = log(folder, "yaw", "time [s],command [%],heading [deg],pressure [hPa]", rows).recordings["yaw"]
+    assert recording.is_position
+    assert recording.time[0] == 0.0
+    assert recording.time[-1] == pytest.approx(5.9)
+    there = np.isfinite(recording.values)
+    assert there.tolist() == [n % 2 == 0 for n in range(60)]
+    assert recording.values[there] == pytest.approx([radians(350 + 2 * n) for n in range(0, 60, 2)])
+
+
+def test_recording_with_depth_and_velocity_goes_by_the_depth(folder: Path) -> None:
+    rows = [f"{n},0.3,{10 * n},0.1" for n in range(30)]
+    (recording,) = log(folder, "heave", "time [ms],command [1],depth [cm],velocity [m/s]", rows).recordings["heave"]
+    assert recording.quantity == "depth"
+    assert recording.values[-1] == pytest.approx(2.9)
+    assert recording.time[-1] == pytest.approx(0.029)
+
+
+def test_recording_of_a_camera(folder: Path) -> None:
+    rows = [f"{n / 30:.4f},30,{20 + n}" for n in range(30)]
+    (recording,) = log(folder, "surge", "time [s],command [%],velocity [cm/s]", rows).recordings["surge"]
+    assert not recording.is_position
+    assert recording.values[0] == pytest.approx(0.2)
+
+
+def test_as_spreadsheets_save_them(folder: Path) -> None:
+    before = load_tank_tests(folder).steady
+    path = folder / "steady_surge.csv"
+    text = path.read_text(encoding="utf-8").replace(",", " , ").replace("\n", "\r\n")
+    path.write_bytes(("\ufeff" + text + "\r\n ,\r\n").encode())
+    assert load_tank_tests(folder).steady == before
+
+
+# ---- What is refused -------------------------------------------------------------------------------------------------
+
+STEADY, TAU = "command [%],velocity [m/s]\n", "command [%],time constant [s]\n"
+LOG = "time [s],command [%],depth [m]\n"
+# File, its content, and all that the one line must name beside the file.
+BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
+    "text": ("steady_surge.csv", STEADY + "20,fast\n", ("line 2", "'velocity [m/s]' = 'fast'", "number")),
+    "decimal comma": ("steady_surge.csv", STEADY + '20,"0,31"\n', ("line 2", "'velocity [m/s]' = '0,31'", "number")),
+    "NaN": ("thrust_top.csv", "command [%],force [N]\n20,nan\n", ("line 2", "'force [N]' = 'nan'", "number")),
+    "no velocity": ("steady_surge.csv", STEADY + "20\n", ("line 2", "'velocity [m/s]'", "missing")),
+    "too many": ("steady_surge.csv", STEADY + "20,0.3,7\n", ("line 2", "column 3 = '7'", "no such column")),
+    "against the command": ("steady_surge.csv", STEADY + "20,0.3\n-20,0.3\n", ("line 3", "[m/s]' = 0.3", "sign")),
+    "no motion": ("steady_surge.csv", STEADY + "20,0\n", ("line 2", "'velocity [m/s]' = 0", "sign")),
+    "no command": ("steady_surge.csv", STEADY + "0,0.1\n", ("line 2", "'command [%]' = 0", "zero")),
+    "beyond full thrust": ("steady_surge.csv", STEADY + "120,0.3\n", ("line 2", "[%]' = '120'", "at most 100")),
+    "beyond full thrust, fraction": (
+        "steady_surge.csv", "command [1],velocity [m/s]\n-1.2,-0.3\n", ("line 2", "'-1.2'", "at least -1")
+    ),
+    "percent as fraction": (
+        "steady_surge.csv", "command [1],velocity [m/s]\n20,0.3\n", ("line 2", "'command [1]' = '20'", "at most 1")
+    ),
+    "no unit": ("steady_surge.csv", "command [%],velocity\n20,0.3\n", ("line 1", "column 2 = 'velocity'", "[m/s]")),
+    "other unit": (
+        "steady_surge.csv", "command [%],velocity [knot]\n20,1\n", ("line 1", "column 2", "'velocity [knot]'", "[cm/s]")
+    ),
+    "yaw in m/s": ("steady_yaw.csv", STEADY + "20,1\n", ("line 1", "column 2", "velocity [rad/s] or velocity [deg/s]")),
+    "other column": (
+        "steady_surge.csv", "command [%],velocity [m/s],roll [deg]\n", ("line 1", "column 3", "'roll [deg]'", "no such")
+    ),
+    "column twice": (
+        "steady_surge.csv", "command [%],velocity [m/s],command [1]\n", ("line 1", "column 3", "[1]'", "before")
+    ),
+    "column missing": ("steady_surge.csv", "command [%]\n20\n", ("line 1", "'velocity [m/s]' is missing")),
+    "empty": ("steady_surge.csv", "", ("line 1", "'command [%]' is missing")),
+    "header alone": ("steady_surge.csv", STEADY, ("line 1", "no rows")),
+    "not UTF-8": ("steady_surge.csv", STEADY.encode() + b"20,\xb5\n", ("UTF-8", "byte 30")),
+    "open quote": ("steady_surge.csv", STEADY + '20,"0.3\n', ("line 2",)),
+    "negative Tau": ("time_constant_yaw.csv", TAU + "20,-3\n", ("line 2", "'time constant [s]' = -3", "above 0")),
+    "Tau without command": ("time_constant_yaw.csv", TAU + "0,3\n", ("line 2", "'command [%]' = 0", "zero")),
+    "reverse thrust as magnitude": (
+        "thrust_rear.csv", "command [%],force [N]\n50,9\n-50,6\n", ("line 3", "'force [N]' = 6", "sign of the command")
+    ),
+    "time goes back": ("log_heave.csv", LOG + "0,30,0\n0.1,30,0\n0.1,30,0\n", ("line 4", "'time [s]' = 0.1", "later")),
+    "too few samples": ("log_heave.csv", LOG + "0,30,0\n0.1,30,\n0.2,30,\n", ("1 samples of depth", "20")),
+    "command missing": ("log_heave.csv", LOG + "0,,0\n", ("line 2", "'command [%]'", "missing")),
+    "nothing measured": ("log_heave.csv", "time [s],command [%]\n0,0\n", ("line 1", "'depth [m]' or 'velocity [m/s]'")),
+    "heading in heave": ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", ("line 1", "'depth [m]' or")),
+    "unknown name": ("stedy_surge.csv", STEADY, ("no name of a test", "steady_")),
+    "no axis": ("steady_sway.csv", STEADY, ("no name of a test", "surge, heave or yaw")),
+    "no thruster": ("thrust_left.csv", STEADY, ("no name of a test", "rear or top")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_file_is_one_clear_line(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name, content, named = BAD[case]
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    refused(folder, (str(path), *named), capsys)
+
+
+def edit(old: str, new: str) -> Callable[[str], str]:
+    def change(text: str) -> str:
+        assert text.count(old) == 1
+        return text.replace(old, new)
+
+    return change
+
+
+BAD_ROV: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
+    "no mass": (edit("m_rov = ", "# "), ("known.m_rov", "missing")),
+    "unknown coefficient": (edit("[windows]", "mass = 1.0\n[windows]"), ("known.mass", "no such key")),
+    "unit": (edit('"kg"', '"lb"'), ("known.m_rov", "'lb'", "'kg'")),
+    "unknown window": (edit("heave = [0.2, 0.7]", "sway = [0.2, 0.7]"), ("windows.sway", "no such key")),
+    "window of three": (edit("[0.2, 0.7]", "[0.2, 0.5, 0.7]"), ("windows.heave", "2")),
+    "identifier": (edit('"videoray_refit"', '"video ray"'), ("vehicle.identifier", "'video ray'")),
+    "not TOML": (edit("[windows]", "[windows"), ("not TOML",)),
+    "nothing to set beside": (
+        edit('against = "videoray"', 'against = "nowhere.toml"'),
+        ("against", "nowhere.toml", "videoray_refit"),
+    ),
+    "half a thrust curve": (edit("b_t_top = ", "# "), ("a_t_top", "b_t_top is not")),
+    "no thrust curve": (
+        lambda t: edit("b_t_top = ", "# ")(edit("a_t_top = ", "# ")(t)),
+        ("no thrust_top*.csv", "a_t_top"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_ROV)
+def test_bad_rov_file_is_one_clear_line(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change, named = BAD_ROV[case]
+    path = folder / "rov.toml"
+    path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
+    refused(folder, named, capsys)
+
+
+def test_folders_that_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    refused(tmp_path / "nowhere", ("no such folder",), capsys)
+    refused(tmp_path, ("rov.toml", "No such file"), capsys)
+    shutil.copy(TESTS / "rov.toml", tmp_path)
+    refused(tmp_path, ("no tests",), capsys)
+
+
+def test_axis_without_tests(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "steady_yaw.csv").unlink()
+    refused(folder, (str(folder), "steady_yaw*.csv", "a_d_r, b_d_r"), capsys)
+
+
+def test_thrust_both_given_and_tested(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "thrust_top.csv").write_text("command [%],force [N]\n20,1\n40,2\n", encoding="utf-8")
+    refused(folder, ("a_t_top", "thrust_top.csv"), capsys)
+
+
+@pytest.mark.parametrize(
+    ("rows", "reason"),
+    [
+        ([f"{n / 10},0,{n / 10}" for n in range(50)], "command never changes"),
+        ([f"{n / 10},{30 * (n > 9)},1.5" for n in range(50)], "depth never changes"),
+        ([f"{n / 10},{30 * (n > 9)},{-0.02 * max(n - 9, 0):.2f}" for n in range(100)], "against the command"),
+    ],
+)
+def test_recordings_that_teach_nothing(
+    rows: list[str], reason: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "log_heave.csv").write_text(LOG + "\n".join(rows) + "\n", encoding="utf-8")
+    refused(folder, (str(folder / "log_heave.csv"), reason), capsys)
+
+
+def refused(folder: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    """Exit code 2, one line with all that must be named, and what stood in the output file stays."""
+    output = folder.parent / "out.toml"
+    output.write_text("before", encoding="utf-8")
+    there = sorted(folder.parent.rglob("*"))
+    assert main(["identify", str(folder), "-o", str(output)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    for word in named:
+        assert word in err
+    assert output.read_text(encoding="utf-8") == "before"
+    assert sorted(folder.parent.rglob("*")) == there
+
+
+def test_errors_by_type(folder: Path) -> None:
+    (folder / "steady_surge.csv").write_text(STEADY, encoding="utf-8")
+    with pytest.raises(DataFileError):
+        load_tank_tests(folder)
+    (folder / "rov.toml").unlink()
+    with pytest.raises(VehicleFileError):
+        load_tank_tests(folder)
+    with pytest.raises(VehicleFileError):
+        load_vehicle(folder / "rov.toml")

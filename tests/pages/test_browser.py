@@ -1,0 +1,270 @@
+"""What a person sees who opens the FMU: its documentation page, and FMPy's web app, in headless Chromium.
+
+SCREENSHOTS=docs pytest -m interop tests/test_browser.py takes the picture of the README anew.
+"""
+
+import importlib.util
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from rov_fmu.export.interface import UNITS, Variable, variables
+from rov_fmu.motion.rov import Inputs, State, step
+from rov_fmu.pages.templates import number, pretty_unit
+from rov_fmu.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page, Route
+
+pytestmark = pytest.mark.interop
+
+_FLAGS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+
+
+@pytest.fixture(scope="module")
+def declared(vehicle: Vehicle) -> tuple[Variable, ...]:
+    return variables(vehicle.coefficients)
+
+
+@pytest.fixture(scope="module")
+def browser() -> "Iterator[Browser]":
+    playwright = pytest.importorskip("playwright.sync_api")
+    chromium = shutil.which("chromium") or pytest.skip("there is no chromium")
+    with playwright.sync_playwright() as engine:
+        browser = engine.chromium.launch(executable_path=chromium, headless=True, args=_FLAGS)
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """A page with what it said and what it asked for."""
+
+    def __init__(self, browser: "Browser", *, width: int = 1280, height: int = 900, scheme: Any = "light") -> None:
+        self.page: Page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+        self.said: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
+        self.page.on("pageerror", lambda error: self.said.append(f"exception: {error}"))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+
+    def problems(self) -> list[str]:
+        return [text for text in self.said if text.startswith(("error", "warning", "exception", "assert"))]
+
+
+@pytest.fixture
+def visit(browser: "Browser") -> Iterator[Callable[..., Visit]]:
+    visits: list[Visit] = []
+
+    def new(**options: Any) -> Visit:
+        visits.append(Visit(browser, **options))
+        return visits[-1]
+
+    yield new
+    for one in visits:
+        one.page.close()
+
+
+# ---- documentation/index.html ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_documentation_asks_for_nothing_and_fits(
+    videoray_dir: Path, visit: Callable[..., Visit], tmp_path: Path, width: int, scheme: str
+) -> None:
+    seen = visit(width=width, scheme=scheme)
+    url = (videoray_dir / "documentation" / "index.html").as_uri()
+    seen.page.goto(url)
+    seen.page.screenshot(path=tmp_path / f"documentation-{width}-{scheme}.png", full_page=True)
+    assert seen.said == []
+    assert seen.asked == [url]
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= width  # nothing to scroll sideways for
+    plots = seen.page.locator("svg")
+    assert plots.count() == 8
+    for plot in plots.all():
+        box = plot.bounding_box()
+        assert box is not None
+        assert box["width"] > 200
+        assert box["height"] > 100
+    light = seen.page.evaluate("getComputedStyle(document.body).backgroundColor").removeprefix("rgb(").split(",")[0]
+    assert (int(light) > 128) == (scheme == "light")
+
+
+def test_the_documentation_shows_the_variables_in_groups(
+    videoray_dir: Path, visit: Callable[..., Visit], declared: tuple[Variable, ...]
+) -> None:
+    page = visit().page
+    page.goto((videoray_dir / "documentation" / "index.html").as_uri())
+    groups = page.evaluate(
+        "Array.from(document.querySelectorAll('#variables + .wide tbody'), group => Array.from(group.rows,"
+        " row => Array.from(row.cells, cell => cell.innerText.trim())))"
+    )
+    expected = groupby(declared, lambda v: (v.causality, v.variability, v.initial))
+    assert groups == [[_row(v) for v in members] for _, members in expected]
+    assert len(groups) == 6  # inputs, states, derivatives, thrust, fixed and tunable coefficients
+
+
+def _row(v: Variable) -> list[str]:
+    unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
+    limits = [number(value) for value in (v.start, v.minimum, v.maximum)]
+    return [v.name, v.description, v.causality, v.variability, unit, *limits]
+
+
+# ---- FMPy's web app --------------------------------------------------------------------------------------------------
+
+COMMANDS = {"u_l": 0.32, "u_r": 0.3, "u_t": 0.4}
+SHOWN = ("u", "w", "r", "z", "psi")
+
+
+@pytest.fixture(scope="module")
+def webapp(
+    videoray_fmu: Path, declared: tuple[Variable, ...], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[str]:
+    """The address of the app; it offers the commands and all parameters."""
+    pytest.importorskip("dash_bootstrap_components", reason="FMPy's web app is not installed: fmpy[webapp]")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    offered = [*COMMANDS, *(v.name for v in declared if v.causality == "parameter")]
+    command = [
+        sys.executable,
+        "-m",
+        "fmpy.webapp",
+        str(videoray_fmu),
+        "--port",
+        str(port),
+        "--output-variables",
+        *SHOWN,
+    ]
+    folder = tmp_path_factory.mktemp("webapp")  # where it unzips the FMU, and leaves it
+    with (folder / "log").open("w") as log:
+        server = subprocess.Popen(
+            [*command, "--start-values", *offered, "--output-variables", *SHOWN],
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "TMPDIR": str(folder)},
+        )
+    try:
+        _wait_for(f"http://127.0.0.1:{port}/", server, folder / "log")
+        yield f"http://127.0.0.1:{port}/"
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def _wait_for(address: str, server: "subprocess.Popen[bytes]", log: Path) -> None:
+    for _ in range(300):
+        try:
+            urllib.request.urlopen(address).close()
+        except OSError:
+            assert server.poll() is None, log.read_text()
+            time.sleep(0.1)
+        else:
+            return
+    raise AssertionError(f"no answer from {address}: {log.read_text()}")
+
+
+@pytest.fixture
+def app(webapp: str, visit: Callable[..., Visit]) -> Visit:
+    """The app, open. Its one request to the outside is FMPy's own, for Bootstrap, and is answered here."""
+    from dash_bootstrap_components.themes import BOOTSTRAP
+
+    def answer(route: "Route") -> None:
+        route.fulfill(content_type="text/css", body=_bootstrap())
+
+    seen = visit(width=1120, height=720)
+    seen.page.route(BOOTSTRAP, answer)
+    seen.page.goto(webapp)
+    seen.page.wait_for_selector("#simulate-button")
+    seen.asked = [url for url in seen.asked if url != BOOTSTRAP]
+    return seen
+
+
+def _bootstrap() -> str:
+    """The style sheet as another package brings it; without it the page is plain, and has the same content."""
+    package = importlib.util.find_spec("flask_bootstrap")
+    if package is None or package.origin is None:
+        return ""
+    return Path(package.origin).with_name("static").joinpath("bootstrap5/css/bootstrap.min.css").read_text("utf-8")
+
+
+def test_the_app_offers_values_with_units_in_the_declared_order(app: Visit, declared: tuple[Variable, ...]) -> None:
+    rows = app.page.evaluate(
+        "Array.from(document.querySelectorAll('#simulation-container label'), label => [label.innerText,"
+        " document.getElementById(label.htmlFor).value, label.parentElement.querySelector('span').innerText])"
+    )
+    offered = [v for v in declared if v.name in COMMANDS or v.causality == "parameter"]
+    assert [(name, float(value), unit) for name, value, unit in rows] == [(v.name, v.start, v.unit) for v in offered]
+
+
+def test_the_app_simulates_and_plots_in_display_units(
+    app: Visit, webapp: str, vehicle: Vehicle, tmp_path: Path
+) -> None:
+    for name, value in COMMANDS.items():
+        box = app.page.get_by_label(name, exact=True)
+        box.fill(str(value))
+        box.blur()  # only then the app takes it
+    app.page.click("#simulate-button")
+    app.page.wait_for_selector("#result-col .js-plotly-plot .trace", timeout=30_000)
+    assert app.page.locator(".alert").count() == 0
+    app.page.wait_for_timeout(500)  # it draws with a transition
+    app.page.screenshot(path=Path(os.environ.get("SCREENSHOTS", tmp_path)) / "webapp.png")
+
+    figure = app.page.evaluate(
+        "(plot => [plot._fullData.map(trace => trace.y.at(-1)), plot.data.map((trace, n) =>"
+        " plot.layout['yaxis' + (n ? n + 1 : '')].title.text)])(document.querySelector('.js-plotly-plot'))"
+    )
+    end = vars(step(vehicle.coefficients, Inputs(**COMMANDS), State(), 10.0))
+    units = {"u": "m/s", "w": "m/s", "r": "rad/s", "z": "m", "psi": "rad"}
+    last, titles = figure
+    assert titles == [f"{name} [{UNITS[unit].display or unit}]" for name, unit in units.items()]
+    assert titles[0] == "u [knot]"
+    assert last == pytest.approx([end[name] * UNITS[unit].factor for name, unit in units.items()], abs=1e-4)
+    assert app.problems() == []
+    assert [url for url in app.asked if not url.startswith(webapp)] == []
+
+
+def test_the_app_tells_what_the_model_is(
+    app: Visit, webapp: str, vehicle: Vehicle, declared: tuple[Variable, ...], tmp_path: Path
+) -> None:
+    app.page.get_by_role("tab", name="Model Info").click()
+    info = app.page.locator("#model-info-container")
+    info.wait_for(state="visible")
+    app.page.screenshot(path=tmp_path / "model-info.png")
+    text = info.inner_text()
+    assert vehicle.description in text
+    assert "Model Exchange, Co-Simulation" in text
+    for label, value in (("Continuous States", 7), ("Event Indicators", 0), ("Variables", len(declared))):
+        assert f"{label}\n{value}\n" in text
+    size = info.locator("img").evaluate("image => [image.naturalWidth, image.naturalHeight]")
+    assert min(size) >= 100
+    assert app.problems() == []
+    assert [url for url in app.asked if not url.startswith(webapp)] == []
+
+
+def test_the_app_shows_the_documentation(app: Visit, webapp: str, vehicle: Vehicle, tmp_path: Path) -> None:
+    app.page.get_by_role("tab", name="Documentation").click()
+    app.page.locator("#documentation-container").wait_for(state="visible")
+    frame = app.page.frame_locator("#documentation-container iframe")
+    assert vehicle.name in frame.locator("h1").inner_text()
+    app.page.screenshot(path=tmp_path / "documentation-tab.png")
+    assert app.problems() == []
+    assert [url for url in app.asked if not url.startswith(webapp)] == []

@@ -1,0 +1,253 @@
+"""The identification report: whole, self-contained, the same bytes every time, and in the FMU of its vehicle."""
+
+import re
+import shutil
+import zipfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import html
+
+from checks.commands import ROOT, TESTS
+from checks.recordings import PLANS, clean, write_log
+from rov_fmu.cli import main
+from rov_fmu.files.output import write_whole
+from rov_fmu.identify.identification import Identification, compare
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.least_squares import Array
+from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW
+from rov_fmu.pages.report import report_output, report_page
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
+from tests.pages.test_fmu_page import check_refers_to_itself_alone
+
+PAGES = ["of_tables", "of_recordings"]
+
+
+@pytest.fixture(scope="module")
+def of_tables() -> Identification:
+    """The VideoRay's tests, as they ship."""
+    return identify(load_tank_tests(TESTS))
+
+
+@pytest.fixture(scope="module")
+def of_recordings(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+    """Thrust tests, and a recording of each axis."""
+    folder, random = tmp_path_factory.mktemp("logs"), np.random.default_rng(1)
+    write_rov(folder, thrust_rear=(0.0, 0.7))
+    k = load_vehicle(VIDEORAY).coefficients
+    k = replace(k, alpha_u=1.0, alpha_w=1.0, alpha_r=1.0)
+    for thruster, m in (("rear", SURGE), ("top", HEAVE)):
+        rows = [(c, m.force(k, c) + 0.05 * random.standard_normal()) for c in COMMANDS.tolist()]
+        write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
+    for m in (SURGE, HEAVE, YAW):
+        write_log(folder, "a&b $1", clean(k, m, PLANS[m.name][0], rate=20.0).noisy(random))
+    return identify(load_tank_tests(folder))
+
+
+@pytest.fixture(params=PAGES)
+def results(request: pytest.FixtureRequest) -> Identification:
+    found: Identification = request.getfixturevalue(request.param)
+    return found
+
+
+@pytest.fixture(scope="module")
+def pages(of_tables: Identification, of_recordings: Identification) -> Mapping[int, str]:
+    return {id(found): report_page(found) for found in (of_tables, of_recordings)}
+
+
+@pytest.fixture
+def page(results: Identification, pages: Mapping[int, str]) -> str:
+    return pages[id(results)]
+
+
+def text_of(page: str) -> str:
+    return " ".join(html.fromstring(page).text_content().split())
+
+
+def rows(page: str) -> list[list[str]]:
+    return [[cell.text_content().strip() for cell in row.iter("th", "td")] for row in html.fromstring(page).iter("tr")]
+
+
+def test_page_is_whole_html(page: str) -> None:
+    assert page.startswith("<!DOCTYPE html>")
+    root = html.document_fromstring(page, ensure_head_body=True)
+    ids = [e.get("id") for e in root.iter() if isinstance(e.tag, str) and e.get("id")]
+    assert len(ids) == len(set(ids))
+    assert {a.get("href").removeprefix("#") for a in root.iter("a")} <= set(ids)
+    assert set(re.findall(r"url\(#(\w+)\)", page)) | set(re.findall(r'<use [^>]*href="#(\w+)"', page)) <= set(ids)
+    for tag in ("table", "tbody", "tr", "td", "th", "div", "p", "ul", "li", "svg", "text", "figure"):
+        assert len(re.findall(rf"<{tag}[\s>]", page)) == page.count(f"</{tag}>"), tag
+    assert "nan" not in re.findall(r"[a-z]+", text_of(page)), "a dash stands where there is no number"
+
+
+def test_loads_nothing(page: str) -> None:
+    check_refers_to_itself_alone(page)
+    assert not re.search(r"https?://|@import", page)
+    assert set(re.findall(r"url\((.)", page)) == {"#"}
+
+
+def test_the_same_twice(results: Identification, page: str) -> None:
+    assert report_page(results) == page
+
+
+def test_every_input_has_its_hash(results: Identification, page: str) -> None:
+    table = [row for row in rows(page) if len(row) == 3]
+    for name, digest in results.experiments.inputs.items():
+        (row,) = [row for row in table if row[0] == name]
+        assert row[1]
+        assert row[2] == digest
+
+
+def test_every_warning_is_there_in_words(of_tables: Identification, pages: Mapping[int, str]) -> None:
+    items = [item.text_content().strip() for item in html.fromstring(pages[id(of_tables)]).iter("li")]
+    assert of_tables.warnings
+    assert {f"{warning}." for warning in of_tables.warnings} <= set(items)
+
+
+def test_every_coefficient_has_its_interval(results: Identification, page: str) -> None:
+    table = {row[0]: row for row in reversed(rows(page)) if len(row) == 7}  # the first of each name
+    for name in COEFFICIENTS:
+        row, interval = table[name], results.vehicle.intervals.get(name)
+        assert row[2] == f"{getattr(results.vehicle.coefficients, name):.5g}"
+        assert row[3:5] == ([f"{end:.4g}" for end in interval] if interval else ["", ""])
+        assert row[6] == results.vehicle.sources[name]
+
+
+def test_every_measured_point_stands_beside_the_models(of_tables: Identification, pages: Mapping[int, str]) -> None:
+    table = rows(pages[id(of_tables)])
+    for comparison in compare(of_tables):
+        columns: tuple[Array, ...] = (comparison.model, comparison.left_out, comparison.against)
+        for n, p in enumerate(comparison.points):
+            numbers = [f"{column[n]:.4g}".replace("-", "−") for column in columns]
+            assert [row for row in table if len(row) == 9 and row[2::2][:3] == numbers and p.source in row[8]]
+    assert ["Surge, Vss", "6", "5.3 %", "9.7 %", "16.6 %"] in table
+
+
+def test_recordings_are_drawn_and_their_holds_listed(of_recordings: Identification, pages: Mapping[int, str]) -> None:
+    page = pages[id(of_recordings)]
+    labels = {svg.get("aria-label") for svg in html.fromstring(page).iter("svg")}
+    for axis in of_recordings.axes:
+        assert axis.recordings
+        assert f"Recording: log_{axis.axis.name}_a&b $1.csv" in labels
+        assert sum(row[0].startswith(f"log_{axis.axis.name}") for row in rows(page)) >= len(axis.steps)
+    assert {"Thrust: rear", "Thrust: top"} <= labels
+    assert ["80 %", "weight 0"] in [[row[0], row[-1]] for row in rows(page) if len(row) == 6]
+
+
+CASES: Mapping[str, Tables] = {
+    "no more than a fit needs": {"steady_yaw": [(0.3, 1.5), (0.6, 3.1)], "thrust_top": TOP[1:3]},
+    "one thrust": {"steady_heave": [(0.3, 0.163)]},
+    "drag at its bound": {"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]},
+    "backward too": {"thrust_rear": [*FORCES, (-0.5, -8.0)], "steady_heave": [*STEADY["heave"], (-0.5, -0.25)]},
+    "no warning but of Tau": {},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_any_data(case: str, tmp_path: Path) -> None:
+    text = text_of(report_page(folder_with(tmp_path, CASES[case])))
+    assert "nan" not in re.findall(r"[a-z]+", text)
+    assert "inf" not in re.findall(r"[a-z]+", text)
+
+
+def test_text_of_the_files_is_escaped(of_tables: Identification) -> None:
+    odd = replace(of_tables, vehicle=replace(of_tables.vehicle, name='<script>$1</script> & "Söhne"'))
+    root = html.fromstring(report_page(odd))
+    assert root.findtext(".//h1") == odd.vehicle.name
+    assert not list(root.iter("script"))
+
+
+# ---- The file, and the FMU -------------------------------------------------------------------------------------------
+
+
+def test_nothing_is_left_half_written(
+    of_tables: Identification, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "report.html"
+    path.write_text("before", encoding="utf-8")
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(OSError, match="No space left") as caught:
+        write_whole(report_output(of_tables, path))
+    assert caught.value.filename == str(path)
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+    assert path.read_text(encoding="utf-8") == "before"
+
+
+@pytest.mark.parametrize(("name", "reason"), [("no/report.html", "there is no folder"), (".", "is a folder")])
+def test_a_place_that_cannot_be_is_named(
+    name: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(TESTS), "--report", str(tmp_path / name), "-o", str(tmp_path / "v.toml")]) == 2
+    error = capsys.readouterr().err
+    assert reason in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir()), "no vehicle file without the report that it names"
+
+
+@pytest.fixture
+def identified(tmp_path: Path) -> Path:
+    """A vehicle file that names its report, in another folder."""
+    (tmp_path / "pages").mkdir()
+    path = tmp_path / "vehicle.toml"
+    assert main(["identify", str(TESTS), "-o", str(path), "--report", str(tmp_path / "pages" / "report.html")]) == 0
+    return path
+
+
+@pytest.mark.parametrize("backend", [["--platform", "host"], ["--backend", "pythonfmu"]])
+def test_the_fmu_has_the_report(identified: Path, tmp_path: Path, backend: list[str]) -> None:
+    output = tmp_path / "out.fmu"
+    assert 'report = "pages/report.html"' in identified.read_text(encoding="utf-8")
+    assert main(["build", str(identified), *backend, "-o", str(output)]) == 0
+    with zipfile.ZipFile(output) as archive:
+        assert archive.read("documentation/identification.html") == (tmp_path / "pages/report.html").read_bytes()
+        index = html.fromstring(archive.read("documentation/index.html").decode())
+    assert "identification.html" in [a.get("href") for a in index.iter("a")]
+
+
+def test_a_report_that_is_gone(identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.rmtree(tmp_path / "pages")
+    assert main(["build", str(identified), "-o", str(tmp_path / "out.fmu")]) == 2
+    error = capsys.readouterr().err
+    assert "provenance.report = 'pages/report.html': there is no such file" in error
+    assert error.count("\n") == 1
+
+
+def test_a_tuned_vehicle_elsewhere_keeps_its_report(identified: Path, tmp_path: Path) -> None:
+    (tmp_path / "tuned").mkdir()
+    path = tmp_path / "tuned" / "tuned.toml"
+    tune = ["tune", str(identified), "--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "-o", str(path)]
+    assert main(tune) == 0
+    provenance = load_vehicle(path).provenance
+    assert provenance
+    assert provenance.report
+    assert provenance.report.resolve() == tmp_path / "pages" / "report.html"
+
+
+def test_vehicle_without_a_report(of_tables: Identification) -> None:
+    assert of_tables.vehicle.provenance
+    assert of_tables.vehicle.provenance.report is None
+
+
+# ---- The paper's figures ---------------------------------------------------------------------------------------------
+
+
+def test_figures_of_the_paper_are_those_that_ship(tmp_path: Path) -> None:
+    assert main(["figures", str(tmp_path)]) == 0
+    made = tmp_path / "paper_figures.svg"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [made.name, "videoray.svg"]
+    text = made.read_text(encoding="utf-8")
+    shown = re.findall(r"<text[^>]*>([^<]*)</text>", text)
+    for number in ("5", "6", "7", "8", "9", "11a", "11b"):
+        assert any(words.startswith(f"Figure {number}: ") for words in shown), number
+    shipped = (ROOT / "docs" / made.name).read_text(encoding="utf-8")
+    assert re.findall(r"<text[^>]*>([^<]*)</text>", shipped) == shown

@@ -1,0 +1,173 @@
+"""Vehicle files with anything in them: a vehicle that can be built and stepped, or one clear line."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
+
+import pytest
+from fmpy.model_description import ModelDescription, read_model_description
+from hypothesis import strategies as st
+
+from checks.commands import REFIT
+from checks.damage import changed_bytes, changed_lines, changed_toml, fuzz
+from rov_fmu.cli import main
+from rov_fmu.export.archive import archive, native_content
+from rov_fmu.export.interface import variables
+from rov_fmu.export.osp import osp_model_description
+from rov_fmu.identify.tuning import tune, tuned_values
+from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, Inputs, State, step
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.writer import write_tuned
+
+TEXT = VIDEORAY.read_text(encoding="utf-8")
+SOURCES = [VIDEORAY.read_bytes(), REFIT.read_bytes()]
+_BUILT = 10  # of the files that can be read, every so manieth is made into an FMU
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Where the file is to stand, beside the folder with the tables."""
+    for folder in ("tables", "pictures"):
+        (tmp_path / folder).symlink_to(VIDEORAY.parent / folder, target_is_directory=True)
+    return tmp_path / "rov.toml"
+
+
+def check_refusal(error: VehicleFileError, path: Path) -> None:
+    """Lines that can be printed, begin with the file and are not endless."""
+    for text in str(error).splitlines():
+        assert text.startswith(f"{path}: ")
+        assert text.isprintable()
+        assert len(text) - len(str(path)) < 300
+
+
+def check_usable(vehicle: Vehicle) -> None:
+    """All numbers within their bounds, and a step that is finite or the NaN that stands for overflow."""
+    for name, value in asdict(vehicle.coefficients).items():
+        assert COEFFICIENTS[name].minimum <= value <= COEFFICIENTS[name].maximum
+    low, high = vehicle.command_range
+    assert 0.0 <= low < high <= 1.0
+    assert all(isfinite(end) for interval in vehicle.intervals.values() for end in interval)
+    after = step(vehicle.coefficients, Inputs(u_l=0.3, u_r=0.2, u_t=-0.1), State(), 0.1)
+    assert all(isfinite(value) for value in asdict(after).values())
+
+
+def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
+    """What FMPy reads and validates of an FMU without binaries."""
+    fmu = folder / "only.fmu"
+    fmu.write_bytes(archive(native_content(vehicle).files))
+    osp_model_description(variables(vehicle.coefficients))
+    return read_model_description(str(fmu), validate=True)
+
+
+@pytest.mark.parametrize("examples", [100, pytest.param(1000, marks=pytest.mark.long)])
+def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int, path: Path) -> None:
+    usable = 0
+
+    def check(data: st.DataObject) -> None:
+        nonlocal usable
+        change = data.draw(st.sampled_from([changed_toml, changed_toml, changed_lines, changed_bytes]))
+        path.write_bytes(change(data.draw(st.sampled_from(SOURCES)), data))
+        try:
+            vehicle = load_vehicle(path)
+        except VehicleFileError as error:
+            check_refusal(error, path)
+            return
+        check_usable(vehicle)
+        usable += 1
+        if usable % _BUILT == 0:
+            assert description(vehicle, path.parent).modelName == vehicle.identifier
+
+    fuzz(check, examples)
+    assert usable > examples / 20, "the changes must leave some files as good as they were"
+
+
+@pytest.mark.parametrize("examples", [20, pytest.param(300, marks=pytest.mark.long)])
+def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> None:
+    def check(data: st.DataObject) -> None:
+        path.write_bytes(changed_toml(data.draw(st.sampled_from(SOURCES)), data))
+        try:
+            vehicle = load_vehicle(path)
+        except VehicleFileError:
+            return
+        force = HEAVE.force(vehicle.coefficients, 0.3)
+        if force > 1e-3 and max(vehicle.coefficients.a_d_w, vehicle.coefficients.b_d_w) > 1e-3:
+            k = vehicle.coefficients
+            tuning = tune(k, HEAVE, 0.3, min(1.0, 0.1 * force / (k.a_d_w + k.b_d_w)))
+            write_tuned(path, path.with_name("tuned.toml"), *tuned_values(tuning))
+            assert load_vehicle(path.with_name("tuned.toml")).coefficients.beta_w == k.beta_w
+
+    fuzz(check, examples)
+
+
+@pytest.mark.parametrize("examples", [15, pytest.param(100, marks=pytest.mark.long)])
+def test_every_command_says_the_same_line_and_writes_nothing(
+    examples: int, path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def check(data: st.DataObject) -> None:
+        path.write_bytes(data.draw(st.sampled_from([changed_toml, changed_bytes]))(SOURCES[0], data))
+        try:
+            load_vehicle(path)
+            return
+        except VehicleFileError as error:
+            refusal = str(error)
+        before = sorted(path.parent.iterdir())
+        file, output = str(path), str(path.with_name("out"))
+        for arguments in (
+            ["build", file, "-o", output, "--osp", "--platform", "host"],
+            ["tables", file],
+            ["tune", file, "--axis=yaw", "--command=0.3", "--v-ss=1", "-o", output],
+        ):
+            assert main(arguments) == 2
+            assert capsys.readouterr() == ("", "".join(f"rov-fmu: {line}\n" for line in refusal.splitlines()))
+        assert sorted(path.parent.iterdir()) == before
+
+    fuzz(check, examples)
+
+
+def _value(text: str) -> Callable[[str], str]:
+    return lambda toml: toml.replace("value = 0.22", f"value = {text}")
+
+
+def _name(text: str) -> Callable[[str], str]:
+    return lambda toml: toml.replace('name = "VideoRay Pro 4"', f"name = {text}")
+
+
+# What chance hardly finds: what is done to the text, and what the line must name.
+ODD: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
+    "a number of 5000 hexadecimal digits": (_value("0x" + "f" * 5000), ("coefficients.R.value", "0xfff")),
+    "a key of 3000 parts": (lambda text: text.replace('name = "', "name" + ".a" * 3000 + ' = "'), ("vehicle.name",)),
+    "lists in lists": (lambda text: text + "deep = " + "[" * 100_000, ("not TOML",)),
+    "tables in tables": (lambda text: text + "deep = " + "{a=" * 100_000, ("not TOML",)),
+    "a megabyte of one letter": (lambda _: "x" * 10**6, ("not TOML",)),
+    "a megabyte of zeros": (lambda _: "\0" * 10**6, ("not TOML",)),
+    "a date and time": (_value("2018-07-21T07:32:00Z"), ("coefficients.R.value", "datetime", "number")),
+    "a control character": (_name(r'"Video\u001b[31mRay"'), ("vehicle.name", r"\x1b", "control character")),
+    "what XML cannot hold": (_name(r'"Video\ufffeRay"'), ("vehicle.name", r"\ufffe")),
+    "a name over two lines": (_name(r'"Video\nRay"'), ("vehicle.name", r"Video\nRay")),
+    "a name without end": (_name(f'"{"x" * 1000}"'), ("vehicle.name", "100 characters")),
+    "an identifier too long for a file": (
+        lambda text: text.replace('identifier = "videoray"', f'identifier = "{"x" * 300}"'),
+        ("vehicle.identifier", "at most 100"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ODD)
+def test_what_chance_hardly_finds_is_one_clear_line(case: str, path: Path) -> None:
+    change, named = ODD[case]
+    path.write_text(change(TEXT), encoding="utf-8")
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(path)
+    check_refusal(caught.value, path)
+    for word in named:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("identifier", ["int", "x" * 100, "__init__"])
+def test_any_identifier_makes_an_fmu(identifier: str, path: Path) -> None:
+    path.write_text(TEXT.replace('identifier = "videoray"', f'identifier = "{identifier}"'), encoding="utf-8")
+    fmu = path.with_name("out.fmu")
+    assert main(["build", str(path), "-o", str(fmu), "--platform", "host", "--osp"]) == 0
+    assert read_model_description(str(fmu)).modelName == identifier

@@ -1,0 +1,424 @@
+"""Tables 6–8 on the FMU: V_ss and Tau taken from its trajectories, against closed form, print and measurement."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cache
+from itertools import product
+from math import e, inf, isclose
+from pathlib import Path
+
+import fmpy
+import pytest
+from scipy.optimize import brentq
+
+from checks.commands import ALONE
+from rov_fmu.cli import main
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.vehicle.published import STEP_TESTS, Cell, ResponseTable, load_tables
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+
+DATA = VIDEORAY.parent / "tables"
+
+
+# ---- What the paper prints, and how far Table 9 leads from it -------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Band:
+    """Where the simulated value lies, less the printed one: one unit of the last printed digit wide."""
+
+    low: float
+    high: float
+    reason: str
+
+
+def off(low: float, reason: str) -> Band:
+    """The printed value is not what the coefficients give: it is off by `low` and up to 0.01 more."""
+    return Band(low, low + 0.01, reason)
+
+
+ROUNDED = Band(-0.005, 0.005, "the paper rounds")
+TRUNCATED = Band(0.0, 0.01, "the paper cuts digits off")
+HEAVE_TAU = (
+    "Not from Table 9: its α_w, β_w make Tau 1.59 to 1.60 times as long as without them, the printed Tau are 1.68 to "
+    "1.79 times as long; the paper does not tell how it read Tau."
+)
+YAW_TAU = "Table 9 gives 1 to 4 % more; the paper does not tell how it read Tau, and prints two of heave's here."
+YAW_V = "Not from Table 9: 5 % more at 20 %, 1 to 2 % less at 30 and 50 %, although 70 % agrees; no α_r gives all four."
+
+# Axis and command in %: V_ss and Tau of the non-linear model, V_ss and Tau of the scaled one, each as printed and band.
+CELLS: dict[tuple[str, int], tuple[tuple[str, Band], ...]] = {
+    ("heave", 20): (
+        ("0.10", ROUNDED),
+        ("1.76", off(0.25, HEAVE_TAU)),
+        ("0.11", ROUNDED),
+        ("3.08", off(0.13, HEAVE_TAU)),
+    ),
+    ("heave", 30): (
+        ("0.16", ROUNDED),
+        ("1.33", off(0.05, HEAVE_TAU)),
+        ("0.17", ROUNDED),
+        ("2.23", off(-0.03, HEAVE_TAU)),
+    ),
+    ("heave", 50): (
+        ("0.28", ROUNDED),
+        ("0.80", off(0.05, HEAVE_TAU)),
+        ("0.30", ROUNDED),
+        ("1.40", off(-0.05, HEAVE_TAU)),
+    ),
+    ("heave", 70): (
+        ("0.39", TRUNCATED),
+        ("0.58", off(0.03, HEAVE_TAU)),
+        ("0.42", TRUNCATED),
+        ("1.04", off(-0.06, HEAVE_TAU)),
+    ),
+    ("yaw", 20): (
+        ("0.93", ROUNDED),
+        ("0.39", off(0.01, YAW_TAU)),
+        ("1.10", off(-0.06, YAW_V)),
+        ("3.08", off(0.05, YAW_TAU)),
+    ),
+    ("yaw", 30): (
+        ("1.47", ROUNDED),
+        ("0.29", TRUNCATED),
+        ("1.61", off(0.03, YAW_V)),
+        ("2.23", off(0.07, YAW_TAU)),
+    ),
+    ("yaw", 50): (
+        ("2.57", ROUNDED),
+        ("0.19", TRUNCATED),
+        ("2.82", off(0.03, YAW_V)),
+        ("1.46", off(0.04, YAW_TAU)),
+    ),
+    ("yaw", 70): (
+        ("3.68", ROUNDED),
+        ("0.14", TRUNCATED),
+        ("4.07", ROUNDED),
+        ("1.10", off(0.01, YAW_TAU)),
+    ),
+}
+
+# Table 8 is lost, so surge is held to the V_ss measured in Table 4: command in % and the relative deviation of the
+# non-linear and the scaled model from it. The paper tunes around 30 %, by fits that weigh low commands (section 5), and
+# says itself that surge deviates above. At 20 % the measured velocity needs more thrust than (9) has there.
+SURGE: dict[int, tuple[float, float]] = {
+    20: (-0.278, -0.211),
+    30: (-0.075, +0.006),
+    40: (-0.003, +0.080),
+    50: (+0.129, +0.218),
+    60: (+0.117, +0.202),
+    70: (+0.082, +0.161),
+}
+SURGE_BAND = 0.0005  # half a unit of their last digit
+
+MODELS = ("non_linear", "scaled")
+ROWS = [*CELLS, *(("surge", command) for command in SURGE)]
+
+
+# ---- The tests of the paper, run on the FMU --------------------------------------------------------------------------
+
+
+class Tank:
+    """A test tank with the FMU in it. The closed form is not used here: time passes by fmi2DoStep alone."""
+
+    def __init__(self, folder: Path) -> None:
+        description = fmpy.read_model_description(str(folder))
+        self._references = {v.name: v.valueReference for v in description.modelVariables}
+        self._fmu = fmpy.instantiate_fmu(str(folder), description, fmi_type="CoSimulation")
+        self._time = 0.0
+
+    def close(self) -> None:
+        self._fmu.freeInstance()
+
+    def start_from_rest(self, values: Mapping[str, float]) -> None:
+        self._fmu.reset()
+        self._fmu.setupExperiment(startTime=0.0)
+        self._fmu.setReal([self._references[name] for name in values], list(values.values()))
+        self._fmu.enterInitializationMode()
+        self._fmu.exitInitializationMode()
+        self._time = 0.0
+
+    def value(self, name: str) -> float:
+        return float(self._fmu.getReal([self._references[name]])[0])
+
+    def step(self, h: float) -> None:
+        self._fmu.doStep(currentCommunicationPoint=self._time, communicationStepSize=h)
+        self._time += h
+
+    def steady_velocity(self, velocity: str) -> float:
+        """The velocity that no longer changes."""
+        before = inf
+        for _ in range(1000):
+            self.step(1.0)
+            now = self.value(velocity)
+            if isclose(now, before, rel_tol=1e-15):
+                return now
+            before = now
+        raise AssertionError(f"{velocity} still changes after {self._time:g} s")
+
+    def time_to_reach(self, velocity: str, target: float) -> float:
+        """When the velocity crosses the target: bracketed by steps of 10 ms, then found within that step."""
+        h = 0.01
+        for _ in range(10_000):
+            before, start = self._fmu.getFMUstate(), self._time
+            self.step(h)
+            if self.value(velocity) >= target:
+                break
+            self._fmu.freeFMUstate(before)
+        else:
+            raise AssertionError(f"{velocity} does not reach {target} in {self._time:g} s")
+
+        def lacking(time: float) -> float:
+            self._fmu.setFMUstate(before)
+            self._time = start
+            if time > 0.0:
+                self.step(time)
+            return self.value(velocity) - target
+
+        time = start + brentq(lacking, 0.0, h, xtol=1e-15)
+        self._fmu.freeFMUstate(before)
+        return float(time)
+
+
+Responses = Callable[[str, int, str], tuple[float, float]]
+
+
+@pytest.fixture(scope="module")
+def simulated(videoray_dir: Path) -> Iterator[Responses]:
+    """V_ss and Tau of an axis at a command in %, by one of the models, from trajectories of the FMU."""
+    tank = Tank(videoray_dir)
+
+    @cache
+    def responses(axis: str, command: int, model: str) -> tuple[float, float]:
+        experiment = next(x for x in STEP_TESTS if x.axis.name == axis)
+        values = {name: sign * command / 100.0 for name, sign in experiment.axis.signs.items()}
+        if model == "non_linear":
+            values |= {f"{tuning}_{velocity}": 1.0 for tuning in ("alpha", "beta") for velocity in "uwr"}
+        tank.start_from_rest(values)
+        V_ss = tank.steady_velocity(experiment.axis.velocity)
+        tank.start_from_rest(values)
+        return V_ss, tank.time_to_reach(experiment.axis.velocity, (1.0 - 1.0 / e) * V_ss)
+
+    yield responses
+    tank.close()
+
+
+@pytest.fixture(scope="module")
+def tables(vehicle: Vehicle) -> Mapping[str, ResponseTable]:
+    return {table.axis.name: table for table in load_tables(vehicle)}
+
+
+def cells_of(tables: Mapping[str, ResponseTable], axis: str, command: int, model: str) -> tuple[Cell, Cell]:
+    row = next(row for row in tables[axis].rows if row.command == command)
+    response = getattr(row, model)
+    return response.V_ss, response.Tau
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("axis", "command"), ROWS)
+def test_trajectory_gives_the_closed_form(
+    axis: str, command: int, model: str, simulated: Responses, tables: Mapping[str, ResponseTable]
+) -> None:
+    closed_form = [cell.computed for cell in cells_of(tables, axis, command, model)]
+    assert simulated(axis, command, model) == pytest.approx(closed_form, rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("axis", "command"), list(CELLS))
+def test_trajectory_gives_the_printed_cells(axis: str, command: int, model: str, simulated: Responses) -> None:
+    first = 2 * MODELS.index(model)
+    cells = CELLS[axis, command][first : first + 2]
+    for value, (printed, band) in zip(simulated(axis, command, model), cells, strict=True):
+        assert band.low <= value - float(printed) <= band.high, f"{value} for {printed}: {band}"
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("command", SURGE)
+def test_surge_trajectory_against_table_4(
+    command: int, model: str, simulated: Responses, tables: Mapping[str, ResponseTable]
+) -> None:
+    measured = float(tables["surge"].steady[Decimal(command)])
+    deviation = simulated("surge", command, model)[0] / measured - 1.0
+    assert deviation == pytest.approx(SURGE[command][MODELS.index(model)], rel=0.0, abs=SURGE_BAND)
+
+
+# ---- The files ---------------------------------------------------------------------------------------------------
+
+
+def test_every_row_is_tested(tables: Mapping[str, ResponseTable]) -> None:
+    assert [(axis, int(row.command)) for axis, table in tables.items() for row in table.rows] == ROWS
+
+
+def test_tables_number_axes_and_units(tables: Mapping[str, ResponseTable]) -> None:
+    assert [(t.number, t.axis.name, t.axis.unit) for t in tables.values()] == [
+        (6, "heave", "m/s"),
+        (7, "yaw", "rad/s"),
+        (8, "surge", "m/s"),
+    ]
+
+
+@pytest.mark.parametrize(("axis", "command"), list(CELLS))
+def test_files_hold_the_printed_cells(axis: str, command: int, tables: Mapping[str, ResponseTable]) -> None:
+    cells = [cell for model in MODELS for cell in cells_of(tables, axis, command, model)]
+    assert [str(cell.printed) for cell in cells] == [printed for printed, _ in CELLS[axis, command]]
+    assert [cell.rounds_to_printed for cell in cells] == [band is ROUNDED for _, band in CELLS[axis, command]]
+
+
+def test_table_8_is_lost_but_for_the_velocities_of_table_4(tables: Mapping[str, ResponseTable]) -> None:
+    surge = tables["surge"]
+    for row, model in product(surge.rows, MODELS):
+        V_ss, Tau = cells_of(tables, "surge", int(row.command), model)
+        assert (V_ss.printed, Tau.printed, Tau.measured) == (None, None, None)
+        assert V_ss.measured == surge.steady[row.command]
+
+
+@pytest.mark.parametrize("axis", ["heave", "yaw"])
+def test_tables_6_and_7_repeat_the_velocities_of_tables_3_and_5(axis: str, tables: Mapping[str, ResponseTable]) -> None:
+    for row in tables[axis].rows:
+        assert row.scaled.V_ss.measured == tables[axis].steady[row.command]
+
+
+def test_cell_deviations() -> None:
+    cell = Cell(printed=Decimal("0.50"), computed=0.55, measured=Decimal("0.44"))
+    assert cell.from_printed == pytest.approx(0.1)
+    assert cell.from_measured == pytest.approx(0.25)
+    lost = Cell(printed=None, computed=0.55, measured=Decimal("0.0"))
+    assert (lost.from_printed, lost.from_measured) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("printed", "computed", "rounds"),
+    [("0.50", 0.5049, True), ("0.50", 0.4951, True), ("0.50", 0.5051, False), ("0.50", 0.4949, False),
+     ("0.5", 0.549, True), ("12", 12.49, True), ("12", 12.51, False), ("1.2e2", 124.0, True), ("0.50", inf, False)],
+)  # fmt: skip
+def test_rounds_to_printed_digits(printed: str, computed: float, rounds: bool) -> None:
+    assert Cell(Decimal(printed), computed, None).rounds_to_printed is rounds
+
+
+# ---- rov-fmu tables -------------------------------------------------------------------------------------
+
+
+def test_command_prints_the_tables_side_by_side(tables: Mapping[str, ResponseTable]) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "rov_fmu", "tables"],
+        cwd=VIDEORAY.parent.parent, capture_output=True, text=True, encoding="utf-8", check=True,
+        env={**os.environ, "PYTHONUTF8": "1", "COLUMNS": "80", "FORCE_COLOR": ""},
+    )  # fmt: skip
+    assert run.stderr == ""
+    assert max(map(len, run.stdout.splitlines())) <= 110
+    for table in tables.values():
+        block = re.search(rf"^Table {table.number}\. {table.axis.name.capitalize()}.*?^$", run.stdout, re.M | re.S)
+        assert block
+        lines = iter(line.split() for line in block[0].splitlines() if re.match(r"\d+ %", line))
+        for quantity, row in product(("V_ss", "Tau"), table.rows):
+            words = next(lines)
+            assert words[0] == str(row.command)
+            cells = [getattr(getattr(row, model), quantity) for model in MODELS]
+            assert [words[3], words[6]] == [f"{cell.computed:.4f}" for cell in cells]
+            assert [words[2], words[5]] == [str(cell.printed or "-") for cell in cells]
+            assert words[8] == str(cells[0].measured or "-")
+            for word, deviation in ((words[4], cells[0].from_printed), (words[9], cells[1].from_measured)):
+                assert word.rstrip("*") == ("-" if deviation is None else f"{deviation:+.1%}")
+        assert next(lines, None) is None
+
+
+def test_vehicle_without_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "bare.toml"
+    path.write_text(ALONE, encoding="utf-8")
+    assert main(["tables", str(path)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert "vehicle.data" in err
+
+
+HEAVE, YAW, SURGE_STEADY = "table6_heave_response.csv", "table7_yaw_response.csv", "table4_surge_steady.csv"
+# File, what stands there, what stands there instead, and all that the one line must name.
+BAD_TABLES: dict[str, tuple[str, str, str, tuple[str, ...]]] = {
+    "text for a number": (HEAVE, "1.76", "slow", ("line 2", "'non-linear Tau [s]'", "'slow'", "number")),
+    "decimal comma": (HEAVE, "1.33", '"1,33"', ("line 3", "'non-linear Tau [s]'", "'1,33'", "number")),
+    "NaN": (HEAVE, "0.30", "nan", ("line 4", "'scaled V_ss [m/s]'", "'nan'", "number")),
+    "larger than a double": (HEAVE, "0.30", "1e400", ("line 4", "'scaled V_ss [m/s]'", "'1e400'", "number")),
+    "far larger": (HEAVE, "0.30", "1e99999999999999999999", ("line 4", "'scaled V_ss [m/s]'", "number")),
+    "underscore": (HEAVE, "0.30", "0.3_0", ("line 4", "'scaled V_ss [m/s]'", "'0.3_0'", "number")),
+    "negative velocity": (SURGE_STEADY, "0.31", "-0.31", ("line 2", "'forward [m/s]'", "'-0.31'", "negative")),
+    "negative command": (HEAVE, "\n20,", "\n-20,", ("line 2", "'command [%]'", "'-20'", "above 0")),
+    "command above full thrust": (HEAVE, "\n70,", "\n170,", ("line 5", "'command [%]'", "'170'", "at most 100")),
+    "no command": (HEAVE, "\n30,", "\n,", ("line 3", "'command [%]'", "missing")),
+    "command twice": (HEAVE, "\n30,", "\n20.0,", ("line 3", "'command [%]'", "'20.0'", "above")),
+    "cell missing": (YAW, ",4.06,", ",4.06", ("line 5", "'experiment Tau [s]'", "missing")),
+    "cell too many": (YAW, "3.05", "3.05,1", ("line 2", "column 8", "'1'", "no such column")),
+    "other unit": (SURGE_STEADY, "m/s", "knot", ("line 1", "column 2", "'forward [knot]'", "'forward [m/s]'")),
+    "column missing": (HEAVE, ",experiment Tau [s]", "", ("line 1", "column 7", "'experiment Tau [s]'")),
+    "column too many": (SURGE_STEADY, "[m/s]", "[m/s],backward [m/s]", ("line 1", "column 3", "'backward [m/s]'")),
+    "quote left open": (SURGE_STEADY, "0.31", '"0.31', ("line 7",)),
+}
+
+
+def tables_with(tmp_path: Path, name: str, change: Callable[[str], bytes]) -> tuple[Path, Path]:
+    """A copy of the VideoRay's vehicle file with one table changed: both paths."""
+    shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
+    vehicle_file, folder = tmp_path / VIDEORAY.name, tmp_path / DATA.name
+    (folder / name).write_bytes(change((DATA / name).read_text(encoding="utf-8")))
+    return vehicle_file, folder / name
+
+
+def check_refused(vehicle_file: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(DataFileError) as caught:
+        load_tables(load_vehicle(vehicle_file))
+    assert main(["tables", str(vehicle_file)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == f"rov-fmu: {caught.value}\n"
+    assert len(err.splitlines()) == 1
+    for word in named:
+        assert word in err
+
+
+@pytest.mark.parametrize("case", BAD_TABLES)
+def test_bad_table_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name, old, new, named = BAD_TABLES[case]
+
+    def change(text: str) -> bytes:
+        assert old in text
+        return text.replace(old, new, 1).encode()
+
+    vehicle_file, table = tables_with(tmp_path, name, change)
+    check_refused(vehicle_file, (str(table), *named), capsys)
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        (b"", ("line 1", "'command [%]'")),
+        (b"command [%],forward [m/s]\n", ("line 1", "no rows")),
+        (b"command [%],forward [m/s]\n20,0.31 \xb5\n", ("UTF-8", "byte 34")),
+    ],
+    ids=["empty", "header alone", "not UTF-8"],
+)
+def test_bad_file(content: bytes, named: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vehicle_file, table = tables_with(tmp_path, SURGE_STEADY, lambda _: content)
+    check_refused(vehicle_file, (str(table), *named), capsys)
+
+
+def test_missing_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vehicle_file, table = tables_with(tmp_path, SURGE_STEADY, str.encode)
+    table.unlink()
+    check_refused(vehicle_file, (str(table), "No such file"), capsys)
+
+
+def test_tables_as_spreadsheets_save_them(tmp_path: Path, vehicle: Vehicle) -> None:
+    """Byte order mark, CRLF, blank lines and blanks around the cells."""
+
+    def change(text: str) -> bytes:
+        return ("\ufeff" + text.replace(",", " , ").replace("\n", "\r\n") + "\r\n ,\r\n").encode()
+
+    vehicle_file, _ = tables_with(tmp_path, SURGE_STEADY, change)
+    assert load_tables(load_vehicle(vehicle_file)) == load_tables(vehicle)

@@ -1,0 +1,216 @@
+"""The vehicle file: what it holds, and one clear line for whatever is wrong with it."""
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from checks.commands import ALONE
+from rov_fmu.cli import main
+from rov_fmu.motion.rov import COEFFICIENTS, Coefficients
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+
+TEXT = VIDEORAY.read_text(encoding="utf-8")
+
+# Stated again as an independent witness of the vehicle file.
+TABLE_9 = Coefficients(
+    m_rov=6.57, I_r=0.105, R=0.22, gamma=0.423,
+    a_t_rear=42.9, b_t_rear=2.711, a_t_top=6.494, b_t_top=0.0513,
+    a_d_u=3.159, b_d_u=9.379, a_d_w=18.72, b_d_w=0.6324, a_d_r=0.1246, b_d_r=0.103,
+    alpha_u=1.1, beta_u=1.0, alpha_w=1.14, beta_w=0.59, alpha_r=1.2, beta_r=0.12,
+)  # fmt: skip
+
+
+def test_videoray_holds_table_9(vehicle: Vehicle) -> None:
+    assert vehicle.coefficients == TABLE_9
+
+
+def test_every_coefficient_names_its_equation_or_table(vehicle: Vehicle) -> None:
+    assert set(vehicle.sources) == set(COEFFICIENTS)
+    assert all("Table 9" in source for source in vehicle.sources.values())
+
+
+def test_videoray_keeps_the_unweighted_thrust_curve_beside(vehicle: Vehicle) -> None:
+    assert [a.values for a in vehicle.alternatives.values()] == [{"a_t_rear": 100.3, "b_t_rear": -27.09}]
+
+
+def test_videoray_was_identified_from_20_to_70_percent(vehicle: Vehicle) -> None:
+    assert vehicle.command_range == (0.2, 0.7)
+
+
+def test_optional_parts_may_be_absent(tmp_path: Path) -> None:
+    path = tmp_path / "other.toml"
+    path.write_text(ALONE.split("[alternatives")[0], encoding="utf-8")
+    vehicle = load_vehicle(path)
+    assert vehicle.data is None
+    assert vehicle.alternatives == {}
+    assert vehicle.coefficients == TABLE_9
+
+
+def edit(pattern: str, replacement: str) -> Callable[[str], str]:
+    """A change to the text of the VideoRay's file: the one line that matches."""
+
+    def change(text: str) -> str:
+        changed, count = re.subn(pattern, lambda _: replacement, text, flags=re.MULTILINE)
+        assert count == 1, f"{pattern} matches {count} times"
+        return changed
+
+    return change
+
+
+def value(name: str, text: str) -> Callable[[str], str]:
+    """Another value of a coefficient."""
+    return edit(rf"(?<=^{name} = {{ value = )[^,]*(?=, .*Table 9)", text)
+
+
+# What is done to the file, and all that the one line must name: key, value, what is allowed.
+BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
+    "unknown coefficient": (
+        edit(r"(?=^R = )", 'mass = { value = 6.57, unit = "kg", source = "" }\n'),
+        ("coefficients.mass", "no such key"),
+    ),
+    "unknown key of a coefficient": (
+        edit(r'(?<=^R = { value = 0.22, )unit = "m"', 'unit = "m", error = 0.01'),
+        ("coefficients.R.error", "no such key"),
+    ),
+    "unknown section": (lambda text: text + "\n[thrusters]\n", ("thrusters", "no such key")),
+    "missing coefficient": (edit(r"^m_rov = .*$", ""), ("coefficients.m_rov", "missing")),
+    "missing value": (edit(r"(?<=^R = { )value = 0.22, ", ""), ("coefficients.R.value", "missing")),
+    "missing unit": (edit(r'(?<=^R = { value = 0.22, )unit = "m", ', ""), ("coefficients.R.unit", "missing")),
+    "missing source": (edit(r'(?<=^R = { value = 0.22, unit = "m"), source = .*(?= })', ""), ("R.source", "missing")),
+    "missing section": (
+        lambda text: text.split("[validity]")[0] + "[coefficients]" + text.split("[coefficients]")[1],
+        ("validity", "missing"),
+    ),
+    "missing name": (edit(r"^name = .*$", ""), ("vehicle.name", "missing")),
+    "number without unit and source": (edit(r"^R = .*$", "R = 0.22"), ("coefficients.R", "0.22")),
+    "empty source": (edit(r'(?<=^R = { value = 0.22, unit = "m", source = )".*"', '""'), ("R.source", "''")),
+    "empty name": (edit(r"^name = .*$", 'name = ""'), ("vehicle.name", "''")),
+    "text for a number": (value("m_rov", '"heavy"'), ("coefficients.m_rov.value", "'heavy'", "number")),
+    "number in quotes": (value("m_rov", '"6.57"'), ("coefficients.m_rov.value", "'6.57'", "number")),
+    "boolean for a number": (value("m_rov", "true"), ("coefficients.m_rov.value", "True", "number")),
+    "list for a number": (value("m_rov", "[6.57]"), ("coefficients.m_rov.value", "[6.57]", "number")),
+    "date for a number": (value("m_rov", "2018-07-21"), ("coefficients.m_rov.value", "2018", "number")),
+    "number for a text": (edit(r"^name = .*$", "name = 4"), ("vehicle.name", "4", "string")),
+    "negative mass": (value("m_rov", "-6.57"), ("coefficients.m_rov", "-6.57", "0.001")),
+    "no mass": (value("m_rov", "0.0"), ("coefficients.m_rov", "0.0", "0.001")),
+    "negative drag": (value("a_d_w", "-18.72"), ("coefficients.a_d_w", "-18.72", "0 ...")),
+    "gamma in degrees": (value("gamma", "24.2"), ("coefficients.gamma", "24.2", "1.57")),
+    "NaN": (value("m_rov", "nan"), ("coefficients.m_rov.value", "nan", "finite")),
+    "infinity": (value("b_t_top", "inf"), ("coefficients.b_t_top.value", "inf", "finite")),
+    "negative infinity": (value("b_t_top", "-inf"), ("coefficients.b_t_top.value", "-inf", "finite")),
+    "larger than a double": (value("b_t_top", "1e999"), ("coefficients.b_t_top.value", "inf", "finite")),
+    "integer larger than a double": (value("b_t_top", "1" + 400 * "0"), ("coefficients.b_t_top",)),
+    "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), ("coefficients.m_rov", "'lb'", "'kg'")),
+    "bad alternative": (
+        edit(r"(?<=^a_t_rear = { value = )100.3", "nan"),
+        ("alternatives.unweighted_rear_thrust.a_t_rear.value", "nan"),
+    ),
+    "identifier with a space": (edit(r"^identifier = .*$", 'identifier = "video ray"'), ("identifier", "'video ray'")),
+    "identifier with a digit first": (edit(r"^identifier = .*$", 'identifier = "4pro"'), ("identifier", "'4pro'")),
+    "identifier with an umlaut": (edit(r"^identifier = .*$", 'identifier = "über"'), ("identifier", "'über'")),
+    "identifier with a line break": (edit(r"^identifier = .*$", r'identifier = "rov\n"'), ("identifier", r"'rov\n'")),
+    "empty identifier": (edit(r"^identifier = .*$", 'identifier = ""'), ("vehicle.identifier", "''")),
+    "commands in percent": (edit(r"^command_max = .*$", "command_max = 70.0"), ("validity.command_max", "70.0")),
+    "no range of commands": (
+        edit(r"^command_max = .*$", "command_max = 0.2"),
+        ("validity.command_min", "0.2", "less than", "command_max"),
+    ),
+    "range upside down": (edit(r"^command_min = .*$", "command_min = 0.8"), ("validity.command_min", "0.8", "0.7")),
+    "a folder name that cannot be": (edit(r"^data = .*$", f'data = "{"x" * 300}"'), ("vehicle.data", "no such folder")),
+    "a list in a list in a list": (lambda text: text + "deep = " + "[" * 5000, ("not TOML",)),
+    "an endless number": (value("m_rov", "1" * 5000), ("not TOML",)),
+    "a key over two lines": (lambda text: text + '\n["two\\nlines"]\n', ("two\\nlines", "no such key")),
+    "missing folder": (edit(r"^data = .*$", 'data = "nowhere"'), ("vehicle.data", "'nowhere'", "no such folder")),
+    "not TOML": (edit(r"^\[coefficients\]$", "[coefficients"), ("not TOML", "line ")),
+    "a key twice": (edit(r"(?=^R = )", "R = 1.0\n"), ("not TOML", "line ")),
+    "half a file": (lambda text: text.split("[coefficients]")[0], ("coefficients", "missing")),
+}
+
+
+@pytest.fixture(params=BAD_FILES)
+def bad_file(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, tuple[str, ...]]:
+    """A vehicle file with something wrong, and what must be named."""
+    change, named = BAD_FILES[request.param]
+    shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
+    path = tmp_path / "bad.toml"
+    path.write_text(change(TEXT), encoding="utf-8")
+    return path, named
+
+
+def test_every_mistake_of_a_file_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "bad.toml"
+    text = ALONE.replace("m_rov = { value = 6.57", "m_rov = { value = -1.0").replace('"kg.m2"', '"lb"')
+    text = text.replace("command_min = 0.2", "command_min = 20").replace("R = {", "radius = {")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(path)
+    lines = str(caught.value).splitlines()
+    wrong = ("validity.command_min = 20", "coefficients.m_rov.value = -1.0", "coefficients.I_r.unit = 'lb'",
+             "coefficients.R", "coefficients.radius")  # fmt: skip
+    assert len(lines) == len(wrong)
+    for line, words in zip(lines, wrong, strict=True):
+        assert line.startswith(f"{path}: {words}")
+
+
+def test_mistakes_beyond_the_form_are_told_together(tmp_path: Path) -> None:
+    path = tmp_path / "bad.toml"
+    text = VIDEORAY.read_text(encoding="utf-8").replace("command_min = 0.2", "command_min = 0.8")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(path)
+    keys = [line.removeprefix(f"{path}: ").split(" = ")[0] for line in str(caught.value).splitlines()]
+    assert keys == ["validity.command_min", "vehicle.data", "vehicle.pictures"]
+
+
+def check_line(line: str, path: Path, named: tuple[str, ...]) -> None:
+    assert len(line.splitlines()) == 1
+    for word in (str(path), *named):
+        assert word in line
+
+
+def test_bad_file_is_one_clear_line(bad_file: tuple[Path, tuple[str, ...]]) -> None:
+    path, named = bad_file
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(path)
+    check_line(str(caught.value), path, named)
+
+
+def test_commands_refuse_a_bad_file(
+    bad_file: tuple[Path, tuple[str, ...]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, named = bad_file
+    fmu = tmp_path / "out" / "bad.fmu"
+    fmu.parent.mkdir()
+    for arguments in (["build", str(path), "-o", str(fmu), "--platform", "host"], ["tables", str(path)]):
+        assert main(arguments) == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        check_line(err, path, named)
+    assert not any(fmu.parent.iterdir())
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    path = tmp_path / "nowhere.toml"
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(path)
+    check_line(str(caught.value), path, ("No such file",))
+
+
+def test_folder_for_a_file(tmp_path: Path) -> None:
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(tmp_path)
+    check_line(str(caught.value), tmp_path, ())
+
+
+def test_not_utf_8(tmp_path: Path) -> None:
+    path = tmp_path / "latin.toml"
+    path.write_bytes(
+        TEXT.split("[coefficients]")[0].replace("VideoRay Pro 4", "Röv", 1).replace("β", "b").encode("latin-1")
+    )
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(path)
+    check_line(str(caught.value), path, ("UTF-8", f"byte {path.read_bytes().index(0xF6)}"))
