@@ -75,17 +75,16 @@ def _describe(
     interfaces: Mapping[str, Mapping[str, str]],
     source_files: tuple[str, ...] = (),
 ) -> bytes:
+    head = {
+        "guid": guid,
+        "description": vehicle.description,
+        "author": vehicle.source,
+        "version": vehicle.version,
+        "license": "MIT, see documentation/licenses/license.txt",
+        "generationTool": TOOL,
+    }
     return model_description(
-        declared,
-        identifier=vehicle.identifier,
-        guid=guid,
-        description=vehicle.description,
-        version=vehicle.version,
-        tool=TOOL,
-        interfaces=interfaces,
-        source_files=source_files,
-        author=vehicle.source,
-        license="MIT, see documentation/licenses/license.txt",
+        declared, identifier=vehicle.identifier, head=head, interfaces=interfaces, source_files=source_files
     )
 
 

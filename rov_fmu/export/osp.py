@@ -6,11 +6,8 @@ libcosim and the OSP tools look for it beside the FMU. The variables stay what m
 from collections.abc import Mapping
 from pathlib import Path
 
-from lxml import etree
-
 from rov_fmu.export.interface import Variable
-
-_NAMESPACE = "https://open-simulation-platform.com/OspModelDescription/1.0.1"
+from rov_fmu.files.templates import render
 
 # The element of a group by the unit of its variables, in the order that the schema prescribes.
 _ELEMENTS = {
@@ -45,16 +42,11 @@ _GROUPS: dict[str, dict[str, str | None]] = {
 def osp_model_description(variables: tuple[Variable, ...]) -> bytes:
     """The XML document: every input and output in one group. UTF-8, indented, the same bytes for the same arguments."""
     by_name = {v.name: v for v in variables}
-    root = etree.Element(f"{{{_NAMESPACE}}}OspModelDescription", {"version": "1.0"}, nsmap={None: _NAMESPACE})
-    parent = etree.SubElement(root, f"{{{_NAMESPACE}}}VariableGroups")
+    units = {name: _unit(axes, by_name) for name, axes in _GROUPS.items()}
     order = list(_ELEMENTS)
-    for name, axes in sorted(_GROUPS.items(), key=lambda group: order.index(_unit(group[1], by_name))):
-        unit = _unit(axes, by_name)
-        group = etree.SubElement(parent, f"{{{_NAMESPACE}}}{_ELEMENTS[unit]}", {"name": name})
-        for reference, axis in axes.items():
-            attributes = {"ref": reference, "unit": unit} | ({"axis": axis} if axis else {})
-            etree.SubElement(group, f"{{{_NAMESPACE}}}Variable", attributes)
-    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+    groups = [(_ELEMENTS[units[name]], name, units[name], _GROUPS[name])
+              for name in sorted(_GROUPS, key=lambda name: order.index(units[name]))]  # fmt: skip
+    return render("osp.xml.j2", groups=groups).encode()
 
 
 def _unit(names: Mapping[str, str | None], by_name: Mapping[str, Variable]) -> str:

@@ -1,30 +1,20 @@
-"""What pages are made with: templates, and numbers as one writes them."""
+"""What pages are made with: their templates, and numbers as one writes them."""
 
 import re
 from math import isfinite, isnan
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-from rov_fmu.files.places import FMU_SRC
+from rov_fmu.files.templates import render
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def page(template: str, **content: object) -> str:
-    """A page from a template; what comes from files is escaped, and a name misspelt is an error."""
-    folders = [Path(__file__).parent / "templates", FMU_SRC]
-    templates = Environment(
-        loader=FileSystemLoader(folders),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    templates.filters |= {
-        "number": number, "fixed": fixed, "percent": percent, "deviation": deviation, "unit": pretty_unit,
-    }  # fmt: skip
-    return templates.get_template(template).render(**content)
+    """A page from a template, with these formats as filters."""
+    return render(
+        template, Path(__file__).parent / "templates",
+        number=number, fixed=fixed, percent=percent, deviation=deviation, unit=pretty_unit, **content,
+    )  # fmt: skip
 
 
 def number(value: float | None, digits: int | None = None) -> str:
