@@ -2,14 +2,16 @@
 
 import re
 import struct
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from lxml import html
 
+from rov_fmu.export.archive import Content, native_content, python_content
 from rov_fmu.export.interface import variables
-from rov_fmu.pages.fmu_page import documentation_page
+from rov_fmu.pages.fmu_page import documentation, documentation_page
 from rov_fmu.pages.paper_figures import write_figures
 from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.published import load_tables
@@ -209,3 +211,24 @@ def test_the_page_of_the_python_flavour_claims_no_more_than_it_does(vehicle: Veh
     for claim in ("Model Exchange", "fmi2Discard", "Directional derivatives", "First derivatives"):
         assert claim in native
         assert claim not in python
+
+
+@pytest.mark.parametrize("content_of", [native_content, python_content])
+def test_nothing_of_the_videoray_stands_in_the_fmu_of_another_vehicle(
+    vehicle: Vehicle, content_of: Callable[..., Content]
+) -> None:
+    """Neither its name nor its picture nor what was found of it alone."""
+    other = replace(
+        vehicle, name="Pilchard", identifier="pilchard", description="An ROV", source="A tank test", data=None,
+        pictures=None, limits=("It leaks.",), alternatives={}, sources=dict.fromkeys(vehicle.sources, "A tank test"),
+    )  # fmt: skip
+    files = content_of(other, documentation(other, native=content_of is native_content)).files
+    own = vehicle.pictures and {path.read_bytes() for path in vehicle.pictures.iterdir()}
+    assert own
+    for name, content in files.items():
+        assert content not in own, name
+        if not name.endswith((".png", ".so", ".dll")):
+            text = content.decode("utf-8").lower()
+            for claim in ("videoray", "#f6b90c", *(limit.lower() for limit in vehicle.limits)):
+                assert claim not in text, (name, claim)
+    assert b"It leaks." in files["documentation/index.html"]
