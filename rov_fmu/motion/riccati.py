@@ -16,6 +16,10 @@ The linear equation y'' + B y' = A C y with y(0) = 1, y'(0) = A v0 gives v = y'/
 
 from dataclasses import dataclass
 from math import atan, atanh, copysign, cos, e, exp, expm1, hypot, inf, isinf, log, log1p, sin, sqrt
+from typing import Any
+
+Number = Any
+"""A float, or an array of them: for what is plain arithmetic."""
 
 RISE = 1.0 - 1.0 / e
 """Share of V_ss that is reached after Tau, (17)."""
@@ -99,11 +103,11 @@ def _leg(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, floa
     q = b * b + a * c
     if -_MODERATE < q < 4.0 * _MODERATE:
         x = 0.25 * q
-        n, m = _tanh(x)
+        n, m = tanh_fraction(x)
         # f = g/(1 + x g^2), g = tanh(r/2)/(r/2) = n/m
-        N, M = _tanh(q) if q < _MODERATE else (n * m, m * m + x * n * n)
+        N, M = tanh_fraction(q) if q < _MODERATE else (n * m, m * m + x * n * n)
         v = _end_velocity(a, b, c, v0, N, M, M - b * N)
-        mean = _mean(b, c, x, v0, n, m)
+        mean = mean_velocity(b, c, x, v0, n, m)
     elif q < 0.0:
         root = sqrt(-q)
         x, y, fade = cos(root), sin(root) / root, exp(-b)
@@ -137,7 +141,7 @@ def _end_velocity(a: float, b: float, c: float, v0: float, N: float, M: float, k
     return v0 + change if change > -0.5 * v0 else (v0 * keep + c * N) / growth
 
 
-def _mean(b: float, c: float, x: float, v0: float, n: float, m: float) -> float:
+def mean_velocity(b: Number, c: Number, x: Number, v0: Number, n: Number, m: Number) -> Number:
     """X/h = v0 Y + c W where |q| is moderate, x = q/4.
 
     With g = tanh(r/2)/(r/2) = n/m, the same for r = b, and t = r g/2, t_b = b g_b/2,
@@ -149,14 +153,14 @@ def _mean(b: float, c: float, x: float, v0: float, n: float, m: float) -> float:
     and dg is that of n and m, where no difference is left.
     """
     y, half = 0.25 * b * b, 0.5 * b
-    n_b, m_b = _tanh(y)
+    n_b, m_b = tanh_fraction(y)
     dn, dm = _tanh_difference(x, y)
     coasting = (m_b - half * n_b) * (n * m)
     pushed = 0.5 * (m_b * n * n + half * (m + half * n) * (dn * m_b - n_b * dm))
     return (v0 * coasting + c * pushed) / ((m_b + half * n_b) * (m * m - x * n * n))
 
 
-def _tanh(x: float) -> tuple[float, float]:
+def tanh_fraction(x: Number) -> tuple[Number, Number]:
     """n, m with tanh(sqrt(x))/sqrt(x) = n/m, the continued fraction of tanh: exact to the last digit for |x| < 0.9."""
     x2 = x * x
     n = (_N[0] + _N[1] * x) + x2 * ((_N[2] + _N[3] * x) + x2 * _N[4])
@@ -164,7 +168,7 @@ def _tanh(x: float) -> tuple[float, float]:
     return n, m
 
 
-def _tanh_difference(x: float, y: float) -> tuple[float, float]:
+def _tanh_difference(x: Number, y: Number) -> tuple[Number, Number]:
     """The divided differences of n and m over x and y."""
     first, product = x + y, x * y
     second = first * first - product

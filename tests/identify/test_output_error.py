@@ -67,7 +67,7 @@ def test_trajectory_is_that_of_exact_steps(seed: int) -> None:
         s += covered
         exact.append((v, s))
     for got, true in zip(found, np.array(exact).T, strict=True):
-        assert np.abs(got - true).max() <= 1e-10 * np.abs(true).max()
+        assert np.abs(got - true).max() <= 1e-12 * np.abs(true).max()
 
 
 # ---- Round trip ------------------------------------------------------------------------------------------------------
