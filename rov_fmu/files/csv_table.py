@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 
-from rov_fmu.files.messages import FileError, shown
+from rov_fmu.files.messages import FileError, brief, shown
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 _HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]+)\]")
@@ -25,7 +25,7 @@ class Column:
     units: Mapping[str, float]
     optional: bool = False
     blanks: bool = False
-    """Whether its cells may be empty; they read as NaN."""
+    """Whether its cells may be empty; they read as NaN, as do those that a row of an optional column lacks."""
     minimum: float | None = None
     maximum: float | None = None
     """In the first unit."""
@@ -38,16 +38,17 @@ class Columns:
     """The numbers of a file in the first unit of each column, and the line that each row stands on."""
 
     path: Path
-    headers: Mapping[str, tuple[str, float]]
-    """Of each column: as it stands there, and how many of its unit make one of the first."""
+    headers: Mapping[str, str]
+    """As they stand there, by column."""
+    texts: Mapping[str, list[str]]
+    """The cells as they stand there."""
     values: Mapping[str, list[float]]
     lines: list[int]
 
     def error(self, row: int, column: str, reason: str) -> DataFileError:
         """The one line for a number that cannot be."""
-        header, per = self.headers[column]
-        value = self.values[column][row] * per
-        return DataFileError(f"{self.path}, line {self.lines[row]}, column {shown(header)} = {value:g}: {reason}")
+        header, text = shown(self.headers[column]), brief(self.texts[column][row])
+        return DataFileError(f"{self.path}, line {self.lines[row]}, column {header} = {text}: {reason}")
 
 
 def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = False) -> Columns:
@@ -55,7 +56,7 @@ def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = Fa
 
     `others` lets the file have columns besides, which are not read.
     """
-    lines = csv_lines(path)
+    lines = _csv_lines(path)
     line, header = next(lines, (1, []))
     read: dict[int, tuple[str, float, Column]] = {}
     for place, title in enumerate(header):
@@ -67,30 +68,30 @@ def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = Fa
     names = [name for name, *_ in read.values()]
     for name, column in columns.items():
         if name not in names and not column.optional:
-            raise DataFileError(f"{path}, line {line}: column {_title(name, column)!r} is missing")
-    values: dict[str, list[float]] = {name: [] for name in names}
-    numbers: list[int] = []
-    for line, texts in lines:
-        if len(texts) > len(header):
-            text = texts[len(header)]
-            raise DataFileError(
-                f"{path}, line {line}, column {len(header) + 1} = {shown(text)}: there is no such column"
-            )
+            raise DataFileError(f"{path}, line {line}, column {len(header) + 1}: {_title(name, column)!r} is missing")
+    headers = {name: header[place] for place, (name, *_) in read.items()}
+    table = Columns(path, headers, {name: [] for name in names}, {name: [] for name in names}, [])
+    for line, cells in lines:
+        if len(cells) > len(header):
+            text = shown(cells[len(header)])
+            raise DataFileError(f"{path}, line {line}, column {len(header) + 1} = {text}: there is no such column")
         for place, (name, per, column) in read.items():
-            text = texts[place] if place < len(texts) else ""
+            text = cells[place] if place < len(cells) else ""
             try:
-                values[name].append(_value(text, per, column))
+                if place >= len(cells) and not column.optional:
+                    raise ValueError("this cell is missing")
+                table.values[name].append(_value(text, per, column))
             except ValueError as error:
                 value = f" = {shown(text)}" if text else ""
                 raise DataFileError(f"{path}, line {line}, column {shown(header[place])}{value}: {error}") from None
-        numbers.append(line)
-    if not numbers:
+            table.texts[name].append(text)
+        table.lines.append(line)
+    if not table.lines:
         raise DataFileError(f"{path}, line {line}: no rows below the header")
-    headers = {name: (header[place], per) for place, (name, per, _) in read.items()}
-    return Columns(path, headers, values, numbers)
+    return table
 
 
-def csv_lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+def _csv_lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line that is not blank."""
     try:
         text = path.read_bytes().decode("utf-8-sig")
@@ -107,13 +108,6 @@ def csv_lines(path: Path) -> Iterator[tuple[int, list[str]]]:
         raise DataFileError(f"{path}, line {reader.line_num}: {error}") from error
 
 
-def number(text: str) -> float:
-    """A finite number. Raises ValueError with the reason alone."""
-    if not _NUMBER.fullmatch(text) or not isfinite(value := float(text)):
-        raise ValueError("must be a number")
-    return value
-
-
 def _column(
     title: str, columns: Mapping[str, Column], above: Container[str], others: bool
 ) -> tuple[str, float, Column] | None:
@@ -127,7 +121,7 @@ def _column(
         raise ValueError(f"there is no such column, but {known}")
     column = columns[name]
     if not match or match["unit"] not in column.units:
-        raise ValueError(f"must be {' or '.join(f'{name} [{unit}]' for unit in column.units)}")
+        raise ValueError(f"must be {' or '.join(repr(f'{name} [{unit}]') for unit in column.units)}")
     if name in above:
         raise ValueError("there is such a column before")
     return name, column.units[match["unit"]], column
@@ -143,7 +137,9 @@ def _value(text: str, per: float, column: Column) -> float:
         if column.blanks:
             return nan
         raise ValueError("this cell is missing")
-    value = number(text) / per
+    if not _NUMBER.fullmatch(text) or not isfinite(plain := float(text)):
+        raise ValueError("must be a number")
+    value = plain / per
     if column.minimum is not None and value < column.minimum:
         raise ValueError(f"must be at least {column.minimum * per:g}")
     if column.maximum is not None and value > column.maximum:

@@ -92,13 +92,13 @@ def identify(experiments: TankTests) -> Identification:
 def _thrust(experiments: TankTests, thruster: str) -> QuadraticFit | None:
     """The thrust curve of a thruster, None where it is given."""
     names = (f"a_t_{thruster}", f"b_t_{thruster}")
-    given = [name for name in names if name in experiments.rov.known]
     rows = experiments.thrust.get(thruster, ())
-    if len(given) == 2 and not rows:
+    if names[0] in experiments.rov.known:
+        if rows:
+            raise DataFileError(
+                f"{experiments.folder}: rov.toml gives {', '.join(names)}, but there is {rows[0].file} too"
+            )
         return None
-    if given:
-        other = f"there is {rows[0].file} too" if rows else f"{', '.join(set(names) - set(given))} is not"
-        raise DataFileError(f"{experiments.folder}: rov.toml gives {', '.join(given)}, but {other}")
     if not rows:
         raise DataFileError(f"{experiments.folder}: no thrust_{thruster}*.csv, and rov.toml does not give {names[0]}")
     weights = np.array([_weight(experiments, f"thrust_{thruster}", row.command) for row in rows])

@@ -1,17 +1,19 @@
 """A folder of tank tests (CSV) and what no test tells (rov.toml), read and checked.
 
-The name of a file says what it holds and of which thruster or axis, what follows an underscore is free:
+The name of a file, in small or capital letters, says what it holds and of which thruster or axis; what follows an
+underscore is free:
 
     thrust_<rear|top>*.csv                     command, force                  bollard pull, (6)-(10)
     steady_<surge|heave|yaw>*.csv              command, velocity               Tables 3-5
     time_constant_<surge|heave|yaw>*.csv       command, time constant          (17), Tables 6-8
     log_<surge|heave|yaw>*.csv                 time, command, and distance, depth or heading, or velocity
 
-Every column has its unit in its header: `command [%]`. Commands are those of axes.py; a rear command is that of
+Every column has its unit in its header: `command [%]`. Commands are those of an Axis; a rear command is that of
 both rear thrusters, opposite in yaw. Numbers leave this module in SI units, commands as fractions of full thrust.
 """
 
 import hashlib
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -21,19 +23,17 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, create_model
+from pydantic import AfterValidator, BeforeValidator, ValidationInfo, create_model, model_validator
 
-from rov_fmu.files.csv_table import Column, Columns, DataFileError, read_columns
-from rov_fmu.files.messages import shown
+from rov_fmu.files.csv_table import Column, DataFileError, read_columns
 from rov_fmu.motion.rov import AXES, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import QUANTITIES, Finite, Head, Quantity, Strict, Validity, pair, read_checked
+from rov_fmu.vehicle.vehicle import QUANTITIES, Finite, Head, Quantity, Strict, Validity, beside, pair, read_checked
 
 ROV_FILE = "rov.toml"
 THRUSTERS = ("rear", "top")
-_KINDS = re.compile(
-    rf"(?:(?P<thrust>thrust)_(?P<thruster>{'|'.join(THRUSTERS)})"
-    rf"|(?P<kind>steady|time_constant|log)_(?P<axis>{'|'.join(AXES)}))(?:_.*)?\.csv"
+_NAME = re.compile(
+    rf"(?P<kind>thrust|steady|time_constant|log)_(?P<of>{'|'.join((*THRUSTERS, *AXES))})(?:_.*)?\.csv", re.IGNORECASE
 )
 _REQUIRED = ("m_rov", "I_r", "R", "gamma")  # geometry and mass: no test in the tank tells them
 _LEAST_SAMPLES = 20
@@ -116,73 +116,77 @@ def load_tank_tests(folder: Path) -> TankTests:
     if not folder.is_dir():
         raise DataFileError(f"{folder}: there is no such folder")
     rov = _load_rov(folder / ROV_FILE)
-    thrust: dict[str, list[Row]] = {thruster: [] for thruster in THRUSTERS}
-    rows: dict[str, dict[str, list[Row]]] = {kind: {axis: [] for axis in AXES} for kind in _READ}
-    recordings: dict[str, list[Recording]] = {axis: [] for axis in AXES}
+    rows: dict[str, dict[str, tuple[Row, ...]]] = {kind: {} for kind in ("thrust", "steady", "time_constant")}
+    recordings: dict[str, tuple[Recording, ...]] = {}
     inputs = {ROV_FILE: _hash(folder / ROV_FILE)}
-    for path in sorted(folder.glob("*.csv")):
-        match = _KINDS.fullmatch(path.name)
-        if not match or not path.name.isprintable():
+    for path in sorted(path for path in folder.iterdir() if path.name.lower().endswith(".csv")):
+        match = _NAME.fullmatch(path.name)
+        kind, of = (match["kind"].lower(), match["of"].lower()) if match else ("", "")
+        if of not in (THRUSTERS if kind == "thrust" else AXES) or not path.name.isprintable():
             raise DataFileError(
                 f"{path}: no name of a test; thrust_ begins one, then rear or top, or steady_, time_constant_ or log_, "
                 "then surge, heave or yaw, then _ and any printable characters"
             )
-        if match["thrust"]:
-            thrust[match["thruster"]] += _thrust(path)
-        elif match["kind"] == "log":
-            recordings[match["axis"]].append(_recording(path, AXES[match["axis"]]))
+        if kind == "log":
+            recordings[of] = (*recordings.get(of, ()), _recording(path, AXES[of]))
         else:
-            rows[match["kind"]][match["axis"]] += _READ[match["kind"]](path, AXES[match["axis"]])
+            rows[kind][of] = (*rows[kind].get(of, ()), *_rows(path, kind, of))
         inputs[path.name] = _hash(path)
     if len(inputs) == 1:
         raise DataFileError(f"{folder}: there are no tests (*.csv) in this folder")
-    return TankTests(
-        folder=folder,
-        rov=rov,
-        thrust=_frozen(thrust),
-        steady=_frozen(rows["steady"]),
-        time_constants=_frozen(rows["time_constant"]),
-        recordings=_frozen(recordings),
-        inputs=inputs,
-    )
+    return TankTests(folder, rov, rows["thrust"], rows["steady"], rows["time_constant"], recordings, inputs)
 
 
 # ---- rov.toml --------------------------------------------------------------------------------------------------------
 
 _Window = Annotated[tuple[Finite, Finite], BeforeValidator(pair)]
 _known: dict[str, Any] = {name: (q, ...) if name in _REQUIRED else (q | None, None) for name, q in QUANTITIES.items()}
-_Known = create_model("_Known", __base__=Strict, **_known)
+_AnyKnown = create_model("_AnyKnown", __base__=Strict, **_known)
+
+
+class _Known(_AnyKnown):  # type: ignore[misc, valid-type]
+    @model_validator(mode="after")
+    def _whole_curves(self) -> "_Known":
+        for names in ((f"a_t_{thruster}", f"b_t_{thruster}") for thruster in THRUSTERS):
+            given = [name for name in names if getattr(self, name)]
+            if len(given) == 1:
+                raise ValueError(f"{given[0]} is given, but {min(set(names) - set(given))} is not")
+        return self
+
+
 _windows: dict[str, Any] = dict.fromkeys((*(f"thrust_{t}" for t in THRUSTERS), *AXES), (_Window | None, None))
 _Windows = create_model("_Windows", __base__=Strict, **_windows)
 
 
+def _vehicle(name: str, info: ValidationInfo) -> str:
+    if not _vehicle_file(name, beside(name, info)):
+        raise ValueError(
+            f"must be a vehicle file, seen from this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
+        )
+    return name
+
+
+def _vehicle_file(name: str, path: Path) -> Path | None:
+    """The vehicle file at a path, or the one that ships under the name."""
+    return path if os.path.isfile(path) else SHIPPED.get(name)  # noqa: PTH113 (as in vehicle.py)
+
+
 class _RovFile(Strict):
+    against: Annotated[str, AfterValidator(_vehicle)] | None = None
     vehicle: Head
-    known: _Known  # type: ignore[valid-type]
+    known: _Known
     windows: _Windows = _Windows()  # type: ignore[valid-type]
     validity: Validity | None = None
-    against: str | None = None
 
 
 def _load_rov(path: Path) -> Rov:
     checked = read_checked(path, _RovFile)
-    known = {name: q for name in QUANTITIES if (q := getattr(checked.known, name)) is not None}
-    windows = {name: w for name in _windows if (w := getattr(checked.windows, name)) is not None}
-    against = None
-    if checked.against:
-        beside = path.parent / checked.against
-        against = beside if beside.is_file() else SHIPPED.get(checked.against)
-        if not against:
-            raise DataFileError(
-                f"{path}: against = {shown(checked.against)}: must be a vehicle file, seen from this folder, or one of "
-                f"the vehicles that ship: {', '.join(SHIPPED)}"
-            )
     return Rov(
         **dict(checked.vehicle),
-        known=known,
-        windows=windows,
-        command_range=(checked.validity.command_min, checked.validity.command_max) if checked.validity else None,
-        against=against,
+        known={name: q for name in _known if (q := getattr(checked.known, name))},
+        windows={name: window for name in _windows if (window := getattr(checked.windows, name))},
+        command_range=checked.validity.command_range if checked.validity else None,
+        against=_vehicle_file(checked.against, path.parent / checked.against) if checked.against else None,
         limits=checked.validity.limits if checked.validity else (),
     )
 
@@ -213,46 +217,23 @@ def time_constant_column(*, optional: bool = False) -> Column:
     return Column(_TIMES, optional, optional, maximum=1e5, least=1e-4)
 
 
-def _thrust(path: Path) -> Iterator[Row]:
-    """Rows of command and force."""
-    table = read_columns(path, {"command": HELD_COMMAND, "force": _FORCE})
-    noise = 0.05 * max(map(abs, table.values["force"]))
-    for n, row in enumerate(_rows(table, "force")):
-        if row.command * row.value < 0.0 and abs(row.value) > noise:
-            raise table.error(
-                n, "force", "must have the sign of the command, for a thruster pushes where it is told to"
-            )
-        yield row
-
-
-def _steady(path: Path, axis: Axis) -> Iterator[Row]:
-    """Rows of command and velocity."""
-    table = read_columns(path, {"command": HELD_COMMAND, "velocity": velocity_column(axis)})
-    for n, row in enumerate(_rows(table, "velocity")):
-        if row.command == 0.0:
+def _rows(path: Path, kind: str, of: str) -> Iterator[Row]:
+    """Rows of command, and force, velocity or time constant."""
+    name = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}[kind]
+    column = _FORCE if kind == "thrust" else velocity_column(AXES[of]) if kind == "steady" else time_constant_column()
+    table = read_columns(path, {"command": HELD_COMMAND, name: column})
+    noise = 0.05 * max(map(abs, table.values[name]))
+    numbers = zip(table.lines, table.values["command"], table.values[name], strict=True)
+    for n, (line, command, value) in enumerate(numbers):
+        if kind == "thrust" and command * value < 0.0 and abs(value) > noise:
+            raise table.error(n, name, "must have the sign of the command, for a thruster pushes where it is told to")
+        if kind != "thrust" and command == 0.0:
             raise table.error(n, "command", "must not be zero, for nothing moves")
-        if row.command * row.value <= 0.0:
-            raise table.error(n, "velocity", "must have the sign of the command: forward, down, bow to starboard is +")
-        yield row
-
-
-def _time_constant(path: Path, axis: Axis) -> Iterator[Row]:  # noqa: ARG001 (as _steady)
-    """Rows of command and time constant."""
-    table = read_columns(path, {"command": HELD_COMMAND, "time constant": time_constant_column()})
-    for n, row in enumerate(_rows(table, "time constant")):
-        if row.command == 0.0:
-            raise table.error(n, "command", "must not be zero, for nothing moves")
-        if row.value <= 0.0:
-            raise table.error(n, "time constant", "must be above 0")
-        yield row
-
-
-_READ = {"steady": _steady, "time_constant": _time_constant}
-
-
-def _rows(table: Columns, column: str) -> Iterator[Row]:
-    for line, command, value in zip(table.lines, table.values["command"], table.values[column], strict=True):
-        yield Row(table.path.name, line, command, value)
+        if kind == "steady" and command * value <= 0.0:
+            raise table.error(n, name, "must have the sign of the command: forward, down, bow to starboard is +")
+        if kind == "time_constant" and value <= 0.0:
+            raise table.error(n, name, "must be above 0")
+        yield Row(path.name, line, command, value)
 
 
 def _recording(path: Path, axis: Axis) -> Recording:
@@ -283,7 +264,3 @@ def _recording(path: Path, axis: Axis) -> Recording:
 
 def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _frozen(lists: Mapping[str, list[Any]]) -> dict[str, tuple[Any, ...]]:
-    return {name: tuple(items) for name, items in lists.items() if items}

@@ -4,20 +4,17 @@ The printed numbers are the CSV files of the vehicle's data folder; the computed
 closed form. Where the two differ, that is shown as it is.
 """
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from itertools import zip_longest
 from pathlib import Path
 
-from rov_fmu.files.csv_table import DataFileError, csv_lines, number
-from rov_fmu.files.messages import shown
+from rov_fmu.files.csv_table import Column, DataFileError, read_columns
 from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW, Axis, Coefficients, Inputs
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import TABLES, Vehicle
 
 Cells = tuple[Decimal | None, ...]
 
-COMMAND = "command [%]"
 _SOURCES = ("non-linear", "scaled", "experiment")
 
 
@@ -117,50 +114,31 @@ def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
     """
     if vehicle.data is None:
         raise DataFileError(f"{vehicle.name}: no published tables, the vehicle file has no key vehicle.data")
-    return tuple(_load_table(vehicle.data, vehicle.coefficients, experiment) for experiment in STEP_TESTS)
+    return tuple(_load_table(vehicle.data, vehicle.coefficients, test) for test in STEP_TESTS)
 
 
-def read_table(path: Path, columns: Sequence[str]) -> dict[Decimal, Cells]:
-    """Rows of a CSV file by command in %, its first column; an empty cell is None. Raises DataFileError.
-
-    `columns` are the headers of the others, all magnitudes.
-    """
-    columns = [COMMAND, *columns]
+def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
+    """Rows of a CSV file by command in %; an empty cell is None. `units` are those of the other columns, by name."""
+    others = {name: Column({unit: 1.0}, blanks=True) for name, unit in units.items()}
+    table = read_columns(path, {"command": Column({"%": 1.0}), **others})
     rows: dict[Decimal, Cells] = {}
-    lines = csv_lines(path)
-    line, header = next(lines, (1, []))
-    for place, (name, found) in enumerate(zip_longest(columns, header), 1):
-        if name != found:
-            wanted = f"must be {name!r}" if name else "there is no such column"
-            raise DataFileError(f"{path}, line {line}, column {place} = {shown(found or '')}: {wanted}")
-    for line, texts in lines:
-        cells: list[Decimal | None] = []
-        for name, text in zip_longest(columns, texts):
-            try:
-                cells.append(_cell(name, text, rows))
-            except ValueError as error:
-                column = repr(name) if name else len(columns) + 1
-                value = f" = {shown(text)}" if text else ""
-                raise DataFileError(f"{path}, line {line}, column {column}{value}: {error}") from None
-        command, *others = cells
-        assert command is not None  # _cell demands it
-        rows[command] = tuple(others)
-    if not rows:
-        raise DataFileError(f"{path}, line {line}: no rows below the header")
+    for n, command in enumerate(map(Decimal, table.texts["command"])):
+        if not 0 < command <= 100:
+            raise table.error(n, "command", "must be above 0 and at most 100")
+        if command in rows:
+            raise table.error(n, "command", "there is a row of this command above")
+        if negative := next((name for name in units if table.values[name][n] < 0.0), None):
+            raise table.error(n, negative, "must not be negative")
+        rows[command] = tuple(Decimal(text) if (text := table.texts[name][n]) else None for name in units)
     return rows
 
 
-def _load_table(folder: Path, coefficients: Coefficients, experiment: StepTest) -> ResponseTable:
-    e = experiment
-    responses = read_table(
-        folder / f"table{e.number}_{e.axis.name}_response.csv",
-        [f"{source} {quantity}" for source in _SOURCES for quantity in (f"V_ss [{e.axis.unit}]", "Tau [s]")],
-    )
-    velocities = read_table(
-        folder / f"table{e.steady_number}_{e.axis.name}_steady.csv",
-        [f"{direction} [{e.axis.unit}]" for direction in e.steady_columns],
-    )
-    place = e.steady_columns.index(e.direction)
+def _load_table(folder: Path, coefficients: Coefficients, test: StepTest) -> ResponseTable:
+    of_responses, of_velocities = (folder / name for name in TABLES[test.axis.name])
+    units = {"V_ss": test.axis.unit, "Tau": "s"}
+    responses = _read_table(of_responses, {f"{s} {quantity}": units[quantity] for s in _SOURCES for quantity in units})
+    velocities = _read_table(of_velocities, dict.fromkeys(test.steady_columns, test.axis.unit))
+    place = test.steady_columns.index(test.direction)
     steady = {command: V for command, cells in velocities.items() if (V := cells[place]) is not None}
 
     def row(command: Decimal, cells: Cells) -> ResponseRow:
@@ -169,7 +147,7 @@ def _load_table(folder: Path, coefficients: Coefficients, experiment: StepTest) 
             V_measured = steady.get(command)
 
         def response(k: Coefficients, V_printed: Decimal | None, Tau_printed: Decimal | None) -> Response:
-            V_ss, Tau = e.response(k, command)
+            V_ss, Tau = test.response(k, command)
             return Response(Cell(V_printed, V_ss, V_measured), Cell(Tau_printed, Tau, Tau_measured))
 
         return ResponseRow(
@@ -179,26 +157,7 @@ def _load_table(folder: Path, coefficients: Coefficients, experiment: StepTest) 
         )
 
     rows = tuple(row(command, cells) for command, cells in responses.items())
-    return ResponseTable(**vars(e), rows=rows, steady=steady)
-
-
-def _cell(column: str | None, text: str | None, commands: Container[Decimal]) -> Decimal | None:
-    """The value of one cell; `commands` are those of the rows above. Raises ValueError with the reason alone."""
-    if column is None:
-        raise ValueError("there is no such column")
-    if text is None or (not text and column == COMMAND):
-        raise ValueError("this cell is missing")
-    if not text:
-        return None
-    number(text)
-    value = Decimal(text)
-    if column == COMMAND and not 0 < value <= 100:
-        raise ValueError("must be above 0 and at most 100")
-    if column == COMMAND and value in commands:
-        raise ValueError("there is a row of this command above")
-    if value < 0:
-        raise ValueError("must not be negative")
-    return value
+    return ResponseTable(**vars(test), rows=rows, steady=steady)
 
 
 def _deviation(value: float, reference: Decimal | None) -> float | None:

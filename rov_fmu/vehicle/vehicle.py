@@ -5,6 +5,7 @@ import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -15,8 +16,8 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    ValidationInfo,
     create_model,
-    model_validator,
 )
 from pydantic_core import ErrorDetails
 
@@ -31,8 +32,18 @@ else:
     import tomli as tomllib
 
 
+TABLES = {
+    "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
+    "yaw": ("table7_yaw_response.csv", "table5_yaw_steady.csv"),
+    "surge": ("table8_surge_response.csv", "table4_surge_steady.csv"),
+}
+"""Files of published tables in the data folder, by axis: responses, and measured steady velocities."""
+PICTURES = ("model.png", "from_above.svg", "from_starboard.svg")
+"""Files in the folder of pictures."""
+
+
 class VehicleFileError(FileError):
-    """A vehicle file that cannot be used: one line with file, key, value and what is allowed."""
+    """A vehicle file that cannot be used: a line a mistake with file, key, value and what is allowed."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +88,7 @@ class Vehicle:
     data: Path | None
     """The folder with the published tables."""
     pictures: Path | None = None
-    """The folder with the vehicle's own model.png, from_above.svg, from_starboard.svg, each if it has one."""
+    """The folder with the vehicle's own PICTURES, each if it has one."""
     limits: tuple[str, ...] = ()
     """What was found of the vehicle that the model leaves out, in sentences."""
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -86,10 +97,11 @@ class Vehicle:
 
     @property
     def files(self) -> list[Path]:
-        """Every file that the vehicle file names."""
+        """Every file that is read beside the vehicle file."""
         report = self.provenance.report if self.provenance else None
-        folders = filter(None, (self.data, self.pictures))
-        return [*(path for folder in folders for path in folder.glob("*")), *filter(None, (report,))]
+        tables = [self.data / name for names in TABLES.values() for name in names] if self.data else []
+        pictures = [self.pictures / name for name in PICTURES] if self.pictures else []
+        return [path for path in (*tables, *pictures, report) if path and path.is_file()]
 
     def picture(self, name: str) -> Path:
         """The vehicle's own picture of this name, or the neutral one."""
@@ -108,23 +120,8 @@ Checked = TypeVar("Checked", bound=Strict)
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
-    checked = read_checked(path, _File)
-    head, low, high = checked.vehicle, checked.validity.command_min, checked.validity.command_max
-    wrong = []
-    if low >= high:
-        wrong.append(f"{path}: validity.command_min = {low}: must be less than command_max = {high}")
-    folders = {key: path.parent / name if (name := getattr(head, key)) else None for key in ("data", "pictures")}
-    wrong += [
-        f"{path}: vehicle.{key} = {shown(getattr(head, key))}: there is no such folder beside the file"
-        for key, folder in folders.items()
-        if folder and not os.path.isdir(folder)  # noqa: PTH112 (Path.is_dir raises on names that cannot be)
-    ]
-    named = checked.provenance.report if checked.provenance else None
-    report = path.parent / named if named else None
-    if report and not (os.path.isfile(report) or (coming and is_same(report, coming))):  # noqa: PTH113 (as above)
-        wrong.append(f"{path}: provenance.report = {shown(named)}: there is no such file beside this one")
-    if wrong:
-        raise VehicleFileError(*wrong)
+    checked = read_checked(path, _File, coming=coming)
+    head = checked.vehicle
     quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
     return Vehicle(
         name=head.name,
@@ -134,20 +131,21 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         source=head.source,
         coefficients=Coefficients(**{name: q.value for name, q in quantities.items()}),
         sources={name: q.source for name, q in quantities.items()},
-        command_range=(low, high),
+        command_range=checked.validity.command_range,
         alternatives={name: a.plain() for name, a in checked.alternatives.items()},
-        **folders,
+        data=path.parent / head.data if head.data else None,
+        pictures=path.parent / head.pictures if head.pictures else None,
         limits=checked.validity.limits,
         intervals={name: q.interval for name, q in quantities.items() if q.interval},
-        provenance=Provenance(**dict(checked.provenance) | {"report": report}) if checked.provenance else None,
+        provenance=checked.provenance.plain(path.parent) if checked.provenance else None,
     )
 
 
-def read_checked(path: Path, model: type[Checked]) -> Checked:
-    """Read a TOML file of the given form. Raises VehicleFileError."""
+def read_checked(path: Path, model: type[Checked], **context: object) -> Checked:
+    """Read a TOML file of the given form; `folder` and what else is given is the context. Raises VehicleFileError."""
     document = _read_toml(path)
     try:
-        return model.model_validate(document)
+        return model.model_validate(document, context={"folder": path.parent, **context})
     except ValidationError as error:
         raise VehicleFileError(*(f"{path}: {_problem(problem)}" for problem in error.errors())) from error
 
@@ -183,19 +181,19 @@ Interval = Annotated[tuple[Finite, Finite], BeforeValidator(pair)]
 """[low, high] in a TOML file."""
 
 
+def _encloses(interval: tuple[float, float], info: ValidationInfo) -> tuple[float, float]:
+    if not interval[0] <= (value := info.data.get("value", interval[0])) <= interval[1]:
+        raise ValueError(f"must be [low, high] around the value {value}")
+    return interval
+
+
 class Quantity(Strict):
     """The value of a coefficient, and its 95 % confidence interval if it has one."""
 
     value: float
     unit: str
     source: _Text
-    interval: Interval | None = None
-
-    @model_validator(mode="after")
-    def _encloses(self) -> "Quantity":
-        if self.interval and not self.interval[0] <= self.value <= self.interval[1]:
-            raise ValueError("interval: must be [low, high] around the value")
-        return self
+    interval: Annotated[Interval, AfterValidator(_encloses)] | None = None
 
 
 def _quantity(name: str, meta: Meta) -> Any:
@@ -247,17 +245,49 @@ class Head(Strict):
     source: _Text
 
 
+def beside(name: str, info: ValidationInfo) -> Path:
+    """A path as seen from the file that names it."""
+    return Path((info.context or {})["folder"], name)
+
+
+def _folder(name: str, info: ValidationInfo) -> str:
+    if not os.path.isdir(beside(name, info)):  # noqa: PTH112 (Path.is_dir raises on names that cannot be)
+        raise ValueError("there is no such folder beside the file")
+    return name
+
+
+_Folder = Annotated[str, AfterValidator(_folder)]
+
+
 class _FileHead(Head):
-    data: str | None = None
-    pictures: str | None = None
+    data: _Folder | None = None
+    pictures: _Folder | None = None
+
+
+def _below(low: float, info: ValidationInfo) -> float:
+    if low >= (high := info.data.get("command_max", inf)):
+        raise ValueError(f"must be less than command_max = {high}")
+    return low
 
 
 class Validity(Strict):
     """Thruster commands over which the model holds."""
 
-    command_min: _Command
     command_max: _Command
+    command_min: Annotated[_Command, AfterValidator(_below)]
     limits: Annotated[tuple[_Text, ...], BeforeValidator(pair)] = ()
+
+    @property
+    def command_range(self) -> tuple[float, float]:
+        """From the weakest to the strongest."""
+        return self.command_min, self.command_max
+
+
+def _report(name: str, info: ValidationInfo) -> str:
+    path, coming = beside(name, info), (info.context or {})["coming"]
+    if not (os.path.isfile(path) or (coming and is_same(path, coming))):  # noqa: PTH113 (as above)
+        raise ValueError("there is no such file beside this one")
+    return name
 
 
 class _Provenance(Strict):
@@ -265,7 +295,10 @@ class _Provenance(Strict):
     method: _Text
     inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
     warnings: Annotated[tuple[_Text, ...], BeforeValidator(pair)] = ()
-    report: _Text | None = None
+    report: Annotated[_Text, AfterValidator(_report)] | None = None
+
+    def plain(self, folder: Path) -> Provenance:
+        return Provenance(**dict(self) | {"report": folder / self.report if self.report else None})
 
 
 class _File(Strict):
@@ -287,4 +320,5 @@ def _problem(problem: ErrorDetails) -> str:
         case "model_type":
             return f"{key} = {shown(problem['input'])}: must be a table of keys and values"
     reason = problem["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-    return f"{key} = {shown(problem['input'])}: {reason}"
+    of_table = problem["type"] == "value_error" and isinstance(problem["input"], dict)
+    return f"{key}: {reason}" if of_table else f"{key} = {shown(problem['input'])}: {reason}"

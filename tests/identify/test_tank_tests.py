@@ -14,6 +14,7 @@ from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.identify.tank_tests import Row, TankTests, load_tank_tests
 from rov_fmu.vehicle.published import load_tables
+from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 
@@ -112,6 +113,39 @@ def test_as_spreadsheets_save_them(folder: Path) -> None:
     assert load_tank_tests(folder).steady == before
 
 
+def test_names_in_any_case(folder: Path) -> None:
+    before = load_tank_tests(folder)
+    (folder / "time_constant_heave.csv").rename(folder / "time_constant_heave.CSV")
+    (folder / "steady_yaw.csv").rename(folder / "Steady_YAW.Csv")
+    (folder / "Log_Heave.csv").write_text(LOG + "\n".join(f"{n},30,{n}" for n in range(30)) + "\n", encoding="utf-8")
+    (folder / "steady_surge.csv.txt").write_text("not a test", encoding="utf-8")
+    found = load_tank_tests(folder)
+    assert [row.value for row in found.time_constants["heave"]] == [r.value for r in before.time_constants["heave"]]
+    assert [row.value for row in found.steady["yaw"]] == [row.value for row in before.steady["yaw"]]
+    assert [recording.file for recording in found.recordings["heave"]] == ["Log_Heave.csv"]
+    assert {"time_constant_heave.CSV", "Steady_YAW.Csv", "Log_Heave.csv"} <= set(found.inputs)
+
+
+def test_names_that_differ_by_case_are_two_files(folder: Path) -> None:
+    before = load_tank_tests(folder).steady["surge"]
+    (folder / "Steady_Surge.CSV").write_text(STEADY + "20,0.3\n", encoding="utf-8")
+    if (folder / "steady_surge.csv").read_text(encoding="utf-8") == STEADY + "20,0.3\n":
+        pytest.skip("this file system takes both names for one file")
+    found = load_tank_tests(folder).steady["surge"]
+    assert sorted(found, key=lambda row: row.file) == [Row("Steady_Surge.CSV", 2, 0.2, 0.3), *before]
+
+
+def test_a_vehicle_to_set_beside_is_seen_from_the_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rov = folder / "rov.toml"
+    text = rov.read_text(encoding="utf-8").replace('against = "videoray"', 'against = "../mine.toml"')
+    rov.write_text(text, encoding="utf-8")
+    refused(folder, (f"{rov}: against = '../mine.toml': must be a vehicle file", "this folder", "videoray"), capsys)
+    shutil.copy(VIDEORAY, folder.parent / "mine.toml")
+    against = load_tank_tests(folder).rov.against
+    assert against
+    assert against.samefile(folder.parent / "mine.toml")
+
+
 # ---- What is refused -------------------------------------------------------------------------------------------------
 
 STEADY, TAU = "command [%],velocity [m/s]\n", "command [%],time constant [s]\n"
@@ -137,7 +171,9 @@ BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
     "other unit": (
         "steady_surge.csv", "command [%],velocity [knot]\n20,1\n", ("line 1", "column 2", "'velocity [knot]'", "[cm/s]")
     ),
-    "yaw in m/s": ("steady_yaw.csv", STEADY + "20,1\n", ("line 1", "column 2", "velocity [rad/s] or velocity [deg/s]")),
+    "yaw in m/s": (
+        "steady_yaw.csv", STEADY + "20,1\n", ("line 1", "column 2", "'velocity [rad/s]' or 'velocity [deg/s]'")
+    ),
     "other column": (
         "steady_surge.csv", "command [%],velocity [m/s],roll [deg]\n", ("line 1", "column 3", "'roll [deg]'", "no such")
     ),
@@ -193,7 +229,7 @@ BAD_ROV: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
         edit('against = "videoray"', 'against = "nowhere.toml"'),
         ("against", "nowhere.toml", "videoray_refit"),
     ),
-    "half a thrust curve": (edit("b_t_top = ", "# "), ("a_t_top", "b_t_top is not")),
+    "half a thrust curve": (edit("b_t_top = ", "# "), ("known: a_t_top", "b_t_top is not")),
     "no thrust curve": (
         lambda t: edit("b_t_top = ", "# ")(edit("a_t_top = ", "# ")(t)),
         ("no thrust_top*.csv", "a_t_top"),
@@ -207,6 +243,21 @@ def test_bad_rov_file_is_one_clear_line(case: str, folder: Path, capsys: pytest.
     path = folder / "rov.toml"
     path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
     refused(folder, named, capsys)
+
+
+def test_every_mistake_of_a_rov_file_is_told(folder: Path) -> None:
+    path = folder / "rov.toml"
+    text = path.read_text(encoding="utf-8").replace('"kg"', '"lb"').replace("heave = [0.2, 0.7]", "sway = [0.2, 0.7]")
+    text = text.replace('"videoray"', '"nowhere.toml"').replace('"videoray_refit"', '"video ray"')
+    path.write_text(text + "\n[validity]\ncommand_min = 0.7\ncommand_max = 0.2\n", encoding="utf-8")
+    with pytest.raises(VehicleFileError) as caught:
+        load_tank_tests(folder)
+    wrong = ("against = 'nowhere.toml'", "vehicle.identifier = 'video ray'", "known.m_rov.unit = 'lb'", "windows.sway",
+             "validity.command_min = 0.7: must be less than command_max = 0.2")  # fmt: skip
+    lines = str(caught.value).splitlines()
+    assert len(lines) == len(wrong)
+    for line, words in zip(lines, wrong, strict=True):
+        assert line.startswith(f"{path}: {words}")
 
 
 def test_folders_that_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -145,12 +145,13 @@ def test_every_mistake_of_a_file_is_told(tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
     text = ALONE.replace("m_rov = { value = 6.57", "m_rov = { value = -1.0").replace('"kg.m2"', '"lb"')
     text = text.replace("command_min = 0.2", "command_min = 20").replace("R = {", "radius = {")
+    text = text.replace("[vehicle]", '[vehicle]\ndata = "nowhere"')
     path.write_text(text, encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
         load_vehicle(path)
     lines = str(caught.value).splitlines()
-    wrong = ("validity.command_min = 20", "coefficients.m_rov.value = -1.0", "coefficients.I_r.unit = 'lb'",
-             "coefficients.R", "coefficients.radius")  # fmt: skip
+    wrong = ("vehicle.data = 'nowhere'", "validity.command_min = 20", "coefficients.m_rov.value = -1.0",
+             "coefficients.I_r.unit = 'lb'", "coefficients.R", "coefficients.radius")  # fmt: skip
     assert len(lines) == len(wrong)
     for line, words in zip(lines, wrong, strict=True):
         assert line.startswith(f"{path}: {words}")
@@ -163,7 +164,26 @@ def test_mistakes_beyond_the_form_are_told_together(tmp_path: Path) -> None:
     with pytest.raises(VehicleFileError) as caught:
         load_vehicle(path)
     keys = [line.removeprefix(f"{path}: ").split(" = ")[0] for line in str(caught.value).splitlines()]
-    assert keys == ["validity.command_min", "vehicle.data", "vehicle.pictures"]
+    assert keys == ["vehicle.data", "vehicle.pictures", "validity.command_min"]
+
+
+def test_only_what_is_read_counts_as_an_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder with tables and pictures beside the vehicle file: the FMU of the first build is none of them."""
+    for folder in ("tables", "pictures"):
+        shutil.copytree(VIDEORAY.parent / folder, tmp_path, dirs_exist_ok=True)
+    path, fmu = tmp_path / "here.toml", tmp_path / "here.fmu"
+    path.write_text(re.sub(r'^(data|pictures) = "\w+"', r'\1 = "."', TEXT, flags=re.M), encoding="utf-8")
+    table, picture = tmp_path / "table3_heave_steady.csv", tmp_path / "model.png"
+    for _ in range(2):
+        assert main(["build", str(path), "--backend", "pythonfmu", "-o", str(fmu)]) == 0
+    assert {table, picture} < set(load_vehicle(path).files)
+    assert fmu not in load_vehicle(path).files
+    capsys.readouterr()
+    for target in (table, picture, path):
+        before = target.read_bytes()
+        assert main(["build", str(path), "--backend", "pythonfmu", "-o", str(target)]) == 2
+        assert f"would overwrite {target}" in capsys.readouterr().err
+        assert target.read_bytes() == before
 
 
 def check_line(line: str, path: Path, named: tuple[str, ...]) -> None:
