@@ -1,4 +1,4 @@
-"""What the data cannot determine, and what speaks against the model, in words."""
+"""What is not identifiable from the data, and what speaks against the model, in words."""
 
 from collections.abc import Iterator
 
@@ -12,112 +12,116 @@ from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.motion.rov import Axis, Coefficients
 
 
-def on_thrust(thruster: str, fit: QuadraticFit) -> Iterator[str]:
+def on_thrust(thruster: str, fit: QuadraticFit) -> list[str]:
     """Warnings about a thrust curve."""
-    where = f"{thruster} thrust"
-    count = int((fit.weights > 0.0).sum())
-    if fit.estimate.freedom <= 0.0:
-        yield f"{where}: {count} points fix two coefficients exactly, so nothing tells how good they are"
-    if fit.b < 0.0 < fit.a:
-        yield f"{where}: the curve points backward below {-fit.b / fit.a:.0%}; weigh high commands out (windows)"
-    yield from _asymmetry(where, fit.x[fit.weights > 0.0], fit.y[fit.weights > 0.0], "force", f"thrust_{thruster}")
+    return [f"{thruster} thrust: {words}" for words in _on_thrust(thruster, fit)]
 
 
-def on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None) -> Iterator[str]:
+def on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None) -> list[str]:
     """Warnings about drag and β of an axis."""
-    m = result.axis
-    where = m.name
-    beta = m.coefficient("beta")
-    if beta in result.held:
+    return [f"{result.axis.name}: {words}" for words in _on_axis(result, base, thrust)]
+
+
+def _on_thrust(thruster: str, fit: QuadraticFit) -> Iterator[str]:
+    if fit.estimate.degrees_of_freedom <= 0.0:
+        yield f"{fit.counts.sum()} points for two coefficients leave no degree of freedom, so there are no intervals"
+    if fit.b < 0.0 < fit.a:
+        yield f"the curve points backward below {-fit.b / fit.a:.0%}; weigh high commands out (windows)"
+    yield from _asymmetry(fit.x[fit.counts], fit.y[fit.counts], "force", f"thrust_{thruster}")
+
+
+def _on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None) -> Iterator[str]:
+    axis, beta = result.axis, result.axis.coefficient("beta")
+    if beta in result.assumed:
         yield (
-            f"{where}: V_ss alone never fixes {m.inertia}/{beta}; {beta} = 1 is an assumption, and every Tau with it. "
-            f"A time constant or a recording of a step from rest tells it"
+            f"{axis.inertia}/{beta} is not identifiable from V_ss alone; {beta} = 1 is assumed, and every Tau follows "
+            f"from it. A time constant or a recording of a step from rest makes it identifiable"
         )
     if result.estimate and result.chosen != "known":
-        yield from _on_drag(m, result.estimate, result)
+        yield from _on_drag(axis, result.estimate, result)
     steady = [p for p in result.points if p.quantity == "V_ss"]
     x, y = np.array([p.command for p in steady]), np.array([p.value for p in steady])
-    yield from _asymmetry(where, x, y, "V_ss", where)
+    yield from _asymmetry(x, y, "V_ss", axis.name)
     used = [abs(p.command) for p in result.points if p.weight > 0.0]
     if thrust is not None and used:
-        tested = np.abs(thrust.x[thrust.weights > 0.0])
+        tested = np.abs(thrust.x[thrust.counts])
         if max(used) > tested.max() + 0.005 or min(used) < tested.min() - 0.005:
             yield (
-                f"{where}: commands of {min(used):.0%} to {max(used):.0%} are used, but {m.thruster} thrust was tested "
+                f"commands of {min(used):.0%} to {max(used):.0%} are used, but {axis.thruster} thrust was tested "
                 f"from {tested.min():.0%} to {tested.max():.0%} only"
             )
     if result.response and not result.recordings:
-        yield from _on_response(where, result.response)
+        yield from _on_response(result.response)
     if result.recordings:
         yield from _on_recordings(result, result.recordings, base)
         if thrust is not None:
             yield from _on_disagreement(result.recordings, thrust)
 
 
-def _on_drag(m: Axis, estimate: Estimate, result: AxisResult) -> Iterator[str]:
-    a_d, b_d = m.coefficient("a_d"), m.coefficient("b_d")
-    if estimate.freedom <= 0.0:
-        yield f"{m.name}: as many coefficients as measurements, so nothing tells how good they are"
+def _on_drag(axis: Axis, estimate: Estimate, result: AxisResult) -> Iterator[str]:
+    a_d, b_d = axis.coefficient("a_d"), axis.coefficient("b_d")
+    if estimate.degrees_of_freedom <= 0.0:
+        yield "as many coefficients as measurements leave no degree of freedom, so there are no intervals"
     elif a_d in estimate.names and b_d in estimate.names:
         wide = []
         for name in (a_d, b_d):
             interval = estimate.interval(name)
             if interval is None:
-                wide.append(f"{name} is not determined at all")
+                wide.append(f"{name} is not identifiable at all")
             elif interval[1] - interval[0] > estimate[name]:
                 wide.append(f"{name} may lie anywhere from {interval[0]:.3g} to {interval[1]:.3g}")
         if wide:
             correlation = estimate.correlation[estimate.names.index(a_d), estimate.names.index(b_d)]
             together = f" (correlation {correlation:.2f})" if np.isfinite(correlation) else ""
             yield (
-                f"{m.name}: the data hardly tell quadratic from linear drag: {', '.join(wide)}{together}; what they do "
-                f"tell is the sum of both at the velocities tested"
+                f"quadratic and linear drag are hardly identifiable apart: {', '.join(wide)}{together}; "
+                f"identifiable is their sum at the velocities tested"
             )
     for name in estimate.names:
         if estimate[name] == 0.0:
             asked = ""
             if result.drag and not result.recordings:
                 asked = f" (by (11)-(13) alone {result.drag.unbounded[name == b_d]:.3g})"
-            yield f"{m.name}: {name} stops at 0, the data ask for a negative one{asked}, which drag cannot be"
+            yield f"{name} is at its bound of 0, the fit without bounds is negative{asked}, which drag cannot be"
 
 
-def _on_response(where: str, fit: ResponseFit) -> Iterator[str]:
+def _on_response(fit: ResponseFit) -> Iterator[str]:
     for quantity in ("V_ss", "Tau"):
-        inside, outside = fit.rms(quantity), fit.rms(quantity, left_out=True)
+        inside, outside = fit.rms(quantity), fit.rms(quantity, leave_one_out=True)
         if outside > 0.02 and outside > 1.5 * inside:
             yield (
-                f"{where}: {quantity} at a thrust that is left out of the fit is missed by {outside:.1%} (RMS), "
-                f"against {inside:.1%} within the fit: single thrusts carry much of it"
+                f"the leave-one-thrust-out error of {quantity} is {outside:.1%} (RMS), the residual of the fit "
+                f"{inside:.1%}: single thrusts carry much of it"
             )
 
 
 def _on_recordings(result: AxisResult, fit: RecordingsFit, base: Coefficients) -> Iterator[str]:
-    m = fit.axis
+    axis = fit.axis
     for s in fit.simulations:
         if s.correlation_time > 3.0 and s.noise > 1e-4 * float(np.ptp(s.measured)):
             yield (
-                f"{m.name}: what is left of {s.recording.file} is correlated over {s.correlation_time:.0f} samples, so "
-                f"more than the sensor's noise (turbulence, tether, or the model); the intervals are widened for it"
+                f"the residuals of {s.recording.file} are correlated over {s.correlation_time:.0f} samples, "
+                f"so more than the sensor's noise (turbulence, tether, or the model); the intervals are widened for it"
             )
         share = s.outliers / len(s.time)
         if share > 0.03:
-            yield f"{m.name}: {share:.0%} of the samples of {s.recording.file} are far off and count less"
+            yield f"{share:.0%} of the samples of {s.recording.file} are outliers and count less"
     weakest = min((abs(p.command) for p in result.points), default=1.0)
-    if fit.load.is_significant and abs(fit.load.value) > 0.02 * abs(m.force(base, weakest)):
+    if fit.load.is_significant and abs(fit.load.value) > 0.02 * abs(axis.force(base, weakest)):
         yield (
-            f"{m.name}: the recordings show a constant load of {fit.load.value:.3g} {m.load} (ballast, tether), which "
-            f"the model leaves out; the other coefficients bend to it"
+            f"the recordings show a constant load of {fit.load.value:.3g} {axis.load} (ballast, tether), which "
+            f"is not in the model; the other coefficients are biased by it"
         )
     if fit.delay.is_significant and abs(fit.delay.value) > 0.02:
         yield (
-            f"{m.name}: the motion {'lags' if fit.delay.value > 0.0 else 'leads'} the commands by "
-            f"{abs(fit.delay.value):.2f} s beyond what the model gives; a delay is not modelled and biases beta"
+            f"the motion {'lags' if fit.delay.value > 0.0 else 'leads'} the commands by "
+            f"{abs(fit.delay.value):.2f} s beyond what the model gives; a delay is not in the model and biases beta"
         )
     tables = [p for p in result.points if p.error is None and p.weight > 0.0]
     for quantity in ("V_ss", "Tau"):
-        off = relative_rms(tables, predict(m, fit.coefficients, tables), quantity)
+        off = relative_rms(tables, predict(axis, fit.coefficients, tables), quantity)
         if off > 0.05:
-            yield f"{m.name}: {quantity} of the tables is {off:.0%} (RMS) off what the recordings give"
+            yield f"{quantity} of the tables is {off:.0%} (RMS) off what the recordings give"
 
 
 def _on_disagreement(fit: RecordingsFit, thrust: QuadraticFit) -> Iterator[str]:
@@ -127,12 +131,12 @@ def _on_disagreement(fit: RecordingsFit, thrust: QuadraticFit) -> Iterator[str]:
             tested, error = thrust.estimate[name], thrust.estimate.errors[name]
             if abs(fit.estimate[name] - tested) > 3.0 * error:
                 yield (
-                    f"{fit.axis.name}: the recordings ask for {name} = {fit.estimate[name]:.3g}, while the thrust "
+                    f"the recordings ask for {name} = {fit.estimate[name]:.3g}, while the thrust "
                     f"tests gave {tested:.3g} +- {error:.1g}: a thruster in motion is not one that is held"
                 )
 
 
-def _asymmetry(where: str, x: Array, y: Array, what: str, window: str) -> Iterator[str]:
+def _asymmetry(x: Array, y: Array, what: str, window: str) -> Iterator[str]:
     """Both directions at the same command, where they differ by more than 5 %."""
     ratios = {}
     for level in np.unique(np.round(np.abs(x[x < 0.0]), 6)).tolist():
@@ -142,6 +146,6 @@ def _asymmetry(where: str, x: Array, y: Array, what: str, window: str) -> Iterat
     if ratios and max(map(abs, ratios.values())) > 0.05:
         level = max(ratios, key=lambda c: abs(ratios[c]))
         yield (
-            f"{where}: {what} differs by {ratios[level]:+.0%} from positive to negative commands at {level:.0%}, which "
+            f"{what} differs by {ratios[level]:+.0%} from positive to negative commands at {level:.0%}, which "
             f"the model takes as equal; windows.{window} picks a direction"
         )

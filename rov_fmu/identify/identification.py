@@ -33,8 +33,8 @@ class AxisResult:
     """By the points."""
     recordings: RecordingsFit | None
     """By the recordings."""
-    held: Mapping[str, str]
-    """Coefficients that nothing tells, and what is taken instead."""
+    assumed: Mapping[str, str]
+    """Coefficients that are not identifiable, and what is assumed instead."""
     warnings: tuple[str, ...]
 
     @property
@@ -64,7 +64,7 @@ class AxisResult:
 class Identification:
     """A vehicle, and all that it was made of."""
 
-    experiments: TankTests
+    tests: TankTests
     vehicle: Vehicle
     thrust: Mapping[str, QuadraticFit]
     """By thruster, where it was tested; force (N) over command."""
@@ -74,7 +74,7 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the data cannot determine, and what speaks against the model."""
+        """What is not identifiable from the data, and what speaks against the model."""
         assert self.vehicle.provenance
         return self.vehicle.provenance.warnings
 
@@ -88,9 +88,14 @@ class Comparison:
     """V_ss or Tau."""
     points: tuple[Point, ...]
     model: Array
-    left_out: Array
-    """By the fit to the points without those of the same thrust."""
+    leave_one_out: Array
+    """Leave-one-thrust-out: by the fit to the points without those of the same thrust."""
     against: Array
+
+    @property
+    def columns(self) -> list[Array]:
+        """Of the vehicle, leave-one-thrust-out, and of the vehicle to compare with where there is one."""
+        return [self.model, self.leave_one_out, *([] if np.isnan(self.against).all() else [self.against])]
 
     def rms(self, model: Array) -> float:
         """RMS relative error over the points that count."""
@@ -98,18 +103,18 @@ class Comparison:
 
 
 def compare(identification: Identification) -> tuple[Comparison, ...]:
-    """Every measured V_ss and Tau beside the vehicle, the fit without its thrust, and the vehicle to compare with."""
+    """Every measured V_ss and Tau beside the vehicle, the leave-one-thrust-out fit, and the vehicle to compare with."""
     found = []
-    for axis in identification.axes:
+    for result in identification.axes:
         for quantity in ("V_ss", "Tau"):
-            place = [n for n, p in enumerate(axis.points) if p.quantity == quantity]
-            points = tuple(axis.points[n] for n in place)
-            model = predict(axis.axis, identification.vehicle.coefficients, points)
-            other = identification.against
-            against = predict(axis.axis, other.coefficients, points) if other else np.full(len(points), np.nan)
-            left_out = axis.response.left_out[place] if axis.response else np.full(len(points), np.nan)
-            if points:
-                found.append(Comparison(axis, quantity, points, model, left_out, against))
+            if place := [n for n, p in enumerate(result.points) if p.quantity == quantity]:
+                points = tuple(result.points[n] for n in place)
+                model, against = (
+                    predict(result.axis, v.coefficients, points) if v else np.full(len(points), np.nan)
+                    for v in (identification.vehicle, identification.against)
+                )
+                out = result.response.leave_one_out[place] if result.response else np.full(len(points), np.nan)
+                found.append(Comparison(result, quantity, points, model, out, against))
     return tuple(found)
 
 

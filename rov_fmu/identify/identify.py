@@ -1,4 +1,4 @@
-"""From a folder of tank tests to a vehicle: thrust, then drag and β of every axis, with what the data do not tell.
+"""From a folder of tank tests to a vehicle: thrust, then drag and β of every axis, and what is not identifiable.
 
 An axis with recordings takes its coefficients from them (output error), and they have a say in the thrust curve too;
 one without, from the measured points V_ss and Tau. The points, of tables and of recordings, are fitted in either case,
@@ -9,17 +9,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm as normal
-from scipy.stats import t as student
 
 from rov_fmu import __version__
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.identify import diagnostics
 from rov_fmu.identify.identification import AxisResult, Identification, count
-from rov_fmu.identify.least_squares import LEVEL, Estimate
+from rov_fmu.identify.least_squares import Estimate, quantile
 from rov_fmu.identify.output_error import RecordingsFit, fit_recordings
 from rov_fmu.identify.quadratic_fit import QuadraticFit, fit_quadratic
-from rov_fmu.identify.response_fit import Point, fit_response, free_coefficients
+from rov_fmu.identify.response_fit import Point, drag_and_beta, fit_response, free_coefficients
 from rov_fmu.identify.simulator import prepare
 from rov_fmu.identify.step_responses import AGAINST, StepResponse, steps
 from rov_fmu.identify.tank_tests import LEAST_VELOCITY, MOST_VELOCITY, THRUSTERS, Recording, Row, TankTests
@@ -27,129 +25,113 @@ from rov_fmu.motion.rov import AXES, COEFFICIENTS, Axis, Coefficients
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
 
-def identify(experiments: TankTests) -> Identification:
+def identify(tests: TankTests) -> Identification:
     """Identify a vehicle from its tests. Raises DataFileError, VehicleFileError."""
-    rov = experiments.rov
+    rov, known = tests.rov, tests.rov.known
     against = load_vehicle(rov.against) if rov.against else None
-    thrust = {thruster: fit for thruster in THRUSTERS if (fit := _thrust(experiments, thruster))}
+    thrust = {thruster: fit for thruster in THRUSTERS if (fit := _thrust(tests, thruster))}
     values = dict.fromkeys(COEFFICIENTS, 1.0)  # to begin with
     values |= {name: value for fit in thrust.values() for name, value in fit.estimate.named.items()}
-    values |= {name: known.value for name, known in rov.known.items()}
-    sources = {name: known.source for name, known in rov.known.items()}
-    intervals = {name: known.interval for name, known in rov.known.items() if known.interval}
+    values |= {name: given.value for name, given in known.items()}
+    sources = {name: given.source for name, given in known.items()}
+    intervals = {name: given.interval for name, given in known.items() if given.interval}
     for fit in thrust.values():
         weighted = "(7)" if 0.0 in fit.weights else "(6)"
-        forces = count(int((fit.weights > 0.0).sum()), "force")
+        forces = count(int(fit.counts.sum()), "force")
         sources |= dict.fromkeys(fit.estimate.names, f"{weighted} over {forces}")
         intervals |= fit.estimate.intervals
-    axes: list[AxisResult] = []
+    results: list[AxisResult] = []
     for thruster in THRUSTERS:
-        base = Coefficients(**values)
-        by_axis = _recordings(experiments, thruster, base, thrust.get(thruster))
+        by_axis = _fit_recordings(tests, thruster, Coefficients(**values), thrust.get(thruster))
         for recorded in by_axis.values():  # the last word on the thrust curve too
             values |= {name: getattr(recorded.coefficients, name) for name in recorded.estimate.names}
             intervals |= recorded.estimate.intervals
             if f"a_t_{thruster}" in recorded.estimate.names:
                 also = f"{sources[f'a_t_{thruster}'].split(',')[0]}, and the recordings"
-                sources |= dict.fromkeys((f"a_t_{thruster}", f"b_t_{thruster}"), also)
-        for axis in AXES.values():
-            if axis.thruster != thruster:
-                continue
-            fitted = by_axis.get(axis.name)
-            result = _axis(experiments, axis, Coefficients(**values), fitted, thrust.get(thruster))
-            axes.append(result)
-            if result.response and not fitted:
-                values |= {n: getattr(result.response.coefficients, n) for n in result.response.estimate.names}
-                values |= {n: getattr(result.response.coefficients, n) for n in result.response.held}
-                intervals |= result.response.estimate.intervals
-            sources |= dict.fromkeys(
-                (n for kind in ("a_d", "b_d", "beta") if (n := axis.coefficient(kind)) not in rov.known),
-                result.method[0].upper() + result.method[1:],
-            )
-            sources |= result.held
-    axes.sort(key=lambda axis: list(AXES).index(axis.axis.name))
+                sources |= dict.fromkeys(recorded.axis.thrust_names, also)
+        for axis in (axis for axis in AXES.values() if axis.thruster == thruster):
+            result = _axis(tests, axis, Coefficients(**values), by_axis.get(axis.name), thrust.get(thruster))
+            results.append(result)
+            if result.response and result.chosen == "points":
+                fitted = result.response
+                values |= {n: getattr(fitted.coefficients, n) for n in (*fitted.estimate.names, *fitted.assumed)}
+                intervals |= fitted.estimate.intervals
+            sources |= dict.fromkeys(drag_and_beta(axis, known), result.method[0].upper() + result.method[1:])
+            sources |= result.assumed
+    results.sort(key=lambda result: list(AXES).index(result.axis.name))
     warnings = [w for thruster, fit in thrust.items() for w in diagnostics.on_thrust(thruster, fit)]
-    warnings += [w for axis in axes for w in axis.warnings]
-    method = "; ".join(f"{axis.axis.name}: {axis.method}" for axis in axes)
+    warnings += [w for result in results for w in result.warnings]
+    method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
     vehicle = Vehicle(
-        name=rov.name,
-        identifier=rov.identifier,
-        version=rov.version,
-        description=rov.description,
-        source=rov.source,
+        **dict(rov.head),
         coefficients=Coefficients(**values),
         sources=sources,
-        command_range=rov.command_range or _command_range(axes),
+        command_range=rov.command_range or _command_range(results),
         alternatives={},
         data=None,
         limits=rov.limits,
         intervals=intervals,
-        provenance=Provenance(f"rov-fmu {__version__} identify", method, experiments.inputs, tuple(warnings)),
+        provenance=Provenance(f"rov-fmu {__version__} identify", method, tests.inputs, tuple(warnings)),
     )
-    return Identification(experiments, vehicle, thrust, tuple(axes), against)
+    return Identification(tests, vehicle, thrust, tuple(results), against)
 
 
-def _thrust(experiments: TankTests, thruster: str) -> QuadraticFit | None:
+def _thrust(tests: TankTests, thruster: str) -> QuadraticFit | None:
     """The thrust curve of a thruster, None where it is given."""
     names = (f"a_t_{thruster}", f"b_t_{thruster}")
-    rows = experiments.thrust.get(thruster, ())
-    if names[0] in experiments.rov.known:
+    rows = tests.thrust.get(thruster, ())
+    if names[0] in tests.rov.known:
         if rows:
-            raise DataFileError(
-                f"{experiments.folder}: rov.toml gives {', '.join(names)}, but there is {rows[0].file} too"
-            )
+            raise DataFileError(f"{tests.folder}: rov.toml gives {', '.join(names)}, but there is {rows[0].file} too")
         return None
     if not rows:
-        raise DataFileError(f"{experiments.folder}: no thrust_{thruster}*.csv, and rov.toml does not give {names[0]}")
-    weights = np.array([_weight(experiments, f"thrust_{thruster}", row.command) for row in rows])
+        raise DataFileError(f"{tests.folder}: no thrust_{thruster}*.csv, and rov.toml does not give {names[0]}")
+    weights = np.array([_weight(tests, f"thrust_{thruster}", row.command) for row in rows])
     if len({abs(row.command) for row, weight in zip(rows, weights, strict=True) if weight and row.command}) < 2:
-        raise DataFileError(f"{experiments.folder}: thrust_{thruster}*.csv: two commands at least must count")
+        raise DataFileError(f"{tests.folder}: thrust_{thruster}*.csv: two commands at least must count")
     return fit_quadratic(names, np.array([r.command for r in rows]), np.array([r.value for r in rows]), weights)
 
 
-def _recordings(
-    experiments: TankTests, thruster: str, base: Coefficients, thrust: QuadraticFit | None
+def _fit_recordings(
+    tests: TankTests, thruster: str, base: Coefficients, thrust: QuadraticFit | None
 ) -> dict[str, RecordingsFit]:
     """The fits of the axes that a thruster drives, by axis, where they were recorded."""
     recordings: list[Recording] = []
-    for m in AXES.values():
-        wanted = {m.coefficient(kind) for kind in ("a_d", "b_d", "beta")} - set(experiments.rov.known)
-        if m.thruster == thruster and wanted:
-            recordings += experiments.recordings.get(m.name, ())
+    for axis in AXES.values():
+        if axis.thruster == thruster and drag_and_beta(axis, tests.rov.known):
+            recordings += tests.recordings.get(axis.name, ())
     for recording in recordings:
-        values = recording.values[np.isfinite(recording.values)]
+        path, values = tests.folder / recording.file, recording.values[np.isfinite(recording.values)]
         still = "command" if not recording.command.any() else recording.quantity if np.ptp(values) == 0.0 else None
         if still:
-            raise DataFileError(f"{experiments.folder / recording.file}: {still} never changes: nothing can be learnt")
-        _check_thrust(experiments, recording.axis, base, [1.0])
+            raise DataFileError(f"{path}: {still} never changes: nothing is identifiable")
+        _check_thrust(tests, recording.axis, base, [1.0])
         speed = prepare(recording, base).speed
         if not LEAST_VELOCITY <= speed <= MOST_VELOCITY:
             raise DataFileError(
-                f"{experiments.folder / recording.file}: {recording.quantity} tells of a velocity of {speed:.3g} "
+                f"{path}: {recording.quantity} tells of a velocity of {speed:.3g} "
                 f"{recording.axis.unit}: must be {LEAST_VELOCITY:g} at least and {MOST_VELOCITY:g} at most"
             )
         found = steps(recording)
         if found and all(step.note == AGAINST for step in found):
-            raise DataFileError(
-                f"{experiments.folder / recording.file}: moves against the command; forward, down, to starboard is +"
-            )
+            raise DataFileError(f"{path}: moves against the command; forward, down, to starboard is +")
     if not recordings:
         return {}
-    fits = fit_recordings(recordings, base, experiments.rov.known, _uncertain(thrust))
+    fits = fit_recordings(recordings, base, tests.rov.known, _thrust_uncertainty(thrust))
     return {fit.axis.name: fit for fit in fits}
 
 
-def _check_thrust(experiments: TankTests, m: Axis, base: Coefficients, commands: Sequence[float]) -> None:
+def _check_thrust(tests: TankTests, axis: Axis, base: Coefficients, commands: Sequence[float]) -> None:
     """Where the vehicle moves, the thruster must push it there, at one command at least."""
-    forces = [m.force(base, command) for command in commands]
+    forces = [axis.force(base, command) for command in commands]
     if commands and all(force * command <= 0.0 for force, command in zip(forces, commands, strict=True)):
         raise DataFileError(
-            f"{experiments.folder}: the thrust curve of {m.thruster} gives {forces[0]:.3g} {m.load} at a command of "
-            f"{commands[0]:.0%}, where {m.name} needs a push that way"
+            f"{tests.folder}: the thrust curve of {axis.thruster} gives {forces[0]:.3g} {axis.load} at a command of "
+            f"{commands[0]:.0%}, where {axis.name} needs a push that way"
         )
 
 
-def _uncertain(thrust: QuadraticFit | None) -> Estimate | None:
+def _thrust_uncertainty(thrust: QuadraticFit | None) -> Estimate | None:
     """The thrust curve as something measured; None where there is no telling how well, or it is exact.
 
     Few forces tell their own scatter badly, which Student's distribution counts; from here on the normal one is used.
@@ -157,61 +139,62 @@ def _uncertain(thrust: QuadraticFit | None) -> Estimate | None:
     if thrust is None or not np.isfinite(thrust.estimate.covariance).all():
         return None
     exact = np.sqrt(np.diag(thrust.estimate.covariance)).max() < 1e-6 * np.abs(thrust.estimate.values).max()
-    few = float(student.ppf(0.5 + 0.5 * LEVEL, thrust.estimate.freedom) / normal.ppf(0.5 + 0.5 * LEVEL))
+    few = quantile(thrust.estimate.degrees_of_freedom) / quantile(np.inf)
     return None if exact else replace(thrust.estimate, covariance=few**2 * thrust.estimate.covariance)
 
 
 def _axis(
-    experiments: TankTests,
-    m: Axis,
+    tests: TankTests,
+    axis: Axis,
     base: Coefficients,
     fitted: RecordingsFit | None,
     thrust: QuadraticFit | None,
 ) -> AxisResult:
-    known = experiments.rov.known
-    found = tuple(step for recording in experiments.recordings.get(m.name, ()) for step in steps(recording))
-    points = _points(experiments, m, found)
-    wanted = {m.coefficient(kind) for kind in ("a_d", "b_d", "beta")} - set(known)
-    uncertain = _uncertain(thrust)
+    known = tests.rov.known
+    found = tuple(step for recording in tests.recordings.get(axis.name, ()) for step in steps(recording))
+    points = _points(tests, axis, found)
+    wanted = set(drag_and_beta(axis, known))
+    uncertain = _thrust_uncertainty(thrust)
     of_thrust = uncertain.covariance if uncertain else None
     if fitted and uncertain:
-        of_thrust = fitted.estimate.of(m.thrust_names).covariance
+        of_thrust = fitted.estimate.part(axis.thrust_names).covariance
     used = [p for p in points if p.weight > 0.0]
-    _check_thrust(experiments, m, base, [p.command for p in used])
+    _check_thrust(tests, axis, base, [p.command for p in used])
     steady = [p for p in used if p.quantity == "V_ss"]
-    told = free_coefficients(m, used, known)[0] if steady or wanted <= {m.coefficient("beta")} else ()
-    response = fit_response(m, points, base, known, of_thrust) if told else None
-    if not fitted and not response and (missing := sorted(wanted - {m.coefficient("beta")})):
+    enough = bool(steady) or wanted <= {axis.coefficient("beta")}
+    identifiable = enough and free_coefficients(axis, used, known)[0]
+    response = fit_response(axis, points, base, known, of_thrust) if identifiable else None
+    if not fitted and not response and (missing := sorted(wanted - {axis.coefficient("beta")})):
         raise DataFileError(
-            f"{experiments.folder}: no steady_{m.name}*.csv or log_{m.name}*.csv that counts, and rov.toml does not "
+            f"{tests.folder}: no steady_{axis.name}*.csv or log_{axis.name}*.csv that counts, and rov.toml does not "
             f"give {', '.join(missing)}"
         )
     drag = None
     if steady:
-        x, y = np.array([p.value for p in steady]), np.array([m.force(base, p.command) for p in steady])
-        alpha = getattr(base, m.coefficient("alpha"))
+        x, y = np.array([p.value for p in steady]), np.array([axis.force(base, p.command) for p in steady])
+        force = getattr(base, axis.coefficient("alpha")) * y
         groups = np.array([abs(p.command) for p in steady])
-        drag = fit_quadratic((m.coefficient("a_d"), m.coefficient("b_d")), x, alpha * y, groups=groups)
-    held = dict(response.held) if response and not fitted else {}
-    if m.coefficient("alpha") not in known:
-        held[m.coefficient("alpha")] = "The data tell drag against thrust only, so thrust is taken as it is"
-    if not fitted and not response and m.coefficient("beta") not in known:
-        held[m.coefficient("beta")] = "No test tells it; taken as 1"
-    result = AxisResult(m, points, found, drag, response, fitted, held, ())
+        drag = fit_quadratic((axis.coefficient("a_d"), axis.coefficient("b_d")), x, force, groups=groups)
+    assumed = dict(response.assumed) if response and not fitted else {}
+    if (alpha := axis.coefficient("alpha")) not in known:
+        assumed[alpha] = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
+    if not fitted and not response and (beta := axis.coefficient("beta")) not in known:
+        assumed[beta] = "Not identifiable from these tests; assumed 1"
+    result = AxisResult(axis, points, found, drag, response, fitted, assumed, ())
     return replace(result, warnings=tuple(diagnostics.on_axis(result, base, thrust)))
 
 
-def _points(experiments: TankTests, m: Axis, found: tuple[StepResponse, ...]) -> tuple[Point, ...]:
+def _points(tests: TankTests, axis: Axis, found: tuple[StepResponse, ...]) -> tuple[Point, ...]:
     """Rows of the tables, then what the recordings tell."""
 
     def weight(command: float) -> float:
-        return _weight(experiments, m.name, command)
+        return _weight(tests, axis.name, command)
 
     def point(quantity: str, row: Row) -> Point:
         return Point(quantity, row.command, row.value, weight(row.command), f"{row.file}, line {row.line}")
 
-    points = [point("V_ss", row) for row in experiments.steady.get(m.name, ())]
-    points += [point("Tau", row) for row in experiments.time_constants.get(m.name, ())]
+    points = [point("V_ss", row) for row in tests.steady.get(axis.name, ())]
+    points += [point("Tau", row) for row in tests.time_constants.get(axis.name, ())]
     for step in found:
         source = f"{step.file}, {step.start:.1f} s"
         if step.V_ss is not None:
@@ -221,16 +204,16 @@ def _points(experiments: TankTests, m: Axis, found: tuple[StepResponse, ...]) ->
     return tuple(points)
 
 
-def _weight(experiments: TankTests, window: str, command: float) -> float:
-    low, high = experiments.rov.windows.get(window, (-1.0, 1.0))
+def _weight(tests: TankTests, window: str, command: float) -> float:
+    low, high = tests.rov.windows.get(window, (-1.0, 1.0))
     return float(low - 1e-9 <= command <= high + 1e-9)
 
 
-def _command_range(axes: list[AxisResult]) -> tuple[float, float]:
+def _command_range(results: list[AxisResult]) -> tuple[float, float]:
     """From the weakest to the strongest command that counts."""
-    commands = {round(abs(p.command), 6) for axis in axes for p in axis.points if p.weight > 0.0}
-    for axis in axes:
-        for simulation in axis.recordings.simulations if axis.recordings else ():
+    commands = {round(abs(p.command), 6) for result in results for p in result.points if p.weight > 0.0}
+    for result in results:
+        for simulation in result.recordings.simulations if result.recordings else ():
             commands |= set(np.round(np.abs(simulation.recording.command), 6).tolist()) - {0.0}
     low, high = min(commands, default=0.0), max(commands, default=1.0)
     return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))

@@ -5,7 +5,7 @@ The fits themselves are SciPy's. Tuning α and β, positive factors, are fitted 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, isfinite, log, nan
+from math import exp, isfinite, log, nan, sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -16,21 +16,22 @@ from scipy.stats import t as student
 from rov_fmu.motion.rov import COEFFICIENTS
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 LEVEL = 0.95
-_RANK = 1e-6  # singular values below this fraction of the largest belong to what the data cannot tell
+_RANK = 1e-6  # singular values below this fraction of the largest belong to what is not identifiable
 _LEAST_FACTOR = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Fitted coefficients in the units of dynamics.COEFFICIENTS, p of them."""
+    """Fitted coefficients in the units of COEFFICIENTS, p of them."""
 
     names: tuple[str, ...]
     values: Array
     """p."""
     covariance: Array
-    """p x p; infinite where the data do not determine a coefficient."""
-    freedom: float
+    """p x p; infinite where a coefficient is not identifiable."""
+    degrees_of_freedom: float
     """Degrees of freedom left: independent numbers less parameters."""
     noise: float
     """Standard deviation of the residuals, in their unit."""
@@ -43,7 +44,7 @@ class Estimate:
         """Values by name."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
-    def of(self, names: Sequence[str]) -> "Estimate":
+    def part(self, names: Sequence[str]) -> "Estimate":
         """The part of some of the coefficients."""
         place = [self.names.index(name) for name in names]
         return replace(
@@ -57,17 +58,17 @@ class Estimate:
 
     @property
     def correlation(self) -> Array:
-        """p x p; NaN where the data do not determine a coefficient."""
+        """p x p; NaN where a coefficient is not identifiable."""
         error = np.sqrt(np.diag(self.covariance))
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(self.covariance / np.outer(error, error))
 
     def interval(self, name: str) -> tuple[float, float] | None:
-        """95 % interval, cut where the coefficient ceases to be physical; None where the data do not bound it."""
+        """95 % interval, cut where the coefficient ceases to be physical; None where it is not identifiable."""
         value, error = self[name], self.errors[name]
-        if not isfinite(error) or not self.freedom > 0.0:
+        if not isfinite(error) or not self.degrees_of_freedom > 0.0:
             return None
-        reach = float(student.ppf(0.5 + 0.5 * LEVEL, self.freedom)) * error
+        reach = quantile(self.degrees_of_freedom) * error
         meta = COEFFICIENTS[name]
         if is_factor(name):
             ratio = exp(min(reach / value, 100.0))
@@ -78,6 +79,16 @@ class Estimate:
     def intervals(self) -> dict[str, tuple[float, float]]:
         """95 % intervals by name, of the coefficients that have one."""
         return {name: found for name in self.names if (found := self.interval(name))}
+
+    def half_band(self, slopes: Array) -> Array:
+        """Half the width of the 95 % band, to first order, of numbers with these derivatives by the coefficients.
+
+        ... x p to ...; infinite where a coefficient is not identifiable.
+        """
+        if self.degrees_of_freedom <= 0.0 or not np.isfinite(self.covariance).all():
+            return np.full(slopes.shape[:-1], np.inf)
+        variance = np.einsum("...i,ij,...j->...", slopes, self.covariance, slopes)
+        return np.asarray(quantile(self.degrees_of_freedom) * np.sqrt(np.maximum(variance, 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,15 +145,21 @@ def minimize(
     return Solution(result.x, plain.fun, plain.jac)
 
 
+def fit_named(residuals: Callable[[dict[str, float]], Array], start: Mapping[str, float]) -> Solution:
+    """Least squares of residuals that are a function of named coefficients."""
+    names = tuple(start)
+    return minimize(lambda x: residuals(external(names, x)), internal(names, start), bounds(names))
+
+
 def covariance(gram: Array, meat: Array | None = None) -> Array:
-    """G^-1 M G^-1, or G^-1 without M, of G = J'J; infinite variance where J does not tell a parameter."""
+    """G^-1 M G^-1, or G^-1 without M, of G = J'J; infinite variance where a parameter is not identifiable."""
     scale = np.sqrt(np.diag(gram))
     scale[scale == 0.0] = 1.0
     squares, V = np.linalg.eigh(gram / np.outer(scale, scale))
-    told = squares > _RANK**2 * max(squares.max(initial=0.0), 1e-300)
-    inverse = (V[:, told] / squares[told]) @ V[:, told].T / np.outer(scale, scale)
+    identifiable = squares > _RANK**2 * max(squares.max(initial=0.0), 1e-300)
+    inverse = (V[:, identifiable] / squares[identifiable]) @ V[:, identifiable].T / np.outer(scale, scale)
     result = inverse if meat is None else inverse @ meat @ inverse
-    for n in np.flatnonzero(np.linalg.norm(V[:, told], axis=1) < 1.0 - 1e-6):
+    for n in np.flatnonzero(np.linalg.norm(V[:, identifiable], axis=1) < 1.0 - 1e-6):
         result[n, :] = result[:, n] = 0.0
         result[n, n] = np.inf
     return np.asarray(result)
@@ -154,12 +171,42 @@ def propagated(jacobian: Array, of_known: Array, of_known_covariance: Array) -> 
     return np.asarray(gain @ of_known_covariance @ gain.T)
 
 
-def estimate(names: Sequence[str], x: Array, of_x: Array, freedom: float, noise: float) -> Estimate:
+def estimate(names: Sequence[str], x: Array, of_x: Array, degrees_of_freedom: float, noise: float) -> Estimate:
     """The estimate of the first parameters, named, from internal ones and their covariance."""
     p = len(names)
     values = np.array([external(names, x)[n] for n in names])
     slope = np.array([value if is_factor(n) else 1.0 for n, value in zip(names, values, strict=True)])
-    return Estimate(tuple(names), values, of_x[:p, :p] * np.outer(slope, slope), freedom, noise)
+    return Estimate(tuple(names), values, of_x[:p, :p] * np.outer(slope, slope), degrees_of_freedom, noise)
+
+
+def estimate_alike(
+    names: Sequence[str], solution: Solution, count: int, thrust: tuple[Array, Array] | None = None
+) -> Estimate:
+    """The estimate where so many measured numbers err alike, by as much as the residuals tell.
+
+    `thrust` is the residuals' Jacobian by coefficients taken as known, and the covariance of these.
+    """
+    degrees, J = float(count - len(names)), solution.jacobian
+    noise = sqrt(float(solution.residuals @ solution.residuals) / degrees) if degrees > 0.0 else nan
+    of_x = covariance(J.T @ J) * noise**2 if degrees > 0.0 else np.full((len(names), len(names)), np.inf)
+    if thrust is not None:
+        of_x = of_x + propagated(J, *thrust)
+    return estimate(names, solution.x, of_x, degrees, noise)
+
+
+def leave_one_out(groups: Array, predict: Callable[[Flags], Array | None]) -> Array:
+    """Predictions of every group's numbers by a fit without the group; NaN where too few are left (None)."""
+    found = np.full(len(groups), np.nan)
+    for group in np.unique(groups):
+        out = groups == group
+        if (predicted := predict(out)) is not None:
+            found[out] = predicted
+    return found
+
+
+def quantile(degrees_of_freedom: float) -> float:
+    """How many standard errors a 95 % interval reaches (Student)."""
+    return float(student.ppf(0.5 + 0.5 * LEVEL, degrees_of_freedom))
 
 
 def rms(errors: Array) -> float:

@@ -11,10 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import t as student
 
 from rov_fmu.identify.least_squares import (
-    LEVEL,
     Array,
     Estimate,
     Solution,
@@ -24,10 +22,11 @@ from rov_fmu.identify.least_squares import (
     external,
     internal,
     minimize,
+    quantile,
 )
-from rov_fmu.identify.response_fit import response_band
-from rov_fmu.identify.simulator import Prepared, Simulator, prepare
-from rov_fmu.identify.step_responses import correlation_time, spread, white_noise
+from rov_fmu.identify.response_fit import drag_and_beta, response_band
+from rov_fmu.identify.simulator import PreparedRecording, Simulator, prepare
+from rov_fmu.identify.step_responses import correlation_time, robust_deviation, white_noise
 from rov_fmu.identify.tank_tests import Recording
 from rov_fmu.motion.rov import Axis, Coefficients
 
@@ -62,8 +61,8 @@ class Simulation:
 
 
 @dataclass(frozen=True)
-class Suspicion:
-    """A cause that the model leaves out, estimated to first order beside the fit: value and 95 % interval."""
+class UnmodelledEffect:
+    """An effect that is not in the model, estimated to first order beside the fit: value and 95 % interval."""
 
     value: float
     interval: tuple[float, float]
@@ -82,9 +81,9 @@ class RecordingsFit:
     coefficients: Coefficients
     estimate: Estimate
     simulations: tuple[Simulation, ...]
-    load: Suspicion
+    load: UnmodelledEffect
     """A constant force (N) or torque (N.m) beside thrust and drag: ballast, tether."""
-    delay: Suspicion
+    delay: UnmodelledEffect
     """Time (s) from the command to the thrust, or by which the clocks differ."""
 
     def band(self, commands: Array) -> tuple[Array, Array, Array, Array]:
@@ -104,104 +103,96 @@ def fit_recordings(
     `thrust` is the estimate of a_t and b_t by tests, where they are not known; all recordings must be of its thruster.
     The intervals count the correlation that the residuals have beyond white noise.
     """
-    axes = list(dict.fromkeys(r.axis.name for r in recordings))
-    data = tuple(prepare(r, base) for axis in axes for r in recordings if r.axis.name == axis)
-    parts = [_alone(tuple(d for d in data if d.axis.name == axis), base, known, loss) for axis in axes]
+    axes = list({r.axis.name: r.axis for r in recordings}.values())
+    by_axis = [tuple(prepare(r, base) for r in recordings if r.axis is axis) for axis in axes]
+    data = tuple(d for part in by_axis for d in part)
+    parts = [_fit_alone(part, base, known, loss) for part in by_axis]
     values = dict(thrust.named if thrust else {})
     for simulator, x in parts:
         values |= external(simulator.names, x)
-    model = Simulator(data, base, tuple(values), thrust)
-    x = np.concatenate([internal(model.names, values), *(x[len(s.names) :] for s, x in parts)])
     sigma = np.concatenate([_noise(simulator, x) for simulator, x in parts])
-    ends = _Ends(model, _solve(model, x, sigma, loss), sigma, loss)
-    coefficients = replace(base, **external(model.names, ends.x))
-    whole = estimate(model.names, ends.x, ends.covariance(), ends.freedom, 1.0)
+    model = Simulator(data, base, tuple(values), sigma, thrust)
+    start = np.concatenate([internal(model.names, values), *(x[len(s.names) :] for s, x in parts)])
+    analysis = _ResidualAnalysis(model, _solve(model, start, loss), loss)
+    coefficients = replace(base, **external(model.names, analysis.x))
+    whole = estimate(model.names, analysis.x, analysis.covariance(), analysis.degrees_of_freedom, 1.0)
     found = []
     for axis in axes:
-        m = next(d.axis for d in data if d.axis.name == axis)
-        names = [n for n in model.names if n in m.thrust_names or n.endswith(f"_{m.velocity}")]
-        simulations = tuple(s for s in ends.simulations if s.recording.axis.name == axis)
-        load, delay = ends.suspicion(model.by_load(m, ends.x, sigma)), ends.suspicion(ends.by_delay(m))
-        found.append(RecordingsFit(m, coefficients, whole.of(names), simulations, load, delay))
+        names = [n for n in model.names if n in axis.thrust_names or n.endswith(f"_{axis.velocity}")]
+        simulations = tuple(s for s in analysis.simulations if s.recording.axis is axis)
+        columns = model.by_load(axis, analysis.x), analysis.by_delay(axis)
+        effects = (analysis.unmodelled_effect(column) for column in columns)
+        found.append(RecordingsFit(axis, coefficients, whole.part(names), simulations, *effects))
     return tuple(found)
 
 
-def _alone(
-    data: tuple[Prepared, ...], base: Coefficients, known: Collection[str], loss: Loss
+def _fit_alone(
+    data: tuple[PreparedRecording, ...], base: Coefficients, known: Collection[str], loss: Loss
 ) -> tuple[Simulator, Array]:
     """One axis, thrust as it is, from a part of the samples: enough to come near, and fast."""
-    m = data[0].axis
-    names = tuple(n for kind in ("a_d", "b_d", "beta") if (n := m.coefficient(kind)) not in known)
-    thin = Simulator(tuple(d.thinned() for d in data), base, names)
+    names = drag_and_beta(data[0].axis, known)
     sigma = np.array([max(white_noise(d.values), _least_noise(d.values)) for d in data])
+    thin = Simulator(tuple(d.thinned() for d in data), base, names, sigma)
     starts = (thin.start(beta) for beta in _BETAS)
-    start = min(starts, key=lambda x: float(np.sum(np.sqrt(1.0 + thin.residuals(x, sigma) ** 2))))
-    return Simulator(data, base, names), _solve(thin, start, sigma, "soft_l1" if loss == "huber" else loss).x
+    start = min(starts, key=lambda x: float(np.sum(np.sqrt(1.0 + thin.residuals(x) ** 2))))
+    x = _solve(thin, start, "soft_l1" if loss == "huber" else loss).x
+    return Simulator(data, base, names, np.ones(len(data))), x
 
 
 def _noise(simulator: Simulator, x: Array) -> Array:
     """Standard deviation of every recording's residuals, robust."""
-    left = simulator.split(simulator.residuals(x, np.ones(len(simulator.data))))
-    return np.array([max(spread(r), _least_noise(d.values)) for r, d in zip(left, simulator.data, strict=True)])
+    residuals = simulator.residuals(x)
+    return np.array([max(robust_deviation(residuals[rows]), _least_noise(d.values))
+                     for d, rows, *_ in simulator.places])  # fmt: skip
 
 
 def _least_noise(values: Array) -> float:
     return max(1e-6 * float(np.ptp(values)), 1e-12)
 
 
-def _solve(model: Simulator, start: Array, sigma: Array, loss: Literal["soft_l1", "huber", "linear"]) -> Solution:
-    return minimize(
-        lambda x: model.residuals(x, sigma),
-        start,
-        bounds(model.names, sum(d.own for d in model.data)),
-        jacobian=lambda x: model.jacobian(x, sigma),
-        loss=loss,
-        threshold=_HUBER if loss == "huber" else 1.0,
-    )
+def _solve(model: Simulator, start: Array, loss: Literal["soft_l1", "huber", "linear"]) -> Solution:
+    limits = bounds(model.names, len(start) - len(model.names))
+    threshold = _HUBER if loss == "huber" else 1.0
+    return minimize(model.residuals, start, limits, jacobian=model.jacobian, loss=loss, threshold=threshold)
 
 
-class _Ends:
-    """What the solution leaves over, and what follows from it."""
+class _ResidualAnalysis:
+    """Noise, correlation and outliers of a solution's residuals, and the uncertainty that follows from them."""
 
-    def __init__(self, model: Simulator, solution: Solution, sigma: Array, loss: Loss) -> None:
-        self.x, self._jacobian, self._sigma = solution.x, solution.jacobian, sigma
+    def __init__(self, model: Simulator, solution: Solution, loss: Loss) -> None:
+        self.x, self._jacobian, self._model = solution.x, solution.jacobian, model
         r = solution.residuals
         self._inside = np.abs(r) <= _HUBER if loss == "huber" else np.ones(len(r), bool)
         self._psi = np.where(self._inside, r, _HUBER * np.sign(r))
         self._variance = np.ones(len(r))  # of each psi, correlation counted; of the thrust curve it is 1
-        simulations, row = [], 0
-        excess = len(r) / (len(r) - len(solution.x))
-        for d, own, s in zip(model.data, model.own(solution.x), sigma.tolist(), strict=True):
-            rows = slice(row, row + len(d.time))
-            left, correlation = r[rows], correlation_time(self._psi[rows])
+        self.simulations: list[Simulation] = []
+        self.degrees_of_freedom = 2.0 * bool(model.thrust) - len(self.x)
+        excess = len(r) / (len(r) - len(self.x))
+        for d, rows, initial, sigma in model.places:
+            correlation = correlation_time(self._psi[rows])
             self._variance[rows] = correlation * excess * np.mean(self._psi[rows] ** 2)
-            outliers = int((np.abs(left) > _HUBER).sum())
-            run = model.run(d, solution.x, own)
-            simulations.append(Simulation(d.recording, d.time, d.values, *run, s * spread(left), correlation, outliers))
-            row = rows.stop
-        self.simulations = tuple(simulations)
-        self.freedom = sum(len(s.time) / s.correlation_time for s in simulations) + len(r) - row - len(solution.x)
+            self.degrees_of_freedom += len(d.time) / correlation
+            run, noise = model.run(d, self.x, self.x[initial]), sigma * robust_deviation(r[rows])
+            outliers = int((np.abs(r[rows]) > _HUBER).sum())
+            self.simulations.append(Simulation(d.recording, d.time, d.values, *run, noise, correlation, outliers))
 
     def covariance(self, jacobian: Array | None = None) -> Array:
         """Of the parameters of a robust fit; correlated residuals count as so many fewer."""
         J = self._jacobian if jacobian is None else jacobian
         return covariance(*((J * weights[:, None]).T @ J for weights in (self._inside, self._variance)))
 
-    def by_delay(self, m: Axis) -> Array:
+    def by_delay(self, axis: Axis) -> Array:
         """Derivative of the residuals by a delay on an axis."""
-        column, row = np.zeros(len(self._psi)), 0
-        for s, sigma in zip(self.simulations, self._sigma.tolist(), strict=True):
-            rows = slice(row, row + len(s.time))
-            if s.recording.axis is m:
-                column[rows] = -(s.velocity if s.recording.is_position else s.acceleration) / sigma
-            row = rows.stop
+        column = np.zeros(len(self._psi))
+        for s, (d, rows, _, sigma) in zip(self.simulations, self._model.places, strict=True):
+            if d.axis is axis:
+                column[rows] = -(s.velocity if d.recording.is_position else s.acceleration) / sigma
         return column
 
-    def suspicion(self, column: Array) -> Suspicion:
+    def unmodelled_effect(self, column: Array) -> UnmodelledEffect:
         """One Gauss-Newton step with one more parameter, from the solution."""
         J = np.column_stack([self._jacobian, column])
         gram = (J * self._inside[:, None]).T @ J
         value = -float(np.linalg.lstsq(gram, J.T @ self._psi, rcond=None)[0][-1])
-        error = float(np.sqrt(self.covariance(J)[-1, -1]))
-        reach = float(student.ppf(0.5 + 0.5 * LEVEL, max(self.freedom, 1.0))) * error
-        return Suspicion(value, (value - reach, value + reach))
+        reach = quantile(max(self.degrees_of_freedom, 1.0)) * float(np.sqrt(self.covariance(J)[-1, -1]))
+        return UnmodelledEffect(value, (value - reach, value + reach))

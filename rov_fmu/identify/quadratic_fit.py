@@ -1,13 +1,21 @@
 """Thrust over command and drag over velocity by (weighted) least squares, (6)-(16)."""
 
 from dataclasses import dataclass
-from math import nan, sqrt
+from math import nan
 
 import numpy as np
 from scipy.optimize import lsq_linear
-from scipy.stats import t as student
 
-from rov_fmu.identify.least_squares import LEVEL, Array, Estimate, bounds, covariance, estimate, rms
+from rov_fmu.identify.least_squares import (
+    Array,
+    Estimate,
+    Flags,
+    Solution,
+    bounds,
+    estimate_alike,
+    leave_one_out,
+    rms,
+)
 from rov_fmu.motion.rov import COEFFICIENTS
 
 
@@ -22,8 +30,8 @@ class QuadraticFit:
     estimate: Estimate
     unbounded: tuple[float, float]
     """a and b if they could take any value."""
-    left_out: Array
-    """Prediction of every point by a fit without the points of its thrust; NaN where too few are left."""
+    leave_one_out: Array
+    """Leave-one-thrust-out: a fit without the points of its thrust, at every point; NaN where too few are left."""
 
     @property
     def a(self) -> float:
@@ -35,18 +43,23 @@ class QuadraticFit:
         """Linear coefficient."""
         return float(self.estimate.values[1])
 
+    @property
+    def counts(self) -> Flags:
+        """Whether a point has weight."""
+        return self.weights > 0.0
+
+    @property
+    def residual_rms(self) -> float:
+        """Over the points that count."""
+        return rms(self.residuals[self.counts])
+
     def value(self, x: Array) -> Array:
         """The curve."""
         return np.asarray(_quadratic(x) @ self.estimate.values)
 
     def band(self, x: Array) -> tuple[Array, Array]:
         """95 % confidence band of the curve; infinite where there are too few points."""
-        if self.estimate.freedom <= 0.0 or not np.isfinite(self.estimate.covariance).all():
-            return np.full_like(x, -np.inf), np.full_like(x, np.inf)
-        M = _quadratic(x)
-        reach = student.ppf(0.5 + 0.5 * LEVEL, self.estimate.freedom) * np.sqrt(
-            np.einsum("ij,jk,ik->i", M, self.estimate.covariance, M)
-        )
+        reach = self.estimate.half_band(_quadratic(x))
         return self.value(x) - reach, self.value(x) + reach
 
     @property
@@ -59,14 +72,13 @@ class QuadraticFit:
         """Share of the weighted variance about the mean that the curve explains."""
         if not self.weights.any():
             return nan
-        spread = self.y - np.average(self.y, weights=self.weights)
-        total = float(self.weights @ spread**2)
+        total = float(self.weights @ (self.y - np.average(self.y, weights=self.weights)) ** 2)
         return 1.0 - float(self.weights @ self.residuals**2) / total if total > 0.0 else nan
 
     @property
-    def left_out_error(self) -> float:
-        """RMS of measured less predicted without the point's own thrust, over the points that count."""
-        return rms((self.y - self.left_out)[self.weights > 0.0])
+    def leave_one_out_error(self) -> float:
+        """Leave-one-thrust-out: RMS of measured less predicted, over the points that count."""
+        return rms((self.y - self.leave_one_out)[self.counts])
 
     @property
     def at_bound(self) -> tuple[str, ...]:
@@ -84,22 +96,17 @@ def fit_quadratic(
     weights = np.ones_like(x) if weights is None else weights
     groups = np.abs(x) if groups is None else groups
     low, high = bounds(names)
-    root = np.sqrt(weights)[:, None]
-    M = _quadratic(x) * root
-    values = _linear(M, y * root[:, 0], low, high)
-    free = _linear(M, y * root[:, 0], np.full(2, -np.inf), np.full(2, np.inf))
-    used = weights > 0.0
-    freedom = float(used.sum() - 2)
-    residuals = root[:, 0] * y - M @ values
-    noise = sqrt(float(residuals @ residuals) / freedom) if freedom > 0.0 else nan
-    spread = covariance(M.T @ M) * noise**2 if freedom > 0.0 else np.full((2, 2), np.inf)
-    found = estimate(names, values, spread, freedom, noise)
-    left_out = np.full_like(y, np.nan)
-    for group in np.unique(groups):
-        out = groups == group
-        if len(np.unique(groups[used & ~out])) >= 2:
-            left_out[out] = _quadratic(x[out]) @ _linear(M[~out], (root[:, 0] * y)[~out], low, high)
-    return QuadraticFit(x, y, weights, found, (float(free[0]), float(free[1])), left_out)
+    root, used = np.sqrt(weights), weights > 0.0
+    M, weighted = _quadratic(x) * root[:, None], root * y
+    values = _linear(M, weighted, low, high)
+    free = _linear(M, weighted, np.full(2, -np.inf), np.full(2, np.inf))
+
+    def without(out: Flags) -> Array | None:
+        enough = len(np.unique(groups[used & ~out])) >= 2
+        return _quadratic(x[out]) @ _linear(M[~out], weighted[~out], low, high) if enough else None
+
+    found = estimate_alike(names, Solution(values, weighted - M @ values, M), int(used.sum()))
+    return QuadraticFit(x, y, weights, found, (float(free[0]), float(free[1])), leave_one_out(groups, without))
 
 
 def _quadratic(x: Array) -> Array:

@@ -2,23 +2,19 @@
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, nan, sqrt
+from math import isfinite
 
 import numpy as np
-from scipy.stats import t as student
 
 from rov_fmu.identify.least_squares import (
-    LEVEL,
     Array,
     Estimate,
+    Flags,
     Solution,
-    bounds,
-    covariance,
-    estimate,
+    estimate_alike,
     external,
-    internal,
-    minimize,
-    propagated,
+    fit_named,
+    leave_one_out,
     rms,
 )
 from rov_fmu.motion.rov import Axis, Coefficients
@@ -36,7 +32,7 @@ class Point:
     source: str
     """File and line, or file and time."""
     error: float | None = None
-    """Standard error, where a recording tells it."""
+    """Standard error, of a point from a recording."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +45,9 @@ class ResponseFit:
     estimate: Estimate
     given_thrust: Estimate
     """The same, were the thrust curve certain; V_ss and Tau are hardly less so if it is not, for drag bends with it."""
-    held: Mapping[str, str]
-    """Coefficients that the points do not tell, and what is taken instead."""
-    left_out: Array
+    assumed: Mapping[str, str]
+    """Coefficients that are not identifiable from the points, and what is assumed instead."""
+    leave_one_out: Array
     """n: prediction of every point by a fit without the points of its thrust; NaN where too few are left."""
 
     @property
@@ -59,9 +55,9 @@ class ResponseFit:
         """n: the fitted model at every point."""
         return predict(self.axis, self.coefficients, self.points)
 
-    def rms(self, quantity: str, *, left_out: bool = False) -> float:
+    def rms(self, quantity: str, *, leave_one_out: bool = False) -> float:
         """RMS relative error over the points of V_ss or Tau that count."""
-        return relative_rms(self.points, self.left_out if left_out else self.model, quantity)
+        return relative_rms(self.points, self.leave_one_out if leave_one_out else self.model, quantity)
 
     def band(self, commands: Array) -> tuple[Array, Array, Array, Array]:
         """95 % confidence band of the curves over commands: V_ss low and high, Tau low and high."""
@@ -80,32 +76,29 @@ def fit_response(
     The thrust coefficients' covariance (2 x 2, a_t and b_t), where they were fitted, widens the intervals.
     """
     used = [p for p in points if p.weight > 0.0]
-    names, held = free_coefficients(axis, used, known)
-    base = replace(base, **{name: value for name, (value, _) in held.items()})
+    names, assumed = free_coefficients(axis, used, known)
+    base = replace(base, **{name: value for name, (value, _) in assumed.items()})
     solution = _solve(axis, used, base, names)
-    freedom = float(len(used) - len(names))
-    noise = sqrt(float(solution.residuals @ solution.residuals) / freedom) if freedom > 0.0 else nan
-    of_x = covariance(solution.jacobian.T @ solution.jacobian) * (noise**2 if freedom > 0.0 else np.inf)
-    given_thrust = estimate(names, solution.x, of_x, freedom, noise)
+    thrust = None
     if thrust_covariance is not None and names:
-        of_thrust = _thrust_jacobian(axis, base, lambda k: _residuals(axis, used, k, external(names, solution.x)))
-        of_x = of_x + propagated(solution.jacobian, of_thrust, thrust_covariance)
-    left_out = np.full(len(points), np.nan)
-    levels = [round(abs(p.command), 6) for p in points]
-    for level in set(levels):
-        rest = [p for p, at in zip(points, levels, strict=True) if at != level and p.weight > 0.0]
-        out = [n for n, at in enumerate(levels) if at == level]
-        if set(free_coefficients(axis, rest, known)[0]) >= set(names) and len(rest) >= len(names):
-            other = replace(base, **external(names, _solve(axis, rest, base, names).x))
-            left_out[out] = predict(axis, other, [points[n] for n in out])
+        by_thrust = _thrust_jacobian(axis, base, lambda k: _residuals(axis, used, k, external(names, solution.x)))
+        thrust = by_thrust, thrust_covariance
+
+    def without(out: Flags) -> Array | None:
+        rest = [p for p, is_out in zip(points, out, strict=True) if not is_out and p.weight > 0.0]
+        if not set(free_coefficients(axis, rest, known)[0]) >= set(names) or len(rest) < len(names):
+            return None
+        other = replace(base, **external(names, _solve(axis, rest, base, names).x))
+        return predict(axis, other, [p for p, is_out in zip(points, out, strict=True) if is_out])
+
     return ResponseFit(
         axis,
         tuple(points),
         replace(base, **external(names, solution.x)),
-        estimate(names, solution.x, of_x, freedom, noise),
-        given_thrust,
-        {name: reason for name, (_, reason) in held.items()},
-        left_out,
+        estimate_alike(names, solution, len(used), thrust),
+        estimate_alike(names, solution, len(used)),
+        {name: reason for name, (_, reason) in assumed.items()},
+        leave_one_out(np.array([round(abs(p.command), 6) for p in points]), without),
     )
 
 
@@ -126,19 +119,14 @@ def response_band(
     axis: Axis, coefficients: Coefficients, found: Estimate, commands: Array
 ) -> tuple[Array, Array, Array, Array]:
     """95 % confidence band of V_ss and Tau over commands, to first order in the estimate."""
-    names = found.names
     curve = np.array([axis.response(coefficients, c) for c in commands.tolist()])
-    if found.freedom <= 0.0 or not np.isfinite(found.covariance).all():
-        low, high = np.full_like(curve, -np.inf), np.full_like(curve, np.inf)
-    else:
-        slopes = np.empty((len(names), *curve.shape))
-        for n, name in enumerate(names):
+    slopes = np.empty((*curve.shape, len(found.names)))
+    with np.errstate(invalid="ignore"):  # without any drag both are infinite
+        for n, name in enumerate(found.names):
             h = 1e-5 * (found[name] or min(found.errors[name], 1.0))
             moved = replace(coefficients, **{name: found[name] + h})
-            with np.errstate(invalid="ignore"):  # without any drag both are infinite
-                slopes[n] = (np.array([axis.response(moved, c) for c in commands.tolist()]) - curve) / h
-        variance = np.einsum("pcq,pr,rcq->cq", slopes, found.covariance, slopes)
-        reach = float(student.ppf(0.5 + 0.5 * LEVEL, found.freedom)) * np.sqrt(np.maximum(variance, 0.0))
+            slopes[..., n] = (np.array([axis.response(moved, c) for c in commands.tolist()]) - curve) / h
+        reach = found.half_band(slopes)
         low, high = curve - reach, curve + reach
     return low[:, 0], high[:, 0], low[:, 1], high[:, 1]
 
@@ -154,24 +142,26 @@ def _thrust_jacobian(axis: Axis, base: Coefficients, residuals: Callable[[Coeffi
     return np.column_stack(columns)
 
 
+def drag_and_beta(axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:
+    """Names of a_d, b_d and β of an axis, as far as they are not known."""
+    return tuple(name for kind in ("a_d", "b_d", "beta") if (name := axis.coefficient(kind)) not in known)
+
+
 def free_coefficients(
     axis: Axis, used: Sequence[Point], known: Collection[str]
 ) -> tuple[tuple[str, ...], dict[str, tuple[float, str]]]:
-    """Coefficients to fit, and those held: value and reason."""
-    a_d, b_d, beta = (axis.coefficient(kind) for kind in ("a_d", "b_d", "beta"))
-    held: dict[str, tuple[float, str]] = {}
+    """Coefficients to fit, and those that are not identifiable: the value assumed, and the reason."""
+    a_d, b_d, beta = drag_and_beta(axis)
+    assumed: dict[str, tuple[float, str]] = {}
     if b_d not in known and a_d not in known and len({round(abs(p.command), 6) for p in used}) < 2:
-        held[b_d] = (0.0, "one thrust alone cannot tell linear from quadratic drag; taken as 0")
+        assumed[b_d] = (0.0, "Linear and quadratic drag are not identifiable apart from one thrust; assumed 0")
     if beta not in known and not any(p.quantity == "Tau" for p in used):
-        held[beta] = (1.0, f"V_ss alone never fixes {axis.inertia}/{beta}; taken as 1")
-    return tuple(n for n in (a_d, b_d, beta) if n not in known and n not in held), held
+        assumed[beta] = (1.0, f"{axis.inertia}/{beta} is not identifiable from V_ss alone; assumed 1")
+    return drag_and_beta(axis, {*known, *assumed}), assumed
 
 
 def _solve(axis: Axis, used: Sequence[Point], base: Coefficients, names: tuple[str, ...]) -> Solution:
-    def residuals(x: Array) -> Array:
-        return _residuals(axis, used, base, external(names, x))
-
-    return minimize(residuals, internal(names, _start(axis, used, base, names)), bounds(names))
+    return fit_named(lambda values: _residuals(axis, used, base, values), _start(axis, used, base, names))
 
 
 def _residuals(axis: Axis, used: Sequence[Point], base: Coefficients, values: Mapping[str, float]) -> Array:
@@ -182,7 +172,7 @@ def _residuals(axis: Axis, used: Sequence[Point], base: Coefficients, values: Ma
 
 def _start(axis: Axis, used: Sequence[Point], base: Coefficients, names: tuple[str, ...]) -> dict[str, float]:
     """Where to begin: half of the drag linear, half quadratic, at the mean V_ss; then β by the mean Tau."""
-    a_d, b_d, beta = (axis.coefficient(kind) for kind in ("a_d", "b_d", "beta"))
+    a_d, b_d, beta = drag_and_beta(axis)
     alpha = getattr(base, axis.coefficient("alpha"))
     steady = [p for p in used if p.quantity == "V_ss"]
     drag = [d for p in steady if (d := alpha * axis.force(base, p.command) / p.value) > 0.0]

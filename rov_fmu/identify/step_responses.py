@@ -100,10 +100,10 @@ def without_spikes(values: Array) -> Array:
 
 def white_noise(values: Array) -> float:
     """About the standard deviation of the sensor's noise, from second differences: motion is smooth beside it."""
-    return spread(np.diff(values, 2)) / sqrt(6.0)
+    return robust_deviation(np.diff(values, 2)) / sqrt(6.0)
 
 
-def spread(values: Array) -> float:
+def robust_deviation(values: Array) -> float:
     """Standard deviation, robust."""
     return float(1.4826 * np.median(np.abs(values - np.median(values))))
 
@@ -139,7 +139,7 @@ def _steady(step: StepResponse, time: Array, values: Array, is_position: bool) -
     even, v = velocity(time, values, is_position=is_position)
     tail = v[int(0.7 * len(v)) :]
     level = float(np.median(tail))
-    off = np.flatnonzero(np.abs(v - level)[: len(v) - len(tail)] > max(0.02 * abs(level), 3.0 * spread(tail)))
+    off = np.flatnonzero(np.abs(v - level)[: len(v) - len(tail)] > max(0.02 * abs(level), 3.0 * robust_deviation(tail)))
     earliest = int(np.searchsorted(time, even[off[-1]])) + 1 if off.size else 0
     latest = len(time) - max(_LEAST, len(time) // 4)
     for first in np.unique(np.linspace(min(earliest, latest), latest, 15).astype(int)).tolist():
@@ -200,7 +200,7 @@ def _rising(step: StepResponse, time: Array, values: Array, is_position: bool) -
     n = _odd(window / interval, len(even))
     kernel = savgol_coeffs(n, min(_ORDER, n - 1), deriv=int(is_position), delta=interval)
     _, fitted = velocity(time, values, is_position=False, window=window)
-    noise = spread(np.interp(even, time, values) - fitted)
+    noise = robust_deviation(np.interp(even, time, values) - fitted)
     at = int(np.searchsorted(even - step.start, Tau))
     near = slice(max(at - n // 4 - 1, 0), at + n // 4 + 2)
     rise = float(np.polyfit(even[near], v[near], 1)[0])

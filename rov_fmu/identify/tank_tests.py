@@ -1,4 +1,4 @@
-"""A folder of tank tests (CSV) and what no test tells (rov.toml), read and checked.
+"""A folder of tank tests (CSV) and what is given beforehand (rov.toml), read and checked.
 
 The name of a file, in small or capital letters, says what it holds and of which thruster or axis; what follows an
 underscore is free:
@@ -35,7 +35,7 @@ THRUSTERS = ("rear", "top")
 _NAME = re.compile(
     rf"(?P<kind>thrust|steady|time_constant|log)_(?P<of>{'|'.join((*THRUSTERS, *AXES))})(?:_.*)?\.csv", re.IGNORECASE
 )
-_REQUIRED = ("m_rov", "I_r", "R", "gamma")  # geometry and mass: no test in the tank tells them
+_REQUIRED = ("m_rov", "I_r", "R", "gamma")  # geometry and mass: not identifiable in the tank
 _LEAST_SAMPLES = 20
 
 
@@ -72,13 +72,9 @@ class Recording:
 
 @dataclass(frozen=True)
 class Rov:
-    """What no test tells."""
+    """What is given beforehand (rov.toml)."""
 
-    name: str
-    identifier: str
-    version: str
-    description: str
-    source: str
+    head: Head
     known: Mapping[str, Quantity]
     """Coefficients that are given, not identified: mass, moment of inertia, geometry, maybe more."""
     windows: Mapping[str, tuple[float, float]]
@@ -182,7 +178,7 @@ class _RovFile(Strict):
 def _load_rov(path: Path) -> Rov:
     checked = read_checked(path, _RovFile)
     return Rov(
-        **dict(checked.vehicle),
+        head=checked.vehicle,
         known={name: q for name in _known if (q := getattr(checked.known, name))},
         windows={name: window for name in _windows if (window := getattr(checked.windows, name))},
         command_range=checked.validity.command_range if checked.validity else None,

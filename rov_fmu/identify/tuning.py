@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, sqrt
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
 from rov_fmu.files.csv_table import read_columns
-from rov_fmu.identify.least_squares import Array, Estimate, bounds, covariance, estimate, external, internal, minimize
+from rov_fmu.identify.least_squares import Array, Estimate, estimate_alike, fit_named
 from rov_fmu.identify.response_fit import Point, predict
 from rov_fmu.identify.tank_tests import HELD_COMMAND, time_constant_column, velocity_column
 from rov_fmu.motion.rov import COEFFICIENTS, Axis, Coefficients
@@ -81,14 +81,11 @@ def tune_over(k: Coefficients, axis: Axis, points: Sequence[Point]) -> Tuning:
         start = replace(start, **{names[1]: 1.0})
         start = _with(start, names[1], float(np.median([axis.response(start, c)[1] / T for c, T in Taus.items()])))
     measured = np.array([p.value for p in points])
-    solution = minimize(
-        lambda x: predict(axis, replace(k, **external(names, x)), points) / measured - 1.0,
-        internal(names, {name: getattr(start, name) for name in names}),
-        bounds(names),
+    solution = fit_named(
+        lambda values: predict(axis, replace(k, **values), points) / measured - 1.0,
+        {name: getattr(start, name) for name in names},
     )
-    freedom = float(len(points) - len(names))
-    noise = sqrt(float(solution.residuals @ solution.residuals) / freedom) if freedom > 0.0 else np.inf
-    found = estimate(names, solution.x, covariance(solution.jacobian.T @ solution.jacobian) * noise**2, freedom, noise)
+    found = estimate_alike(names, solution, len(points))
     return Tuning(axis, replace(k, **found.named), tuple(points), found)
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from decimal import Decimal
+from math import isnan
 
 from rich import box
 from rich.console import Console
@@ -14,6 +15,7 @@ from rov_fmu.build import Built
 from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
+DEVIATION = "+.1%"
 _MIN_WIDTH = 110  # rich takes 80 columns in a pipe, and cuts digits off to fit a table into them
 
 
@@ -63,20 +65,9 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
     tuning = (f"{name}_{t.axis.velocity}" for name in ("alpha", "beta"))
     values = ", ".join(f"{name} = {getattr(vehicle.coefficients, name):g}" for name in tuning)
-    result = table(
-        f"Table {t.number}. {t.axis.name.capitalize()}, {values}",
-        "\ncommand",
-        (
-            "non-linear\nprinted",
-            "\ncomputed",
-            "\ndev.",
-            "scaled\nprinted",
-            "\ncomputed",
-            "\ndev.",
-            "test\nmeasured",
-            "\ndev.",
-        ),
-    )
+    compared = [f"{model}\nprinted|\ncomputed|\ndev." for model in ("non-linear", "scaled")]
+    headers = "|".join([*compared, "test\nmeasured|\ndev."]).split("|")
+    result = table(f"Table {t.number}. {t.axis.name.capitalize()}, {values}", "\ncommand", headers)
     for quantity, unit in (("V_ss", t.axis.unit), ("Tau", "s")):
         result.add_section()
         result.add_row(f"{quantity} [{unit}]")
@@ -86,17 +77,17 @@ def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
                 f"{row.command} %",
                 *_model(getattr(row.non_linear, quantity)),
                 *_model(scaled),
-                _text(scaled.measured),
-                _percent(scaled.from_measured),
+                text(scaled.measured),
+                text(scaled.from_measured, DEVIATION),
             )
     return result
 
 
 def _model(cell: Cell) -> Iterator[str]:
     """Printed, computed, deviation."""
-    yield _text(cell.printed)
+    yield text(cell.printed)
     yield f"{cell.computed:.4f}"
-    yield _percent(cell.from_printed) + (" " if cell.rounds_to_printed else "*")
+    yield text(cell.from_printed, DEVIATION) + (" " if cell.rounds_to_printed else "*")
 
 
 def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] = ()) -> Table:
@@ -112,9 +103,6 @@ def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] =
     return result
 
 
-def _text(value: Decimal | None) -> str:
-    return "-" if value is None else str(value)
-
-
-def _percent(ratio: float | None) -> str:
-    return "-" if ratio is None else f"{ratio:+.1%}"
+def text(value: float | Decimal | None, form: str = "") -> str:
+    """A number as the format has it; a dash where there is none."""
+    return "-" if value is None or isnan(value) else format(value, form)

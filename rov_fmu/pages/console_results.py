@@ -1,16 +1,16 @@
 """What the command line prints of an identification and of a tuning."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-import numpy as np
 from rich.table import Table
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
-from rov_fmu.identify.least_squares import Array
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.motion.rov import COEFFICIENTS
-from rov_fmu.pages.console import console, table
+from rov_fmu.pages.console import DEVIATION, console, table, text
 from rov_fmu.vehicle.vehicle import Vehicle
+
+_OUT = "leave-\none-out"
 
 
 def print_identification(identification: Identification) -> None:
@@ -19,23 +19,18 @@ def print_identification(identification: Identification) -> None:
     out.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
     out.print()
     out.print(_coefficients(vehicle))
-    for axis in identification.axes:
-        if axis.steps:
-            out.print()
-            out.print(_steps(axis))
-    comparisons = compare(identification)
-    for comparison in comparisons:
+    comparisons, other = compare(identification), [identification.against.name] if identification.against else []
+    tables = [_steps(result) for result in identification.axes if result.steps]
+    tables += [_points(comparison, other) for comparison in comparisons]
+    for found in [*tables, *([_summary(comparisons, other)] if comparisons else [])]:
         out.print()
-        out.print(_points(comparison, identification.against))
-    if comparisons:
-        out.print()
-        out.print(_summary(comparisons, identification.against))
+        out.print(found)
     out.print(
-        "\ndev.: relative to the measured value. left out: by a fit to the points without those of the same thrust.\n"
+        "\ndev.: relative to the measured value. leave-one-out: by a fit without the points of the same thrust.\n"
         "(weight 0): not fitted, and not counted in the RMS. interval: 95 % confidence."
     )
     if identification.warnings:
-        out.print("\nWhat the data do not tell:")
+        out.print("\nNot identifiable, or against the model:")
     for warning in identification.warnings:
         out.print(f"- {warning}", soft_wrap=True)
 
@@ -49,56 +44,45 @@ def _coefficients(vehicle: Vehicle) -> Table:
     return result
 
 
-def _steps(axis: AxisResult) -> Table:
-    unit = axis.axis.unit
-    headers = ("from s", "to s", "command", f"V_ss [{unit}]", "+-", "Tau [s]", "+-")
-    result = table(f"{axis.axis.name.capitalize()}: held commands of the recordings", "file", headers, ("",))
-    for s in axis.steps:
-        steady, Tau = (_with_error(s.V_ss, s.V_ss_error), _with_error(s.Tau, s.Tau_error))
-        result.add_row(s.file, f"{s.start:.1f}", f"{s.end:.1f}", f"{s.command:.0%}", *steady, *Tau, s.note)
-    return result
+def _steps(result: AxisResult) -> Table:
+    headers = ("from s", "to s", "command", f"V_ss [{result.axis.unit}]", "+-", "Tau [s]", "+-")
+    found = table(f"{result.axis.name.capitalize()}: held commands of the recordings", "file", headers, ("",))
+    for s in result.steps:
+        responses = [text(n, form) for n, form in (
+            (s.V_ss, ".4f"), (s.V_ss_error, ".1g"), (s.Tau, ".4f"), (s.Tau_error, ".1g"),
+        )]  # fmt: skip
+        found.add_row(s.file, f"{s.start:.1f}", f"{s.end:.1f}", f"{s.command:.0%}", *responses, s.note)
+    return found
 
 
-def _points(comparison: Comparison, against: Vehicle | None) -> Table:
-    unit = "s" if comparison.quantity == "Tau" else comparison.result.axis.unit
-    other = (against.name, "dev.") if against else ()
-    result = table(
-        f"{comparison.result.axis.name.capitalize()}: {comparison.quantity} [{unit}]",
-        "command",
-        ("measured", "model", "dev.", "left out", "dev.", *other),
-        ("source",),
-    )
+def _points(comparison: Comparison, other: Sequence[str]) -> Table:
+    axis, quantity = comparison.result.axis, comparison.quantity
+    names = [name for model in ("model", _OUT, *other) for name in (model, "dev.")]
+    title = f"{axis.name.capitalize()}: {quantity} [{'s' if quantity == 'Tau' else axis.unit}]"
+    found = table(title, "command", ("measured", *names), ("source",))
     for n, p in enumerate(comparison.points):
-        columns = [comparison.model, comparison.left_out, *([comparison.against] if against else [])]
-        cells = [text for column in columns for text in _against(float(column[n]), p.value)]
+        cells = [cell for column in comparison.columns for cell in _against(float(column[n]), p.value)]
         source = p.source + ("" if p.weight else " (weight 0)")
-        result.add_row(f"{p.command:.0%}", f"{p.value:.4g}", *cells, source)
-    return result
+        found.add_row(f"{p.command:.0%}", f"{p.value:.4g}", *cells, source)
+    return found
 
 
-def _summary(comparisons: Iterable[Comparison], against: Vehicle | None) -> Table:
-    other = (against.name,) if against else ()
-    result = table("RMS relative error", "", ("model", "left out", *other))
+def _summary(comparisons: Iterable[Comparison], other: Sequence[str]) -> Table:
+    found = table("RMS relative error", "", ("model", _OUT, *other))
     for c in comparisons:
-        columns: list[Array] = [c.model, c.left_out, *([c.against] if against else [])]
-        numbers = [c.rms(column) for column in columns]
-        result.add_row(f"{c.result.axis.name} {c.quantity}", *("-" if np.isnan(n) else f"{n:.4f}" for n in numbers))
-    return result
-
-
-def _with_error(value: float | None, error: float | None) -> tuple[str, str]:
-    return ("-" if value is None else f"{value:.4f}", "-" if error is None else f"{error:.1g}")
+        found.add_row(f"{c.result.axis.name} {c.quantity}", *(text(c.rms(column), ".4f") for column in c.columns))
+    return found
 
 
 def _against(value: float, measured: float) -> tuple[str, str]:
-    return ("-", "-") if np.isnan(value) else (f"{value:.4f}", f"{value / measured - 1.0:+.1%}")
+    return text(value, ".4f"), text(value / measured - 1.0, DEVIATION)
 
 
 def print_tuning(tuning: Tuning) -> None:
     """α and β, and what they give at the wanted points."""
-    out, m = console(), tuning.axis
+    out = console()
     for kind in ("alpha", "beta"):
-        name = m.coefficient(kind)
+        name = tuning.axis.coefficient(kind)
         line = f"{name} = {getattr(tuning.coefficients, name):.6g}"
         interval = tuning.estimate.intervals.get(name) if tuning.estimate else None
         out.print(line + (f"   95 %: {interval[0]:.4g} ... {interval[1]:.4g}" if interval else ""))

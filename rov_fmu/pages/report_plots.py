@@ -1,4 +1,4 @@
-"""The plots of the identification report: every fit with its 95 % band, and below it what it leaves over."""
+"""The plots of the identification report: every fit with its 95 % band, and its residuals below."""
 
 from collections.abc import Sequence
 
@@ -30,22 +30,22 @@ def plot_thrust(figure: Figure, fit: QuadraticFit, curve: tuple[float, float]) -
     if moved:
         above.plot(100.0 * x, curve[0] * np.abs(x) * x + curve[1] * x, color=LIGHT["blue"], label="with the recordings")
     above.set_title("Force (N)", loc="left")
-    _finish(above, below, "command (%)", "left (N)")
+    _finish(above, below, "command (%)", "residual (N)")
 
 
-def plot_drag(figure: Figure, axis: AxisResult, k: Coefficients, against: Coefficients | None) -> None:
+def plot_drag(figure: Figure, result: AxisResult, k: Coefficients, against: Coefficients | None) -> None:
     """Thrust at measured V_ss: the drag that the vehicle takes, and the fit to these forces alone as in (11)-(16)."""
-    m, fit = axis.axis, axis.drag
+    axis, fit = result.axis, result.drag
     assert fit
     above, below = _two(figure)
     v = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
     _quadratic(above, below, fit, v, 1.0, color="grey", label="fit to these forces")
-    above.plot(v, _drag(m, k, v), color=LIGHT["blue"], label="model")
-    if against and (alpha := getattr(against, m.coefficient("alpha"))):
-        scaled = _drag(m, against, v) * getattr(k, m.coefficient("alpha")) / alpha
+    above.plot(v, _drag(axis, k, v), color=LIGHT["blue"], label="model")
+    if against and (alpha := getattr(against, axis.coefficient("alpha"))):
+        scaled = _drag(axis, against, v) * getattr(k, axis.coefficient("alpha")) / alpha
         above.plot(v, scaled, ":", color=LIGHT["teal"], label="compared")
-    above.set_title(f"Drag ({_unit(m.load)}) over ${m.velocity}$", loc="left")
-    _finish(above, below, f"velocity ({m.unit})", f"left ({_unit(m.load)})")
+    above.set_title(f"Drag ({_unit(axis.load)}) over ${axis.velocity}$", loc="left")
+    _finish(above, below, f"velocity ({axis.unit})", f"residual ({_unit(axis.load)})")
 
 
 def _quadratic(above: Axes, below: Axes, fit: QuadraticFit, x: Array, scale: float, *, color: str, label: str) -> None:
@@ -53,15 +53,14 @@ def _quadratic(above: Axes, below: Axes, fit: QuadraticFit, x: Array, scale: flo
     if np.isfinite(low).all():
         above.fill_between(scale * x, low, high, color=LIGHT[color], alpha=0.18, linewidth=0.0, label="95 %")
     above.plot(scale * x, fit.value(x), "--" if color == "grey" else "-", color=LIGHT[color], label=label)
-    counts = fit.weights > 0.0
-    _dots(above, scale * fit.x, fit.y, counts, label="measured")
-    _dots(below, scale * fit.x, fit.residuals, counts)
-    _diamonds(below, scale * fit.x, fit.y - fit.left_out)
+    _dots(above, scale * fit.x, fit.y, fit.counts, label="measured")
+    _dots(below, scale * fit.x, fit.residuals, fit.counts)
+    _diamonds(below, scale * fit.x, fit.y - fit.leave_one_out)
 
 
 def plot_response(
     figure: Figure,
-    axis: AxisResult,
+    result: AxisResult,
     quantity: str,
     comparison: Comparison | None,
     k: Coefficients,
@@ -69,13 +68,13 @@ def plot_response(
     command_range: tuple[float, float],
 ) -> None:
     """V_ss or Tau over command, signs dropped, and below the relative errors."""
-    m, points = axis.axis, comparison.points if comparison else ()
+    axis, points = result.axis, comparison.points if comparison else ()
     above, below = _two(figure) if points else (figure.subplots(), None)
     at = [abs(p.command) for p in points] or list(command_range)
     c = np.linspace(max(0.5 * min(at), 0.01), min(max(at) + 0.05, 1.0), 46)
     tested = (c >= min(at)) & (c <= max(at))
-    curve = _curve(m, k, quantity, c)
-    fit = axis.recordings or axis.response
+    curve = _curve(axis, k, quantity, c)
+    fit = result.recordings or result.response
     if fit:
         V_low, V_high, Tau_low, Tau_high = fit.band(c)
         low, high = (Tau_low, Tau_high) if quantity == "Tau" else (V_low, V_high)
@@ -85,36 +84,36 @@ def plot_response(
             )
     above.plot(100.0 * c, curve, color=LIGHT["blue"], label="model")
     if against:
-        above.plot(100.0 * c, _curve(m, against, quantity, c), "--", color=LIGHT["grey"], label="compared")
+        above.plot(100.0 * c, _curve(axis, against, quantity, c), "--", color=LIGHT["grey"], label="compared")
     top = [*(abs(p.value) for p in points), *curve[tested][np.isfinite(curve[tested])].tolist()]
     above.set_ylim(0.0, 1.25 * max(top, default=1.0) or 1.0)
-    above.set_title("$Tau$ (s)" if quantity == "Tau" else rf"$V_{{ss}}$ ({m.unit})", loc="left")
+    above.set_title("$Tau$ (s)" if quantity == "Tau" else rf"$V_{{ss}}$ ({axis.unit})", loc="left")
     if comparison and below:
         x, y = 100.0 * np.array(at), np.array([abs(p.value) for p in points])
         counts = np.array([p.weight > 0.0 for p in points])
         _dots(above, x, y, counts, label="measured")
-        for model, draw in ((comparison.model, _dots), (comparison.left_out, _diamonds)):
+        for model, draw in ((comparison.model, _dots), (comparison.leave_one_out, _diamonds)):
             errors = 100.0 * (np.abs(model) / y - 1.0)
             draw(below, x, errors, counts)
     _finish(above, below, "command (%)", "error (%)")
 
 
-def plot_steps(figure: Figure, axis: AxisResult, k: Coefficients) -> None:
+def plot_steps(figure: Figure, result: AxisResult, k: Coefficients) -> None:
     """Steps of the command from rest, up to four, with what was measured of them; signs dropped."""
-    tested = sorted({round(abs(p.command), 6) for p in axis.points})
+    tested = sorted({round(abs(p.command), 6) for p in result.points})
     steps = []
     for command in evenly(tested):
-        here = [p for p in axis.points if round(abs(p.command), 6) == command]
+        here = [p for p in result.points if round(abs(p.command), 6) == command]
         V_ss, Tau = ([abs(p.value) for p in here if p.quantity == quantity] for quantity in ("V_ss", "Tau"))
         steps.append(Step(command, V_ss, Tau))
     ax: Axes = figure.subplots()
-    draw_steps(ax, axis.axis, steps, [(k, "-")])
-    ax.set_title(f"Steps: ${axis.axis.velocity}$ ({axis.axis.unit})", loc="left")
+    draw_steps(ax, result.axis, steps, [(k, "-")])
+    ax.set_title(f"Steps: ${result.axis.velocity}$ ({result.axis.unit})", loc="left")
 
 
 def plot_recording(figure: Figure, simulation: Simulation, holds: Sequence[StepResponse]) -> None:
-    """Velocity of a recording and of the model, and below what the fit leaves of each measured sample."""
-    recording, m = simulation.recording, simulation.recording.axis
+    """Velocity of a recording and of the model, and below the residuals of the measured samples."""
+    recording, axis = simulation.recording, simulation.recording.axis
     above, below = _two(figure, (2.2, 1.0))
     for hold in holds:
         above.axvspan(hold.start, hold.end, facecolor=LIGHT["band"], edgecolor=LIGHT["page"], zorder=0)
@@ -128,13 +127,13 @@ def plot_recording(figure: Figure, simulation: Simulation, holds: Sequence[StepR
     thin = slice(None, None, max(1, len(simulation.time) // (2 * _BINS)))
     above.plot(simulation.time[thin], simulation.velocity[thin], color=LIGHT["blue"], linewidth=1.2, label="model")
     above.margins(y=0.18)
-    above.set_title(f"${m.velocity}$ ({m.unit})", loc="left")
+    above.set_title(f"${axis.velocity}$ ({axis.unit})", loc="left")
     parts = np.array_split(np.arange(len(simulation.time)), min(_BINS, len(simulation.time)))
     low, high = ([pick(simulation.residuals[part]) for part in parts] for pick in (np.min, np.max))
     t = [simulation.time[part[0]] for part in parts]
     below.fill_between(t, low, high, color=LIGHT["orange"], linewidth=0.6)
-    unit = m.position_unit if recording.is_position else m.unit
-    _finish(above, below, "time (s)", f"left ({unit})")
+    unit = axis.position_unit if recording.is_position else axis.unit
+    _finish(above, below, "time (s)", f"residual ({unit})")
     above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
 
 
@@ -144,11 +143,11 @@ def _two(figure: Figure, heights: tuple[float, float] = (2.6, 1.0)) -> tuple[Axe
     return above, below
 
 
-def _finish(above: Axes, below: Axes | None, x: str, left: str) -> None:
+def _finish(above: Axes, below: Axes | None, x: str, y: str) -> None:
     (below or above).set_xlabel(x)
     above.locator_params(nbins=6)
     if below:
-        below.set_ylabel(left)
+        below.set_ylabel(y)
         below.locator_params(axis="y", nbins=3)
         reach = 1.15 * max(map(abs, below.get_ylim()))
         below.set_ylim(-reach, reach)
@@ -164,17 +163,17 @@ def _dots(ax: Axes, x: Array, y: Array, counts: Flags, label: str = "") -> None:
 
 
 def _diamonds(ax: Axes, x: Array, y: Array, counts: Flags | None = None) -> None:  # noqa: ARG001 (as _dots)
-    """By the fit without the point's own thrust."""
+    """Leave-one-thrust-out."""
     ax.plot(x, y, "D", color=LIGHT["violet"], markerfacecolor="none", markersize=4.0, zorder=4)
 
 
-def _drag(m: Axis, k: Coefficients, v: Array) -> Array:
-    a_d, b_d = (getattr(k, m.coefficient(kind)) for kind in ("a_d", "b_d"))
+def _drag(axis: Axis, k: Coefficients, v: Array) -> Array:
+    a_d, b_d = (getattr(k, axis.coefficient(kind)) for kind in ("a_d", "b_d"))
     return np.asarray(a_d * np.abs(v) * v + b_d * v)
 
 
-def _curve(m: Axis, k: Coefficients, quantity: str, commands: Array) -> Array:
-    return np.array([m.response(k, c)[quantity == "Tau"] for c in commands.tolist()])
+def _curve(axis: Axis, k: Coefficients, quantity: str, commands: Array) -> Array:
+    return np.array([axis.response(k, c)[quantity == "Tau"] for c in commands.tolist()])
 
 
 def _unit(unit: str) -> str:

@@ -63,7 +63,7 @@ class Provenance:
     inputs: Mapping[str, str]
     """SHA-256 of every input file, by its name."""
     warnings: tuple[str, ...] = ()
-    """What the data do not determine, in words."""
+    """What is not identifiable from the data, and what speaks against the model, in words."""
     report: Path | None = None
     """The page on the identification."""
 
@@ -124,11 +124,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     head = checked.vehicle
     quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
     return Vehicle(
-        name=head.name,
-        identifier=head.identifier,
-        version=head.version,
-        description=head.description,
-        source=head.source,
+        **{key: getattr(head, key) for key in Head.model_fields},
         coefficients=Coefficients(**{name: q.value for name, q in quantities.items()}),
         sources={name: q.source for name, q in quantities.items()},
         command_range=checked.validity.command_range,

@@ -65,7 +65,7 @@ def test_window_of_weights_gives_the_lower_commands_their_curve() -> None:
     assert (weighted.a, weighted.b) == pytest.approx((42.9, 2.711))
     assert abs(all_of_them.a - 42.9) > 3.0
     assert weighted.r_squared == pytest.approx(1.0)
-    assert weighted.left_out_error == pytest.approx(0.0, abs=1e-9)
+    assert weighted.leave_one_out_error == pytest.approx(0.0, abs=1e-9)
     assert weighted.residuals[weights == 0.0] == pytest.approx(forces[weights == 0.0] - weighted.value(COMMANDS)[7:])
 
 
@@ -75,7 +75,7 @@ def test_covariance_correlation_and_band_are_those_of_a_straight_line() -> None:
     fit, line = fit_quadratic(REAR, COMMANDS, forces, COMMANDS**-2.0), linregress(COMMANDS, forces / COMMANDS)
     assert [fit.a, fit.b] == pytest.approx([line.slope, line.intercept])
     assert list(fit.estimate.errors.values()) == pytest.approx([line.stderr, line.intercept_stderr])
-    assert fit.estimate.freedom == 8.0
+    assert fit.estimate.degrees_of_freedom == 8.0
     assert fit.estimate.noise == pytest.approx(np.sqrt(np.sum((fit.residuals / COMMANDS) ** 2) / 8.0))
     assert fit.estimate.correlation == pytest.approx(np.array([[1.0, -0.886], [-0.886, 1.0]]), abs=0.001)
     low, high = fit.band(COMMANDS)
@@ -102,8 +102,8 @@ def test_leaving_a_thrust_out_leaves_all_of_its_rows_out() -> None:
     y = 10.0 * np.abs(x) * x + np.array([0.1, 0.2, 0.0, 0.0, -0.3])
     fit = fit_quadratic(REAR, x, y)
     without = fit_quadratic(REAR, x[[2, 3]], y[[2, 3]])
-    assert fit.left_out[[0, 1, 4]] == pytest.approx(without.value(x[[0, 1, 4]]))
-    assert np.isnan(fit_quadratic(REAR, x[:3], y[:3]).left_out).all(), "one thrust left fixes no curve"
+    assert fit.leave_one_out[[0, 1, 4]] == pytest.approx(without.value(x[[0, 1, 4]]))
+    assert np.isnan(fit_quadratic(REAR, x[:3], y[:3]).leave_one_out).all(), "one thrust left fixes no curve"
 
 
 def test_two_points_have_a_curve_but_no_interval() -> None:
@@ -132,7 +132,7 @@ def test_points_of_a_model_give_the_model(m: Axis, vehicle: Vehicle) -> None:
     for name in names:
         assert getattr(fit.coefficients, name) == pytest.approx(getattr(k, name), rel=1e-5)
     assert fit.rms("V_ss") < 1e-7
-    assert fit.rms("Tau", left_out=True) < 1e-6
+    assert fit.rms("Tau", leave_one_out=True) < 1e-6
 
 
 def test_intervals_of_points_cover_the_truth(vehicle: Vehicle) -> None:
@@ -151,14 +151,14 @@ def test_steady_velocities_alone_leave_beta(k: Coefficients) -> None:
     fit = fit_response(SURGE, [p for p in points_of(SURGE, k, (0.2, 0.5, 0.7)) if p.quantity == "V_ss"], k)
     assert fit.estimate.names == ("a_d_u", "b_d_u")
     assert fit.coefficients.beta_u == 1.0
-    assert "V_ss alone never fixes m_rov/beta_u" in fit.held["beta_u"]
+    assert "m_rov/beta_u is not identifiable from V_ss alone" in fit.assumed["beta_u"]
 
 
 def test_one_thrust_leaves_linear_drag(k: Coefficients) -> None:
     fit = fit_response(HEAVE, points_of(HEAVE, k, (0.3,)), k)
     assert fit.estimate.names == ("a_d_w", "beta_w")
     assert fit.coefficients.b_d_w == 0.0
-    assert "b_d_w" in fit.held
+    assert "b_d_w" in fit.assumed
     assert fit.model == pytest.approx([p.value for p in fit.points])
 
 
@@ -257,7 +257,7 @@ def test_full_folder_to_vehicle_file_in_20_seconds(
 
 def test_points_of_a_comparison_stand_beside_the_model(full: Identification) -> None:
     for comparison in compare(full):
-        assert len(comparison.points) == len(comparison.model) == len(comparison.left_out)
+        assert len(comparison.points) == len(comparison.model) == len(comparison.leave_one_out)
         assert comparison.rms(comparison.model) < 0.05
         assert np.isnan(comparison.rms(comparison.against)), "there is nothing to set beside"
 
@@ -266,7 +266,7 @@ def axis_of(found: Identification, axis: str) -> AxisResult:
     return next(result for result in found.axes if result.axis.name == axis)
 
 
-# ---- What the data do not tell, in words -----------------------------------------------------------------------------
+# ---- What is not identifiable, in words -----------------------------------------------------------------------------
 
 FORCES = [(c, 42.9 * c * c + 2.711 * c) for c in (0.1, 0.3, 0.5, 0.7)]
 TOP = [(c, 6.494 * c * c + 0.0513 * c) for c in (0.1, 0.3, 0.5, 0.7)]
@@ -292,17 +292,23 @@ def folder_with(
 
 Tables = Mapping[str, list[tuple[float, float]]]
 WORDS: dict[str, tuple[Tables, str]] = {
-    "no Tau": ({}, "surge: V_ss alone never fixes m_rov/beta_u"),
-    "no Tau in yaw": ({}, "yaw: V_ss alone never fixes I_r/beta_r"),
-    "few points": ({"steady_heave": [(0.3, 0.15), (0.5, 0.29), (0.7, 0.38)]}, "heave: the data hardly tell quadratic"),
+    "no Tau": ({}, "surge: m_rov/beta_u is not identifiable from V_ss alone"),
+    "no Tau in yaw": ({}, "yaw: I_r/beta_r is not identifiable from V_ss alone"),
+    "few points": (
+        {"steady_heave": [(0.3, 0.15), (0.5, 0.29), (0.7, 0.38)]},
+        "heave: quadratic and linear drag are",
+    ),
     "as many as coefficients": ({"steady_yaw": [(0.3, 1.5), (0.6, 3.1)]}, "yaw: as many coefficients as measurements"),
-    "drag at its bound": ({"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]}, "heave: b_d_w stops at 0"),
-    "one thrust carries": ({"steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)]}, "at a thrust that is left out"),
+    "drag at its bound": (
+        {"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]},
+        "heave: b_d_w is at its bound",
+    ),
+    "one thrust carries": ({"steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)]}, "leave-one-thrust-out error of V_ss"),
     "thrust that points backward": ({"thrust_rear": [(0.3, 1.0), (0.5, 11.5), (0.7, 30.0)]}, "backward below 27%"),
     "weak reverse thrust": ({"thrust_rear": [*FORCES, (-0.5, -8.0)]}, "rear thrust: force differs by -34%"),
     "slow upward": ({"steady_heave": [*STEADY["heave"], (-0.5, -0.25)]}, "heave: V_ss differs by -11%"),
     "thrust not tested": ({"thrust_top": TOP[:3]}, "but top thrust was tested from 10% to 50% only"),
-    "two thrusts": ({"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]}, "2 points fix two"),
+    "two thrusts": ({"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]}, "2 points for two"),
 }
 
 
@@ -329,7 +335,7 @@ def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
     forward = folder_with(tmp_path, tables, thrust_rear=(0.0, 1.0))
     assert forward.thrust["rear"].weights.tolist() == [1.0] * 4 + [0.0]
     assert forward.vehicle.coefficients.a_t_rear == pytest.approx(42.9, rel=1e-3)
-    assert both.thrust["rear"].left_out_error > 1.0
+    assert both.thrust["rear"].leave_one_out_error > 1.0
     assert forward.vehicle.sources["a_t_rear"] == "(7) over 4 forces"
     assert both.vehicle.sources["a_t_rear"] == "(6) over 5 forces"
 

@@ -63,7 +63,7 @@ def test_method_and_inputs_are_stated() -> None:
 @pytest.mark.parametrize("column", RMS)
 def test_errors_on_the_measured_values(column: tuple[str, str], comparisons: dict[tuple[str, str], Comparison]) -> None:
     c = comparisons[column]
-    assert [c.rms(values) for values in (c.model, c.left_out, c.against)] == pytest.approx(RMS[column], abs=1e-4)
+    assert [c.rms(values) for values in (c.model, c.leave_one_out, c.against)] == pytest.approx(RMS[column], abs=1e-4)
 
 
 def test_refit_is_better_than_the_scaled_model_where_that_was_asked() -> None:
@@ -108,12 +108,16 @@ def test_against_is_the_papers_scaled_model(vehicle: Vehicle, comparisons: dict[
             assert by_command[float(row.command) / 100.0] == pytest.approx(row.scaled.V_ss.computed)
 
 
-def test_drag_is_physical_and_what_nothing_tells_is_said(refit: Identification) -> None:
+def test_drag_is_physical_and_what_is_not_identifiable_is_said(refit: Identification) -> None:
     k = refit.vehicle.coefficients
     assert all(getattr(k, name) >= 0.0 for name in COEFFICIENTS if name.startswith(("a_d", "b_d")))
     assert k.alpha_u == k.alpha_w == k.alpha_r == k.beta_u == 1.0
-    assert "V_ss alone never fixes" in refit.vehicle.sources["beta_u"]
-    for words in ("surge: V_ss alone never fixes", "heave: the data hardly tell", "yaw: the data hardly tell"):
+    assert "not identifiable from V_ss alone" in refit.vehicle.sources["beta_u"]
+    for words in (
+        "surge: m_rov/beta_u is not identifiable",
+        "heave: quadratic and linear drag are hardly identifiable",
+        "yaw: quadratic and linear drag are hardly identifiable",
+    ):
         assert any(words in warning for warning in refit.warnings)
 
 

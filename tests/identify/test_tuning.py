@@ -48,7 +48,7 @@ def test_many_points_of_a_tuned_model_give_its_tuning(k: Coefficients) -> None:
     tuning = tune_over(k, YAW, wanted)
     assert [tuning.alpha, tuning.beta] == pytest.approx([1.2, 0.12], rel=1e-6)
     assert tuning.estimate
-    assert tuning.estimate.freedom == 4.0
+    assert tuning.estimate.degrees_of_freedom == 4.0
 
 
 def test_scattered_points_have_intervals_and_the_least_error(k: Coefficients) -> None:

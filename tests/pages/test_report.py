@@ -98,7 +98,7 @@ def test_the_same_twice(results: Identification, page: str) -> None:
 
 def test_every_input_has_its_hash(results: Identification, page: str) -> None:
     table = [row for row in rows(page) if len(row) == 3]
-    for name, digest in results.experiments.inputs.items():
+    for name, digest in results.tests.inputs.items():
         (row,) = [row for row in table if row[0] == name]
         assert row[1]
         assert row[2] == digest
@@ -122,7 +122,7 @@ def test_every_coefficient_has_its_interval(results: Identification, page: str) 
 def test_every_measured_point_stands_beside_the_models(of_tables: Identification, pages: Mapping[int, str]) -> None:
     table = rows(pages[id(of_tables)])
     for comparison in compare(of_tables):
-        columns: tuple[Array, ...] = (comparison.model, comparison.left_out, comparison.against)
+        columns: tuple[Array, ...] = (comparison.model, comparison.leave_one_out, comparison.against)
         for n, p in enumerate(comparison.points):
             numbers = [f"{column[n]:.4g}".replace("-", "−") for column in columns]
             assert [row for row in table if len(row) == 9 and row[2::2][:3] == numbers and p.source in row[8]]
