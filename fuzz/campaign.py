@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 
+from checks.c_programs import compile_c
 from checks.legal import legal_header
-from checks.sanitized import build_sanitized
 
 TARGET_SOURCE = Path(__file__).with_name("c") / "target.c"
 CORPUS = Path(__file__).with_name("corpus.zip")
@@ -51,8 +51,7 @@ class Counts:
 
 def build_target(sources: Mapping[str, str], output: Path) -> None:
     """Compile the fuzzer for the sources of an FMU, with AddressSanitizer and UndefinedBehaviorSanitizer."""
-    everything = {**sources, "legal.h": legal_header()}
-    build_sanitized(everything, TARGET_SOURCE, output, "fuzzer,address,undefined")
+    compile_c(TARGET_SOURCE, output, {**sources, "legal.h": legal_header()}, sanitizers="fuzzer,address,undefined")
 
 
 def unpack_corpus(folder: Path) -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from checks.c_programs import clang
 from checks.legal import MODES, legal_modes
-from checks.sanitized import clang
 from fuzz import __main__ as command
 from fuzz.campaign import FindingError, build_target, fuzz, replay, unpack_corpus
 from rov_fmu.export.archive import native_content

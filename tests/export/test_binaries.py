@@ -5,7 +5,6 @@ import random
 import re
 import shutil
 import struct
-import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
@@ -17,8 +16,9 @@ import lief
 import numpy as np
 import pytest
 
+from checks.c_programs import compile_c, run_program
 from rov_fmu.cli import main
-from rov_fmu.export.compile import PLATFORMS, compiler, fmi_headers
+from rov_fmu.export.compile import PLATFORMS, fmi_headers
 from rov_fmu.motion.rov import Inputs
 
 lief.logging.disable()
@@ -150,31 +150,19 @@ def _recorded_steps() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _run(binaries: Path, name: str, folder: Path, guid: str) -> np.ndarray:
+def _run(binaries: Path, name: str, folder: Path) -> np.ndarray:
     machine = MACHINES[name]
     if reason := machine.missing():
         pytest.skip(f"{name}: {reason}")
-    source = Path(__file__).parent / "host.c"
     program = folder / f"host-{name}{machine.suffix}"
-    command = [*compiler(), "-target", machine.target, "-std=c11", "-O1"]
-    libraries = [] if machine.suffix else ["-ldl"]
-    headers = ["-I", str(fmi_headers())]
-    subprocess.run([*command, *headers, str(source), "-o", str(program), *libraries], check=True, cwd=folder)
+    flags = ("-target", machine.target, *(() if machine.suffix else ("-ldl",)))
+    compile_c(Path(__file__).with_name("host.c"), program, binaries.parent / "sources", *flags)
     library = shutil.copy(_binary(binaries, name), folder / f"{name}{PLATFORMS[name].suffix}")
     environment = os.environ | {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
-    result = subprocess.run(
-        [*machine.command, str(program), f"./{Path(library).name}", guid],
-        input=_recorded_steps(),
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert result.returncode == 0, result.stderr
-    return np.array(
-        [[struct.unpack(">d", bytes.fromhex(x))[0] for x in line.split()] for line in result.stdout.splitlines()]
-    )
+    command: list[str | Path] = [*machine.command, program, f"./{Path(library).name}"]
+    run = run_program(*command, input=_recorded_steps(), cwd=folder, env=environment)
+    assert run.code == 0, run.errors
+    return np.array([[struct.unpack(">d", bytes.fromhex(x))[0] for x in line] for line in run.lines])
 
 
 @pytest.fixture(scope="session")
@@ -183,15 +171,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def guid(binaries: Path) -> str:
-    return str(fmpy.read_model_description(str(binaries.parent)).guid)
-
-
-@pytest.fixture(scope="session")
-def trajectory(binaries: Path, folder: Path, guid: str) -> np.ndarray:
+def trajectory(binaries: Path, folder: Path) -> np.ndarray:
     if sys.platform != "linux":
         pytest.skip("the programs are run on Linux")
-    return _run(binaries, "linux64", folder, guid)
+    return _run(binaries, "linux64", folder)
 
 
 # The compiler makes Windows' start-up code for a program anew, which takes a minute.
@@ -199,10 +182,8 @@ def trajectory(binaries: Path, folder: Path, guid: str) -> np.ndarray:
     "name",
     [*LINUX[1:], *(pytest.param(name, marks=pytest.mark.long) for name in WINDOWS)],
 )
-def test_every_platform_runs_as_linux64_does(
-    binaries: Path, folder: Path, guid: str, trajectory: np.ndarray, name: str
-) -> None:
-    other = _run(binaries, name, folder, guid)
+def test_every_platform_runs_as_linux64_does(binaries: Path, folder: Path, trajectory: np.ndarray, name: str) -> None:
+    other = _run(binaries, name, folder)
     assert trajectory.shape == (400, 11)
     assert np.isfinite(trajectory).all()
     scale = np.maximum.accumulate(np.abs(trajectory))

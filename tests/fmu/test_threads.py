@@ -1,14 +1,12 @@
 """Instances know nothing of each other: eight threads drive their own, under ThreadSanitizer and AddressSanitizer."""
 
-import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from checks.sanitized import build_sanitized, clang
+from checks.c_programs import Ended, clang, compile_c, run_program
 from rov_fmu.export.archive import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -26,25 +24,14 @@ _PLAIN_ADDRESSES = (
 )
 
 
-@dataclass(frozen=True)
-class Run:
-    counts: dict[str, int]
-    code: int
-    errors: str
-
-
 @pytest.fixture(scope="module")
 def sources(vehicle: Vehicle) -> Mapping[str, str]:
     return native_content(vehicle).sources
 
 
-def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls: int) -> Run:
-    program = folder / "threads"
-    build_sanitized(sources, PROGRAM, program, sanitizers, ("-pthread",))
-    command = [sys.executable, "-c", _PLAIN_ADDRESSES, str(program), str(calls)]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
-    counts = {name: int(count) for name, count in map(str.split, result.stdout.splitlines())}
-    return Run(counts, result.returncode, result.stderr)
+def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls: int) -> Ended:
+    program = compile_c(PROGRAM, folder / "threads", sources, "-pthread", sanitizers=sanitizers)
+    return run_program(sys.executable, "-c", _PLAIN_ADDRESSES, program, str(calls))
 
 
 @pytest.mark.parametrize("calls", [200_000, pytest.param(2_000_000, marks=pytest.mark.long)])
@@ -55,9 +42,10 @@ def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
     run = run_threads(sources, tmp_path, sanitizers, calls)
     assert run.code == 0, run.errors
     assert run.errors == ""
-    assert run.counts["calls"] == calls
-    assert 0.8 * calls < run.counts["accepted"] < 0.99 * calls  # refused calls are driven too
-    assert run.counts["messages"] > 0.1 * calls
+    counts = {name: int(count) for name, count in run.lines}
+    assert counts["calls"] == calls
+    assert 0.8 * calls < counts["accepted"] < 0.99 * calls  # refused calls are driven too
+    assert counts["messages"] > 0.1 * calls
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,8 @@
 #define _POSIX_C_SOURCE 200809L
 #include "fmu.c"
 
+#include "check.h"
+
 #include <pthread.h>
 
 enum { N_SESSIONS = 8, N_HALVES = 2, N_KINDS = 2 };
@@ -239,27 +241,19 @@ static void *second_half(void *argument)
     return NULL;
 }
 
-static void check(bool ok, const char *what)
-{
-    if (!ok) {
-        fprintf(stderr, "threads: %s failed\n", what);
-        exit(1);
-    }
-}
-
 /* All sessions, as many at a time as there are threads. */
 static void run(session sessions[N_SESSIONS], unsigned threads)
 {
     void *(*const halves[N_HALVES])(void *) = {first_half, second_half};
     pthread_t thread[N_SESSIONS];
-    check(pthread_barrier_init(&together, NULL, threads) == 0, "pthread_barrier_init");
+    CHECK(pthread_barrier_init(&together, NULL, threads) == 0);
     for (int half = 0; half < N_HALVES; half++) {
         for (unsigned begun = 0; begun < N_SESSIONS; begun += threads) {
             for (unsigned i = begun; i < begun + threads; i++) {
-                check(pthread_create(&thread[i], NULL, halves[half], &sessions[i]) == 0, "pthread_create");
+                CHECK(pthread_create(&thread[i], NULL, halves[half], &sessions[i]) == 0);
             }
             for (unsigned i = begun; i < begun + threads; i++) {
-                check(pthread_join(thread[i], NULL) == 0, "pthread_join");
+                CHECK(pthread_join(thread[i], NULL) == 0);
             }
         }
     }
@@ -268,7 +262,7 @@ static void run(session sessions[N_SESSIONS], unsigned threads)
 
 int main(int argc, char *argv[])
 {
-    check(argc == 2, "usage: threads CALLS;");
+    CHECK(argc == 2);
     calls_of_a_half = strtoul(argv[1], NULL, 10) / (N_SESSIONS * N_HALVES);
     const size_t size = N_HALVES * calls_of_a_half;
     static session alone[N_SESSIONS], at_once[N_SESSIONS];
@@ -276,7 +270,7 @@ int main(int argc, char *argv[])
         alone[i].random = at_once[i].random = 88172645463325252u + i;
         alone[i].trace = calloc(size, sizeof *alone[i].trace);
         at_once[i].trace = calloc(size, sizeof *at_once[i].trace);
-        check(alone[i].trace != NULL && at_once[i].trace != NULL, "calloc");
+        CHECK(alone[i].trace != NULL && at_once[i].trace != NULL);
     }
     run(alone, 1);
     run(at_once, N_SESSIONS);

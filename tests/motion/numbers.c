@@ -1,68 +1,27 @@
 /* Counts bytes: many instances at once, long lives, and the FMU's shared library loaded again and again (glibc).
  *
- * Usage: numbers LIBRARY GUID INSTANCES CYCLES LOADS. Each line of output is a name and a number.
+ * Usage: numbers LIBRARY INSTANCES CYCLES LOADS. Each line of output is a name and a number.
  *
  * Memory is counted twice, neither estimated: bytes allocated, and pages of address space, where all that does not come
  * from malloc shows. Growth is what is there after the last of several equal rounds, less that after the first. */
 #define _GNU_SOURCE
-#include "fmi2FunctionTypes.h"
-#include "model.h"
+#include "fmu.h"
 
-#include <dlfcn.h>
 #include <malloc.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum {
     N_ROUNDS = 4,
     N_STEPS = 5, /* of each of many instances */
-    N_INPUTS = sizeof(rov_inputs) / sizeof(double),
-    N_STATES = sizeof(rov_state) / sizeof(double),
-    FIRST_STATE = offsetof(rov_variables, state) / sizeof(double),
-    FIRST_DERIVATIVE = offsetof(rov_variables, derivative) / sizeof(double),
-    FIRST_COEFFICIENT = offsetof(rov_variables, coefficients) / sizeof(double)
+    N_INPUTS = FIRST_STATE
 };
 
-#define FUNCTIONS(F)                                                                                                \
-    F(Instantiate) F(FreeInstance) F(SetupExperiment) F(EnterInitializationMode) F(ExitInitializationMode) F(Reset)  \
-    F(SetReal) F(GetReal) F(DoStep) F(GetFMUstate) F(SetFMUstate) F(FreeFMUstate) F(SerializedFMUstateSize)          \
-    F(SerializeFMUstate) F(DeSerializeFMUstate) F(GetDirectionalDerivative)
-
-#define DECLARE(name) fmi2##name##TYPE *name;
-typedef struct {
-    void *handle;
-    FUNCTIONS(DECLARE)
-} library;
-
-static const char *path, *guid;
-static library fmu;
+static const char *path;
 static size_t messages;
-
-static void check(int ok, const char *what)
-{
-    if (!ok) {
-        fprintf(stderr, "numbers: %s failed\n", what);
-        exit(1);
-    }
-}
-
-static void load(void)
-{
-    fmu.handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    check(fmu.handle != NULL, "dlopen");
-    void *symbol;
-#define FIND(name)                             \
-    symbol = dlsym(fmu.handle, "fmi2" #name);  \
-    check(symbol != NULL, "fmi2" #name);       \
-    memcpy(&fmu.name, &symbol, sizeof symbol);
-    FUNCTIONS(FIND)
-}
 
 static void unload(void)
 {
-    check(dlclose(fmu.handle) == 0, "dlclose");
-    check(dlopen(path, RTLD_NOW | RTLD_NOLOAD) == NULL, "unloading the library");
+    CHECK(dlclose(fmi2.library) == 0);
+    CHECK(dlopen(path, RTLD_NOW | RTLD_NOLOAD) == NULL);
 }
 
 /* ---- Memory ---- */
@@ -76,7 +35,7 @@ static memory memory_now(void)
     const struct mallinfo2 info = mallinfo2();
     char text[32] = "";
     FILE *const file = fopen("/proc/self/statm", "r");
-    check(file != NULL && fgets(text, sizeof text, file) != NULL, "reading /proc/self/statm");
+    CHECK(file != NULL && fgets(text, sizeof text, file) != NULL);
     fclose(file);
     return (memory){(long long)(info.uordblks + info.hblkhd), strtoll(text, NULL, 10)};
 }
@@ -96,22 +55,12 @@ static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2St
     messages++;
 }
 
-static void start(fmi2Component c)
-{
-    check(fmu.SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK, "fmi2SetupExperiment");
-    check(fmu.EnterInitializationMode(c) == fmi2OK, "fmi2EnterInitializationMode");
-    check(fmu.ExitInitializationMode(c) == fmi2OK, "fmi2ExitInitializationMode");
-}
-
 static fmi2Component instance(int number)
 {
     static const fmi2CallbackFunctions callbacks = {logger, NULL, NULL, NULL, NULL};
     char name[32];
     snprintf(name, sizeof name, "vehicle %d", number);
-    fmi2Component const c = fmu.Instantiate(name, fmi2CoSimulation, guid, NULL, &callbacks, fmi2False, fmi2False);
-    check(c != NULL, "fmi2Instantiate");
-    start(c);
-    return c;
+    return new_instance(name, &callbacks);
 }
 
 /* A step with inputs of its own for every instance and step; the command beyond 1 saturates. */
@@ -123,8 +72,8 @@ static void step(fmi2Component c, int number, int n)
         vr[i] = i;
         values[i] = ((number * 31 + n * 7 + (int)i * 13) % 100 - 50) / 48.0;
     }
-    check(fmu.SetReal(c, vr, N_INPUTS, values) == fmi2OK, "fmi2SetReal");
-    check(fmu.DoStep(c, 0.1 * n, 0.1, fmi2True) == fmi2OK, "fmi2DoStep");
+    CHECK(fmi2.SetReal(c, vr, N_INPUTS, values) == fmi2OK);
+    CHECK(fmi2.DoStep(c, 0.1 * n, 0.1, fmi2True) == fmi2OK);
 }
 
 static rov_state state_of(fmi2Component c)
@@ -135,7 +84,7 @@ static rov_state state_of(fmi2Component c)
     for (unsigned i = 0; i < N_STATES; i++) {
         vr[i] = FIRST_STATE + i;
     }
-    check(fmu.GetReal(c, vr, N_STATES, values) == fmi2OK, "fmi2GetReal");
+    CHECK(fmi2.GetReal(c, vr, N_STATES, values) == fmi2OK);
     memcpy(&state, values, sizeof state);
     return state;
 }
@@ -145,7 +94,7 @@ static rov_state state_of(fmi2Component c)
 static void crowd(int n)
 {
     fmi2Component *const instances = calloc((size_t)n, sizeof *instances);
-    check(instances != NULL, "calloc");
+    CHECK(instances != NULL);
     long long bytes = 0;
     int different = 0;
     memory freed[N_ROUNDS];
@@ -162,16 +111,16 @@ static void crowd(int n)
         bytes = memory_now().allocated - before.allocated;
         fmi2Component const alone = instance(n);
         for (int i = 0; i < n; i++) {
-            check(fmu.Reset(alone) == fmi2OK, "fmi2Reset");
-            start(alone);
+            CHECK(fmi2.Reset(alone) == fmi2OK);
+            initialize(alone);
             for (int k = 0; k < N_STEPS; k++) {
                 step(alone, i, k);
             }
             const rov_state a = state_of(instances[i]), b = state_of(alone);
             different += memcmp(&a, &b, sizeof a) != 0;
-            fmu.FreeInstance(instances[i]);
+            fmi2.FreeInstance(instances[i]);
         }
-        fmu.FreeInstance(alone);
+        fmi2.FreeInstance(alone);
         freed[round] = memory_now();
     }
     free(instances);
@@ -188,8 +137,8 @@ static void steps(fmi2Component c, int n)
 
 static void resets(fmi2Component c, int n)
 {
-    check(fmu.Reset(c) == fmi2OK, "fmi2Reset");
-    start(c);
+    CHECK(fmi2.Reset(c) == fmi2OK);
+    initialize(c);
     step(c, n % 100, n);
 }
 
@@ -200,31 +149,30 @@ static void saves(fmi2Component c, int n)
     size_t size;
     fmi2Byte bytes[1024];
     step(c, n % 100, n);
-    check(fmu.GetFMUstate(c, &saved) == fmi2OK, "fmi2GetFMUstate");
-    check(fmu.SerializedFMUstateSize(c, saved, &size) == fmi2OK && size <= sizeof bytes, "fmi2SerializedFMUstateSize");
-    check(fmu.SerializeFMUstate(c, saved, bytes, size) == fmi2OK, "fmi2SerializeFMUstate");
-    check(fmu.DeSerializeFMUstate(c, bytes, size, &read) == fmi2OK, "fmi2DeSerializeFMUstate");
-    check(fmu.SetFMUstate(c, read) == fmi2OK, "fmi2SetFMUstate");
+    CHECK(fmi2.GetFMUstate(c, &saved) == fmi2OK);
+    CHECK(fmi2.SerializedFMUstateSize(c, saved, &size) == fmi2OK && size <= sizeof bytes);
+    CHECK(fmi2.SerializeFMUstate(c, saved, bytes, size) == fmi2OK);
+    CHECK(fmi2.DeSerializeFMUstate(c, bytes, size, &read) == fmi2OK);
+    CHECK(fmi2.SetFMUstate(c, read) == fmi2OK);
     bytes[size / 2] ^= 1;
-    check(fmu.DeSerializeFMUstate(c, bytes, size, &read) == fmi2Error, "refusing damaged bytes");
-    check(fmu.FreeFMUstate(c, &saved) == fmi2OK && fmu.FreeFMUstate(c, &read) == fmi2OK, "fmi2FreeFMUstate");
+    CHECK(fmi2.DeSerializeFMUstate(c, bytes, size, &read) == fmi2Error);
+    CHECK(fmi2.FreeFMUstate(c, &saved) == fmi2OK && fmi2.FreeFMUstate(c, &read) == fmi2OK);
 }
 
 /* Each of them logged. */
 static void refusals(fmi2Component c, int n)
 {
-    const fmi2ValueReference coefficient = FIRST_COEFFICIENT, derivative = FIRST_DERIVATIVE, input = 0;
+    const fmi2ValueReference coefficient = REFERENCE(coefficients), derivative = FIRST_CALCULATED, input = 0;
     const double infinite = 1e308 * 10.0, one = 1.0;
     double change;
     const size_t before = messages;
-    check(fmu.SetReal(c, &coefficient, 1, &one) == fmi2Error, "refusing a fixed parameter");
-    check(fmu.SetReal(c, &input, 1, &infinite) == fmi2Discard, "refusing infinity");
-    check(fmu.DoStep(c, 0.0, -1.0, fmi2True) == fmi2Error, "refusing a step back");
-    check(fmu.EnterInitializationMode(c) == fmi2Error, "refusing a second initialization");
-    check(fmu.SetFMUstate(c, NULL) == fmi2Error, "refusing no state");
-    check(fmu.GetDirectionalDerivative(c, &derivative, 1, &derivative, 1, &one, &change) == fmi2Error,
-          "refusing a derivative as a known");
-    check(messages == before + 6, "logging");
+    CHECK(fmi2.SetReal(c, &coefficient, 1, &one) == fmi2Error);
+    CHECK(fmi2.SetReal(c, &input, 1, &infinite) == fmi2Discard);
+    CHECK(fmi2.DoStep(c, 0.0, -1.0, fmi2True) == fmi2Error);
+    CHECK(fmi2.EnterInitializationMode(c) == fmi2Error);
+    CHECK(fmi2.SetFMUstate(c, NULL) == fmi2Error);
+    CHECK(fmi2.GetDirectionalDerivative(c, &derivative, 1, &derivative, 1, &one, &change) == fmi2Error);
+    CHECK(messages == before + 6);
     (void)n;
 }
 
@@ -233,7 +181,7 @@ static void lives(fmi2Component c, int n)
     (void)c;
     fmi2Component const other = instance(n);
     step(other, n % 100, 0);
-    fmu.FreeInstance(other);
+    fmi2.FreeInstance(other);
 }
 
 static void endure(const char *name, void (*cycle)(fmi2Component, int), int cycles)
@@ -246,7 +194,7 @@ static void endure(const char *name, void (*cycle)(fmi2Component, int), int cycl
         }
         after[round] = memory_now();
     }
-    fmu.FreeInstance(c);
+    fmi2.FreeInstance(c);
     report_growth(name, after[0], after[N_ROUNDS - 1]);
 }
 
@@ -257,7 +205,7 @@ static void reload(int loads)
     memory after[N_ROUNDS];
     for (int round = 0; round < N_ROUNDS; round++) {
         for (int n = 0; n < loads / N_ROUNDS; n++) {
-            load();
+            load_fmu(path);
             lives(NULL, n);
             unload();
         }
@@ -268,14 +216,13 @@ static void reload(int loads)
 
 int main(int argc, char *argv[])
 {
-    check(argc == 6, "usage: numbers LIBRARY GUID INSTANCES CYCLES LOADS;");
+    CHECK(argc == 5);
     path = argv[1];
-    guid = argv[2];
-    const int instances = atoi(argv[3]), cycles = atoi(argv[4]), loads = atoi(argv[5]);
-    check(instances > 0 && cycles >= 10 * N_ROUNDS && loads >= N_ROUNDS, "enough of each");
+    const int instances = atoi(argv[2]), cycles = atoi(argv[3]), loads = atoi(argv[4]);
+    CHECK(instances > 0 && cycles >= 10 * N_ROUNDS && loads >= N_ROUNDS);
     memory_now(); /* what it allocates itself for good is there before anything is counted */
     reload(loads);
-    load();
+    load_fmu(path);
     crowd(instances);
     endure("steps", steps, cycles);
     endure("lives", lives, cycles / 10);

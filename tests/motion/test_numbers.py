@@ -1,13 +1,12 @@
 """Ten thousand instances, a million steps, a thousand loads: as good as the first, and memory stays flat."""
 
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from checks.c_programs import compile_c, run_program
 from checks.fmi2 import Fmu
-from rov_fmu.export.compile import WARNINGS, compiler, fmi_headers
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is counted by glibc and /proc")
 
@@ -17,11 +16,7 @@ ROUNDS = ("instances", "steps", "lives", "resets", "saves", "refusals", "loads")
 
 @pytest.fixture(scope="module")
 def program(videoray_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    output = tmp_path_factory.mktemp("numbers") / "numbers"
-    include = [f"-I{folder}" for folder in (videoray_dir / "sources", fmi_headers())]
-    command = [*compiler(), "-std=c11", "-O2", *WARNINGS, *include, str(PROGRAM), "-ldl", "-o", str(output)]
-    subprocess.run(command, check=True, cwd=output.parent)
-    return output
+    return compile_c(PROGRAM, tmp_path_factory.mktemp("numbers") / "numbers", videoray_dir / "sources", "-ldl")
 
 
 @pytest.fixture(
@@ -31,11 +26,9 @@ def program(videoray_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
 )
 def numbers(request: pytest.FixtureRequest, program: Path, videoray_dir: Path) -> dict[str, float]:
     """What the program measured."""
-    fmu = Fmu(videoray_dir)
-    arguments = [str(fmu.library), str(fmu.description.guid), *map(str, request.param)]
-    result = subprocess.run([str(program), *arguments], capture_output=True, text=True, timeout=600, check=False)
-    assert result.returncode == 0, result.stderr
-    return {name: float(value) for name, value in map(str.split, result.stdout.splitlines())}
+    run = run_program(program, Fmu(videoray_dir).library, *map(str, request.param))
+    assert run.code == 0, run.errors
+    return {name: float(value) for name, value in run.lines}
 
 
 def test_each_of_ten_thousand_instances_gets_what_it_gets_alone(numbers: dict[str, float]) -> None:
