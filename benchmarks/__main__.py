@@ -1,11 +1,11 @@
 """Measure what the FMU costs and how exact it is, beside other ways to the same motion, and print one table."""
 
-import argparse
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import click
 import fmpy
 from rich.console import Console
 
@@ -15,11 +15,11 @@ from rov_fmu.export.compile import BuildError, host_platform
 from rov_fmu.files.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code, run_process
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 
-from . import archive, fleet, importer, picture, promises, sections
-from .page import Page, machine
-from .plain_c import Programs, measurable
+from . import archive, fleet, importer, picture, sections
+from .page import Section, machine, print_sections
+from .plain_c import PlainC, measurable
 from .steps import Measured, Plan
 from .work import Work
 
@@ -47,78 +47,65 @@ for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep
 _QUICK = Effort(3, 1024, 8, 1, 1000, 100, 3, all_platforms=False)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code: 0 measured, 1 there is nothing to measure, 2 bad input, 130 interrupted."""
-    return exit_code("benchmarks", lambda: _run(arguments), {BuildError: 1, OSError: 2})
-
-
-def _run(arguments: Sequence[str] | None) -> None:
-    options = _parser().parse_args(arguments)
-    check_targets(filter(None, (options.picture,)))
+@click.command(help=__doc__)
+@click.option("--quick", is_flag=True, help="Few repetitions, only this machine's binary: to see that all of it runs.")
+@click.option("--picture", "picture_file", type=click.Path(path_type=Path), metavar="FILE.svg",
+              help="Also draw cost against error there (docs/cost_error.svg is the README's).")  # fmt: skip
+def _command(quick: bool, picture_file: Path | None) -> None:
+    check_targets(filter(None, (picture_file,)))
     if host_platform() is None:
         raise BuildError("there is no binary for this machine to measure")
-    page = Page()
     print(machine())
     print(_HOW)
     with tempfile.TemporaryDirectory(prefix="benchmarks-", ignore_cleanup_errors=True) as folder:
-        _measure(page, load_vehicle(VIDEORAY), Path(folder), _QUICK if options.quick else Effort(), options.picture)
-    page.print()
+        found = list(_measure(Path(folder), _QUICK if quick else Effort(), picture_file))
+    print_sections(found)
 
 
-def _measure(page: Page, vehicle: Vehicle, folder: Path, effort: Effort, picture_file: Path | None) -> None:
-    k = vehicle.coefficients
-    say = Console(stderr=True).status
-    programs = Programs(vehicle, Path(tempfile.mkdtemp(dir=folder))) if measurable() else None
-    if programs:
+def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterator[Section]:
+    vehicle = load_vehicle(VIDEORAY)
+    k, say = vehicle.coefficients, Console(stderr=True).status
+    plain_c = PlainC(vehicle, Path(tempfile.mkdtemp(dir=folder))) if measurable() else None
+    if plain_c:
         with say("steps in plain C"):
             plan = Plan(k, effort.commands, effort.known)
-            measured = Measured(programs, plan.jobs, effort.repetitions)
-            sections.plain_c(page, plan, measured)
-            sections.at_equal_error(page, plan, measured)
+            measured = Measured(plain_c, plan.jobs, effort.repetitions)
+            yield from sections.plain_c(plan, measured)
             if picture_file:
                 write_whole(Output(picture_file, picture.cost_error_picture(plan, measured).encode()))
     else:
-        page.section("Plain C: not measured, the programs are written for Linux on x86-64")
+        yield [["Plain C: not measured, the programs are written for Linux on x86-64"]]
     with say("building"):
-        builds = _build(vehicle, folder, effort)
+        native, python = folder / "native.fmu", folder / "python.fmu"
+        build(vehicle, python, backend="pythonfmu")
+        builds = {"for this machine": archive.build(native, ["host"])}
+        if effort.all_platforms:
+            builds["for all platforms"] = archive.build(folder / "all.fmu", [])
         folders = {name: folder / name for name in (importer.NATIVE, importer.PYTHONFMU)}
-        loaded = archive.load(folder / "native.fmu", folders[importer.NATIVE], effort.loads)
-        fmpy.extract(str(folder / "python.fmu"), str(folders[importer.PYTHONFMU]))
+        loaded = archive.load(native, folders[importer.NATIVE], effort.loads)
+        fmpy.extract(str(python), str(folders[importer.PYTHONFMU]))
     with say("a manoeuvre through FMPy"):
         manoeuvre = Work(k, straight=False, hold=1.0, commands=round(importer.STOP), starts=1)
         simulated = importer.simulate(folders, manoeuvre, effort.manoeuvres)
-        stepped = importer.step_through(folders, manoeuvre, effort.manoeuvres)
-        sections.through_fmpy(page, simulated, stepped)
+        yield sections.through_fmpy(simulated, importer.step_through(folders, manoeuvre, effort.manoeuvres))
     with say("many instances and runs"):
         variations, runs = fleet.Variations(k, effort.runs), {}
-        if programs:
-            instances, runs["plain C"] = fleet.in_c(programs, variations, effort.repetitions)
-            sections.instances(page, instances)
+        if plain_c:
+            yield sections.instances(fleet.instances(plain_c, effort.repetitions))
+            runs["plain C"] = fleet.in_c(plain_c, variations, effort.repetitions)
         slave = fmpy_slave(folders[importer.NATIVE])
         runs["FMPy"] = fleet.through_fmpy(slave, variations, effort.runs_in_fmpy, effort.manoeuvres)
         slave.freeInstance()
-        sections.variations(page, runs)
-    sections.archive(page, builds, loaded)
-    if programs:
-        promises.section(page, promises.promises(plan, measured))
+        yield sections.variations(runs)
+    yield from sections.archive(builds, loaded)
+    if plain_c:
+        yield sections.promises(plan, measured)
 
 
-def _build(vehicle: Vehicle, folder: Path, effort: Effort) -> dict[str, archive.Built]:
-    """native.fmu for this machine and python.fmu in the folder; what was measured of the native ones."""
-    build(vehicle, folder / "python.fmu", backend="pythonfmu")
-    builds = {"for this machine": archive.build(folder / "native.fmu", ["host"])}
-    if effort.all_platforms:
-        builds["for all platforms"] = archive.build(folder / "all.fmu", [])
-    return builds
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("--quick", action="store_true",
-                        help="few repetitions and only this machine's binary: to see that all of it runs")  # fmt: skip
-    parser.add_argument("--picture", type=Path, metavar="FILE.svg",
-                        help="also draw cost against error there (docs/cost_error.svg is the README's)")  # fmt: skip
-    return parser
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code: 0 measured, 1 there is nothing to measure, 2 bad input, 130 interrupted."""
+    codes = {BuildError: 1, OSError: 2, click.ClickException: 2}
+    return exit_code("benchmarks", lambda: _command(arguments, "python -m benchmarks", standalone_mode=False), codes)
 
 
 if __name__ == "__main__":

@@ -3,69 +3,62 @@
 import time
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
 import fmpy
 import numpy as np
-from numpy.typing import NDArray
 
 from checks.fmi2 import fmpy_slave, keep_loaded
 from rov_fmu.motion.rov import Inputs
 
-from .work import STATES, Work, flight
+from .plain_c import Reals
+from .work import COMMANDS, STATES, Work, flight
 
 STOP, INTERVAL = 100.0, 0.01
 NATIVE, PYTHONFMU, MODEL_EXCHANGE = "native", "PythonFMU", "Model Exchange"
 RELATIVE_TOLERANCE = 1e-6
+_OPTIONS: dict[str, dict[str, Any]] = {
+    NATIVE: {"fmi_type": "CoSimulation"},
+    PYTHONFMU: {"fmi_type": "CoSimulation"},
+    MODEL_EXCHANGE: {"fmi_type": "ModelExchange", "solver": "CVode", "relative_tolerance": RELATIVE_TOLERANCE},
+}
 
 
-@dataclass(frozen=True)
-class Simulated:
-    """Seconds of processor time in each repetition; the largest error of a state at the end (SI units)."""
+def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, tuple[Reals, float]]:
+    """Simulate the extracted FMUs in turn: commands that change every second, the state recorded every 10 ms.
 
-    seconds: NDArray[Any]
-    error: float
-
-
-def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, Simulated]:
-    """Simulate the extracted FMUs in turn: commands that change every second, the state recorded every 10 ms."""
-    end = astuple(flight(manoeuvre.coefficients, manoeuvre.sequence, manoeuvre.hold)[-1])
+    Seconds of processor time in each repetition; the largest error of a state at the end (SI units).
+    """
     keep_loaded(folders[PYTHONFMU])
-    signals = _signals(manoeuvre.sequence, manoeuvre.hold)
-    ways: dict[str, tuple[Path, dict[str, Any]]] = {
-        NATIVE: (folders[NATIVE], {"fmi_type": "CoSimulation"}),
-        PYTHONFMU: (folders[PYTHONFMU], {"fmi_type": "CoSimulation"}),
-        MODEL_EXCHANGE: (
-            folders[NATIVE],
-            {"fmi_type": "ModelExchange", "solver": "CVode", "relative_tolerance": RELATIVE_TOLERANCE},
-        ),
-    }
+    end = astuple(flight(manoeuvre.coefficients, manoeuvre.sequence, manoeuvre.hold)[-1])
+    # two rows at each change, as FMPy wants them
+    rows = [((n + k) * manoeuvre.hold, *astuple(c)) for n, c in enumerate(manoeuvre.sequence) for k in (0, 1)]
+    signals = np.array(rows, dtype=[("time", float), *((field.name, float) for field in fields(Inputs))])
     seconds, errors = defaultdict(list), {}
     for _ in range(repetitions):
-        for name, (folder, options) in ways.items():
-            description = fmpy.read_model_description(str(folder))
+        for name, options in _OPTIONS.items():
+            folder = str(folders.get(name, folders[NATIVE]))
+            description = fmpy.read_model_description(folder)
             start = time.process_time()
             result = fmpy.simulate_fmu(
-                str(folder), stop_time=STOP, output_interval=INTERVAL, input=signals, output=STATES, validate=False,
+                folder, stop_time=STOP, output_interval=INTERVAL, input=signals, output=STATES, validate=False,
                 model_description=description, **options,
             )  # fmt: skip
             seconds[name].append(time.process_time() - start)
-            errors[name] = max(abs(result[n][-1] - value) for n, value in zip(STATES, end, strict=True))
-    return {name: Simulated(np.array(times), float(errors[name])) for name, times in seconds.items()}
+            errors[name] = float(max(abs(result[n][-1] - value) for n, value in zip(STATES, end, strict=True)))
+    return {name: (np.array(times), errors[name]) for name, times in seconds.items()}
 
 
-def step_through(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, NDArray[Any]]:
+def step_through(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, Reals]:
     """Seconds of processor time in each repetition for the same, with nothing but the functions of a step."""
-    keep_loaded(folders[PYTHONFMU])
-    slaves = {name: fmpy_slave(folders[name]) for name in (NATIVE, PYTHONFMU)}
+    slaves = {name: fmpy_slave(folder) for name, folder in folders.items()}
     seconds = defaultdict(list)
     # both flavours have the same references
     description = fmpy.read_model_description(str(folders[NATIVE]))
     references = {variable.name: variable.valueReference for variable in description.modelVariables}
-    commands = [references[name] for name in ("u_l", "u_r", "u_t")]
-    velocities = [references[name] for name in ("u", "w", "r")]
+    commands, velocities = ([references[name] for name in names] for names in (COMMANDS, ("u", "w", "r")))
     for _ in range(repetitions):
         for name, slave in slaves.items():
             slave.reset()
@@ -82,9 +75,3 @@ def step_through(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int)
     for slave in slaves.values():
         slave.freeInstance()
     return {name: np.array(times) for name, times in seconds.items()}
-
-
-def _signals(commands: list[Inputs], hold: float) -> NDArray[Any]:
-    """FMPy's input: two rows at each change."""
-    rows = [((n + end) * hold, *astuple(command)) for n, command in enumerate(commands) for end in (0, 1)]
-    return np.array(rows, dtype=[("time", float), *((field.name, float) for field in fields(Inputs))])

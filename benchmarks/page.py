@@ -3,6 +3,7 @@
 import os
 import platform
 import subprocess
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -12,33 +13,26 @@ from rich.table import Table
 
 from rov_fmu.export.compile import compiler
 
-_COLUMNS = 5
 _WIDTH = 118
 
+Section = Sequence[Sequence[str]]
+"""A title and headings of up to four columns; then rows, each of a name and its cells."""
 
-class Page:
-    """Rows of a name and up to four cells, under headings that name the cells."""
 
-    def __init__(self) -> None:
-        self._table = Table(show_header=False, show_edge=False, box=None, pad_edge=False, padding=(0, 2, 0, 0))
-        self._table.add_column(min_width=46)
-        for _ in range(1, _COLUMNS):
-            self._table.add_column(justify="right", min_width=15)
-
-    def section(self, title: str, *headings: str) -> None:
-        """Begin a section."""
-        if self._table.row_count:
-            self._table.add_row()
-        self._table.add_row(*(f"[bold]{escape(text)}[/]" for text in (title, *headings)))
-
-    def row(self, name: str, *cells: str) -> None:
-        """Add a row to the section."""
-        self._table.add_row(escape(name), *map(escape, cells))
-
-    def print(self) -> None:
-        """Print the table, as wide as it is where no terminal limits it."""
-        console = Console()
-        (console if console.is_terminal else Console(width=_WIDTH)).print(self._table, highlight=False)
+def print_sections(sections: Iterable[Section]) -> None:
+    """Print the table, as wide as it is where no terminal limits it."""
+    table = Table(show_header=False, show_edge=False, box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column(min_width=46)
+    for _ in range(4):
+        table.add_column(justify="right", min_width=15)
+    for headings, *rows in sections:
+        if table.row_count:
+            table.add_row()
+        table.add_row(*(f"[bold]{escape(text)}[/]" for text in headings))
+        for row in rows:
+            table.add_row(*map(escape, row))
+    console = Console()
+    (console if console.is_terminal else Console(width=_WIDTH)).print(table, highlight=False)
 
 
 def digits(value: float, count: int = 3) -> str:

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from rov_fmu.pages.svg import LIGHT, svg_file
 
 from .page import digits, duration
-from .steps import BDF, CLOSED, EULER, FIXED_POINT, NAMES, RK4, TARGET, Measured, Plan, compared
+from .plain_c import BDF, CLOSED, EULER, FIXED_POINT, RK4
+from .steps import NAMES, TARGET, Measured, Plan, compared
 
 NAME = "cost_error.svg"
 _SIZE = (9.4, 4.7)  # inches

@@ -1,60 +1,95 @@
-"""The C programs that measure: built with the compiler of the FMU, and run (Linux on x86-64)."""
+"""What is measured in plain C: built with the compiler of the FMU, and called in this process (Linux on x86-64)."""
 
 import asyncio
+import ctypes
 import platform
-import subprocess
 import sys
+from ctypes import POINTER, byref, c_double, c_int, c_long, c_size_t, c_void_p
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import fmpy.sundials
+import numpy as np
+from numpy.typing import NDArray
 
+from checks.c_programs import compile_c
 from rov_fmu.export.archive import native_content
-from rov_fmu.export.compile import C_FLAGS, PLATFORMS, WARNINGS, compile_all, compiler, fmi_headers
+from rov_fmu.export.compile import PLATFORMS, compile_all
 from rov_fmu.vehicle.vehicle import Vehicle
 
 PLATFORM = "linux64"
+# as steps.py names them: the FMU, the formulas without FMI, the explicit methods, CVODE's
+FMU, CLOSED, EULER, RK4 = "fmu", "closed", "euler", "rk4"
+BDF, ADAMS, FIXED_POINT = CVODE = ("bdf", "adams", "adams-fixed")
 _SOURCES = Path(__file__).with_name("c")
-_FLAGS = (*C_FLAGS, "-g0", "-fno-asynchronous-unwind-tables")
-# a program needs but a part of the FMU's sources
-_STRICT = (*WARNINGS, "-Wshadow", "-Wno-unused-function")
+# a library needs but a part of the FMU's sources
+_FLAGS = ("-target", *PLATFORMS[PLATFORM].targets, "-shared", "-g0", "-fno-asynchronous-unwind-tables", "-Wshadow",
+          "-Wno-unused-function", "-DFMI2_OVERRIDE_FUNCTION_PREFIX")  # fmt: skip
 # The explicit methods with what is best for them: packed into pairs, RK4 of three axes takes a third longer.
-_FASTEST = {"explicit.c": ("-O3", "-fno-slp-vectorize")}
+_FASTEST = ("-O3", "-fno-slp-vectorize")
+_SUNDIALS = ("core", "nvecserial", "sunmatrixdense", "sunlinsoldense", "cvode")  # each needs those before it
+_REALS, _REFERENCES = np.ctypeslib.ndpointer(float, flags="C"), np.ctypeslib.ndpointer(np.uint32, flags="C")
+
+Reals = NDArray[np.float64]
 
 
 def measurable() -> bool:
-    """Whether the programs run on this machine."""
+    """Whether that runs on this machine."""
     return sys.platform == "linux" and platform.machine() == "x86_64"
 
 
-class Programs:
-    """The FMU's shared library and the programs beside it, in a folder of their own."""
+class PlainC:
+    """The FMU's shared library, and beside it the methods and what times them all, in a folder of their own."""
 
     def __init__(self, vehicle: Vehicle, folder: Path) -> None:
         content = native_content(vehicle)
-        self.folder = folder
-        self.library = folder / f"{content.identifier}{PLATFORMS[PLATFORM].suffix}"
-        built = asyncio.run(compile_all([PLATFORM], content.sources, content.identifier))
-        self.library.write_bytes(built[PLATFORM])
-        for name, text in content.sources.items():
-            Path(folder, name).write_text(text, encoding="utf-8")
+        fmu = folder / f"{content.identifier}{PLATFORMS[PLATFORM].suffix}"
+        fmu.write_bytes(asyncio.run(compile_all([PLATFORM], content.sources, content.identifier))[PLATFORM])
+        of_fmpy = Path(fmpy.sundials.__file__).parent / fmpy.platform_tuple
+        linked = [fmu, *(of_fmpy / f"sundials_{name}.so" for name in _SUNDIALS)]
+        for library in linked:
+            ctypes.CDLL(str(library))
 
-    def run(self, sources: list[str], *arguments: str, work: str = "") -> list[list[str]]:
-        """Build a program of C files and run it on the library; the words of each line that it prints."""
-        target = ("-target", *PLATFORMS[PLATFORM].targets)
-        folders = ("-DFMI2_OVERRIDE_FUNCTION_PREFIX", f"-I{self.folder}", f"-I{fmi_headers()}")
-        objects = [f"{source}.o" for source in sources]
-        for source, compiled in zip(sources, objects, strict=True):
-            flags = (*_FLAGS, *_FASTEST.get(source, ()), *_STRICT, *folders, "-c", "-o", compiled)
-            self._compile(*target, *flags, str(_SOURCES / source))
-        self._compile(*target, *objects, "-lm", "-ldl", "-o", "program")
-        program = [str(self.folder / "program"), str(self.library), *arguments]
-        output = subprocess.run(program, check=True, input=work, stdout=subprocess.PIPE, text=True).stdout
-        return [line.split() for line in output.splitlines()]
+        def load(name: str, *flags: str) -> Any:
+            output = folder / f"{name}.so"
+            return ctypes.CDLL(str(compile_c(_SOURCES / f"{name}.c", output, content.sources, *_FLAGS, *flags)))
 
-    def _compile(self, *arguments: str) -> None:
-        subprocess.run([*compiler(), *arguments], cwd=self.folder, check=True)
+        self._explicit, self._measure = load("explicit", *_FASTEST), load("measure", *map(str, linked))
+        m = self._measure
+        m.new_solver.argtypes, m.new_solver.restype = (c_int, c_int, c_int, c_double), c_void_p
+        m.hold.argtypes = (c_void_p, c_void_p, c_int, c_double, c_long, c_long, c_long, _REALS, _REALS)
+        m.step_in_turn.argtypes = (c_size_t, c_size_t, POINTER(c_double))
+        m.run_each.argtypes = (c_size_t, _REFERENCES, c_size_t, _REALS, _REALS, _REALS)
+        m.hold.restype = m.step_in_turn.restype = m.run_each.restype = c_double
+        m.begin()
+        self._solver = cache(m.new_solver)
 
+    def hold(
+        self, method: str, states: int, setting: float, h: float, steps: int, commands: Reals, start: Reals
+    ) -> tuple[float, Reals]:
+        """Hold commands in turn, each for so many steps of h: seconds a step, and the end (seven states).
 
-def sundials_folder() -> str:
-    """Where FMPy has its SUNDIALS libraries."""
-    return str(Path(fmpy.sundials.__file__).parent / fmpy.platform_tuple)
+        `setting`: sub-steps, or the tolerance of CVODE.
+        """
+        function, solver, end = None, None, start.copy()
+        if method in CVODE:
+            solver = self._solver(states, 2 if method == BDF else 1, method == FIXED_POINT, setting)
+        elif method != FMU:
+            library = self._measure if method == CLOSED else self._explicit
+            function = ctypes.cast(getattr(library, f"{method}_{states}"), c_void_p)
+        substeps = 1 if method in CVODE else round(setting)
+        each = self._measure.hold(function, solver, states, h, substeps, steps, len(commands), commands, end)
+        return 1e-9 * each, end
+
+    def step_in_turn(self, instances: int, steps: int) -> tuple[float, float]:
+        """So many instances, so many steps of 10 ms in all: seconds a step, bytes of memory an instance."""
+        memory = c_double()
+        return 1e-9 * self._measure.step_in_turn(instances, steps // instances, byref(memory)), memory.value
+
+    def run_each(self, references: list[int], values: Reals, commands: Reals) -> tuple[float, Reals]:
+        """A run of ten commands of 10 s for each row of start values: seconds, and where each ends."""
+        ends = np.empty((len(values), 7))
+        vr = np.array(references, dtype=np.uint32)
+        seconds = 1e-9 * self._measure.run_each(len(values), vr, len(vr), values, commands, ends)
+        return seconds, ends

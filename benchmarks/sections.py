@@ -1,117 +1,123 @@
 """The sections of the table, of what was measured."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .archive import Built, Loaded
-from .fleet import Instances, Runs
-from .importer import INTERVAL, MODEL_EXCHANGE, NATIVE, PYTHONFMU, RELATIVE_TOLERANCE, STOP, Simulated
-from .page import Page, digits, duration, error
-from .steps import (
-    BDF,
-    CLOSED,
-    EULER,
-    FIXED_POINT,
-    FMU,
-    NAMES,
-    RK4,
-    SUBSTEP,
-    TARGET,
-    TOLERANCES,
-    H,
-    Measured,
-    Plan,
-    compared,
-)
+from .fleet import INSTANCES, Runs
+from .importer import INTERVAL, MODEL_EXCHANGE, NATIVE, PYTHONFMU, RELATIVE_TOLERANCE, STOP
+from .page import Section, digits, duration, error
+from .plain_c import BDF, CLOSED, CVODE, EULER, FMU, RK4, Reals
+from .steps import KINDS, NAMES, SUBSTEP, TARGET, H, Job, Measured, Plan, compared, methods
 
-_HEADINGS = tuple(f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H)
+_STEPS = [f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H]
+_OURS = {FMU: "ours, fmi2DoStep", CLOSED: "ours, without FMI"}
+_SUBSTEPS = f"sub-steps ≤ {1000 * SUBSTEP:g} ms"
+_NAMES = {**_OURS, RK4: f"RK4, {_SUBSTEPS}", EULER: f"forward Euler, {_SUBSTEPS}"}
 
 
-def plain_c(page: Page, plan: Plan, measured: Measured) -> None:
-    """What a communication step costs: velocities, and the whole state turning, straight, and straight ahead."""
-    for title, states, straight in (
-        ("Velocities u, w, r", 3, False),
-        ("Velocities and pose, turning", 7, False),
-        ("Velocities and pose, straight", 7, True),
-    ):
-        page.section(title, *_HEADINGS)
-        if states == 7:
-            _step_row(page, plan, measured, "ours, fmi2DoStep", FMU, states, straight)
-        _step_row(page, plan, measured, "ours, without FMI", CLOSED, states, straight)
-        for name, method in (("RK4", RK4), ("forward Euler", EULER)):
-            _step_row(page, plan, measured, f"{name}, sub-steps ≤ {1000 * SUBSTEP:g} ms", method, states, straight)
-        for method in (BDF, FIXED_POINT):
-            for tolerance in TOLERANCES:
-                name = f"{NAMES[method]}, tolerance {error(tolerance)}"
-                _step_row(page, plan, measured, name, method, states, straight, tolerance)
-    page.section("The same, nothing turns back", *_HEADINGS)
-    for name, method in (("ours, fmi2DoStep", FMU), ("ours, without FMI", CLOSED)):
-        page.row(name, *(duration(measured.cost(plan.job_ahead(method, h))) for h in H))
-
-
-def _step_row(
-    page: Page, plan: Plan, measured: Measured, name: str, method: str, states: int, straight: bool, setting: float = 0
-) -> None:
-    jobs = [plan.job(method, states, h, straight, setting) for h in H]
-    page.row(name, *(f"{duration(measured.cost(job))}  {error(measured.error(job)):>5}" for job in jobs))
-
-
-def at_equal_error(page: Page, plan: Plan, measured: Measured) -> None:
-    """The cost of a held command of 1 s where all have the same error."""
-    headings = ("velocities", "times ours", "and pose, turning", "times ours")
-    page.section(f"A command of 1 s to {error(TARGET)}", *headings)
+def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
+    """What a communication step costs (velocities, and the whole state turning, straight, and straight ahead), and a
+    held command of 1 s where all have the same error."""
+    titles = ("Velocities u, w, r", "Velocities and pose, turning", "Velocities and pose, straight")
+    for title, (states, straight) in zip(titles, KINDS, strict=True):
+        section = [[title, *_STEPS]]
+        for method, tolerance in methods(states):
+            name = _NAMES.get(method) or f"{NAMES[method]}, tolerance {error(tolerance)}"
+            jobs = [plan.job(method, states, h, straight, tolerance) for h in H]
+            section.append([name, *(f"{duration(measured.cost(j))}  {error(measured.error(j)):>5}" for j in jobs)])
+        yield section
+    ahead = {name: [duration(measured.cost(plan.job(m, 7, h, ahead=True))) for h in H] for m, name in _OURS.items()}
+    yield [["The same, nothing turns back", *_STEPS], *([name, *costs] for name, costs in ahead.items())]
     ours = {states: plan.job(CLOSED, states, 1.0) for states in (3, 7)}
-    page.row("ours, to rounding", *(cell for job in ours.values() for cell in (duration(measured.cost(job)), "1")))
-    for method, name in {RK4: "RK4", **NAMES}.items():
-        cells = []
+    cells = [cell for job in ours.values() for cell in (duration(measured.cost(job)), "1")]
+    section = [["ours, to rounding", *cells]]
+    for method, name in NAMES.items():
+        section.append([name])
         for states, job in ours.items():
             if (states, method) in plan.sweeps:
                 cost, times = compared(measured, plan.sweeps[states, method], job)
-                cells += [duration(cost), digits(times)]
-        page.row(name, *cells)
+                section[-1] += [duration(cost), digits(times)]
+    headings = ["velocities", "times ours", "and pose, turning", "times ours"]
+    yield [[f"A command of 1 s to {error(TARGET)}", *headings], *section]
 
 
-def through_fmpy(page: Page, simulated: Mapping[str, Simulated], stepped: Mapping[str, NDArray[Any]]) -> None:
+def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[str, Reals]) -> Section:
     """The manoeuvre in an importer: as a user simulates it, and the functions of a step alone."""
-    title = f"FMPy, {STOP:g} s at {1000 * INTERVAL:g} ms, turning"
-    page.section(title, "a step", "all", "error at the end", "times native")
     names = {
         NATIVE: "native",
         PYTHONFMU: "PythonFMU flavour",
         MODEL_EXCHANGE: f"Model Exchange, CVode {error(RELATIVE_TOLERANCE)}",
     }
 
-    def row(name: str, seconds: NDArray[Any], native: NDArray[Any], end: str) -> None:
+    def row(name: str, seconds: Reals, native: Reals, end: str) -> list[str]:
         total = float(np.median(seconds))
-        page.row(name, duration(total / STOP * INTERVAL), duration(total), end, digits(np.median(seconds / native)))
+        return [name, duration(total / STOP * INTERVAL), duration(total), end, digits(np.median(seconds / native))]
 
-    for key, run in simulated.items():
-        row(f"simulate_fmu, {names[key]}", run.seconds, simulated[NATIVE].seconds, error(run.error))
-    for key, seconds in stepped.items():
-        row(f"set, doStep, get, {names[key]}", seconds, stepped[NATIVE], "")
+    return [
+        [f"FMPy, {STOP:g} s at {1000 * INTERVAL:g} ms, turning", "a step", "all", "error at the end", "times native"],
+        *(row(f"simulate_fmu, {names[key]}", seconds, simulated[NATIVE][0], error(end))
+          for key, (seconds, end) in simulated.items()),
+        *(row(f"set, doStep, get, {names[key]}", seconds, stepped[NATIVE], "") for key, seconds in stepped.items()),
+    ]  # fmt: skip
 
 
-def instances(page: Page, found: Mapping[int, Instances]) -> None:
+def instances(found: Reals) -> Section:
     """Many instances, stepped in turn."""
-    page.section("Instances in turn, straight and down", *(f"{n:,}" for n in found))
-    page.row("a step of 10 ms", *(duration(i.seconds) for i in found.values()))
-    page.row("memory of each", *(f"{i.bytes:,.0f} B" for i in found.values()))
+    return [
+        ["Instances in turn, straight and down", *(f"{n:,}" for n in INSTANCES)],
+        ["a step of 10 ms", *map(duration, found[:, 0])],
+        ["memory of each", *(f"{memory:,.0f} B" for memory in found[:, 1])],
+    ]
 
 
-def variations(page: Page, runs: Mapping[str, Runs]) -> None:
+def variations(runs: Mapping[str, Runs]) -> Section:
     """Runs with other parameters."""
-    page.section("Variations of α and β, 100 s, turning", "runs", "a run", "runs a second", "error at the end")
-    for name, found in runs.items():
-        page.row(name, f"{found.count:,}", duration(1.0 / found.rate), digits(found.rate), error(found.error))
+    return [
+        ["Variations of α and β, 100 s, turning", "runs", "a run", "runs a second", "error at the end"],
+        *([name, f"{found.count:,}", duration(1.0 / found.rate), digits(found.rate), error(found.error)]
+          for name, found in runs.items()),
+    ]  # fmt: skip
 
 
-def archive(page: Page, builds: Mapping[str, Built], loaded: Loaded) -> None:
-    """Size, load time and build time."""
-    page.section("The archive", "size", "build, cold", "build, warm")
-    for name, built in builds.items():
-        page.row(name, f"{built.size / 1000:,.0f} kB", duration(built.cold), duration(built.warm))
-    page.section("Loading it through FMPy", "extract", "description", "instance", "library alone")
-    page.row("for this machine", *map(duration, (loaded.extract, loaded.describe, loaded.instantiate, loaded.library)))
+def archive(builds: Mapping[str, tuple[int, float, float]], loaded: Sequence[float]) -> Iterator[Section]:
+    """Size, build time and load time."""
+    rows = [
+        [name, f"{size / 1000:,.0f} kB", duration(cold), duration(warm)] for name, (size, cold, warm) in builds.items()
+    ]
+    yield [["The archive", "size", "build, cold", "build, warm"], *rows]
+    yield [
+        ["Loading it through FMPy", "extract", "description", "instance", "library alone"],
+        ["for this machine", *map(duration, loaded)],
+    ]
+
+
+def promises(plan: Plan, measured: Measured) -> Section:
+    """What was promised of the cost of a step. Ratios and differences are the medians of those in each repetition."""
+    velocity, held = plan.job(CLOSED, 3, SUBSTEP), plan.job(CLOSED, 3, 1.0)
+    step = measured.ratio(velocity, plan.job(RK4, 3, SUBSTEP))
+    worst = max(measured.error(job) for job in (velocity, held))
+    times = {method: compared(measured, plan.sweeps[3, method], held)[1] for method in (RK4, *CVODE)}
+    best = min(CVODE, key=lambda method: times[method])
+    spread = _spread(measured, [plan.job(CLOSED, 7, h, ahead=True) for h in H])
+    turning_back = _spread(measured, [plan.job(CLOSED, 7, h, straight=True) for h in H])
+    fmu, bare = (measured.seconds[plan.job(method, 7, SUBSTEP, straight=True)] for method in (FMU, CLOSED))
+    layer = max(0.0, float(np.median(fmu - bare)))
+    per = f"at {error(TARGET)} a command of 1 s"
+    made = [
+        ("velocity step of 3 axes to one of RK4, 10 ms", digits(step), "≤ 1", step <= 1.0),
+        ("its error, m/s, rad/s", error(worst), "≤ 1e-14", worst <= 1e-14),
+        (f"RK4 to ours, {per}", digits(times[RK4]), "≥ 20", times[RK4] >= 20.0),
+        (f"{NAMES[best]} to ours, {per}", digits(times[best]), "≥ 500", times[best] >= 500.0),
+        (f"{NAMES[BDF]}, as FMPy uses it, to ours", digits(times[BDF]), "≥ 500", times[BDF] >= 500.0),
+        ("dearest to cheapest step, 1 ms to 100 s, ahead", digits(spread), "≤ 1.5", spread <= 1.5),
+        ("the same, straight but turning back", digits(turning_back), "≤ 1.5", turning_back <= 1.5),
+        ("what FMI adds to a step of 10 ms", duration(layer), "≤ 20 ns", layer <= 20e-9),
+    ]
+    rows = [(what, found, promised, "kept" if kept else "NOT KEPT") for what, found, promised, kept in made]
+    return [("Promised", "measured", "promised", ""), *rows]
+
+
+def _spread(measured: Measured, jobs: Sequence[Job]) -> float:
+    costs = np.array([measured.seconds[job] for job in jobs])
+    return float(np.median(costs.max(axis=0) / costs.min(axis=0)))

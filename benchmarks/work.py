@@ -1,10 +1,13 @@
 """The same work for all: seeded commands, held, and where each ends to 50 digits."""
 
 import random
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
 from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
 
 from checks import reference
 from rov_fmu.motion import rov
@@ -12,7 +15,7 @@ from rov_fmu.motion.rov import Coefficients, Inputs, State
 
 SEED = 1
 STATES = tuple(field.name for field in fields(State))
-Ends = tuple[tuple[float, ...], ...]
+COMMANDS = ("u_l", "u_r", "u_t")
 
 
 def flight(k: Coefficients, commands: Sequence[Inputs], hold: float) -> list[State]:
@@ -42,28 +45,27 @@ class Work:
         return [Inputs(left, left if self.straight else right, top) for left, right, top in signed]
 
     @cached_property
-    def states(self) -> list[State]:
+    def array(self) -> NDArray[np.float64]:
+        """The commands, a row each."""
+        return np.array([[getattr(command, name) for name in COMMANDS] for command in self.sequence])
+
+    @cached_property
+    def states(self) -> NDArray[np.float64]:
         """Where the first commands start: each where the one before ends after a second, the first at rest."""
-        return flight(self.coefficients, self.sequence[: self.starts - 1], 1.0)
+        return np.array([astuple(s) for s in flight(self.coefficients, self.sequence[: self.starts - 1], 1.0)])
 
     @cached_property
     def ends(self) -> list[dict[str, reference.Number]]:
         """The states at the ends of the first commands, to 50 digits."""
         return [
-            reference.step(self.coefficients, command, start, self.hold).state
-            for command, start in zip(self.sequence, self.states, strict=False)
+            reference.step(self.coefficients, command, State(*start), self.hold).state
+            for command, start in zip(self.sequence, self.states.tolist(), strict=False)
         ]
 
-    def error(self, found: Ends) -> float:
+    def error(self, found: Iterable[Sequence[float]]) -> float:
         """The largest difference of any state (m/s, rad/s, m, rad) of the three or seven that were found."""
         return max(
             abs(float(end[name] - value))
             for end, values in zip(self.ends, found, strict=True)
             for name, value in zip(STATES, values, strict=False)
         )
-
-    def text(self) -> str:
-        """For the C program."""
-        commands = [f"{c.u_l.hex()} {c.u_r.hex()} {c.u_t.hex()}" for c in self.sequence]
-        states = [" ".join(value.hex() for value in astuple(state)) for state in self.states]
-        return "\n".join([f"{len(commands)} {len(states)}", *commands, *states, ""])

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import NoReturn
 
-from click import ClickException
+from click import Abort, ClickException
 
 from rov_fmu.files.messages import one_line
 from rov_fmu.files.output import WriteError
@@ -23,7 +23,7 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
         finally:
             if sys.stdout:  # --help leaves by SystemExit
                 sys.stdout.flush()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Abort):
         return _say(program, "interrupted, no file is half-written", 130)
     except BrokenPipeError:
         _end_output()

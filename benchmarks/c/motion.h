@@ -22,6 +22,8 @@ typedef struct {
     riccati axis[3]; /* surge, heave, yaw under the forces of the command */
 } motion;
 
+typedef void advance(motion *m, state *s, double h, long steps);
+
 /* The forces of the command: once a communication step for seven states, ahead of the measurement for three. */
 static inline void prepare_axes(motion *m)
 {
@@ -44,10 +46,5 @@ static inline void rates(const motion *m, int n, const double s[], double rate[]
         rate[6] = s[2];
     }
 }
-
-typedef void advance(motion *m, state *s, double h, long steps);
-
-/* explicit.c */
-advance euler_velocities, euler_states, rk4_velocities, rk4_states;
 
 #endif

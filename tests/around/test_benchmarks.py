@@ -12,12 +12,11 @@ import pytest
 from lxml import etree
 
 from benchmarks import page
-from benchmarks.fleet import Variations, in_c
-from benchmarks.plain_c import Programs, measurable
-from benchmarks.steps import CLOSED, CVODE, EULER, FMU, RK4, TOLERANCES, Job, Measured, cost_at
+from benchmarks.fleet import INSTANCES, Variations, in_c, instances
+from benchmarks.plain_c import CLOSED, CVODE, EULER, FMU, RK4, PlainC, measurable
+from benchmarks.steps import TOLERANCES, Job, Measured, cost_at
 from benchmarks.work import Work
-from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle
 
 ROOT = Path(__file__).parent.parent.parent
 COMMANDS = 8
@@ -26,14 +25,14 @@ in_plain_c = pytest.mark.skipif(not measurable(), reason="the C programs are wri
 
 
 @pytest.fixture(scope="module")
-def programs(tmp_path_factory: pytest.TempPathFactory) -> Programs:
-    return Programs(load_vehicle(VIDEORAY), tmp_path_factory.mktemp("programs"))
+def plain_c(vehicle: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> PlainC:
+    return PlainC(vehicle, tmp_path_factory.mktemp("plain C"))
 
 
 class Small:
     """All methods on a few commands: those that turn the motion back, and those that do not."""
 
-    def __init__(self, vehicle: Vehicle, programs: Programs) -> None:
+    def __init__(self, vehicle: Vehicle, plain_c: PlainC) -> None:
         self.work = Work(vehicle.coefficients, False, 1.0, COMMANDS, COMMANDS)
         self.ahead = Work(vehicle.coefficients, True, 1.0, COMMANDS, COMMANDS, ahead=True)
         self.long = Work(vehicle.coefficients, False, 100.0, COMMANDS, 4)
@@ -45,7 +44,7 @@ class Small:
             *(self.solver(method, states, tolerance) for method in CVODE for states in (3, 7)
               for tolerance in TOLERANCES),
         ]  # fmt: skip
-        self.measured = Measured(programs, self.jobs, 2)
+        self.measured = Measured(plain_c, self.jobs, 2)
 
     def ours(self, method: str, states: int, h: float) -> Job:
         return Job(method, states, 1.0, self.long if h > 1.0 else self.work, h)
@@ -58,8 +57,8 @@ class Small:
 
 
 @pytest.fixture(scope="module")
-def small(vehicle: Vehicle, programs: Programs) -> Small:
-    return Small(vehicle, programs)
+def small(vehicle: Vehicle, plain_c: PlainC) -> Small:
+    return Small(vehicle, plain_c)
 
 
 @in_plain_c
@@ -107,12 +106,19 @@ def test_every_job_is_timed_in_every_repetition(small: Small) -> None:
 
 
 @in_plain_c
-def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, programs: Programs) -> None:
-    instances, runs = in_c(programs, Variations(vehicle.coefficients, 20), 2)
+def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, plain_c: PlainC) -> None:
+    runs = in_c(plain_c, Variations(vehicle.coefficients, 20), 2)
     assert runs.count == 20
+    assert 0.0 < runs.rate < inf
     assert runs.error < 1e-11
-    assert list(instances) == [1, 100, 10_000]
-    assert all(0 < found.bytes < 4096 for found in instances.values())
+
+
+@in_plain_c
+def test_many_instances_are_stepped_and_small(plain_c: PlainC) -> None:
+    assert INSTANCES == (1, 100, 10_000)
+    seconds, memory = instances(plain_c, 2).T
+    assert all((seconds > 0.0) & (seconds < 1e-3))
+    assert all((memory > 0) & (memory < 4096))
 
 
 def test_cost_at_an_error_lies_between_the_settings() -> None:

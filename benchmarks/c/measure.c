@@ -1,0 +1,179 @@
+/* Times held commands (u_l, u_r, u_t), by one method or another, and the FMU in numbers: a library that plain_c.py calls,
+ * linked with the FMU and with SUNDIALS. Times are processor time of this thread: what else runs does not count. */
+#define _POSIX_C_SOURCE 200809L
+#include "cvode.h"
+#include "interface.h"
+
+#include <malloc.h>
+#include <time.h>
+
+enum { N_COMMANDS = 3, HELD = 10 };
+
+/* All value references; the commands come first. */
+static fmi2ValueReference reference[N_VARIABLES];
+static const fmi2ValueReference *const COMMANDS = reference, *const STATES = reference + FIRST_STATE;
+static motion m;
+static fmi2Component rov;
+
+static double nanoseconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
+}
+
+static fmi2Component new_instance(void)
+{
+    static const fmi2CallbackFunctions callbacks;
+    const fmi2Component c = fmi2Instantiate("rov", fmi2CoSimulation, MODEL_GUID, NULL, &callbacks, fmi2False, fmi2False);
+    CHECK(c != NULL);
+    return c;
+}
+
+/* From the beginning, with n values set. */
+static void start_instance(fmi2Component c, const fmi2ValueReference vr[], size_t n, const double values[])
+{
+    CHECK(fmi2Reset(c) == fmi2OK && fmi2SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK
+          && fmi2SetReal(c, vr, n, values) == fmi2OK && fmi2EnterInitializationMode(c) == fmi2OK
+          && fmi2ExitInitializationMode(c) == fmi2OK);
+}
+
+/* Once, before all else. */
+void begin(void)
+{
+    union {
+        double at[N_VARIABLES];
+        rov_variables named;
+    } defaults;
+    for (int i = 0; i < N_VARIABLES; i++) {
+        defaults.at[i] = VARIABLES[i].start;
+        reference[i] = (fmi2ValueReference)i;
+    }
+    m.coefficients = defaults.named.coefficients;
+    rov_prepare(&m.coefficients, &m.gains);
+    rov = new_instance();
+}
+
+/* ---- Methods ---- */
+
+/* The closed form: one step, however long. */
+void closed_3(motion *at, state *s, double h, long steps)
+{
+    (void)steps;
+    for (int i = 0; i < 3; i++) {
+        s->at[i] = riccati_velocity(&at->axis[i], s->at[i], h);
+    }
+}
+
+void closed_7(motion *at, state *s, double h, long steps)
+{
+    (void)steps;
+    rov_state next;
+    rov_step(&at->coefficients, &at->gains, &at->inputs, &s->named, h, &next);
+    s->named = next;
+}
+
+/* Hold n commands in turn from the state s on, each for `steps` communication steps of h, by a method in so many
+ * sub-steps, by a solver, or, with neither, in the FMU. Nanoseconds a communication step; s becomes the end. */
+double hold(advance *method, cvode *solver, int states, double h, long substeps, long steps, long n,
+            const double command[][N_COMMANDS], state *s)
+{
+    double(*const force)[3] = malloc((size_t)n * sizeof *force); /* C of each axis */
+    CHECK(force != NULL);
+    for (long i = 0; i < n; i++) {
+        m.inputs = (rov_inputs){.u_l = command[i][0], .u_r = command[i][1], .u_t = command[i][2]};
+        prepare_axes(&m);
+        for (int axis = 0; axis < 3; axis++) {
+            force[i][axis] = m.axis[axis].C;
+        }
+    }
+    if (method == NULL && solver == NULL) {
+        start_instance(rov, STATES, N_STATES, s->at);
+    }
+    const double start = nanoseconds();
+    for (long i = 0; i < n; i++) {
+        if (method != NULL && states == 3) {
+            for (int axis = 0; axis < 3; axis++) {
+                m.axis[axis].C = force[i][axis];
+            }
+        } else if (method != NULL || solver != NULL) {
+            m.inputs = (rov_inputs){.u_l = command[i][0], .u_r = command[i][1], .u_t = command[i][2]};
+        }
+        if (method != NULL) {
+            for (long step = 0; step < steps; step++) {
+                method(&m, s, h / (double)substeps, substeps);
+            }
+        } else if (solver != NULL) {
+            prepare_axes(&m);
+            cvode_hold(solver, &m, s, h, steps);
+        } else {
+            double t = 0.0;
+            CHECK(fmi2SetReal(rov, COMMANDS, N_COMMANDS, command[i]) == fmi2OK);
+            for (long step = 0; step < steps; step++, t += h) {
+                CHECK(fmi2DoStep(rov, t, h, fmi2True) == fmi2OK);
+            }
+        }
+    }
+    const double each = (nanoseconds() - start) / (double)(n * steps);
+    if (method == NULL && solver == NULL) {
+        CHECK(fmi2GetReal(rov, STATES, N_STATES, s->at) == fmi2OK);
+    }
+    free(force);
+    return each;
+}
+
+/* ---- Numbers ---- */
+
+/* Bytes in use on the heap. */
+static double heap(void)
+{
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wdeprecated-declarations" /* mallinfo2 came after the GLIBC that is linked here */
+    return mallinfo().uordblks;
+#pragma GCC diagnostic pop
+}
+
+/* n instances that go straight ahead and down, so many rounds of steps in turn: nanoseconds a step; *bytes of each. */
+double step_in_turn(size_t n, size_t rounds, double *bytes)
+{
+    static const double commands[] = {0.5, 0.5, 0.5}, h = 0.01;
+    fmi2Component *const c = malloc(n * sizeof *c);
+    CHECK(c != NULL);
+    const double before = heap();
+    for (size_t i = 0; i < n; i++) {
+        c[i] = new_instance();
+    }
+    *bytes = (heap() - before) / (double)n;
+    for (size_t i = 0; i < n; i++) {
+        start_instance(c[i], COMMANDS, N_COMMANDS, commands);
+    }
+    double t = 0.0;
+    const double start = nanoseconds();
+    for (size_t round = 0; round < rounds; round++, t += h) {
+        for (size_t i = 0; i < n; i++) {
+            CHECK(fmi2DoStep(c[i], t, h, fmi2True) == fmi2OK);
+        }
+    }
+    const double each = (nanoseconds() - start) / (double)(rounds * n);
+    for (size_t i = 0; i < n; i++) {
+        fmi2FreeInstance(c[i]);
+    }
+    free(c);
+    return each;
+}
+
+/* Runs of ten commands of 10 s, each with n values set at its start: nanoseconds, and where each ends. */
+double run_each(size_t runs, const fmi2ValueReference vr[], size_t n, const double *values,
+                const double command[HELD][N_COMMANDS], double end[][N_STATES])
+{
+    const double start = nanoseconds();
+    for (size_t i = 0; i < runs; i++) {
+        start_instance(rov, vr, n, values + i * n);
+        for (int k = 0; k < HELD; k++) {
+            CHECK(fmi2SetReal(rov, COMMANDS, N_COMMANDS, command[k]) == fmi2OK
+                  && fmi2DoStep(rov, 10.0 * k, 10.0, fmi2True) == fmi2OK);
+        }
+        CHECK(fmi2GetReal(rov, STATES, N_STATES, end[i]) == fmi2OK);
+    }
+    return nanoseconds() - start;
+}
