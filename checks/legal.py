@@ -75,14 +75,18 @@ def legal_modes(kind: int) -> Mapping[str, tuple[str, ...]]:
 
 
 def legal_header() -> str:
-    """legal.h: an enumerator for every function that takes an instance, its name, and its modes by interface."""
+    """legal.h: every function that takes an instance, its name, and its modes by interface."""
     tables = {kind: legal_modes(kind) for kind in MODES}
     names = [*dict.fromkeys(name for table in tables.values() for name in table), "fmi2CancelStep"]
-    lines = ["/* Generated from fuzz/legal.py. */", "typedef enum {"]
-    lines += [f"    CALL_{name}," for name in names]
-    lines += ["    N_CALLS", "} call;", "static const char *const CALL_NAMES[N_CALLS] = {"]
-    lines += [f'    "{name}",' for name in names]
-    lines += ["};", "static const int LEGAL[2][N_CALLS] = {"]
+    lines = [
+        "/* Generated from checks/legal.py. */",
+        "#define EACH_CALL(F) \\",
+        *(f"    F({name}) \\" for name in names),
+        "",
+    ]
+    lines += ["#define CALL_OF(name) CALL_##name,", "typedef enum { EACH_CALL(CALL_OF) N_CALLS } call;"]
+    lines += ["#define NAME_OF(name) #name,", "static const char *const CALL_NAMES[N_CALLS] = {EACH_CALL(NAME_OF)};"]
+    lines += ["static const int LEGAL[2][N_CALLS] = {"]
     for interface, kind in (("fmi2ModelExchange", MODEL_EXCHANGE), ("fmi2CoSimulation", CO_SIMULATION)):
         masks = (" | ".join(tables[kind].get(name, ("0",))) for name in names)
         lines += [f"    [{interface}] = {{", *(f"        {mask}," for mask in masks), "    },"]

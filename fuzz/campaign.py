@@ -5,18 +5,16 @@ import subprocess
 import zipfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 
 from checks.c_programs import compile_c
 from checks.legal import legal_header
+from rov_fmu.export.archive import archive
 
 TARGET_SOURCE = Path(__file__).with_name("c") / "target.c"
 CORPUS = Path(__file__).with_name("corpus.zip")
 _LONGEST_INPUT = 2000  # bytes, some hundred calls
 _LONGEST_TIME = 60  # s for one of them
-_EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 class FindingError(Exception):
@@ -27,26 +25,8 @@ class FindingError(Exception):
         self.inputs = inputs
 
 
-@dataclass
-class Counts:
-    """Calls by function: refused, accepted."""
-
-    refused: Counter[str] = field(default_factory=Counter)
-    accepted: Counter[str] = field(default_factory=Counter)
-
-    def add(self, file: Path) -> None:
-        for line in file.read_text(encoding="utf-8").splitlines():
-            name, refused, accepted = line.split()
-            self.refused[name] += int(refused)
-            self.accepted[name] += int(accepted)
-
-    def include(self, other: "Counts") -> None:
-        self.refused.update(other.refused)
-        self.accepted.update(other.accepted)
-
-    @property
-    def calls(self) -> int:
-        return self.refused.total() + self.accepted.total()
+Counts = Counter[tuple[str, bool]]
+"""Calls by function and whether they were accepted."""
 
 
 def build_target(sources: Mapping[str, str], output: Path) -> None:
@@ -65,12 +45,9 @@ def pack_corpus(target: Path, folder: Path) -> int:
     smaller = folder.with_name(f"{folder.name}.smaller")
     smaller.mkdir()
     _finish(_start(target, folder.parent, ["-merge=1", "-use_counters=0", str(smaller), str(folder)]), folder.parent)
-    packed = BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in sorted(smaller.iterdir()):
-            archive.writestr(zipfile.ZipInfo(path.name, _EPOCH), path.read_bytes(), zipfile.ZIP_DEFLATED)
-    CORPUS.write_bytes(packed.getvalue())
-    return len(list(smaller.iterdir()))
+    kept = {path.name: path.read_bytes() for path in smaller.iterdir()}
+    CORPUS.write_bytes(archive(kept))
+    return len(kept)
 
 
 def replay(target: Path, inputs: Sequence[Path], folder: Path) -> Counts:
@@ -93,7 +70,7 @@ def fuzz(target: Path, corpus: Path, folder: Path, seconds: int, jobs: int) -> C
     counts = Counts()
     try:
         for job in started:
-            counts.include(_finish(job, folder))
+            counts.update(_finish(job, folder))
     finally:
         for process, _, _ in started:
             process.kill()
@@ -120,19 +97,17 @@ def _start(target: Path, folder: Path, arguments: Sequence[str], name: str = "co
 def _finish(job: _Job, folder: Path) -> Counts:
     process, file, log = job
     if process.wait() != 0:
-        words = log.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
         # libFuzzer's progress begins with #, and has names of the log categories in it
-        told = _essence([line for line in words if not line.startswith("#")])
+        told = _essence([line for line in lines if not line.startswith("#")])
         raise FindingError("\n".join(told), sorted(folder.glob("finding-*")))
-    counts = Counts()
-    if file.exists():
-        counts.add(file)
-    return counts
+    words = map(str.split, file.read_text(encoding="utf-8").splitlines() if file.exists() else ())
+    return Counts({(name, bool(n)): int(count) for name, *both in words for n, count in enumerate(both)})
 
 
-def _essence(words: Sequence[str]) -> Iterator[str]:
+def _essence(lines: Sequence[str]) -> Iterator[str]:
     """Of a log of libFuzzer what was found and where in our C, without how it went there."""
-    for line in words:
+    for line in lines:
         if line.startswith("    #"):
             _, _, place = line.partition(" in ")
             if ".sources/" in place or "fuzz/c/" in place:

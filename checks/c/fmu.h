@@ -12,6 +12,9 @@
 #include <string.h>
 
 #ifdef _WIN32
+#define WIN32_LEAN_AND_MEAN
+#define NOGDI /* has a FIXED of its own */
+#define NOUSER /* and an INPUT */
 #include <windows.h>
 typedef HMODULE library;
 static inline library open_library(const char *path) { return LoadLibraryA(path); }

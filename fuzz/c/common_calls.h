@@ -50,10 +50,9 @@ static void instantiate(slot *s, const char *name, int type, const char *guid, b
 {
     free_instance(s);
     const fmi2CallbackFunctions given = {logs ? check_message : NULL, NULL, NULL, NULL, s};
-    fmi2CallbackFunctions *const callbacks = copy_of(&given, 1, sizeof given);
+    LENT fmi2CallbackFunctions *const callbacks = copy_of(&given, 1, sizeof given);
     before_call();
     s->f = fmi2Instantiate(name, (fmi2Type)type, guid, NULL, functions ? callbacks : NULL, fmi2False, events);
-    free(callbacks);
     const bool good = name != NULL && name[strspn(name, " \t\n")] != '\0' && guid != NULL && strcmp(guid, MODEL_GUID) == 0
                       && type >= 0 && type <= 1 && functions && !memory_is_full;
     PROPERTY((s->f != NULL) == good, "fmi2Instantiate of type %d", type);
@@ -77,7 +76,7 @@ static void call_fmi2Instantiate(slot *s)
 static void call_fmi2SetDebugLogging(slot *s)
 {
     const size_t n = take_count();
-    fmi2String *const categories = take_byte() < 250 ? exactly(n, sizeof *categories) : NULL;
+    LENT fmi2String *const categories = take_byte() < 250 ? exactly(n, sizeof *categories) : NULL;
     bool good = n == 0 || categories != NULL;
     for (size_t i = 0; i < n && categories != NULL; i++) {
         bool known = false;
@@ -87,20 +86,15 @@ static void call_fmi2SetDebugLogging(slot *s)
         }
         good = good && known;
     }
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SetDebugLogging, good);
-    after_call(s, CALL_fmi2SetDebugLogging, wanted, fmi2SetDebugLogging(s->f, take_bool(), n, categories), true);
-    free(categories);
+    CALL(s, good, true, fmi2SetDebugLogging, s->f, take_bool(), n, categories);
 }
 
 static void call_fmi2SetupExperiment(slot *s)
 {
     const bool simple = take_bool(), stops = !simple && take_bool();
     const double start = simple ? 0.0 : take_real(), stop = stops ? take_real() : 0.0;
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SetupExperiment, isfinite(start) && (!stops || stop >= start));
-    const fmi2Status status = fmi2SetupExperiment(s->f, take_bool(), take_real(), start, stops, stop);
-    if (after_call(s, CALL_fmi2SetupExperiment, wanted, status, true)) {
+    const bool good = isfinite(start) && (!stops || stop >= start);
+    if (CALL(s, good, true, fmi2SetupExperiment, s->f, take_bool(), take_real(), start, stops, stop)) {
         s->at.set_up = true;
         s->at.time = start;
         s->at.stop_defined = stops;
@@ -109,34 +103,23 @@ static void call_fmi2SetupExperiment(slot *s)
 }
 
 /* Functions without arguments that lead to a mode. */
-static void go(slot *s, call which, fmi2Status (*function)(fmi2Component), bool arguments, lifecycle to)
-{
-    before_call();
-    const verdict wanted = legal(s, which, arguments);
-    if (after_call(s, which, wanted, function(s->f), true)) {
-        s->at.mode = to;
+#define CALL_THAT_LEADS(function, good, to)            \
+    static void call_##function(slot *s)               \
+    {                                                  \
+        if (CALL(s, good, true, function, s->f)) {     \
+            s->at.mode = to;                           \
+        }                                              \
     }
-}
 
-static void call_fmi2EnterInitializationMode(slot *s)
-{
-    go(s, CALL_fmi2EnterInitializationMode, fmi2EnterInitializationMode, s->at.set_up, INITIALIZATION);
-}
-
-static void call_fmi2ExitInitializationMode(slot *s)
-{
-    go(s, CALL_fmi2ExitInitializationMode, fmi2ExitInitializationMode, true,
-       s->at.type == fmi2ModelExchange ? EVENT : STEP);
-}
-
-static void call_fmi2Terminate(slot *s)
-{
-    go(s, CALL_fmi2Terminate, fmi2Terminate, true, TERMINATED);
-}
+CALL_THAT_LEADS(fmi2EnterInitializationMode, s->at.set_up, INITIALIZATION)
+CALL_THAT_LEADS(fmi2ExitInitializationMode, true, s->at.type == fmi2ModelExchange ? EVENT : STEP)
+CALL_THAT_LEADS(fmi2Terminate, true, TERMINATED)
+CALL_THAT_LEADS(fmi2EnterEventMode, true, EVENT)
+CALL_THAT_LEADS(fmi2EnterContinuousTimeMode, true, CONTINUOUS)
 
 static void call_fmi2Reset(slot *s)
 {
-    go(s, CALL_fmi2Reset, fmi2Reset, true, INSTANTIATED);
+    CALL(s, true, true, fmi2Reset, s->f);
     s->at = (expected){.type = s->at.type, .mode = INSTANTIATED};
 }
 
@@ -177,22 +160,18 @@ static void check_results(const char *function, bool accepted, const double *val
 static void call_fmi2GetReal(slot *s)
 {
     const size_t n = take_count();
-    fmi2ValueReference *const vr = take_references(n);
-    double *const values = take_byte() < 253 ? exactly(n, sizeof *values) : NULL;
+    LENT fmi2ValueReference *const vr = take_references(n);
+    LENT double *const values = take_byte() < 253 ? exactly(n, sizeof *values) : NULL;
     bool good = n == 0 || (vr != NULL && values != NULL), derived = false;
     for (size_t i = 0; i < n && vr != NULL; i++) {
         good = good && vr[i] < N_VARIABLES;
         derived = derived || (vr[i] >= FIRST_CALCULATED && vr[i] < FIRST_CALCULATED + N_STATES);
     }
-    before_call();
     verdict wanted = legal(s, CALL_fmi2GetReal, good);
     if (wanted == ACCEPTED && derived && !is_moderate(s->f)) {
         wanted = EITHER; /* a derivative may overflow */
     }
-    const bool accepted = after_call(s, CALL_fmi2GetReal, wanted, fmi2GetReal(s->f, vr, n, values), false);
-    check_results("fmi2GetReal", accepted, values, n);
-    free(vr);
-    free(values);
+    check_results("fmi2GetReal", CALL_AS(s, wanted, false, fmi2GetReal, s->f, vr, n, values), values, n);
 }
 
 /* Sections 2.2.7, 3.2.3 and 4.2.4. */
@@ -210,17 +189,15 @@ static bool settable(const slot *s, fmi2ValueReference vr)
 static void call_fmi2SetReal(slot *s)
 {
     const size_t n = take_count();
-    fmi2ValueReference *const vr = take_references(n);
-    double *const values = take_reals(n);
+    LENT fmi2ValueReference *const vr = take_references(n);
+    LENT double *const values = take_reals(n);
     bool good = n == 0 || (vr != NULL && values != NULL);
     for (size_t i = 0; i < n && good; i++) {
         good = vr[i] < N_VARIABLES && settable(s, vr[i]) && isfinite(values[i])
                && (VARIABLES[vr[i]].kind == INPUT
                    || (values[i] >= VARIABLES[vr[i]].minimum && values[i] <= VARIABLES[vr[i]].maximum));
     }
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SetReal, good);
-    if (after_call(s, CALL_fmi2SetReal, wanted, fmi2SetReal(s->f, vr, n, values), true)) {
+    if (CALL(s, good, true, fmi2SetReal, s->f, vr, n, values)) {
         for (size_t i = n; i-- > 0;) { /* the last one counts */
             bool later = false;
             for (size_t j = i + 1; j < n; j++) {
@@ -229,22 +206,16 @@ static void call_fmi2SetReal(slot *s)
             PROPERTY(later || memcmp(&s->f->now.values.at[vr[i]], &values[i], sizeof(double)) == 0, "not set");
         }
     }
-    free(vr);
-    free(values);
 }
 
 /* No variables of another type: nothing to get or set. */
-#define CALL_OF_OTHER_TYPE(function, type)                                                   \
-    static void call_##function(slot *s)                                                     \
-    {                                                                                        \
-        const size_t n = take_count();                                                       \
-        fmi2ValueReference *const vr = take_references(n);                                   \
-        type *const values = exactly(n, sizeof(type));                                       \
-        before_call();                                                                       \
-        const verdict wanted = legal(s, CALL_##function, n == 0);                            \
-        after_call(s, CALL_##function, wanted, function(s->f, vr, n, values), false);        \
-        free(vr);                                                                            \
-        free(values);                                                                        \
+#define CALL_OF_OTHER_TYPE(function, type)                          \
+    static void call_##function(slot *s)                            \
+    {                                                               \
+        const size_t n = take_count();                              \
+        LENT fmi2ValueReference *const vr = take_references(n);     \
+        LENT type *const values = exactly(n, sizeof(type));         \
+        CALL(s, n == 0, false, function, s->f, vr, n, values);      \
     }
 
 CALL_OF_OTHER_TYPE(fmi2GetInteger, fmi2Integer)
@@ -257,9 +228,10 @@ CALL_OF_OTHER_TYPE(fmi2SetString, fmi2String)
 static void call_fmi2GetDirectionalDerivative(slot *s)
 {
     const size_t n_unknown = take_count(), n_known = take_count();
-    fmi2ValueReference *const unknown = take_references(n_unknown), *const known = take_references(n_known);
-    double *const change = take_reals(n_known);
-    double *const result = exactly(n_unknown, sizeof *result);
+    LENT fmi2ValueReference *const unknown = take_references(n_unknown);
+    LENT fmi2ValueReference *const known = take_references(n_known);
+    LENT double *const change = take_reals(n_known);
+    LENT double *const result = exactly(n_unknown, sizeof *result);
     bool good = (n_unknown == 0 || unknown != NULL) && (n_known == 0 || (known != NULL && change != NULL));
     for (size_t i = 0; i < n_known && good; i++) {
         const variable_kind kind = known[i] < N_VARIABLES ? VARIABLES[known[i]].kind : CALCULATED;
@@ -268,20 +240,12 @@ static void call_fmi2GetDirectionalDerivative(slot *s)
     for (size_t i = 0; i < n_unknown && good; i++) {
         good = unknown[i] < N_VARIABLES && (VARIABLES[unknown[i]].kind == STATE || VARIABLES[unknown[i]].kind == CALCULATED);
     }
-    before_call();
     verdict wanted = legal(s, CALL_fmi2GetDirectionalDerivative, good);
-    if (wanted == ACCEPTED) {
-        for (size_t i = 0; i < n_known; i++) {
-            wanted = fabs(change[i]) <= 1e30 && is_moderate(s->f) ? wanted : EITHER;
-        }
+    for (size_t i = 0; i < n_known && wanted == ACCEPTED; i++) {
+        wanted = fabs(change[i]) <= 1e30 && is_moderate(s->f) ? wanted : EITHER;
     }
-    const fmi2Status status = fmi2GetDirectionalDerivative(s->f, unknown, n_unknown, known, n_known, change, result);
-    const bool accepted = after_call(s, CALL_fmi2GetDirectionalDerivative, wanted, status, false);
-    check_results("fmi2GetDirectionalDerivative", accepted, result, n_unknown);
-    free(unknown);
-    free(known);
-    free(change);
-    free(result);
+    check_results("fmi2GetDirectionalDerivative", CALL_AS(s, wanted, false, fmi2GetDirectionalDerivative, s->f, unknown,
+                  n_unknown, known, n_known, change, result), result, n_unknown);
 }
 
 #endif

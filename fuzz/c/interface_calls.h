@@ -7,46 +7,29 @@
 
 /* ---- Model Exchange ---- */
 
-static void call_fmi2EnterEventMode(slot *s)
-{
-    go(s, CALL_fmi2EnterEventMode, fmi2EnterEventMode, true, EVENT);
-}
-
-static void call_fmi2EnterContinuousTimeMode(slot *s)
-{
-    go(s, CALL_fmi2EnterContinuousTimeMode, fmi2EnterContinuousTimeMode, true, CONTINUOUS);
-}
-
 static void call_fmi2NewDiscreteStates(slot *s)
 {
     const bool given = take_byte() < 240;
-    fmi2EventInfo *const info = exactly(1, sizeof *info);
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2NewDiscreteStates, given);
-    if (after_call(s, CALL_fmi2NewDiscreteStates, wanted, fmi2NewDiscreteStates(s->f, given ? info : NULL), false)) {
+    LENT fmi2EventInfo *const info = exactly(1, sizeof *info);
+    if (CALL(s, given, false, fmi2NewDiscreteStates, s->f, given ? info : NULL)) {
         PROPERTY(info->newDiscreteStatesNeeded == fmi2False && info->terminateSimulation == fmi2False
                      && info->nextEventTimeDefined == fmi2False, "an event of the model's own");
     }
-    free(info);
 }
 
 static void call_fmi2CompletedIntegratorStep(slot *s)
 {
     const bool given = take_byte() < 240;
     fmi2Boolean event = 7, stop = 7;
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2CompletedIntegratorStep, given);
-    const fmi2Status status = fmi2CompletedIntegratorStep(s->f, take_bool(), given ? &event : NULL, &stop);
-    const fmi2Boolean told = after_call(s, CALL_fmi2CompletedIntegratorStep, wanted, status, false) ? fmi2False : 7;
+    const bool accepted = CALL(s, given, false, fmi2CompletedIntegratorStep, s->f, take_bool(), given ? &event : NULL, &stop);
+    const fmi2Boolean told = accepted ? fmi2False : 7;
     PROPERTY(event == told && stop == told, "an event %d or an end %d", event, stop);
 }
 
 static void call_fmi2SetTime(slot *s)
 {
     const double time = take_real();
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SetTime, isfinite(time));
-    if (after_call(s, CALL_fmi2SetTime, wanted, fmi2SetTime(s->f, time), true)) {
+    if (CALL(s, isfinite(time), true, fmi2SetTime, s->f, time)) {
         s->at.time = time;
     }
 }
@@ -60,53 +43,36 @@ static size_t take_number_of_states(void)
 static void call_fmi2SetContinuousStates(slot *s)
 {
     const size_t n = take_number_of_states();
-    double *const x = take_reals(n);
+    LENT double *const x = take_reals(n);
     bool good = n == N_STATES && x != NULL;
     for (size_t i = 0; i < n && good; i++) {
         good = isfinite(x[i]);
     }
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SetContinuousStates, good);
-    if (after_call(s, CALL_fmi2SetContinuousStates, wanted, fmi2SetContinuousStates(s->f, x, n), true)) {
+    if (CALL(s, good, true, fmi2SetContinuousStates, s->f, x, n)) {
         PROPERTY(memcmp(&s->f->now.values.at[FIRST_STATE], x, n * sizeof *x) == 0, "not set");
     }
-    free(x);
 }
 
-static void get_states(slot *s, call which, fmi2Status (*function)(fmi2Component, fmi2Real *, size_t), bool overflows)
-{
-    const size_t n = take_number_of_states();
-    double *const x = take_byte() < 253 ? exactly(n, sizeof *x) : NULL;
-    before_call();
-    verdict wanted = legal(s, which, n == N_STATES && x != NULL);
-    wanted = wanted == ACCEPTED && overflows && !is_moderate(s->f) ? EITHER : wanted;
-    check_results(CALL_NAMES[which], after_call(s, which, wanted, function(s->f, x, n), false), x, n);
-    free(x);
-}
+/* `overflows`: a result may. */
+#define CALL_OF_STATES(function, overflows)                                                             \
+    static void call_##function(slot *s)                                                                \
+    {                                                                                                   \
+        const size_t n = take_number_of_states();                                                       \
+        LENT double *const x = take_byte() < 253 ? exactly(n, sizeof *x) : NULL;                        \
+        verdict wanted = legal(s, CALL_##function, n == N_STATES && x != NULL);                         \
+        wanted = wanted == ACCEPTED && (overflows) && !is_moderate(s->f) ? EITHER : wanted;             \
+        check_results(#function, CALL_AS(s, wanted, false, function, s->f, x, n), x, n);                \
+    }
 
-static void call_fmi2GetDerivatives(slot *s)
-{
-    get_states(s, CALL_fmi2GetDerivatives, fmi2GetDerivatives, true);
-}
-
-static void call_fmi2GetContinuousStates(slot *s)
-{
-    get_states(s, CALL_fmi2GetContinuousStates, fmi2GetContinuousStates, false);
-}
-
-static void call_fmi2GetNominalsOfContinuousStates(slot *s)
-{
-    get_states(s, CALL_fmi2GetNominalsOfContinuousStates, fmi2GetNominalsOfContinuousStates, false);
-}
+CALL_OF_STATES(fmi2GetDerivatives, true)
+CALL_OF_STATES(fmi2GetContinuousStates, false)
+CALL_OF_STATES(fmi2GetNominalsOfContinuousStates, false)
 
 static void call_fmi2GetEventIndicators(slot *s)
 {
     const size_t n = take_byte() % 4;
-    double *const indicators = exactly(n, sizeof *indicators);
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2GetEventIndicators, n == 0);
-    after_call(s, CALL_fmi2GetEventIndicators, wanted, fmi2GetEventIndicators(s->f, indicators, n), false);
-    free(indicators);
+    LENT double *const indicators = exactly(n, sizeof *indicators);
+    CALL(s, n == 0, false, fmi2GetEventIndicators, s->f, indicators, n);
 }
 
 /* ---- Co-Simulation ---- */
@@ -114,24 +80,18 @@ static void call_fmi2GetEventIndicators(slot *s)
 static void call_fmi2SetRealInputDerivatives(slot *s)
 {
     const size_t n = take_count();
-    fmi2ValueReference *const vr = take_references(n);
-    fmi2Integer *const order = exactly(n, sizeof *order);
-    double *const values = take_reals(n);
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SetRealInputDerivatives, n == 0);
-    const fmi2Status status = fmi2SetRealInputDerivatives(s->f, vr, n, order, values);
-    after_call(s, CALL_fmi2SetRealInputDerivatives, wanted, status, false);
-    free(vr);
-    free(order);
-    free(values);
+    LENT fmi2ValueReference *const vr = take_references(n);
+    LENT fmi2Integer *const order = exactly(n, sizeof *order);
+    LENT double *const values = take_reals(n);
+    CALL(s, n == 0, false, fmi2SetRealInputDerivatives, s->f, vr, n, order, values);
 }
 
 static void call_fmi2GetRealOutputDerivatives(slot *s)
 {
     const size_t n = take_count();
-    fmi2ValueReference *const vr = take_references(n);
-    fmi2Integer *const order = exactly(n, sizeof *order);
-    double *const values = exactly(n, sizeof *values);
+    LENT fmi2ValueReference *const vr = take_references(n);
+    LENT fmi2Integer *const order = exactly(n, sizeof *order);
+    LENT double *const values = exactly(n, sizeof *values);
     bool good = n == 0 || vr != NULL;
     for (size_t i = 0; i < n; i++) {
         const unsigned any = take_byte();
@@ -139,17 +99,11 @@ static void call_fmi2GetRealOutputDerivatives(slot *s)
         good = good && order[i] == 1 && vr[i] >= FIRST_STATE && vr[i] < N_VARIABLES
                && (vr[i] < FIRST_CALCULATED || (vr[i] >= FIRST_CALCULATED + N_STATES && VARIABLES[vr[i]].kind == CALCULATED));
     }
-    before_call();
     verdict wanted = legal(s, CALL_fmi2GetRealOutputDerivatives, good);
     wanted = wanted == ACCEPTED && !is_moderate(s->f) ? EITHER : wanted;
-    const fmi2Status status = fmi2GetRealOutputDerivatives(s->f, vr, n, order, values);
-    const bool accepted = after_call(s, CALL_fmi2GetRealOutputDerivatives, wanted, status, false);
-    if (accepted) {
-        check_results("fmi2GetRealOutputDerivatives", accepted, values, n);
+    if (CALL_AS(s, wanted, false, fmi2GetRealOutputDerivatives, s->f, vr, n, order, values)) {
+        check_results("fmi2GetRealOutputDerivatives", true, values, n);
     }
-    free(vr);
-    free(order);
-    free(values);
 }
 
 static void call_fmi2DoStep(slot *s)
@@ -181,20 +135,16 @@ static void call_fmi2DoStep(slot *s)
 
 static void call_fmi2CancelStep(slot *s)
 {
-    before_call();
-    after_call(s, CALL_fmi2CancelStep, REFUSED, fmi2CancelStep(s->f), false);
+    CALL_AS(s, REFUSED, false, fmi2CancelStep, s->f);
 }
 
-#define CALL_OF_STATUS(function, type, known)                                                              \
-    static void call_##function(slot *s)                                                                   \
-    {                                                                                                      \
-        const int kind = (int)(take_byte() % 6) - 1;                                                       \
-        const bool given = take_byte() < 240;                                                              \
-        type *const value = exactly(1, sizeof(type));                                                      \
-        before_call();                                                                                     \
-        const verdict wanted = legal(s, CALL_##function, given && kind == (known));                        \
-        after_call(s, CALL_##function, wanted, function(s->f, (fmi2StatusKind)kind, given ? value : NULL), false); \
-        free(value);                                                                                       \
+#define CALL_OF_STATUS(function, type, known)                                                                       \
+    static void call_##function(slot *s)                                                                            \
+    {                                                                                                               \
+        const int kind = (int)(take_byte() % 6) - 1;                                                                \
+        const bool given = take_byte() < 240;                                                                       \
+        LENT type *const value = exactly(1, sizeof(type));                                                          \
+        CALL(s, given && kind == (known), false, function, s->f, (fmi2StatusKind)kind, given ? value : NULL);       \
     }
 
 enum { NOTHING = -100 };

@@ -17,10 +17,9 @@ static void call_fmi2GetFMUstate(slot *s)
     const unsigned n = take_byte();
     fmi2FMUstate other = foreign;
     fmi2FMUstate *const at = n < 240 ? &to->state : n < 248 ? &other : NULL;
-    before_call();
     memory_is_full = n >= 230 && n < 240;
-    const verdict wanted = legal(s, CALL_fmi2GetFMUstate, n < 240 && !(memory_is_full && to->state == NULL));
-    if (after_call(s, CALL_fmi2GetFMUstate, wanted, fmi2GetFMUstate(s->f, at), false)) {
+    const bool good = n < 240 && !(memory_is_full && to->state == NULL);
+    if (CALL(s, good, false, fmi2GetFMUstate, s->f, at)) {
         to->at = s->at;
     }
     memory_is_full = false;
@@ -31,9 +30,8 @@ static void call_fmi2SetFMUstate(slot *s)
 {
     saved_slot *const from = take_saved();
     const bool own = take_byte() < 240;
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SetFMUstate, own && from->state != NULL && from->at.type == s->at.type);
-    if (after_call(s, CALL_fmi2SetFMUstate, wanted, fmi2SetFMUstate(s->f, own ? from->state : foreign), true)) {
+    const bool good = own && from->state != NULL && from->at.type == s->at.type;
+    if (CALL(s, good, true, fmi2SetFMUstate, s->f, own ? from->state : foreign)) {
         s->at = from->at;
     }
 }
@@ -43,10 +41,8 @@ static void call_fmi2FreeFMUstate(slot *s)
     saved_slot *const from = take_saved();
     const unsigned n = take_byte();
     fmi2FMUstate other = foreign;
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2FreeFMUstate, n < 240 || n >= 248);
-    const fmi2Status status = fmi2FreeFMUstate(s->f, n < 240 ? &from->state : n < 248 ? &other : NULL);
-    const bool accepted = after_call(s, CALL_fmi2FreeFMUstate, wanted, status, false);
+    fmi2FMUstate *const freed = n < 240 ? &from->state : n < 248 ? &other : NULL;
+    const bool accepted = CALL(s, n < 240 || n >= 248, false, fmi2FreeFMUstate, s->f, freed);
     PROPERTY(!accepted || n >= 240 || from->state == NULL, "a freed state is still there");
 }
 
@@ -55,10 +51,8 @@ static void call_fmi2SerializedFMUstateSize(slot *s)
     const saved_slot *const from = take_saved();
     const unsigned n = take_byte();
     size_t size = 12345;
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SerializedFMUstateSize, from->state != NULL && n < 240);
-    const fmi2Status status = fmi2SerializedFMUstateSize(s->f, from->state, n < 240 ? &size : NULL);
-    const bool accepted = after_call(s, CALL_fmi2SerializedFMUstateSize, wanted, status, false);
+    const bool good = from->state != NULL && n < 240;
+    const bool accepted = CALL(s, good, false, fmi2SerializedFMUstateSize, s->f, from->state, n < 240 ? &size : NULL);
     PROPERTY(size == (accepted ? SERIALIZED_SIZE : 12345), "%zu bytes", size);
 }
 
@@ -69,10 +63,8 @@ static void call_fmi2SerializeFMUstate(slot *s)
     const unsigned n = take_byte();
     const size_t size = n < 200 ? SERIALIZED_SIZE : n < 250 ? SERIALIZED_SIZE - 2 + n % 5 : take_word(1);
     fmi2Byte *const bytes = exactly(size, 1);
-    before_call();
-    const verdict wanted = legal(s, CALL_fmi2SerializeFMUstate, from->state != NULL && size >= SERIALIZED_SIZE);
-    const fmi2Status status = fmi2SerializeFMUstate(s->f, from->state, bytes, size);
-    if (after_call(s, CALL_fmi2SerializeFMUstate, wanted, status, false)) {
+    const bool good = from->state != NULL && size >= SERIALIZED_SIZE;
+    if (CALL(s, good, false, fmi2SerializeFMUstate, s->f, from->state, bytes, size)) {
         free(to->bytes);
         *to = (buffer){bytes, size, checksum((unsigned char *)bytes, size), false, from->at};
     } else {
@@ -123,13 +115,12 @@ static void call_fmi2DeSerializeFMUstate(slot *s)
     saved_slot *const to = take_saved();
     const bool whole = from->bytes != NULL && from->size == SERIALIZED_SIZE
                        && checksum((unsigned char *)from->bytes, from->size) == from->sum;
-    before_call();
     memory_is_full = take_byte() >= 250;
     verdict wanted = legal(s, CALL_fmi2DeSerializeFMUstate, whole && !(memory_is_full && to->state == NULL));
     wanted = wanted == ACCEPTED && from->forged ? EITHER : wanted;
-    const fmi2Status status = fmi2DeSerializeFMUstate(s->f, from->bytes, from->size, &to->state);
+    const bool accepted = CALL_AS(s, wanted, false, fmi2DeSerializeFMUstate, s->f, from->bytes, from->size, &to->state);
     memory_is_full = false;
-    if (!after_call(s, CALL_fmi2DeSerializeFMUstate, wanted, status, false)) {
+    if (!accepted) {
         return;
     }
     const fmu_state *const state = &((saved_state *)to->state)->state;

@@ -16,6 +16,7 @@ static void *calloc_or_not(size_t count, size_t size)
 #define calloc calloc_or_not
 #include "fmu.c"
 #undef calloc
+#include "check.h"
 #include "legal.h"
 
 enum { N_SLOTS = 4, N_SAVED = 3, N_BUFFERS = 3 };
@@ -51,17 +52,6 @@ typedef struct {
 static slot slots[N_SLOTS];
 static saved_slot saves[N_SAVED];
 static buffer buffers[N_BUFFERS];
-
-/* Ends the program where a property is broken: the fuzzer keeps the input. */
-#define PROPERTY(holds, ...)                                             \
-    do {                                                                 \
-        if (!(holds)) {                                                  \
-            fprintf(stderr, "broken property (%s): ", #holds);           \
-            fprintf(stderr, __VA_ARGS__);                                \
-            fprintf(stderr, "\n");                                       \
-            abort();                                                     \
-        }                                                                \
-    } while (0)
 
 /* ---- Values from the fuzzer's bytes; zeros where they end ---- */
 
@@ -109,6 +99,14 @@ static double take_real(void)
         return ((double)take_byte() - 127.0) / 100.0;
     }
 }
+
+/* A pointer whose memory is freed where its block ends. */
+static void release(const void *pointer)
+{
+    free(*(void *const *)pointer);
+}
+
+#define LENT __attribute__((cleanup(release)))
 
 /* Memory of exactly this size, so that a byte beyond it is seen. */
 static void *exactly(size_t count, size_t size)
@@ -225,6 +223,12 @@ static bool after_call(const slot *s, call which, verdict wanted, fmi2Status sta
     counts[which][accepted]++;
     return accepted;
 }
+
+/* Calls a function of the FMU, and after_call with what it returned. `good`: its arguments are. */
+#define CALL_AS(s, wanted, changes, function, ...) \
+    (before_call(), after_call(s, CALL_##function, wanted, function(__VA_ARGS__), changes))
+#define CALL(s, good, changes, function, ...) \
+    CALL_AS(s, legal(s, CALL_##function, good), changes, function, __VA_ARGS__)
 
 /* Far from where a result can overflow. */
 static bool is_moderate(const fmu *f)

@@ -28,8 +28,8 @@ def test_the_corpus_reaches_every_function_and_finds_nothing(vehicle: Vehicle, c
     counts = replay(tmp_path / "target", [corpus], tmp_path)
     legal = {name for kind in MODES for name in legal_modes(kind)}
     never = {"fmi2GetStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus"}  # no step is ever pending
-    assert {name for name, count in counts.accepted.items() if count} == legal - never
-    assert {name for name, count in counts.refused.items() if count} == legal | {"fmi2CancelStep"}
+    assert {name for name, accepted in +counts if accepted} == legal - never
+    assert {name for name, accepted in +counts if not accepted} == legal | {"fmi2CancelStep"}
 
 
 # A line of C, what it is made into, and how the fuzzer tells.
@@ -124,7 +124,7 @@ def test_a_finding_can_be_made_again(
     assert told in (words := capsys.readouterr().err)
     (kept,) = tmp_path.glob("finding-*")
     assert f"again with: python -m fuzz ./{kept.name}, in base64:\n" in words
-    assert b64decode(words.splitlines()[-1]) == kept.read_bytes()
+    assert b64decode(words.split()[-1]) == kept.read_bytes()
     assert command.main([kept.name]) == 1
     assert told in capsys.readouterr().err
 

@@ -1,6 +1,6 @@
 """What a person sees who opens the FMU: its documentation page, and FMPy's web app, in headless Chromium.
 
-SCREENSHOTS=docs pytest -m interop tests/test_browser.py takes the picture of the README anew.
+SCREENSHOTS=docs pytest -m interop tests/pages/test_browser.py takes the picture of the README anew.
 """
 
 import importlib.util
@@ -12,6 +12,7 @@ import sys
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page, Route
+    from playwright.sync_api import Browser, Page
 
 pytestmark = pytest.mark.interop
 
@@ -124,78 +125,44 @@ def test_the_documentation_shows_the_variables_in_groups(
 
 def _row(v: Variable) -> list[str]:
     unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
-    limits = [number(value) for value in (v.start, v.minimum, v.maximum)]
+    limits = ["" if value is None else number(value) for value in (v.start, v.minimum, v.maximum)]
     return [v.name, v.description, v.causality, v.variability, unit, *limits]
 
 
 # ---- FMPy's web app --------------------------------------------------------------------------------------------------
 
 COMMANDS = {"u_l": 0.32, "u_r": 0.3, "u_t": 0.4}
-SHOWN = ("u", "w", "r", "z", "psi")
+SHOWN = {"u": "m/s", "w": "m/s", "r": "rad/s", "z": "m", "psi": "rad"}
 
 
-@pytest.fixture(scope="module")
-def webapp(
-    videoray_fmu: Path, declared: tuple[Variable, ...], tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[str]:
+@pytest.fixture
+def webapp(videoray_fmu: Path, declared: tuple[Variable, ...], tmp_path: Path) -> Iterator[str]:
     """The address of the app; it offers the commands and all parameters."""
     pytest.importorskip("dash_bootstrap_components", reason="FMPy's web app is not installed: fmpy[webapp]")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     offered = [*COMMANDS, *(v.name for v in declared if v.causality == "parameter")]
-    command = [
-        sys.executable,
-        "-m",
-        "fmpy.webapp",
-        str(videoray_fmu),
-        "--port",
-        str(port),
-        "--output-variables",
-        *SHOWN,
-    ]
-    folder = tmp_path_factory.mktemp("webapp")  # where it unzips the FMU, and leaves it
-    with (folder / "log").open("w") as log:
+    command = [sys.executable, "-m", "fmpy.webapp", str(videoray_fmu), "--port", str(port)]
+    with (tmp_path / "log").open("w") as log:  # beside it it unzips the FMU, and leaves it
         server = subprocess.Popen(
             [*command, "--start-values", *offered, "--output-variables", *SHOWN],
             stdout=log,
             stderr=subprocess.STDOUT,
-            env={**os.environ, "TMPDIR": str(folder)},
+            env={**os.environ, "TMPDIR": str(tmp_path)},
         )
+    address = f"http://127.0.0.1:{port}/"
     try:
-        _wait_for(f"http://127.0.0.1:{port}/", server, folder / "log")
-        yield f"http://127.0.0.1:{port}/"
+        for _ in range(300):
+            with suppress(OSError):
+                urllib.request.urlopen(address).close()
+                break
+            assert server.poll() is None, (tmp_path / "log").read_text()
+            time.sleep(0.1)
+        yield address
     finally:
         server.terminate()
         server.wait()
-
-
-def _wait_for(address: str, server: "subprocess.Popen[bytes]", log: Path) -> None:
-    for _ in range(300):
-        try:
-            urllib.request.urlopen(address).close()
-        except OSError:
-            assert server.poll() is None, log.read_text()
-            time.sleep(0.1)
-        else:
-            return
-    raise AssertionError(f"no answer from {address}: {log.read_text()}")
-
-
-@pytest.fixture
-def app(webapp: str, visit: Callable[..., Visit]) -> Visit:
-    """The app, open. Its one request to the outside is FMPy's own, for Bootstrap, and is answered here."""
-    from dash_bootstrap_components.themes import BOOTSTRAP
-
-    def answer(route: "Route") -> None:
-        route.fulfill(content_type="text/css", body=_bootstrap())
-
-    seen = visit(width=1120, height=720)
-    seen.page.route(BOOTSTRAP, answer)
-    seen.page.goto(webapp)
-    seen.page.wait_for_selector("#simulate-button")
-    seen.asked = [url for url in seen.asked if url != BOOTSTRAP]
-    return seen
 
 
 def _bootstrap() -> str:
@@ -206,65 +173,55 @@ def _bootstrap() -> str:
     return Path(package.origin).with_name("static").joinpath("bootstrap5/css/bootstrap.min.css").read_text("utf-8")
 
 
-def test_the_app_offers_values_with_units_in_the_declared_order(app: Visit, declared: tuple[Variable, ...]) -> None:
-    rows = app.page.evaluate(
+def test_the_web_app_offers_the_declared_values_simulates_and_tells_what_the_model_is(
+    webapp: str, visit: Callable[..., Visit], vehicle: Vehicle, declared: tuple[Variable, ...], tmp_path: Path
+) -> None:
+    from dash_bootstrap_components.themes import BOOTSTRAP
+
+    seen = visit(width=1120, height=720)
+    page = seen.page
+    # the one request to the outside is FMPy's own, and is answered here
+    page.route(BOOTSTRAP, lambda route: route.fulfill(content_type="text/css", body=_bootstrap()))
+    page.goto(webapp)
+    page.wait_for_selector("#simulate-button")
+    rows = page.evaluate(
         "Array.from(document.querySelectorAll('#simulation-container label'), label => [label.innerText,"
         " document.getElementById(label.htmlFor).value, label.parentElement.querySelector('span').innerText])"
     )
     offered = [v for v in declared if v.name in COMMANDS or v.causality == "parameter"]
     assert [(name, float(value), unit) for name, value, unit in rows] == [(v.name, v.start, v.unit) for v in offered]
 
-
-def test_the_app_simulates_and_plots_in_display_units(
-    app: Visit, webapp: str, vehicle: Vehicle, tmp_path: Path
-) -> None:
     for name, value in COMMANDS.items():
-        box = app.page.get_by_label(name, exact=True)
+        box = page.get_by_label(name, exact=True)
         box.fill(str(value))
         box.blur()  # only then the app takes it
-    app.page.click("#simulate-button")
-    app.page.wait_for_selector("#result-col .js-plotly-plot .trace", timeout=30_000)
-    assert app.page.locator(".alert").count() == 0
-    app.page.wait_for_timeout(500)  # it draws with a transition
-    app.page.screenshot(path=Path(os.environ.get("SCREENSHOTS", tmp_path)) / "webapp.png")
-
-    figure = app.page.evaluate(
+    page.click("#simulate-button")
+    page.wait_for_selector("#result-col .js-plotly-plot .trace", timeout=30_000)
+    assert page.locator(".alert").count() == 0
+    page.wait_for_timeout(500)  # it draws with a transition
+    page.screenshot(path=Path(os.environ.get("SCREENSHOTS", tmp_path)) / "webapp.png")
+    last, titles = page.evaluate(
         "(plot => [plot._fullData.map(trace => trace.y.at(-1)), plot.data.map((trace, n) =>"
         " plot.layout['yaxis' + (n ? n + 1 : '')].title.text)])(document.querySelector('.js-plotly-plot'))"
     )
     end = vars(step(vehicle.coefficients, Inputs(**COMMANDS), State(), 10.0))
-    units = {"u": "m/s", "w": "m/s", "r": "rad/s", "z": "m", "psi": "rad"}
-    last, titles = figure
-    assert titles == [f"{name} [{UNITS[unit].display or unit}]" for name, unit in units.items()]
+    assert titles == [f"{name} [{UNITS[unit].display or unit}]" for name, unit in SHOWN.items()]
     assert titles[0] == "u [knot]"
-    assert last == pytest.approx([end[name] * UNITS[unit].factor for name, unit in units.items()], abs=1e-4)
-    assert app.problems() == []
-    assert [url for url in app.asked if not url.startswith(webapp)] == []
+    assert last == pytest.approx([end[name] * UNITS[unit].factor for name, unit in SHOWN.items()], abs=1e-4)
 
-
-def test_the_app_tells_what_the_model_is(
-    app: Visit, webapp: str, vehicle: Vehicle, declared: tuple[Variable, ...], tmp_path: Path
-) -> None:
-    app.page.get_by_role("tab", name="Model Info").click()
-    info = app.page.locator("#model-info-container")
+    page.get_by_role("tab", name="Model Info").click()
+    info = page.locator("#model-info-container")
     info.wait_for(state="visible")
-    app.page.screenshot(path=tmp_path / "model-info.png")
     text = info.inner_text()
     assert vehicle.description in text
     assert "Model Exchange, Co-Simulation" in text
-    for label, value in (("Continuous States", 7), ("Event Indicators", 0), ("Variables", len(declared))):
-        assert f"{label}\n{value}\n" in text
+    for label, count in (("Continuous States", 7), ("Event Indicators", 0), ("Variables", len(declared))):
+        assert f"{label}\n{count}\n" in text
     size = info.locator("img").evaluate("image => [image.naturalWidth, image.naturalHeight]")
     assert min(size) >= 100
-    assert app.problems() == []
-    assert [url for url in app.asked if not url.startswith(webapp)] == []
 
-
-def test_the_app_shows_the_documentation(app: Visit, webapp: str, vehicle: Vehicle, tmp_path: Path) -> None:
-    app.page.get_by_role("tab", name="Documentation").click()
-    app.page.locator("#documentation-container").wait_for(state="visible")
-    frame = app.page.frame_locator("#documentation-container iframe")
-    assert vehicle.name in frame.locator("h1").inner_text()
-    app.page.screenshot(path=tmp_path / "documentation-tab.png")
-    assert app.problems() == []
-    assert [url for url in app.asked if not url.startswith(webapp)] == []
+    page.get_by_role("tab", name="Documentation").click()
+    page.locator("#documentation-container").wait_for(state="visible")
+    assert vehicle.name in page.frame_locator("#documentation-container iframe").locator("h1").inner_text()
+    assert seen.problems() == []
+    assert [url for url in seen.asked if not url.startswith((webapp, BOOTSTRAP))] == []
