@@ -30,10 +30,8 @@ class Effort:
 
     repetitions: int = 25
     commands: int = 16384
-    known: int = 64
-    """Commands whose ends are compared with 50 digits."""
-    manoeuvres: int = 5
-    """Repetitions of what Python steps."""
+    known: int = 64  # commands whose ends are compared with 50 digits
+    manoeuvres: int = 5  # repetitions of what Python steps
     runs: int = 100_000
     runs_in_fmpy: int = 2000
     loads: int = 20

@@ -9,6 +9,7 @@ from fmpy.fmi2 import FMU2Slave
 from rov_fmu.export.interface import variables
 from rov_fmu.motion.rov import COEFFICIENTS, Coefficients
 
+from .importer import restart
 from .plain_c import PlainC, Reals
 from .work import COMMANDS, STATES, Work, flight
 
@@ -69,11 +70,7 @@ def through_fmpy(slave: FMU2Slave, variations: Variations, runs: int, repetition
         ends = []
         start = time.process_time()
         for values in variations.values[:runs].tolist():
-            slave.reset()
-            slave.setupExperiment(startTime=0.0)
-            slave.setReal(variations.references, values)
-            slave.enterInitializationMode()
-            slave.exitInitializationMode()
+            restart(slave, variations.references, values)
             for n, command in enumerate(variations.work.sequence):
                 slave.setReal(variations.inputs, (command.u_l, command.u_r, command.u_t))
                 slave.doStep(currentCommunicationPoint=n * _HOLD, communicationStepSize=_HOLD)

@@ -2,13 +2,14 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
 import fmpy
 import numpy as np
+from fmpy.fmi2 import FMU2Slave
 
 from checks.fmi2 import fmpy_slave, keep_loaded
 from rov_fmu.motion.rov import Inputs
@@ -17,13 +18,21 @@ from .plain_c import Reals
 from .work import COMMANDS, STATES, Work, flight
 
 STOP, INTERVAL = 100.0, 0.01
-NATIVE, PYTHONFMU, MODEL_EXCHANGE = "native", "PythonFMU", "Model Exchange"
-RELATIVE_TOLERANCE = 1e-6
+NATIVE, PYTHONFMU, MODEL_EXCHANGE = "native", "PythonFMU flavour", "Model Exchange, CVode 1e-6"
 _OPTIONS: dict[str, dict[str, Any]] = {
     NATIVE: {"fmi_type": "CoSimulation"},
     PYTHONFMU: {"fmi_type": "CoSimulation"},
-    MODEL_EXCHANGE: {"fmi_type": "ModelExchange", "solver": "CVode", "relative_tolerance": RELATIVE_TOLERANCE},
+    MODEL_EXCHANGE: {"fmi_type": "ModelExchange", "solver": "CVode", "relative_tolerance": 1e-6},
 }
+
+
+def restart(slave: FMU2Slave, references: Sequence[int] = (), values: Sequence[float] = ()) -> None:
+    """From the beginning, with parameters set."""
+    slave.reset()
+    slave.setupExperiment(startTime=0.0)
+    slave.setReal(references, values)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
 
 
 def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, tuple[Reals, float]]:
@@ -61,10 +70,7 @@ def step_through(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int)
     commands, velocities = ([references[name] for name in names] for names in (COMMANDS, ("u", "w", "r")))
     for _ in range(repetitions):
         for name, slave in slaves.items():
-            slave.reset()
-            slave.setupExperiment(startTime=0.0)
-            slave.enterInitializationMode()
-            slave.exitInitializationMode()
+            restart(slave)
             start = time.process_time()
             for n in range(round(STOP / INTERVAL)):
                 command = manoeuvre.sequence[int(n * INTERVAL / manoeuvre.hold)]

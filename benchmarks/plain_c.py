@@ -9,8 +9,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import fmpy.sundials
 import numpy as np
+from fmpy import sundials
+from fmpy.sundials.libraries import sundials_core, sundials_cvode
 from numpy.typing import NDArray
 
 from checks.c_programs import compile_c
@@ -23,12 +24,12 @@ PLATFORM = "linux64"
 FMU, CLOSED, EULER, RK4 = "fmu", "closed", "euler", "rk4"
 BDF, ADAMS, FIXED_POINT = CVODE = ("bdf", "adams", "adams-fixed")
 _SOURCES = Path(__file__).with_name("c")
-# a library needs but a part of the FMU's sources
+# a library needs but a part of the FMU's sources; what replaces mallinfo came after the GLIBC that is linked here
 _FLAGS = ("-target", *PLATFORMS[PLATFORM].targets, "-shared", "-g0", "-fno-asynchronous-unwind-tables", "-Wshadow",
-          "-Wno-unused-function", "-DFMI2_OVERRIDE_FUNCTION_PREFIX")  # fmt: skip
+          "-Wno-unused-function", "-Wno-deprecated-declarations")  # fmt: skip
 # The explicit methods with what is best for them: packed into pairs, RK4 of three axes takes a third longer.
 _FASTEST = ("-O3", "-fno-slp-vectorize")
-_SUNDIALS = ("core", "nvecserial", "sunmatrixdense", "sunlinsoldense", "cvode")  # each needs those before it
+_SUNDIALS = (sundials_core._name, sundials_cvode._name)
 _REALS, _REFERENCES = np.ctypeslib.ndpointer(float, flags="C"), np.ctypeslib.ndpointer(np.uint32, flags="C")
 
 Reals = NDArray[np.float64]
@@ -46,24 +47,41 @@ class PlainC:
         content = native_content(vehicle)
         fmu = folder / f"{content.identifier}{PLATFORMS[PLATFORM].suffix}"
         fmu.write_bytes(asyncio.run(compile_all([PLATFORM], content.sources, content.identifier))[PLATFORM])
-        of_fmpy = Path(fmpy.sundials.__file__).parent / fmpy.platform_tuple
-        linked = [fmu, *(of_fmpy / f"sundials_{name}.so" for name in _SUNDIALS)]
-        for library in linked:
-            ctypes.CDLL(str(library))
 
         def load(name: str, *flags: str) -> Any:
             output = folder / f"{name}.so"
             return ctypes.CDLL(str(compile_c(_SOURCES / f"{name}.c", output, content.sources, *_FLAGS, *flags)))
 
-        self._explicit, self._measure = load("explicit", *_FASTEST), load("measure", *map(str, linked))
+        self._explicit, self._measure = load("explicit", *_FASTEST), load("measure", "-ldl", *_SUNDIALS)
         m = self._measure
-        m.new_solver.argtypes, m.new_solver.restype = (c_int, c_int, c_int, c_double), c_void_p
-        m.hold.argtypes = (c_void_p, c_void_p, c_int, c_double, c_long, c_long, c_long, _REALS, _REALS)
+        m.hold.argtypes = (c_void_p, c_void_p, c_void_p, c_int, c_double, c_long, c_long, c_long, _REALS, _REALS)
         m.step_in_turn.argtypes = (c_size_t, c_size_t, POINTER(c_double))
         m.run_each.argtypes = (c_size_t, _REFERENCES, c_size_t, _REALS, _REALS, _REALS)
         m.hold.restype = m.step_in_turn.restype = m.run_each.restype = c_double
-        m.begin()
-        self._solver = cache(m.new_solver)
+        m.begin(str(fmu).encode())
+        self._solver = cache(self._new_solver)
+
+    def _new_solver(self, states: int, method: str, tolerance: float) -> tuple[Any, Any]:
+        """CVODE with the same relative and absolute tolerance, and its vector.
+
+        BDF: Newton's method with a dense matrix, as FMPy sets it up.
+        """
+        context = sundials.SUNContext()
+        flags = [sundials.SUNContext_Create(sundials.SUN_COMM_NULL, byref(context))]
+        y, rates = sundials.N_VNew_Serial(states, context), sundials.CVRhsFn((f"rates_{states}", self._measure))
+        solver = sundials.CVodeCreate(2 if method == BDF else 1, context)
+        flags += [sundials.CVodeInit(solver, rates, 0.0, y), sundials.CVodeSetMaxNumSteps(solver, 1_000_000)]
+        flags += [sundials_cvode.CVodeSStolerances(c_void_p(solver), c_double(tolerance), c_double(tolerance))]
+        if method == FIXED_POINT:
+            sundials_cvode.SUNNonlinSol_FixedPoint.restype = c_void_p
+            iteration = c_void_p(sundials_cvode.SUNNonlinSol_FixedPoint(y, 0, context))
+            flags += [sundials_cvode.CVodeSetNonlinearSolver(c_void_p(solver), iteration)]
+        else:
+            matrix = sundials.SUNDenseMatrix(states, states, context)
+            flags += [sundials.CVodeSetLinearSolver(solver, sundials.SUNLinSol_Dense(y, matrix, context), matrix)]
+        if any(flags):
+            raise RuntimeError(f"CVODE cannot be set up: {flags}")
+        return solver, ctypes.cast(y, c_void_p)
 
     def hold(
         self, method: str, states: int, setting: float, h: float, steps: int, commands: Reals, start: Reals
@@ -72,14 +90,14 @@ class PlainC:
 
         `setting`: sub-steps, or the tolerance of CVODE.
         """
-        function, solver, end = None, None, start.copy()
+        function, solver, end = None, (None, None), start.copy()
         if method in CVODE:
-            solver = self._solver(states, 2 if method == BDF else 1, method == FIXED_POINT, setting)
+            solver = self._solver(states, method, setting)
         elif method != FMU:
             library = self._measure if method == CLOSED else self._explicit
             function = ctypes.cast(getattr(library, f"{method}_{states}"), c_void_p)
         substeps = 1 if method in CVODE else round(setting)
-        each = self._measure.hold(function, solver, states, h, substeps, steps, len(commands), commands, end)
+        each = self._measure.hold(function, *solver, states, h, substeps, steps, len(commands), commands, end)
         return 1e-9 * each, end
 
     def step_in_turn(self, instances: int, steps: int) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from .fleet import INSTANCES, Runs
-from .importer import INTERVAL, MODEL_EXCHANGE, NATIVE, PYTHONFMU, RELATIVE_TOLERANCE, STOP
+from .importer import INTERVAL, NATIVE, STOP
 from .page import Section, digits, duration, error
 from .plain_c import BDF, CLOSED, CVODE, EULER, FMU, RK4, Reals
 from .steps import KINDS, NAMES, SUBSTEP, TARGET, H, Job, Measured, Plan, compared, methods
@@ -44,11 +44,6 @@ def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
 
 def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[str, Reals]) -> Section:
     """The manoeuvre in an importer: as a user simulates it, and the functions of a step alone."""
-    names = {
-        NATIVE: "native",
-        PYTHONFMU: "PythonFMU flavour",
-        MODEL_EXCHANGE: f"Model Exchange, CVode {error(RELATIVE_TOLERANCE)}",
-    }
 
     def row(name: str, seconds: Reals, native: Reals, end: str) -> list[str]:
         total = float(np.median(seconds))
@@ -56,9 +51,9 @@ def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[
 
     return [
         [f"FMPy, {STOP:g} s at {1000 * INTERVAL:g} ms, turning", "a step", "all", "error at the end", "times native"],
-        *(row(f"simulate_fmu, {names[key]}", seconds, simulated[NATIVE][0], error(end))
-          for key, (seconds, end) in simulated.items()),
-        *(row(f"set, doStep, get, {names[key]}", seconds, stepped[NATIVE], "") for key, seconds in stepped.items()),
+        *(row(f"simulate_fmu, {name}", seconds, simulated[NATIVE][0], error(end))
+          for name, (seconds, end) in simulated.items()),
+        *(row(f"set, doStep, get, {name}", seconds, stepped[NATIVE], "") for name, seconds in stepped.items()),
     ]  # fmt: skip
 
 
@@ -95,7 +90,7 @@ def archive(builds: Mapping[str, tuple[int, float, float]], loaded: Sequence[flo
 def promises(plan: Plan, measured: Measured) -> Section:
     """What was promised of the cost of a step. Ratios and differences are the medians of those in each repetition."""
     velocity, held = plan.job(CLOSED, 3, SUBSTEP), plan.job(CLOSED, 3, 1.0)
-    step = measured.ratio(velocity, plan.job(RK4, 3, SUBSTEP))
+    step = float(np.median(measured.seconds[velocity] / measured.seconds[plan.job(RK4, 3, SUBSTEP)]))
     worst = max(measured.error(job) for job in (velocity, held))
     times = {method: compared(measured, plan.sweeps[3, method], held)[1] for method in (RK4, *CVODE)}
     best = min(CVODE, key=lambda method: times[method])

@@ -70,21 +70,14 @@ class Measured:
         turns = [[job.hold(plain_c, 0, commands[job])[0] for job in jobs[:: (-1) ** n]][:: (-1) ** n]
                  for n in range(repetitions)]  # fmt: skip
         self.seconds = dict(zip(jobs, np.array(turns).T, strict=True))
-        self._errors: dict[Job, float] = {}
 
     def error(self, job: Job) -> float:
         """The largest error at the end of a held command."""
-        if job not in self._errors:
-            self._errors[job] = job.work.error(self.ends[job])
-        return self._errors[job]
+        return job.work.error(self.ends[job])
 
     def cost(self, job: Job) -> float:
         """Seconds a communication step, the median."""
         return float(np.median(self.seconds[job]))
-
-    def ratio(self, job: Job, to: Job) -> float:
-        """Cost of one to that of another, the median of those in each repetition."""
-        return float(np.median(self.seconds[job] / self.seconds[to]))
 
 
 class Plan:

@@ -1,8 +1,8 @@
-/* Times held commands (u_l, u_r, u_t), by one method or another, and the FMU in numbers: a library that plain_c.py calls,
- * linked with the FMU and with SUNDIALS. Times are processor time of this thread: what else runs does not count. */
+/* Times held commands (u_l, u_r, u_t), by one method or another, and the FMU in numbers: a library that plain_c.py
+ * calls, linked with SUNDIALS. Times are processor time of this thread: what else runs does not count. */
 #define _POSIX_C_SOURCE 200809L
-#include "cvode.h"
-#include "interface.h"
+#include "fmu.h"
+#include "motion.h"
 
 #include <malloc.h>
 #include <time.h>
@@ -14,6 +14,7 @@ static fmi2ValueReference reference[N_VARIABLES];
 static const fmi2ValueReference *const COMMANDS = reference, *const STATES = reference + FIRST_STATE;
 static motion m;
 static fmi2Component rov;
+static const fmi2CallbackFunctions CALLBACKS;
 
 static double nanoseconds(void)
 {
@@ -22,24 +23,15 @@ static double nanoseconds(void)
     return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
 }
 
-static fmi2Component new_instance(void)
-{
-    static const fmi2CallbackFunctions callbacks;
-    const fmi2Component c = fmi2Instantiate("rov", fmi2CoSimulation, MODEL_GUID, NULL, &callbacks, fmi2False, fmi2False);
-    CHECK(c != NULL);
-    return c;
-}
-
 /* From the beginning, with n values set. */
 static void start_instance(fmi2Component c, const fmi2ValueReference vr[], size_t n, const double values[])
 {
-    CHECK(fmi2Reset(c) == fmi2OK && fmi2SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK
-          && fmi2SetReal(c, vr, n, values) == fmi2OK && fmi2EnterInitializationMode(c) == fmi2OK
-          && fmi2ExitInitializationMode(c) == fmi2OK);
+    CHECK(fmi2.Reset(c) == fmi2OK && fmi2.SetReal(c, vr, n, values) == fmi2OK);
+    initialize(c);
 }
 
 /* Once, before all else. */
-void begin(void)
+void begin(const char *path)
 {
     union {
         double at[N_VARIABLES];
@@ -51,7 +43,8 @@ void begin(void)
     }
     m.coefficients = defaults.named.coefficients;
     rov_prepare(&m.coefficients, &m.gains);
-    rov = new_instance();
+    load_fmu(path);
+    rov = new_instance("rov", &CALLBACKS);
 }
 
 /* ---- Methods ---- */
@@ -73,9 +66,41 @@ void closed_7(motion *at, state *s, double h, long steps)
     s->named = next;
 }
 
+/* SUNDIALS CVODE, of which FMPy ships the libraries and no headers. plain_c.py makes the solvers. */
+typedef void *handle;
+enum { NORMAL = 1 }; /* task */
+double *N_VGetArrayPointer(handle vector);
+int CVodeReInit(handle solver, double t, handle y);
+int CVodeSetStopTime(handle solver, double t);
+int CVode(handle solver, double t, handle y, double *reached, int task);
+
+#define RATES(n)                                                         \
+    int rates_##n(double t, handle y, handle rate, void *user)           \
+    {                                                                    \
+        (void)t, (void)user;                                             \
+        rates(&m, n, N_VGetArrayPointer(y), N_VGetArrayPointer(rate));   \
+        return 0;                                                        \
+    }
+RATES(3)
+RATES(7)
+
+/* A held command begins anew, for the right side has a jump there, and ends at a stop time. */
+static __attribute__((noinline)) void solve(handle solver, handle y, int states, state *s, double h, long steps)
+{
+    const size_t size = (size_t)states * sizeof(double);
+    double *const now = N_VGetArrayPointer(y), reached, t = 0.0;
+    memcpy(now, s, size);
+    CHECK((CVodeReInit(solver, 0.0, y) | CVodeSetStopTime(solver, h * (double)steps)) == 0);
+    for (long i = 0; i < steps; i++) {
+        t += h;
+        CHECK(CVode(solver, t, y, &reached, NORMAL) >= 0);
+        memcpy(s, now, size);
+    }
+}
+
 /* Hold n commands in turn from the state s on, each for `steps` communication steps of h, by a method in so many
  * sub-steps, by a solver, or, with neither, in the FMU. Nanoseconds a communication step; s becomes the end. */
-double hold(advance *method, cvode *solver, int states, double h, long substeps, long steps, long n,
+double hold(advance *method, handle solver, handle y, int states, double h, long substeps, long steps, long n,
             const double command[][N_COMMANDS], state *s)
 {
     double(*const force)[3] = malloc((size_t)n * sizeof *force); /* C of each axis */
@@ -105,18 +130,18 @@ double hold(advance *method, cvode *solver, int states, double h, long substeps,
             }
         } else if (solver != NULL) {
             prepare_axes(&m);
-            cvode_hold(solver, &m, s, h, steps);
+            solve(solver, y, states, s, h, steps);
         } else {
             double t = 0.0;
-            CHECK(fmi2SetReal(rov, COMMANDS, N_COMMANDS, command[i]) == fmi2OK);
+            CHECK(fmi2.SetReal(rov, COMMANDS, N_COMMANDS, command[i]) == fmi2OK);
             for (long step = 0; step < steps; step++, t += h) {
-                CHECK(fmi2DoStep(rov, t, h, fmi2True) == fmi2OK);
+                CHECK(fmi2.DoStep(rov, t, h, fmi2True) == fmi2OK);
             }
         }
     }
     const double each = (nanoseconds() - start) / (double)(n * steps);
     if (method == NULL && solver == NULL) {
-        CHECK(fmi2GetReal(rov, STATES, N_STATES, s->at) == fmi2OK);
+        CHECK(fmi2.GetReal(rov, STATES, N_STATES, s->at) == fmi2OK);
     }
     free(force);
     return each;
@@ -124,26 +149,17 @@ double hold(advance *method, cvode *solver, int states, double h, long substeps,
 
 /* ---- Numbers ---- */
 
-/* Bytes in use on the heap. */
-static double heap(void)
-{
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wdeprecated-declarations" /* mallinfo2 came after the GLIBC that is linked here */
-    return mallinfo().uordblks;
-#pragma GCC diagnostic pop
-}
-
 /* n instances that go straight ahead and down, so many rounds of steps in turn: nanoseconds a step; *bytes of each. */
 double step_in_turn(size_t n, size_t rounds, double *bytes)
 {
     static const double commands[] = {0.5, 0.5, 0.5}, h = 0.01;
     fmi2Component *const c = malloc(n * sizeof *c);
     CHECK(c != NULL);
-    const double before = heap();
+    const int before = mallinfo().uordblks; /* in use on the heap */
     for (size_t i = 0; i < n; i++) {
-        c[i] = new_instance();
+        c[i] = new_instance("rov", &CALLBACKS);
     }
-    *bytes = (heap() - before) / (double)n;
+    *bytes = (double)(mallinfo().uordblks - before) / (double)n;
     for (size_t i = 0; i < n; i++) {
         start_instance(c[i], COMMANDS, N_COMMANDS, commands);
     }
@@ -151,12 +167,12 @@ double step_in_turn(size_t n, size_t rounds, double *bytes)
     const double start = nanoseconds();
     for (size_t round = 0; round < rounds; round++, t += h) {
         for (size_t i = 0; i < n; i++) {
-            CHECK(fmi2DoStep(c[i], t, h, fmi2True) == fmi2OK);
+            CHECK(fmi2.DoStep(c[i], t, h, fmi2True) == fmi2OK);
         }
     }
     const double each = (nanoseconds() - start) / (double)(rounds * n);
     for (size_t i = 0; i < n; i++) {
-        fmi2FreeInstance(c[i]);
+        fmi2.FreeInstance(c[i]);
     }
     free(c);
     return each;
@@ -170,10 +186,10 @@ double run_each(size_t runs, const fmi2ValueReference vr[], size_t n, const doub
     for (size_t i = 0; i < runs; i++) {
         start_instance(rov, vr, n, values + i * n);
         for (int k = 0; k < HELD; k++) {
-            CHECK(fmi2SetReal(rov, COMMANDS, N_COMMANDS, command[k]) == fmi2OK
-                  && fmi2DoStep(rov, 10.0 * k, 10.0, fmi2True) == fmi2OK);
+            CHECK(fmi2.SetReal(rov, COMMANDS, N_COMMANDS, command[k]) == fmi2OK
+                  && fmi2.DoStep(rov, 10.0 * k, 10.0, fmi2True) == fmi2OK);
         }
-        CHECK(fmi2GetReal(rov, STATES, N_STATES, end[i]) == fmi2OK);
+        CHECK(fmi2.GetReal(rov, STATES, N_STATES, end[i]) == fmi2OK);
     }
     return nanoseconds() - start;
 }

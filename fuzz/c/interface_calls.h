@@ -20,8 +20,8 @@ static void call_fmi2NewDiscreteStates(slot *s)
 static void call_fmi2CompletedIntegratorStep(slot *s)
 {
     const bool given = take_byte() < 240;
-    fmi2Boolean event = 7, stop = 7;
-    const bool accepted = CALL(s, given, false, fmi2CompletedIntegratorStep, s->f, take_bool(), given ? &event : NULL, &stop);
+    fmi2Boolean event = 7, stop = 7, *const asked = given ? &event : NULL;
+    const bool accepted = CALL(s, given, false, fmi2CompletedIntegratorStep, s->f, take_bool(), asked, &stop);
     const fmi2Boolean told = accepted ? fmi2False : 7;
     PROPERTY(event == told && stop == told, "an event %d or an end %d", event, stop);
 }
