@@ -1,0 +1,243 @@
+"""What README and documentation say holds: commands run, options exist, links lead somewhere, the site builds."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import redirect_stdout
+from dataclasses import replace
+from functools import cache
+from importlib.util import find_spec
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from checks.commands import ROOT
+from rov_fmu import __version__
+from rov_fmu.cli import main
+from rov_fmu.motion.rov import COEFFICIENTS, Inputs, State, Thrust, declared, step
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle
+
+README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
+PAGES = [
+    *(README, ROOT / "CONTRIBUTING.md", CHANGELOG),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "models").rglob("README.md")),
+    *sorted((ROOT / "examples").rglob("README.md")),
+]
+PROGRAMS = ("rov-fmu ", "python build_fmu.py", "python -m ")
+HOLDS_COMMANDS = re.compile(r"(?:rov-fmu|fmpy|cat) ")
+HERE_DOCUMENT = re.compile(r"(?<=<<END\n).*?^END$", re.MULTILINE | re.DOTALL)
+
+
+def name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    text = page.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def lines(block: str) -> list[str]:
+    """The commands of a block, without the files they make."""
+    return HERE_DOCUMENT.sub("", block).replace("\\\n", " ").strip().splitlines()
+
+
+def runnable(page: Path) -> list[str]:
+    """The blocks that need neither network nor anything installed but this package."""
+    return [
+        block for block in blocks(page, "sh") if all(HOLDS_COMMANDS.match(line) for line in filter(None, lines(block)))
+    ]
+
+
+def commands(page: Path) -> Iterator[list[str]]:
+    """The words of every command of ours, in blocks and in running text."""
+    inline = re.findall(r"(?<!`)`([^`\n]+)`(?!`)", page.read_text(encoding="utf-8"))
+    for line in [*inline, *(line for block in blocks(page, "sh") for line in lines(block))]:
+        for command in line.split("#")[0].split("&&"):
+            if command.strip().startswith(PROGRAMS) and "|" not in command and "<" not in command:
+                yield shlex.split(command)
+
+
+@cache
+def usage(command: tuple[str, ...]) -> str:
+    """What --help says."""
+    if command[1:2] == ("rov_fmu",) or command == ("build_fmu.py",):
+        said = StringIO()
+        with redirect_stdout(said):
+            assert main([*(command[2:] or ["build"]), "--help"]) == 0
+        return said.getvalue()
+    whole = [sys.executable, *command, "--help"]
+    return subprocess.run(whole, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+
+
+def module_of(words: Sequence[str]) -> tuple[tuple[str, ...], Sequence[str]]:
+    """What to ask for help, and the words after it."""
+    if words[0] == "rov-fmu":
+        subcommand, rest = words[1:2], words[2:]
+        return ("-m", "rov_fmu", *(subcommand if subcommand and subcommand[0][0] != "-" else ())), rest
+    if words[1] == "build_fmu.py":
+        return ("build_fmu.py",), words[2:]
+    return ("-m", words[2]), words[3:]
+
+
+def test_readme_is_read_in_one_sitting() -> None:
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 110
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_to_files(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8"))
+    missing = [target for target in targets if "://" not in target and not (page.parent / target).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != CHANGELOG], ids=name)
+def test_commands_and_options_exist(page: Path) -> None:
+    for words in commands(page):
+        asked, rest = module_of(words)
+        if asked[-1] in {"venv", "fmpy.webapp"}:
+            continue
+        help_text = usage(asked)
+        unknown = [word for word in rest if word.startswith("-") and not re.search(rf"(?<!\S){word}\b", help_text)]
+        assert not unknown, f"{' '.join(words)}: {unknown}"
+
+
+def test_there_are_commands_to_look_at() -> None:
+    said = {" ".join(module_of(words)[0]) for page in PAGES for words in commands(page)}
+    wanted = [f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "tables", "figures")]
+    assert {*wanted, "build_fmu.py", "-m interop", "-m fuzz", "-m benchmarks"} <= said
+
+
+# ---- Run -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def workplace(tmp_path: Path, videoray_fmu: Path) -> Path:
+    """What a reader has at hand: the FMU, a folder of tank tests, the command (it builds for this machine alone)."""
+    shutil.copy(videoray_fmu, tmp_path)
+    shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", tmp_path / "my_tests")
+    program = tmp_path / "bin" / "rov-fmu"
+    program.parent.mkdir()
+    program.write_text(
+        "#!/usr/bin/env bash\n"
+        'if [[ $1 = build && "$*" != *--platform* && "$*" != *--backend* ]]; then set -- "$@" --platform host; fi\n'
+        f'exec "{sys.executable}" -m rov_fmu "$@"\n'
+    )
+    program.chmod(0o755)
+    return tmp_path
+
+
+def run(workplace: Path, *command: str) -> str:
+    path = os.pathsep.join([str(workplace / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = os.environ | {"PATH": path, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg", "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(
+        command, cwd=workplace, env=environment, capture_output=True, text=True, encoding="utf-8", check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+SHELL_PAGES = [page for page in PAGES if runnable(page)]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the pages' commands are written for a POSIX shell")
+@pytest.mark.long
+@pytest.mark.parametrize("page", SHELL_PAGES, ids=name)
+def test_commands_run(page: Path, workplace: Path) -> None:
+    for block in runnable(page):
+        run(workplace, "bash", "-euc", block)
+
+
+def test_the_pages_with_commands_are_found() -> None:
+    wanted = {"README.md", *(f"docs/{page}.md" for page in ("identify", "importers", "model", "platforms"))}
+    assert wanted <= {name(page) for page in SHELL_PAGES}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name)
+def test_programs_print_what_is_said(page: Path, workplace: Path) -> None:
+    for program in blocks(page, "python"):
+        printed = run(workplace, sys.executable, "-c", program).splitlines()
+        said = re.findall(r"^print\(.*?  # (.*)$", program, re.MULTILINE)
+        assert len(printed) == len(said) == 1
+        if printed != said:
+            value = re.search(r"\d+\.(\d+) ", said[0])
+            assert value, "a sentence that ends with a number and its unit"
+            assert f"{float(printed[0]):.{len(value[1])}f}" == value[0].strip()
+
+
+def test_the_steps_of_the_readme_end_where_it_says(vehicle: Vehicle) -> None:
+    text = README.read_text(encoding="utf-8")
+    ahead = step(vehicle.coefficients, Inputs(u_l=0.3, u_r=0.3), State(), 10.0)
+    assert f"ends at u = {ahead.u:.4f} m/s" in text
+    untuned = replace(vehicle.coefficients, alpha_w=1.0, beta_w=1.0)
+    assert f"positive down: {step(untuned, Inputs(u_t=0.3), State(), 20.0).w:.4f} m/s" in text
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_tab_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    assert f"{shell}_source" in README.read_text(encoding="utf-8")
+    monkeypatch.setenv("COMP_WORDS", "rov-fmu build video")
+    monkeypatch.setenv("COMP_CWORD", "video" if shell == "fish" else "2")
+    said = []
+    for asked in ("source", "complete"):
+        monkeypatch.setenv("_ROV_FMU_COMPLETE", f"{shell}_{asked}")
+        with pytest.raises(SystemExit):
+            main([])
+        said.append(capsys.readouterr().out)
+    assert "_rov_fmu_completion" in said[0]
+    assert all(vehicle in said[1] for vehicle in SHIPPED)
+
+
+# ---- What is said elsewhere too --------------------------------------------------------------------------------------
+
+
+def test_every_variable_is_told() -> None:
+    table = (ROOT / "docs" / "variables.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"`([^`]+)`", table))
+    assert told >= {*declared(Inputs), *declared(State), *declared(Thrust)}
+    tunable = {n for n, meta in COEFFICIENTS.items() if meta.tunable}
+    prefixes = tuple(word.removesuffix("…") for word in told if word.endswith("…"))
+    assert all(n in told or n.startswith(prefixes) for n in COEFFICIENTS)
+    assert tunable <= told
+
+
+def test_version_is_that_of_the_package() -> None:
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    newest = re.findall(r"^## (.*)$", CHANGELOG.read_text(encoding="utf-8"), re.MULTILINE)[0]
+    assert newest == f"[Unreleased] – {__version__}" or newest.startswith(f"[{__version__}] – ")
+
+
+def test_workflow_runs_the_two_commands() -> None:
+    workflow = (ROOT / ".github" / "workflows" / "test.yml").read_text(encoding="utf-8")
+    two = [line.split("#")[0].strip() for line in lines(blocks(README, "sh")[0])]
+    assert len(two) == 2
+    assert all(f"- run: {command}\n" in workflow for command in two)
+    oldest = re.search(r'requires-python = ">=([\d.]+)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert oldest
+    assert f'python: ["{oldest[1]}", ' in workflow
+
+
+@pytest.mark.long
+@pytest.mark.skipif(find_spec("furo") is None, reason='the site needs Sphinx: pip install -e ".[docs]"')
+def test_site_builds_strictly_and_fetches_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "docs", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    pages = {page.name: page.read_text(encoding="utf-8") for page in tmp_path.glob("*.html")}
+    assert {f"{page.stem}.html" for page in (ROOT / "docs").glob("*.md")} <= set(pages)
+    assert "ends at u = 0.4729 m/s" in pages["index.html"], "the README is the first page"
+    for coefficient in COEFFICIENTS:
+        assert f">{coefficient}</span>" in pages["vehicle-file.html"]
+    for title, page in pages.items():
+        assert "{{" not in page, title
+        assert not re.findall(r'<(?:script|img|iframe)[^>]*src="(?:https?:)?//|<link[^>]*href="(?:https?:)?//', page), (
+            title
+        )
