@@ -61,7 +61,7 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuT
         return NULL;
     }
     strcpy(f->name, name);
-    f->callbacks = *functions;
+    memcpy(&f->callbacks, functions, sizeof f->callbacks); /* its members are const in the headers of FMI 2.0.0 */
     for (int i = 0; i < N_LOG_CATEGORIES; i++) {
         f->log_enabled[i] = i != logEvents || loggingOn != fmi2False;
     }

@@ -7,6 +7,7 @@
 
 #include "interface.h"
 
+#include "fmi2Functions.h"
 #include "rov.h"
 
 #include <stdarg.h>
@@ -22,7 +23,7 @@ typedef union {
     rov_variables named;
 } variable_values;
 
-_Static_assert(sizeof(rov_variables) == N_VARIABLES * sizeof(double), "one double a variable");
+typedef char one_double_a_variable[sizeof(rov_variables) == N_VARIABLES * sizeof(double) ? 1 : -1];
 
 typedef enum {
     INSTANTIATED = 1,

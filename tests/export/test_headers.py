@@ -1,0 +1,266 @@
+"""The C sources under the FMI headers that importers ship, by other compilers: names, warnings, the same bits.
+
+FMPy's package brings headers whose names never bear a prefix. The others are made of them, by what the standard's own
+differ in: FMI 2.0.0 (as in FMI Library, FMI4cpp, MasterSim or PythonFMU 0.6.3) has const members in
+fmi2CallbackFunctions and pastes the prefix; 2.0.1 to 2.0.3 (and Reference-FMUs) paste it; 2.0.4 and 2.0.5 do, unless
+FMI2_OVERRIDE_FUNCTION_PREFIX is defined.
+"""
+
+import platform
+import random
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import lief
+import pytest
+
+from checks.fmi2 import OK, Fmu, reals
+from rov_fmu.export.archive import native_content
+from rov_fmu.export.compile import compiler, fmi_headers
+from rov_fmu.vehicle.vehicle import Vehicle
+
+_EXPORT = "#if defined _WIN32"  # begins the definition of FMI2_Export in FMPy's header
+_NAME = "#define fmi2FullName(name) name"
+_KNOWS_OVERRIDE = (
+    "#if !defined FMI2_OVERRIDE_FUNCTION_PREFIX && defined FMI2_FUNCTION_PREFIX\n"
+    "#define FMI2_ACTUAL_FUNCTION_PREFIX FMI2_FUNCTION_PREFIX\n#endif\n"
+)
+
+
+def _write_headers(folder: Path, release: str) -> Path:
+    shutil.copytree(fmi_headers(), folder)
+    functions, types = folder / "fmi2Functions.h", folder / "fmi2FunctionTypes.h"
+    prefix = "FMI2_ACTUAL_FUNCTION_PREFIX" if release == "2.0.4" else "FMI2_FUNCTION_PREFIX"
+    if release != "FMPy":
+        text = functions.read_text(encoding="utf-8")
+        assert text.count(_EXPORT) == text.count(_NAME) == 1
+        before, _, after = text.partition(_EXPORT)
+        export, _, after = after.partition(_NAME)
+        functions.write_text(
+            f"{before}{_KNOWS_OVERRIDE if release == '2.0.4' else ''}#if defined FMI2_Export\n#elif defined {prefix}\n"
+            f"#define FMI2_Export\n#elif defined _WIN32{export}\n#ifdef {prefix}\n#define fmi2Paste(a, b) a##b\n"
+            f"#define fmi2PasteB(a, b) fmi2Paste(a, b)\n#define fmi2FullName(name) fmi2PasteB({prefix}, name)\n#else\n"
+            f"{_NAME}\n#endif\n{after}",
+            encoding="utf-8",
+        )
+    if release == "2.0.0":
+        text, n = re.subn(
+            r"^( +)(fmi2\w+ +(?:logger|allocateMemory|freeMemory|stepFinished|componentEnvironment);)",
+            r"\1const \2",
+            types.read_text(encoding="utf-8"),
+            flags=re.M,
+        )
+        assert n == 5
+        types.write_text(text, encoding="utf-8")
+    return folder
+
+
+RELEASES = ("2.0.0", "2.0.1", "2.0.4", "FMPy")
+
+
+@pytest.fixture(scope="module")
+def headers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("headers")
+    return {release: _write_headers(folder / release, release) for release in RELEASES}
+
+
+_STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
+_PLAIN = {"2.0.4": ("-DFMI2_OVERRIDE_FUNCTION_PREFIX",)}
+"""What these headers are told for a shared library; the others need nothing."""
+COMPILERS = {"zig": compiler()} | {name: [name] for name in ("gcc", "clang") if shutil.which(name)}
+_HAS_FMA = "fma" in Path("/proc/cpuinfo").read_text(encoding="utf-8") if Path("/proc/cpuinfo").exists() else False
+
+
+def _compile(fmu: Fmu, headers: Path, command: Sequence[str], library: Path) -> Path:
+    """The FMU's sources as a shared library."""
+    sources = fmu.folder / "sources"
+    shared = ("-shared", "-fPIC", "-I", str(headers), "fmu.c", "-lm", "-o", str(library))
+    built = subprocess.run([*command, *_STRICT, *shared], cwd=sources, capture_output=True, text=True, check=False)
+    assert (built.returncode, built.stderr) == (0, "")
+    return library
+
+
+def _flight(fmu: Fmu, steps: int = 400) -> bytes:
+    """All values along a random flight: turns, reversals, saturation, loads, long and short steps, tuned."""
+    drawn = random.Random(20)
+    result = b""
+    with fmu.instance() as rov:
+        rov.start({"u": -0.4, "r": 0.9, "psi": 2.0, "gamma": 0.4})
+        t = 0.0
+        for _ in range(steps):
+            chosen = drawn.sample(fmu.inputs, 4)
+            values = {name: drawn.choice((0.0, drawn.uniform(-1.2, 1.2))) for name in chosen}
+            assert rov.set(values | {"beta_r": drawn.uniform(0.5, 2.0)}) == OK
+            h = 10.0 ** drawn.uniform(-4.0, 1.5)
+            assert rov.step(t, h) == OK
+            t += h
+            result += bytes(reals(*rov.get(list(fmu.variables))))
+    return result
+
+
+@pytest.fixture(scope="module")
+def shipped(fmu: Fmu) -> bytes:
+    return _flight(fmu)
+
+
+def _flies_the_same(fmu: Fmu, library: Path, shipped: bytes) -> None:
+    assert _flight(Fmu(fmu.folder, library)) == shipped
+
+
+def _exports(library: Path) -> set[str]:
+    binary = lief.parse(str(library))
+    assert binary is not None
+    return {function.name for function in binary.exported_functions if "fmi2" in function.name}
+
+
+# Every header once, every compiler once, both standards; all of them in the long tests.
+_STANDARDS, _NAMES = ("c99", "c11"), list(COMPILERS)
+_SOME = {(release, _NAMES[i % len(_NAMES)], _STANDARDS[i % 2]) for i, release in enumerate(RELEASES)}
+_MATRIX = [
+    pytest.param(r, c, s, marks=() if (r, c, s) in _SOME else pytest.mark.long)
+    for r in RELEASES
+    for c in COMPILERS
+    for s in _STANDARDS
+]
+
+
+@pytest.mark.parametrize(("release", "name", "standard"), _MATRIX)
+def test_a_shared_library_has_plain_names_and_flies_the_same(
+    fmu: Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path, release: str, name: str, standard: str
+) -> None:
+    command = [*COMPILERS[name], f"-std={standard}", "-O2", *_PLAIN.get(release, ())]
+    library = _compile(fmu, headers[release], command, tmp_path / "videoray.so")
+    assert _exports(library) == _exports(fmu.library)
+    _flies_the_same(fmu, library, shipped)
+
+
+@pytest.mark.parametrize("release", ["2.0.0", "2.0.1", "2.0.4"])
+@pytest.mark.parametrize("override", [False, True])
+def test_the_prefix_reaches_the_exports_only_where_it_is_meant_to(
+    fmu: Fmu, headers: dict[str, Path], tmp_path: Path, release: str, override: bool
+) -> None:
+    plain = _exports(fmu.library)
+    prefixed = {f"videoray_{name}" for name in plain}
+    command = [*compiler(), "-O0", *_PLAIN["2.0.4"] * override]
+    library = _compile(fmu, headers[release], command, tmp_path / "a.so")
+    assert _exports(library) == (prefixed if release == "2.0.4" and not override else plain)
+    if not override:  # asked for, for a static library
+        command = [*compiler(), "-O0", "-DFMI2_FUNCTION_PREFIX=videoray_"]
+        assert _exports(_compile(fmu, headers[release], command, tmp_path / "b.so")) == prefixed
+
+
+@pytest.mark.parametrize("release", ["2.0.0", "2.0.4"])
+def test_two_models_link_into_one_program_under_their_prefixes(
+    vehicle: Vehicle, headers: dict[str, Path], tmp_path: Path, release: str
+) -> None:
+    calls, include = [], ("-isystem", str(headers[release]))
+    for identifier in ("videoray", "sister"):
+        content = native_content(replace(vehicle, identifier=identifier))
+        (tmp_path / identifier).mkdir()
+        for name, text in content.sources.items():
+            (tmp_path / identifier / name).write_text(text, encoding="utf-8")
+        prefix = () if release == "2.0.4" else (f"-DFMI2_FUNCTION_PREFIX={identifier}_",)
+        subprocess.run(
+            [*compiler(), "-std=c11", *prefix, *include, "-c", "fmu.c", "-o", f"../{identifier}.o"],
+            cwd=tmp_path / identifier,
+            check=True,
+        )
+        calls.append(f'    printf("%p\\n", instantiate({identifier}_fmi2Instantiate, "{content.guid}"));')
+    main = tmp_path / "main.c"
+    main.write_text(
+        '#include "fmi2FunctionTypes.h"\n#include <stdio.h>\n'
+        "fmi2InstantiateTYPE videoray_fmi2Instantiate, sister_fmi2Instantiate;\n"
+        "static void *instantiate(fmi2InstantiateTYPE *f, const char *guid)\n{\n"
+        "    static const fmi2CallbackFunctions callbacks;\n"
+        '    return f("rov", fmi2CoSimulation, guid, NULL, &callbacks, fmi2False, fmi2False);\n}\n'
+        "int main(void)\n{\n" + "\n".join(calls) + "\n    return 0;\n}\n",
+        encoding="utf-8",
+    )
+    subprocess.run(
+        [*compiler(), *include, "main.c", "videoray.o", "sister.o", "-lm", "-o", "main"],
+        cwd=tmp_path,
+        check=True,
+    )
+    pointers = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.split()
+    assert len(pointers) == len(set(pointers)) == 2
+    assert "(nil)" not in pointers
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64" or not _HAS_FMA, reason="needs an x86-64 processor with FMA")
+@pytest.mark.parametrize(
+    ("name", "flags"),
+    [
+        pytest.param(name, flags, marks=() if name != "zig" and "-O2" in flags else pytest.mark.long)
+        for name in COMPILERS
+        for flags in (("-O2", "-march=haswell"), ("-O3", "-mfma", "-std=c99"), ("-O1", "-mfma", "-std=gnu11"))
+    ],
+)
+def test_fused_multiplication_does_not_change_a_bit(
+    fmu: Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path, name: str, flags: tuple[str, ...]
+) -> None:
+    library = _compile(fmu, headers["2.0.0"], [*COMPILERS[name], *flags], tmp_path / "videoray.so")
+    _flies_the_same(fmu, library, shipped)
+
+
+_OF_ONE = ("fabs", "sqrt", "sin", "cos", "exp", "log", "log1p", "expm1", "atan", "atanh")
+_OF_TWO = ("fmin", "fmax", "copysign", "hypot", "remainder")
+# What the sources use of the C library, as Microsoft's headers declare it; those cannot be had from a package.
+_MICROSOFT = {
+    "math.h": "#define INFINITY ((float)(1e300 * 1e300))\n#define NAN (-(float)(INFINITY * 0.0f))\n"
+    "short _dclass(double);\n#define isfinite(x) (_dclass(x) <= 0)\n#define isnan(x) (_dclass(x) == 2)\n"
+    + "".join(f"double {f}(double);\n" for f in _OF_ONE)
+    + "".join(f"double {f}(double, double);\n" for f in _OF_TWO),
+    "stdlib.h": "#include <stddef.h>\nvoid *calloc(size_t, size_t);\nvoid free(void *);\n",
+    "string.h": "#include <stddef.h>\nvoid *memset(void *, int, size_t);\nvoid *memcpy(void *, const void *, size_t);\n"
+    "int memcmp(const void *, const void *, size_t);\nint strcmp(const char *, const char *);\n"
+    "size_t strlen(const char *);\nchar *strcpy(char *, const char *);\nsize_t strspn(const char *, const char *);\n",
+    "stdio.h": "#include <stdarg.h>\n#include <stddef.h>\nint vsnprintf(char *, size_t, const char *, va_list);\n",
+}
+
+
+@pytest.mark.parametrize("release", RELEASES)
+@pytest.mark.parametrize("standard", _STANDARDS)
+def test_microsofts_compiler_would_take_them(
+    fmu: Fmu, headers: dict[str, Path], tmp_path: Path, release: str, standard: str
+) -> None:
+    """By clang, which takes its place: its target, its language, no __GNUC__."""
+    for name, text in _MICROSOFT.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    zig = Path(compiler()[0])
+    result = subprocess.run(
+        [
+            *(zig, "clang", "--target=x86_64-pc-windows-msvc", "-fms-compatibility", "-fms-extensions"),
+            *("-fms-compatibility-version=19.30", "-ffreestanding", "-nostdinc", "-fsyntax-only", f"-std={standard}"),
+            *(*_STRICT, "-isystem", tmp_path, "-isystem", zig.parent / "lib" / "include"),
+            *("-isystem", headers[release], "fmu.c"),
+        ],
+        cwd=fmu.folder / "sources",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_the_headers_are_what_their_releases_are(headers: dict[str, Path], tmp_path: Path) -> None:
+    """Const members are refused where they are assigned; a prefix is pasted where it is known."""
+    program = tmp_path / "p.c"
+    program.write_text(
+        '#define FMI2_FUNCTION_PREFIX pre_\n#include "fmi2Functions.h"\n'
+        "void *prefixed(void) { return (void *)pre_fmi2Reset; }\n"
+        "#ifdef ASSIGN\nvoid f(fmi2CallbackFunctions *a, const fmi2CallbackFunctions *b) { *a = *b; }\n#endif\n",
+        encoding="utf-8",
+    )
+
+    def takes(release: str, *flags: str) -> bool:
+        command = [*compiler(), *flags, "-I", str(headers[release]), "-c", str(program), "-o", str(tmp_path / "p.o")]
+        return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+    override = "-DFMI2_OVERRIDE_FUNCTION_PREFIX"
+    assert [takes(r) for r in RELEASES] == [True, True, True, False]
+    assert [takes(r, override) for r in RELEASES] == [True, True, False, False]
+    assert [takes(r, "-DASSIGN") for r in RELEASES] == [False, True, True, False]
