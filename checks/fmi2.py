@@ -281,8 +281,8 @@ class Instance:
         return status
 
 
-def fmpy_slave(folder: Path) -> FMU2Slave:
-    """An instance of an unzipped FMU for Co-Simulation, as FMPy drives it."""
+def fmpy_slave(folder: Path, log: list[Message] | None = None) -> FMU2Slave:
+    """An instance of an unzipped FMU for Co-Simulation, as FMPy drives it, all logged where a log is given."""
     description = fmpy.read_model_description(str(folder))
     slave = FMU2Slave(
         guid=description.guid,
@@ -290,7 +290,7 @@ def fmpy_slave(folder: Path) -> FMU2Slave:
         modelIdentifier=description.coSimulation.modelIdentifier,
         instanceName="rov",
     )
-    slave.instantiate()
+    slave.instantiate(callbacks=None if log is None else recording_callbacks(log), loggingOn=log is not None)
     return slave
 
 

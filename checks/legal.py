@@ -18,7 +18,7 @@ _COMMON = """
     fmi2EnterInitializationMode         x . . . .
     fmi2ExitInitializationMode          . x . . .
     fmi2Reset                           x x x x x
-    fmi2GetReal                         . x x x x
+    fmi2GetReal                         + x x x x
     fmi2GetInteger                      . x x x x
     fmi2GetBoolean                      . x x x x
     fmi2GetString                       . x x x x
@@ -32,7 +32,7 @@ _COMMON = """
 """
 _ONLY = {
     CO_SIMULATION: """
-    fmi2Terminate                       . . x . .
+    fmi2Terminate                       . + x . .
     fmi2SetReal                         x x x . .
     fmi2SetInteger                      x x x . .
     fmi2SetBoolean                      x x x . .
@@ -47,7 +47,7 @@ _ONLY = {
     fmi2GetStringStatus                 . . x x .
 """,
     MODEL_EXCHANGE: """
-    fmi2Terminate                       . . x x .
+    fmi2Terminate                       . + x x .
     fmi2SetReal                         x x x x .
     fmi2SetInteger                      x x x . .
     fmi2SetBoolean                      x x x . .

@@ -42,9 +42,9 @@ FMI2_Export fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2V
 }
 
 /* Rounding of communication points, relative to their size, but never more than half a step. */
-static double time_tolerance(double stop, double h)
+static double time_tolerance(double t, double h)
 {
-    return fmin(1e-9 * (fabs(stop) + h), 0.5 * h);
+    return fmin(1e-9 * (fabs(t) + h), 0.5 * h);
 }
 
 FMI2_Export fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
@@ -68,6 +68,10 @@ FMI2_Export fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunication
         FAIL(f, "fmi2DoStep: the motion over %g s from t = %g overflows; the state from before is kept.", h, t);
     }
     v->state = next.named.state;
+    if (fabs(t - f->now.time) > time_tolerance(f->now.time, h)) {
+        WARN_ONCE(f, TIME_JUMPED, "fmi2DoStep: the step from t = %.15g does not begin at t = %.15g, where the FMU is; done "
+                  "from its state, and said once.", t, f->now.time);
+    }
     f->now.time = end; /* the model is autonomous: whatever t says, h seconds have passed */
     return fmi2OK;
 }

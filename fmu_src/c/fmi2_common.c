@@ -22,7 +22,10 @@ static void start(fmu *f)
     for (size_t i = 0; i < N_VARIABLES; i++) {
         f->now.values.at[i] = VARIABLES[i].start;
     }
-    memset(f->saturation_logged, 0, sizeof f->saturation_logged);
+    memset(f->warned, 0, sizeof f->warned);
+    for (int i = 0; i < N_LOG_CATEGORIES; i++) {
+        f->log_enabled[i] = i != logEvents || f->logging_on;
+    }
     rov_prepare(&f->now.values.named.coefficients, &f->gains);
 }
 
@@ -55,16 +58,14 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuT
              fmuGUID == NULL ? "NULL" : fmuGUID, MODEL_GUID);
         return NULL;
     }
-    fmu *const f = calloc(1, sizeof *f + strlen(name) + 1);
+    fmu *const f = (fmu *)calloc(1, sizeof *f + strlen(name) + 1);
     if (f == NULL) {
         emit(functions, name, fmi2Error, logStatusError, "fmi2Instantiate: out of memory.");
         return NULL;
     }
     strcpy(f->name, name);
     memcpy(&f->callbacks, functions, sizeof f->callbacks); /* its members are const in the headers of FMI 2.0.0 */
-    for (int i = 0; i < N_LOG_CATEGORIES; i++) {
-        f->log_enabled[i] = i != logEvents || loggingOn != fmi2False;
-    }
+    f->logging_on = loggingOn != fmi2False;
     f->now.type = fmuType;
     start(f);
     return f;
@@ -134,7 +135,10 @@ FMI2_Export fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 
 FMI2_Export fmi2Status fmi2Terminate(fmi2Component c)
 {
-    OPEN("fmi2Terminate", RUNNING);
+    OPEN("fmi2Terminate", INITIALIZATION | RUNNING);
+    if (f->now.mode == INITIALIZATION) {
+        WARN_ONCE(f, ENDED_EARLY, "fmi2Terminate: done, though the standard has no such call in Initialization Mode.");
+    }
     enter(f, TERMINATED);
     return fmi2OK;
 }
@@ -151,7 +155,7 @@ FMI2_Export fmi2Status fmi2Reset(fmi2Component c)
 
 FMI2_Export fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
-    OPEN("fmi2GetReal", INITIALIZED);
+    OPEN("fmi2GetReal", EVERYWHERE);
     REQUIRE("fmi2GetReal", nvr == 0 || (vr != NULL && value != NULL), "vr or value is NULL.");
     bool calculated = false;
     for (size_t i = 0; i < nvr; i++) {
@@ -173,10 +177,14 @@ FMI2_Export fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[
     for (size_t i = 0; i < nvr; i++) {
         value[i] = f->now.values.at[vr[i]];
     }
+    if (f->now.mode == INSTANTIATED) {
+        WARN_ONCE(f, READ_EARLY, "fmi2GetReal: done, though the standard has no such call before initialization; said once.");
+    }
     return fmi2OK;
 }
 
-/* Sections 2.2.7, 3.2.3 and 4.2.4, and inputs before initialization, as importers set them. */
+/* Sections 2.2.7, 3.2.3 and 4.2.4, and what importers do: inputs before initialization, and parameters between the
+ * integrator's steps. */
 static bool may_set(const fmu *f, variable_kind kind)
 {
     switch (f->now.mode) {
@@ -184,7 +192,7 @@ static bool may_set(const fmu *f, variable_kind kind)
     case INITIALIZATION: return kind != CALCULATED;
     case EVENT:
     case STEP: return kind == INPUT || kind == TUNABLE;
-    case CONTINUOUS: return kind == INPUT || kind == STATE;
+    case CONTINUOUS: return kind == INPUT || kind == STATE || kind == TUNABLE;
     case TERMINATED:
     case FAILED: break;
     }
@@ -216,11 +224,12 @@ FMI2_Export fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[
     for (size_t i = 0; i < nvr; i++) {
         const variable_info *const info = &VARIABLES[vr[i]];
         f->now.values.at[vr[i]] = value[i];
-        if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)
-            && !f->saturation_logged[vr[i]] && f->log_enabled[logStatusWarning]) {
-            f->saturation_logged[vr[i]] = true;
-            LOG(f, fmi2Warning, logStatusWarning, "fmi2SetReal: %s = %.15g saturates at %g; said once.", info->name,
-                value[i], value[i] < 0.0 ? info->minimum : info->maximum);
+        if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
+            WARN_ONCE(f, vr[i], "fmi2SetReal: %s = %.15g saturates at %g; said once.", info->name, value[i],
+                      value[i] < 0.0 ? info->minimum : info->maximum);
+        } else if (info->kind == TUNABLE && f->now.mode == CONTINUOUS) {
+            WARN_ONCE(f, TUNED_LATE, "fmi2SetReal: %s is set, though the standard wants Event Mode for it; said once.",
+                      info->name);
         }
     }
     if (coefficient) {

@@ -51,10 +51,14 @@ typedef struct {
     variable_values values;
 } fmu_state;
 
+/* What is warned of once: a command that saturates, by value reference, and what importers do against the standard. */
+enum { READ_EARLY = FIRST_STATE, TUNED_LATE, ENDED_EARLY, TIME_JUMPED, N_WARNINGS };
+
 typedef struct {
     fmi2CallbackFunctions callbacks;
+    bool logging_on; /* as given to fmi2Instantiate */
     bool log_enabled[N_LOG_CATEGORIES];
-    bool saturation_logged[FIRST_STATE];
+    bool warned[N_WARNINGS];
     rov_gains gains; /* follows the coefficients */
     fmu_state now;
     char name[]; /* as given to fmi2Instantiate */
@@ -81,11 +85,11 @@ static void emit(const fmi2CallbackFunctions *callbacks, const char *name, fmi2S
         }
         text[length] = '\0';
     }
-    length = 0; /* the logger formats again: a percent sign is doubled */
+    length = 0; /* the logger formats again, and # begins a value reference: both signs are doubled */
     for (const char *c = text; *c != '\0'; c++) {
         message[length++] = *c;
-        if (*c == '%') {
-            message[length++] = '%';
+        if (*c == '%' || *c == '#') {
+            message[length++] = *c;
         }
     }
     message[length] = '\0';
@@ -97,6 +101,13 @@ static void emit(const fmi2CallbackFunctions *callbacks, const char *name, fmi2S
     do {                                                                                 \
         if ((f)->log_enabled[category]) {                                                \
             emit(&(f)->callbacks, (f)->name, status, category, __VA_ARGS__);             \
+        }                                                                                \
+    } while (0)
+#define WARN_ONCE(f, what, ...)                                                          \
+    do {                                                                                 \
+        if (!(f)->warned[what]) {                                                        \
+            (f)->warned[what] = (f)->log_enabled[logStatusWarning];                      \
+            LOG(f, fmi2Warning, logStatusWarning, __VA_ARGS__);                          \
         }                                                                                \
     } while (0)
 #define FAIL(f, ...)                                \

@@ -35,6 +35,8 @@ FMI2_Export fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean 
     return fmi2OK;
 }
 
+/* A time beyond stopTime is taken: solvers look past the end before they interpolate back to it, CasADi tells stopTime 1
+ * whatever it integrates over, and the model, which does not depend on time, is as valid there. */
 FMI2_Export fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 {
     OPEN("fmi2SetTime", EVENT | CONTINUOUS);

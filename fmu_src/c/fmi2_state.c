@@ -76,7 +76,7 @@ typedef struct {
 
 static saved_state *as_saved(fmi2FMUstate FMUstate)
 {
-    saved_state *const saved = FMUstate;
+    saved_state *const saved = (saved_state *)FMUstate;
     return saved != NULL && saved->owner == VARIABLES ? saved : NULL;
 }
 
@@ -84,7 +84,7 @@ static saved_state *as_saved(fmi2FMUstate FMUstate)
 static saved_state *state_memory(fmi2FMUstate *FMUstate)
 {
     if (*FMUstate == NULL) {
-        saved_state *const saved = calloc(1, sizeof *saved);
+        saved_state *const saved = (saved_state *)calloc(1, sizeof *saved);
         if (saved != NULL) {
             saved->owner = VARIABLES;
             *FMUstate = saved;

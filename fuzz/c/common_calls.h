@@ -16,6 +16,9 @@ static void check_message(fmi2ComponentEnvironment environment, fmi2String name,
     const int length = vsnprintf(text, sizeof text, message, none); /* as importers do: no percent sign is left in it */
     va_end(none);
     PROPERTY(length > 0 && length < 640, "a message of %d characters", length);
+    for (const char *c = text; (c = strchr(c, '#')) != NULL; c += 2) { /* a single one would begin a value reference */
+        PROPERTY(c[1] == '#', "a message with a single #: %s", text);
+    }
     PROPERTY(status != fmi2Pending && status != fmi2Fatal, "a message of status %d", (int)status);
     bool known = false;
     for (int i = 0; i < N_LOG_CATEGORIES; i++) {
@@ -31,7 +34,7 @@ static void check_message(fmi2ComponentEnvironment environment, fmi2String name,
 
 static const char *take_name(void)
 {
-    static const char *const names[] = {NULL, "", " \t\n", "rov", "rov 2", "%s%n%d", "\xc3\xa9\xff", "logEvents",
+    static const char *const names[] = {NULL, "", " \t\n", "rov", "rov 2", "#%s%n%d#", "\xc3\xa9\xff", "logEvents",
                                         "logStatusError", "logStatusWarning", "logStatusDiscard", MODEL_GUID};
     static char longest[1000];
     memset(longest, '%', sizeof longest - 1);
@@ -181,7 +184,7 @@ static bool settable(const slot *s, fmi2ValueReference vr)
     switch ((int)s->at.mode) {
     case INSTANTIATED:
     case INITIALIZATION: return kind != CALCULATED;
-    case CONTINUOUS: return kind == INPUT || kind == STATE;
+    case CONTINUOUS: return kind == INPUT || kind == STATE || kind == TUNABLE;
     default: return kind == INPUT || kind == TUNABLE;
     }
 }

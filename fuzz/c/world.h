@@ -169,14 +169,19 @@ static void copy_instance(unsigned char *to, const fmu *from)
     memset(&((fmu *)(void *)to)->now.values.at[FIRST_CALCULATED], 0, sizeof(rov_state) + sizeof(rov_thrust));
 }
 
-static bool is_same(const slot *s)
+/* `speaks`: it may have warned of what is warned of once. */
+static bool is_same(const slot *s, bool speaks)
 {
     if (s->f == NULL) {
         return true;
     }
     _Alignas(fmu) unsigned char now[sizeof(fmu)];
     copy_instance(now, s->f);
-    return memcmp(now, instances_before[s - slots], sizeof now) == 0;
+    fmu *const before = (fmu *)(void *)instances_before[s - slots];
+    if (speaks) {
+        memcpy(before->warned, s->f->warned, sizeof before->warned);
+    }
+    return memcmp(now, before, sizeof now) == 0;
 }
 
 static void before_call(void)
@@ -208,7 +213,8 @@ static bool after_call(const slot *s, call which, verdict wanted, fmi2Status sta
     PROPERTY(wanted == EITHER || accepted == (wanted == ACCEPTED), "%s: %s in %s returns %d", name,
              wanted == ACCEPTED ? "legal" : "illegal", s->f == NULL ? "no instance" : mode_name(s->at.mode), (int)status);
     for (int i = 0; i < N_SLOTS; i++) {
-        PROPERTY((s == &slots[i] && accepted && changes) || is_same(&slots[i]), "%s changes instance %d", name, i);
+        const bool own = s == &slots[i] && accepted;
+        PROPERTY((own && changes) || is_same(&slots[i], own), "%s changes instance %d", name, i);
     }
     for (int i = 0; i < N_SAVED; i++) {
         PROPERTY(accepted || saves[i].state == NULL

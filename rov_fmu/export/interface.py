@@ -172,7 +172,7 @@ def _finite(bound: float) -> float | None:
 # Names by the standard (2.2.4) and what is said in each.
 LOG_CATEGORIES = {
     "logEvents": "Changes of mode: initialization, event mode, reset, termination",
-    "logStatusWarning": "A command beyond ±1 that saturates",
+    "logStatusWarning": "A command beyond ±1 that saturates, a call or a time that the standard does not foresee; once",
     "logStatusDiscard": "A value refused by fmi2SetReal or by a solver's state: not finite, or outside min ... max",
     "logStatusError": "Illegal calls and arguments, steps past stopTime, results that overflow",
 }

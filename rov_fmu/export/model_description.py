@@ -6,12 +6,19 @@ from dataclasses import dataclass
 from rov_fmu.export.interface import LOG_CATEGORIES, PARAMETERS_OF, UNITS, Variable
 from rov_fmu.files.templates import render
 
+# What is false is written out too, for FMI++ ends where it is absent.
 _COMMON = {
+    "canBeInstantiatedOnlyOncePerProcess": "false",
     "canNotUseMemoryManagementFunctions": "true",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
 }
-_CO_SIMULATION = {"canHandleVariableCommunicationStepSize": "true", **_COMMON}
+_CO_SIMULATION = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "canRunAsynchronuously": "false",
+    **_COMMON,
+}
 
 # The interfaces of each flavour and what they can do, as it really is.
 NATIVE = {

@@ -20,6 +20,11 @@ _DERIVATIVE = _STATE + _STATE - _INPUTS
 _THRUST = _DERIVATIVE + len(rov.Thrust.__dataclass_fields__)
 
 
+def _time_tolerance(t: float, h: float) -> float:
+    """Rounding of communication points, as in fmi2_co_simulation.c."""
+    return min(1e-9 * (abs(t) + h), 0.5 * h)
+
+
 class Rov(Fmi2Slave):  # type: ignore[misc]
     """All values by value reference: inputs, state, derivative, thrust, coefficients."""
 
@@ -30,8 +35,9 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.log_categories = declaration["log_categories"]
         self.declared: list[dict[str, Any]] = declaration["variables"]
         self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
+        self.time = 0.0
         self.stop_time: float | None = None
-        self.saturated: set[int] = set()
+        self.warned: set[int | str] = set()
         for reference, v in enumerate(self.declared):
             self.register_variable(
                 Real(
@@ -49,7 +55,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:  # noqa: ARG002
         """Keep the stop time: steps past it are errors."""
-        self.stop_time = stop_time
+        self.time, self.stop_time = start_time, stop_time
 
     def set_real(self, references: list[int], values: list[float]) -> None:
         """Set all values, or none where one is refused."""
@@ -66,12 +72,9 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         for reference, value in zip(references, values, strict=True):
             v = self.declared[reference]
             self.values[reference] = value
-            if v["causality"] == "input" and v["minimum"] is not None and reference not in self.saturated:
-                if v["minimum"] <= value <= v["maximum"]:
-                    continue
-                self.saturated.add(reference)
+            if v["causality"] == "input" and v["minimum"] is not None and not v["minimum"] <= value <= v["maximum"]:
                 limit = max(v["minimum"], min(v["maximum"], value))
-                self.log(f"{v['name']} = {value!r} saturates at {limit:g}; said once.", Fmi2Status.warning)
+                self._warn_once(reference, f"{v['name']} = {value!r} saturates at {limit:g}")
 
     def get_real(self, references: list[int]) -> list[float]:
         """Values, the calculated ones from the others."""
@@ -87,15 +90,22 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         if not (step_size > 0.0 and isfinite(end)):
             self.log(f"step size {step_size!r} at t = {current_time!r} is not a step forward.", Fmi2Status.error)
             return False
-        if self.stop_time is not None and end > self.stop_time + 1e-9 * (abs(self.stop_time) + step_size):
+        if self.stop_time is not None and end > self.stop_time + _time_tolerance(self.stop_time, step_size):
             self.log(f"a step of {step_size!r} s passes the stop time {self.stop_time!r}.", Fmi2Status.error)
             return False
         after = list(vars(rov.step(*self._model(), step_size)).values())
         if not all(map(isfinite, after)):
             self.log(f"the motion overflows within {step_size!r} s.", Fmi2Status.error)
             return False
-        self.values[_INPUTS:_STATE] = after
+        if abs(current_time - self.time) > _time_tolerance(self.time, step_size):
+            self._warn_once("time", f"the step from t = {current_time!r} does not begin at t = {self.time!r}")
+        self.values[_INPUTS:_STATE], self.time = after, end
         return True
+
+    def _warn_once(self, what: int | str, text: str) -> None:
+        if what not in self.warned:
+            self.warned.add(what)
+            self.log(f"{text}; said once.", Fmi2Status.warning)
 
     def _model(self) -> tuple[rov.Coefficients, rov.Inputs, rov.State]:
         return (
@@ -105,7 +115,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         )
 
     def _get_fmu_state(self) -> dict[str, Any]:
-        return {"values": list(self.values), "stop_time": self.stop_time}
+        return {"values": list(self.values), "time": self.time, "stop_time": self.stop_time}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        self.values, self.stop_time = list(state["values"]), state["stop_time"]
+        self.values, self.time, self.stop_time = list(state["values"]), state["time"], state["stop_time"]

@@ -58,6 +58,18 @@ PLANTED = {
         'OPEN("fmi2SetContinuousStates", CONTINUOUS | EVENT);',
         "fmi2SetContinuousStates: illegal in Event Mode",
     ),
+    "a message may introduce a value reference": (
+        "fmi2_instance.h",
+        "if (*c == '%' || *c == '#') {",
+        "if (*c == '%') {",
+        "a message with a single #",
+    ),
+    "what is warned of once is in the state": (
+        "fmi2_common.c",
+        "    if (f->now.mode == INSTANTIATED) {\n        WARN",
+        "    if (f->now.mode == INSTANTIATED) {\n        f->now.time = 1.0;\n        WARN",
+        "to read changes the instance",
+    ),
     "the last byte of a state is not there": (
         "fmi2_state.c",
         "size >= SERIALIZED_SIZE,",

@@ -6,6 +6,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmpy.validation import validate_fmu
+from lxml import etree
 
 from checks.commands import ALONE
 from rov_fmu.cli import main
@@ -67,6 +68,19 @@ def test_the_description_says_what_the_interface_declares(videoray_dir: Path, ve
         assert not interface.needsExecutionTool
     assert description.coSimulation.canHandleVariableCommunicationStepSize
     assert description.coSimulation.maxOutputDerivativeOrder == 1
+
+
+def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> None:
+    """FMI++ ends where these are absent."""
+    description = etree.parse(videoray_dir / "modelDescription.xml")
+    once = "canBeInstantiatedOnlyOncePerProcess"
+    for interface, flags in {
+        "CoSimulation": (once, "canInterpolateInputs", "canRunAsynchronuously"),
+        "ModelExchange": (once,),
+    }.items():
+        element = description.find(interface)
+        assert element is not None
+        assert [element.get(flag) for flag in flags] == ["false"] * len(flags)
 
 
 def test_the_same_inputs_give_the_same_bytes(videoray_fmu: Path, tmp_path: Path) -> None:

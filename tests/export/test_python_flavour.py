@@ -6,10 +6,11 @@ from pathlib import Path
 
 import fmpy
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
-from checks.fmi2 import fmpy_slave, keep_loaded
+from checks.fmi2 import WARNING, Message, fmpy_slave, keep_loaded
 from rov_fmu.cli import main
 from rov_fmu.export.interface import Variable, variables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -105,6 +106,59 @@ def test_both_flavours_move_the_same_way(python_dir: Path, videoray_dir: Path, v
             compare()
     for slave in both:
         slave.terminate()
+        slave.freeInstance()
+
+
+# start time, stop time, and of one step t, h, and whether it is done
+STOPS = [
+    (0.0, 1.0, 0.9, 0.1 + 1.0e-9, True),
+    (0.0, 1.0, 0.9, 0.1 + 1.2e-9, False),
+    (0.0, 1e-6, 9e-7, 1.0e-7 + 0.9e-15, True),
+    (0.0, 1e-6, 9e-7, 1.0e-7 + 1.2e-15, False),
+    (0.0, 1e6, 1e6, 1e-2, False),  # within 1e-9 of the stop time, but a whole step
+    (0.0, 1e6, 1e6 - 0.9e-3, 1e-3, True),
+    (0.0, 1e6, 1e6 - 0.4e-3, 1e-3, False),
+    (0.0, 1e6, 1e6 - 0.6e-3, 1e-3, True),
+    (-2.0, -1.0, -1.1, 0.1 + 1.0e-9, True),
+    (-2.0, -1.0, -1.1, 0.1 + 1.2e-9, False),
+    (0.0, None, 1e6, 1e3, True),
+]
+
+
+@pytest.mark.parametrize(("start", "stop", "t", "h", "done"), STOPS)
+def test_both_flavours_end_at_the_same_stop_time(
+    python_dir: Path, videoray_dir: Path, start: float, stop: float | None, t: float, h: float, done: bool
+) -> None:
+    for folder in (python_dir, videoray_dir):
+        slave = fmpy_slave(folder)
+        slave.setupExperiment(startTime=start, stopTime=stop)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        if done:
+            slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+        else:
+            with pytest.raises(FMICallException):
+                slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+        slave.freeInstance()
+
+
+def test_both_flavours_warn_once_of_what_saturates_and_of_a_jump_in_time(python_dir: Path, videoray_dir: Path) -> None:
+    for folder in (python_dir, videoray_dir):
+        log: list[Message] = []
+        slave = fmpy_slave(folder, log)
+        slave.setupExperiment(startTime=1.0)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        saved, warned = slave.getFMUState(), []
+        for t in (1.0, 1.1, 1.0, 1.1 + 1e-11, 1.5, 9.0):
+            if t == 1.0:
+                slave.setFMUState(saved)  # to step again from there is no jump
+            slave.setReal([0], [1.5])
+            slave.doStep(currentCommunicationPoint=t, communicationStepSize=0.1)
+            warned.append([m.text for m in log if m.status == WARNING])
+        assert [len(texts) for texts in warned] == [1, 1, 1, 1, 2, 2]
+        assert "u_l = 1.5 saturates at 1; said once." in warned[0][0]
+        assert "step from t = 1.5 does not begin at t = 1.2" in warned[-1][1]
         slave.freeInstance()
 
 

@@ -19,6 +19,7 @@ from checks.fmi2 import (
     OK,
     SIGNATURES,
     STEP,
+    WARNING,
     Fmu,
     Message,
     integers,
@@ -211,7 +212,52 @@ def test_a_step_past_the_stop_time_is_refused_up_to_rounding(
         assert rov.step(t, h) == status
         assert (rov.save() == before) == (status == ERROR)
         assert rov.mode() == STEP
-        assert [m.status for m in rov.log] == [status] * (status == ERROR)
+        assert [m.status for m in rov.log] == ([ERROR] if status == ERROR else [WARNING] * (t != start))  # of the jump
+
+
+# start time; then of each step t and h, and whether it is warned of
+JUMPS: list[tuple[float, list[tuple[float, float, bool]]]] = [
+    (0.0, [(0.0, 0.1, False), (0.1, 0.1, False), (0.2, 0.1, False)]),
+    (0.0, [(0.1, 0.1, True), (0.2, 0.1, False), (0.5, 0.1, False)]),  # a first step at t = h; said once
+    (0.0, [(-1.4e-17, 0.1, False), (0.1, 0.1, False), (0.1, 0.1, True)]),  # repeated
+    (-2.0, [(-2.0, 0.5, False), (-1.0, 0.5, True)]),  # skipped
+    (0.0, [(0.0, 0.1, False), (0.1 + 1e-11, 0.1, False)]),
+    (0.0, [(0.0, 0.1, False), (0.1 + 1e-9, 0.1, True)]),
+    (1e6, [(1e6 + 1e-4, 0.1, False)]),
+    (1e6, [(1e6 - 1e-2, 0.1, True)]),
+    (1e9, [(1e9 + 1e-7, 1e-6, False)]),
+    (1e9, [(1e9 + 1e-6, 1e-6, True)]),  # a whole step is not rounding
+]
+
+
+@pytest.mark.parametrize(("start", "steps"), JUMPS)
+def test_a_repeated_or_skipped_communication_point_is_warned_of_once(
+    fmu: Fmu, start: float, steps: list[tuple[float, float, bool]]
+) -> None:
+    with fmu.instance() as rov, fmu.instance() as regular:
+        for either in (rov, regular):
+            assert either.setup(start) == OK
+            assert either.set({"u_l": 0.5, "r": 1.0}) == OK
+            either.expect("fmi2EnterInitializationMode")
+            either.expect("fmi2ExitInitializationMode")
+        at = start
+        for t, h, warned in steps:
+            assert rov.step(t, h) == regular.step(at, h) == OK
+            at += h
+            assert [(m.status, m.category) for m in rov.log] == [(WARNING, "logStatusWarning")] * warned
+            rov.log.clear()
+            assert rov.get(fmu.outputs) == regular.get(fmu.outputs)
+
+
+def test_a_step_tried_again_from_a_restored_state_is_no_jump(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        rov.start()
+        assert rov.step(0.0, 0.5) == OK
+        before = rov.save()
+        assert rov.step(0.5, 0.5) == OK
+        assert rov.load(before) == OK
+        assert rov.step(0.5, 0.25) == OK
+        assert rov.log == []
 
 
 def test_a_thousand_steps_added_up_reach_the_stop_time(fmu: Fmu) -> None:

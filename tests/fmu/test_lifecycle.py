@@ -27,6 +27,7 @@ from checks.fmi2 import (
     STEP,
     TERMINATED,
     TERMINATED_STATUS,
+    WARNING,
     Fmu,
     Instance,
     integers,
@@ -148,13 +149,13 @@ def test_an_illegal_call_is_refused_logs_one_line_and_changes_nothing(
 
 
 def settable(mode: str, variable: Any) -> bool:
-    """Conditions 1, 3, 4, 5 and 6 of the tables; + inputs before initialization, as importers set them."""
+    """Conditions 1, 3, 4, 5 and 6 of the tables; + inputs before initialization and tuning in Continuous-Time Mode."""
     if variable.causality == "input":
         return mode not in (TERMINATED, FAILED)
     if mode in (INSTANTIATED, INITIALIZATION):
         return bool(variable.initial == "exact")
-    if mode in (STEP, EVENT):
-        return bool(variable.variability == "tunable")
+    if mode in (STEP, EVENT, CONTINUOUS) and variable.variability == "tunable":
+        return True
     return mode == CONTINUOUS and variable.causality == "output" and variable.initial == "exact"
 
 
@@ -176,13 +177,84 @@ def test_a_variable_can_be_set_in_the_modes_of_its_causality_and_variability(fmu
                 assert rov.save() == before, name
 
 
-@pytest.mark.parametrize(("kind", "mode"), [c for c in EVERY_MODE if c[1] != INSTANTIATED], ids=_ids)
-def test_every_variable_can_be_read_once_initialization_began(fmu: Fmu, kind: int, mode: str) -> None:
+@pytest.mark.parametrize(("kind", "mode"), EVERY_MODE, ids=_ids)
+def test_every_variable_can_be_read(fmu: Fmu, kind: int, mode: str) -> None:
     with fmu.instance(kind) as rov:
         rov.reach(mode)
         assert rov.get(fmu.parameters) == [float(fmu.variables[name].start) for name in fmu.parameters]
         assert rov.get(fmu.states) == [0.0] * len(fmu.states)
         assert len(rov.get(list(fmu.variables))) == len(fmu.variables)
+
+
+@pytest.mark.parametrize("kind", MODES, ids=_ids)
+def test_what_is_calculated_can_be_read_right_after_instantiation(fmu: Fmu, kind: int) -> None:
+    calculated = [name for name in fmu.outputs + fmu.derivatives if name not in fmu.states]
+    values = {"u_l": 0.5, "u_t": -0.25, "u": 0.4, "r": -0.2, "psi": 1.0, "beta_u": 0.5, "m_rov": 9.0}
+    with fmu.instance(kind) as rov:
+        assert rov.get(calculated) == [0.0] * len(calculated)  # at rest, nothing pushes
+        assert rov.set(values) == OK
+        early = rov.get(calculated)
+        rov.start(values)
+        assert rov.get(calculated) == early
+        assert {name for name, value in zip(calculated, early, strict=True) if value == 0.0} == {"F_r", "der(z)"}
+
+
+def _warnings(rov: Instance) -> list[str]:
+    assert {(m.status, m.category) for m in rov.log} <= {(WARNING, "logStatusWarning")}
+    said = [m.text for m in rov.log]
+    rov.log.clear()
+    return said
+
+
+def test_what_the_standard_forbids_and_importers_do_is_done_and_warned_of_once(fmu: Fmu) -> None:
+    n = len(fmu.variables)
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        for _ in range(2):  # again after a reset
+            assert rov.call("fmi2GetReal", references(n), 1, reals(0.0)) == ERROR
+            assert [m.status for m in rov.log] == [ERROR]  # what is refused is not warned of
+            rov.log.clear()
+            for _ in range(3):
+                assert rov.get(["alpha_u"]) == [float(fmu.variables["alpha_u"].start)]
+            (said,) = _warnings(rov)
+            assert said.startswith("fmi2GetReal: ")
+            rov.reach(CONTINUOUS)
+            assert rov.set({"u_l": 0.5, "u": 0.1}) == OK
+            assert _warnings(rov) == []
+            before = rov.get(["der(u)"])
+            assert rov.set({"beta_u": 0.5, "m_rov": 7.0}) == ERROR
+            rov.log.clear()
+            for value in (0.5, 0.25):
+                assert rov.set({"beta_u": value, "alpha_w": value}) == OK
+                assert rov.get(["beta_u", "alpha_w"]) == [value, value]
+            assert rov.get(["der(u)"])[0] == pytest.approx(before[0] * 0.25 / float(fmu.variables["beta_u"].start))
+            (said,) = _warnings(rov)
+            assert said.startswith("fmi2SetReal: beta_u ")
+            rov.expect("fmi2EnterEventMode")
+            assert rov.set({"beta_r": 0.5}) == OK
+            assert _warnings(rov) == []
+            rov.expect("fmi2Reset")
+            rov.setup()
+            rov.expect("fmi2EnterInitializationMode")
+            rov.expect("fmi2Terminate")
+            (said,) = _warnings(rov)
+            assert said.startswith("fmi2Terminate: ")
+            rov.expect("fmi2Reset")
+
+
+def test_warnings_are_no_part_of_the_state(fmu: Fmu) -> None:
+    with fmu.instance() as rov, fmu.instance() as quiet:
+        new = rov.save()
+        rov.get(["u"])
+        assert rov.save() == new
+        assert rov.load(new) == OK
+        rov.get(["u"])
+        assert len(_warnings(rov)) == 1
+        quiet.expect("fmi2SetDebugLogging", 0, 1, strings(b"logStatusWarning"))
+        quiet.get(["u"])
+        assert quiet.log == []
+        quiet.expect("fmi2SetDebugLogging", 1, 1, strings(b"logStatusWarning"))
+        quiet.get(["u"])  # what was not heard has not been said
+        assert len(_warnings(quiet)) == 1
 
 
 @pytest.mark.parametrize(("kind", "mode"), EVERY_MODE, ids=_ids)
