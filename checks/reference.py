@@ -1,4 +1,4 @@
-"""The exact motion to 50 digits, from the textbook solutions of (18) and not from the formulas of models/ (mpmath).
+"""The exact motion to 50 digits, from the textbook solutions of (18), not the formulas of rov_fmu/motion/ (mpmath).
 
 While v keeps its sign, v' = C - B v - A v^2 is elementary: through its two equilibria where they are real, a tangent
 where they are not, a hyperbola where they coincide, an exponential or a line without quadratic drag. Every formula

@@ -26,9 +26,10 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, ValidationInfo, create_model, model_validator
 
 from rov_fmu.files.csv_table import Column, DataFileError, read_columns
+from rov_fmu.files.toml_file import Strict, beside, pair, read_checked
 from rov_fmu.motion.rov import AXES, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import QUANTITIES, Finite, Head, Quantity, Strict, Validity, beside, pair, read_checked
+from rov_fmu.vehicle.vehicle import QUANTITIES, Finite, Head, Quantity, Validity, VehicleFileError
 
 ROV_FILE = "rov.toml"
 THRUSTERS = ("rear", "top")
@@ -176,7 +177,7 @@ class _RovFile(Strict):
 
 
 def _load_rov(path: Path) -> Rov:
-    checked = read_checked(path, _RovFile)
+    checked = read_checked(path, _RovFile, VehicleFileError)
     return Rov(
         head=checked.vehicle,
         known={name: q for name in _known if (q := getattr(checked.known, name))},

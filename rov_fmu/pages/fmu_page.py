@@ -174,7 +174,10 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
     if table and table.steady:
         points = [(float(c), float(V)) for c, V in table.steady.items()]
         ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
-    _scale(ax, 100, "command (%)")
+    ax.set(xlim=(0, 100), xlabel="command (%)")
+    ax.locator_params(nbins=6)
+    if ax.dataLim.y0 >= 0.0:
+        ax.set_ylim(bottom=0.0)
     ax.set_title(rf"{axis.name.capitalize()}: $V_{{ss}}$ ({axis.unit})", loc="left")
     ax.legend(loc="upper left")
 
@@ -184,13 +187,6 @@ def plot_steps(ax: Axes, k: Coefficients, axis: Axis, commands: Sequence[Decimal
     steps = [measured_step(table, c) for c in commands]
     draw_steps(ax, axis, steps, [(k, "-")])
     ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left")
-
-
-def _scale(ax: Axes, end: int, label: str) -> None:
-    ax.set(xlim=(0, end), xlabel=label)
-    ax.locator_params(nbins=6)
-    if ax.dataLim.y0 >= 0.0:
-        ax.set_ylim(bottom=0.0)
 
 
 def steady_picture(vehicle: Vehicle) -> str:

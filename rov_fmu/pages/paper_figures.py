@@ -1,4 +1,4 @@
-"""Figures 5-9 and 11 of the paper, redrawn as far as it prints their data: `python -m models figures docs`.
+"""Figures 5-9 and 11 of the paper, redrawn as far as it prints their data: `rov-fmu figures docs`.
 
 Its curves are those of the printed equations. Of the points only V_ss and Tau are printed (Tables 3-7); the force at a
 measured velocity is that of the thrust curve, (11)-(13). The forces behind the thrust curves (Figures 4-6) and every
@@ -84,16 +84,16 @@ def _notes(ax: Axes) -> None:
 
 
 def _drag(ax: Axes, vehicle: Vehicle, table: ResponseTable, title: str, equation: str) -> None:
-    m, k = table.axis, vehicle.coefficients
-    names = (m.coefficient("a_d"), m.coefficient("b_d"))
+    axis, k = table.axis, vehicle.coefficients
+    names = (axis.coefficient("a_d"), axis.coefficient("b_d"))
     v = np.array([float(V) for V in table.steady.values()])
-    force = np.array([m.force(k, float(c) / 100.0) for c in table.steady])
+    force = np.array([axis.force(k, float(c) / 100.0) for c in table.steady])
     free = fit_quadratic(names, v, force).unbounded
     end = 1.1 * float(v.max())
     _curve(ax, 1.0, (0.0, end), *free, "--", "grey", "least squares of the points")
     _curve(ax, 1.0, (0.0, end), getattr(k, names[0]), getattr(k, names[1]), "-", "blue", equation)
     ax.plot(v, force, "o", color=LIGHT["orange"], markersize=4.5, zorder=5, label=f"Table {table.steady_number}")
-    _finish(ax, title, f"${m.velocity}$ ({m.unit})", "torque (N·m)" if m.load == "N.m" else "force (N)")
+    _finish(ax, title, f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
 
 
 def _steps(ax: Axes, vehicle: Vehicle, table: ResponseTable, title: str) -> None:

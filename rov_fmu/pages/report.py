@@ -1,5 +1,6 @@
 """The identification report: one HTML file with the data, the fits, their residuals, and the warnings."""
 
+from collections import Counter
 from functools import partial
 from pathlib import Path
 
@@ -25,7 +26,6 @@ def report_output(results: Identification, path: Path) -> Output:
 def report_page(results: Identification) -> str:
     """The report as HTML, the same for the same input."""
     comparisons = compare(results)
-    of_axis = {r.axis.name: [c for c in comparisons if c.result is r] for r in results.axes}
     k = results.vehicle.coefficients
     return page(
         "report.html.j2",
@@ -37,9 +37,7 @@ def report_page(results: Identification) -> str:
         coefficients=[(name, meta, getattr(k, name)) for name, meta in COEFFICIENTS.items()],
         thrust=[(thruster, fit, _thrust(k, thruster, fit)) for thruster, fit in results.thrust.items()],
         given=[(t, [f"{kind}_{t}" for kind in ("a_t", "b_t")]) for t in THRUSTERS if t not in results.thrust],
-        axes=[
-            (r, of_axis[r.axis.name], _plots(results, r, of_axis[r.axis.name]), _recordings(r)) for r in results.axes
-        ],
+        axes=[(result, _plots(results, result, comparisons), _recordings(result)) for result in results.axes],
         inputs=_inputs(results.tests),
     )
 
@@ -49,9 +47,9 @@ def _thrust(k: Coefficients, thruster: str, fit: QuadraticFit) -> Markup:
     return inline_svg(f"Thrust: {thruster}", partial(plot_thrust, fit=fit, curve=curve), _PLOT)
 
 
-def _plots(results: Identification, result: AxisResult, comparisons: list[Comparison]) -> list[Markup]:
+def _plots(results: Identification, result: AxisResult, comparisons: tuple[Comparison, ...]) -> list[Markup]:
     k, against = results.vehicle.coefficients, results.against.coefficients if results.against else None
-    by_quantity = {c.quantity: c for c in comparisons}
+    by_quantity = {c.quantity: c for c in comparisons if c.result is result}
     draw: dict[str, Draw] = {
         f"{quantity} over the command": partial(
             plot_response, result=result, quantity=quantity, comparison=by_quantity.get(quantity), k=k,
@@ -82,14 +80,13 @@ def _recordings(result: AxisResult) -> list[tuple[str, str, Markup]]:
 def _inputs(tests: TankTests) -> list[tuple[str, str, str]]:
     """Name, what it holds, SHA-256."""
     holds = {ROV_FILE: "what is given beforehand: mass, geometry"}
-    tables = (
-        ("force", tests.thrust), ("steady velocity", tests.steady),
-        ("time constant", tests.time_constants),
-    )  # fmt: skip
-    for what, rows in tables:
-        files = [row.file for found in rows.values() for row in found]
-        plural = {"steady velocity": "steady velocities"}.get(what, f"{what}s")
-        holds |= {file: f"{n} {what if n == 1 else plural}" for file in files if (n := files.count(file))}
+    for one, many, rows in (
+        ("force", "forces", tests.thrust),
+        ("steady velocity", "steady velocities", tests.steady),
+        ("time constant", "time constants", tests.time_constants),
+    ):
+        files = Counter(row.file for found in rows.values() for row in found)
+        holds |= {file: f"{n} {one if n == 1 else many}" for file, n in files.items()}
     for recording in (r for found in tests.recordings.values() for r in found):
         holds[recording.file] = (
             f"{len(recording.time)} samples of command and {recording.quantity} in {recording.time[-1]:.4g} s"

@@ -10,7 +10,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from rov_fmu.files.csv_table import Column, DataFileError, read_columns
-from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW, Axis, Coefficients, Inputs
+from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW, Axis, Coefficients
 from rov_fmu.vehicle.vehicle import TABLES, Vehicle
 
 Cells = tuple[Decimal | None, ...]
@@ -74,13 +74,7 @@ class StepTest:
     steady_number: int
     """Of the table of measured steady velocities."""
     steady_columns: tuple[str, ...]
-    """Directions of motion in that table."""
-    direction: str
-    """The one that the responses belong to."""
-
-    def inputs(self, command: Decimal) -> Inputs:
-        """The inputs that hold a command given in %."""
-        return self.axis.inputs(float(command) / 100.0)
+    """Directions of motion in that table; the responses belong to the last."""
 
     def response(self, coefficients: Coefficients, command: Decimal) -> tuple[float, float]:
         """V_ss and Tau (s) in closed form for a command given in %."""
@@ -96,9 +90,9 @@ class ResponseTable(StepTest):
 
 
 STEP_TESTS = (
-    StepTest(HEAVE, 6, 3, ("upward", "downward"), "downward"),
-    StepTest(YAW, 7, 5, ("yaw",), "yaw"),
-    StepTest(SURGE, 8, 4, ("forward",), "forward"),
+    StepTest(HEAVE, 6, 3, ("upward", "downward")),
+    StepTest(YAW, 7, 5, ("yaw",)),
+    StepTest(SURGE, 8, 4, ("forward",)),
 )
 
 
@@ -138,8 +132,7 @@ def _load_table(folder: Path, coefficients: Coefficients, test: StepTest) -> Res
     units = {"V_ss": test.axis.unit, "Tau": "s"}
     responses = _read_table(of_responses, {f"{s} {quantity}": units[quantity] for s in _SOURCES for quantity in units})
     velocities = _read_table(of_velocities, dict.fromkeys(test.steady_columns, test.axis.unit))
-    place = test.steady_columns.index(test.direction)
-    steady = {command: V for command, cells in velocities.items() if (V := cells[place]) is not None}
+    steady = {command: V for command, cells in velocities.items() if (V := cells[-1]) is not None}
 
     def row(command: Decimal, cells: Cells) -> ResponseRow:
         V_non_linear, Tau_non_linear, V_scaled, Tau_scaled, V_measured, Tau_measured = cells
@@ -156,8 +149,7 @@ def _load_table(folder: Path, coefficients: Coefficients, test: StepTest) -> Res
             response(coefficients, V_scaled, Tau_scaled),
         )
 
-    rows = tuple(row(command, cells) for command, cells in responses.items())
-    return ResponseTable(**vars(test), rows=rows, steady=steady)
+    return ResponseTable(**vars(test), rows=tuple(row(*item) for item in responses.items()), steady=steady)
 
 
 def _deviation(value: float, reference: Decimal | None) -> float | None:

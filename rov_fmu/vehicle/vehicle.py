@@ -2,35 +2,19 @@
 
 import os
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    create_model,
-)
-from pydantic_core import ErrorDetails
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, create_model
 
-from rov_fmu.files.messages import FileError, brief, shown
+from rov_fmu.files.messages import FileError
 from rov_fmu.files.output import is_same
 from rov_fmu.files.places import FMU_SRC
+from rov_fmu.files.toml_file import Strict, beside, pair, read_checked
 from rov_fmu.motion.rov import COEFFICIENTS, Coefficients, Meta
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 
 TABLES = {
     "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
@@ -109,18 +93,9 @@ class Vehicle:
         return own if own and own.is_file() else FMU_SRC / "pictures" / name
 
 
-class Strict(BaseModel):
-    """A table of a TOML file: no keys but these, no number in quotes."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-Checked = TypeVar("Checked", bound=Strict)
-
-
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
-    checked = read_checked(path, _File, coming=coming)
+    checked = read_checked(path, _File, VehicleFileError, coming=coming)
     head = checked.vehicle
     quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
     return Vehicle(
@@ -137,26 +112,6 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     )
 
 
-def read_checked(path: Path, model: type[Checked], **context: object) -> Checked:
-    """Read a TOML file of the given form; `folder` and what else is given is the context. Raises VehicleFileError."""
-    document = _read_toml(path)
-    try:
-        return model.model_validate(document, context={"folder": path.parent, **context})
-    except ValidationError as error:
-        raise VehicleFileError(*(f"{path}: {_problem(problem)}" for problem in error.errors())) from error
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise VehicleFileError(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise VehicleFileError(f"{path}: not UTF-8 text, at byte {error.start}") from error
-    except (ValueError, RecursionError) as error:
-        raise VehicleFileError(f"{path}: not TOML: {brief(str(error))}") from error
-
-
 def _printable(text: str) -> str:
     if found := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
         raise ValueError(f"must be without the control character {found[0]!a}")
@@ -166,11 +121,6 @@ def _printable(text: str) -> str:
 _Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_printable)]
 _Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"), AfterValidator(_printable)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-def pair(value: object) -> object:
-    """TOML knows lists, not tuples."""
-    return tuple(value) if isinstance(value, list) else value
 
 
 Interval = Annotated[tuple[Finite, Finite], BeforeValidator(pair)]
@@ -241,11 +191,6 @@ class Head(Strict):
     source: _Text
 
 
-def beside(name: str, info: ValidationInfo) -> Path:
-    """A path as seen from the file that names it."""
-    return Path((info.context or {})["folder"], name)
-
-
 def _folder(name: str, info: ValidationInfo) -> str:
     if not os.path.isdir(beside(name, info)):  # noqa: PTH112 (Path.is_dir raises on names that cannot be)
         raise ValueError("there is no such folder beside the file")
@@ -301,20 +246,5 @@ class _File(Strict):
     vehicle: _FileHead
     validity: Validity
     coefficients: _Coefficients  # type: ignore[valid-type]
-    alternatives: dict[str, _Alternative] = {}
+    alternatives: dict[str, _Alternative] = Field(default={})
     provenance: _Provenance | None = None
-
-
-def _problem(problem: ErrorDetails) -> str:
-    """A problem of the file in one line: key, value, what is allowed."""
-    key = brief(".".join(map(str, problem["loc"])))
-    match problem["type"]:
-        case "missing":
-            return f"{key}: this key is missing"
-        case "extra_forbidden":
-            return f"{key}: there is no such key"
-        case "model_type":
-            return f"{key} = {shown(problem['input'])}: must be a table of keys and values"
-    reason = problem["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
-    of_table = problem["type"] == "value_error" and isinstance(problem["input"], dict)
-    return f"{key}: {reason}" if of_table else f"{key} = {shown(problem['input'])}: {reason}"

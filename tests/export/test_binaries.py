@@ -32,7 +32,7 @@ DARWIN = ["darwin64", "aarch64-darwin"]
 
 @pytest.fixture(scope="session")
 def binaries(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder binaries/ of the FMU that build_fmu.py writes by default."""
+    """The folder binaries/ of the FMU that a build writes by default."""
     folder = tmp_path_factory.mktemp("all platforms")
     assert main(["build", "-o", str(folder / "videoray.fmu")]) == 0
     fmpy.extract(str(folder / "videoray.fmu"), unzipdir=str(folder / "fmu"))

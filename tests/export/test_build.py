@@ -1,4 +1,4 @@
-"""The archive that build_fmu.py writes."""
+"""The archive that a build writes."""
 
 import zipfile
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What build_fmu.py does when it cannot: one clear line, an exit code, the old FMU untouched, nothing left behind."""
+"""What a build does when it cannot: one clear line, an exit code, the old FMU untouched, nothing left behind."""
 
 import errno
 import os

@@ -103,7 +103,7 @@ def test_a_variable_without_a_group_is_noticed(declared: dict[str, Variable]) ->
         osp_model_description(tuple(v for v in declared.values() if v.name != "psi"))
 
 
-# ---- build_fmu.py --osp ----------------------------------------------------------------------------------------------
+# ---- rov-fmu build --osp -------------------------------------------------------------------------------------------
 
 
 def _build(path: Path, *arguments: str) -> int:

@@ -191,11 +191,7 @@ def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_
         options = [
             f"{name}={data.draw(words)}" for name in ("--command", "--v-ss", "--tau") if data.draw(st.integers(0, 5))
         ]
-        try:
-            code = main(["tune", str(VIDEORAY), "--axis", axis, *options, "-o", str(tuned)])
-        except SystemExit:  # of argparse, which says how the command goes before what is wrong
-            assert capsys.readouterr().err.count("error:") == 1
-            return
+        code = main(["tune", str(VIDEORAY), "--axis", axis, *options, "-o", str(tuned)])
         printed, _ = tuned_or_one_line(code, tuned, capsys)
         assert "inf" not in printed
 

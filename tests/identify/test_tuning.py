@@ -93,7 +93,7 @@ def test_what_no_tuning_gives(
     check_refused(["tune", str(VIDEORAY), "--axis", "heave", *options], named, capsys)
 
 
-# ---- python -m models tune -------------------------------------------------------------------------------------------
+# ---- rov-fmu tune ----------------------------------------------------------------------------------------------------
 
 
 def check_refused(arguments: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
