@@ -20,7 +20,7 @@ from rov_fmu.identify.quadratic_fit import QuadraticFit, fit_quadratic
 from rov_fmu.identify.response_fit import Point, drag_and_beta, fit_response, free_coefficients
 from rov_fmu.identify.simulator import prepare
 from rov_fmu.identify.step_responses import AGAINST, StepResponse, steps
-from rov_fmu.identify.tank_tests import LEAST_VELOCITY, MOST_VELOCITY, THRUSTERS, Recording, Row, TankTests
+from rov_fmu.identify.tank_tests import LEAST_VELOCITY, MOST_VELOCITY, THRUSTERS, Recording, TankTests
 from rov_fmu.motion.rov import AXES, COEFFICIENTS, Axis, Coefficients
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
@@ -185,22 +185,18 @@ def _axis(
 
 
 def _points(tests: TankTests, axis: Axis, found: tuple[StepResponse, ...]) -> tuple[Point, ...]:
-    """Rows of the tables, then what the recordings tell."""
-
-    def weight(command: float) -> float:
-        return _weight(tests, axis.name, command)
-
-    def point(quantity: str, row: Row) -> Point:
-        return Point(quantity, row.command, row.value, weight(row.command), f"{row.file}, line {row.line}")
-
-    points = [point("V_ss", row) for row in tests.steady.get(axis.name, ())]
-    points += [point("Tau", row) for row in tests.time_constants.get(axis.name, ())]
+    """Rows of the tables, then the responses of the recordings."""
+    rows = [("V_ss", row) for row in tests.steady.get(axis.name, ())]
+    rows += [("Tau", row) for row in tests.time_constants.get(axis.name, ())]
+    points = [
+        Point(quantity, row.command, row.value, _weight(tests, axis.name, row.command), f"{row.file}, line {row.line}")
+        for quantity, row in rows
+    ]
     for step in found:
-        source = f"{step.file}, {step.start:.1f} s"
-        if step.V_ss is not None:
-            points.append(Point("V_ss", step.command, step.V_ss, weight(step.command), source, step.V_ss_error))
-        if step.Tau is not None:
-            points.append(Point("Tau", step.command, step.Tau, weight(step.command), source, step.Tau_error))
+        weight, source = _weight(tests, axis.name, step.command), f"{step.file}, {step.start:.1f} s"
+        for quantity, value, error in (("V_ss", step.V_ss, step.V_ss_error), ("Tau", step.Tau, step.Tau_error)):
+            if value is not None:
+                points.append(Point(quantity, step.command, value, weight, source, error))
     return tuple(points)
 
 
@@ -211,9 +207,9 @@ def _weight(tests: TankTests, window: str, command: float) -> float:
 
 def _command_range(results: list[AxisResult]) -> tuple[float, float]:
     """From the weakest to the strongest command that counts."""
-    commands = {round(abs(p.command), 6) for result in results for p in result.points if p.weight > 0.0}
-    for result in results:
-        for simulation in result.recordings.simulations if result.recordings else ():
-            commands |= set(np.round(np.abs(simulation.recording.command), 6).tolist()) - {0.0}
+    used = [abs(p.command) for result in results for p in result.points if p.weight > 0.0]
+    recorded = [s.recording.command for result in results if result.recordings for s in result.recordings.simulations]
+    commands = set(np.round(np.abs(np.concatenate([used, *recorded])), 6).tolist())
+    commands -= {0.0}
     low, high = min(commands, default=0.0), max(commands, default=1.0)
     return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))

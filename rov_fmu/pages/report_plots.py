@@ -5,18 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from rov_fmu.identify.identification import AxisResult, Comparison
-from rov_fmu.identify.least_squares import Array
+from rov_fmu.identify.least_squares import Array, Flags
 from rov_fmu.identify.output_error import Simulation
 from rov_fmu.identify.quadratic_fit import QuadraticFit
 from rov_fmu.identify.step_responses import StepResponse, velocity, without_spikes
 from rov_fmu.motion.rov import Axis, Coefficients
 from rov_fmu.pages.plots import Step, draw_steps, evenly
 from rov_fmu.pages.svg import LIGHT
-
-Flags = NDArray[np.bool_]
 
 _BINS = 300  # of a recording: as many as one can see
 
@@ -49,9 +46,7 @@ def plot_drag(figure: Figure, result: AxisResult, k: Coefficients, against: Coef
 
 
 def _quadratic(above: Axes, below: Axes, fit: QuadraticFit, x: Array, scale: float, *, color: str, label: str) -> None:
-    low, high = fit.band(x)
-    if np.isfinite(low).all():
-        above.fill_between(scale * x, low, high, color=LIGHT[color], alpha=0.18, linewidth=0.0, label="95 %")
+    _band(above, scale * x, *fit.band(x), color)
     above.plot(scale * x, fit.value(x), "--" if color == "grey" else "-", color=LIGHT[color], label=label)
     _dots(above, scale * fit.x, fit.y, fit.counts, label="measured")
     _dots(below, scale * fit.x, fit.residuals, fit.counts)
@@ -74,14 +69,9 @@ def plot_response(
     c = np.linspace(max(0.5 * min(at), 0.01), min(max(at) + 0.05, 1.0), 46)
     tested = (c >= min(at)) & (c <= max(at))
     curve = _curve(axis, k, quantity, c)
-    fit = result.recordings or result.response
-    if fit:
-        V_low, V_high, Tau_low, Tau_high = fit.band(c)
-        low, high = (Tau_low, Tau_high) if quantity == "Tau" else (V_low, V_high)
-        if np.isfinite(low).all() and np.isfinite(high).all():
-            above.fill_between(
-                100.0 * c, np.maximum(low, 0.0), high, color=LIGHT["blue"], alpha=0.18, linewidth=0.0, label="95 %"
-            )
+    if fit := result.recordings or result.response:
+        low, high = fit.band(c)[2:] if quantity == "Tau" else fit.band(c)[:2]
+        _band(above, 100.0 * c, np.maximum(low, 0.0), high, "blue")
     above.plot(100.0 * c, curve, color=LIGHT["blue"], label="model")
     if against:
         above.plot(100.0 * c, _curve(axis, against, quantity, c), "--", color=LIGHT["grey"], label="compared")
@@ -92,9 +82,8 @@ def plot_response(
         x, y = 100.0 * np.array(at), np.array([abs(p.value) for p in points])
         counts = np.array([p.weight > 0.0 for p in points])
         _dots(above, x, y, counts, label="measured")
-        for model, draw in ((comparison.model, _dots), (comparison.leave_one_out, _diamonds)):
-            errors = 100.0 * (np.abs(model) / y - 1.0)
-            draw(below, x, errors, counts)
+        _dots(below, x, 100.0 * (np.abs(comparison.model) / y - 1.0), counts)
+        _diamonds(below, x, 100.0 * (np.abs(comparison.leave_one_out) / y - 1.0))
     _finish(above, below, "command (%)", "error (%)")
 
 
@@ -137,6 +126,11 @@ def plot_recording(figure: Figure, simulation: Simulation, holds: Sequence[StepR
     above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
 
 
+def _band(ax: Axes, x: Array, low: Array, high: Array, color: str) -> None:
+    if np.isfinite(low).all() and np.isfinite(high).all():
+        ax.fill_between(x, low, high, color=LIGHT[color], alpha=0.18, linewidth=0.0, label="95 %")
+
+
 def _two(figure: Figure, heights: tuple[float, float] = (2.6, 1.0)) -> tuple[Axes, Axes]:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=heights)
     below.axhline(0.0, color=LIGHT["muted"], linewidth=0.8)
@@ -162,7 +156,7 @@ def _dots(ax: Axes, x: Array, y: Array, counts: Flags, label: str = "") -> None:
                     label=name or None)  # fmt: skip
 
 
-def _diamonds(ax: Axes, x: Array, y: Array, counts: Flags | None = None) -> None:  # noqa: ARG001 (as _dots)
+def _diamonds(ax: Axes, x: Array, y: Array) -> None:
     """Leave-one-thrust-out."""
     ax.plot(x, y, "D", color=LIGHT["violet"], markerfacecolor="none", markersize=4.0, zorder=4)
 

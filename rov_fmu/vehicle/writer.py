@@ -11,7 +11,7 @@ from tomlkit.items import Array, InlineTable
 from rov_fmu.files.messages import shown
 from rov_fmu.files.output import Output, write_whole
 from rov_fmu.motion.rov import COEFFICIENTS
-from rov_fmu.vehicle.vehicle import Provenance, Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Head, Vehicle, VehicleFileError, load_vehicle
 
 _DIGITS = 6  # significant ones: more than any tank test has, few enough to be the same on every machine
 
@@ -20,26 +20,16 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     """The vehicle file, in a folder, of a vehicle without tables, pictures and alternatives."""
     document = tomlkit.document()
     if vehicle.provenance:
-        document.add(
-            tomlkit.comment("Made from tank tests: [provenance] tells how, and `interval` is 95 % confidence.")
-        )
-        document.add(tomlkit.nl())
-    head = tomlkit.table()
-    for key in ("name", "identifier", "version", "description", "source"):
-        head.add(key, getattr(vehicle, key))
-    document.add("vehicle", head)
-    validity = tomlkit.table()
-    for key, value in zip(("command_min", "command_max"), vehicle.command_range, strict=True):
-        validity.add(key, _rounded(value))
-    if vehicle.limits:
-        validity.add("limits", _lines(vehicle.limits))
-    document.add("validity", validity)
-    coefficients = tomlkit.table()
-    for name in COEFFICIENTS:
-        coefficients.add(name, _quantity(vehicle, name))
-    document.add("coefficients", coefficients)
-    if vehicle.provenance:
-        document.add("provenance", _provenance(vehicle.provenance, folder))
+        words = "Made from tank tests: [provenance] tells how, and `interval` is 95 % confidence."
+        document.add(tomlkit.comment(words)).add(tomlkit.nl())
+    low, high = map(_rounded, vehicle.command_range)
+    document["vehicle"] = {key: getattr(vehicle, key) for key in Head.model_fields}
+    document["validity"] = {"command_min": low, "command_max": high, **_lines("limits", vehicle.limits)}
+    document["coefficients"] = {name: _quantity(vehicle, name) for name in COEFFICIENTS}
+    if made := vehicle.provenance:
+        report = {"report": _seen_from(folder, made.report)} if made.report else {}
+        head = {"tool": made.tool, "method": made.method, **report, **_lines("warnings", made.warnings)}
+        document["provenance"] = {**head, "inputs": dict(made.inputs)}
     return tomlkit.dumps(document)
 
 
@@ -93,33 +83,18 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
 def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
     value, interval = _rounded(getattr(vehicle.coefficients, name)), vehicle.intervals.get(name)
     entry = tomlkit.inline_table()
-    entry.append("value", value)
-    entry.append("unit", COEFFICIENTS[name].unit)
+    entry |= {"value": value, "unit": COEFFICIENTS[name].unit}
     if interval:
-        entry.append("interval", [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)])
-    entry.append("source", vehicle.sources[name])
+        entry["interval"] = [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)]
+    entry["source"] = vehicle.sources[name]
     return entry
 
 
-def _provenance(provenance: Provenance, folder: Path) -> Any:
-    table = tomlkit.table()
-    table.add("tool", provenance.tool)
-    table.add("method", provenance.method)
-    if provenance.report:
-        table.add("report", _seen_from(folder, provenance.report))
-    if provenance.warnings:
-        table.add("warnings", _lines(provenance.warnings))
-    inputs = tomlkit.table()
-    for name, digest in provenance.inputs.items():
-        inputs.add(name, digest)
-    table.add("inputs", inputs)
-    return table
-
-
-def _lines(texts: Iterable[str]) -> Array:
+def _lines(key: str, texts: Iterable[str]) -> dict[str, Array]:
+    """The texts a line each, where there are any."""
     lines = tomlkit.array().multiline(True)
     lines.extend(texts)
-    return lines
+    return {key: lines} if lines else {}
 
 
 def _seen_from(folder: Path, path: Path) -> str:
