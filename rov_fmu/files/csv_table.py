@@ -9,6 +9,7 @@ from math import isfinite, nan
 from pathlib import Path
 
 from rov_fmu.files.messages import FileError, brief, shown
+from rov_fmu.files.reading import read_text
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 _HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]+)\]")
@@ -93,13 +94,7 @@ def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = Fa
 
 def _csv_lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line that is not blank."""
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise DataFileError(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise DataFileError(f"{path}: not UTF-8 text, at byte {error.start}") from error
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    reader = csv.reader(io.StringIO(read_text(path, DataFileError), newline=""), strict=True)
     try:
         for cells in reader:
             if any(map(str.strip, cells)):

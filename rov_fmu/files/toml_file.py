@@ -2,12 +2,13 @@
 
 import sys
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo
 from pydantic_core import ErrorDetails
 
 from rov_fmu.files.messages import FileError, brief, shown
+from rov_fmu.files.reading import read_text
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -26,20 +27,11 @@ Checked = TypeVar("Checked", bound=Strict)
 
 def read_checked(path: Path, model: type[Checked], failure: type[FileError], **context: object) -> Checked:
     """Read a TOML file of the given form; `folder` and what else is given is the context. Raises `failure`."""
-    document = _read_toml(path, failure)
+    text = read_text(path, failure)
     try:
-        return model.model_validate(document, context={"folder": path.parent, **context})
+        return model.model_validate(tomllib.loads(text), context={"folder": path.parent, **context})
     except ValidationError as error:
         raise failure(*(f"{path}: {_problem(problem)}" for problem in error.errors())) from error
-
-
-def _read_toml(path: Path, failure: type[FileError]) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise failure(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise failure(f"{path}: not UTF-8 text, at byte {error.start}") from error
     except (ValueError, RecursionError) as error:
         raise failure(f"{path}: not TOML: {brief(str(error))}") from error
 

@@ -163,7 +163,7 @@ class _ResidualAnalysis:
         self.x, self._jacobian, self._model = solution.x, solution.jacobian, model
         r = solution.residuals
         self._inside = np.abs(r) <= _HUBER if loss == "huber" else np.ones(len(r), bool)
-        self._psi = np.where(self._inside, r, _HUBER * np.sign(r))
+        self._psi = np.clip(r, -_HUBER, _HUBER) if loss == "huber" else r
         self._variance = np.ones(len(r))  # of each psi, correlation counted; of the thrust curve it is 1
         self.simulations: list[Simulation] = []
         self.degrees_of_freedom = 2.0 * bool(model.thrust) - len(self.x)

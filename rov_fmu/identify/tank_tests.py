@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, ValidationInfo, create_model, model_validator
 
 from rov_fmu.files.csv_table import Column, DataFileError, read_columns
+from rov_fmu.files.reading import read_bytes
 from rov_fmu.files.toml_file import Strict, beside, pair, read_checked
 from rov_fmu.motion.rov import AXES, Axis
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -260,4 +261,4 @@ def _recording(path: Path, axis: Axis) -> Recording:
 
 
 def _hash(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_bytes(path, DataFileError)).hexdigest()

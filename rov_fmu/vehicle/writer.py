@@ -10,6 +10,7 @@ from tomlkit.items import Array, InlineTable
 
 from rov_fmu.files.messages import shown
 from rov_fmu.files.output import Output, write_whole
+from rov_fmu.files.reading import read_text
 from rov_fmu.motion.rov import COEFFICIENTS
 from rov_fmu.vehicle.vehicle import Head, Vehicle, VehicleFileError, load_vehicle
 
@@ -49,7 +50,7 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
 
     `reason` is the source of those that change. Raises as write_vehicle.
     """
-    document: Any = tomlkit.parse(source.read_text(encoding="utf-8-sig"))
+    document: Any = tomlkit.parse(read_text(source, VehicleFileError))
     if "coefficients" not in document:
         raise VehicleFileError(f"{source}: cannot be read a second time, as it must be to write it tuned")
     for name, exact in values.items():
