@@ -6,26 +6,27 @@ So a command acts one step after the depth that it answers to.
 Each function gives the outputs at the end of every step, named as "rov.z".
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from importlib import import_module
-from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from examples.systems import PARAMETER_SET
 from rov_fmu.motion import rov
 
 from .autopilot import Autopilot
-from .system import DEFAULT, OUTPUTS, STEP, STEPS, STOP, parameter_sets
+from .system import OUTPUTS, STEP, STEPS, STOP, parameter_sets, system_files
 
 Trajectory = dict[str, NDArray[np.float64]]
 NAMES = [(component, name) for component, names in OUTPUTS.items() for name in names]
 
 
-def plain(folder: Path, parameters: str, *, sequential: bool = False) -> Trajectory:  # noqa: ARG001
+def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
     """`rov_fmu.motion.rov` and the autopilot's class in a loop; sequential: the ROV gets the commands without delay."""
     values = parameter_sets()[parameters]
     names = rov.COEFFICIENTS
@@ -59,70 +60,44 @@ def fmpy(folder: Path, parameters: str) -> Trajectory:
     from fmpy.ssp.simulation import simulate_ssp
     from fmpy.ssp.ssd import Parameter, ParameterSet, read_ssd
 
-    path = str(folder / "videoray.ssp")
+    path = str(system_files(folder, parameters)[0])
     together = ParameterSet(name=parameters)
     for component in read_ssd(path).system.elements:
-        for binding in component.parameterBindings:
-            for values in binding.parameterValues:
-                if values.name == parameters:
-                    together.parameters += [
-                        Parameter(name=f"{component.name}.{p.name}", type=p.type, value=p.value)
-                        for p in values.parameters
-                    ]
+        for p in component.parameterBindings[0].parameterValues[0].parameters:
+            together.parameters.append(Parameter(name=f"{component.name}.{p.name}", type=p.type, value=p.value))
     result = simulate_ssp(path, stop_time=STOP, step_size=STEP, parameter_set=together)
     return {f"{c}.{name}": np.array(result[f"{c}.{name}"][:STEPS]) for c, name in NAMES}
 
 
-def libcosim_ssp(folder: Path, parameters: str) -> Trajectory:
-    """libcosim from the SSP archive."""
+def libcosim(folder: Path, parameters: str, *, osp: bool = False) -> Trajectory:
+    """libcosim from the SSP archive, or from the OSP configuration, connected by variable groups.
+
+    It counts time in nanoseconds, so its steps are off by the last bits, and with them the results.
+    """
     from libcosimpy.CosimExecution import CosimExecution
-
-    _warnings_only()
-    return _libcosim(CosimExecution.from_ssp_file(str(folder / "videoray.ssp")), parameters)
-
-
-def libcosim_osp(folder: Path, parameters: str) -> Trajectory:
-    """libcosim from the OSP configuration, connected by variable groups."""
-    from libcosimpy.CosimExecution import CosimExecution
-
-    _warnings_only()
-    return _libcosim(CosimExecution.from_osp_config_file(str(folder)), parameters)
-
-
-def _warnings_only() -> None:
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
-
-    log_output_level(CosimLogLevel.WARNING)
-
-
-def _libcosim(execution: Any, parameters: str) -> Trajectory:
-    """It counts time in nanoseconds, so its steps are off by the last bits, and with them the results."""
     from libcosimpy.CosimObserver import CosimObserver
 
+    log_output_level(CosimLogLevel.WARNING)
+    open_file = CosimExecution.from_osp_config_file if osp else CosimExecution.from_ssp_file
+    execution = open_file(str(system_files(folder, parameters)[osp]))
     index = {component: execution.slave_index_from_instance_name(component) for component in OUTPUTS}
     reference = {c: {v.name.decode(): v.reference for v in execution.slave_variables(i)} for c, i in index.items()}
-    if parameters != DEFAULT:  # no other can be chosen in Python, so its values are set over the default ones
-        for name, value in parameter_sets()[parameters]["rov"].items():
-            assert execution.real_initial_value(index["rov"], reference["rov"][name], value)
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
     rows = []
     for _ in range(STEPS):
         assert execution.step()
-        values = (
-            observer.last_real_values(index[component], [reference[component][name] for name in names])
-            for component, names in OUTPUTS.items()
-        )
-        rows.append([*chain.from_iterable(values)])
+        rows.append([observer.last_real_values(index[c], [reference[c][name]])[0] for c, name in NAMES])
     return _trajectory(rows)
 
 
 def ecos(folder: Path, parameters: str) -> Trajectory:
-    """Ecos from the SSP archive, with one of its parameter sets."""
+    """Ecos from the SSP archive; it takes the parameter sets of the name that it is given."""
     from ecospy import EcosSimulation
 
-    with EcosSimulation(ssp_path=str(folder / "videoray.ssp"), step_size=STEP) as simulation:
-        assert simulation.init(parameter_set=parameters)
+    with EcosSimulation(ssp_path=str(system_files(folder, parameters)[0]), step_size=STEP) as simulation:
+        assert simulation.init(parameter_set=PARAMETER_SET)
         rows = []
         for _ in range(STEPS):
             simulation.step()
@@ -131,9 +106,8 @@ def ecos(folder: Path, parameters: str) -> Trajectory:
     return _trajectory(rows)
 
 
-def _trajectory(rows: Iterable[list[float]]) -> Trajectory:
-    columns = np.array(list(rows)).T
-    return {f"{component}.{name}": column for (component, name), column in zip(NAMES, columns, strict=True)}
+def _trajectory(rows: Sequence[Sequence[float]]) -> Trajectory:
+    return {f"{component}.{name}": column for (component, name), column in zip(NAMES, np.array(rows).T, strict=True)}
 
 
 class Engine(NamedTuple):
@@ -153,7 +127,7 @@ class Engine(NamedTuple):
 
 ENGINES = {
     "FMPy, SSP": Engine(fmpy, "fmpy"),
-    "libcosim, SSP": Engine(libcosim_ssp, "libcosimpy.CosimExecution"),
-    "libcosim, OSP": Engine(libcosim_osp, "libcosimpy.CosimExecution"),
+    "libcosim, SSP": Engine(libcosim, "libcosimpy.CosimExecution"),
+    "libcosim, OSP": Engine(partial(libcosim, osp=True), "libcosimpy.CosimExecution"),
     "Ecos, SSP": Engine(ecos, "ecospy"),
 }

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rov_fmu.pages.svg import PALETTE
+from rov_fmu.pages.svg import LIGHT, svg_file
 
 from .engines import ENGINES, Trajectory, plain
 from .system import DEFAULT, MISSION, STEP, STEPS, build_system, parameter_sets
@@ -29,20 +28,24 @@ TIME = STEP * np.arange(1, STEPS + 1)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = argparse.ArgumentParser(prog="python -m examples.station_keeping.run", description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("build/station_keeping"),
+                        help="where the files of the system go (default: %(default)s)")  # fmt: skip
+    parser.add_argument("--figure", type=Path, metavar="FILE.svg", help="the picture (default: in that folder)")
+    options = parser.parse_args(arguments)
     folder: Path = options.folder
     build_system(folder)
     good, drawn = True, {}
     for parameters in parameter_sets():
         print(f"\n{parameters}")
-        expected = drawn[parameters] = plain(folder, parameters)
+        expected = drawn[parameters] = plain(parameters)
         good &= report("no engine", expected, expected)
         for name, engine in ENGINES.items():
             if reason := engine.missing():
                 print(f"  {name:<16}not run: {reason}")
                 continue
             good &= report(name, engine.run(folder, parameters), expected)
-        hasty = difference(plain(folder, parameters, sequential=True), expected)
+        hasty = difference(plain(parameters, sequential=True), expected)
         print("  a master that steps one after the other would differ by up to "
               f"{1000 * hasty['rov.z']:.1f} mm and {degrees(hasty['rov.psi']):.2f} deg")  # fmt: skip
     figure = options.figure or folder / "station_keeping.svg"
@@ -75,68 +78,40 @@ def held(result: Trajectory) -> tuple[float, float]:
 
 
 def draw(results: Mapping[str, Trajectory], path: Path) -> None:
-    """Depth, heading, track and commands, to an SVG or PNG file."""
-    color = {role: light for role, (light, _) in PALETTE.items()}
-    style = {
-        "svg.hashsalt": "station keeping",
-        "svg.fonttype": "none",
-        "font.size": 9.5,
-        "text.color": color["ink"],
-        "axes.labelcolor": color["muted"],
-        "axes.edgecolor": color["muted"],
-        "axes.grid": True,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.titlesize": 10.5,
-        "axes.titleweight": "bold",
-        "grid.color": color["rule"],
-        "grid.linewidth": 0.6,
-        "xtick.color": color["muted"],
-        "ytick.color": color["muted"],
-        "legend.frameon": False,
-        "legend.fontsize": 8.5,
-    }
-    with rc_context(style):
-        figure = Figure(figsize=(8.6, 6.4), layout="constrained", facecolor=color["page"])
-        axes: Sequence[Axes] = figure.subplots(2, 2).flat
+    """Depth, heading, track and commands, to an SVG file."""
+
+    def drawn(figure: Figure) -> None:
+        depth, heading, track, commands = axes = list(figure.subplots(2, 2).flat)
+        blue = {"color": LIGHT["blue"]}
+        t = TIME[::6]
         for parameters, result in results.items():
-            line: Any = {"linewidth": 1.6} if parameters == DEFAULT else {"linewidth": 1.1, "linestyle": "--"}
-            label = "Table 9" if parameters == DEFAULT else "α = β = 1"
             few = {name: values[::6] for name, values in result.items()}
-            t = TIME[::6]
-            axes[0].plot(t, few["rov.z"], color=color["blue"], label=label, **line)
-            axes[1].plot(t, np.degrees(few["rov.psi"]), color=color["blue"], label=label, **line)
-            axes[2].plot(few["rov.y"], few["rov.x"], color=color["blue"], label=label, **line)
+            line: dict[str, Any] = {"linewidth": 1.1, "linestyle": "--", "label": "α = β = 1"}
+            if parameters == DEFAULT:
+                line = {"linewidth": 1.6, "label": "Table 9"}
+            depth.plot(t, few["rov.z"], **blue, **line)
+            heading.plot(t, np.degrees(few["rov.psi"]), **blue, **line)
+            track.plot(few["rov.y"], few["rov.x"], **blue, **line)
             for name, role in (("u_l", "teal"), ("u_r", "violet"), ("u_t", "orange")):
-                command = 100.0 * few[f"autopilot.{name}"]
-                axes[3].plot(t, command, color=color[role], label=name if label == "Table 9" else None, **line)
-        wanted: Any = {"color": color["orange"], "linewidth": 1.3, "linestyle": ":", "label": "reference model"}
-        axes[0].plot(t, few["autopilot.z_d"], **wanted)
-        axes[1].plot(t, np.degrees(few["autopilot.psi_d"]), **wanted)
-        _finish(axes[0], "Depth", "time (s)", "z (m)")
-        axes[0].invert_yaxis()
-        _finish(axes[1], "Heading", "time (s)", "ψ (deg)")
-        axes[1].set_yticks(np.arange(0.0, degrees(pi / 2) + 1.0, 15.0))
-        _finish(axes[2], "Track", "east y (m)", "north x (m)")
-        axes[2].plot(0.0, 0.0, "o", color=color["blue"], markersize=4.5)
-        axes[2].set_aspect("equal", adjustable="datalim")
-        _finish(axes[3], "Commands", "time (s)", "%")
-        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None, dpi=150)
+                line["label"] = name if parameters == DEFAULT else None
+                commands.plot(t, 100.0 * few[f"autopilot.{name}"], color=LIGHT[role], **line)
+        wanted: Any = {"color": LIGHT["orange"], "linewidth": 1.3, "linestyle": ":", "label": "reference model"}
+        depth.plot(t, few["autopilot.z_d"], **wanted)
+        heading.plot(t, np.degrees(few["autopilot.psi_d"]), **wanted)
+        heading.set_yticks(np.arange(0.0, degrees(pi / 2) + 1.0, 15.0))
+        track.plot(0.0, 0.0, "o", markersize=4.5, **blue)
+        track.set_aspect("equal", adjustable="datalim")
+        time = "time (s)"
+        titles = (("Depth", time, "z (m)"), ("Heading", time, "ψ (deg)"), ("Track", "east y (m)", "north x (m)"),
+                  ("Commands", time, "%"))  # fmt: skip
+        ax: Axes
+        for ax, (title, x, y) in zip(axes, titles, strict=True):
+            ax.set_title(title, loc="left")
+            ax.set(xlabel=x, ylabel=y)
+            ax.legend()
+        depth.invert_yaxis()
 
-
-def _finish(ax: Axes, title: str, x: str, y: str) -> None:
-    ax.set_title(title, loc="left")
-    ax.set_xlabel(x)
-    ax.set_ylabel(y)
-    ax.legend()
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m examples.station_keeping.run", description=__doc__)
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("build/station_keeping"),
-                        help="where the files of the system go (default: %(default)s)")  # fmt: skip
-    parser.add_argument("--figure", type=Path, metavar="FILE", help="SVG or PNG (default: in that folder)")
-    return parser
+    path.write_text(svg_file(drawn, (8.6, 6.4), salt="station keeping", background=LIGHT["page"]), encoding="utf-8")
 
 
 if __name__ == "__main__":

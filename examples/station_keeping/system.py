@@ -1,4 +1,4 @@
-"""The system of ROV and autopilot as files: two FMUs, videoray.ssp, and a folder with an OSP configuration."""
+"""The system of ROV and autopilot as files: two FMUs; an SSP archive and an OSP configuration a parameter set."""
 
 import shutil
 import subprocess
@@ -7,12 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from math import pi
 from pathlib import Path
-from typing import Any
-from zipfile import ZipFile
 
-from lxml import etree
-from lxml.builder import ElementMaker
-
+from examples.systems import Component, System, write_osp, write_ssp
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -22,7 +18,7 @@ STOP = 60.0  # s
 STEP = 0.05  # s, between two communication points
 STEPS = round(STOP / STEP)
 
-DEFAULT = "table9"  # the parameter set that engines take by default
+DEFAULT = "table9"
 
 Values = Mapping[str, float | bool]
 
@@ -42,6 +38,7 @@ CONNECTIONS = {
 # The same by the groups of the OSP model descriptions.
 GROUPS = ("depth", "heading", "thruster_commands")
 
+FMUS = {"rov": "videoray.fmu", "autopilot": "Autopilot.fmu"}
 OUTPUTS = {
     "rov": ("x", "y", "z", "psi", "u", "w", "r"),
     "autopilot": ("u_l", "u_r", "u_t", "z_d", "psi_d"),
@@ -58,6 +55,15 @@ def parameter_sets() -> dict[str, dict[str, Values]]:
     }
 
 
+def system_files(folder: Path, parameters: str) -> tuple[Path, Path]:
+    """The SSP archive and the OSP configuration of a parameter set; what tools look for holds the default one.
+
+    A parameter set is a system of its own: of several, tools take another one each, and they open one .ssd an archive.
+    """
+    suffix = "" if parameters == DEFAULT else f"_{parameters}"
+    return folder / f"videoray{suffix}.ssp", folder / f"OspSystemStructure{suffix}.xml"
+
+
 def build_system(folder: Path) -> None:
     """Write all files. Raises RuntimeError where an FMU cannot be built."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -66,123 +72,15 @@ def build_system(folder: Path) -> None:
     build = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "autopilot.py"), "-d", str(folder)]
     subprocess.run(build, check=True)
     shutil.copy(HERE / "Autopilot_OspModelDescription.xml", folder)
-    write_ssp(folder / "videoray.ssp", {"rov": folder / "videoray.fmu", "autopilot": folder / "Autopilot.fmu"})
-    (folder / "OspSystemStructure.xml").write_bytes(osp_system_structure(parameter_sets()[DEFAULT]))
-
-
-# ---- SSP 1.0 -------------------------------------------------------------------------------------------------------
-
-# libcosim and Ecos look for these prefixes.
-_SSP = {
-    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
-    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
-    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
-    "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
-}
-_ssd, _ssc, _ssv, _osp = (ElementMaker(namespace=_SSP[prefix], nsmap=_SSP) for prefix in _SSP)
-
-
-def write_ssp(path: Path, fmus: Mapping[str, Path]) -> None:
-    """Write the SSP archive: the structure, a parameter set for each way to tune the ROV, the FMUs."""
-    with ZipFile(path, "w") as archive:
-        archive.writestr("SystemStructure.ssd", _document(system_structure(fmus)))
-        for name, values in parameter_sets().items():
-            archive.writestr(f"resources/{name}.ssv", _document(_parameter_set(name, values["rov"])))
-        for fmu in fmus.values():
-            archive.write(fmu, f"resources/{fmu.name}")
-
-
-def system_structure(fmus: Mapping[str, Path]) -> Any:
-    """SystemStructure.ssd: only connected inputs are connectors, for FMPy sets every one of them at every step."""
-    inputs = list(CONNECTIONS.values())
-    sets = parameter_sets()
-    # The set of the whole system has one name in all components, for Ecos takes one name.
-    bindings = {
-        "rov": [_ssd.ParameterBinding(source=f"resources/{name}.ssv") for name in sets],
-        "autopilot": [
-            _ssd.ParameterBinding(_ssd.ParameterValues(_parameter_set(name, values["autopilot"])))
-            for name, values in sets.items()
-        ],
-    }
-    components = [
-        _ssd.Component(
-            _ssd.Connectors(
-                *(_connector(name, "input") for element, name in inputs if element == component),
-                *(_connector(name, "output") for name in OUTPUTS[component]),
-            ),
-            _ssd.ParameterBindings(*bindings[component]),
-            name=component,
-            source=f"resources/{fmu.name}",
-            type="application/x-fmu-sharedlibrary",
-        )
-        for component, fmu in fmus.items()
-    ]
-    connections = [
-        _ssd.Connection(startElement=start[0], startConnector=start[1], endElement=end[0], endConnector=end[1])
-        for start, end in CONNECTIONS.items()
-    ]
-    algorithm = _osp.Algorithm(_osp.FixedStepAlgorithm(baseStepSize=repr(STEP)))
-    return _ssd.SystemStructureDescription(
-        _ssd.System(_ssd.Elements(*components), _ssd.Connections(*connections), name="station_keeping"),
-        _ssd.DefaultExperiment(
-            _ssd.Annotations(_ssc.Annotation(algorithm, type="com.opensimulationplatform")),
-            startTime="0.0",
-            stopTime=repr(STOP),
-        ),
-        name="station_keeping",
-        version="1.0",
-    )
-
-
-def _connector(name: str, kind: str) -> Any:
-    return _ssd.Connector(_ssc.Real(), name=name, kind=kind)
-
-
-def _parameter_set(name: str, values: Values) -> Any:
-    parameters = (_ssv.Parameter(_ssv(*_typed(value)), name=variable) for variable, value in values.items())
-    return _ssv.ParameterSet(_ssv.Parameters(*parameters), name=name, version="1.0")
-
-
-# ---- OSP -----------------------------------------------------------------------------------------------------------
-
-_ose = ElementMaker(
-    namespace="http://opensimulationplatform.com/MSMI/OSPSystemStructure",
-    nsmap={None: "http://opensimulationplatform.com/MSMI/OSPSystemStructure"},
-)
-
-
-def osp_system_structure(values: Mapping[str, Values]) -> bytes:
-    """OspSystemStructure.xml, for the folder with the FMUs and their OSP model descriptions."""
-    simulators = (
-        _ose.Simulator(
-            _ose.InitialValues(
-                *(_ose.InitialValue(_ose(*_typed(value)), variable=name) for name, value in values[component].items())
-            ),
-            name=component,
-            source=source,
-        )
-        for component, source in (("rov", "videoray.fmu"), ("autopilot", "Autopilot.fmu"))
-    )
-    connections = (
-        _ose.VariableGroupConnection(*(_ose.VariableGroup(simulator=s, name=group) for s in ("rov", "autopilot")))
-        for group in GROUPS
-    )
-    return _document(
-        _ose.OspSystemStructure(
-            _ose.StartTime("0.0"),
-            _ose.BaseStepSize(repr(STEP)),
-            _ose.Algorithm("fixedStep"),
-            _ose.Simulators(*simulators),
-            _ose.Connections(*connections),
-            version="0.1",
-        )
-    )
-
-
-def _typed(value: float | bool) -> tuple[str, dict[str, str]]:
-    """The element of a value, as both formats have it."""
-    return ("Boolean", {"value": str(value).lower()}) if isinstance(value, bool) else ("Real", {"value": repr(value)})
-
-
-def _document(root: Any) -> bytes:
-    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+    for parameters, values in parameter_sets().items():
+        # Only connected inputs are connectors, for FMPy sets every one of them at every step.
+        components = {
+            name: Component(
+                folder / fmu, values[name], [v for c, v in CONNECTIONS.values() if c == name], OUTPUTS[name]
+            )
+            for name, fmu in FMUS.items()
+        }
+        system = System("station_keeping", components, STEP, STOP, CONNECTIONS, GROUPS)
+        ssp, osp = system_files(folder, parameters)
+        write_ssp(ssp, system)
+        write_osp(osp, system)

@@ -9,14 +9,24 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
-from fmpy.ssp.ssd import read_ssd, read_ssv
+from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
 
 from checks.fmi2 import keep_loaded
 from examples.station_keeping import run
 from examples.station_keeping.autopilot import Thruster
 from examples.station_keeping.engines import ENGINES, NAMES, Trajectory, plain
-from examples.station_keeping.system import DEFAULT, GROUPS, MISSION, SEA, STEP, build_system, parameter_sets
+from examples.station_keeping.system import (
+    DEFAULT,
+    GROUPS,
+    MISSION,
+    SEA,
+    STEP,
+    build_system,
+    parameter_sets,
+    system_files,
+)
+from examples.systems import PARAMETER_SET
 from rov_fmu.motion.rov import thruster_force
 
 SETS = tuple(parameter_sets())
@@ -221,8 +231,8 @@ def test_a_compass_may_wrap(start: Start) -> None:
 
 
 @pytest.fixture(scope="module", params=SETS)
-def expected(request: pytest.FixtureRequest, folder: Path) -> tuple[str, Trajectory]:
-    return request.param, plain(folder, request.param)
+def expected(request: pytest.FixtureRequest) -> tuple[str, Trajectory]:
+    return request.param, plain(request.param)
 
 
 def agree(result: Trajectory, expected: Trajectory) -> None:
@@ -242,17 +252,17 @@ def test_fmpy_holds_and_agrees(folder: Path, expected: tuple[str, Trajectory]) -
     assert result["rov.z"].max() < 5.0 + 0.02  # and not beyond
 
 
-def test_the_parameter_sets_make_a_difference(folder: Path) -> None:
-    apart = run.difference(*(plain(folder, name) for name in SETS))
+def test_the_parameter_sets_make_a_difference() -> None:
+    apart = run.difference(*(plain(name) for name in SETS))
     assert apart["rov.z"] > 1e-3
     assert degrees(apart["rov.psi"]) > 1.0
 
 
-def test_the_order_of_stepping_makes_a_difference(folder: Path, expected: tuple[str, Trajectory]) -> None:
+def test_the_order_of_stepping_makes_a_difference(expected: tuple[str, Trajectory]) -> None:
     parameters, trajectory = expected
-    apart = run.difference(plain(folder, parameters, sequential=True), trajectory)
+    apart = run.difference(plain(parameters, sequential=True), trajectory)
     assert 1e-3 < apart["rov.z"] < 1e-2
-    assert max(run.held(plain(folder, parameters, sequential=True))) < 0.02  # it is held all the same
+    assert max(run.held(plain(parameters, sequential=True))) < 0.02  # it is held all the same
 
 
 def test_a_load_that_comes_on_is_held(start: Start) -> None:
@@ -276,11 +286,13 @@ def test_a_load_that_comes_on_is_held(start: Start) -> None:
 # ---- The files -------------------------------------------------------------------------------------------------------
 
 
-def test_the_ssp_is_one_that_engines_read(folder: Path) -> None:
-    path = folder / "videoray.ssp"
+@pytest.mark.parametrize("parameters", SETS)
+def test_the_ssp_is_one_that_engines_read(folder: Path, parameters: str) -> None:
+    path = system_files(folder, parameters)[0]
     system = read_ssd(str(path)).system  # checked against the schemas of SSP 1.0
     assert system.connectors == []
     with zipfile.ZipFile(path) as archive:
+        assert [name for name in archive.namelist() if name.endswith(".ssd")] == ["SystemStructure.ssd"]
         text = archive.read("SystemStructure.ssd").decode()
         assert "<ssd:SystemStructureDescription" in text
         assert "<ssc:Real" in text
@@ -290,22 +302,56 @@ def test_the_ssp_is_one_that_engines_read(folder: Path) -> None:
     assert {(e.name, c.name) for e in system.elements for c in e.connectors if c.kind == "input"} == ends
 
 
-def test_the_parameter_sets_of_the_ssp(folder: Path) -> None:
-    path = str(folder / "videoray.ssp")
-    table9, untuned = (
-        {p.name: float(p.value) for p in read_ssv(path, resource=f"resources/{name}.ssv").parameters} for name in SETS
-    )
+@pytest.mark.parametrize("parameters", SETS)
+def test_a_component_has_one_parameter_binding(folder: Path, parameters: str) -> None:
+    with zipfile.ZipFile(system_files(folder, parameters)[0]) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    validate_tree(root, "SystemStructureDescription.xsd")
+    bindings = [len(list(component.iter("{*}ParameterBinding"))) for component in root.iter("{*}Component")]
+    assert bindings == [1, 1]
+    assert len(list(root.iter("{*}ParameterBinding"))) == 2, "and none beside those of the components"
+    sets = list(root.iter("{*}ParameterSet"))
+    assert [s.get("name") for s in sets] == [PARAMETER_SET] * 2, "Ecos takes those of one name"
+    for values in sets:
+        validate_tree(values, "SystemStructureParameterValues.xsd")
+
+
+@pytest.mark.parametrize("parameters", SETS)
+def test_omsimulator_finds_a_master_with_fixed_steps(folder: Path, parameters: str) -> None:
+    with zipfile.ZipFile(system_files(folder, parameters)[0]) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    # It looks for literal tags, and at the system's first annotation only.
+    tags = {element: f"{element.prefix}:{etree.QName(element).localname}" for element in root.iter(etree.Element)}
+    found = next(element for element in root if tags[element] == "ssd:System")
+    for tag in ("ssd:Annotations", "ssc:Annotation", "oms:Annotations", "oms:SimulationInformation",
+                "oms:FixedStepMaster"):  # fmt: skip
+        found = next(element for element in found if tags[element] == tag)
+        assert tag != "ssc:Annotation" or found.get("type") == "org.openmodelica"
+    assert dict(found.attrib) == {"description": "oms-ma", "stepSize": "0.05", "relativeTolerance": "1e-4"}
+
+
+def test_the_parameter_sets_of_the_two_systems(folder: Path) -> None:
+    def values(parameters: str) -> dict[str, dict[str, str]]:
+        system = read_ssd(str(system_files(folder, parameters)[0])).system
+        return {c.name: {p.name: p.value for p in c.parameterBindings[0].parameterValues[0].parameters}
+                for c in system.elements}  # fmt: skip
+
+    default, other = (values(name) for name in SETS)
+    assert SETS[0] == DEFAULT
+    assert default["autopilot"] == other["autopilot"]
+    assert {
+        name: float(default["autopilot"][name]) for name in ("z_ref", "psi_ref", "surge")
+    }.items() <= MISSION.items()
+    table9, untuned = ({name: float(value) for name, value in given["rov"].items()} for given in (default, other))
     tuning = {f"{letter}_{axis}" for letter in ("alpha", "beta") for axis in "uwr"}
     assert {name for name in table9 if table9[name] != untuned[name]} == tuning - {"beta_u"}  # 1 in Table 9
     assert {untuned[name] for name in tuning} == {1.0}
     assert SEA.items() <= table9.items()
-    for component in read_ssd(path).system.elements:
-        sets = [values.name for binding in component.parameterBindings for values in binding.parameterValues]
-        assert sets == [DEFAULT, SETS[1]]  # libcosim takes the first
 
 
-def test_the_groups_of_the_osp_configuration_fit(folder: Path) -> None:
-    root = etree.parse(str(folder / "OspSystemStructure.xml")).getroot()
+@pytest.mark.parametrize("parameters", SETS)
+def test_the_groups_of_the_osp_configuration_fit(folder: Path, parameters: str) -> None:
+    root = etree.parse(str(system_files(folder, parameters)[1])).getroot()
     assert [e.get("name") for e in root.iter("{*}VariableGroup")] == [name for name in GROUPS for _ in range(2)]
     causality = []
     for model, fmu in (("videoray", "videoray.fmu"), ("Autopilot", "Autopilot.fmu")):
@@ -321,16 +367,16 @@ def test_the_groups_of_the_osp_configuration_fit(folder: Path) -> None:
     assert [[opposite[c] for c in group] for group in causality[0]] == causality[1]
 
 
-def test_the_stick_balances_current_and_tether(folder: Path) -> None:
-    result = plain(folder, DEFAULT)
+def test_the_stick_balances_current_and_tether() -> None:
+    result = plain(DEFAULT)
     assert result["rov.u"][-1] == pytest.approx(-SEA["V_E"], abs=0.01)
     assert MISSION["psi_ref"] == pytest.approx(pi / 2)
     assert sin(result["rov.psi"][-1]) == pytest.approx(1.0)  # it faces the current
 
 
-def test_the_picture_shows_all_four(folder: Path, tmp_path: Path) -> None:
+def test_the_picture_shows_all_four(tmp_path: Path) -> None:
     path = tmp_path / "picture.svg"
-    run.draw({name: plain(folder, name) for name in SETS}, path)
+    run.draw({name: plain(name) for name in SETS}, path)
     text = path.read_text(encoding="utf-8")
     for title in ("Depth", "Heading", "Track", "Commands", "Table 9", "α = β = 1", "reference model"):
         assert f">{title}<" in text
