@@ -3,13 +3,13 @@
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from rov_fmu import cli
 
@@ -23,8 +23,16 @@ STYLES = {Verdict.DIFFERS: "red", Verdict.FAILED: "red", Verdict.NOT_RUN: "yello
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code: 0 all that ran agree, 1 one does not, 2 bad arguments."""
-    options = _parser().parse_args(arguments)
-    console = Console()
+    parser = argparse.ArgumentParser(prog="python -m interop", description=__doc__)
+    add = parser.add_argument
+    add("names", nargs="*", metavar="NAME", help=f"importer (see --list) or kit: {', '.join(KITS)}; what is named must "
+        "run (default: all that are installed)")  # fmt: skip
+    add("--fmu", type=Path, metavar="FILE", help="FMU of the VideoRay (default: built for this)")
+    add("--install", action="store_true", help="install the kits instead of running (Linux)")
+    add("--list", action="store_true", help="list the importers instead of running them")
+    add("--tools", type=Path, default=HERE / ".tools", metavar="FOLDER", help="where the importers are installed "
+        "(default: interop/.tools)")  # fmt: skip
+    options = parser.parse_args(arguments)
     try:
         importers = chosen(options.names)
         if options.fmu and not options.fmu.is_file():
@@ -32,17 +40,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except LookupError as error:
         print(f"interop: {error.args[0]}", file=sys.stderr)
         return 2
-    tools = options.tools.resolve()
+    tools, console = options.tools.resolve(), Console(highlight=False)
     if options.list:
         for importer in importers:
             print(f"{importer.name:<14}{importer.kit:<8}{importer.title} {importer.version}, {importer.interface}")
         return 0
     if options.install:
-        return _install(dict.fromkeys(importer.kit for importer in importers), tools, console)
+        # All kits, whether or not one fails.
+        return max([_install(kit, tools, console) for kit in dict.fromkeys(importer.kit for importer in importers)])
     with tempfile.TemporaryDirectory() as folder:
         fmu = options.fmu or _built(Path(folder))
-        expected = reference()
-        outcomes = []
+        expected, outcomes = reference(), []
         for importer in importers:
             with console.status(f"{importer.title}, {importer.interface}"):
                 outcomes.append(run(importer, fmu, tools, expected))
@@ -52,16 +60,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(any(outcome.verdict in bad for outcome in outcomes))
 
 
-def _install(kits: Iterable[str], tools: Path, console: Console) -> int:
-    code = 0
-    for kit in kits:
-        try:
-            with console.status(f"installing {kit}"):
-                install(kit, tools, lambda text: console.print(text, highlight=False))
-        except InstallError as error:
-            print(f"interop: {error}", file=sys.stderr)
-            code = 1
-    return code
+def _install(kit: str, tools: Path, console: Console) -> int:
+    try:
+        with console.status(f"installing {kit}"):
+            install(kit, tools, console.print)
+    except InstallError as error:
+        print(f"interop: {error}", file=sys.stderr)
+        return 1
+    return 0
 
 
 def _built(folder: Path) -> Path:
@@ -74,12 +80,8 @@ def _built(folder: Path) -> Path:
 
 
 def _show(outcomes: Sequence[Outcome], console: Console) -> None:
-    table = Table(title="The same manoeuvre, 30 s, in every importer; SI units", title_justify="left")
-    table.add_column("importer")
-    table.add_column("version")
-    table.add_column("FMI interface")
-    table.add_column("max. difference", justify="right")
-    table.add_column("verdict")
+    table = Table("importer", "version", "FMI interface", Column("max. difference", justify="right"), "verdict",
+                  title="The same manoeuvre, 30 s, in every importer; SI units", title_justify="left")  # fmt: skip
     for outcome in outcomes:
         importer, size = outcome.importer, outcome.difference
         shown = "" if size is None else f"{size:.1e}" if size else "0"
@@ -88,22 +90,9 @@ def _show(outcomes: Sequence[Outcome], console: Console) -> None:
     console.print(table)
     for outcome in outcomes:
         if outcome.reason:
-            console.print(f"{outcome.importer.name} {outcome.verdict.value}: {outcome.reason}", highlight=False)
+            console.print(f"{outcome.importer.name} {outcome.verdict.value}: {outcome.reason}")
         for line in outcome.log.strip().splitlines()[-15:]:
-            console.print(f"    {line}", highlight=False, markup=False)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m interop", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME",
-                        help=f"importer (see --list) or kit: {', '.join(KITS)}; what is named must run "
-                             "(default: all that are installed)")  # fmt: skip
-    parser.add_argument("--fmu", type=Path, metavar="FILE", help="FMU of the VideoRay (default: built for this)")
-    parser.add_argument("--install", action="store_true", help="install the kits instead of running (Linux)")
-    parser.add_argument("--list", action="store_true", help="list the importers instead of running them")
-    parser.add_argument("--tools", type=Path, default=HERE / ".tools", metavar="FOLDER",
-                        help="where the importers are installed (default: interop/.tools)")  # fmt: skip
-    return parser
+            console.print(f"    {line}", markup=False)
 
 
 if __name__ == "__main__":

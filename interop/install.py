@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from .importers import HERE, IMPORTERS, RUNNERS, Importer
+from .importers import HERE, IMPORTERS, RUNNERS, Importer, environment
 from .run import without_places
 
 # What each kit takes from the system, and the Debian packages that have it.
@@ -41,8 +41,9 @@ def _install(kit: str, programs: tuple[str, ...], tools: Path, say: Callable[[st
     if not wanted:
         say(f"{kit}: all is there")
     elif kit == "python":
-        say(f"{kit}: requirements.txt")
-        _install_python(tools)
+        for requirements in dict.fromkeys(file for file, _ in wanted):
+            say(f"{kit}: {requirements}")
+            _install_python(requirements, tools)
     else:
         for importer in wanted.values():
             say(f"{kit}: {importer.title} {importer.version}")
@@ -51,11 +52,11 @@ def _install(kit: str, programs: tuple[str, ...], tools: Path, say: Callable[[st
         raise InstallError(f"{absent[0]} was installed, but is not where it is looked for")
 
 
-def _install_python(tools: Path) -> None:
-    environment = tools / "python"
-    _call([sys.executable, "-m", "venv", "--clear", str(environment)], tools)
-    pip = [str(environment / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    _call([*pip, "-r", str(HERE / "requirements.txt")], tools)
+def _install_python(requirements: str, tools: Path) -> None:
+    place = tools / environment(requirements)
+    _call([sys.executable, "-m", "venv", "--clear", str(place)], tools)
+    pip = [str(place / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    _call([*pip, "-r", str(HERE / requirements)], tools)
 
 
 def _install_java(importer: Importer, tools: Path) -> None:

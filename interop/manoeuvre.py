@@ -27,16 +27,8 @@ STEP = 1.0 / POINTS_A_SECOND
 DETOUR = 15.0
 OUTPUTS = tuple(f.name for f in (*fields(State), *fields(Thrust)))
 
-PARAMETERS = {
-    "m_rov": 7.2,
-    "I_r": 0.12,
-    "a_d_u": 3.5,
-    "b_d_w": 0.9,
-    "alpha_u": 1.0,
-    "beta_w": 0.7,
-    "alpha_r": 1.1,
-    "beta_r": 0.25,
-}
+PARAMETERS = {"m_rov": 7.2, "I_r": 0.12, "a_d_u": 3.5, "b_d_w": 0.9,
+              "alpha_u": 1.0, "beta_w": 0.7, "alpha_r": 1.1, "beta_r": 0.25}  # fmt: skip
 
 # The inputs from each time (s) on. They start with rest, so that it does not matter when the first ones are set.
 PHASES = {

@@ -1,7 +1,7 @@
-"""The files of the manoeuvre, for the runners in Python (standard library only)."""
+"""The files of the manoeuvre and the loop over its steps, for the runners in Python (standard library only)."""
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -21,25 +21,41 @@ class Step:
     inputs: dict[str, float]
     detour: bool
 
+    @property
+    def length(self) -> float:
+        """What is left between the two communication points (s)."""
+        return self.end - self.start
+
 
 def parameters() -> dict[str, float]:
     """The parameters to set before the initialization."""
-    with Path("parameters.csv").open(newline="") as file:
-        return {row["name"]: float(row["value"]) for row in csv.DictReader(file)}
+    return {row["name"]: float(row["value"]) for row in _read("parameters.csv")}
 
 
-def steps() -> Iterator[Step]:
+def steps() -> list[Step]:
     """The communication steps."""
-    with Path("manoeuvre.csv").open(newline="") as file:
-        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    for row, following in pairwise(rows):
-        detour, start = row.pop("detour"), row.pop("time")
-        yield Step(start, following["time"], row, bool(detour))
+    rows = [{name: float(value) for name, value in row.items()} for row in _read("manoeuvre.csv")]
+    return [Step(row.pop("time"), after["time"], row, bool(row.pop("detour"))) for row, after in pairwise(rows)]
 
 
-def write(rows: list[dict[str, float]], path: str = "result.csv") -> None:
-    """Write time and outputs; the first row holds the names."""
+def fly(
+    advance: Callable[[Step], object], outputs: Callable[[], Sequence[float]], files: Sequence[str] = ("result.csv",)
+) -> None:
+    """Take every step and write all outputs, those of one ROV after the other, to a file for each ROV."""
+    rows = [(0.0, outputs())]
+    for step in steps():
+        advance(step)
+        rows.append((step.end, outputs()))
+    for n, path in enumerate(files):
+        write(([time, *values[n * len(OUTPUTS) : (n + 1) * len(OUTPUTS)]] for time, values in rows), path)
+
+
+def write(rows: Iterable[Iterable[float]], path: str = "result.csv") -> None:
+    """Write rows of time and outputs."""
     with Path(path).open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
+        csv.writer(file).writerows([("time", *OUTPUTS), *rows])
+
+
+def _read(path: str) -> list[dict[str, str]]:
+    with Path(path).open(newline="") as file:
+        return list(csv.DictReader(file))

@@ -1,7 +1,8 @@
-"""Independent importers fly the manoeuvre as `models.dynamics` does, and the harness notices where one does not."""
+"""Independent importers fly the manoeuvre as `rov_fmu.motion.rov` does, and the harness notices where one does not."""
 
 import csv
 import re
+import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import astuple, fields, replace
@@ -13,6 +14,7 @@ import pytest
 
 from interop.__main__ import main
 from interop.importers import EXACT, HERE, IMPORTERS, KITS, RUNNERS, Importer, pinned
+from interop.install import install
 from interop.manoeuvre import (
     DETOUR,
     OUTPUTS,
@@ -207,19 +209,47 @@ def test_importer_is_pinned_and_its_runner_is_there(importer: Importer) -> None:
             assert Path(part).is_file()
 
 
-def test_every_requirement_is_pinned() -> None:
-    lines = [line for line in (HERE / "requirements.txt").read_text().splitlines() if not line.startswith("#")]
+@pytest.mark.parametrize("file", sorted(HERE.glob("requirements*.txt")), ids=lambda file: file.name)
+def test_every_requirement_is_pinned(file: Path) -> None:
+    lines = [line for line in file.read_text().splitlines() if not line.startswith("#")]
     assert lines
     assert all(re.fullmatch(r"[\w-]+==[\d.]+( +#.*)?", line) for line in lines)
     with pytest.raises(LookupError):
         pinned("requirements.txt", "fmp")
 
 
+def test_no_environment_is_cleared_for_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+
+    def call(command: list[str], tools: Path) -> None:
+        calls.append(command)
+        for importer in IMPORTERS if "-r" in command else ():
+            if importer.kit == "python" and command[-1] == str(HERE / importer.pin[0]):
+                place = tools / importer.proof.format(version=importer.version).replace("*", ".11")
+                place.mkdir(parents=True, exist_ok=True)
+
+    monkeypatch.setattr("interop.install._call", call)
+    said: list[str] = []
+    install("python", tmp_path, said.append)
+    made = [command[-1] for command in calls if "venv" in command]
+    files = [command[-1] for command in calls if "-r" in command]
+    assert made == [str(tmp_path / name) for name in ("python", "python-cofmupy")]
+    assert files == [str(HERE / name) for name in ("requirements.txt", "requirements-cofmupy.txt")]
+    for importer in IMPORTERS:
+        if importer.kit == "python":
+            assert importer.is_installed(tmp_path)
+            assert Path(importer.command_line(tmp_path)[0]).parent.parent in {Path(place) for place in made}
+    calls.clear()
+    shutil.rmtree(tmp_path / "python-cofmupy")
+    install("python", tmp_path, said.append)
+    assert [command[-1] for command in calls if "venv" in command] == [str(tmp_path / "python-cofmupy")]
+
+
 def test_no_registry_is_named() -> None:
     files = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "interop"],
                            cwd=HERE.parent, capture_output=True, text=True, check=True).stdout.split()  # fmt: skip
     assert files
-    known = {"maven.apache.org", "ssp-standard.org", "opensimulationplatform.com"}  # XML name spaces
+    known = {"maven.apache.org"}  # an XML name space
     for name in files:
         hosts = set(re.findall(r"\w+://([^/\s\"']+)", (HERE.parent / name).read_text()))
         assert Path(name).name != "Cargo.lock"
