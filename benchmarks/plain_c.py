@@ -1,6 +1,5 @@
 """What is measured in plain C: built with the compiler of the FMU, and called in this process (Linux on x86-64)."""
 
-import asyncio
 import ctypes
 import platform
 import sys
@@ -46,7 +45,7 @@ class PlainC:
     def __init__(self, vehicle: Vehicle, folder: Path) -> None:
         content = native_content(vehicle)
         fmu = folder / f"{content.identifier}{PLATFORMS[PLATFORM].suffix}"
-        fmu.write_bytes(asyncio.run(compile_all([PLATFORM], content.sources, content.identifier))[PLATFORM])
+        fmu.write_bytes(compile_all([PLATFORM], content.sources, content.identifier)[PLATFORM])
 
         def load(name: str, *flags: str) -> Any:
             output = folder / f"{name}.so"

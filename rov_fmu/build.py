@@ -1,9 +1,7 @@
 """From a vehicle to its FMU: page and content made, compiled, written, validated and run."""
 
-import asyncio
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -100,15 +98,7 @@ def _compiled(
         seconds[name] = perf_counter() - start
         on_compiled(name)
 
-    def compile_here() -> dict[str, bytes]:
-        return asyncio.run(compile_all(platforms, content.sources, content.identifier, done))
-
-    try:
-        asyncio.get_running_loop()
-    except RuntimeError:
-        return compile_here(), seconds
-    with ThreadPoolExecutor(1) as thread:  # a notebook's own loop runs in this one
-        return thread.submit(compile_here).result(), seconds
+    return compile_all(platforms, content.sources, content.identifier, done), seconds
 
 
 def _check(path: Path, platforms: Sequence[str] | None) -> str:

@@ -1,6 +1,5 @@
 """C sources to one shared library per platform, with the C compiler of the ziglang package: no other one is needed."""
 
-import asyncio
 import importlib.util
 import os
 import platform
@@ -8,8 +7,11 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 from fat_macho import FatWriter
 
@@ -82,7 +84,7 @@ def fmi_headers() -> Path:
     return Path(spec.origin).with_name("c-code")
 
 
-async def compile_all(
+def compile_all(
     platforms: Sequence[str],
     sources: Mapping[str, str],
     identifier: str,
@@ -92,26 +94,61 @@ async def compile_all(
 
     Raises BuildError. Interrupted or failed, it leaves no process and no file behind.
     """
-    turns = asyncio.Semaphore(os.cpu_count() or 1)
-
-    async def one(name: str) -> bytes:
-        async with turns:
-            library = await _compile(name, sources, identifier)
-        on_done(name)
-        return library
-
-    tasks = [asyncio.create_task(one(name)) for name in platforms]
     try:
-        return dict(zip(platforms, await asyncio.gather(*tasks), strict=True))
+        with ThreadPoolExecutor(os.cpu_count()) as pool, _Compilers() as compilers:
+            jobs = {pool.submit(_compile, compilers, name, sources, identifier): name for name in platforms}
+            for job in as_completed(jobs):
+                job.result()
+                on_done(jobs[job])
+            return {name: job.result() for job, name in jobs.items()}
     except OSError as error:
         raise BuildError(f"cannot compile: {error.strerror or error}") from error
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def _compile(name: str, sources: Mapping[str, str], identifier: str) -> bytes:
+class _Compilers:
+    """The compilers that run, each waited for in a thread: interrupts reach the main thread alone, and it ends them."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._running: set[subprocess.Popen[bytes]] = set()
+        self._ended = False
+
+    def __enter__(self) -> "_Compilers":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._ended = True
+            for process in self._running:
+                if os.name == "posix":
+                    with suppress(ProcessLookupError):
+                        os.killpg(process.pid, signal.SIGKILL)
+                else:
+                    process.kill()
+
+    def run(self, command: Sequence[str], folder: str) -> tuple[int, str]:
+        """Exit code and output. Returns when no process of it is left that might write into the folder."""
+        with self._lock:
+            if self._ended:
+                raise BuildError("interrupted")
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,  # the compiler has children of its own, which must end with it
+            )
+            self._running.add(process)
+        assert process.stdout
+        with process.stdout:
+            output = process.stdout.read()  # to the end, which comes when all who can write have ended
+        code = process.wait()
+        with self._lock:
+            self._running.remove(process)
+        return code, output.decode(errors="replace").strip()
+
+
+def _compile(compilers: _Compilers, name: str, sources: Mapping[str, str], identifier: str) -> bytes:
     target_platform = PLATFORMS[name]
     with tempfile.TemporaryDirectory(prefix="fmu-") as folder:
         for file, text in sources.items():
@@ -120,8 +157,21 @@ async def _compile(name: str, sources: Mapping[str, str], identifier: str) -> by
         install_name = (f"-Wl,-install_name,@rpath/{library.name}",) if library.suffix == ".dylib" else ()
         slices = []
         for target in target_platform.targets:
-            flags = [*target_platform.flags, *install_name, "-o", library.name]
-            await _run_compiler(name, target, flags, folder)
+            command = [
+                *(*compiler(), "-target", target),
+                *C_FLAGS,
+                *("-g0", "-s", "-shared", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables"),
+                *WARNINGS,
+                "-DFMI2_OVERRIDE_FUNCTION_PREFIX",
+                f"-I{fmi_headers()}",
+                UNITY_FILE,
+                *target_platform.flags,
+                *install_name,
+                *("-o", library.name),
+            ]
+            code, output = compilers.run(command, folder)
+            if code != 0:
+                raise BuildError(f"{name}: the compiler failed for {target}\n{output}")
             slices.append(library.read_bytes())
         if len(slices) > 1:
             universal = FatWriter()  # type: ignore[no-untyped-call]
@@ -129,31 +179,3 @@ async def _compile(name: str, sources: Mapping[str, str], identifier: str) -> by
                 universal.add(part)
             universal.write_to(str(library))
         return library.read_bytes()
-
-
-async def _run_compiler(name: str, target: str, flags: list[str], folder: str) -> None:
-    process = await asyncio.create_subprocess_exec(
-        *(*compiler(), "-target", target),
-        *C_FLAGS,
-        *("-g0", "-s", "-shared", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables"),
-        *WARNINGS,
-        "-DFMI2_OVERRIDE_FUNCTION_PREFIX",
-        f"-I{fmi_headers()}",
-        UNITY_FILE,
-        *flags,
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,  # the compiler has children of its own, which must end with it
-    )
-    try:
-        output, _ = await process.communicate()
-    finally:
-        if process.returncode is None:
-            if os.name == "posix":
-                os.killpg(process.pid, signal.SIGKILL)
-            else:
-                process.kill()
-            await process.wait()
-    if process.returncode != 0:
-        raise BuildError(f"{name}: the compiler failed for {target}\n{output.decode(errors='replace').strip()}")

@@ -130,14 +130,15 @@ def _run(old: Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
 def test_no_room_for_temporary_files(old: Path, tmp_path: Path) -> None:
     limited = tmp_path / "limited.py"
     limited.write_text(
-        "import resource, runpy, signal, sys\n"
+        "import matplotlib.font_manager, resource, runpy, signal, sys\n"  # which writes a cache of its own
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
         f"sys.argv = ['build_fmu.py', '--platform', 'host', '-o', {str(old)!r}]\n"
         f"runpy.run_path({_SCRIPT!r}, run_name='__main__')\n",
         encoding="utf-8",
     )
-    result = subprocess.run([sys.executable, limited], capture_output=True, text=True, check=False, cwd=tmp_path)
+    # -B: what Python compiles would be cut off too, and stay so for all who import it
+    result = subprocess.run([sys.executable, "-B", limited], capture_output=True, text=True, check=False, cwd=tmp_path)
     assert result.returncode == 1
     assert result.stderr.splitlines()[0].startswith("rov-fmu: ")
     assert "File too large" in result.stderr

@@ -7,7 +7,7 @@ from functools import partial
 from itertools import product
 from math import copysign, cos, hypot, isfinite, pi, sin
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import pytest
@@ -209,9 +209,9 @@ FAR = {
 @pytest.mark.parametrize("name", FAR)
 def test_no_turn_goes_too_far(fmu: Fmu, name: str) -> None:
     k, i, before, h = case = turning_case(*FAR[name])
-    start = perf_counter()
+    start = process_time()
     found = run(fmu, *case)
-    assert perf_counter() - start < 0.1  # it takes at most some thousand pieces
+    assert process_time() - start < 0.1  # it takes at most some thousand pieces
     assert all(map(isfinite, astuple(found)))
     expected = rov.step(*case)
     assert [getattr(found, v) for v in VELOCITIES] == [getattr(expected, v) for v in VELOCITIES]
@@ -235,9 +235,9 @@ def test_what_overflows_is_said_at_once(fmu: Fmu) -> None:
         assert not all(map(isfinite, astuple(rov.step(*case))))
         with fmu.instance() as instance:
             instance.start({**asdict(k), **asdict(i), **asdict(before)})
-            start = perf_counter()
+            start = process_time()
             assert instance.step(0.0, h) == ERROR
-            assert perf_counter() - start < 0.1
+            assert process_time() - start < 0.1
             assert "overflows" in instance.log[-1].text
 
 
@@ -304,9 +304,9 @@ def test_one_step_of_ten_seconds_is_a_thousand_of_ten_milliseconds(fmu: Fmu, veh
 def test_a_step_of_a_thousand_seconds_is_exact_and_takes_no_time(fmu: Fmu, vehicle: Vehicle, manoeuvre: str) -> None:
     inputs, before = AXES[manoeuvre]
     exact = reference.step(vehicle.coefficients, inputs, before, 1000.0)
-    started = perf_counter()
+    started = process_time()
     found = run(fmu, vehicle.coefficients, inputs, before, 1000.0)
-    assert perf_counter() - started < 0.1  # some 0.1 ms, most of them not the step's
+    assert process_time() - started < 0.1  # some 0.1 ms, most of them not the step's
     assert max(worst(found, exact.state, exact.scale, before)) <= 1e-14
 
 

@@ -39,9 +39,9 @@ def step_them_all(folder: str) -> None:
         with fmu.instance() as rov:
             rov.start(values)
             before = rov.get(states)
-            start = time.perf_counter()
+            start = time.process_time()
             status = rov.step(0.0, h)
-            seconds = time.perf_counter() - start
+            seconds = time.process_time() - start
             after = rov.get(states)
             case = (h, values, seconds, before, after)
             assert status in {OK, ERROR}, case
