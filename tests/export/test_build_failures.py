@@ -146,21 +146,66 @@ def test_no_room_for_temporary_files(old: Path, tmp_path: Path) -> None:
     assert _untouched(old)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+def _endless_compiler(folder: Path) -> dict[str, str]:
+    """What makes a build use a compiler that never ends, with a child of its own, whose number it writes."""
+    zig = folder / "endless" / "ziglang" / "zig"
+    zig.parent.mkdir(parents=True)
+    zig.with_name("__init__.py").touch()
+    zig.write_text(
+        f"#!/bin/sh\nsleep 6000 &\necho $! > '{folder}/n'\nmv '{folder}/n' '{folder}/number'\nwait\n", encoding="utf-8"
+    )
+    zig.chmod(0o755)
+    return {"PYTHONPATH": str(zig.parent.parent)}
+
+
+def _is_running(process: int) -> bool:
+    """Not gone, and not waiting for init to take note of its end."""
+    stat = Path(f"/proc/{process}/stat")
+    try:
+        return stat.read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals are POSIX, /proc is Linux")
 @pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
     old: Path, tmp_path: Path, signal_: signal.Signals
 ) -> None:
-    # an empty cache makes the compiler work for seconds
-    cache = str(tmp_path / "cache")
-    process = _run(old, tmp_path, ZIG_GLOBAL_CACHE_DIR=cache, ZIG_LOCAL_CACHE_DIR=cache)
-    deadline = time.monotonic() + 60.0
-    while not list((tmp_path / "tmp").glob("fmu-*/fmu.c")) or not Path(cache).exists():
+    """No clock tells: nothing but the interrupt ends the compiler, and the limits are those of a test that hangs."""
+    process = _run(old, tmp_path, **_endless_compiler(tmp_path))
+    deadline = time.monotonic() + 120.0
+    while not (number := tmp_path / "number").exists():
         assert time.monotonic() < deadline
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal_)
-    _, error = process.communicate(timeout=10)
+    _, error = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert error == "rov-fmu: interrupted, no file is half-written\n"
+    assert not _is_running(int(number.read_text(encoding="utf-8")))
+    assert list((tmp_path / "tmp").iterdir()) == []
+    assert _untouched(old)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7])
+@pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_at_any_moment_it_leaves_nothing(
+    old: Path, tmp_path: Path, signal_: signal.Signals, share: float
+) -> None:
+    """The real compiler, which an empty cache makes work for seconds."""
+    cache = tmp_path / "cache"
+    process = _run(old, tmp_path, ZIG_GLOBAL_CACHE_DIR=str(cache), ZIG_LOCAL_CACHE_DIR=str(cache))
+    deadline = time.monotonic() + 120.0
+    while not list((tmp_path / "tmp").glob("fmu-*/fmu.c")):
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.001)
+    time.sleep(share)
+    process.send_signal(signal_)
+    _, error = process.communicate(timeout=120)
     assert process.returncode == 130
     assert error == "rov-fmu: interrupted, no file is half-written\n"
     assert list((tmp_path / "tmp").iterdir()) == []
