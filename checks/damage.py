@@ -45,11 +45,8 @@ VALUES: st.SearchStrategy[Any] = st.recursive(
 
 
 def fuzz(check: Callable[[st.DataObject], None], examples: int) -> None:
-    """Run a check over so many examples, the same ones every time."""
-    always = settings(
-        max_examples=examples, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)
-    )
-    always(given(data=st.data())(check))()
+    """Run a check over so many examples."""
+    settings(max_examples=examples, suppress_health_check=list(HealthCheck))(given(data=st.data())(check))()
 
 
 def changed_bytes(content: bytes, data: st.DataObject) -> bytes:

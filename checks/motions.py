@@ -14,12 +14,12 @@ from tests.motion.test_riccati import DISTANCE, SMALLEST, TINY, VELOCITY, Case
 def hold(
     law: Callable[..., None], examples: int, *strategies: st.SearchStrategy[Any], at: Sequence[tuple[Any, ...]] = ()
 ) -> None:
-    """Try a law at these places and on examples, the same ones in every run."""
+    """Try a law at these places and on examples."""
     check = given(*strategies)(law)
     for place in at:
         check = example(*place)(check)
     slow = [HealthCheck.too_slow, HealthCheck.filter_too_much]
-    settings(max_examples=examples, derandomize=True, deadline=None, suppress_health_check=slow)(check)()
+    settings(max_examples=examples, suppress_health_check=slow)(check)()
 
 
 # ---- Motions ----
