@@ -1,9 +1,8 @@
-"""When a motion comes to rest, in Python and in C, to the last digits: where the force is small, artanh has lost them."""
+"""When a motion comes to rest, to the last digits, in Python and in C; where the force is small, artanh loses them."""
 
 import ctypes
 import subprocess
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from mpmath import mp

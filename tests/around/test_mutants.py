@@ -1,0 +1,42 @@
+"""Single changes to operators and constants that the tests must notice. All of them: python -m checks.mutants."""
+
+import pytest
+
+from checks import mutants
+from checks.commands import ROOT
+
+
+def test_every_file_has_tests_that_hold_it() -> None:
+    tests = {test for file in mutants.files() for test in mutants.tests_of(file)}
+    assert [test for test in tests if not (ROOT / test).exists()] == []
+
+
+def test_what_is_named_as_equivalent_is_a_mutant_of_today() -> None:
+    known = mutants.equivalents()
+    made = {(m.file, m.after) for m in (make() for make in mutants.sites(sorted({file for file, _ in known})))}
+    assert sorted(known.keys() - made) == []
+    assert all(len(reason) > 20 for reason in known.values())
+
+
+@pytest.mark.parametrize(("file", "before", "after"), [
+    ("some.py", "a = f'{x * per:g}' if n <= 1 else -0.0", {
+        "a = f'{x / per:g}' if n <= 1 else -0.0", "a = f'{x * per:g}' if n < 1 else -0.0",
+        "a = f'{x * per:g}' if n <= 2 else -0.0", "a = f'{x * per:g}' if n <= 1 else +0.0",
+        "a = f'{x * per:g}' if n <= 1 else -1.0",
+    }),
+    ("some.c", "a[1u] = x > 0.5 && !b ? -y * 2.0 : 1e3; /* a * b */", {
+        "a[2u] = x > 0.5 && !b ? -y * 2.0 : 1e3; /* a * b */", "a[1u] = x >= 0.5 && !b ? -y * 2.0 : 1e3; /* a * b */",
+        "a[1u] = x > 1.0 && !b ? -y * 2.0 : 1e3; /* a * b */", "a[1u] = x > 0.5 || !b ? -y * 2.0 : 1e3; /* a * b */",
+        "a[1u] = x > 0.5 && b ? -y * 2.0 : 1e3; /* a * b */", "a[1u] = x > 0.5 && !b ? +y * 2.0 : 1e3; /* a * b */",
+        "a[1u] = x > 0.5 && !b ? -y / 2.0 : 1e3; /* a * b */", "a[1u] = x > 0.5 && !b ? -y * 4.0 : 1e3; /* a * b */",
+    }),
+])  # fmt: skip
+def test_a_mutant_is_one_change(file: str, before: str, after: set[str]) -> None:
+    assert {mutant.text for mutant in (make() for make in mutants.mutants_of(file, f"{before}\n"))} == {
+        f"{line}\n" if file.endswith(".c") else line for line in after
+    }
+
+
+@pytest.mark.long
+def test_of_a_sample_nine_in_ten_are_killed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert mutants.main(["--sample", "24", "--seed", "16", "--jobs", "2"]) == 0, capsys.readouterr().out
