@@ -1,0 +1,78 @@
+"""The numbers of modelDescription.xml, written down a second time: bounds, nominal values, units."""
+
+from math import pi
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+DRAG, CURVES, TUNING = (
+    " ".join(f"{kind}_{which}" for kind in kinds.split() for which in whiches.split())
+    for kinds, whiches in (("a_d b_d", "u w r"), ("a_t b_t", "rear top"), ("alpha beta", "u w r"))
+)
+# Minimum, maximum, nominal value.
+NUMBERS = {
+    "u_l u_r u_t": (-1.0, 1.0, 1.0),
+    "X_ext Z_ext x y z": (None, None, 10.0),
+    "N_ext V_N V_E u w r psi": (None, None, 1.0),
+    "der(u) der(w) der(r) der(x) der(y) der(z) der(psi) F_l F_r F_t tau_rear": (None, None, None),
+    "m_rov": (1e-3, 1e6, None),
+    "I_r": (1e-6, 1e6, None),
+    "R": (0.0, 100.0, None),
+    "gamma": (0.0, pi / 2.0, None),
+    CURVES: (-1e6, 1e6, None),
+    DRAG: (0.0, 1e6, None),
+    TUNING: (0.0, 1e3, None),
+}
+# Exponents of kg, m, s, rad.
+UNITS = {
+    "1": (0, 0, 0, 0),
+    "kg": (1, 0, 0, 0),
+    "m": (0, 1, 0, 0),
+    "rad": (0, 0, 0, 1),
+    "m/s": (0, 1, -1, 0),
+    "rad/s": (0, 0, -1, 1),
+    "m/s2": (0, 1, -2, 0),
+    "rad/s2": (0, 0, -2, 1),
+    "N": (1, 1, -2, 0),
+    "N.m": (1, 2, -2, 0),
+    "kg.m2": (1, 2, 0, 0),
+    "N.s/m": (1, 0, -1, 0),
+    "N.s2/m2": (1, -1, 0, 0),
+    "N.m.s/rad": (1, 2, -1, -1),
+    "N.m.s2/rad2": (1, 2, 0, -2),
+}
+DISPLAYED = {
+    ("1", "%"): 100.0,
+    ("rad", "deg"): 180.0 / pi,
+    ("rad/s", "deg/s"): 180.0 / pi,
+    ("m/s", "knot"): 3600.0 / 1852.0,
+}
+
+
+@pytest.fixture(scope="module")
+def description(videoray_dir: Path) -> etree._ElementTree:
+    return etree.parse(str(videoray_dir / "modelDescription.xml"))
+
+
+def test_bounds_and_nominal_values(description: etree._ElementTree) -> None:
+    expected = {name: numbers for names, numbers in NUMBERS.items() for name in names.split()}
+    found = {}
+    for variable in description.iter("ScalarVariable"):
+        values = (variable[0].get(key) for key in ("min", "max", "nominal"))
+        found[variable.get("name")] = tuple(None if value is None else float(value) for value in values)
+    assert found == expected
+
+
+def test_units(description: etree._ElementTree) -> None:
+    units = {unit.get("name"): unit for unit in description.iter("Unit")}
+    exponents = {
+        name: [unit.find("BaseUnit").get(base, "0") for base in ("kg", "m", "s", "rad")] for name, unit in units.items()
+    }
+    assert {name: tuple(map(int, found)) for name, found in exponents.items()} == UNITS
+    displayed = {
+        (name, shown.get("name")): float(shown.get("factor"))
+        for name, unit in units.items()
+        for shown in unit.iter("DisplayUnit")
+    }
+    assert displayed == pytest.approx(DISPLAYED, rel=1e-15)

@@ -1,0 +1,55 @@
+"""Where the rules of reading and of looking at recordings begin and end."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from checks.commands import TESTS
+from checks.recordings import clean
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.identify.step_responses import correlation_time, steps
+from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.motion.rov import HEAVE
+from rov_fmu.vehicle.vehicle import Vehicle
+
+
+@pytest.mark.parametrize("samples", [19, 20])
+def test_twenty_samples_are_enough(samples: int, tmp_path: Path) -> None:
+    """Blanks not counted."""
+    shutil.copytree(TESTS, tmp_path / "tests")
+    rows = [f"{0.1 * n:g},30,{0.01 * n:g}" for n in range(samples)] + ["5,30,"]
+    log = tmp_path / "tests" / "log_heave.csv"
+    log.write_text("\n".join(("time [s],command [%],depth [m]", *rows)), encoding="utf-8")
+    if samples < 20:
+        with pytest.raises(DataFileError, match="19 samples of depth, at least 20 are needed"):
+            load_tank_tests(log.parent)
+    else:
+        (recording,) = load_tank_tests(log.parent).recordings["heave"]
+        assert len(recording.values) == 21
+
+
+@pytest.mark.parametrize("force", [0.049, 0.051])
+def test_a_force_against_the_command_is_noise_up_to_a_twentieth_of_the_largest(force: float, tmp_path: Path) -> None:
+    shutil.copytree(TESTS, tmp_path / "tests")
+    path = tmp_path / "tests" / "thrust_rear_more.csv"
+    path.write_text(f"command [%],force [N]\n80,10\n-1,{10.0 * force:g}\n", encoding="utf-8")
+    if force > 0.05:
+        with pytest.raises(DataFileError, match="must have the sign of the command"):
+            load_tank_tests(path.parent)
+    else:
+        assert load_tank_tests(path.parent).thrust["rear"][-1].value == 10.0 * force
+
+
+@pytest.mark.parametrize("residuals", [[0.0] * 50, [0.5] * 50, [1.0, -1.0], [2.0]])
+def test_residuals_that_tell_no_correlation_count_as_white(residuals: list[float]) -> None:
+    assert correlation_time(np.array(residuals)) == 1.0
+
+
+def test_what_is_steady_is_so_to_the_last_sample(vehicle: Vehicle) -> None:
+    recording = clean(vehicle.coefficients, HEAVE, [(0.0, 3.0), (0.3, 30.0)]).noisy(np.random.default_rng(0))
+    (step,) = steps(recording)
+    assert step.steady is not None
+    assert step.steady[1] == recording.time[-1]
+    assert 3.0 < step.steady[0] < 25.0
