@@ -53,3 +53,36 @@ def test_what_is_steady_is_so_to_the_last_sample(vehicle: Vehicle) -> None:
     assert step.steady is not None
     assert step.steady[1] == recording.time[-1]
     assert 3.0 < step.steady[0] < 25.0
+
+
+_THRUST, _HEAVE = ("thrust_rear", "command [%],force [N]"), ("steady_heave", "command [%],velocity [m/s]")
+_YAW, _TAU = ("steady_yaw", "command [%],velocity [rad/s]"), ("time_constant_yaw", "command [%],time constant [s]")
+_DEPTH, _SPEED = ("log_heave", "time [s],command [%],depth [m]"), ("log_surge", "time [s],command [%],velocity [m/s]")
+
+
+@pytest.mark.parametrize(
+    ("table", "within", "beyond"),
+    [
+        *((_THRUST, f"{sign}100,{sign}1", f"{sign}100.01,{sign}1") for sign in ("", "-")),
+        *((_THRUST, f"{sign}50,{sign}1e6", f"{sign}50,{sign}1000001") for sign in ("", "-")),
+        (_THRUST, "0.01,1", "0.0099,1"),
+        *((table, f"{s}50,{s}1e3", f"{s}50,{s}1000.1") for table in (_HEAVE, _YAW) for s in ("", "-")),
+        *((table, f"{s}50,{s}1e-5", f"{s}50,{s}9.9e-6") for table in (_HEAVE, _YAW) for s in ("", "-")),
+        (_TAU, "50,1e5", "50,100001"),
+        (_TAU, "50,1e-4", "50,9.9e-5"),
+        (_DEPTH, "-1e10,0,0", "-1.0001e10,0,0"),
+        *((_DEPTH, f"0,0,{sign}1e7", f"0,0,{sign}10000001") for sign in ("", "-")),
+        *((_SPEED, f"0,0,{sign}1e3", f"0,0,{sign}1000.1") for sign in ("", "-")),
+        (_SPEED, "0,0.001,1e-9", "0,100.1,1e-9"),
+    ],
+)
+def test_bounds_of_every_column(table: tuple[str, str], within: str, beyond: str, tmp_path: Path) -> None:
+    shutil.copy(TESTS / "rov.toml", tmp_path)
+    name, header = table
+    rest = [f"{n},0,0" for n in range(1, 21)] if name.startswith("log") else []
+    path = tmp_path / f"{name}.csv"
+    path.write_text("\n".join((header, within, *rest)), encoding="utf-8")
+    assert set(load_tank_tests(tmp_path).inputs) == {"rov.toml", path.name}
+    path.write_text("\n".join((header, beyond, *rest)), encoding="utf-8")
+    with pytest.raises(DataFileError, match="line 2, column"):
+        load_tank_tests(tmp_path)
