@@ -2,7 +2,7 @@
 
 import sys
 
-from rov_fmu.cli import run
+from rov_fmu.__main__ import run
 
 if __name__ == "__main__":
     run(["build", *sys.argv[1:]])

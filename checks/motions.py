@@ -1,4 +1,4 @@
-"""Motions to try laws on, over all that models.riccati takes and where its formulas change; what rounding may do."""
+"""Motions to try laws on, over all that motion.riccati takes and where its formulas change; what rounding may do."""
 
 from collections.abc import Callable, Sequence
 from math import copysign, inf
@@ -8,7 +8,16 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from rov_fmu.motion.riccati import Riccati, advance, time_to_rest
-from tests.motion.test_riccati import DISTANCE, SMALLEST, TINY, VELOCITY, Case
+
+Case = tuple[float, float, float, float, float]
+"""A, B, C, v0, h of an axis."""
+
+# Of the largest velocity on the way and of the length of the path, which is the distance where the motion does not
+# turn. Over 100,000 random cases the largest errors are 5.7e-16 and 1.1e-15.
+VELOCITY = 2e-15
+DISTANCE = 4e-15
+SMALLEST = 5e-324
+TINY = 2.0 * SMALLEST
 
 
 def hold(

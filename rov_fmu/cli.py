@@ -1,11 +1,12 @@
 """The command rov-fmu: build | identify | tune | tables | figures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial, wraps
 from pathlib import Path
 from time import perf_counter
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -15,9 +16,11 @@ from rov_fmu.export.compile import PLATFORMS, BuildError
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.output import check_targets, write_whole
 from rov_fmu.motion.rov import AXES
-from rov_fmu.process import exit_code, run_process
+from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
-from rov_fmu.vehicle.vehicle import load_vehicle
+
+if TYPE_CHECKING:
+    from rov_fmu.build import Built
 
 _EXIT_CODES = {FileError: 2, OSError: 2, click.ClickException: 2, BuildError: 1}
 
@@ -33,11 +36,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code("rov-fmu", action, _EXIT_CODES)
 
 
-def run(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line as a process of its own."""
-    run_process(partial(main, arguments))
-
-
 def _after_parsing(command: Callable[..., None]) -> Callable[..., Callable[[], None]]:
     """Do nothing yet: errors and interrupts of the work itself are not click's to handle."""
 
@@ -48,20 +46,15 @@ def _after_parsing(command: Callable[..., None]) -> Callable[..., Callable[[], N
     return chosen
 
 
-class _Vehicle(click.ParamType[Path]):
-    """A vehicle file, or the name of a vehicle that ships."""
-
-    name = "VEHICLE"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:  # noqa: ARG002
-        return find_vehicle(value)
-
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
-        names = [CompletionItem(name) for name in SHIPPED if name.startswith(incomplete)]
-        return [*names, CompletionItem(incomplete, type="file")]
+def _vehicles(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    names = [CompletionItem(name) for name in SHIPPED if name.startswith(incomplete)]
+    return [*names, CompletionItem(incomplete, type="file")]
 
 
-_FILE = click.Path(path_type=Path)
+_vehicle = partial(
+    click.argument, "vehicle", callback=lambda _, __, given: find_vehicle(given), shell_complete=_vehicles
+)
+_FILE = click.Path(path_type=Path, readable=False)  # what cannot be read is told where it is read
 
 
 @click.group(no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
@@ -74,7 +67,7 @@ def _commands() -> None:
 
 
 @_commands.command("build")
-@click.argument("vehicle", type=_Vehicle(), default=str(VIDEORAY), metavar="[VEHICLE]")
+@_vehicle(default=str(VIDEORAY))
 @click.option("-o", "--output", type=_FILE, metavar="FILE.fmu", help="Where to write it; <identifier>.fmu by default.")
 @click.option("--backend", type=click.Choice(["native", "pythonfmu"]), default="native", show_default=True,
               help="Compiled C, or pure Python with PythonFMU.")  # fmt: skip
@@ -88,15 +81,45 @@ def _build(vehicle: Path, output: Path | None, backend: str, platforms: tuple[st
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
     from rov_fmu.build import build, chosen_platforms, default_output
     from rov_fmu.export.osp import osp_path
-    from rov_fmu.pages.console import build_progress, print_built
+    from rov_fmu.vehicle.vehicle import load_vehicle
 
     started = perf_counter()
     loaded = load_vehicle(vehicle)
     output = output or default_output(loaded, backend)
     check_targets([output, *([osp_path(output, loaded.identifier)] if osp else [])], [vehicle])
-    with build_progress(chosen_platforms(platforms) if backend == "native" else []) as on_compiled:
+    with _progress(chosen_platforms(platforms) if backend == "native" else []) as on_compiled:
         built = build(loaded, output, platforms=platforms, backend=backend, osp=osp, on_compiled=on_compiled)
-    print_built(built, perf_counter() - started)
+    _print_built(built, perf_counter() - started)
+
+
+@contextmanager
+def _progress(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
+    """A line a platform that is being compiled, on a terminal only; yields what to call when one is done."""
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from rov_fmu.pages.console import console
+
+    out = console()
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=out, transient=True, disable=not out.is_terminal) as progress:
+        tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
+        yield lambda name: progress.update(tasks[name], completed=1)
+
+
+def _print_built(built: "Built", seconds: float) -> None:
+    """Files, sizes, times, and what the FMU showed when it was run."""
+    from rich.text import Text
+
+    from rov_fmu.pages.console import console
+
+    out = console()
+    out.print(Text.assemble((str(built.path), "bold"), f"  {built.size / 1000:.0f} kB  {built.guid}"), soft_wrap=True)
+    for name, size in built.binaries.items():
+        out.print(f"  {name:<14}{size / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
+    out.print(f"  {built.note}")
+    for path in built.beside:
+        out.print(Text(str(path), "bold"), soft_wrap=True)
+    out.print(f"  built in {seconds:.1f} s")
 
 
 @_commands.command("identify")
@@ -129,7 +152,7 @@ def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
 
 
 @_commands.command("tune")
-@click.argument("vehicle", type=_Vehicle())
+@_vehicle()
 @click.option("--axis", required=True, type=click.Choice(list(AXES)))
 @click.option("--command", type=float, help="Fraction of full thrust: 30 % is 0.3.")
 @click.option("--v-ss", type=float, help="Wanted steady velocity at this command, m/s or rad/s.")
@@ -145,6 +168,7 @@ def _tune(
     """Find alpha and beta of an axis for a wanted response."""
     from rov_fmu.identify.tuning import TuningError, read_points, tune, tune_over, tuned_values
     from rov_fmu.pages.console_results import print_tuning
+    from rov_fmu.vehicle.vehicle import load_vehicle
     from rov_fmu.vehicle.writer import write_tuned
 
     if points is not None and (command, v_ss, tau) != (None, None, None):
@@ -166,12 +190,13 @@ def _tune(
 
 
 @_commands.command("tables")
-@click.argument("vehicle", type=_Vehicle(), default=str(VIDEORAY), metavar="[VEHICLE]")
+@_vehicle(default=str(VIDEORAY))
 @_after_parsing
 def _tables(vehicle: Path) -> None:
     """Print Tables 6-8 of the paper: printed, computed, measured."""
     from rov_fmu.pages.console import print_tables
     from rov_fmu.vehicle.published import load_tables
+    from rov_fmu.vehicle.vehicle import load_vehicle
 
     loaded = load_vehicle(vehicle)
     print_tables(loaded, load_tables(loaded))

@@ -6,8 +6,6 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import NoReturn
 
-from click import Abort, ClickException
-
 from rov_fmu.files.messages import one_line
 from rov_fmu.files.output import WriteError
 
@@ -17,6 +15,8 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
 
     OSError is among the codes. The messages of the others are printed as they are.
     """
+    from click import Abort, ClickException  # late: where it is not installed, the command line can say so
+
     try:
         try:
             action()

@@ -14,6 +14,7 @@ from rov_fmu.export.interface import Variable, interface_header, model_header, v
 from rov_fmu.export.model_description import NATIVE, PYTHON, model_description
 from rov_fmu.export.python_flavour import python_files, python_sources
 from rov_fmu.files.places import LICENSE
+from rov_fmu.files.reading import read_bytes
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 TOOL = f"rov-fmu {__version__}"
@@ -102,10 +103,7 @@ def _common_files(vehicle: Vehicle) -> dict[str, bytes]:
     files = {"model.png": vehicle.picture("model.png"), "documentation/licenses/license.txt": LICENSE}
     if report:
         files[f"documentation/{REPORT}"] = report
-    try:
-        return {name: path.read_bytes() for name, path in files.items()}
-    except OSError as error:
-        raise VehicleFileError(f"{error.filename}: {error.strerror}") from error
+    return {name: read_bytes(path, VehicleFileError) for name, path in files.items()}
 
 
 def _fmi_license() -> bytes:

@@ -1,17 +1,13 @@
-"""What the command line prints: a build, and the tables of the paper beside a vehicle."""
+"""Where the command line prints, and the tables of the paper beside a vehicle."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
 from decimal import Decimal
 from math import isnan
 
 from rich import box
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
-from rich.text import Text
 
-from rov_fmu.build import Built
 from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -24,28 +20,6 @@ def console() -> Console:
     found = Console(markup=False, highlight=False, emoji=False)
     found.width = max(found.width, _MIN_WIDTH)
     return found
-
-
-@contextmanager
-def build_progress(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
-    """A line a platform that is being compiled, on a terminal only; yields what to call when one is done."""
-    out = console()
-    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
-    with Progress(*columns, console=out, transient=True, disable=not out.is_terminal) as progress:
-        tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
-        yield lambda name: progress.update(tasks[name], completed=1)
-
-
-def print_built(built: Built, seconds: float) -> None:
-    """Files, sizes, times, and what the FMU showed when it was run."""
-    out = console()
-    out.print(Text.assemble((str(built.path), "bold"), f"  {built.size / 1000:.0f} kB  {built.guid}"), soft_wrap=True)
-    for name, size in built.binaries.items():
-        out.print(f"  {name:<14}{size / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
-    out.print(f"  {built.note}")
-    for path in built.beside:
-        out.print(Text(str(path), "bold"), soft_wrap=True)
-    out.print(f"  built in {seconds:.1f} s")
 
 
 def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:

@@ -13,6 +13,7 @@ from matplotlib import style
 from matplotlib.figure import Figure
 
 from rov_fmu.files.messages import FileError
+from rov_fmu.files.reading import read_bytes
 
 # Role: colour on a light and on a dark page. In a page a plot refers to the role, so it follows the page.
 PALETTE = {
@@ -71,10 +72,9 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
 
 def inline_file(label: str, path: Path) -> Markup:
     """A picture drawn by hand, as part of a page. Raises FileError."""
+    drawn = read_bytes(path)
     try:
-        return inline(label, str(etree.tostring(_without_scripts(path), encoding="unicode")))
-    except OSError as error:
-        raise FileError(f"{path}: {error.strerror or 'cannot be read'}") from error
+        return inline(label, str(etree.tostring(_without_scripts(drawn), encoding="unicode")))
     except etree.XMLSyntaxError as error:
         raise FileError(f"{path}: not an SVG picture: {error.msg}") from error
 
@@ -102,8 +102,8 @@ def svg_file(
     return _without_ballast(file.getvalue()).replace("'DejaVu Sans'", _FONTS)
 
 
-def _without_scripts(path: Path) -> Any:
-    root = etree.parse(path, etree.XMLParser(resolve_entities=False, no_network=True)).getroot()
+def _without_scripts(svg: bytes) -> Any:
+    root = etree.fromstring(svg, etree.XMLParser(resolve_entities=False, no_network=True))
     etree.strip_elements(root, f"{_SVG}script", f"{_SVG}foreignObject", with_tail=False)
     return root
 

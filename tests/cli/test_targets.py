@@ -83,13 +83,13 @@ def full_folder(folder: Path) -> tuple[Path, Path]:
     return target, temporary
 
 
-def _bound_by_permissions() -> list[str]:
+def bound_by_permissions() -> list[str]:
     """What to put before a command that permissions shall bind, as they do not the administrator."""
     if os.geteuid() != 0:
         return []
     if not shutil.which("setpriv"):
         pytest.skip("there is no setpriv to bind the administrator by permissions")
-    return ["setpriv", "--bounding-set=-dac_override", "--inh-caps=-dac_override"]
+    return ["setpriv", "--bounding-set=-dac_override,-dac_read_search", "--inh-caps=-dac_override,-dac_read_search"]
 
 
 @_posix
@@ -99,7 +99,7 @@ def test_what_is_read_only_stays(what: str, tmp_path: Path) -> None:
     for path in target.iterdir():
         path.chmod(0o644 if what == "folder" else 0o444)
     target.chmod(0o555 if what == "folder" else 0o755)
-    ends = run_elsewhere([(c, target / c.name) for c in COMMANDS.values()], temporary, _bound_by_permissions())
+    ends = run_elsewhere([(c, target / c.name) for c in COMMANDS.values()], temporary, bound_by_permissions())
     check_refusals(
         ends, "its folder is read-only" if what == "folder" else "cannot be written: is read-only", target, temporary
     )

@@ -157,7 +157,7 @@ def test_bad_points(content: str, named: str, tmp_path: Path, capsys: pytest.Cap
     ("options", "named"),
     [
         ([], "--points"), (["--command", "0.3"], "--v-ss"), (["--points", "a.csv", "--tau", "3"], "instead"),
-        (["--points", "nowhere.csv"], "nowhere.csv: No such file"),
+        (["--points", "nowhere.csv"], "nowhere.csv: cannot be read: No such file"),
         ([*HEAVE_AT_30[2:], "-o", "nowhere/tuned.toml"], "no folder"),
     ],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Laws of one axis, for every drag, force, velocity and time: models.riccati judged by itself, over its whole range."""
+"""Laws of one axis, for every drag, force, velocity and time: motion.riccati judged by itself, over its whole range."""
 
 from collections.abc import Callable, Sequence
 from math import e, inf
@@ -13,6 +13,9 @@ from checks.motions import (
     BOUNDARIES,
     CASES,
     OFFSET,
+    SMALLEST,
+    TINY,
+    Case,
     hold,
     memory,
     path,
@@ -23,7 +26,6 @@ from checks.motions import (
     similar,
 )
 from rov_fmu.motion.riccati import advance, steady_velocity, time_constant, time_to_rest
-from tests.motion.test_riccati import SMALLEST, TINY, Case
 
 
 def for_every(

@@ -1,4 +1,4 @@
-"""One axis is exact: models.riccati against 50 digits, over its whole range and where its formulas change."""
+"""One axis is exact: motion.riccati against 50 digits, over its whole range and where its formulas change."""
 
 import random
 from itertools import product
@@ -8,16 +8,9 @@ import pytest
 from mpmath import mp
 from scipy.optimize import brentq
 
+from checks.motions import DISTANCE, SMALLEST, TINY, VELOCITY, Case
 from checks.reference import axis
 from rov_fmu.motion.riccati import advance, steady_velocity, time_constant, time_to_rest
-
-Case = tuple[float, float, float, float, float]
-
-# Of the largest velocity on the way and of the length of the path, which is the distance where the motion does not
-# turn. Over 100,000 random cases the largest errors are 5.7e-16 and 1.1e-15.
-VELOCITY = 2e-15
-DISTANCE = 4e-15
-TINY = 1e-323  # two steps of the smallest double
 
 
 def check(case: Case) -> None:
@@ -103,9 +96,6 @@ def test_huge_coefficients_are_exact() -> None:
     for motion in product((0.0, 1.0, 1e6, 1e15), (0.0, 1.0, 1e6, 1e15), (-1e18, -1.0, 0.0, 1e9, 1e18), (0.0, 1.0, 1e6)):
         for h in (1e-5, 1.0, 1e3):
             check((*motion, h))
-
-
-SMALLEST = 5e-324
 
 
 @pytest.mark.parametrize("tiny", [1e-12, 1e-300, SMALLEST])

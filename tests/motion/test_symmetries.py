@@ -9,13 +9,12 @@ import pytest
 from hypothesis import strategies as st
 
 from checks.fmi2 import Fmu
-from checks.motions import hold, memory, path_of, power, signed, size
+from checks.motions import DISTANCE, TINY, VELOCITY, hold, memory, path_of, power, signed, size
 from rov_fmu.motion import rov
 from rov_fmu.motion.rov import Coefficients, Inputs, State
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.motion.test_exactness import Case, run
-from tests.motion.test_riccati import DISTANCE, TINY, VELOCITY
 
 Step = Callable[[Coefficients, Inputs, State, float], State]
 

@@ -1,0 +1,144 @@
+"""Files that cannot be read: one line that names the file and the reason, and nothing of writing."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from checks.commands import TESTS, Command, run_elsewhere
+from rov_fmu.cli import main
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from tests.cli.test_targets import bound_by_permissions
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="permissions are POSIX")
+
+# What reads a file of the folder that `copied` makes, and that file.
+READING: dict[str, tuple[str, Callable[[Path], list[str]]]] = {
+    "the vehicle of a build": ("videoray.toml", lambda f: _build(f / "videoray.toml")),
+    "the vehicle of the tables": ("videoray.toml", lambda f: ["tables", str(f / "videoray.toml")]),
+    "the vehicle to tune": ("videoray.toml", lambda f: _tune(f, "--command=0.3", "--v-ss=0.2")),
+    "the points": ("points.csv", lambda f: _tune(f, f"--points={f / 'points.csv'}")),
+    "a published table": ("tables/table6_heave_response.csv", lambda f: ["tables", str(f / "videoray.toml")]),
+    "a table of a build": ("tables/table3_heave_steady.csv", lambda f: _build(f / "videoray.toml")),
+    "a drawing": ("pictures/from_above.svg", lambda f: _build(f / "videoray.toml")),
+    "a drawing of the FMU in Python": (
+        "pictures/from_starboard.svg",
+        lambda f: _build(f / "videoray.toml", "--backend=pythonfmu"),
+    ),
+    "the icon": ("pictures/model.png", lambda f: _build(f / "videoray.toml")),
+    "the report": ("report.html", lambda f: _build(f / "refit.toml")),
+    "rov.toml": ("tests/rov.toml", lambda f: ["identify", str(f / "tests")]),
+    "a tank test": ("tests/steady_surge.csv", lambda f: ["identify", str(f / "tests")]),
+    "the vehicle to set beside": ("beside.toml", lambda f: ["identify", str(f / "tests")]),
+}
+PICTURES = {"a drawing", "a drawing of the FMU in Python", "the icon"}
+"""Where there is none, the neutral one stands in."""
+
+
+def _tune(folder: Path, *options: str) -> list[str]:
+    return ["tune", str(folder / "videoray.toml"), "--axis=heave", *options]
+
+
+def _build(vehicle: Path, *options: str) -> list[str]:
+    return ["build", str(vehicle), "-o", str(Path.cwd() / "rov.fmu"), *options]
+
+
+@pytest.fixture
+def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The shipped vehicles with all that they read, in a folder that is the current one's neighbour."""
+    folder = tmp_path / "inputs"
+    shutil.copytree(VIDEORAY.parent, folder)
+    shutil.copytree(TESTS, folder / "tests")
+    shutil.copy(VIDEORAY, folder / "beside.toml")
+    (folder / "points.csv").write_text("command [%],velocity [m/s]\n20,0.1\n", encoding="utf-8")
+    (folder / "report.html").write_text("a report", encoding="utf-8")
+    refit = SHIPPED["videoray_refit"].read_text(encoding="utf-8")
+    reported = refit.replace("\n[provenance]", '\n[provenance]\nreport = "report.html"')
+    (folder / "refit.toml").write_text(reported, encoding="utf-8")
+    rov = (folder / "tests" / "rov.toml").read_text(encoding="utf-8")
+    beside = rov.replace('against = "videoray"', 'against = "../beside.toml"')
+    assert beside != rov
+    (folder / "tests" / "rov.toml").write_text(beside, encoding="utf-8")
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    return folder
+
+
+def _check(said: str, named: str) -> None:
+    assert said.startswith("rov-fmu: ")
+    assert said.count("\n") == 1
+    assert named in said
+    assert "written" not in said
+    assert not list(Path.cwd().iterdir())
+
+
+def _folder(path: Path, _: pytest.MonkeyPatch) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def _gone(path: Path, _: pytest.MonkeyPatch) -> None:
+    path.unlink()
+
+
+def _gone_as_it_is_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = Path.read_bytes
+
+    def gone(self: Path) -> bytes:
+        if path.exists() and self.samefile(path):
+            path.unlink()
+        return read(self)
+
+    monkeypatch.setattr(Path, "read_bytes", gone)
+
+
+WRONG = [
+    *((case, _folder) for case in READING.keys() - PICTURES),
+    *((case, _gone) for case in READING.keys() - PICTURES - {"a tank test"}),
+    *((case, _gone_as_it_is_read) for case in READING),
+]
+
+
+@pytest.mark.parametrize(("case", "what"), sorted(WRONG, key=str))
+def test_what_is_no_file_is_one_line_that_names_it(
+    case: str,
+    what: Callable[[Path, pytest.MonkeyPatch], None],
+    copied: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    name, arguments = READING[case]
+    what(copied / name, monkeypatch)
+    assert main(arguments(copied)) == 2
+    _check(capsys.readouterr().err, Path(name).name)
+
+
+def test_what_may_not_be_read_is_one_line_that_names_it(copied: Path, tmp_path: Path) -> None:
+    (tmp_path / "temporary").mkdir()
+    commands = []
+    for case, (name, arguments) in READING.items():
+        folder = Path(shutil.copytree(copied, tmp_path / case))
+        (folder / name).chmod(0)
+        commands.append((Command(name, arguments), folder))
+    ends = run_elsewhere(commands, tmp_path / "temporary", bound_by_permissions())
+    for (command, _), (code, said) in zip(commands, ends, strict=True):
+        assert code == 2, command.name
+        assert "cannot be read: Permission denied" in said
+        _check(said, Path(command.name).name)
+
+
+def test_a_folder_that_may_not_be_read_is_named(copied: Path, tmp_path: Path) -> None:
+    (tmp_path / "temporary").mkdir()
+    commands = {
+        "tests": Command("tests", lambda f: ["identify", str(f / "tests")]),
+        "tables": Command("tables", lambda f: ["tables", str(f / "videoray.toml")]),
+    }
+    for name, mode in (("tests", 0o000), ("tests", 0o600), ("tests", 0o300), ("tables", 0o000), ("tables", 0o600)):
+        (copied / name).chmod(mode)
+        ((code, said),) = run_elsewhere([(commands[name], copied)], tmp_path / "temporary", bound_by_permissions())
+        (copied / name).chmod(0o755)
+        assert code == 2
+        assert "Permission denied" in said
+        _check(said, str(copied / name))

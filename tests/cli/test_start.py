@@ -1,0 +1,251 @@
+"""How the command starts: by name, quickly, with shell completion, with progress on a terminal, and not installed."""
+
+import asyncio
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from checks.commands import ROOT, TESTS, start
+from rov_fmu.build import build
+from rov_fmu.cli import main
+from rov_fmu.export.compile import PLATFORMS
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle
+
+_TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
+_posix = pytest.mark.skipif(os.name != "posix", reason="terminals and signals are POSIX")
+
+# ---- By name ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_vehicle_that_ships_is_built_by_its_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["build", name, "--backend", "pythonfmu"]) == 0
+    assert capsys.readouterr().out.startswith(f"{name}-python.fmu  ")
+    assert [path.name for path in tmp_path.iterdir()] == [f"{name}-python.fmu"]
+
+
+@pytest.mark.parametrize("command", [["build"], ["tables"], ["tune", "--axis=yaw"]])
+def test_an_unknown_name_is_one_line_with_those_that_ship(
+    command: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*command, "videorey"]) == 2
+    ships = ", ".join(SHIPPED)
+    said = f"rov-fmu: videorey: there is no such file, and no vehicle of this name ships, only {ships}\n"
+    assert capsys.readouterr() == ("", said)
+
+
+# ---- Quickly ---------------------------------------------------------------------------------------------------------
+
+_LATE = ("asyncio", "jinja2", "lxml", "matplotlib", "numpy", "pydantic", "rich", "scipy")
+"""What takes time to import."""
+NEEDED: dict[str, tuple[list[str], set[str]]] = {
+    "--help": (["--help"], set()),
+    "help of build": (["build", "--help"], set()),
+    "--version": (["--version"], set()),
+    "tables": (["tables"], {"pydantic", "rich"}),
+    "tune": (_TUNE, {"numpy", "pydantic", "rich", "scipy"}),
+    "identify": (["identify", str(TESTS)], {"numpy", "pydantic", "rich", "scipy"}),
+}
+
+
+@pytest.mark.parametrize("case", NEEDED)
+def test_a_command_imports_what_it_uses(case: str) -> None:
+    arguments, allowed = NEEDED[case]
+    script = (
+        "import sys\nbefore = set(sys.modules)\nfrom rov_fmu.cli import main\n"
+        f"try:\n    code = main({arguments!r})\nexcept SystemExit as end:\n    code = end.code\n"
+        "print(code or 0, *sorted(set(sys.modules) - before), file=sys.stderr)"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    code, *imported = ran.stderr.split()
+    assert code == "0"
+    assert "click" in imported
+    assert set(imported) & set(_LATE) <= allowed
+
+
+# ---- Completion ------------------------------------------------------------------------------------------------------
+
+
+def _completed(*words: str, shell: str = "bash") -> list[str]:
+    asked = {
+        "_ROV_FMU_COMPLETE": f"{shell}_complete",
+        "COMP_WORDS": " ".join(["rov-fmu", *words]),
+        "COMP_CWORD": str(len(words)) if shell == "bash" else words[-1],
+    }
+    process = start([], environment=asked, stdout=subprocess.PIPE)
+    out, said = process.communicate(timeout=30)
+    assert (process.returncode, said) == (0, "")
+    return out.splitlines()
+
+
+def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
+    assert _completed("") == [f"plain,{name}" for name in ("build", "figures", "identify", "tables", "tune")]
+    assert _completed("build", "video") == [*(f"plain,{name}" for name in SHIPPED), "file,video"]
+    assert _completed("tables", "videoray_") == ["plain,videoray_refit", "file,videoray_"]
+    assert _completed("tune", "./my") == ["file,./my"]
+    assert _completed("build", "--platform", "") == [f"plain,{name}" for name in ("host", *PLATFORMS)]
+    assert _completed("build", "--backend", "p") == ["plain,pythonfmu"]
+    assert _completed("tune", "videoray", "--axis", "") == ["plain,surge", "plain,heave", "plain,yaw"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_script_for_a_shell_is_there(shell: str) -> None:
+    if shell == "bash" and not shutil.which("bash"):
+        pytest.skip("click asks bash for its version")
+    process = start([], environment={"_ROV_FMU_COMPLETE": f"{shell}_source"}, stdout=subprocess.PIPE)
+    out, said = process.communicate(timeout=30)
+    assert (process.returncode, said) == (0, "")
+    assert f"_ROV_FMU_COMPLETE={shell}_complete" in out
+
+
+# ---- Progress --------------------------------------------------------------------------------------------------------
+
+
+@_posix
+def test_a_build_tells_its_progress_on_a_terminal(tmp_path: Path) -> None:
+    ours, theirs = os.openpty()
+    plain = {"TERM": "xterm", "NO_COLOR": "1"}
+    process = start(["build", "--platform=host", "-o", str(tmp_path / "x.fmu")], environment=plain, stdout=theirs)
+    os.close(theirs)
+    said = b""
+    while part := _read(ours):
+        said += part
+    os.close(ours)
+    assert process.communicate(timeout=60)[1] == ""
+    assert process.returncode == 0
+    assert b"compiling " in said
+    assert said.index(b"compiling ") < said.index(b"built in")
+    assert b"\x1b[2K" in said, "the lines of the progress are taken back"
+
+
+def _read(terminal: int) -> bytes:
+    try:
+        return os.read(terminal, 4096)
+    except OSError:  # so Linux ends a terminal
+        return b""
+
+
+def test_a_build_is_quiet_where_there_is_no_terminal(tmp_path: Path) -> None:
+    process = start(["build", "--platform=host", "-o", str(tmp_path / "x.fmu")], stdout=subprocess.PIPE)
+    out, said = process.communicate(timeout=60)
+    assert (process.returncode, said) == (0, "")
+    assert "compiling" not in out
+    assert "\x1b" not in out
+    assert "\r" not in out
+    assert len(out.splitlines()) == 4  # the file, the platform, what the run gave, the time
+
+
+# ---- Not installed ---------------------------------------------------------------------------------------------------
+
+
+_HIDES = """
+import sys
+from importlib.metadata import Distribution, PackageNotFoundError
+
+class Missing:
+    def find_spec(self, name, *_):
+        if name == {!r}:
+            raise ModuleNotFoundError(name, name=name)
+
+sys.meta_path.insert(0, Missing())
+find = Distribution.from_name
+def from_name(name):
+    if name == "rov-fmu":
+        raise PackageNotFoundError(name)
+    return find(name)
+Distribution.from_name = from_name
+"""
+
+
+def _checkout(folder: Path, missing: str) -> subprocess.CompletedProcess[str]:
+    """Run build_fmu.py of a checkout that nothing tells Python of, without one of the dependencies."""
+    copy = folder / "checkout"
+    for name in ("rov_fmu", "fmu_src", "models"):
+        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("build_fmu.py", "LICENSE"):
+        shutil.copy(ROOT / name, copy)
+    hidden = folder / "sitecustomize.py"  # found before others, like any module in PYTHONPATH
+    hidden.write_text(_HIDES.format(missing), encoding="utf-8")
+    return subprocess.run(
+        [sys.executable, str(copy / "build_fmu.py"), "--platform=host", "-o", str(folder / "x.fmu")],
+        cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_a_checkout_that_is_not_installed_builds_the_same(videoray_fmu: Path, tmp_path: Path) -> None:
+    ran = _checkout(tmp_path, "nothing_at_all")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert (tmp_path / "x.fmu").read_bytes() == videoray_fmu.read_bytes()
+
+
+@pytest.mark.parametrize("missing", ["click", "fat_macho", "pydantic", "matplotlib"])
+def test_a_dependency_that_is_not_there_is_named(missing: str, tmp_path: Path) -> None:
+    ran = _checkout(tmp_path, missing)
+    assert ran.returncode == 1
+    assert ran.stdout == ""
+    assert ran.stderr == f"rov-fmu: the package {missing} is not installed: pip install -e . (in a checkout)\n"
+    assert not (tmp_path / "x.fmu").exists()
+
+
+# ---- In a notebook ---------------------------------------------------------------------------------------------------
+
+
+def test_a_build_runs_inside_a_running_loop(vehicle: Vehicle, videoray_fmu: Path, tmp_path: Path) -> None:
+    async def cell() -> list[str]:
+        done: list[str] = []
+        built = build(vehicle, tmp_path / "x.fmu", platforms=["host"], on_compiled=done.append)
+        assert list(built.binaries) == list(built.seconds) == done
+        return done
+
+    assert len(asyncio.run(cell())) == 1
+    assert (tmp_path / "x.fmu").read_bytes() == videoray_fmu.read_bytes()
+
+
+_CELL = """
+import asyncio, sys
+from pathlib import Path
+from rov_fmu.build import build
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+async def cell():
+    try:
+        build(load_vehicle(VIDEORAY), Path(sys.argv[1]), platforms=["host"])
+    except KeyboardInterrupt:
+        print("interrupted")
+
+asyncio.new_event_loop().run_until_complete(cell())
+"""
+
+
+@_posix
+def test_an_interrupted_build_in_a_notebook_ends_at_once_and_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "tmp").mkdir()
+    # an empty cache makes the compiler work for seconds
+    caches = dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(tmp_path / "cache"))
+    process = subprocess.Popen(
+        [sys.executable, "-c", _CELL, str(tmp_path / "x.fmu")],
+        env=os.environ | caches | {"TMPDIR": str(tmp_path / "tmp")}, cwd=ROOT, stdout=subprocess.PIPE, text=True,
+        # a shell starts what it runs in the background with interrupts ignored, and that is inherited
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
+    )  # fmt: skip
+    deadline = time.monotonic() + 60.0
+    while not list((tmp_path / "tmp").glob("fmu-*/fmu.c")) or not (tmp_path / "cache").exists():
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=10)
+    assert (process.returncode, out) == (0, "interrupted\n")
+    assert list((tmp_path / "tmp").iterdir()) == []
+    assert not (tmp_path / "x.fmu").exists()
