@@ -1,7 +1,6 @@
 """The same vehicle file gives the same FMU to the byte: from another folder, by another Python."""
 
 import hashlib
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,50 +8,45 @@ from pathlib import Path
 import pytest
 
 from checks.commands import ROOT
+from tests.cli.test_wheel import CONSTRAINTS, built, environment, interpreter
 
 _BUILDS = {"native": ("--platform", "linux64", "--platform", "win64"), "pythonfmu": ("--backend", "pythonfmu")}
 _OTHERS = [f"3.{minor}" for minor in range(10, 15) if minor != sys.version_info.minor]
 
 
-def _built(python: str, folder: Path) -> dict[str, str]:
-    """Build both flavours with a Python; their hashes."""
+def _built(folder: Path, *command: str) -> dict[str, str]:
+    """Build both flavours with a command; their hashes."""
     hashes = {}
     for name, arguments in _BUILDS.items():
         fmu = folder / f"{name}.fmu"
-        command = [python, str(ROOT / "build_fmu.py"), *arguments, "-o", str(fmu)]
-        subprocess.run(command, check=True, capture_output=True, cwd=folder)
+        subprocess.run([*command, *arguments, "-o", str(fmu)], check=True, capture_output=True, cwd=folder)
         hashes[name] = hashlib.sha256(fmu.read_bytes()).hexdigest()
     return hashes
 
 
+def _from_checkout(python: str, folder: Path) -> dict[str, str]:
+    return _built(folder, python, str(ROOT / "build_fmu.py"))
+
+
+def test_built_in_another_folder(tmp_path: Path) -> None:
+    one, other = tmp_path / "here", tmp_path / "deep" / "er and other"
+    for folder in (one, other):
+        folder.mkdir(parents=True)
+    assert _from_checkout(sys.executable, other) == _from_checkout(sys.executable, one)
+
+
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    return _built(sys.executable, tmp_path_factory.mktemp("here"))
-
-
-def test_built_in_another_folder(here: dict[str, str], tmp_path: Path) -> None:
-    folder = tmp_path / "deep" / "er and other"
-    folder.mkdir(parents=True)
-    assert _built(sys.executable, folder) == here
-
-
-def _interpreter(version: str) -> str | None:
-    """An interpreter of a version, if there is one that starts."""
-    installed = [str(path) for path in Path.home().glob(f".pyenv/versions/{version}.*/bin/python")]
-    for candidate in [shutil.which(f"python{version}"), *installed]:
-        if candidate and subprocess.run([candidate, "--version"], capture_output=True, check=False).returncode == 0:
-            return candidate
-    return None
+def pinned(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Built by this Python from the checkout, with the versions of constraints.txt."""
+    folder = tmp_path_factory.mktemp("pinned")
+    return _from_checkout(environment(folder / "venv", "-c", CONSTRAINTS, ROOT).python, folder)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("version", _OTHERS)
-def test_built_by_another_python(here: dict[str, str], tmp_path: Path, version: str) -> None:
-    interpreter = _interpreter(version)
-    if interpreter is None:
+def test_built_by_another_python_from_the_wheel(pinned: dict[str, str], tmp_path: Path, version: str) -> None:
+    python = interpreter(version)
+    if python is None:
         pytest.skip(f"there is no Python {version} here")
-    subprocess.run([interpreter, "-m", "venv", str(tmp_path / "venv")], check=True)
-    python = str(tmp_path / "venv" / "bin" / "python")
-    install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-e", str(ROOT)]
-    subprocess.run([python, *install], check=True)
-    assert _built(python, tmp_path) == here
+    made = environment(tmp_path / "venv", "-c", CONSTRAINTS, built("wheel", tmp_path / "dist"), python=python)
+    assert _built(tmp_path, str(made.bin / "rov-fmu"), "build") == pinned

@@ -1,0 +1,174 @@
+"""What `pip install rov-fmu` puts on a machine, and that it is enough: no checkout, no compiler but ziglang."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from checks.commands import ROOT
+from rov_fmu import __version__
+from rov_fmu.vehicle.shipped import SHIPPED
+
+CONSTRAINTS = ROOT / "constraints.txt"
+_PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
+
+
+def built(kind: str, folder: Path) -> Path:
+    """The wheel or the sdist of this checkout."""
+    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", folder], check=True, cwd=ROOT)
+    (path,) = folder.glob("*.whl" if kind == "wheel" else "*.tar.gz")
+    return path
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A fresh virtual environment."""
+
+    folder: Path
+
+    @property
+    def bin(self) -> Path:
+        return self.folder / ("Scripts" if os.name == "nt" else "bin")
+
+    @property
+    def python(self) -> str:
+        return str(self.bin / "python")
+
+    def run(self, *command: str | Path, where: Path) -> str:
+        """Run a program of this environment in a folder, where there is no other program; what it prints."""
+        path = {"PATH": str(self.bin), "PYTHONSAFEPATH": "1"}
+        program = [str(self.bin / command[0]), *map(str, command[1:])]
+        return subprocess.run(
+            program, cwd=where, env=os.environ | path, stdout=subprocess.PIPE, text=True, check=True
+        ).stdout
+
+
+def environment(folder: Path, *requirements: str | Path, python: str = sys.executable) -> Environment:
+    """A virtual environment of a Python with what is required installed."""
+    subprocess.run([python, "-m", "venv", folder], check=True)
+    made = Environment(folder)
+    subprocess.run([made.python, *_PIP, "install", *map(str, requirements)], check=True, cwd=folder)
+    return made
+
+
+def interpreter(version: str) -> str | None:
+    """An interpreter of a version, if there is one that starts."""
+    installed = [str(path) for path in Path.home().glob(f".pyenv/versions/{version}.*/bin/python")]
+    for candidate in [shutil.which(f"python{version}"), *installed]:
+        if candidate and subprocess.run([candidate, "--version"], capture_output=True, check=False).returncode == 0:
+            return candidate
+    return None
+
+
+def _files(folder: str) -> set[str]:
+    """Of the checkout, but what Python leaves there and what is for readers of the repository."""
+    files = (path for path in (ROOT / folder).rglob("*") if path.is_file())
+    kept = (path for path in files if path.parent.name != "__pycache__" and path.name != "README.md")
+    return {path.relative_to(ROOT).as_posix() for path in kept}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built("wheel", tmp_path_factory.mktemp("wheel"))
+
+
+def _content(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_the_wheel_holds_the_package_and_its_data_alone(wheel: Path) -> None:
+    names = _content(wheel).keys()
+    assert {name.split("/")[0] for name in names} == {"rov_fmu", f"rov_fmu-{__version__}.dist-info"}
+    ours = [name for name in names if name.startswith("rov_fmu/")]
+    assert not [n for n in ours if re.search(r"__pycache__|README|\.pyc|\.fmu$|/\.", n)]
+    data = {n.removeprefix("rov_fmu/data/") for n in ours if n.startswith("rov_fmu/data/")}
+    assert data == {*_files("fmu_src"), *_files("models"), "LICENSE"}
+    assert set(ours) - {f"rov_fmu/data/{n}" for n in data} == _files("rov_fmu")
+    assert "rov_fmu/py.typed" in ours
+
+
+def test_the_metadata_is_complete(wheel: Path) -> None:
+    text = _content(wheel)[f"rov_fmu-{__version__}.dist-info/METADATA"].decode()
+    holder = re.search(r"Copyright \(c\) \d+ (.*)", (ROOT / "LICENSE").read_text(encoding="utf-8"))
+    assert holder
+    for line in (
+        "Name: rov-fmu",
+        f"Version: {__version__}",
+        "License-Expression: MIT",
+        "License-File: LICENSE",
+        f"Author: {holder[1]}",
+        "Requires-Python: >=3.10",
+        *(f"Classifier: Programming Language :: Python :: 3.{minor}" for minor in range(10, 15)),
+        "Classifier: Typing :: Typed",
+    ):
+        assert f"\n{line}\n" in text, line
+    assert re.search(r"^Keywords: .*FMI", text, re.M)
+    assert "pillow" not in text.lower()
+
+
+@pytest.mark.long
+def test_the_installed_command_does_everything_outside_the_checkout(wheel: Path, tmp_path: Path) -> None:
+    made = environment(tmp_path / "venv", "-c", CONSTRAINTS, wheel)
+    here = tmp_path / "here"
+    here.mkdir()
+    told = made.run("rov-fmu", "build", where=here)
+    assert "aarch64-darwin" in told
+    assert "built in" in told
+    made.run("fmpy", "simulate", "videoray.fmu", "--start-values", "u_l", "0.3", "u_r", "0.3", where=here)
+    made.run("rov-fmu", "build", "videoray_refit", "--platform", "host", where=here)
+    made.run("rov-fmu", "build", "--backend", "pythonfmu", "--osp", where=here)
+    assert "Table 8." in made.run("rov-fmu", "tables", "videoray", where=here)
+    assert "alpha_u" in made.run("rov-fmu", "tune", "videoray", "--axis=surge", "--command=0.3", "--v-ss=1", where=here)
+    assert "paper_figures.svg" in made.run("rov-fmu", "figures", ".", where=here)
+    tests = shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", tmp_path / "tests")
+    made.run("rov-fmu", "identify", tests, "-o", "rov.toml", "--report", "rov.html", where=here)
+    made.run("rov-fmu", "build", "rov.toml", "--platform", "host", "-o", "rov.fmu", where=here)
+    # the same bytes as from the checkout
+    same = tmp_path / "same"
+    same.mkdir()
+    made.run("python", ROOT / "build_fmu.py", where=same)
+    made.run("python", ROOT / "build_fmu.py", "--backend", "pythonfmu", "--osp", where=same)
+    for path in same.iterdir():
+        assert path.read_bytes() == (here / path.name).read_bytes(), path.name
+    assert len(list(same.iterdir())) == 3
+
+
+@pytest.mark.long
+def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
+    sdist = built("sdist", tmp_path / "sdist")
+    with tarfile.open(sdist) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"tests/cli/test_wheel.py", "constraints.txt", "build_fmu.py", "LICENSE", "README.md"} <= names
+    subprocess.run([sys.executable, *_PIP, "wheel", "--no-deps", "-w", tmp_path / "again", sdist], check=True)
+    (again,) = (tmp_path / "again").iterdir()
+    assert _content(again) == _content(wheel)
+
+
+def lowest(folder: Path) -> Path:
+    """A file of constraints: each dependency at the lower bound that pyproject.toml gives it."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    pins = [f"{name}=={bound}" for name, bound in re.findall(r'^    "([a-z-]+)>=([0-9.]+)', text, re.M)]
+    assert len(pins) > 20
+    path = folder / "lowest.txt"
+    path.write_text("\n".join(pins) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.long
+def test_the_lowest_versions_are_enough(tmp_path: Path) -> None:
+    python = interpreter("3.10")
+    if python is None:
+        pytest.skip("there is no Python 3.10 here")
+    made = environment(tmp_path / "venv", "-c", lowest(tmp_path), f"{ROOT}[test]", python=python)
+    quick = ("cli/test_start.py", "export/test_build.py", "export/test_osp.py", "identify", "pages", "vehicle")
+    command = [made.python, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *(f"tests/{part}" for part in quick)]
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout[-3000:]
