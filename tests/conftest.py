@@ -15,7 +15,7 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 def pytest_configure(config: pytest.Config) -> None:
     """Properties: the same examples in every run of the default tests, fresh ones in the long run."""
     settings.register_profile("same", derandomize=True, database=None, deadline=None)
-    settings.register_profile("fresh", database=None, deadline=None, print_blob=True)
+    settings.register_profile("fresh", derandomize=False, database=None, deadline=None, print_blob=True)
     settings.load_profile("fresh" if config.option.markexpr == "long" else "same")
 
 

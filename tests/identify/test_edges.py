@@ -9,7 +9,7 @@ import pytest
 from checks.commands import TESTS
 from checks.recordings import clean
 from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.identify.step_responses import correlation_time, steps
+from rov_fmu.identify.step_responses import correlation_time, steps, velocity
 from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.rov import HEAVE
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -86,3 +86,10 @@ def test_bounds_of_every_column(table: tuple[str, str], within: str, beyond: str
     path.write_text("\n".join((header, beyond, *rest)), encoding="utf-8")
     with pytest.raises(DataFileError, match="line 2, column"):
         load_tank_tests(tmp_path)
+
+
+def test_velocity_is_smoothed_over_half_a_second() -> None:
+    time = np.arange(300) / 100.0
+    values = np.random.default_rng(0).standard_normal(300)
+    half, default = (velocity(time, values, is_position=False, **how) for how in ({"window": 0.5}, {}))
+    assert (half[1] == default[1]).all()

@@ -1,14 +1,14 @@
 """When a motion comes to rest, to the last digits, in Python and in C; where the force is small, artanh loses them."""
 
 import ctypes
-import subprocess
 from collections.abc import Callable
 
 import pytest
 from mpmath import mp
 
+from checks.c_programs import compile_c
 from checks.reference import DIGITS
-from rov_fmu.export.compile import C_FLAGS, C_SOURCES, compiler
+from rov_fmu.export.compile import C_SOURCES
 from rov_fmu.motion.riccati import time_to_rest
 
 TimeToRest = Callable[[float, float, float, float], float]
@@ -26,13 +26,15 @@ def function(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     if request.param == "Python":
         return time_to_rest
     folder = tmp_path_factory.mktemp("rest")
-    (folder / "rest.c").write_text(
-        f'#include "{C_SOURCES / "riccati.c"}"\n'
+    program = folder / "rest.c"
+    program.write_text(
+        '#include "riccati.c"\n'
+        "double rest(double, double, double, double);\n"
         "double rest(double A, double B, double C, double v0) { return riccati_time_to_rest(A, B, C, v0); }\n",
         encoding="utf-8",
     )
-    subprocess.run([*compiler(), *C_FLAGS, "-shared", "rest.c", "-lm", "-o", "rest.so"], cwd=folder, check=True)
-    rest = ctypes.CDLL(str(folder / "rest.so")).rest
+    library = compile_c(program, folder / "rest.so", C_SOURCES, "-shared", "-Wno-unused-function")
+    rest = ctypes.CDLL(str(library)).rest
     rest.argtypes, rest.restype = [ctypes.c_double] * 4, ctypes.c_double
     found: TimeToRest = rest
     return found
