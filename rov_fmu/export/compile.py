@@ -6,12 +6,13 @@ import platform
 import signal
 import subprocess
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Lock
+from queue import SimpleQueue
+from threading import Lock, current_thread, main_thread
 
 from fat_macho import FatWriter
 
@@ -94,19 +95,50 @@ def compile_all(
 
     Raises BuildError. Interrupted or failed, it leaves no process and no file behind.
     """
+    ended: SimpleQueue[Future[bytes] | None] = SimpleQueue()
     try:
-        with ThreadPoolExecutor(os.cpu_count()) as pool, _Compilers() as compilers:
+        with (
+            _interrupts_to(lambda: ended.put(None)),
+            ThreadPoolExecutor(os.cpu_count()) as pool,
+            _Compilers() as compilers,
+        ):
             jobs = {pool.submit(_compile, compilers, name, sources, identifier): name for name in platforms}
-            for job in as_completed(jobs):
-                job.result()
-                on_done(jobs[job])
+            for job in jobs:
+                job.add_done_callback(ended.put)
+            for _ in jobs:
+                if (done := ended.get()) is None:
+                    raise KeyboardInterrupt
+                done.result()
+                on_done(jobs[done])
             return {name: job.result() for job, name in jobs.items()}
     except OSError as error:
         raise BuildError(f"cannot compile: {error.strerror or error}") from error
 
 
+@contextmanager
+def _interrupts_to(tell: Callable[[], None]) -> Iterator[None]:
+    """Tell of interrupts, and raise at the end: raised at any moment, one could leave a lock of the threads locked."""
+    came: list[int] = []
+
+    def interrupted(number: int, _: object) -> None:
+        came.append(number)
+        tell()
+
+    here = current_thread() is main_thread()
+    taken = [s for s in (signal.SIGINT, signal.SIGTERM) if here and signal.getsignal(s) is signal.default_int_handler]
+    try:
+        for number in taken:
+            signal.signal(number, interrupted)
+        yield
+    finally:
+        for number in taken:
+            signal.signal(number, signal.default_int_handler)
+        if came:
+            raise KeyboardInterrupt
+
+
 class _Compilers:
-    """The compilers that run, each waited for in a thread: interrupts reach the main thread alone, and it ends them."""
+    """The compilers that run, each waited for in a thread; they end where the block does."""
 
     def __init__(self) -> None:
         self._lock = Lock()
