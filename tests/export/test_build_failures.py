@@ -138,7 +138,10 @@ def test_no_room_for_temporary_files(old: Path, tmp_path: Path) -> None:
         encoding="utf-8",
     )
     # -B: what Python compiles would be cut off too, and stay so for all who import it
-    result = subprocess.run([sys.executable, "-B", limited], capture_output=True, text=True, check=False, cwd=tmp_path)
+    result = subprocess.run(
+        [sys.executable, "-B", limited], capture_output=True, text=True, check=False, cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},  # this checkout, whichever is installed
+    )  # fmt: skip
     assert result.returncode == 1
     assert result.stderr.splitlines()[0].startswith("rov-fmu: ")
     assert "File too large" in result.stderr
