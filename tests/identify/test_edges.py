@@ -91,5 +91,5 @@ def test_bounds_of_every_column(table: tuple[str, str], within: str, beyond: str
 def test_velocity_is_smoothed_over_half_a_second() -> None:
     time = np.arange(300) / 100.0
     values = np.random.default_rng(0).standard_normal(300)
-    half, default = (velocity(time, values, is_position=False, **how) for how in ({"window": 0.5}, {}))
+    half, default = velocity(time, values, is_position=False, window=0.5), velocity(time, values, is_position=False)
     assert (half[1] == default[1]).all()
