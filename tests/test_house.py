@@ -18,7 +18,7 @@ AROUND = {
     "examples": {"examples", "rov_fmu"},
     "benchmarks": {"benchmarks", "checks", "rov_fmu"},
     "fuzz": {"fuzz", "checks", "rov_fmu"},
-    "interop": {"interop", "checks", "rov_fmu"},
+    "interop": {"interop", "checks", "examples", "rov_fmu"},
     "tests/around": {"tests", "benchmarks", "checks", "examples", "fuzz", "interop", "rov_fmu"},
     "tests": {"tests", "checks", "rov_fmu"},
 }
