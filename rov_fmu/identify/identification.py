@@ -120,4 +120,5 @@ def compare(identification: Identification) -> tuple[Comparison, ...]:
 
 def count(n: int, what: str) -> str:
     """1 force, 2 forces."""
-    return f"{n} {what}{'' if n == 1 else 's'}"
+    many = f"{what.removesuffix('y')}ies" if what.endswith("y") else f"{what}s"
+    return f"{n} {what if n == 1 else many}"

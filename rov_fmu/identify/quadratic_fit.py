@@ -46,11 +46,11 @@ class QuadraticFit:
 
     def value(self, x: Array) -> Array:
         """The curve."""
-        return np.asarray(_quadratic(x) @ self.estimate.values)
+        return np.asarray(quadratic(x) @ self.estimate.values)
 
     def band(self, x: Array) -> tuple[Array, Array]:
         """95 % confidence band of the curve; infinite where there are too few points."""
-        reach = self.estimate.half_band(_quadratic(x))
+        reach = self.estimate.half_band(quadratic(x))
         return self.value(x) - reach, self.value(x) + reach
 
     @property
@@ -88,19 +88,20 @@ def fit_quadratic(
     groups = np.abs(x) if groups is None else groups
     low, high = bounds(names)
     root, used = np.sqrt(weights), weights > 0.0
-    M, weighted = _quadratic(x) * root[:, None], root * y
+    M, weighted = quadratic(x) * root[:, None], root * y
     values = _linear(M, weighted, low, high)
     free = _linear(M, weighted, np.full(2, -np.inf), np.full(2, np.inf))
 
     def without(out: Flags) -> Array | None:
         enough = len(np.unique(groups[used & ~out])) >= 2
-        return _quadratic(x[out]) @ _linear(M[~out], weighted[~out], low, high) if enough else None
+        return quadratic(x[out]) @ _linear(M[~out], weighted[~out], low, high) if enough else None
 
     found = estimate_alike(names, Solution(values, weighted - M @ values, M), int(used.sum()))
     return QuadraticFit(x, y, weights, found, (float(free[0]), float(free[1])), leave_one_out(groups, without))
 
 
-def _quadratic(x: Array) -> Array:
+def quadratic(x: Array) -> Array:
+    """n x 2: |x| x and x, what a and b are the factors of."""
     return np.column_stack([np.abs(x) * x, x])
 
 

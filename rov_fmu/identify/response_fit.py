@@ -102,6 +102,11 @@ def fit_response(
     )
 
 
+def responses(axis: Axis, coefficients: Coefficients, commands: Array) -> Array:
+    """n x 2: V_ss and Tau of the model at n commands."""
+    return np.array([axis.response(coefficients, c) for c in commands.tolist()])
+
+
 def predict(axis: Axis, coefficients: Coefficients, points: Iterable[Point]) -> Array:
     """V_ss or Tau of the model at every point."""
     responses = (axis.response(coefficients, p.command)[p.quantity == "Tau"] for p in points)
@@ -119,13 +124,13 @@ def response_band(
     axis: Axis, coefficients: Coefficients, found: Estimate, commands: Array
 ) -> tuple[Array, Array, Array, Array]:
     """95 % confidence band of V_ss and Tau over commands, to first order in the estimate."""
-    curve = np.array([axis.response(coefficients, c) for c in commands.tolist()])
+    curve = responses(axis, coefficients, commands)
     slopes = np.empty((*curve.shape, len(found.names)))
     with np.errstate(invalid="ignore"):  # without any drag both are infinite
         for n, name in enumerate(found.names):
             h = 1e-5 * (found[name] or min(found.errors[name], 1.0))
             moved = replace(coefficients, **{name: found[name] + h})
-            slopes[..., n] = (np.array([axis.response(moved, c) for c in commands.tolist()]) - curve) / h
+            slopes[..., n] = (responses(axis, moved, commands) - curve) / h
         reach = found.half_band(slopes)
         low, high = curve - reach, curve + reach
     return low[:, 0], high[:, 0], low[:, 1], high[:, 1]

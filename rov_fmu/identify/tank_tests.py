@@ -71,6 +71,11 @@ class Recording:
         """Whether the velocity is the rate of the values."""
         return self.quantity != "velocity"
 
+    @property
+    def unit(self) -> str:
+        """Of the values."""
+        return self.axis.position_unit if self.is_position else self.axis.unit
+
 
 @dataclass(frozen=True)
 class Rov:

@@ -1,11 +1,12 @@
 """documentation/index.html: one page that stands alone, with the numbers and plots of the vehicle it is about."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from decimal import ROUND_DOWN, Decimal
 from functools import partial
 from itertools import groupby
 from math import isfinite
+from typing import Any
 
 from markupsafe import Markup
 from matplotlib.axes import Axes
@@ -13,12 +14,12 @@ from matplotlib.figure import Figure
 
 from rov_fmu.export.archive import REPORT
 from rov_fmu.export.interface import Variable, variables
-from rov_fmu.motion.rov import AXES, COEFFICIENTS, Axis, Coefficients, Inputs, State, step
+from rov_fmu.motion.rov import AXES, Axis, Coefficients, Inputs, State, step
 from rov_fmu.pages.plots import draw_steps, evenly, measured_step
-from rov_fmu.pages.svg import LIGHT, PALETTE, inline_file, inline_svg, svg_file
+from rov_fmu.pages.svg import LIGHT, inline_file, inline_svg, svg_file
 from rov_fmu.pages.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables, untuned
-from rov_fmu.vehicle.vehicle import Alternative, Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _PANEL = (3.7, 2.9)  # inches
 
@@ -28,9 +29,8 @@ _PANEL = (3.7, 2.9)  # inches
 
 def documentation(vehicle: Vehicle, *, native: bool) -> dict[str, bytes]:
     """The page by its path in the FMU. Raises FileError."""
-    return {
-        "documentation/index.html": documentation_page(vehicle, variables(vehicle.coefficients), native=native).encode()
-    }
+    text = documentation_page(vehicle, variables(vehicle.coefficients), native=native)
+    return {"documentation/index.html": text.encode()}
 
 
 def documentation_page(vehicle: Vehicle, variables: tuple[Variable, ...], *, native: bool = True) -> str:
@@ -38,47 +38,38 @@ def documentation_page(vehicle: Vehicle, variables: tuple[Variable, ...], *, nat
 
     Without a data folder it goes without tables and measurements.
     """
-    tables = load_tables(vehicle) if vehicle.data else ()
-    tables_of = _by_axis(tables)
-    commands = _commands(vehicle, tables)
+    tables = tables_by_axis(vehicle)
+    commands = _commands(vehicle, tables.values())
+    steady, steps = (
+        [_plot(f"{label}: {name}", partial(draw, axis=axis, table=tables.get(name))) for name, axis in AXES.items()]
+        for label, draw in (
+            ("V_ss over the command", partial(plot_steady, vehicle=vehicle)),
+            ("Step responses", partial(plot_steps, k=vehicle.coefficients, commands=commands)),
+        )
+    )
     return page(
         "index.html.j2",
         vehicle=vehicle,
         native=native,
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
         groups=[list(group) for _, group in groupby(variables, lambda v: (v.causality, v.variability, v.initial))],
-        coefficients=[(name, meta, getattr(vehicle.coefficients, name)) for name, meta in COEFFICIENTS.items()],
-        alternatives=[_alternative(a) for a in vehicle.alternatives.values()],
-        reversing=_reversing(asdict(vehicle.coefficients)),
-        palette=PALETTE,
-        tables=[(table, _agreement(table)) for table in tables],
+        values=asdict(vehicle.coefficients),
+        reversing=_reversing,
+        tables=[(table, _agreement(table)) for table in tables.values()],
         moved=step(vehicle.coefficients, Inputs(u_l=0.3, u_r=0.3), State(), 10.0),
-        held=[_held(vehicle, axis, commands) for axis in AXES.values()],
+        held=commands,
         frames=[
             inline_file("The vehicle from above: x forward, y to starboard", vehicle.picture("from_above.svg")),
             inline_file("The vehicle from starboard: x forward, z down", vehicle.picture("from_starboard.svg")),
         ],
-        steady=[
-            _plot(
-                f"V_ss over the command: {axis.name}",
-                partial(plot_steady, vehicle=vehicle, axis=axis, table=tables_of.get(axis.name)),
-            )
-            for axis in AXES.values()
-        ],
-        steps=[
-            _plot(
-                f"Step responses: {axis.name}",
-                partial(
-                    plot_steps, k=vehicle.coefficients, axis=axis, commands=commands, table=tables_of.get(axis.name)
-                ),
-            )
-            for axis in AXES.values()
-        ],
+        steady=steady,
+        steps=steps,
     )
 
 
-def _by_axis(tables: Iterable[ResponseTable]) -> dict[str, ResponseTable]:
-    return {table.axis.name: table for table in tables}
+def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
+    """The published tables of a vehicle by axis, none without a data folder. Raises DataFileError."""
+    return {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
 
 
 def _commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Decimal]:
@@ -91,20 +82,8 @@ def _commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Decimal
     return evenly(common)
 
 
-@dataclass(frozen=True)
-class _Agreement:
-    """How the printed cells of a table compare with the computed ones."""
-
-    printed: int
-    rounded: int
-    """Printed as computed, rounded to the printed digits."""
-    cut_off: int
-    """Not that, but the computed digits without rounding."""
-    farthest: tuple[Cell, str, Decimal] | None
-    """Cell, what it is, and its command."""
-
-
-def _agreement(table: ResponseTable) -> _Agreement:
+def _agreement(table: ResponseTable) -> dict[str, Any]:
+    """How many cells are printed, as computed and rounded, or as computed and cut off; the farthest and its place."""
     cells = [
         (cell, f"{model} {quantity}", row.command)
         for row in table.rows
@@ -112,42 +91,18 @@ def _agreement(table: ResponseTable) -> _Agreement:
         for quantity, cell in (("V_ss", response.V_ss), ("Tau", response.Tau))
         if cell.printed is not None
     ]
-    farthest = max(cells, key=lambda c: abs(c[0].from_printed or 0.0), default=None)
-    rounded = sum(cell.rounds_to_printed for cell, *_ in cells)
-    cut_off = sum(_is_cut_off(cell) for cell, *_ in cells)
-    return _Agreement(len(cells), rounded, cut_off, farthest)
+    return {
+        "printed": len(cells),
+        "rounded": sum(cell.rounds_to_printed for cell, *_ in cells),
+        "cut_off": sum(_is_cut_off(cell) for cell, *_ in cells),
+        "farthest": max(cells, key=lambda c: abs(c[0].from_printed or 0.0), default=None),
+    }
 
 
 def _is_cut_off(cell: Cell) -> bool:
     if cell.printed is None or cell.rounds_to_printed or not isfinite(cell.computed):
         return False
     return Decimal(cell.computed).quantize(cell.printed, ROUND_DOWN) == cell.printed
-
-
-@dataclass(frozen=True)
-class _HeldCommand:
-    """What a held command does."""
-
-    axis: Axis
-    commands: str
-    responses: Sequence[tuple[Decimal, float, float]]
-    """Command (%), V_ss and Tau."""
-
-
-def _held(vehicle: Vehicle, axis: Axis, commands: Iterable[Decimal]) -> _HeldCommand:
-    held = ", ".join(f"{name} = {'−' if sign < 0 else ''}c" for name, sign in axis.signs.items())
-    return _HeldCommand(axis, held, [(c, *axis.response(vehicle.coefficients, float(c) / 100.0)) for c in commands])
-
-
-@dataclass(frozen=True)
-class _Alternative:
-    description: str
-    values: Mapping[str, float]
-    reversing: Sequence[tuple[str, float]]
-
-
-def _alternative(alternative: Alternative) -> _Alternative:
-    return _Alternative(alternative.description, alternative.values, _reversing(alternative.values))
 
 
 def _reversing(values: Mapping[str, float]) -> list[tuple[str, float]]:
@@ -184,18 +139,17 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
 
 def plot_steps(ax: Axes, k: Coefficients, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:
     """Velocity after steps of the command from rest, with the measured V_ss and Tau."""
-    steps = [measured_step(table, c) for c in commands]
-    draw_steps(ax, axis, steps, [(k, "-")])
+    draw_steps(ax, axis, [measured_step(table, c) for c in commands], [(k, "-")])
     ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left")
 
 
 def steady_picture(vehicle: Vehicle) -> str:
     """V_ss of the three axes side by side as an SVG file."""
-    tables_of = _by_axis(load_tables(vehicle) if vehicle.data else ())
+    tables = tables_by_axis(vehicle)
 
     def draw(figure: Figure) -> None:
         for ax, axis in zip(figure.subplots(1, 3), AXES.values(), strict=True):
-            plot_steady(ax, vehicle, axis, tables_of.get(axis.name))
+            plot_steady(ax, vehicle, axis, tables.get(axis.name))
 
     return svg_file(draw, (3 * _PANEL[0], _PANEL[1]), salt="steady") + "\n"
 

@@ -1,48 +1,52 @@
 """The plots of the identification report: every fit with its 95 % band, and its residuals below."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rov_fmu.identify.identification import AxisResult, Comparison
+from rov_fmu.identify.identification import AxisResult, Comparison, Identification
 from rov_fmu.identify.least_squares import Array, Flags
 from rov_fmu.identify.output_error import Simulation
-from rov_fmu.identify.quadratic_fit import QuadraticFit
-from rov_fmu.identify.step_responses import StepResponse, velocity, without_spikes
-from rov_fmu.motion.rov import Axis, Coefficients
+from rov_fmu.identify.quadratic_fit import QuadraticFit, quadratic
+from rov_fmu.identify.response_fit import responses
+from rov_fmu.identify.step_responses import velocity, without_spikes
+from rov_fmu.motion.rov import Axis
 from rov_fmu.pages.plots import Step, draw_steps, evenly
 from rov_fmu.pages.svg import LIGHT
+from rov_fmu.pages.templates import pretty_unit
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _BINS = 300  # of a recording: as many as one can see
 
 
-def plot_thrust(figure: Figure, fit: QuadraticFit, curve: tuple[float, float]) -> None:
-    """Force over command, and the curve (a_t, b_t) of the vehicle where recordings have moved it away from the fit."""
+def plot_thrust(figure: Figure, results: Identification, fit: QuadraticFit) -> None:
+    """Force over command, and the curve of the vehicle where recordings have moved it away from the fit."""
     above, below = _two(figure)
+    curve = [getattr(results.vehicle.coefficients, name) for name in fit.estimate.names]
     x = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
     moved = not np.allclose(curve, (fit.a, fit.b), rtol=1e-9)
     _quadratic(above, below, fit, x, 100.0, color="grey" if moved else "blue", label="fit to the forces")
     if moved:
-        above.plot(100.0 * x, curve[0] * np.abs(x) * x + curve[1] * x, color=LIGHT["blue"], label="with the recordings")
+        above.plot(100.0 * x, quadratic(x) @ curve, color=LIGHT["blue"], label="with the recordings")
     above.set_title("Force (N)", loc="left")
     _finish(above, below, "command (%)", "residual (N)")
 
 
-def plot_drag(figure: Figure, result: AxisResult, k: Coefficients, against: Coefficients | None) -> None:
+def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> None:
     """Thrust at measured V_ss: the drag that the vehicle takes, and the fit to these forces alone as in (11)-(16)."""
     axis, fit = result.axis, result.drag
     assert fit
     above, below = _two(figure)
     v = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
     _quadratic(above, below, fit, v, 1.0, color="grey", label="fit to these forces")
-    above.plot(v, _drag(axis, k, v), color=LIGHT["blue"], label="model")
-    if against and (alpha := getattr(against, axis.coefficient("alpha"))):
-        scaled = _drag(axis, against, v) * getattr(k, axis.coefficient("alpha")) / alpha
+    a, b, alpha = _drag(axis, results.vehicle)
+    above.plot(v, quadratic(v) @ (a, b), color=LIGHT["blue"], label="model")
+    if results.against and (other := _drag(axis, results.against))[2]:
+        scaled = quadratic(v) @ other[:2] * alpha / other[2]
         above.plot(v, scaled, ":", color=LIGHT["teal"], label="compared")
-    above.set_title(f"Drag ({_unit(axis.load)}) over ${axis.velocity}$", loc="left")
-    _finish(above, below, f"velocity ({axis.unit})", f"residual ({_unit(axis.load)})")
+    load = pretty_unit(axis.load)
+    above.set_title(f"Drag ({load}) over ${axis.velocity}$", loc="left")
+    _finish(above, below, f"velocity ({axis.unit})", f"residual ({load})")
 
 
 def _quadratic(above: Axes, below: Axes, fit: QuadraticFit, x: Array, scale: float, *, color: str, label: str) -> None:
@@ -54,27 +58,22 @@ def _quadratic(above: Axes, below: Axes, fit: QuadraticFit, x: Array, scale: flo
 
 
 def plot_response(
-    figure: Figure,
-    result: AxisResult,
-    quantity: str,
-    comparison: Comparison | None,
-    k: Coefficients,
-    against: Coefficients | None,
-    command_range: tuple[float, float],
+    figure: Figure, results: Identification, result: AxisResult, quantity: str, comparison: Comparison | None
 ) -> None:
     """V_ss or Tau over command, signs dropped, and below the relative errors."""
-    axis, points = result.axis, comparison.points if comparison else ()
+    axis, points, which = result.axis, comparison.points if comparison else (), int(quantity == "Tau")
     above, below = _two(figure) if points else (figure.subplots(), None)
-    at = [abs(p.command) for p in points] or list(command_range)
+    at = [abs(p.command) for p in points] or list(results.vehicle.command_range)
     c = np.linspace(max(0.5 * min(at), 0.01), min(max(at) + 0.05, 1.0), 46)
     tested = (c >= min(at)) & (c <= max(at))
-    curve = _curve(axis, k, quantity, c)
+    curve = responses(axis, results.vehicle.coefficients, c)[:, which]
     if fit := result.recordings or result.response:
-        low, high = fit.band(c)[2:] if quantity == "Tau" else fit.band(c)[:2]
+        low, high = fit.band(c)[2 * which :][:2]
         _band(above, 100.0 * c, np.maximum(low, 0.0), high, "blue")
     above.plot(100.0 * c, curve, color=LIGHT["blue"], label="model")
-    if against:
-        above.plot(100.0 * c, _curve(axis, against, quantity, c), "--", color=LIGHT["grey"], label="compared")
+    if results.against:
+        other = responses(axis, results.against.coefficients, c)[:, which]
+        above.plot(100.0 * c, other, "--", color=LIGHT["grey"], label="compared")
     top = [*(abs(p.value) for p in points), *curve[tested][np.isfinite(curve[tested])].tolist()]
     above.set_ylim(0.0, 1.25 * max(top, default=1.0) or 1.0)
     above.set_title("$Tau$ (s)" if quantity == "Tau" else rf"$V_{{ss}}$ ({axis.unit})", loc="left")
@@ -87,7 +86,7 @@ def plot_response(
     _finish(above, below, "command (%)", "error (%)")
 
 
-def plot_steps(figure: Figure, result: AxisResult, k: Coefficients) -> None:
+def plot_steps(figure: Figure, results: Identification, result: AxisResult) -> None:
     """Steps of the command from rest, up to four, with what was measured of them; signs dropped."""
     tested = sorted({round(abs(p.command), 6) for p in result.points})
     steps = []
@@ -96,15 +95,15 @@ def plot_steps(figure: Figure, result: AxisResult, k: Coefficients) -> None:
         V_ss, Tau = ([abs(p.value) for p in here if p.quantity == quantity] for quantity in ("V_ss", "Tau"))
         steps.append(Step(command, V_ss, Tau))
     ax: Axes = figure.subplots()
-    draw_steps(ax, result.axis, steps, [(k, "-")])
+    draw_steps(ax, result.axis, steps, [(results.vehicle.coefficients, "-")])
     ax.set_title(f"Steps: ${result.axis.velocity}$ ({result.axis.unit})", loc="left")
 
 
-def plot_recording(figure: Figure, simulation: Simulation, holds: Sequence[StepResponse]) -> None:
+def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -> None:
     """Velocity of a recording and of the model, and below the residuals of the measured samples."""
-    recording, axis = simulation.recording, simulation.recording.axis
+    recording, axis = simulation.recording, result.axis
     above, below = _two(figure, (2.2, 1.0))
-    for hold in holds:
+    for hold in (step for step in result.steps if step.file == recording.file):
         above.axvspan(hold.start, hold.end, facecolor=LIGHT["band"], edgecolor=LIGHT["page"], zorder=0)
         above.text(
             0.5 * (hold.start + hold.end), 1.0, f"{100.0 * hold.command:g} %".replace("-", "−"), fontsize=8.5,
@@ -121,8 +120,7 @@ def plot_recording(figure: Figure, simulation: Simulation, holds: Sequence[StepR
     low, high = ([pick(simulation.residuals[part]) for part in parts] for pick in (np.min, np.max))
     t = [simulation.time[part[0]] for part in parts]
     below.fill_between(t, low, high, color=LIGHT["orange"], linewidth=0.6)
-    unit = axis.position_unit if recording.is_position else axis.unit
-    _finish(above, below, "time (s)", f"residual ({unit})")
+    _finish(above, below, "time (s)", f"residual ({recording.unit})")
     above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
 
 
@@ -161,14 +159,6 @@ def _diamonds(ax: Axes, x: Array, y: Array) -> None:
     ax.plot(x, y, "D", color=LIGHT["violet"], markerfacecolor="none", markersize=4.0, zorder=4)
 
 
-def _drag(axis: Axis, k: Coefficients, v: Array) -> Array:
-    a_d, b_d = (getattr(k, axis.coefficient(kind)) for kind in ("a_d", "b_d"))
-    return np.asarray(a_d * np.abs(v) * v + b_d * v)
-
-
-def _curve(axis: Axis, k: Coefficients, quantity: str, commands: Array) -> Array:
-    return np.array([axis.response(k, c)[quantity == "Tau"] for c in commands.tolist()])
-
-
-def _unit(unit: str) -> str:
-    return unit.replace(".", "·")
+def _drag(axis: Axis, vehicle: Vehicle) -> tuple[float, ...]:
+    """a_d, b_d and α."""
+    return tuple(getattr(vehicle.coefficients, axis.coefficient(kind)) for kind in ("a_d", "b_d", "alpha"))

@@ -5,6 +5,8 @@ from math import isfinite, isnan
 from pathlib import Path
 
 from rov_fmu.files.templates import render
+from rov_fmu.motion.rov import AXES, COEFFICIENTS
+from rov_fmu.pages.svg import PALETTE
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -12,8 +14,8 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def page(template: str, **content: object) -> str:
     """A page from a template, with these formats as filters."""
     return render(
-        template, Path(__file__).parent / "templates",
-        number=number, fixed=fixed, percent=percent, deviation=deviation, unit=pretty_unit, **content,
+        template, Path(__file__).parent / "templates", number=number, text=text, unit=pretty_unit,
+        palette=PALETTE, axes=AXES, coefficients=COEFFICIENTS, **content,
     )  # fmt: skip
 
 
@@ -33,21 +35,11 @@ def number(value: float | None, digits: int | None = None) -> str:
     return text.replace("-", "−")
 
 
-def fixed(value: float, digits: int) -> str:
-    """A number with so many decimals."""
-    return f"{value:.{digits}f}".replace("-", "−").replace("inf", "∞")
-
-
-def percent(value: float, digits: int = 0) -> str:
-    """A fraction; a dash where there is none."""
-    return f"{100.0 * value:.{digits}f} %".replace("-", "−") if isfinite(value) else "–"
-
-
-def deviation(value: float | None) -> str:
-    """A relative deviation, signed; a dash where there is none."""
+def text(value: float | None, form: str) -> str:
+    """A number as the format has it; a dash where there is none."""
     if value is None or isnan(value):
         return "–"
-    return f"{100.0 * value:+.1f} %".replace("-", "−").replace("inf", "∞")
+    return format(value, form).replace("%", " %").replace("-", "−").replace("inf", "∞")
 
 
 def pretty_unit(unit: str) -> str:
