@@ -9,20 +9,11 @@ from rov_fmu.identify.least_squares import Array, Estimate
 from rov_fmu.identify.output_error import RecordingsFit
 from rov_fmu.identify.quadratic_fit import QuadraticFit
 from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
-from rov_fmu.motion.rov import Axis, Coefficients
+from rov_fmu.motion.rov import Coefficients
 
 
-def on_thrust(thruster: str, fit: QuadraticFit) -> list[str]:
+def on_thrust(thruster: str, fit: QuadraticFit) -> Iterator[str]:
     """Warnings about a thrust curve."""
-    return [f"{thruster} thrust: {words}" for words in _on_thrust(thruster, fit)]
-
-
-def on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None) -> list[str]:
-    """Warnings about drag and β of an axis."""
-    return [f"{result.axis.name}: {words}" for words in _on_axis(result, base, thrust)]
-
-
-def _on_thrust(thruster: str, fit: QuadraticFit) -> Iterator[str]:
     if fit.estimate.degrees_of_freedom <= 0.0:
         yield f"{fit.counts.sum()} points for two coefficients leave no degree of freedom, so there are no intervals"
     if fit.b < 0.0 < fit.a:
@@ -30,15 +21,16 @@ def _on_thrust(thruster: str, fit: QuadraticFit) -> Iterator[str]:
     yield from _asymmetry(fit.x[fit.counts], fit.y[fit.counts], "force", f"thrust_{thruster}")
 
 
-def _on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None) -> Iterator[str]:
+def on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None) -> Iterator[str]:
+    """Warnings about drag and β of an axis."""
     axis, beta = result.axis, result.axis.coefficient("beta")
     if beta in result.assumed:
         yield (
             f"{axis.inertia}/{beta} is not identifiable from V_ss alone; {beta} = 1 is assumed, and every Tau follows "
             f"from it. A time constant or a recording of a step from rest makes it identifiable"
         )
-    if result.estimate and result.chosen != "known":
-        yield from _on_drag(axis, result.estimate, result)
+    if result.estimate:
+        yield from _on_drag(result, result.estimate)
     steady = [p for p in result.points if p.quantity == "V_ss"]
     x, y = np.array([p.command for p in steady]), np.array([p.value for p in steady])
     yield from _asymmetry(x, y, "V_ss", axis.name)
@@ -58,8 +50,8 @@ def _on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None
             yield from _on_disagreement(result.recordings, thrust)
 
 
-def _on_drag(axis: Axis, estimate: Estimate, result: AxisResult) -> Iterator[str]:
-    a_d, b_d = axis.coefficient("a_d"), axis.coefficient("b_d")
+def _on_drag(result: AxisResult, estimate: Estimate) -> Iterator[str]:
+    a_d, b_d = result.axis.coefficient("a_d"), result.axis.coefficient("b_d")
     if estimate.degrees_of_freedom <= 0.0:
         yield "as many coefficients as measurements leave no degree of freedom, so there are no intervals"
     elif a_d in estimate.names and b_d in estimate.names:
@@ -79,9 +71,8 @@ def _on_drag(axis: Axis, estimate: Estimate, result: AxisResult) -> Iterator[str
             )
     for name in estimate.names:
         if estimate[name] == 0.0:
-            asked = ""
-            if result.drag and not result.recordings:
-                asked = f" (by (11)-(13) alone {result.drag.unbounded[name == b_d]:.3g})"
+            by_forces = result.drag if not result.recordings else None
+            asked = f" (by (11)-(13) alone {by_forces.unbounded[name == b_d]:.3g})" if by_forces else ""
             yield f"{name} is at its bound of 0, the fit without bounds is negative{asked}, which drag cannot be"
 
 

@@ -30,21 +30,20 @@ def identify(tests: TankTests) -> Identification:
     rov, known = tests.rov, tests.rov.known
     against = load_vehicle(rov.against) if rov.against else None
     thrust = {thruster: fit for thruster in THRUSTERS if (fit := _thrust(tests, thruster))}
-    values = dict.fromkeys(COEFFICIENTS, 1.0)  # to begin with
-    values |= {name: value for fit in thrust.values() for name, value in fit.estimate.named.items()}
-    values |= {name: given.value for name, given in known.items()}
+    values = dict.fromkeys(COEFFICIENTS, 1.0) | {name: given.value for name, given in known.items()}  # to begin with
     sources = {name: given.source for name, given in known.items()}
     intervals = {name: given.interval for name, given in known.items() if given.interval}
     for fit in thrust.values():
         weighted = "(7)" if 0.0 in fit.weights else "(6)"
         forces = count(int(fit.counts.sum()), "force")
+        values |= fit.estimate.named
         sources |= dict.fromkeys(fit.estimate.names, f"{weighted} over {forces}")
         intervals |= fit.estimate.intervals
     results: list[AxisResult] = []
     for thruster in THRUSTERS:
         by_axis = _fit_recordings(tests, thruster, Coefficients(**values), thrust.get(thruster))
         for recorded in by_axis.values():  # the last word on the thrust curve too
-            values |= {name: getattr(recorded.coefficients, name) for name in recorded.estimate.names}
+            values |= recorded.estimate.named
             intervals |= recorded.estimate.intervals
             if f"a_t_{thruster}" in recorded.estimate.names:
                 also = f"{sources[f'a_t_{thruster}'].split(',')[0]}, and the recordings"
@@ -59,7 +58,7 @@ def identify(tests: TankTests) -> Identification:
             sources |= dict.fromkeys(drag_and_beta(axis, known), result.method[0].upper() + result.method[1:])
             sources |= result.assumed
     results.sort(key=lambda result: list(AXES).index(result.axis.name))
-    warnings = [w for thruster, fit in thrust.items() for w in diagnostics.on_thrust(thruster, fit)]
+    warnings = [f"{t} thrust: {words}" for t, fit in thrust.items() for words in diagnostics.on_thrust(t, fit)]
     warnings += [w for result in results for w in result.warnings]
     method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
     vehicle = Vehicle(
@@ -144,11 +143,7 @@ def _thrust_uncertainty(thrust: QuadraticFit | None) -> Estimate | None:
 
 
 def _axis(
-    tests: TankTests,
-    axis: Axis,
-    base: Coefficients,
-    fitted: RecordingsFit | None,
-    thrust: QuadraticFit | None,
+    tests: TankTests, axis: Axis, base: Coefficients, fitted: RecordingsFit | None, thrust: QuadraticFit | None
 ) -> AxisResult:
     known = tests.rov.known
     found = tuple(step for recording in tests.recordings.get(axis.name, ()) for step in steps(recording))
@@ -181,16 +176,15 @@ def _axis(
     if not fitted and not response and (beta := axis.coefficient("beta")) not in known:
         assumed[beta] = "Not identifiable from these tests; assumed 1"
     result = AxisResult(axis, points, found, drag, response, fitted, assumed, ())
-    return replace(result, warnings=tuple(diagnostics.on_axis(result, base, thrust)))
+    return replace(result, warnings=tuple(f"{axis.name}: {w}" for w in diagnostics.on_axis(result, base, thrust)))
 
 
 def _points(tests: TankTests, axis: Axis, found: tuple[StepResponse, ...]) -> tuple[Point, ...]:
     """Rows of the tables, then the responses of the recordings."""
-    rows = [("V_ss", row) for row in tests.steady.get(axis.name, ())]
-    rows += [("Tau", row) for row in tests.time_constants.get(axis.name, ())]
     points = [
         Point(quantity, row.command, row.value, _weight(tests, axis.name, row.command), f"{row.file}, line {row.line}")
-        for quantity, row in rows
+        for quantity, rows in (("V_ss", tests.steady), ("Tau", tests.time_constants))
+        for row in rows.get(axis.name, ())
     ]
     for step in found:
         weight, source = _weight(tests, axis.name, step.command), f"{step.file}, {step.start:.1f} s"

@@ -129,17 +129,15 @@ def minimize(
     limits: tuple[Array, Array],
     *,
     jacobian: Callable[[Array], Array] | None = None,
-    scale: Array | None = None,
     loss: Literal["linear", "soft_l1", "huber"] = "linear",
     threshold: float = 1.0,
 ) -> Solution:
     """Bounded least squares by SciPy; with a robust loss residuals beyond the threshold count less than squared."""
     low, high = limits
     options: dict[str, Any] = {"jac": jacobian or "3-point", "bounds": limits, "method": "dogbox"}
-    tolerances = {"xtol": 1e-10, "ftol": 1e-12, "gtol": 1e-12}
     result = least_squares(
-        residuals, np.clip(start, low, high), x_scale="jac" if scale is None else scale,
-        loss=loss, f_scale=threshold, max_nfev=200, **options, **tolerances,
+        residuals, np.clip(start, low, high), x_scale="jac", loss=loss, f_scale=threshold, max_nfev=200,
+        xtol=1e-10, ftol=1e-12, gtol=1e-12, **options,
     )  # fmt: skip
     plain = least_squares(residuals, result.x, max_nfev=1, **options)
     return Solution(result.x, plain.fun, plain.jac)

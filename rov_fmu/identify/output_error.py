@@ -108,11 +108,10 @@ def fit_recordings(
     data = tuple(d for part in by_axis for d in part)
     parts = [_fit_alone(part, base, known, loss) for part in by_axis]
     values = dict(thrust.named if thrust else {})
-    for simulator, x in parts:
-        values |= external(simulator.names, x)
-    sigma = np.concatenate([_noise(simulator, x) for simulator, x in parts])
-    model = Simulator(data, base, tuple(values), sigma, thrust)
-    start = np.concatenate([internal(model.names, values), *(x[len(s.names) :] for s, x in parts)])
+    for found_alone, *_ in parts:
+        values |= found_alone
+    model = Simulator(data, base, tuple(values), np.array([s for *_, sigma in parts for s in sigma]), thrust)
+    start = np.concatenate([internal(model.names, values), *(initial for _, initial, _ in parts)])
     analysis = _ResidualAnalysis(model, _solve(model, start, loss), loss)
     coefficients = replace(base, **external(model.names, analysis.x))
     whole = estimate(model.names, analysis.x, analysis.covariance(), analysis.degrees_of_freedom, 1.0)
@@ -128,26 +127,25 @@ def fit_recordings(
 
 def _fit_alone(
     data: tuple[PreparedRecording, ...], base: Coefficients, known: Collection[str], loss: Loss
-) -> tuple[Simulator, Array]:
-    """One axis, thrust as it is, from a part of the samples: enough to come near, and fast."""
+) -> tuple[dict[str, float], Array, list[float]]:
+    """One axis, thrust as it is, from a part of the samples: enough to come near, and fast.
+
+    Coefficients, initial values of the recordings, and the standard deviation of each one's residuals, robust.
+    """
     names = drag_and_beta(data[0].axis, known)
-    sigma = np.array([max(white_noise(d.values), _least_noise(d.values)) for d in data])
+    sigma = np.array([_at_least(white_noise(d.values), d) for d in data])
     thin = Simulator(tuple(d.thinned() for d in data), base, names, sigma)
     starts = (thin.start(beta) for beta in _BETAS)
     start = min(starts, key=lambda x: float(np.sum(np.sqrt(1.0 + thin.residuals(x) ** 2))))
     x = _solve(thin, start, "soft_l1" if loss == "huber" else loss).x
-    return Simulator(data, base, names, np.ones(len(data))), x
+    plain = Simulator(data, base, names, np.ones(len(data)))
+    residuals = plain.residuals(x)
+    noise = [_at_least(robust_deviation(residuals[rows]), d) for d, rows, *_ in plain.places]
+    return external(names, x), x[len(names) :], noise
 
 
-def _noise(simulator: Simulator, x: Array) -> Array:
-    """Standard deviation of every recording's residuals, robust."""
-    residuals = simulator.residuals(x)
-    return np.array([max(robust_deviation(residuals[rows]), _least_noise(d.values))
-                     for d, rows, *_ in simulator.places])  # fmt: skip
-
-
-def _least_noise(values: Array) -> float:
-    return max(1e-6 * float(np.ptp(values)), 1e-12)
+def _at_least(noise: float, data: PreparedRecording) -> float:
+    return max(noise, 1e-6 * float(np.ptp(data.values)), 1e-12)
 
 
 def _solve(model: Simulator, start: Array, loss: Literal["soft_l1", "huber", "linear"]) -> Solution:

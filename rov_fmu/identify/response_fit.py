@@ -81,7 +81,8 @@ def fit_response(
     solution = _solve(axis, used, base, names)
     thrust = None
     if thrust_covariance is not None and names:
-        by_thrust = _thrust_jacobian(axis, base, lambda k: _residuals(axis, used, k, external(names, solution.x)))
+        steps = {name: 1e-5 * max(abs(getattr(base, name)), 0.1) for name in axis.thrust_names}
+        by_thrust = _slopes(lambda k: _residuals(axis, used, k, external(names, solution.x)), base, steps)
         thrust = by_thrust, thrust_covariance
 
     def without(out: Flags) -> Array | None:
@@ -124,27 +125,21 @@ def response_band(
     axis: Axis, coefficients: Coefficients, found: Estimate, commands: Array
 ) -> tuple[Array, Array, Array, Array]:
     """95 % confidence band of V_ss and Tau over commands, to first order in the estimate."""
-    curve = responses(axis, coefficients, commands)
-    slopes = np.empty((*curve.shape, len(found.names)))
+    steps = {name: 1e-5 * (found[name] or min(found.errors[name], 1.0)) for name in found.names}
     with np.errstate(invalid="ignore"):  # without any drag both are infinite
-        for n, name in enumerate(found.names):
-            h = 1e-5 * (found[name] or min(found.errors[name], 1.0))
-            moved = replace(coefficients, **{name: found[name] + h})
-            slopes[..., n] = (responses(axis, moved, commands) - curve) / h
-        reach = found.half_band(slopes)
+        curve = responses(axis, coefficients, commands)
+        reach = found.half_band(_slopes(lambda k: responses(axis, k, commands), coefficients, steps))
         low, high = curve - reach, curve + reach
     return low[:, 0], high[:, 0], low[:, 1], high[:, 1]
 
 
-def _thrust_jacobian(axis: Axis, base: Coefficients, residuals: Callable[[Coefficients], Array]) -> Array:
-    """n x 2: derivative of residuals (a function of the coefficients) by a_t and b_t of the axis."""
+def _slopes(numbers: Callable[[Coefficients], Array], k: Coefficients, steps: Mapping[str, float]) -> Array:
+    """... x p: derivative of numbers (...) by p of the coefficients, by central differences of the given steps."""
     columns = []
-    for name in axis.thrust_names:
-        value = getattr(base, name)
-        h = 1e-5 * max(abs(value), 0.1)
-        up, down = (residuals(replace(base, **{name: value + step})) for step in (h, -h))
+    for name, h in steps.items():
+        up, down = (numbers(replace(k, **{name: getattr(k, name) + step})) for step in (h, -h))
         columns.append((up - down) / (2.0 * h))
-    return np.column_stack(columns)
+    return np.stack(columns, axis=-1)
 
 
 def drag_and_beta(axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:

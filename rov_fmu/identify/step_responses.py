@@ -66,14 +66,12 @@ def steps(recording: Recording) -> tuple[StepResponse, ...]:
         if inside.sum() < _LEAST:
             found.append(replace(step, note="too short"))
             continue
-        step = _steady(step, time[inside], values[inside], recording.is_position)
+        samples = time[inside], values[inside], recording.is_position
+        step = _steady(step, *samples)
         if step.V_ss is not None:
             past = (time >= start - 1.0) & (time <= start)
-            resting = past.sum() >= _LEAST // 2 and _rests(time[past], values[past], recording.is_position, step.V_ss)
-            if resting:
-                step = _rising(step, time[inside], values[inside], recording.is_position)
-            else:
-                step = replace(step, note="not from rest: no Tau")
+            rests = past.sum() >= _LEAST // 2 and _rests(time[past], values[past], recording.is_position, step.V_ss)
+            step = _rising(step, *samples) if rests else replace(step, note="not from rest: no Tau")
         found.append(step)
     return tuple(found)
 
@@ -157,25 +155,22 @@ def _steady(step: StepResponse, time: Array, values: Array, is_position: bool) -
 
 
 def _level(time: Array, values: Array, is_position: bool) -> tuple[float, float, float, float]:
-    """Mean velocity and its standard error; the change of velocity from start to end, and its standard error."""
+    """Mean velocity and its standard error; the change of velocity from start to end, and its standard error.
+
+    By regression; the errors count correlated residuals.
+    """
     half = 0.5 * float(time[-1] - time[0])
     s = (time - 0.5 * (time[-1] + time[0])) / half  # -1 ... 1
     order = int(is_position)
-    legendre = np.polynomial.legendre.legvander(s, order + 1)
-    regression = _regression(legendre, values)
-    (c, error), (d, d_error) = regression[order], regression[order + 1]
+    M = np.polynomial.legendre.legvander(s, order + 1)
+    coefficients, *_ = np.linalg.lstsq(M, values, rcond=None)
+    residuals = values - M @ coefficients
+    variance = float(residuals @ residuals) / max(len(values) - M.shape[1], 1) * correlation_time(residuals)
+    errors = np.sqrt(np.diag(np.linalg.inv(M.T @ M)) * variance)
+    (c, d), (error, d_error) = coefficients[order:].tolist(), errors[order:].tolist()
     per_time = 1.0 / half if is_position else 1.0
     growth = (6.0 if is_position else 2.0) * per_time  # of dP2/ds from -1 to 1, or of P1
     return c * per_time, error * per_time, d * growth, d_error * growth
-
-
-def _regression(M: Array, y: Array) -> list[tuple[float, float]]:
-    """Coefficients of a linear regression with standard errors that count correlated residuals."""
-    coefficients, *_ = np.linalg.lstsq(M, y, rcond=None)
-    residuals = y - M @ coefficients
-    variance = float(residuals @ residuals) / max(len(y) - M.shape[1], 1) * correlation_time(residuals)
-    errors = np.sqrt(np.diag(np.linalg.inv(M.T @ M)) * variance)
-    return list(zip(coefficients.tolist(), errors.tolist(), strict=True))
 
 
 def _rests(time: Array, values: Array, is_position: bool, V_ss: float) -> bool:

@@ -119,8 +119,7 @@ def load_tank_tests(folder: Path) -> TankTests:
     if not folder.is_dir():
         raise DataFileError(f"{folder}: there is no such folder")
     rov = _load_rov(folder / ROV_FILE)
-    rows: dict[str, dict[str, tuple[Row, ...]]] = {kind: {} for kind in ("thrust", "steady", "time_constant")}
-    recordings: dict[str, tuple[Recording, ...]] = {}
+    found: dict[str, Any] = {kind: {} for kind in ("thrust", "steady", "time_constant", "log")}
     inputs = {ROV_FILE: _hash(folder / ROV_FILE)}
     for path in sorted(path for path in folder.iterdir() if path.name.lower().endswith(".csv")):
         match = _NAME.fullmatch(path.name)
@@ -130,14 +129,12 @@ def load_tank_tests(folder: Path) -> TankTests:
                 f"{path}: no name of a test; thrust_ begins one, then rear or top, or steady_, time_constant_ or log_, "
                 "then surge, heave or yaw, then _ and any printable characters"
             )
-        if kind == "log":
-            recordings[of] = (*recordings.get(of, ()), _recording(path, AXES[of]))
-        else:
-            rows[kind][of] = (*rows[kind].get(of, ()), *_rows(path, kind, of))
+        read = [_recording(path, AXES[of])] if kind == "log" else _rows(path, kind, of)
+        found[kind][of] = (*found[kind].get(of, ()), *read)
         inputs[path.name] = _hash(path)
     if len(inputs) == 1:
         raise DataFileError(f"{folder}: there are no tests (*.csv) in this folder")
-    return TankTests(folder, rov, rows["thrust"], rows["steady"], rows["time_constant"], recordings, inputs)
+    return TankTests(folder, rov, found["thrust"], found["steady"], found["time_constant"], found["log"], inputs)
 
 
 # ---- rov.toml --------------------------------------------------------------------------------------------------------

@@ -45,23 +45,10 @@ class Tuning:
 
 
 def tune(k: Coefficients, axis: Axis, command: float, V_ss: float, Tau: float | None = None) -> Tuning:
-    """α and β that give V_ss (m/s, rad/s) and Tau (s) at one command; without Tau β stays. Raises TuningError.
-
-    Thrust α F balances drag at V_ss, a_d V^2 + b_d V = α F, and Tau is inversely proportional to β.
-    """
-    points = [Point("V_ss", command, V_ss, 1.0, "")]
-    if Tau is not None:
-        points.append(Point("Tau", command, Tau, 1.0, ""))
-    _check(axis, points)
-    a_d, b_d = (getattr(k, axis.coefficient(kind)) for kind in ("a_d", "b_d"))
-    force = axis.force(k, command)
-    if V_ss * force <= 0.0:
-        raise TuningError(f"{axis.name}: a command of {command:g} gives a force of {force:g} {axis.load}")
-    tuned = _with(k, axis.coefficient("alpha"), (a_d * abs(V_ss) + b_d) * V_ss / force)
-    if Tau is not None:
-        beta = axis.coefficient("beta")
-        tuned = _with(tuned, beta, axis.response(replace(tuned, **{beta: 1.0}), command)[1] / Tau)
-    return Tuning(axis, tuned, tuple(points))
+    """α and β that give V_ss (m/s, rad/s) and Tau (s) at one command; without Tau β stays. Raises TuningError."""
+    wanted = {"V_ss": V_ss} if Tau is None else {"V_ss": V_ss, "Tau": Tau}
+    points = tuple(Point(quantity, command, value, 1.0, "") for quantity, value in wanted.items())
+    return Tuning(axis, _each_median(k, axis, points), points)
 
 
 def tune_over(k: Coefficients, axis: Axis, points: Sequence[Point]) -> Tuning:
@@ -69,24 +56,38 @@ def tune_over(k: Coefficients, axis: Axis, points: Sequence[Point]) -> Tuning:
 
     Raises TuningError.
     """
-    _check(axis, points)
-    steady = {p.command: p.value for p in points if p.quantity == "V_ss"}
-    Taus = {p.command: p.value for p in points if p.quantity == "Tau"}
-    if not steady:
-        raise TuningError(f"{axis.name}: there is no V_ss, which alpha is tuned by")
-    names = tuple(axis.coefficient(kind) for kind in (("alpha", "beta") if Taus else ("alpha",)))
-    exact = [tune(k, axis, command, V_ss) for command, V_ss in steady.items()]
-    start = _with(k, names[0], float(np.median([t.alpha for t in exact])))
-    if Taus:
-        start = replace(start, **{names[1]: 1.0})
-        start = _with(start, names[1], float(np.median([axis.response(start, c)[1] / T for c, T in Taus.items()])))
+    start = _each_median(k, axis, points)
+    kinds = ("alpha", "beta") if any(p.quantity == "Tau" for p in points) else ("alpha",)
     measured = np.array([p.value for p in points])
     solution = fit_named(
         lambda values: predict(axis, replace(k, **values), points) / measured - 1.0,
-        {name: getattr(start, name) for name in names},
+        {name: getattr(start, name) for name in map(axis.coefficient, kinds)},
     )
-    found = estimate_alike(names, solution, len(points))
+    found = estimate_alike(tuple(map(axis.coefficient, kinds)), solution, len(points))
     return Tuning(axis, replace(k, **found.named), tuple(points), found)
+
+
+def _each_median(k: Coefficients, axis: Axis, points: Sequence[Point]) -> Coefficients:
+    """The median of the α that give each V_ss, and then of the β that give each Tau. Raises TuningError.
+
+    Thrust α F balances drag at V_ss, a_d V^2 + b_d V = α F, and Tau is inversely proportional to β.
+    """
+    for p in points:
+        if reason := _impossible(axis, p):
+            raise TuningError(f"{axis.name}: {reason}")
+    a_d, b_d = (getattr(k, axis.coefficient(kind)) for kind in ("a_d", "b_d"))
+    alphas, beta = [], axis.coefficient("beta")
+    for p in (p for p in points if p.quantity == "V_ss"):
+        force = axis.force(k, p.command)
+        if p.value * force <= 0.0:
+            raise TuningError(f"{axis.name}: a command of {p.command:g} gives a force of {force:g} {axis.load}")
+        alphas.append((a_d * abs(p.value) + b_d) * p.value / force)
+    if not alphas:
+        raise TuningError(f"{axis.name}: there is no V_ss, which alpha is tuned by")
+    tuned = _with(k, axis.coefficient("alpha"), alphas)
+    plain = replace(tuned, **{beta: 1.0})
+    betas = [axis.response(plain, p.command)[1] / p.value for p in points if p.quantity == "Tau"]
+    return _with(tuned, beta, [float(np.median(betas))]) if betas else tuned
 
 
 def tuned_values(tuning: Tuning) -> tuple[dict[str, float], str]:
@@ -132,14 +133,10 @@ def _impossible(axis: Axis, point: Point) -> str | None:
     return None
 
 
-def _check(axis: Axis, points: Sequence[Point]) -> None:
-    for point in points:
-        if reason := _impossible(axis, point):
-            raise TuningError(f"{axis.name}: {reason}")
-
-
-def _with(k: Coefficients, name: str, value: float) -> Coefficients:
-    meta = COEFFICIENTS[name]
-    if not (0.0 < value <= meta.maximum):
-        raise TuningError(f"{name} = {value:g} would do it: must be above 0 and at most {meta.maximum:g}")
-    return replace(k, **{name: value})
+def _with(k: Coefficients, name: str, wanted: Sequence[float]) -> Coefficients:
+    """With the median of the wanted values of a coefficient, each of which must be one that it may have."""
+    maximum = COEFFICIENTS[name].maximum
+    for value in wanted:
+        if not 0.0 < value <= maximum:
+            raise TuningError(f"{name} = {value:g} would do it: must be above 0 and at most {maximum:g}")
+    return replace(k, **{name: float(np.median(wanted))})

@@ -17,10 +17,8 @@ def print_identification(identification: Identification) -> None:
     """Coefficients, recordings, points beside the model, and the warnings."""
     out, vehicle = console(), identification.vehicle
     out.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
-    out.print()
-    out.print(_coefficients(vehicle))
     comparisons, other = compare(identification), [identification.against.name] if identification.against else []
-    tables = [_steps(result) for result in identification.axes if result.steps]
+    tables = [_coefficients(vehicle), *(_steps(result) for result in identification.axes if result.steps)]
     tables += [_points(comparison, other) for comparison in comparisons]
     for found in [*tables, *([_summary(comparisons, other)] if comparisons else [])]:
         out.print()
