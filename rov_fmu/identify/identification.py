@@ -15,8 +15,6 @@ from rov_fmu.identify.tank_tests import TankTests
 from rov_fmu.motion.rov import Axis
 from rov_fmu.vehicle.vehicle import Vehicle
 
-Kind = Literal["recordings", "points", "known"]
-
 
 @dataclass(frozen=True, eq=False)
 class AxisResult:
@@ -38,7 +36,7 @@ class AxisResult:
     warnings: tuple[str, ...]
 
     @property
-    def chosen(self) -> Kind:
+    def chosen(self) -> Literal["recordings", "points", "known"]:
         """Which fit the vehicle takes."""
         return "recordings" if self.recordings else "points" if self.response else "known"
 

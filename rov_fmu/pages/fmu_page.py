@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from rov_fmu.export.archive import REPORT
 from rov_fmu.export.interface import Variable, variables
 from rov_fmu.motion.rov import AXES, Axis, Coefficients, Inputs, State, step
-from rov_fmu.pages.plots import draw_steps, evenly, measured_step
+from rov_fmu.pages.plots import draw_steps, evenly, finish, measured_step
 from rov_fmu.pages.svg import LIGHT, inline_file, inline_svg, svg_file
 from rov_fmu.pages.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables, untuned
@@ -129,12 +129,8 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
     if table and table.steady:
         points = [(float(c), float(V)) for c, V in table.steady.items()]
         ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
-    ax.set(xlim=(0, 100), xlabel="command (%)")
-    ax.locator_params(nbins=6)
-    if ax.dataLim.y0 >= 0.0:
-        ax.set_ylim(bottom=0.0)
-    ax.set_title(rf"{axis.name.capitalize()}: $V_{{ss}}$ ({axis.unit})", loc="left")
-    ax.legend(loc="upper left")
+    finish(ax, rf"{axis.name.capitalize()}: $V_{{ss}}$ ({axis.unit})", "command (%)")
+    ax.set_xlim(0, 100)
 
 
 def plot_steps(ax: Axes, k: Coefficients, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:

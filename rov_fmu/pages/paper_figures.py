@@ -17,7 +17,7 @@ from rov_fmu.files.output import Output, write_whole
 from rov_fmu.identify.quadratic_fit import fit_quadratic, quadratic
 from rov_fmu.motion.rov import AXES, SURGE, Coefficients
 from rov_fmu.pages.fmu_page import steady_picture, tables_by_axis
-from rov_fmu.pages.plots import draw_steps, measured_step
+from rov_fmu.pages.plots import draw_steps, finish, measured_step
 from rov_fmu.pages.svg import LIGHT, svg_file
 from rov_fmu.vehicle.published import ResponseTable, untuned
 from rov_fmu.vehicle.shipped import VIDEORAY
@@ -58,9 +58,9 @@ def _draw(figure: Figure, vehicle: Vehicle) -> None:
     unweighted = other.values["a_t_rear"], other.values["b_t_rear"]
     _curve(rear, 100.0, 1.0, unweighted, "--", "grey", "all points (8)")
     _curve(rear, 100.0, 1.0, (k.a_t_rear, k.b_t_rear), "-", "blue", "weighted (9)")
-    _finish(rear, "Figure 5: forward thrust", "command (%)", "$F_l + F_r$ (N)")
+    finish(rear, "Figure 5: forward thrust", "command (%)", "$F_l + F_r$ (N)")
     _curve(top, 100.0, 1.0, (k.a_t_top, k.b_t_top), "-", "blue", "(10)")
-    _finish(top, "Figure 6: downward thrust", "command (%)", "$F_t$ (N)")
+    finish(top, "Figure 6: downward thrust", "command (%)", "$F_t$ (N)")
     notes.set_axis_off()
     notes.text(0.0, 0.92, "\n".join(_NOT_PRINTED), transform=notes.transAxes, va="top", linespacing=1.7,
                color=LIGHT["muted"])  # fmt: skip
@@ -79,7 +79,7 @@ def _drag(ax: Axes, k: Coefficients, table: ResponseTable, title: str) -> None:
     _curve(ax, 1.0, end, fit_quadratic(names, v, force).unbounded, "--", "grey", "least squares of the points")
     _curve(ax, 1.0, end, (getattr(k, names[0]), getattr(k, names[1])), "-", "blue", axis.equations[0])
     ax.plot(v, force, "o", color=LIGHT["orange"], markersize=4.5, zorder=5, label=f"Table {table.steady_number}")
-    _finish(ax, title, f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
+    finish(ax, title, f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
 
 
 def _steps(ax: Axes, k: Coefficients, table: ResponseTable, title: str) -> None:
@@ -88,22 +88,9 @@ def _steps(ax: Axes, k: Coefficients, table: ResponseTable, title: str) -> None:
     if axis is not SURGE:  # there it would stand in the way
         for look, label in (("--", "non-linear"), ("-", "scaled"), (":", "measured $V_{ss}$"), ("o", "measured $Tau$")):
             ax.plot([], [], look, color=LIGHT["muted"], markersize=5.0, label=label)
-    end = ax.get_xlim()[1]
-    _finish(ax, title, "time (s)", f"${axis.velocity}$ ({axis.unit})", where="lower right")
-    ax.set_xlim(0.0, end)
+    finish(ax, title, "time (s)", f"${axis.velocity}$ ({axis.unit})", where="lower right")
 
 
 def _curve(ax: Axes, scale: float, end: float, curve: tuple[float, float], dashes: str, color: str, label: str) -> None:
     x = np.linspace(0.0, end, 61)
     ax.plot(scale * x, quadratic(x) @ curve, dashes, color=LIGHT[color], linewidth=1.8, label=label)
-
-
-def _finish(ax: Axes, title: str, x: str, y: str, where: str = "upper left") -> None:
-    ax.set(xlabel=x, ylabel=y)
-    ax.set_xlim(left=0.0)
-    if ax.dataLim.y0 >= 0.0:
-        ax.set_ylim(bottom=0.0)
-    ax.locator_params(nbins=6)
-    ax.set_title(title, loc="left")
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc=where)

@@ -41,6 +41,18 @@ def evenly(commands: Sequence[Number]) -> list[Number]:
     return sorted({commands[round((len(commands) - 1) * n / last)] for n in range(last + 1)})
 
 
+def finish(ax: Axes, title: str, x: str, y: str = "", where: str = "upper left") -> None:
+    """Labels, title, legend; the axes begin at 0, as far as the data let them."""
+    ax.set(xlabel=x, ylabel=y)
+    ax.set_xlim(left=0.0)
+    if ax.dataLim.y0 >= 0.0:
+        ax.set_ylim(bottom=0.0)
+    ax.locator_params(nbins=6)
+    ax.set_title(title, loc="left")
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc=where)
+
+
 def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Coefficients, str]]) -> None:
     """Velocity after steps of the command, of every model (the last is the one to label): measured V_ss are dotted
     lines, measured Tau points at 1 - 1/e of it."""

@@ -21,40 +21,38 @@ _BINS = 300  # of a recording: as many as one can see
 
 def plot_thrust(figure: Figure, results: Identification, fit: QuadraticFit) -> None:
     """Force over command, and the curve of the vehicle where recordings have moved it away from the fit."""
-    above, below = _two(figure)
     curve = [getattr(results.vehicle.coefficients, name) for name in fit.estimate.names]
-    x = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
     moved = not np.allclose(curve, (fit.a, fit.b), rtol=1e-9)
-    _quadratic(above, below, fit, x, 100.0, color="grey" if moved else "blue", label="fit to the forces")
+    above, below, x = _quadratic(figure, fit, 100.0, "grey" if moved else "blue", "fit to the forces")
     if moved:
         above.plot(100.0 * x, quadratic(x) @ curve, color=LIGHT["blue"], label="with the recordings")
-    above.set_title("Force (N)", loc="left")
-    _finish(above, below, "command (%)", "residual (N)")
+    _finish(above, below, "Force (N)", "command (%)", "residual (N)")
 
 
 def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> None:
     """Thrust at measured V_ss: the drag that the vehicle takes, and the fit to these forces alone as in (11)-(16)."""
-    axis, fit = result.axis, result.drag
-    assert fit
-    above, below = _two(figure)
-    v = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
-    _quadratic(above, below, fit, v, 1.0, color="grey", label="fit to these forces")
+    assert result.drag
+    axis, load = result.axis, pretty_unit(result.axis.load)
+    above, below, v = _quadratic(figure, result.drag, 1.0, "grey", "fit to these forces")
     a, b, alpha = _drag(axis, results.vehicle)
     above.plot(v, quadratic(v) @ (a, b), color=LIGHT["blue"], label="model")
     if results.against and (other := _drag(axis, results.against))[2]:
         scaled = quadratic(v) @ other[:2] * alpha / other[2]
         above.plot(v, scaled, ":", color=LIGHT["teal"], label="compared")
-    load = pretty_unit(axis.load)
-    above.set_title(f"Drag ({load}) over ${axis.velocity}$", loc="left")
-    _finish(above, below, f"velocity ({axis.unit})", f"residual ({load})")
+    title = f"Drag ({load}) over ${axis.velocity}$"
+    _finish(above, below, title, f"velocity ({axis.unit})", f"residual ({load})")
 
 
-def _quadratic(above: Axes, below: Axes, fit: QuadraticFit, x: Array, scale: float, *, color: str, label: str) -> None:
+def _quadratic(figure: Figure, fit: QuadraticFit, scale: float, color: str, label: str) -> tuple[Axes, Axes, Array]:
+    """Both parts of the plot of a fit, and over which numbers it is drawn."""
+    above, below = _two(figure)
+    x = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
     _band(above, scale * x, *fit.band(x), color)
     above.plot(scale * x, fit.value(x), "--" if color == "grey" else "-", color=LIGHT[color], label=label)
     _dots(above, scale * fit.x, fit.y, fit.counts, label="measured")
     _dots(below, scale * fit.x, fit.residuals, fit.counts)
     _diamonds(below, scale * fit.x, fit.y - fit.leave_one_out)
+    return above, below, x
 
 
 def plot_response(
@@ -76,14 +74,14 @@ def plot_response(
         above.plot(100.0 * c, other, "--", color=LIGHT["grey"], label="compared")
     top = [*(abs(p.value) for p in points), *curve[tested][np.isfinite(curve[tested])].tolist()]
     above.set_ylim(0.0, 1.25 * max(top, default=1.0) or 1.0)
-    above.set_title("$Tau$ (s)" if quantity == "Tau" else rf"$V_{{ss}}$ ({axis.unit})", loc="left")
     if comparison and below:
         x, y = 100.0 * np.array(at), np.array([abs(p.value) for p in points])
         counts = np.array([p.weight > 0.0 for p in points])
         _dots(above, x, y, counts, label="measured")
         _dots(below, x, 100.0 * (np.abs(comparison.model) / y - 1.0), counts)
         _diamonds(below, x, 100.0 * (np.abs(comparison.leave_one_out) / y - 1.0))
-    _finish(above, below, "command (%)", "error (%)")
+    title = "$Tau$ (s)" if quantity == "Tau" else rf"$V_{{ss}}$ ({axis.unit})"
+    _finish(above, below, title, "command (%)", "error (%)")
 
 
 def plot_steps(figure: Figure, results: Identification, result: AxisResult) -> None:
@@ -115,12 +113,11 @@ def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -
     thin = slice(None, None, max(1, len(simulation.time) // (2 * _BINS)))
     above.plot(simulation.time[thin], simulation.velocity[thin], color=LIGHT["blue"], linewidth=1.2, label="model")
     above.margins(y=0.18)
-    above.set_title(f"${axis.velocity}$ ({axis.unit})", loc="left")
     parts = np.array_split(np.arange(len(simulation.time)), min(_BINS, len(simulation.time)))
     low, high = ([pick(simulation.residuals[part]) for part in parts] for pick in (np.min, np.max))
     t = [simulation.time[part[0]] for part in parts]
     below.fill_between(t, low, high, color=LIGHT["orange"], linewidth=0.6)
-    _finish(above, below, "time (s)", f"residual ({recording.unit})")
+    _finish(above, below, f"${axis.velocity}$ ({axis.unit})", "time (s)", f"residual ({recording.unit})")
     above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
 
 
@@ -135,7 +132,8 @@ def _two(figure: Figure, heights: tuple[float, float] = (2.6, 1.0)) -> tuple[Axe
     return above, below
 
 
-def _finish(above: Axes, below: Axes | None, x: str, y: str) -> None:
+def _finish(above: Axes, below: Axes | None, title: str, x: str, y: str) -> None:
+    above.set_title(title, loc="left")
     (below or above).set_xlabel(x)
     above.locator_params(nbins=6)
     if below:
