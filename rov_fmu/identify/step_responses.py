@@ -8,7 +8,7 @@ filter has correlated the sensor's noise yet, and what correlation is left (turb
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import hypot, sqrt
+from math import hypot, isnan, nan, sqrt
 from typing import Literal
 
 import numpy as np
@@ -183,14 +183,13 @@ def _rising(step: StepResponse, time: Array, values: Array, is_position: bool) -
     """The time at which the smoothed velocity reaches (1 - 1/e) V_ss, (17); the window follows the time constant."""
     assert step.V_ss is not None
     assert step.V_ss_error is not None
-    window, Tau = max(_WINDOW, 0.1 * (step.end - step.start)), None
+    window, Tau = max(_WINDOW, 0.1 * (step.end - step.start)), nan
     for _ in range(4):
         even, v = velocity(time, values, is_position=is_position, window=window)
         Tau = _crossing(even - step.start, v / step.V_ss)
-        if Tau is None:
+        if isnan(Tau):
             return replace(step, note="no clear rise to V_ss: no Tau")
         window = min(Tau, 0.5 * (step.end - step.start))
-    assert Tau is not None
     interval = float(even[1] - even[0])
     n = _odd(window / interval, len(even))
     kernel = savgol_coeffs(n, min(_ORDER, n - 1), deriv=int(is_position), delta=interval)
@@ -203,14 +202,14 @@ def _rising(step: StepResponse, time: Array, values: Array, is_position: bool) -
     return replace(step, Tau=Tau, Tau_error=hypot(error, _BIAS * Tau))
 
 
-def _crossing(time: Array, rise: Array) -> float | None:
-    """When a noisy rise passes 1 - 1/e: the mean of the first and the last time it does on its way to 1."""
+def _crossing(time: Array, rise: Array) -> float:
+    """When a noisy rise passes 1 - 1/e: the mean of the first and the last time it does on its way to 1; or NaN."""
     high = np.flatnonzero(rise > 0.95)
     top = int(high[0]) + 1 if high.size else len(rise)
     up = np.maximum.accumulate(rise[:top])
     down = np.minimum.accumulate(rise[:top][::-1])[::-1]
     if rise[0] > RISE or up[-1] < RISE:
-        return None
+        return nan
     return 0.5 * float(np.interp(RISE, up, time[:top]) + np.interp(RISE, down, time[:top]))
 
 

@@ -72,11 +72,12 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
 
 def inline_file(label: str, path: Path) -> Markup:
     """A picture drawn by hand, as part of a page. Raises FileError."""
-    drawn = read_bytes(path)
     try:
-        return inline(label, str(etree.tostring(_without_scripts(drawn), encoding="unicode")))
+        root = etree.fromstring(read_bytes(path), etree.XMLParser(resolve_entities=False, no_network=True))
     except etree.XMLSyntaxError as error:
         raise FileError(f"{path}: not an SVG picture: {error.msg}") from error
+    etree.strip_elements(root, f"{_SVG}script", f"{_SVG}foreignObject", with_tail=False)
+    return inline(label, str(etree.tostring(root, encoding="unicode")))
 
 
 def inline(label: str, svg: str) -> Markup:
@@ -100,12 +101,6 @@ def svg_file(
         draw(figure)
         figure.savefig(file, format="svg", metadata={"Date": None})
     return _without_ballast(file.getvalue()).replace("'DejaVu Sans'", _FONTS)
-
-
-def _without_scripts(svg: bytes) -> Any:
-    root = etree.fromstring(svg, etree.XMLParser(resolve_entities=False, no_network=True))
-    etree.strip_elements(root, f"{_SVG}script", f"{_SVG}foreignObject", with_tail=False)
-    return root
 
 
 def _without_ballast(svg: bytes) -> str:

@@ -1,6 +1,5 @@
 """What pages are made with: their templates, and numbers as one writes them."""
 
-import re
 from math import isfinite, isnan
 from pathlib import Path
 
@@ -23,11 +22,8 @@ def number(value: float | None, digits: int | None = None) -> str:
     """So many significant digits, or exactly where that is short; a dash where there is no number."""
     if value is None or not isfinite(value):
         return "–"
-    if digits is None:
-        text = f"{value:.6g}" if len(repr(value)) > 9 else repr(value).removesuffix(".0")
-        text = f"{value:g}" if abs(value) >= 1e5 else text
-    else:
-        text = f"{value:.{digits}g}"
+    is_short = digits is None and len(repr(value)) <= 9 and abs(value) < 1e5
+    text = repr(value).removesuffix(".0") if is_short else f"{value:.{digits or 6}g}"
     mantissa, _, exponent = text.partition("e")
     if exponent:
         mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")
@@ -44,6 +40,4 @@ def text(value: float | None, form: str) -> str:
 
 def pretty_unit(unit: str) -> str:
     """A unit as one writes it: N.m.s2/rad2 is N·m·s²/rad²."""
-    if unit == "1":
-        return "1"
-    return re.sub(r"\d", lambda digit: digit[0].translate(RAISED), unit).replace(".", "·")
+    return unit if unit == "1" else unit.translate(RAISED).replace(".", "·")
