@@ -82,47 +82,22 @@ FMI2_Export fmi2Status fmi2CancelStep(fmi2Component c)
     FAIL(f, "fmi2CancelStep: no step is pending.");
 }
 
-/* Opens fmi2GetXXXStatus; steps are never pending, so most of what can be asked for does not exist. */
-#define OPEN_STATUS(function)                                   \
-    OPEN(function, STEP | TERMINATED);                          \
-    ONLY_CS(function);                                          \
-    REQUIRE(function, value != NULL, "value is NULL.")
-#define NO_STATUS(function) DISCARD(f, "%s: status kind %d is not available, steps are never pending.", function, (int)s)
-
-FMI2_Export fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
-{
-    OPEN_STATUS("fmi2GetStatus");
-    NO_STATUS("fmi2GetStatus");
-}
-
-FMI2_Export fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
-{
-    OPEN_STATUS("fmi2GetRealStatus");
-    if (s == fmi2LastSuccessfulTime) {
-        *value = f->now.time;
-        return fmi2OK;
+/* fmi2GetXXXStatus: steps are never pending, so most of what can be asked for does not exist. */
+#define STATUS(function, type, exists, answer)                                                                       \
+    FMI2_Export fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value)                            \
+    {                                                                                                                \
+        OPEN(#function, STEP | TERMINATED);                                                                          \
+        ONLY_CS(#function);                                                                                          \
+        REQUIRE(#function, value != NULL, "value is NULL.");                                                         \
+        if (!(exists)) {                                                                                             \
+            DISCARD(f, "%s: status kind %d is not available, steps are never pending.", #function, (int)s);          \
+        }                                                                                                            \
+        *value = answer;                                                                                             \
+        return fmi2OK;                                                                                               \
     }
-    NO_STATUS("fmi2GetRealStatus");
-}
 
-FMI2_Export fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value)
-{
-    OPEN_STATUS("fmi2GetIntegerStatus");
-    NO_STATUS("fmi2GetIntegerStatus");
-}
-
-FMI2_Export fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
-{
-    OPEN_STATUS("fmi2GetBooleanStatus");
-    if (s == fmi2Terminated) {
-        *value = fmi2False;
-        return fmi2OK;
-    }
-    NO_STATUS("fmi2GetBooleanStatus");
-}
-
-FMI2_Export fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value)
-{
-    OPEN_STATUS("fmi2GetStringStatus");
-    NO_STATUS("fmi2GetStringStatus");
-}
+STATUS(fmi2GetStatus, fmi2Status, false, fmi2OK)
+STATUS(fmi2GetRealStatus, fmi2Real, s == fmi2LastSuccessfulTime, f->now.time)
+STATUS(fmi2GetIntegerStatus, fmi2Integer, false, 0)
+STATUS(fmi2GetBooleanStatus, fmi2Boolean, s == fmi2Terminated, fmi2False)
+STATUS(fmi2GetStringStatus, fmi2String, false, NULL)

@@ -34,6 +34,12 @@ static bool is_blank(const char *text)
     return text == NULL || text[strspn(text, " \t\r\n\f\v")] == '\0';
 }
 
+#define REJECT(...)                                                                         \
+    do {                                                                                    \
+        emit(functions, name, fmi2Error, logStatusError, "fmi2Instantiate: " __VA_ARGS__);  \
+        return NULL;                                                                        \
+    } while (0)
+
 FMI2_Export fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
                                           fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
                                           fmi2Boolean visible, fmi2Boolean loggingOn)
@@ -45,23 +51,17 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuT
     }
     const char *const name = instanceName == NULL ? "" : instanceName;
     if (is_blank(instanceName)) {
-        emit(functions, name, fmi2Error, logStatusError, "fmi2Instantiate: the instance name is missing or blank.");
-        return NULL;
+        REJECT("the instance name is missing or blank.");
     }
     if (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation) {
-        emit(functions, name, fmi2Error, logStatusError, "fmi2Instantiate: fmuType = %d is neither fmi2ModelExchange nor "
-             "fmi2CoSimulation.", (int)fmuType);
-        return NULL;
+        REJECT("fmuType = %d is neither fmi2ModelExchange nor fmi2CoSimulation.", (int)fmuType);
     }
     if (fmuGUID == NULL || strcmp(fmuGUID, MODEL_GUID) != 0) {
-        emit(functions, name, fmi2Error, logStatusError, "fmi2Instantiate: the GUID %s is not that of this binary, %s.",
-             fmuGUID == NULL ? "NULL" : fmuGUID, MODEL_GUID);
-        return NULL;
+        REJECT("the GUID %s is not that of this binary, %s.", fmuGUID == NULL ? "NULL" : fmuGUID, MODEL_GUID);
     }
     fmu *const f = (fmu *)calloc(1, sizeof *f + strlen(name) + 1);
     if (f == NULL) {
-        emit(functions, name, fmi2Error, logStatusError, "fmi2Instantiate: out of memory.");
-        return NULL;
+        REJECT("out of memory.");
     }
     strcpy(f->name, name);
     memcpy(&f->callbacks, functions, sizeof f->callbacks); /* its members are const in the headers of FMI 2.0.0 */
@@ -239,45 +239,22 @@ FMI2_Export fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[
 }
 
 /* There are no variables of the other types: reading or writing none of them is all that can be asked for. */
-#define NO_SUCH_VARIABLES(function, modes, type)                                        \
-    OPEN(function, modes);                                                              \
-    (void)vr;                                                                           \
-    (void)value;                                                                        \
-    REQUIRE(function, nvr == 0, "this FMU has no " type " variables.");                 \
-    return fmi2OK
+#define NO_VARIABLES(function, type, values, modes)                                                                     \
+    FMI2_Export fmi2Status function(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, values value[])         \
+    {                                                                                                                   \
+        OPEN(#function, modes);                                                                                         \
+        (void)vr;                                                                                                       \
+        (void)value;                                                                                                    \
+        REQUIRE(#function, nvr == 0, "this FMU has no " type " variables.");                                            \
+        return fmi2OK;                                                                                                  \
+    }
 
-FMI2_Export fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
-{
-    NO_SUCH_VARIABLES("fmi2GetInteger", INITIALIZED, "Integer");
-}
-
-FMI2_Export fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[])
-{
-    NO_SUCH_VARIABLES("fmi2GetBoolean", INITIALIZED, "Boolean");
-}
-
-FMI2_Export fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
-{
-    NO_SUCH_VARIABLES("fmi2GetString", INITIALIZED, "String");
-}
-
-FMI2_Export fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                      const fmi2Integer value[])
-{
-    NO_SUCH_VARIABLES("fmi2SetInteger", INSTANTIATED | INITIALIZATION | EVENT | STEP, "Integer");
-}
-
-FMI2_Export fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                      const fmi2Boolean value[])
-{
-    NO_SUCH_VARIABLES("fmi2SetBoolean", INSTANTIATED | INITIALIZATION | EVENT | STEP, "Boolean");
-}
-
-FMI2_Export fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                     const fmi2String value[])
-{
-    NO_SUCH_VARIABLES("fmi2SetString", INSTANTIATED | INITIALIZATION | EVENT | STEP, "String");
-}
+NO_VARIABLES(fmi2GetInteger, "Integer", fmi2Integer, INITIALIZED)
+NO_VARIABLES(fmi2GetBoolean, "Boolean", fmi2Boolean, INITIALIZED)
+NO_VARIABLES(fmi2GetString, "String", fmi2String, INITIALIZED)
+NO_VARIABLES(fmi2SetInteger, "Integer", const fmi2Integer, INSTANTIATED | INITIALIZATION | EVENT | STEP)
+NO_VARIABLES(fmi2SetBoolean, "Boolean", const fmi2Boolean, INSTANTIATED | INITIALIZATION | EVENT | STEP)
+NO_VARIABLES(fmi2SetString, "String", const fmi2String, INSTANTIATED | INITIALIZATION | EVENT | STEP)
 
 /* ---- Partial derivatives ---- */
 

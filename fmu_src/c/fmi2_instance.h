@@ -8,7 +8,6 @@
 #include "interface.h"
 
 #include "fmi2Functions.h"
-#include "rov.h"
 
 #include <stdarg.h>
 #include <stdbool.h>
@@ -110,16 +109,13 @@ static void emit(const fmi2CallbackFunctions *callbacks, const char *name, fmi2S
             LOG(f, fmi2Warning, logStatusWarning, __VA_ARGS__);                          \
         }                                                                                \
     } while (0)
-#define FAIL(f, ...)                                \
-    do {                                            \
-        LOG(f, fmi2Error, logStatusError, __VA_ARGS__);  \
-        return fmi2Error;                           \
+#define REFUSE(f, status, category, ...)                                                 \
+    do {                                                                                 \
+        LOG(f, status, category, __VA_ARGS__);                                           \
+        return status;                                                                   \
     } while (0)
-#define DISCARD(f, ...)                                 \
-    do {                                                \
-        LOG(f, fmi2Discard, logStatusDiscard, __VA_ARGS__);  \
-        return fmi2Discard;                             \
-    } while (0)
+#define FAIL(f, ...) REFUSE(f, fmi2Error, logStatusError, __VA_ARGS__)
+#define DISCARD(f, ...) REFUSE(f, fmi2Discard, logStatusDiscard, __VA_ARGS__)
 
 static const char *mode_name(lifecycle mode)
 {

@@ -1,14 +1,21 @@
-#include "riccati.h"
-
+/* Exact motion of one axis under a held force: v' = C - B v - A |v| v with A, B >= 0.
+ * The same formulas as rov_fmu/motion/riccati.py, which derives them. No state, no allocation, no errno. */
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
+
+typedef struct {
+    double A; /* quadratic drag, 1/m (1/rad) */
+    double B; /* linear drag, 1/s */
+    double C; /* force, m/s2 (rad/s2) */
+} riccati;
 
 /* A motion mirrored to v0 >= 0, and the first leg of it: until it turns, or longer than asked for. */
 typedef struct {
     double sign, C, v0, turn;
 } riccati_leg;
 
+/* v' at v. */
 static double riccati_acceleration(const riccati *axis, double v)
 {
     return axis->C - (axis->B + axis->A * fabs(v)) * v;
@@ -42,6 +49,7 @@ static double riccati_time_to_rest(double A, double B, double C, double v0)
     return 2.0 * S * (atanh(x) / x);
 }
 
+/* When the force brings v0 to rest and turns it; infinite where it does not. */
 static double riccati_turning_time(const riccati *axis, double v0)
 {
     if ((v0 <= 0.0 || axis->C >= 0.0) && (v0 >= 0.0 || axis->C <= 0.0)) {
@@ -171,6 +179,7 @@ static inline void riccati_leg_advance(double A, double B, double C, double v0, 
     }
 }
 
+/* v(h) from v0 into *v and the integral of v from 0 to h into *s, h > 0; either may be NULL. */
 static inline void riccati_advance(const riccati *axis, double v0, double h, double *v, double *s)
 {
     const riccati_leg leg = riccati_first_leg(axis, v0, h);

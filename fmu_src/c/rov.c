@@ -1,8 +1,17 @@
-#include "rov.h"
+/* The ROV: thrust, surge, heave, yaw and pose, stepped exactly. The same formulas as rov_fmu/motion/rov.py.
+ * Units, signs and the structs (generated into model.h) are those of that module. No state, no allocation. */
+#include "model.h"
 
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
+
+/* What a step needs of the coefficients. */
+typedef struct {
+    riccati surge, heave, yaw;               /* A and B; C is the force of the moment */
+    double surge_gain, heave_gain, yaw_gain; /* beta/m, acceleration per force */
+    double arm;                              /* R sin(gamma), torque per difference of rear thrust */
+} rov_gains;
 
 enum {
     ORDER = 8,           /* terms of the expansion at the ends of a fast turn */
@@ -40,6 +49,7 @@ static void rov_prepare(const rov_coefficients *k, rov_gains *gains)
     };
 }
 
+/* Thrust of the commands, saturated to -1 ... 1. */
 static void rov_thrust_of(const rov_coefficients *k, const rov_gains *gains, const rov_inputs *in, rov_thrust *F)
 {
     F->F_l = 0.5 * thruster_force(k->a_t_rear, k->b_t_rear, in->u_l);
@@ -60,6 +70,7 @@ static rov_gains rov_axes(const rov_coefficients *k, const rov_gains *gains, con
     return now;
 }
 
+/* Time derivatives of the state. */
 static void rov_derivatives(const rov_coefficients *k, const rov_gains *gains, const rov_inputs *in,
                             const rov_state *s, rov_state *rate)
 {
@@ -245,6 +256,7 @@ static void planar_leg(const rov_gains *now, double *u, double *r, double *turn,
     sum->ahead = NAN; /* it overflows */
 }
 
+/* The state after h > 0 seconds with the inputs held. Not finite only where a result overflows. */
 static void rov_step(const rov_coefficients *k, const rov_gains *gains, const rov_inputs *in,
                      const rov_state *s, double h, rov_state *next)
 {
@@ -296,6 +308,8 @@ static double axis_tangent(double m, double beta, double a_d, double b_d, double
     return ((dbeta - beta / m * dm) * balance + beta * dbalance) / m;
 }
 
+/* Directional derivative: for the changes d of inputs, state and coefficients, those of thrust and state derivatives
+ * are written into d. At a command of exactly +-1 the derivative is that of the inside. */
 static void rov_tangent(const rov_variables *at, rov_variables *d)
 {
     const rov_coefficients *k = &at->coefficients, *dk = &d->coefficients;
