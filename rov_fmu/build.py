@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 
-from rov_fmu.export.archive import Content, archive, native_content, python_content
+from rov_fmu.export.archive import archive, native_content, python_content
 from rov_fmu.export.compile import PLATFORMS, BuildError, compile_all, host_platform
 from rov_fmu.export.interface import variables
 from rov_fmu.export.osp import osp_model_description, osp_path
@@ -62,7 +62,14 @@ def build(
     check_targets([output, *(other.path for other in beside)], vehicle.files)
     chosen = chosen_platforms(platforms) if native else []
     content = (native_content if native else python_content)(vehicle, documentation(vehicle, native=native))
-    binaries, seconds = _compiled(content, chosen, on_compiled)
+    start = perf_counter()
+    seconds: dict[str, float] = {}
+
+    def done(name: str) -> None:
+        seconds[name] = perf_counter() - start
+        on_compiled(name)
+
+    binaries = compile_all(chosen, content.sources, content.identifier, done)
     libraries = {f"binaries/{name}/{content.identifier}{PLATFORMS[name].suffix}": b for name, b in binaries.items()}
     packed = archive({**content.files, **libraries})
     notes: list[str] = []
@@ -85,20 +92,6 @@ def chosen_platforms(names: Sequence[str] | None) -> list[str]:
     if "host" in names and host is None:
         raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")
     return list(dict.fromkeys(host if name == "host" and host else name for name in names))
-
-
-def _compiled(
-    content: Content, platforms: Sequence[str], on_compiled: Progress
-) -> tuple[dict[str, bytes], dict[str, float]]:
-    """The binaries by platform, compiled side by side, and after how many seconds each was there."""
-    start = perf_counter()
-    seconds: dict[str, float] = {}
-
-    def done(name: str) -> None:
-        seconds[name] = perf_counter() - start
-        on_compiled(name)
-
-    return compile_all(platforms, content.sources, content.identifier, done), seconds
 
 
 def _check(path: Path, platforms: Sequence[str] | None) -> str:

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial, wraps
+from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
@@ -36,14 +36,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code("rov-fmu", action, _EXIT_CODES)
 
 
-def _after_parsing(command: Callable[..., None]) -> Callable[..., Callable[[], None]]:
-    """Do nothing yet: errors and interrupts of the work itself are not click's to handle."""
+class _Parsed(click.Command):
+    """Does nothing yet: errors and interrupts of the work itself are not click's to handle."""
 
-    @wraps(command)
-    def chosen(**options: Any) -> Callable[[], None]:
-        return partial(command, **options)
-
-    return chosen
+    def invoke(self, ctx: click.Context) -> Callable[[], None]:
+        """What is to be done."""
+        return partial(super().invoke, ctx)
 
 
 def _vehicles(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -66,6 +64,9 @@ def _commands() -> None:
     """
 
 
+_commands.command_class = _Parsed
+
+
 @_commands.command("build")
 @_vehicle(default=str(VIDEORAY))
 @click.option("-o", "--output", type=_FILE, metavar="FILE.fmu", help="Where to write it; <identifier>.fmu by default.")
@@ -74,7 +75,6 @@ def _commands() -> None:
 @click.option("--platform", "platforms", multiple=True, type=click.Choice(["host", *PLATFORMS]), metavar="NAME",
               help=f"host, {', '.join(PLATFORMS)}; may be repeated (default: all).")  # fmt: skip
 @click.option("--osp", is_flag=True, help="Also write <identifier>_OspModelDescription.xml beside it (OSP-IS 1.0.1).")
-@_after_parsing
 def _build(vehicle: Path, output: Path | None, backend: str, platforms: tuple[str, ...], osp: bool) -> None:
     """Build the FMU of a vehicle: the VideoRay Pro 4 by default."""
     if backend == "pythonfmu" and platforms:
@@ -127,7 +127,6 @@ def _print_built(built: "Built", seconds: float) -> None:
 @click.option("-o", "--output", type=_FILE, metavar="VEHICLE.toml", help="Vehicle file to write.")
 @click.option("--report", type=_FILE, metavar="REPORT.html",
               help="Report to write; a build puts it into the FMU of the vehicle file.")  # fmt: skip
-@_after_parsing
 def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
     """Identify a vehicle from FOLDER of tank tests: rov.toml and thrust_, steady_, ... .csv."""
     from rov_fmu.identify.identify import identify
@@ -160,7 +159,6 @@ def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
 @click.option("--points", type=_FILE, metavar="POINTS.csv",
               help="Many wanted points instead: command, velocity, time constant.")  # fmt: skip
 @click.option("-o", "--output", type=_FILE, metavar="TUNED.toml", help="Vehicle file to write.")
-@_after_parsing
 def _tune(
     vehicle: Path, axis: str, command: float | None, v_ss: float | None, tau: float | None,
     points: Path | None, output: Path | None,
@@ -191,7 +189,6 @@ def _tune(
 
 @_commands.command("tables")
 @_vehicle(default=str(VIDEORAY))
-@_after_parsing
 def _tables(vehicle: Path) -> None:
     """Print Tables 6-8 of the paper: printed, computed, measured."""
     from rov_fmu.pages.console import print_tables
@@ -204,7 +201,6 @@ def _tables(vehicle: Path) -> None:
 
 @_commands.command("figures")
 @click.argument("folder", type=_FILE)
-@_after_parsing
 def _figures(folder: Path) -> None:
     """Redraw the paper's figures into FOLDER, as far as it prints their data."""
     from rov_fmu.pages.paper_figures import write_figures

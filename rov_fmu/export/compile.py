@@ -71,18 +71,21 @@ def host_platform() -> str | None:
 
 def compiler() -> list[str]:
     """The C compiler's command. Raises BuildError where it is not installed."""
-    spec = importlib.util.find_spec("ziglang")
-    if spec is None or spec.origin is None:
-        raise BuildError("the C compiler is missing: pip install ziglang")
-    return [str(Path(spec.origin).with_name("zig.exe" if os.name == "nt" else "zig")), "cc"]
+    zig = "zig.exe" if os.name == "nt" else "zig"
+    return [str(_beside("ziglang", "the C compiler is missing: pip install ziglang") / zig), "cc"]
 
 
 def fmi_headers() -> Path:
-    """The folder with the FMI headers, which come with FMPy."""
-    spec = importlib.util.find_spec("fmpy")
+    """The folder with the FMI headers, which come with FMPy. Raises BuildError where it is not installed."""
+    return _beside("fmpy", "the package fmpy, which has the FMI headers, is not installed") / "c-code"
+
+
+def _beside(package: str, missing: str) -> Path:
+    """The folder of a package, which is not imported."""
+    spec = importlib.util.find_spec(package)
     if spec is None or spec.origin is None:
-        raise BuildError("the package fmpy, which has the FMI headers, is not installed")
-    return Path(spec.origin).with_name("c-code")
+        raise BuildError(missing)
+    return Path(spec.origin).parent
 
 
 def compile_all(

@@ -94,6 +94,7 @@ class Variable:
 
 
 # What is calculated from the state, and the knowns that it depends on with their dependenciesKind: derivatives ...
+_ALONG = {"u": "dependent", "psi": "dependent"}
 _DERIVATIVES = {
     axis.velocity: (
         f"{axis.name.capitalize()} acceleration, {axis.equations[1]}",
@@ -102,16 +103,8 @@ _DERIVATIVES = {
     )
     for axis in AXES.values()
 } | {
-    "x": (
-        "Velocity over ground northward, u cos ψ + V_N",
-        "m/s",
-        {"V_N": "constant", "u": "dependent", "psi": "dependent"},
-    ),
-    "y": (
-        "Velocity over ground eastward, u sin ψ + V_E",
-        "m/s",
-        {"V_E": "constant", "u": "dependent", "psi": "dependent"},
-    ),
+    "x": ("Velocity over ground northward, u cos ψ + V_N", "m/s", {"V_N": "constant"} | _ALONG),
+    "y": ("Velocity over ground eastward, u sin ψ + V_E", "m/s", {"V_E": "constant"} | _ALONG),
     "z": ("Rate of change of depth, w", "m/s", {"w": "constant"}),
     "psi": ("Rate of change of heading, r", "rad/s", {"r": "constant"}),
 }
@@ -141,8 +134,8 @@ def variables(coefficients: Coefficients) -> tuple[Variable, ...]:
     result: list[Variable] = []
 
     def add(name: str, meta: Meta, causality: str, variability: str, **rest: Any) -> None:
-        given: dict[str, Any] = {"minimum": _finite(meta.minimum), "maximum": _finite(meta.maximum)}
-        given |= {"display_unit": UNITS[meta.unit].display} | rest
+        bounds = {end: x for end, x in (("minimum", meta.minimum), ("maximum", meta.maximum)) if isfinite(x)}
+        given = {"display_unit": UNITS[meta.unit].display, **bounds, **rest}
         result.append(Variable(name, len(result), meta.description, meta.unit, causality, variability, **given))
 
     for name, meta in declared(Inputs).items():
@@ -162,11 +155,6 @@ def variables(coefficients: Coefficients) -> tuple[Variable, ...]:
             start=getattr(coefficients, name),
             display_unit=None if meta.unit == "1" else UNITS[meta.unit].display)  # fmt: skip
     return tuple(result)
-
-
-def _finite(bound: float) -> float | None:
-    """What the XML says of a bound: nothing where there is none."""
-    return bound if isfinite(bound) else None
 
 
 # Names by the standard (2.2.4) and what is said in each.

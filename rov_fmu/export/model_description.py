@@ -1,10 +1,11 @@
 """modelDescription.xml from the variables (FMI 2.0, section 2.2)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from rov_fmu import __version__
 from rov_fmu.export.interface import LOG_CATEGORIES, PARAMETERS_OF, UNITS, Variable
 from rov_fmu.files.templates import render
+from rov_fmu.vehicle.vehicle import Vehicle
 
 # What is false is written out too, for FMI++ ends where it is absent.
 _COMMON = {
@@ -31,19 +32,30 @@ _EXPERIMENT = {"startTime": 0.0, "stopTime": 10.0, "tolerance": 1e-6, "stepSize"
 
 
 def model_description(
+    vehicle: Vehicle,
     variables: tuple[Variable, ...],
     *,
-    identifier: str,
-    head: Mapping[str, str | None],
+    guid: str,
     interfaces: Mapping[str, Mapping[str, str]],
     source_files: tuple[str, ...] = (),
 ) -> bytes:
-    """The XML document, UTF-8, indented, the same bytes for the same arguments; `head` are attributes of its root."""
-    names = {"variableNamingConvention": "structured", "numberOfEventIndicators": "0"}
+    """The XML document, UTF-8, indented, the same bytes for the same arguments."""
+    head = {
+        "fmiVersion": "2.0",
+        "modelName": vehicle.identifier,
+        "guid": guid,
+        "description": vehicle.description,
+        "author": vehicle.source,
+        "version": vehicle.version,
+        "license": "MIT, see documentation/licenses/license.txt",
+        "generationTool": f"rov-fmu {__version__}",
+        "variableNamingConvention": "structured",
+        "numberOfEventIndicators": "0",
+    }
     return render(
         "modelDescription.xml.j2",
-        head={"fmiVersion": "2.0", "modelName": identifier, **head, **names},
-        interfaces={name: {"modelIdentifier": identifier, **can} for name, can in interfaces.items()},
+        head=head,
+        interfaces={name: {"modelIdentifier": vehicle.identifier, **can} for name, can in interfaces.items()},
         source_files=source_files,
         units={name: UNITS[name] for name in dict.fromkeys(v.unit for v in variables)},
         log_categories=LOG_CATEGORIES,
@@ -54,23 +66,13 @@ def model_description(
     ).encode()
 
 
-@dataclass(frozen=True)
-class _Unknown:
-    """An entry of <ModelStructure>."""
-
-    index: int
-    dependencies: str
-    kinds: str
-
-
-def _structure(variables: tuple[Variable, ...]) -> dict[str, list[_Unknown]]:
+def _structure(variables: tuple[Variable, ...]) -> dict[str, dict[int, dict[int, str]]]:
+    """The lists of <ModelStructure>: by index of an unknown, the kinds of the knowns it depends on, by index."""
     index = {v.name: v.index for v in variables}
-    lists: dict[str, list[_Unknown]] = {"Outputs": [], "Derivatives": [], "InitialUnknowns": []}
+    lists: dict[str, dict[int, dict[int, str]]] = {"Outputs": {}, "Derivatives": {}, "InitialUnknowns": {}}
 
     def add(to: str, variable: Variable, known: Mapping[str, str]) -> None:
-        ordered = sorted(known, key=index.__getitem__)
-        indices, kinds = (" ".join(map(str, x)) for x in ([index[n] for n in ordered], [known[n] for n in ordered]))
-        lists[to].append(_Unknown(variable.index, indices, kinds))
+        lists[to][variable.index] = dict(sorted((index[name], kind) for name, kind in known.items()))
 
     for v in variables:
         if v.dependencies is None:

@@ -3,7 +3,6 @@
 libcosim and the OSP tools look for it beside the FMU. The variables stay what modelDescription.xml says they are.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from rov_fmu.export.interface import Variable
@@ -41,18 +40,14 @@ _GROUPS: dict[str, dict[str, str | None]] = {
 
 def osp_model_description(variables: tuple[Variable, ...]) -> bytes:
     """The XML document: every input and output in one group. UTF-8, indented, the same bytes for the same arguments."""
-    by_name = {v.name: v for v in variables}
-    units = {name: _unit(axes, by_name) for name, axes in _GROUPS.items()}
-    order = list(_ELEMENTS)
-    groups = [(_ELEMENTS[units[name]], name, units[name], _GROUPS[name])
-              for name in sorted(_GROUPS, key=lambda name: order.index(units[name]))]  # fmt: skip
+    unit_of = {v.name: v.unit for v in variables}
+    groups = []
+    for name, members in _GROUPS.items():
+        (unit,) = {unit_of[variable] for variable in members}  # which they share
+        groups.append((_ELEMENTS[unit], name, unit, members))
+    order = list(_ELEMENTS.values())
+    groups.sort(key=lambda group: order.index(group[0]))
     return render("osp.xml.j2", groups=groups).encode()
-
-
-def _unit(names: Mapping[str, str | None], by_name: Mapping[str, Variable]) -> str:
-    """The unit that the variables of a group share."""
-    (unit,) = {by_name[name].unit for name in names}
-    return unit
 
 
 def osp_path(fmu: Path, identifier: str) -> Path:

@@ -83,10 +83,7 @@ def time_constant(A: float, B: float, C: float) -> float:
     With D = B + 2 A V_ss and p = 1 - 1/e, Tau = (2/D) artanh(p D / (D + (1 - p) B)).
     """
     V = steady_velocity(A, B, C)
-    if isinf(V):
-        return inf
-    D = B + 2.0 * A * abs(V)
-    if D == 0.0:
+    if isinf(V) or (D := B + 2.0 * A * abs(V)) == 0.0:
         return inf
     q = 1.0 / e
     return 2.0 * atanh((1.0 - q) / (1.0 + q * (B / D))) / D

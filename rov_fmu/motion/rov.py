@@ -102,43 +102,27 @@ class Meta:
 
 
 def _coefficient(unit: str, description: str, minimum: float, maximum: float, *, tunable: bool = False) -> float:
-    meta = Meta(unit, description, minimum, maximum, tunable=tunable)
-    value: float = field(metadata={"meta": meta})
+    value: float = field(metadata={"meta": Meta(unit, description, minimum, maximum, tunable=tunable)})
     return value
 
 
 def _variable(unit: str, description: str, nominal: float = 1.0, limit: float = inf) -> float:
-    meta = Meta(unit, description, -limit, limit, nominal)
-    value: float = field(default=0.0, metadata={"meta": meta})
+    value: float = field(default=0.0, metadata={"meta": Meta(unit, description, -limit, limit, nominal)})
     return value
 
 
-def _curve(kind: str, thruster: str, equation: str) -> float:
-    name, symbol = {"a": ("Quadratic", "a_t"), "b": ("Linear", "b_t")}[kind]
-    return _coefficient("N", f"{name} thrust coefficient {symbol} of the {thruster}, {equation}", -1e6, 1e6)
+def _curve(name: str, kind: str, thruster: str, equation: str) -> float:
+    return _coefficient("N", f"{name} thrust coefficient {kind} of the {thruster}, {equation}", -1e6, 1e6)
 
 
-def _a_d(axis: Axis) -> float:
-    unit = f"{axis.load}.s2/{axis.position_unit}2"
-    return _coefficient(unit, f"Quadratic drag coefficient a_d of {axis.name}, {axis.equations[0]}", 0.0, 1e6)
-
-
-def _b_d(axis: Axis) -> float:
-    unit = f"{axis.load}.s/{axis.position_unit}"
-    return _coefficient(unit, f"Linear drag coefficient b_d of {axis.name}, {axis.equations[0]}", 0.0, 1e6)
+def _drag(name: str, kind: str, power: str, axis: Axis) -> float:
+    unit = f"{axis.load}.s{power}/{axis.position_unit}{power}"
+    return _coefficient(unit, f"{name} drag coefficient {kind} of {axis.name}, {axis.equations[0]}", 0.0, 1e6)
 
 
 def _tuning(symbol: str, scales: str, axis: Axis) -> float:
     words = f"Tuning {symbol}_{axis.velocity}: scales {scales} in {axis.name}, {axis.equations[1]}"
     return _coefficient("1", words, 0.0, 1e3, tunable=True)
-
-
-def _alpha(axis: Axis) -> float:
-    return _tuning("α", axis.push, axis)
-
-
-def _beta(axis: Axis) -> float:
-    return _tuning("β", "acceleration", axis)
 
 
 def _command(which: str, positive: str) -> float:
@@ -165,22 +149,22 @@ class Coefficients:
     gamma: float = _coefficient(
         "rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, pi / 2
     )
-    a_t_rear: float = _curve("a", "rear pair", "(9)")
-    b_t_rear: float = _curve("b", "rear pair", "(9)")
-    a_t_top: float = _curve("a", "top thruster", "(10)")
-    b_t_top: float = _curve("b", "top thruster", "(10)")
-    a_d_u: float = _a_d(SURGE)
-    b_d_u: float = _b_d(SURGE)
-    a_d_w: float = _a_d(HEAVE)
-    b_d_w: float = _b_d(HEAVE)
-    a_d_r: float = _a_d(YAW)
-    b_d_r: float = _b_d(YAW)
-    alpha_u: float = _alpha(SURGE)
-    beta_u: float = _beta(SURGE)
-    alpha_w: float = _alpha(HEAVE)
-    beta_w: float = _beta(HEAVE)
-    alpha_r: float = _alpha(YAW)
-    beta_r: float = _beta(YAW)
+    a_t_rear: float = _curve("Quadratic", "a_t", "rear pair", "(9)")
+    b_t_rear: float = _curve("Linear", "b_t", "rear pair", "(9)")
+    a_t_top: float = _curve("Quadratic", "a_t", "top thruster", "(10)")
+    b_t_top: float = _curve("Linear", "b_t", "top thruster", "(10)")
+    a_d_u: float = _drag("Quadratic", "a_d", "2", SURGE)
+    b_d_u: float = _drag("Linear", "b_d", "", SURGE)
+    a_d_w: float = _drag("Quadratic", "a_d", "2", HEAVE)
+    b_d_w: float = _drag("Linear", "b_d", "", HEAVE)
+    a_d_r: float = _drag("Quadratic", "a_d", "2", YAW)
+    b_d_r: float = _drag("Linear", "b_d", "", YAW)
+    alpha_u: float = _tuning("α", SURGE.push, SURGE)
+    beta_u: float = _tuning("β", "acceleration", SURGE)
+    alpha_w: float = _tuning("α", HEAVE.push, HEAVE)
+    beta_w: float = _tuning("β", "acceleration", HEAVE)
+    alpha_r: float = _tuning("α", YAW.push, YAW)
+    beta_r: float = _tuning("β", "acceleration", YAW)
 
 
 @dataclass(frozen=True)

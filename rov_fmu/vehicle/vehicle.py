@@ -31,14 +31,6 @@ class VehicleFileError(FileError):
 
 
 @dataclass(frozen=True)
-class Alternative:
-    """Some coefficients that may stand in for the ones used."""
-
-    description: str
-    values: Mapping[str, float]
-
-
-@dataclass(frozen=True)
 class Provenance:
     """What made a vehicle file, how, and from which files."""
 
@@ -103,7 +95,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         coefficients=Coefficients(**{name: q.value for name, q in quantities.items()}),
         sources={name: q.source for name, q in quantities.items()},
         command_range=checked.validity.command_range,
-        alternatives={name: a.plain() for name, a in checked.alternatives.items()},
+        alternatives=checked.alternatives,
         data=path.parent / head.data if head.data else None,
         pictures=path.parent / head.pictures if head.pictures else None,
         limits=checked.validity.limits,
@@ -164,12 +156,15 @@ _Coefficients = create_model("_Coefficients", __base__=Strict, **_REQUIRED)
 _Some = create_model("_Some", __base__=Strict, **_OPTIONAL)
 
 
-class _Alternative(_Some):  # type: ignore[misc, valid-type]
+class Alternative(_Some):  # type: ignore[misc, valid-type]
+    """Some coefficients that may stand in for the ones used."""
+
     description: _Text
 
-    def plain(self) -> Alternative:
-        values = {n: q.value for n in COEFFICIENTS if (q := getattr(self, n)) is not None}
-        return Alternative(self.description, values)
+    @property
+    def values(self) -> Mapping[str, float]:
+        """By name."""
+        return {n: q.value for n in COEFFICIENTS if (q := getattr(self, n)) is not None}
 
 
 def _identifier(text: str) -> str:
@@ -246,5 +241,5 @@ class _File(Strict):
     vehicle: _FileHead
     validity: Validity
     coefficients: _Coefficients  # type: ignore[valid-type]
-    alternatives: dict[str, _Alternative] = Field(default={})
+    alternatives: dict[str, Alternative] = Field(default={})
     provenance: _Provenance | None = None
