@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
@@ -13,8 +13,6 @@ from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.files.output import Output, check_targets, write_whole
 from rov_fmu.pages.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ class Built:
     """Until each platform was compiled."""
     note: str
     """What was found when the FMU was validated and run."""
-    beside: Sequence[Path] = field(default_factory=tuple)
+    beside: Sequence[Path]
     """What was written beside it."""
 
 
@@ -42,7 +40,7 @@ def build(
     platforms: Sequence[str] | None = None,
     backend: str = "native",
     osp: bool = False,
-    on_compiled: Progress = lambda _: None,
+    on_compiled: Callable[[str], None] = lambda _: None,
 ) -> Built:
     """Build the FMU of a vehicle, validate it and run it; it is written whole or not at all.
 

@@ -29,11 +29,6 @@ static void start(fmu *f)
     rov_prepare(&f->now.values.named.coefficients, &f->gains);
 }
 
-static bool is_blank(const char *text)
-{
-    return text == NULL || text[strspn(text, " \t\r\n\f\v")] == '\0';
-}
-
 #define REJECT(...)                                                                         \
     do {                                                                                    \
         emit(functions, name, fmi2Error, logStatusError, "fmi2Instantiate: " __VA_ARGS__);  \
@@ -50,7 +45,7 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuT
         return NULL;
     }
     const char *const name = instanceName == NULL ? "" : instanceName;
-    if (is_blank(instanceName)) {
+    if (name[strspn(name, " \t\r\n\f\v")] == '\0') {
         REJECT("the instance name is missing or blank.");
     }
     if (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation) {
@@ -166,11 +161,9 @@ FMI2_Export fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[
         calculate(f);
         for (size_t i = 0; i < nvr; i++) {
             if (!isfinite(f->now.values.at[vr[i]])) {
-                const char *const name = VARIABLES[vr[i]].name;
-                if (f->now.type == fmi2ModelExchange) {
-                    DISCARD(f, "fmi2GetReal: %s overflows.", name);
-                }
-                FAIL(f, "fmi2GetReal: %s overflows.", name);
+                const bool exchange = f->now.type == fmi2ModelExchange;
+                REFUSE(f, exchange ? fmi2Discard : fmi2Error, exchange ? logStatusDiscard : logStatusError,
+                       "fmi2GetReal: %s overflows.", VARIABLES[vr[i]].name);
             }
         }
     }

@@ -174,13 +174,10 @@ class _Compilers:
                 start_new_session=True,  # the compiler has children of its own, which must end with it
             )
             self._running.add(process)
-        assert process.stdout
-        with process.stdout:
-            output = process.stdout.read()  # to the end, which comes when all who can write have ended
-        code = process.wait()
+        output, _ = process.communicate()  # to the end, which comes when all who can write have ended
         with self._lock:
             self._running.remove(process)
-        return code, output.decode(errors="replace").strip()
+        return process.returncode, output.decode(errors="replace").strip()
 
 
 def _compile(compilers: _Compilers, name: str, sources: Mapping[str, str], identifier: str) -> bytes:

@@ -24,16 +24,13 @@ def brief(text: str) -> str:
 class _Repr(reprlib.Repr):
     """A few levels and entries of a value; the defaults would cut what fits into a message."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxstring = self.maxother = 80
-
     def repr_int(self, x: int, level: int) -> str:
         """Python refuses to write very long numbers in decimals."""
         return super().repr_int(x, level) if x.bit_length() < 1000 else hex(x)
 
 
 _REPR = _Repr()
+_REPR.maxstring = _REPR.maxother = 80
 
 
 def shown(value: object) -> str:

@@ -134,22 +134,15 @@ def _load_table(folder: Path, coefficients: Coefficients, test: StepTest) -> Res
     velocities = _read_table(of_velocities, dict.fromkeys(test.steady_columns, test.axis.unit))
     steady = {command: V for command, cells in velocities.items() if (V := cells[-1]) is not None}
 
-    def row(command: Decimal, cells: Cells) -> ResponseRow:
-        V_non_linear, Tau_non_linear, V_scaled, Tau_scaled, V_measured, Tau_measured = cells
-        if V_measured is None:
-            V_measured = steady.get(command)
-
-        def response(k: Coefficients, V_printed: Decimal | None, Tau_printed: Decimal | None) -> Response:
-            V_ss, Tau = test.response(k, command)
-            return Response(Cell(V_printed, V_ss, V_measured), Cell(Tau_printed, Tau, Tau_measured))
-
-        return ResponseRow(
-            command,
-            response(untuned(coefficients), V_non_linear, Tau_non_linear),
-            response(coefficients, V_scaled, Tau_scaled),
-        )
-
-    return ResponseTable(**vars(test), rows=tuple(row(*item) for item in responses.items()), steady=steady)
+    rows = []
+    for command, (*printed, V_measured, Tau_measured) in responses.items():
+        measured = steady.get(command) if V_measured is None else V_measured, Tau_measured
+        models = [
+            Response(*map(Cell, printed[place : place + 2], test.response(k, command), measured))
+            for place, k in ((0, untuned(coefficients)), (2, coefficients))
+        ]
+        rows.append(ResponseRow(command, *models))
+    return ResponseTable(**vars(test), rows=tuple(rows), steady=steady)
 
 
 def _deviation(value: float, reference: Decimal | None) -> float | None:
