@@ -2,8 +2,7 @@
  *
  * One call advances the state by `steps` steps of h seconds, as an importer's communication step does, and is not
  * inlined into the loop that measures it. */
-#ifndef MOTION_H
-#define MOTION_H
+#pragma once
 
 #include <string.h>
 
@@ -46,5 +45,3 @@ static inline void rates(const motion *m, int n, const double s[], double rate[]
         rate[6] = s[2];
     }
 }
-
-#endif

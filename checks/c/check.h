@@ -1,6 +1,5 @@
 /* What must hold in a C program: where it does not, the program says what and where, and aborts. */
-#ifndef CHECK_H
-#define CHECK_H
+#pragma once
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,5 +14,3 @@
         }                                                                \
     } while (0)
 #define CHECK(holds) PROPERTY(holds, "%s:%d", __FILE__, __LINE__)
-
-#endif

@@ -1,6 +1,5 @@
 /* The FMU as an importer loads it, on every platform: its functions by name, and an instance for Co-Simulation. */
-#ifndef FMU_H
-#define FMU_H
+#pragma once
 
 #include "check.h"
 #include "interface.h"
@@ -69,5 +68,3 @@ static inline fmi2Component new_instance(const char *name, const fmi2CallbackFun
     initialize(c);
     return c;
 }
-
-#endif

@@ -1,10 +1,19 @@
 /* The functions of section 2.1, with any arguments. */
-#ifndef COMMON_CALLS_H
-#define COMMON_CALLS_H
+#pragma once
 
 #include "world.h"
 
 /* ---- Life ---- */
+
+/* Its index, or as many as there are. */
+static int category_of(const char *name)
+{
+    int i = 0;
+    while (i < N_LOG_CATEGORIES && strcmp(name, LOG_CATEGORIES[i]) != 0) {
+        i++;
+    }
+    return i;
+}
 
 static void check_message(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                           fmi2String message, ...)
@@ -20,14 +29,9 @@ static void check_message(fmi2ComponentEnvironment environment, fmi2String name,
         PROPERTY(c[1] == '#', "a message with a single #: %s", text);
     }
     PROPERTY(status != fmi2Pending && status != fmi2Fatal, "a message of status %d", (int)status);
-    bool known = false;
-    for (int i = 0; i < N_LOG_CATEGORIES; i++) {
-        if (strcmp(category, LOG_CATEGORIES[i]) == 0) {
-            known = true;
-            PROPERTY(s->f == NULL || s->f->log_enabled[i], "a message of %s, which is switched off", category);
-        }
-    }
-    PROPERTY(known, "a message of the category %s", category);
+    const int known = category_of(category);
+    PROPERTY(known < N_LOG_CATEGORIES, "a message of the category %s", category);
+    PROPERTY(s->f == NULL || s->f->log_enabled[known], "a message of %s, which is switched off", category);
     PROPERTY(s->f == NULL || strcmp(name, s->f->name) == 0, "a message of the instance %s", name);
     messages++;
 }
@@ -82,12 +86,8 @@ static void call_fmi2SetDebugLogging(slot *s)
     LENT fmi2String *const categories = take_byte() < 250 ? exactly(n, sizeof *categories) : NULL;
     bool good = n == 0 || categories != NULL;
     for (size_t i = 0; i < n && categories != NULL; i++) {
-        bool known = false;
         categories[i] = take_byte() < 200 ? LOG_CATEGORIES[take_byte() % N_LOG_CATEGORIES] : take_name();
-        for (int j = 0; j < N_LOG_CATEGORIES && categories[i] != NULL; j++) {
-            known = known || strcmp(categories[i], LOG_CATEGORIES[j]) == 0;
-        }
-        good = good && known;
+        good = good && categories[i] != NULL && category_of(categories[i]) < N_LOG_CATEGORIES;
     }
     CALL(s, good, true, fmi2SetDebugLogging, s->f, take_bool(), n, categories);
 }
@@ -128,24 +128,25 @@ static void call_fmi2Reset(slot *s)
 
 /* ---- Values ---- */
 
-/* A list of n value references, or NULL. */
-static fmi2ValueReference *take_references(size_t n)
+/* Room for n of them, or NULL. */
+static void *take_room(size_t n, size_t size)
 {
-    fmi2ValueReference *const vr = take_byte() < 253 ? exactly(n, sizeof *vr) : NULL;
-    for (size_t i = 0; i < n && vr != NULL; i++) {
-        vr[i] = take_reference();
-    }
-    return vr;
+    return take_byte() < 253 ? exactly(n, size) : NULL;
 }
 
-static double *take_reals(size_t n)
-{
-    double *const values = take_byte() < 253 ? exactly(n, sizeof *values) : NULL;
-    for (size_t i = 0; i < n && values != NULL; i++) {
-        values[i] = take_real();
+/* A list of n of them, or NULL. */
+#define TAKE_LIST(name, type, take)                              \
+    static type *name(size_t n)                                  \
+    {                                                            \
+        type *const list = take_room(n, sizeof *list);           \
+        for (size_t i = 0; i < n && list != NULL; i++) {         \
+            list[i] = take();                                    \
+        }                                                        \
+        return list;                                             \
     }
-    return values;
-}
+
+TAKE_LIST(take_references, fmi2ValueReference, take_reference)
+TAKE_LIST(take_reals, double, take_real)
 
 /* Where a function gives back n doubles: they are all finite, or it was refused and left them alone. */
 static void check_results(const char *function, bool accepted, const double *values, size_t n)
@@ -164,7 +165,7 @@ static void call_fmi2GetReal(slot *s)
 {
     const size_t n = take_count();
     LENT fmi2ValueReference *const vr = take_references(n);
-    LENT double *const values = take_byte() < 253 ? exactly(n, sizeof *values) : NULL;
+    LENT double *const values = take_room(n, sizeof *values);
     bool good = n == 0 || (vr != NULL && values != NULL), derived = false;
     for (size_t i = 0; i < n && vr != NULL; i++) {
         good = good && vr[i] < N_VARIABLES;
@@ -250,5 +251,3 @@ static void call_fmi2GetDirectionalDerivative(slot *s)
     check_results("fmi2GetDirectionalDerivative", CALL_AS(s, wanted, false, fmi2GetDirectionalDerivative, s->f, unknown,
                   n_unknown, known, n_known, change, result), result, n_unknown);
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* The functions of Model Exchange (section 3.2) and of Co-Simulation (section 4.2), with any arguments. */
-#ifndef INTERFACE_CALLS_H
-#define INTERFACE_CALLS_H
+#pragma once
 
 #include "common_calls.h"
 #include "laws.h"
@@ -58,7 +57,7 @@ static void call_fmi2SetContinuousStates(slot *s)
     static void call_##function(slot *s)                                                                \
     {                                                                                                   \
         const size_t n = take_number_of_states();                                                       \
-        LENT double *const x = take_byte() < 253 ? exactly(n, sizeof *x) : NULL;                        \
+        LENT double *const x = take_room(n, sizeof *x);                                                 \
         verdict wanted = legal(s, CALL_##function, n == N_STATES && x != NULL);                         \
         wanted = wanted == ACCEPTED && (overflows) && !is_moderate(s->f) ? EITHER : wanted;             \
         check_results(#function, CALL_AS(s, wanted, false, function, s->f, x, n), x, n);                \
@@ -153,5 +152,3 @@ CALL_OF_STATUS(fmi2GetRealStatus, fmi2Real, fmi2LastSuccessfulTime)
 CALL_OF_STATUS(fmi2GetIntegerStatus, fmi2Integer, NOTHING)
 CALL_OF_STATUS(fmi2GetBooleanStatus, fmi2Boolean, fmi2Terminated)
 CALL_OF_STATUS(fmi2GetStringStatus, fmi2String, NOTHING)
-
-#endif

@@ -1,6 +1,5 @@
 /* What holds whatever was called: finite outputs, and motion that obeys its equation. */
-#ifndef LAWS_H
-#define LAWS_H
+#pragma once
 
 #include "world.h"
 
@@ -116,5 +115,3 @@ static void check_instance(const slot *s)
         PROPERTY(isfinite(values[i]), "%s = %g", VARIABLES[vr[i]].name, values[i]);
     }
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* The functions of section 2.1.8, with states and bytes of any origin. */
-#ifndef STATE_CALLS_H
-#define STATE_CALLS_H
+#pragma once
 
 #include "world.h"
 
@@ -132,5 +131,3 @@ static void call_fmi2DeSerializeFMUstate(slot *s)
         PROPERTY(isfinite(state->values.at[i]), "a state with %s = %g", VARIABLES[i].name, state->values.at[i]);
     }
 }
-
-#endif

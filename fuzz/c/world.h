@@ -1,6 +1,5 @@
 /* What the fuzzer plays with: bytes to take values from, instances, states, and what the standard expects of each. */
-#ifndef WORLD_H
-#define WORLD_H
+#pragma once
 
 #include <float.h>
 #include <stdbool.h>
@@ -246,5 +245,3 @@ static bool is_moderate(const fmu *f)
     }
     return true;
 }
-
-#endif
