@@ -14,7 +14,7 @@ from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2
 FULL_TURN = 2.0 * pi
 
 # name: start, description
-_INPUTS = {
+_INPUTS: dict[str, tuple[float | bool, str]] = {
     "z": (0.0, "Measured depth (m)"),
     "psi": (0.0, "Measured heading (rad), wrapped or not"),
     "z_ref": (0.0, "Depth to hold (m)"),
@@ -22,17 +22,15 @@ _INPUTS = {
     "surge": (0.0, "Stick forward, -1 ... 1: command of both rear thrusters"),
     "heave": (0.0, "Stick down, -1 ... 1: command of the top thruster while depth hold is off"),
     "yaw": (0.0, "Stick to starboard, -1 ... 1: opposite commands of the rear thrusters while heading hold is off"),
-}
-_SWITCHES = {
-    "depth_hold": "Depth hold is on",
-    "heading_hold": "Heading hold is on",
+    "depth_hold": (False, "Depth hold is on"),
+    "heading_hold": (False, "Heading hold is on"),
 }
 _OUTPUTS = {
-    "u_l": "Left thruster command, positive forward",
-    "u_r": "Right thruster command, positive forward",
-    "u_t": "Top thruster command, positive down",
-    "z_d": "Depth that the reference model wants now (m)",
-    "psi_d": "Heading that the reference model wants now (rad)",
+    "u_l": (0.0, "Left thruster command, positive forward"),
+    "u_r": (0.0, "Right thruster command, positive forward"),
+    "u_t": (0.0, "Top thruster command, positive down"),
+    "z_d": (0.0, "Depth that the reference model wants now (m)"),
+    "psi_d": (0.0, "Heading that the reference model wants now (rad)"),
 }
 _PARAMETERS = {
     "K_p_z": (60.0, "Depth hold: proportional gain (N/m)"),
@@ -79,17 +77,17 @@ class Thruster:
         return 2.0 * force / root if root > 0.0 else 0.0
 
 
+@dataclass
 class Hold:
     """A PID loop behind a second-order reference model, for a depth or, with a period, for an angle."""
 
-    def __init__(self, period: float | None = None) -> None:
-        self.period = period
-        self.on = False
-        self.measured = nan
-        self.rate = 0.0
-        self.reference = 0.0
-        self.reference_rate = 0.0
-        self.integral = 0.0
+    period: float | None = None
+    on: bool = False
+    measured: float = nan
+    rate: float = 0.0
+    reference: float = 0.0
+    reference_rate: float = 0.0
+    integral: float = 0.0
 
     def sample(self, value: float, on: bool, applied: float, h: float) -> None:
         """Take a measurement; where the hold goes on, start with the motion there is and the force that is applied."""
@@ -123,7 +121,7 @@ class Hold:
 class Autopilot(Fmi2Slave):  # type: ignore[misc]
     """The slave: sensors and sticks in, thruster commands out."""
 
-    author = "videoray-fmu"
+    author = "rov-fmu"
     description = "Depth hold and heading hold: two PID loops from depth and heading to thruster commands"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.05)
 
@@ -135,22 +133,15 @@ class Autopilot(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**arguments)
         self.depth = Hold()
         self.heading = Hold(FULL_TURN)
-        for name, (start, description) in _INPUTS.items():
-            self._register(Real, name, start, description, Fmi2Causality.input)
-        for name, description in _SWITCHES.items():
-            self._register(Boolean, name, False, description, Fmi2Causality.input)
-        for name, description in _OUTPUTS.items():
-            self._register(Real, name, 0.0, description, Fmi2Causality.output)
-        for name, (start, description) in _PARAMETERS.items():
-            self._register(Real, name, start, description, Fmi2Causality.parameter)
-
-    def _register(self, kind: type, name: str, start: object, description: str, causality: Fmi2Causality) -> None:
-        setattr(self, name, start)
-        variability = {
-            Fmi2Causality.parameter: Fmi2Variability.tunable,
-            Fmi2Causality.output: Fmi2Variability.discrete,
-        }.get(causality, Fmi2Variability.discrete if kind is Boolean else Fmi2Variability.continuous)
-        self.register_variable(kind(name, description=description, causality=causality, variability=variability))
+        for causality, variability, variables in (
+            (Fmi2Causality.input, Fmi2Variability.continuous, _INPUTS),
+            (Fmi2Causality.output, Fmi2Variability.discrete, _OUTPUTS),
+            (Fmi2Causality.parameter, Fmi2Variability.tunable, _PARAMETERS),
+        ):
+            for name, (start, text) in variables.items():
+                setattr(self, name, start)
+                kind, changes = (Boolean, Fmi2Variability.discrete) if start is False else (Real, variability)
+                self.register_variable(kind(name, description=text, causality=causality, variability=changes))
 
     def do_step(self, current_time: float, step_size: float) -> bool:  # noqa: ARG002
         """Sample the sensors at the start of the step; the commands are there at its end."""
