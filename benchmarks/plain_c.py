@@ -1,8 +1,6 @@
 """What is measured in plain C: built with the compiler of the FMU, and called in this process (Linux on x86-64)."""
 
 import ctypes
-import platform
-import sys
 from ctypes import POINTER, byref, c_double, c_int, c_long, c_size_t, c_void_p
 from functools import cache
 from pathlib import Path
@@ -15,7 +13,7 @@ from numpy.typing import NDArray
 
 from checks.c_programs import compile_c
 from rov_fmu.export.archive import native_content
-from rov_fmu.export.compile import PLATFORMS, compile_all
+from rov_fmu.export.compile import PLATFORMS, compile_all, host_platform
 from rov_fmu.vehicle.vehicle import Vehicle
 
 PLATFORM = "linux64"
@@ -36,7 +34,7 @@ Reals = NDArray[np.float64]
 
 def measurable() -> bool:
     """Whether that runs on this machine."""
-    return sys.platform == "linux" and platform.machine() == "x86_64"
+    return host_platform() == PLATFORM
 
 
 class PlainC:

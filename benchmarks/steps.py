@@ -28,7 +28,7 @@ _SWEEP = {
     RK4: [3.0, 5.0, *(10.0 * 2**n for n in range(9))],
     **{method: [10.0**-n for n in range(3, 14)] for method in CVODE},
 }
-_MANY, _FEW = 16384, 8
+_FEW = 8
 _PASS = 4e-3
 """Seconds to measure at a time: short, so that all are measured in the same minute, again and again."""
 
@@ -83,7 +83,7 @@ class Measured:
 class Plan:
     """What is measured: the table's jobs and, for the picture, cost against error of a held command of 1 s."""
 
-    def __init__(self, coefficients: Coefficients, commands: int = _MANY, starts: int = 64) -> None:
+    def __init__(self, coefficients: Coefficients, commands: int, starts: int) -> None:
         @cache
         def work(straight: bool, long: bool, ahead: bool) -> Work:
             known = 4 if ahead else starts // 4 if long else starts

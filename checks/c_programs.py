@@ -62,7 +62,5 @@ class Ended:
 
 def run_program(*command: str | Path, **how: Any) -> Ended:
     """Run a program, with more of what subprocess.run takes."""
-    result = subprocess.run(
-        list(map(str, command)), capture_output=True, text=True, timeout=600, check=False, **how
-    )  # fmt: skip
+    result = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False, **how)
     return Ended([line.split() for line in result.stdout.splitlines()], result.returncode, result.stderr)

@@ -5,6 +5,7 @@ where they are not, a hyperbola where they coincide, an exponential or a line wi
 holds for complex times too, which is what the pose is integrated with.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -17,83 +18,71 @@ from rov_fmu.motion.rov import Coefficients, Inputs, State
 
 DIGITS = 50
 Number = Any  # of mpmath, real or complex
+Function = Callable[[Number], Number]
+Rest = Callable[[], Number]
 
 
 class Leg:
     """A motion from v0 >= 0 at the time `start` that keeps its sign; `sign` mirrors it, `offset` is its distance."""
 
     def __init__(self, A: Number, B: Number, C: Number, v0: Number, start: Number, sign: int, offset: Number) -> None:
-        self.A, self.B, self.C, self.v0 = A, B, C, v0
         self.start, self.sign, self.offset = start, sign, offset
-        self.D2 = B * B + 4 * A * C
-        self.D = mp.sqrt(abs(self.D2))
-        if A == 0:
-            self.kind = "linear" if B > 0 else "free"
-        elif self.D2 > 0:
-            self.kind = "equilibria"
-            self.V1, self.V2 = (-B + self.D) / (2 * A), (-B - self.D) / (2 * A)
-            self.k = (v0 - self.V1) / (v0 - self.V2)
-        elif self.D2 < 0:
-            self.kind = "tangent"
-            self.phase = mp.atan((2 * A * v0 + B) / self.D)
-        else:
-            self.kind = "hyperbola"
-            self.p = v0 + B / (2 * A)
+        self._velocity, self._distance, self._room, self.rest = _elementary(A, B, C, v0)
 
     def velocity(self, time: Number) -> Number:
-        A, B, C, v0, t = self.A, self.B, self.C, self.v0, time - self.start
-        if self.kind == "equilibria":
-            kE = self.k * mp.exp(-self.D * t)
-            v = (self.V1 - self.V2 * kE) / (1 - kE)
-        elif self.kind == "tangent":
-            v = (self.D * mp.tan(self.phase - self.D * t / 2) - B) / (2 * A)
-        elif self.kind == "hyperbola":
-            v = self.p / (1 + A * self.p * t) - B / (2 * A)
-        elif self.kind == "linear":
-            v = C / B + (v0 - C / B) * mp.exp(-B * t)
-        else:
-            v = v0 + C * t
-        return self.sign * v
+        return self.sign * self._velocity(time - self.start)
 
     def distance(self, time: Number) -> Number:
         """From the beginning of the motion."""
-        A, B, C, v0, t = self.A, self.B, self.C, self.v0, time - self.start
-        if self.kind == "equilibria":
-            s = self.V1 * t + mp.log((1 - self.k * mp.exp(-self.D * t)) / (1 - self.k)) / A
-        elif self.kind == "tangent":
-            s = mp.log(mp.cos(self.phase - self.D * t / 2) / mp.cos(self.phase)) / A - B * t / (2 * A)
-        elif self.kind == "hyperbola":
-            s = mp.log(1 + A * self.p * t) / A - B * t / (2 * A)
-        elif self.kind == "linear":
-            s = C / B * t - (v0 - C / B) * mp.expm1(-B * t) / B
-        else:
-            s = v0 * t + C * t * t / 2
-        return self.offset + self.sign * s
-
-    def rest(self) -> Number:
-        """When a force C < 0 brings the motion to rest."""
-        A, B, C, v0 = self.A, self.B, self.C, self.v0
-        if self.kind == "equilibria":
-            return mp.log(self.k * self.V2 / self.V1) / self.D
-        if self.kind == "tangent":
-            return 2 * (self.phase - mp.atan(B / self.D)) / self.D
-        if self.kind == "hyperbola":
-            return 2 / B - 1 / (A * self.p)
-        return mp.log1p(-B * v0 / C) / B if self.kind == "linear" else -v0 / C
+        return self.offset + self.sign * self._distance(time - self.start)
 
     def room(self, time: Number) -> Number:
         """How far from a complex time the nearest singularity is."""
-        t = time - self.start
-        if self.kind == "equilibria" and self.k != 0:
-            pole, period = mp.log(self.k) / self.D, 2j * mp.pi / self.D
-        elif self.kind == "tangent":
-            pole, period = (2 * self.phase - mp.pi) / self.D, 2 * mp.pi / self.D
-        elif self.kind == "hyperbola" and self.p != 0:
-            return abs(t + 1 / (self.A * self.p))
-        else:
-            return 8 / self.B + mp.re(t) if self.kind == "linear" else mp.inf
-        n = mp.nint(mp.re((t - pole) / period))
-        return abs(t - pole - n * period)
+        return self._room(time - self.start)
+
+
+def _elementary(A: Number, B: Number, C: Number, v0: Number) -> tuple[Function, Function, Function, Rest]:
+    """Velocity, distance and room at a time after v0, and when a force C < 0 brings the motion to rest."""
+    D2 = B * B + 4 * A * C
+    D = mp.sqrt(abs(D2))
+    if A == 0 and B == 0:
+        return lambda t: v0 + C * t, lambda t: v0 * t + C * t * t / 2, lambda _: mp.inf, lambda: -v0 / C
+    if A == 0:
+        return (
+            lambda t: C / B + (v0 - C / B) * mp.exp(-B * t),
+            lambda t: C / B * t - (v0 - C / B) * mp.expm1(-B * t) / B,
+            lambda t: 8 / B + mp.re(t),
+            lambda: mp.log1p(-B * v0 / C) / B,
+        )
+    if D2 > 0:  # two equilibria
+        V1, V2 = (-B + D) / (2 * A), (-B - D) / (2 * A)
+        k = (v0 - V1) / (v0 - V2)
+        return (
+            lambda t: (V1 - V2 * (kE := k * mp.exp(-D * t))) / (1 - kE),
+            lambda t: V1 * t + mp.log((1 - k * mp.exp(-D * t)) / (1 - k)) / A,
+            lambda t: _to_pole(t, mp.log(k) / D, 2j * mp.pi / D) if k != 0 else mp.inf,
+            lambda: mp.log(k * V2 / V1) / D,
+        )
+    if D2 < 0:
+        phase = mp.atan((2 * A * v0 + B) / D)
+        return (
+            lambda t: (D * mp.tan(phase - D * t / 2) - B) / (2 * A),
+            lambda t: mp.log(mp.cos(phase - D * t / 2) / mp.cos(phase)) / A - B * t / (2 * A),
+            lambda t: _to_pole(t, (2 * phase - mp.pi) / D, 2 * mp.pi / D),
+            lambda: 2 * (phase - mp.atan(B / D)) / D,
+        )
+    p = v0 + B / (2 * A)
+    return (
+        lambda t: p / (1 + A * p * t) - B / (2 * A),
+        lambda t: mp.log(1 + A * p * t) / A - B * t / (2 * A),
+        lambda t: abs(t + 1 / (A * p)) if p != 0 else mp.inf,
+        lambda: 2 / B - 1 / (A * p),
+    )
+
+
+def _to_pole(t: Number, pole: Number, period: Number) -> Number:
+    """To the nearest of poles a period apart."""
+    return abs(t - pole - mp.nint(mp.re((t - pole) / period)) * period)
 
 
 class Motion:
@@ -103,10 +92,8 @@ class Motion:
         A, B, C, v0, self.h = (mp.mpf(number) for number in (A, B, C, v0, h))
         sign = -1 if v0 < 0 or (v0 == 0 and C < 0) else 1
         self.legs = [Leg(A, B, sign * C, sign * v0, mp.mpf(0), sign, mp.mpf(0))]
-        if sign * C < 0 and v0 != 0:
-            turn = self.legs[0].rest()
-            if turn < h:
-                self.legs.append(Leg(A, B, -sign * C, mp.mpf(0), turn, -sign, self.legs[0].distance(turn)))
+        if sign * C < 0 and v0 != 0 and (turn := self.legs[0].rest()) < h:
+            self.legs.append(Leg(A, B, -sign * C, mp.mpf(0), turn, -sign, self.legs[0].distance(turn)))
 
     def end(self) -> tuple[Number, Number, Number]:
         """Velocity, distance and length of the path, there and back."""

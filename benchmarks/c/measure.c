@@ -33,15 +33,12 @@ static void start_instance(fmi2Component c, const fmi2ValueReference vr[], size_
 /* Once, before all else. */
 void begin(const char *path)
 {
-    union {
-        double at[N_VARIABLES];
-        rov_variables named;
-    } defaults;
+    double defaults[N_VARIABLES];
     for (int i = 0; i < N_VARIABLES; i++) {
-        defaults.at[i] = VARIABLES[i].start;
+        defaults[i] = VARIABLES[i].start;
         reference[i] = (fmi2ValueReference)i;
     }
-    m.coefficients = defaults.named.coefficients;
+    memcpy(&m.coefficients, &defaults[REFERENCE(coefficients)], sizeof m.coefficients);
     rov_prepare(&m.coefficients, &m.gains);
     load_fmu(path);
     rov = new_instance("rov", &CALLBACKS);

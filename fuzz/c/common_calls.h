@@ -98,10 +98,7 @@ static void call_fmi2SetupExperiment(slot *s)
     const double start = simple ? 0.0 : take_real(), stop = stops ? take_real() : 0.0;
     const bool good = isfinite(start) && (!stops || stop >= start);
     if (CALL(s, good, true, fmi2SetupExperiment, s->f, take_bool(), take_real(), start, stops, stop)) {
-        s->at.set_up = true;
-        s->at.time = start;
-        s->at.stop_defined = stops;
-        s->at.stop = stop;
+        s->at = (expected){s->at.type, s->at.mode, true, stops, start, stop};
     }
 }
 

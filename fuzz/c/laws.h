@@ -85,15 +85,7 @@ static void check_step(const fmu *f, const start_of_step *start)
     PROPERTY(f->now.time == start->end, "a step to t = %a ends at %a", start->end, f->now.time);
 }
 
-/* What a step uses belongs to the coefficients of now. */
-static void check_gains(const fmu *f)
-{
-    rov_gains gains;
-    rov_prepare(&f->now.values.named.coefficients, &gains);
-    PROPERTY(memcmp(&gains, &f->gains, sizeof gains) == 0, "the gains are those of other coefficients");
-}
-
-/* The mode is the expected one; states and thrust can be read and are finite. */
+/* The gains and the mode are the expected ones; states and thrust can be read and are finite. */
 static void check_instance(const slot *s)
 {
     enum { N_THRUST = sizeof(rov_thrust) / sizeof(double) };
@@ -105,7 +97,9 @@ static void check_instance(const slot *s)
     if (s->f == NULL) {
         return;
     }
-    check_gains(s->f);
+    rov_gains gains;
+    rov_prepare(&s->f->now.values.named.coefficients, &gains);
+    PROPERTY(memcmp(&gains, &s->f->gains, sizeof gains) == 0, "the gains are those of other coefficients");
     PROPERTY(s->f->now.mode == s->at.mode && s->f->now.type == s->at.type, "in %s instead of %s",
              mode_name(s->f->now.mode), mode_name(s->at.mode));
     before_call();

@@ -66,12 +66,12 @@ static void call_fmi2SerializeFMUstate(slot *s)
     if (CALL(s, good, false, fmi2SerializeFMUstate, s->f, from->state, bytes, size)) {
         free(to->bytes);
         *to = (buffer){bytes, size, checksum((unsigned char *)bytes, size), false, from->at};
-    } else {
-        for (size_t i = 0; i < size; i++) {
-            PROPERTY((unsigned char)bytes[i] == 0xa5, "a refused call writes bytes");
-        }
-        free(bytes);
+        return;
     }
+    for (size_t i = 0; i < size; i++) {
+        PROPERTY((unsigned char)bytes[i] == 0xa5, "a refused call writes bytes");
+    }
+    free(bytes);
 }
 
 /* Bytes are damaged; or given values that a run may or may not reach, with the checksum that belongs to them. */
@@ -83,12 +83,11 @@ static void damage(void)
     }
     unsigned char *const bytes = (unsigned char *)b->bytes;
     const bool forge = take_bool();
-    const size_t at = (size_t)take_word(2) % SERIALIZED_SIZE;
+    const size_t at = (size_t)take_word(2) % SERIALIZED_SIZE, word = at % (N_HEADER_WORDS + N_VARIABLES);
     if (forge) {
         const double value = take_real();
-        const size_t word = MAGIC_SIZE + GUID_SIZE + 8 * (at % (N_HEADER_WORDS + N_VARIABLES));
-        unsigned char *to = bytes + word;
-        if (at % (N_HEADER_WORDS + N_VARIABLES) < 3) {
+        unsigned char *to = bytes + MAGIC_SIZE + GUID_SIZE + 8 * word;
+        if (word < 3) {
             put_word(&to, take_byte());
         } else {
             put_double(&to, value);
