@@ -98,7 +98,8 @@ static void call_fmi2SetupExperiment(slot *s)
     const double start = simple ? 0.0 : take_real(), stop = stops ? take_real() : 0.0;
     const bool good = isfinite(start) && (!stops || stop >= start);
     if (CALL(s, good, true, fmi2SetupExperiment, s->f, take_bool(), take_real(), start, stops, stop)) {
-        s->at = (expected){s->at.type, s->at.mode, true, stops, start, stop};
+        s->at = (expected){.type = s->at.type, .mode = s->at.mode, .experiment_defined = true, .time = start,
+                           .stop_defined = stops, .stop = stop};
     }
 }
 
@@ -111,7 +112,7 @@ static void call_fmi2SetupExperiment(slot *s)
         }                                              \
     }
 
-CALL_THAT_LEADS(fmi2EnterInitializationMode, s->at.set_up, INITIALIZATION)
+CALL_THAT_LEADS(fmi2EnterInitializationMode, s->at.experiment_defined, INITIALIZATION)
 CALL_THAT_LEADS(fmi2ExitInitializationMode, true, s->at.type == fmi2ModelExchange ? EVENT : STEP)
 CALL_THAT_LEADS(fmi2Terminate, true, TERMINATED)
 CALL_THAT_LEADS(fmi2EnterEventMode, true, EVENT)

@@ -116,19 +116,18 @@ static void call_fmi2DoStep(slot *s)
     }
     before_call();
     verdict wanted = legal(s, CALL_fmi2DoStep, good != REFUSED);
-    start_of_step start = {0};
-    if (wanted == ACCEPTED) {
-        wanted = good == ACCEPTED && is_moderate(s->f) && h <= 1e30 ? ACCEPTED : EITHER;
-        start = start_of(s->f, h, end);
+    if (wanted == ACCEPTED && !(good == ACCEPTED && is_moderate(s->f) && h <= 1e30)) {
+        wanted = EITHER;
     }
     const fmi2Status status = fmi2DoStep(s->f, t, h, take_bool());
     if (wanted == EITHER && s->f->now.mode == FAILED) { /* it overflows: nothing else may have changed */
         PROPERTY(status == fmi2Error, "a failed step returns %d", (int)status);
-        s->at.mode = ((fmu *)(void *)instances_before[s - slots])->now.mode = FAILED;
+        s->at.mode = before(s)->now.mode = FAILED;
     }
     if (after_call(s, CALL_fmi2DoStep, wanted, status, true)) {
         s->at.time = end;
-        check_step(s->f, &start);
+        check_step(before(s), s->f, h);
+        PROPERTY(s->f->now.time == end, "a step to t = %a ends at %a", end, s->f->now.time);
     }
 }
 

@@ -3,22 +3,6 @@
 
 #include "world.h"
 
-enum { N_AXES = 3 };
-
-/* The axes with the forces of the moment, the state, and the step that is asked for. */
-typedef struct {
-    riccati axis[N_AXES];
-    rov_state state;
-    double h, end;
-} start_of_step;
-
-static start_of_step start_of(const fmu *f, double h, double end)
-{
-    const rov_variables *const v = &f->now.values.named;
-    const rov_gains now = rov_axes(&v->coefficients, &f->gains, &v->inputs);
-    return (start_of_step){{now.surge, now.heave, now.yaw}, v->state, h, end};
-}
-
 /* Where drag balances the force. */
 static double equilibrium(const riccati *axis)
 {
@@ -26,24 +10,19 @@ static double equilibrium(const riccati *axis)
     return axis->C == 0.0 ? 0.0 : 2.0 * axis->C / (axis->B + root);
 }
 
-/* Each velocity has gone from where it was towards its equilibrium and not beyond; without force, to the last bit. */
-static void check_velocities(const start_of_step *start, const rov_state *after)
+/* A velocity has gone from where it was towards its equilibrium and not beyond; without force, to the last bit. */
+static void check_velocity(const char *name, const riccati *axis, double v0, double v)
 {
-    const double from[N_AXES] = {start->state.u, start->state.w, start->state.r};
-    const double to[N_AXES] = {after->u, after->w, after->r};
-    for (int i = 0; i < N_AXES; i++) {
-        const riccati *const axis = &start->axis[i];
-        const double v0 = from[i], v = to[i], limit = equilibrium(axis);
-        PROPERTY(isfinite(v), "axis %d moves at %g", i, v);
-        if (axis->C == 0.0) {
-            PROPERTY(fabs(v) <= fabs(v0) && v * v0 >= 0.0, "axis %d without force: from %a to %a", i, v0, v);
-            PROPERTY(v == v0 || axis->A > 0.0 || axis->B > 0.0, "axis %d without drag: from %a to %a", i, v0, v);
-        }
-        if (isfinite(limit)) {
-            const double rounding = 8.0 * DBL_EPSILON * fmax(fabs(v0), fabs(limit)) + DBL_MIN;
-            PROPERTY(v >= fmin(v0, limit) - rounding && v <= fmax(v0, limit) + rounding,
-                     "axis %d: from %a to %a, beyond its equilibrium %a", i, v0, v, limit);
-        }
+    const double limit = equilibrium(axis);
+    PROPERTY(isfinite(v), "%s is %g", name, v);
+    if (axis->C == 0.0) {
+        PROPERTY(fabs(v) <= fabs(v0) && v * v0 >= 0.0, "%s without force: from %a to %a", name, v0, v);
+        PROPERTY(v == v0 || axis->A > 0.0 || axis->B > 0.0, "%s without drag: from %a to %a", name, v0, v);
+    }
+    if (isfinite(limit)) {
+        const double rounding = 8.0 * DBL_EPSILON * fmax(fabs(v0), fabs(limit)) + DBL_MIN;
+        PROPERTY(v >= fmin(v0, limit) - rounding && v <= fmax(v0, limit) + rounding,
+                 "%s: from %a to %a, beyond its equilibrium %a", name, v0, v, limit);
     }
 }
 
@@ -63,10 +42,9 @@ static void check_way(const char *name, double v0, double v, double h, double fr
 }
 
 /* A turn does not make the way longer. */
-static void check_track(const start_of_step *start, const rov_inputs *in, const rov_state *to)
+static void check_track(const rov_inputs *in, const rov_state *from, const rov_state *to, double h)
 {
-    const rov_state *const from = &start->state;
-    const double h = start->h, fastest = fmax(fabs(from->u), fabs(to->u));
+    const double fastest = fmax(fabs(from->u), fabs(to->u));
     const double north = in->V_N * h, east = in->V_E * h;
     const double way = hypot(to->x - from->x - north, to->y - from->y - east);
     const double rounding = rounding_of_way(fastest, h, hypot(from->x, from->y), hypot(to->x, to->y))
@@ -74,15 +52,17 @@ static void check_track(const start_of_step *start, const rov_inputs *in, const 
     PROPERTY(!isfinite(rounding) || way <= fastest * h + rounding, "%a at no more than %a for %a", way, fastest, h);
 }
 
-static void check_step(const fmu *f, const start_of_step *start)
+static void check_step(const fmu *start, const fmu *end, double h)
 {
-    const rov_variables *const now = &f->now.values.named;
-    const rov_state *const from = &start->state, *const to = &now->state;
-    check_velocities(start, to);
-    check_way("z", from->w, to->w, start->h, from->z, to->z);
-    check_way("psi", from->r, to->r, start->h, from->psi, to->psi);
-    check_track(start, &now->inputs, to);
-    PROPERTY(f->now.time == start->end, "a step to t = %a ends at %a", start->end, f->now.time);
+    const rov_variables *const v = &start->now.values.named;
+    const rov_gains forced = rov_axes(&v->coefficients, &start->gains, &v->inputs);
+    const rov_state *const from = &v->state, *const to = &end->now.values.named.state;
+    check_velocity("u", &forced.surge, from->u, to->u);
+    check_velocity("w", &forced.heave, from->w, to->w);
+    check_velocity("r", &forced.yaw, from->r, to->r);
+    check_way("z", from->w, to->w, h, from->z, to->z);
+    check_way("psi", from->r, to->r, h, from->psi, to->psi);
+    check_track(&v->inputs, from, to, h);
 }
 
 /* The gains and the mode are the expected ones; states and thrust can be read and are finite. */

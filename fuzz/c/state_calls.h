@@ -101,12 +101,6 @@ static void damage(void)
     }
 }
 
-/* What an instance is in after a state that was accepted. */
-static expected found(const fmu_state *s)
-{
-    return (expected){s->type, s->mode, s->experiment_defined, s->stop_defined, s->time, s->stop};
-}
-
 static void call_fmi2DeSerializeFMUstate(slot *s)
 {
     const buffer *const from = &buffers[take_byte() % N_BUFFERS];
@@ -122,7 +116,7 @@ static void call_fmi2DeSerializeFMUstate(slot *s)
         return;
     }
     const fmu_state *const state = &((saved_state *)to->state)->state;
-    to->at = from->forged ? found(state) : from->at;
+    to->at = from->forged ? *state : from->at;
     const int modes = state->type == fmi2ModelExchange ? EVERYWHERE & ~(STEP | FAILED) : EVERYWHERE & ~(EVENT | CONTINUOUS);
     const int mode = (int)state->mode;
     PROPERTY((modes & mode) != 0 && (mode & (mode - 1)) == 0, "a state in mode %d", mode);

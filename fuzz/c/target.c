@@ -13,7 +13,7 @@ static void set_out(void)
         slot *const s = &slots[i];
         instantiate(s, "rov", i % 2, MODEL_GUID, true, true, i < 2);
         fmi2SetupExperiment(s->f, fmi2False, 0.0, 0.0, fmi2False, 0.0);
-        s->at.set_up = true;
+        s->at.experiment_defined = true;
         call_fmi2EnterInitializationMode(s);
         call_fmi2ExitInitializationMode(s);
         if (s->at.type == fmi2ModelExchange) {

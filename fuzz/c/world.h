@@ -20,13 +20,8 @@ static void *calloc_or_not(size_t count, size_t size)
 
 enum { N_SLOTS = 4, N_SAVED = 3, N_BUFFERS = 3 };
 
-/* What an instance is in after the calls so far, by the standard. */
-typedef struct {
-    fmi2Type type;
-    lifecycle mode;
-    bool set_up, stop_defined;
-    double time, stop;
-} expected;
+/* What an instance is in after the calls so far, by the standard; its values are not followed. */
+typedef fmu_state expected;
 
 typedef struct {
     fmu *f;
@@ -168,6 +163,11 @@ static void copy_instance(unsigned char *to, const fmu *from)
     memset(&((fmu *)(void *)to)->now.values.at[FIRST_CALCULATED], 0, sizeof(rov_state) + sizeof(rov_thrust));
 }
 
+static fmu *before(const slot *s)
+{
+    return (fmu *)(void *)instances_before[s - slots];
+}
+
 /* `speaks`: it may have warned of what is warned of once. */
 static bool is_same(const slot *s, bool speaks)
 {
@@ -176,11 +176,10 @@ static bool is_same(const slot *s, bool speaks)
     }
     _Alignas(fmu) unsigned char now[sizeof(fmu)];
     copy_instance(now, s->f);
-    fmu *const before = (fmu *)(void *)instances_before[s - slots];
     if (speaks) {
-        memcpy(before->warned, s->f->warned, sizeof before->warned);
+        memcpy(before(s)->warned, s->f->warned, sizeof s->f->warned);
     }
-    return memcmp(now, before, sizeof now) == 0;
+    return memcmp(now, before(s), sizeof now) == 0;
 }
 
 static void before_call(void)
