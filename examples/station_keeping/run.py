@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.pages.svg import LIGHT, svg_file
@@ -81,7 +80,7 @@ def draw(results: Mapping[str, Trajectory], path: Path) -> None:
     """Depth, heading, track and commands, to an SVG file."""
 
     def drawn(figure: Figure) -> None:
-        depth, heading, track, commands = axes = list(figure.subplots(2, 2).flat)
+        depth, heading, track, commands = figure.subplots(2, 2).flat
         blue = {"color": LIGHT["blue"]}
         t = TIME[::6]
         for parameters, result in results.items():
@@ -101,11 +100,12 @@ def draw(results: Mapping[str, Trajectory], path: Path) -> None:
         heading.set_yticks(np.arange(0.0, degrees(pi / 2) + 1.0, 15.0))
         track.plot(0.0, 0.0, "o", markersize=4.5, **blue)
         track.set_aspect("equal", adjustable="datalim")
-        time = "time (s)"
-        titles = (("Depth", time, "z (m)"), ("Heading", time, "ψ (deg)"), ("Track", "east y (m)", "north x (m)"),
-                  ("Commands", time, "%"))  # fmt: skip
-        ax: Axes
-        for ax, (title, x, y) in zip(axes, titles, strict=True):
+        for ax, title, x, y in (
+            (depth, "Depth", "time (s)", "z (m)"),
+            (heading, "Heading", "time (s)", "ψ (deg)"),
+            (track, "Track", "east y (m)", "north x (m)"),
+            (commands, "Commands", "time (s)", "%"),
+        ):
             ax.set_title(title, loc="left")
             ax.set(xlabel=x, ylabel=y)
             ax.legend()
