@@ -9,7 +9,7 @@ import click
 import fmpy
 from rich.console import Console
 
-from checks.fmi2 import fmpy_slave
+from checks.fmpy_slave import fmpy_slave
 from rov_fmu.build import build
 from rov_fmu.export.compile import BuildError, host_platform
 from rov_fmu.files.output import Output, check_targets, write_whole

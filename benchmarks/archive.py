@@ -11,7 +11,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
-from checks.fmi2 import fmpy_slave
+from checks.fmpy_slave import fmpy_slave
 
 _CACHES = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR")
 

@@ -11,7 +11,7 @@ import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
-from checks.fmi2 import fmpy_slave, keep_loaded
+from checks.fmpy_slave import fmpy_slave, keep_loaded
 from rov_fmu.motion.rov import Inputs
 
 from .plain_c import Reals

@@ -6,10 +6,10 @@ import fmpy
 import pytest
 from hypothesis import settings
 
-from checks.fmi2 import Fmu
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.fmi2 import Fmu
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ROOT
+from tests.commands import ROOT
 
 # From the top down. A part imports from itself and from parts below it; files/ and motion/ stand side by side.
 PARTS = ("cli", "build", "pages", "export", "identify", "vehicle", "process", "files")

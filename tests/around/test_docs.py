@@ -16,12 +16,12 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ROOT
 from rov_fmu import __version__
 from rov_fmu.cli import main
 from rov_fmu.motion.rov import COEFFICIENTS, Inputs, State, Thrust, declared, step
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import ROOT
 
 README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
 PAGES = [

@@ -1,9 +1,9 @@
-"""Single changes to operators and constants that the tests must notice. All of them: python -m checks.mutants."""
+"""Single changes to operators and constants that the tests must notice. All of them: python -m tests.mutants."""
 
 import pytest
 
-from checks import mutants
-from checks.commands import ROOT
+from tests import mutants
+from tests.commands import ROOT
 
 
 def test_every_file_has_tests_that_hold_it() -> None:

@@ -12,7 +12,7 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
 
-from checks.fmi2 import keep_loaded
+from checks.fmpy_slave import keep_loaded
 from examples.station_keeping import run
 from examples.station_keeping.autopilot import Thruster
 from examples.station_keeping.engines import ENGINES, NAMES, Trajectory, plain

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ALONE, COMMANDS, TESTS, start
 from rov_fmu.cli import main
 from rov_fmu.export.archive import native_content
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import ALONE, COMMANDS, TESTS, start
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
 OLD = b"the old one"

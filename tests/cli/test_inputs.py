@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import TESTS, Command, run_elsewhere
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from tests.cli.test_targets import bound_by_permissions
+from tests.commands import TESTS, Command, run_elsewhere
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="permissions are POSIX")
 

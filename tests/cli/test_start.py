@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ROOT, TESTS, start
 from rov_fmu.build import build
 from rov_fmu.cli import main
 from rov_fmu.export.compile import PLATFORMS
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import ROOT, TESTS, start
 
 _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
 _posix = pytest.mark.skipif(os.name != "posix", reason="terminals and signals are POSIX")

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import COMMANDS, REFIT, TESTS, Command, run_elsewhere
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import COMMANDS, REFIT, TESTS, Command, run_elsewhere
 
 Capsys = pytest.CaptureFixture[str]
 OLD = b"the old one"

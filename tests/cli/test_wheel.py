@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ROOT
 from rov_fmu import __version__
 from rov_fmu.vehicle.shipped import SHIPPED
+from tests.commands import ROOT
 
 CONSTRAINTS = ROOT / "constraints.txt"
 _PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")

@@ -8,11 +8,11 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from checks.commands import ALONE
 from rov_fmu.cli import main
 from rov_fmu.export import compile as fmu_compile
 from rov_fmu.export.interface import UNITS, variables
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import ALONE
 
 
 def _build(output: Path, *arguments: str) -> int:

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ROOT
 from rov_fmu.cli import main
 from rov_fmu.export import compile as fmu_compile
+from tests.commands import ROOT
 
 _SCRIPT = str(ROOT / "build_fmu.py")
 _OLD = b"the old one"

@@ -18,10 +18,10 @@ from pathlib import Path
 import lief
 import pytest
 
-from checks.fmi2 import OK, Fmu, reals
 from rov_fmu.export.archive import native_content
 from rov_fmu.export.compile import compiler, fmi_headers
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.fmi2 import OK, Fmu, reals
 
 _EXPORT = "#if defined _WIN32"  # begins the definition of FMI2_Export in FMPy's header
 _NAME = "#define fmi2FullName(name) name"

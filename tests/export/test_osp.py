@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from checks.commands import ALONE
 from rov_fmu.cli import main
 from rov_fmu.export.interface import UNITS, Variable, variables
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import ALONE
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
 

@@ -10,10 +10,11 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
-from checks.fmi2 import WARNING, Message, fmpy_slave, keep_loaded
+from checks.fmpy_slave import fmpy_slave, keep_loaded
 from rov_fmu.cli import main
 from rov_fmu.export.interface import Variable, variables
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.fmi2 import WARNING, Message, recording_callbacks
 
 
 @pytest.fixture(scope="session")
@@ -145,7 +146,7 @@ def test_both_flavours_end_at_the_same_stop_time(
 def test_both_flavours_warn_once_of_what_saturates_and_of_a_jump_in_time(python_dir: Path, videoray_dir: Path) -> None:
     for folder in (python_dir, videoray_dir):
         log: list[Message] = []
-        slave = fmpy_slave(folder, log)
+        slave = fmpy_slave(folder, recording_callbacks(log))
         slave.setupExperiment(startTime=1.0)
         slave.enterInitializationMode()
         slave.exitInitializationMode()

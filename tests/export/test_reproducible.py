@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ROOT
 from tests.cli.test_wheel import CONSTRAINTS, built, environment, interpreter
+from tests.commands import ROOT
 
 _BUILDS = {"native": ("--platform", "linux64", "--platform", "win64"), "pythonfmu": ("--backend", "pythonfmu")}
 _OTHERS = [f"3.{minor}" for minor in range(10, 15) if minor != sys.version_info.minor]

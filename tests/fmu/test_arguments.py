@@ -8,7 +8,10 @@ from typing import Any
 import pytest
 from fmpy.fmi2 import fmi2CallbackFunctions
 
-from checks.fmi2 import (
+from rov_fmu.export.interface import variables
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.fmi2 import (
     CO_SIMULATION,
     CONTINUOUS,
     DISCARD,
@@ -28,9 +31,6 @@ from checks.fmi2 import (
     references,
     strings,
 )
-from rov_fmu.export.interface import variables
-from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
 
 CS, ME = CO_SIMULATION, MODEL_EXCHANGE
 _VR = {v.name: v.value_reference for v in variables(load_vehicle(VIDEORAY).coefficients)}

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from checks.fmi2 import (
+from tests.fmi2 import (
     CO_SIMULATION,
     EVERY_MODE,
     INITIALIZATION,

@@ -8,7 +8,7 @@ import pytest
 from fmpy.fmi2 import fmi2EventInfo
 
 from checks import legal
-from checks.fmi2 import (
+from tests.fmi2 import (
     CO_SIMULATION,
     CONTINUOUS,
     DISCARD,

@@ -10,7 +10,7 @@ import pytest
 from fmpy.fmi2 import fmi2EventInfo
 from numpy.typing import NDArray
 
-from checks.fmi2 import CONTINUOUS, DISCARD, EVENT, MODEL_EXCHANGE, OK, Fmu, integers, reals
+from tests.fmi2 import CONTINUOUS, DISCARD, EVENT, MODEL_EXCHANGE, OK, Fmu, integers, reals
 
 # Straight and turning, ahead and astern, commands beyond full, loads and a current; held from one time to the next.
 START = {"u": -0.5, "w": 0.2, "r": 1.5, "psi": 2.0}

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from checks.fmi2 import (
+from tests.fmi2 import (
     CO_SIMULATION,
     CONTINUOUS,
     ERROR,
@@ -101,7 +101,7 @@ def test_a_state_goes_on_in_another_process(fmu: Fmu, whole: bytes, midway: byte
     saved = tmp_path / "state"
     saved.write_bytes(midway)
     script = (
-        "import sys; from pathlib import Path; from checks.fmi2 import Fmu; from tests.fmu.test_state import run\n"
+        "import sys; from pathlib import Path; from tests.fmi2 import Fmu; from tests.fmu.test_state import run\n"
         "with Fmu(Path(sys.argv[1])).instance(name='elsewhere') as rov:\n"
         "    assert rov.load(Path(sys.argv[2]).read_bytes()) == 0, rov.log\n"
         "    sys.stdout.write(run(rov, 10, 20).hex())\n"

@@ -7,7 +7,7 @@ from math import inf, nan
 
 import pytest
 
-from checks.fmi2 import CO_SIMULATION, ERROR, INSTANTIATED, OK, Fmu, Instance
+from tests.fmi2 import CO_SIMULATION, ERROR, INSTANTIATED, OK, Fmu, Instance
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from math import inf, nan, nextafter
 
 import pytest
 
-from checks.fmi2 import (
+from tests.fmi2 import (
     CO_SIMULATION,
     CONTINUOUS,
     DISCARD,

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from checks.commands import TESTS
-from checks.recordings import clean
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.identify.step_responses import correlation_time, steps, velocity
 from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.rov import HEAVE
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import TESTS
+from tests.recordings import clean
 
 
 @pytest.mark.parametrize("samples", [19, 20])

@@ -10,8 +10,16 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from checks.commands import TESTS
-from checks.damage import (
+from rov_fmu.cli import main
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.identify.tuning import read_points
+from rov_fmu.motion.rov import AXES, HEAVE
+from rov_fmu.vehicle.published import load_tables
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+from tests.commands import TESTS
+from tests.damage import (
     CELLS,
     NUMBERS,
     changed_bytes,
@@ -21,15 +29,7 @@ from checks.damage import (
     changed_toml,
     fuzz,
 )
-from checks.recordings import clean, write_log
-from rov_fmu.cli import main
-from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.identify.tank_tests import load_tank_tests
-from rov_fmu.identify.tuning import read_points
-from rov_fmu.motion.rov import AXES, HEAVE
-from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+from tests.recordings import clean, write_log
 
 Capsys = pytest.CaptureFixture[str]
 LOG = "log_heave_a.csv"

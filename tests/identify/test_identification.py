@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from checks.commands import TESTS
-from checks.recordings import AXES, PLANS, clean, write_log
 from rov_fmu.cli import main
 from rov_fmu.identify.identification import AxisResult, Identification, compare
 from rov_fmu.identify.identify import identify
@@ -23,6 +21,8 @@ from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW, Axis, Coefficien
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import TESTS
+from tests.recordings import AXES, PLANS, clean, write_log
 
 REAR = ("a_t_rear", "b_t_rear")
 COMMANDS = np.arange(0.1, 1.01, 0.1)

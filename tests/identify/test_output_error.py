@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from checks.recordings import AXES, NOISE, PLANS, clean
 from rov_fmu.identify.least_squares import Array, Estimate
 from rov_fmu.identify.output_error import RecordingsFit, fit_recordings
 from rov_fmu.identify.quadratic_fit import fit_quadratic
@@ -18,6 +17,7 @@ from rov_fmu.identify.trajectory import trajectory
 from rov_fmu.motion.riccati import Riccati
 from rov_fmu.motion.rov import HEAVE, SURGE, YAW, Axis, Coefficients
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.recordings import AXES, NOISE, PLANS, clean
 
 COMMANDS = np.linspace(0.2, 0.7, 11)
 Disturb = Callable[[Recording, np.random.Generator], Recording]

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import REFIT, TESTS
 from rov_fmu.cli import main
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.identify import identify
@@ -14,6 +13,7 @@ from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.rov import COEFFICIENTS
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import REFIT, TESTS
 
 # RMS relative error on the measured values: the refit, a fit without the thrust itself, the paper's scaled model.
 RMS = {

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from checks.recordings import PLANS, clean
 from rov_fmu.identify.output_error import Loss, RecordingsFit, fit_recordings
 from rov_fmu.motion.rov import HEAVE, Coefficients
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.recordings import PLANS, clean
 
 
 def _fit(k: Coefficients, size: float, loss: Loss = "huber") -> RecordingsFit:

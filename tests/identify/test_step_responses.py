@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from checks.recordings import AXES, PLANS, clean
 from rov_fmu.identify.step_responses import Method, StepResponse, correlation_time, steps, velocity, without_spikes
 from rov_fmu.identify.tank_tests import Recording
 from rov_fmu.motion.rov import HEAVE, SURGE, YAW, Axis
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.recordings import AXES, PLANS, clean
 
 
 def record(vehicle: Vehicle, axis: Axis, *plan: tuple[float, float], seed: int = 0, **options: float) -> Recording:

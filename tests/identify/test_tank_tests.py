@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from checks.commands import TESTS
 from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.identify.tank_tests import Row, TankTests, load_tank_tests
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from tests.commands import TESTS
 
 
 @pytest.fixture

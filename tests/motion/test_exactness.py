@@ -15,12 +15,12 @@ from mpmath import mp
 from scipy.integrate import solve_ivp
 
 from checks import reference
-from checks.fmi2 import ERROR, OK, Fmu
-from checks.motions import path_of
 from rov_fmu.motion import rov
 from rov_fmu.motion.riccati import Riccati
 from rov_fmu.motion.rov import Coefficients, Inputs, State
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.fmi2 import ERROR, OK, Fmu
+from tests.motions import path_of
 
 Case = tuple[Coefficients, Inputs, State, float]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from checks.fmi2 import ERROR, OK, Fmu
 from rov_fmu.motion.rov import State
+from tests.fmi2 import ERROR, OK, Fmu
 
 _DRAG = [("a_d_u", "b_d_u"), ("a_d_r", "b_d_r")]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from checks.c_programs import compile_c, run_program
-from checks.fmi2 import Fmu
+from tests.fmi2 import Fmu
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is counted by glibc and /proc")
 

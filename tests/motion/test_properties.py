@@ -9,7 +9,8 @@ from hypothesis import assume
 from hypothesis import strategies as st
 from mpmath import mp
 
-from checks.motions import (
+from rov_fmu.motion.riccati import advance, steady_velocity, time_constant, time_to_rest
+from tests.motions import (
     BOUNDARIES,
     CASES,
     OFFSET,
@@ -25,7 +26,6 @@ from checks.motions import (
     signed,
     similar,
 )
-from rov_fmu.motion.riccati import advance, steady_velocity, time_constant, time_to_rest
 
 
 def for_every(

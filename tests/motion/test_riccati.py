@@ -8,9 +8,9 @@ import pytest
 from mpmath import mp
 from scipy.optimize import brentq
 
-from checks.motions import DISTANCE, SMALLEST, TINY, VELOCITY, Case
 from checks.reference import axis
 from rov_fmu.motion.riccati import advance, steady_velocity, time_constant, time_to_rest
+from tests.motions import DISTANCE, SMALLEST, TINY, VELOCITY, Case
 
 
 def check(case: Case) -> None:

@@ -8,13 +8,13 @@ from math import cos, hypot, sin, ulp
 import pytest
 from hypothesis import strategies as st
 
-from checks.fmi2 import Fmu
-from checks.motions import DISTANCE, TINY, VELOCITY, hold, memory, path_of, power, signed, size
 from rov_fmu.motion import rov
 from rov_fmu.motion.rov import Coefficients, Inputs, State
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.fmi2 import Fmu
 from tests.motion.test_exactness import Case, run
+from tests.motions import DISTANCE, TINY, VELOCITY, hold, memory, path_of, power, signed, size
 
 Step = Callable[[Coefficients, Inputs, State, float], State]
 

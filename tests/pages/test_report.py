@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 from lxml import html
 
-from checks.commands import ROOT, TESTS
-from checks.recordings import PLANS, clean, write_log
 from rov_fmu.cli import main
 from rov_fmu.files.output import write_whole
 from rov_fmu.identify.identification import Identification, compare
@@ -23,8 +21,10 @@ from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW
 from rov_fmu.pages.report import report_output, report_page
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import ROOT, TESTS
 from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
 from tests.pages.test_fmu_page import check_refers_to_itself_alone
+from tests.recordings import PLANS, clean, write_log
 
 PAGES = ["of_tables", "of_recordings"]
 

@@ -9,8 +9,6 @@ import pytest
 from fmpy.model_description import ModelDescription, read_model_description
 from hypothesis import strategies as st
 
-from checks.commands import REFIT
-from checks.damage import changed_bytes, changed_lines, changed_toml, fuzz
 from rov_fmu.cli import main
 from rov_fmu.export.archive import archive, native_content
 from rov_fmu.export.interface import variables
@@ -20,6 +18,8 @@ from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, Inputs, State, step
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned
+from tests.commands import REFIT
+from tests.damage import changed_bytes, changed_lines, changed_toml, fuzz
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 SOURCES = [VIDEORAY.read_bytes(), REFIT.read_bytes()]

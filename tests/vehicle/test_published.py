@@ -17,12 +17,12 @@ import fmpy
 import pytest
 from scipy.optimize import brentq
 
-from checks.commands import ALONE
 from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.vehicle.published import STEP_TESTS, Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import ALONE
 
 DATA = VIDEORAY.parent / "tables"
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ALONE
 from rov_fmu.cli import main
 from rov_fmu.motion.rov import COEFFICIENTS, Coefficients
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from tests.commands import ALONE
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from checks.commands import ALONE, REFIT, TESTS
 from rov_fmu.cli import main
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_vehicle
+from tests.commands import ALONE, REFIT, TESTS
 
 TEXT = REFIT.read_text(encoding="utf-8")
 HASH = "0123456789abcdef" * 4

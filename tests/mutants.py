@@ -1,6 +1,6 @@
 """Mutants: the package and the FMU's C with one operator or constant changed, which the tests must notice.
 
-    python -m checks.mutants [--sample 40] [--seed 1] [--jobs 2] [file or folder ...]
+    python -m tests.mutants [--sample 40] [--seed 1] [--jobs 2] [file or folder ...]
 
 One small mutator for both languages: mutmut and cosmic-ray know Python alone, choose no tests by module and draw no
 sample, which is most of what stands here.
@@ -27,7 +27,7 @@ from queue import SimpleQueue
 
 import tomlkit
 
-from checks.commands import ROOT
+from tests.commands import ROOT
 
 _LONGEST = 300.0  # s; a mutant that does not end is found
 PLACES = ("rov_fmu", "fmu_src/c")
@@ -237,7 +237,7 @@ def run(mutants: Sequence[Mutant], jobs: int) -> Iterator[tuple[Mutant, str]]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a sample; 0 where at least 90 % of the mutants that are not known as equivalent are killed."""
-    parser = argparse.ArgumentParser(prog="python -m checks.mutants")
+    parser = argparse.ArgumentParser(prog="python -m tests.mutants")
     parser.add_argument("places", nargs="*", default=PLACES, help="files and folders to change")
     parser.add_argument("--sample", type=int, default=sys.maxsize, help="so many, drawn at random (default: all)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample")

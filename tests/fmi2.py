@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 import fmpy
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2EventInfo
+from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2EventInfo
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 MODEL_EXCHANGE, CO_SIMULATION = range(2)
@@ -279,22 +279,3 @@ class Instance:
         status = self.call("fmi2SetFMUstate", state)
         self.expect("fmi2FreeFMUstate", ctypes.byref(state))
         return status
-
-
-def fmpy_slave(folder: Path, log: list[Message] | None = None) -> FMU2Slave:
-    """An instance of an unzipped FMU for Co-Simulation, as FMPy drives it, all logged where a log is given."""
-    description = fmpy.read_model_description(str(folder))
-    slave = FMU2Slave(
-        guid=description.guid,
-        unzipDirectory=str(folder),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="rov",
-    )
-    slave.instantiate(callbacks=None if log is None else recording_callbacks(log), loggingOn=log is not None)
-    return slave
-
-
-def keep_loaded(folder: Path) -> None:
-    """Hold the library of a PythonFMU FMU: to unload it and load it again may crash the interpreter it shares."""
-    for library in (folder / "binaries" / fmpy.platform).iterdir():
-        ctypes.CDLL(str(library))
