@@ -52,7 +52,7 @@ def build(
     written.
     """
     native = backend == "native"
-    output = output or default_output(vehicle, backend)
+    output = Path(output or default_output(vehicle, backend))
     beside = []
     if osp:
         description = osp_model_description(variables(vehicle.coefficients))
@@ -86,6 +86,8 @@ def chosen_platforms(names: Sequence[str] | None) -> list[str]:
     """Platforms by name, `host` resolved; all where none is named. Raises BuildError."""
     if not names:
         return list(PLATFORMS)
+    if unknown := set(names) - {"host", *PLATFORMS}:
+        raise BuildError(f"there is no platform {', '.join(sorted(unknown))}, only host, {', '.join(PLATFORMS)}")
     host = host_platform()
     if "host" in names and host is None:
         raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")

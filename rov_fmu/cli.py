@@ -46,7 +46,7 @@ class _Parsed(click.Command):
 
 def _vehicles(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
     names = [CompletionItem(name) for name in SHIPPED if name.startswith(incomplete)]
-    return [*names, CompletionItem(incomplete, type="file")]
+    return [CompletionItem(incomplete, type="file"), *names]  # bash forgets what comes before "file"
 
 
 _vehicle = partial(
@@ -202,7 +202,7 @@ def _tables(vehicle: Path) -> None:
 @_commands.command("figures")
 @click.argument("folder", type=_FILE)
 def _figures(folder: Path) -> None:
-    """Redraw the paper's figures into FOLDER, as far as it prints their data."""
+    """Redraw the paper's figures, as far as it prints their data, into FOLDER, which is there already."""
     from rov_fmu.pages.paper_figures import write_figures
 
     print(*write_figures(folder), sep="\n")

@@ -139,7 +139,14 @@ def load_tank_tests(folder: Path) -> TankTests:
 
 # ---- rov.toml --------------------------------------------------------------------------------------------------------
 
-_Window = Annotated[tuple[Finite, Finite], BeforeValidator(pair)]
+
+def _window(window: tuple[float, float]) -> tuple[float, float]:
+    if not -1.0 <= window[0] < window[1] <= 1.0:
+        raise ValueError("must be [low, high] within -1 ... 1, fractions of full thrust: 20 % is 0.2")
+    return window
+
+
+_Window = Annotated[tuple[Finite, Finite], BeforeValidator(pair), AfterValidator(_window)]
 _known: dict[str, Any] = {name: (q, ...) if name in _REQUIRED else (q | None, None) for name, q in QUANTITIES.items()}
 _AnyKnown = create_model("_AnyKnown", __base__=Strict, **_known)
 

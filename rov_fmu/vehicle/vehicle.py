@@ -87,7 +87,7 @@ class Vehicle:
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
-    checked = read_checked(path, _File, VehicleFileError, coming=coming)
+    checked = read_checked(Path(path), _File, VehicleFileError, coming=coming)
     head = checked.vehicle
     quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
     return Vehicle(
@@ -139,7 +139,7 @@ def _quantity(name: str, meta: Meta) -> Any:
 
     def within(value: float) -> float:
         if not meta.minimum <= value <= meta.maximum:
-            raise ValueError(f"must be within {meta.minimum:g} ... {meta.maximum:g} {meta.unit}")
+            raise ValueError(f"must be within {meta.minimum:g} ... {meta.maximum:.12g} {meta.unit}")
         return value
 
     fields: dict[str, Any] = {

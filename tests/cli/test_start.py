@@ -90,8 +90,8 @@ def _completed(*words: str, shell: str = "bash") -> list[str]:
 
 def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
     assert _completed("") == [f"plain,{name}" for name in ("build", "figures", "identify", "tables", "tune")]
-    assert _completed("build", "video") == [*(f"plain,{name}" for name in SHIPPED), "file,video"]
-    assert _completed("tables", "videoray_") == ["plain,videoray_refit", "file,videoray_"]
+    assert _completed("build", "video") == ["file,video", *(f"plain,{name}" for name in SHIPPED)]
+    assert _completed("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
     assert _completed("tune", "./my") == ["file,./my"]
     assert _completed("build", "--platform", "") == [f"plain,{name}" for name in ("host", *PLATFORMS)]
     assert _completed("build", "--backend", "p") == ["plain,pythonfmu"]

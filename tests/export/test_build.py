@@ -8,6 +8,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 
+from rov_fmu.build import build
 from rov_fmu.cli import main
 from rov_fmu.export import compile as fmu_compile
 from rov_fmu.export.interface import UNITS, variables
@@ -106,3 +107,9 @@ def test_the_command_line_says_what_it_built(tmp_path: Path, capsys: pytest.Capt
     assert str(fmu_compile.host_platform()) in told
     assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in told
     assert "built in" in told
+
+
+def test_a_program_is_told_of_a_platform_that_does_not_exist(vehicle: Vehicle, tmp_path: Path) -> None:
+    with pytest.raises(fmu_compile.BuildError, match="there is no platform linux, only host, linux64"):
+        build(vehicle, tmp_path / "rov.fmu", platforms=["linux"])
+    assert list(tmp_path.iterdir()) == []

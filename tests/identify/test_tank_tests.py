@@ -224,6 +224,8 @@ BAD_ROV: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "unknown window": (edit("heave = [0.2, 0.7]", "sway = [0.2, 0.7]"), ("windows.sway", "no such key")),
     "window of three": (edit("[0.2, 0.7]", "[0.2, 0.5, 0.7]"), ("windows.heave", "2")),
     "identifier": (edit('"videoray_refit"', '"video ray"'), ("vehicle.identifier", "'video ray'")),
+    "window in percent": (edit("[0.2, 0.7]", "[20, 70]"), ("windows.heave", "0.2")),
+    "window upside down": (edit("[0.2, 0.7]", "[0.7, 0.2]"), ("windows.heave", "[low, high]")),
     "not TOML": (edit("[windows]", "[windows"), ("not TOML",)),
     "nothing to set beside": (
         edit('against = "videoray"', 'against = "nowhere.toml"'),
