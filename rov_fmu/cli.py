@@ -100,8 +100,11 @@ def _progress(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
     from rov_fmu.pages.console import console
 
     out = console()
+    if not out.is_terminal:
+        yield lambda _: None
+        return
     columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
-    with Progress(*columns, console=out, transient=True, disable=not out.is_terminal) as progress:
+    with Progress(*columns, console=out, transient=True) as progress:
         tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
         yield lambda name: progress.update(tasks[name], completed=1)
 
