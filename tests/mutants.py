@@ -236,12 +236,13 @@ def run(mutants: Sequence[Mutant], jobs: int) -> Iterator[tuple[Mutant, str]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a sample; 0 where at least 90 % of the mutants that are not known as equivalent are killed."""
+    """Run a sample; 0 where enough of the mutants that are not known as equivalent are killed."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants")
     parser.add_argument("places", nargs="*", default=PLACES, help="files and folders to change")
     parser.add_argument("--sample", type=int, default=sys.maxsize, help="so many, drawn at random (default: all)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="side by side")
+    parser.add_argument("--least", type=float, default=0.9, help="share that must be killed (default: 0.9)")
     asked = parser.parse_args(arguments)
     every, known, counts = sites(asked.places), equivalents(), Counter[tuple[str, str]]()
     drawn = [make() for make in random.Random(asked.seed).sample(every, min(asked.sample, len(every)))]
@@ -251,7 +252,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for place in sorted({place for place, _ in counts}):
         print(f"{place}: {counts[place, 'killed']} killed, {counts[place, 'survived']} survived")
     killed, survived = (sum(n for (_, end), n in counts.items() if end == ended) for ended in ("killed", "survived"))
-    return int(killed < 9 * survived)
+    return int(killed < asked.least * (killed + survived))
 
 
 if __name__ == "__main__":

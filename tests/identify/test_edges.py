@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.identify.identify import identify
 from rov_fmu.identify.step_responses import correlation_time, steps, velocity
 from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.rov import HEAVE
@@ -93,3 +94,14 @@ def test_velocity_is_smoothed_over_half_a_second() -> None:
     values = np.random.default_rng(0).standard_normal(300)
     half, default = velocity(time, values, is_position=False, window=0.5), velocity(time, values, is_position=False)
     assert (half[1] == default[1]).all()
+
+
+def test_tests_at_one_command_hold_a_twentieth_around_it(tmp_path: Path) -> None:
+    shutil.copytree(TESTS, tmp_path / "tests")
+    for path in (tmp_path / "tests").glob("*.csv"):
+        head, *rows = path.read_text(encoding="utf-8").splitlines()
+        path.write_text("\n".join([head, *(row for row in rows if row.startswith("30,"))]) + "\n", encoding="utf-8")
+        if path.name == "steady_heave_up.csv":
+            path.unlink()
+    low, high = identify(load_tank_tests(tmp_path / "tests")).vehicle.command_range
+    assert (low, high) == pytest.approx((0.25, 0.35))
