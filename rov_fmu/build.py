@@ -40,24 +40,26 @@ def build(
     platforms: Sequence[str] | None = None,
     backend: str = "native",
     osp: bool = False,
+    inputs: Sequence[Path] = (),
     on_compiled: Callable[[str], None] = lambda _: None,
 ) -> Built:
     """Build the FMU of a vehicle, validate it and run it; it is written whole or not at all.
 
     `output` is <identifier>.fmu in this folder by default, `platforms` all of PLATFORMS; `host` is this machine's. The
     backend `pythonfmu` makes the flavour in pure Python, for all platforms at once. `osp` also writes
-    <identifier>_OspModelDescription.xml beside it. `on_compiled` is told of every platform that is done.
+    <identifier>_OspModelDescription.xml beside it. `inputs` are files that it must not overwrite, besides those
+    that the vehicle names. `on_compiled` is told of every platform that is done.
 
     Raises BuildError; VehicleFileError where a file of the vehicle cannot be read; OSError about a path that cannot be
     written.
     """
     native = backend == "native"
-    output = Path(output or default_output(vehicle, backend))
+    output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}.fmu")
     beside = []
     if osp:
         description = osp_model_description(variables(vehicle.coefficients))
         beside = [Output(osp_path(output, vehicle.identifier), description)]
-    check_targets([output, *(other.path for other in beside)], vehicle.files)
+    check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
     chosen = chosen_platforms(platforms) if native else []
     content = (native_content if native else python_content)(vehicle, documentation(vehicle, native=native))
     start = perf_counter()
@@ -75,11 +77,6 @@ def build(
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
     return Built(output, len(packed), content.guid, sizes, seconds, notes[0], [other.path for other in beside])
-
-
-def default_output(vehicle: Vehicle, backend: str) -> Path:
-    """<identifier>.fmu in this folder, or <identifier>-python.fmu."""
-    return Path(f"{vehicle.identifier}{'' if backend == 'native' else '-python'}.fmu")
 
 
 def chosen_platforms(names: Sequence[str] | None) -> list[str]:

@@ -79,16 +79,14 @@ def _build(vehicle: Path, output: Path | None, backend: str, platforms: tuple[st
     """Build the FMU of a vehicle: the VideoRay Pro 4 by default."""
     if backend == "pythonfmu" and platforms:
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
-    from rov_fmu.build import build, chosen_platforms, default_output
-    from rov_fmu.export.osp import osp_path
+    from rov_fmu.build import build, chosen_platforms
     from rov_fmu.vehicle.vehicle import load_vehicle
 
     started = perf_counter()
     loaded = load_vehicle(vehicle)
-    output = output or default_output(loaded, backend)
-    check_targets([output, *([osp_path(output, loaded.identifier)] if osp else [])], [vehicle])
-    with _progress(chosen_platforms(platforms) if backend == "native" else []) as on_compiled:
-        built = build(loaded, output, platforms=platforms, backend=backend, osp=osp, on_compiled=on_compiled)
+    chosen = chosen_platforms(platforms) if backend == "native" else []
+    with _progress(chosen) as done:
+        built = build(loaded, output, platforms=chosen, backend=backend, osp=osp, inputs=[vehicle], on_compiled=done)
     _print_built(built, perf_counter() - started)
 
 
