@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from math import ceil, isfinite
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from matplotlib.axes import Axes
 
@@ -41,7 +41,9 @@ def evenly(commands: Sequence[Number]) -> list[Number]:
     return sorted({commands[round((len(commands) - 1) * n / last)] for n in range(last + 1)})
 
 
-def finish(ax: Axes, title: str, x: str, y: str = "", where: str = "upper left") -> None:
+def finish(
+    ax: Axes, title: str, x: str, y: str = "", where: Literal["upper left", "lower right"] = "upper left"
+) -> None:
     """Labels, title, legend; the axes begin at 0, as far as the data let them."""
     ax.set(xlabel=x, ylabel=y)
     ax.set_xlim(left=0.0)
