@@ -29,7 +29,12 @@ def _module(path: Path) -> str:
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
-FILES = {_module(path): path for folder in AROUND for path in ROOT.glob(f"{folder}/**/*.py")}
+FILES = {
+    _module(path): path
+    for folder in AROUND
+    for path in ROOT.glob(f"{folder}/**/*.py")
+    if not any(part.startswith(".") for part in path.relative_to(ROOT).parts)  # the tools that interop/ installs
+}
 
 
 def _names(module: str) -> Iterator[str]:
