@@ -1,8 +1,8 @@
 """Every FMU variable, declared once.
 
 modelDescription.xml, the C structs and value references, the documentation and the PythonFMU registration are all
-derived from `variables`. The order is that of the C struct `rov_variables`: inputs, state, derivative, thrust,
-coefficients; the value reference of a variable is its place in it.
+derived from `variables`. They stand in the order inputs, state, derivatives, thrust, coefficients;
+the value reference of a variable is its place.
 """
 
 from collections.abc import Mapping
@@ -11,19 +11,8 @@ from math import degrees, isfinite
 from typing import Any
 
 from rov_fmu.files.templates import render
-from rov_fmu.motion.rov import (
-    AXES,
-    COEFFICIENTS,
-    HEAVE,
-    SURGE,
-    YAW,
-    Coefficients,
-    Inputs,
-    Meta,
-    State,
-    Thrust,
-    declared,
-)
+from rov_fmu.motion.layout import AXES, HEAVE, REVERSE, SURGE, SWAY, YAW, Curve, Layout, Meta, VehicleAxis
+from rov_fmu.motion.rov import Rov
 
 
 @dataclass(frozen=True)
@@ -41,12 +30,14 @@ UNITS: dict[str, Unit] = {
     "1": Unit({}, "%", 100.0),
     "kg": Unit({"kg": 1}),
     "m": Unit({"m": 1}),
+    "s": Unit({"s": 1}),
     "rad": Unit({"rad": 1}, "deg", degrees(1.0)),
     "m/s": Unit({"m": 1, "s": -1}, "knot", 1.0 / _KNOT),
     "rad/s": Unit({"rad": 1, "s": -1}, "deg/s", degrees(1.0)),
     "m/s2": Unit({"m": 1, "s": -2}),
     "rad/s2": Unit({"rad": 1, "s": -2}),
     "N": Unit({"kg": 1, "m": 1, "s": -2}),
+    "N/s": Unit({"kg": 1, "m": 1, "s": -3}),
     "N.m": Unit({"kg": 1, "m": 2, "s": -2}),
     "kg.m2": Unit({"kg": 1, "m": 2}),
     "N.s/m": Unit({"kg": 1, "s": -1}),
@@ -93,44 +84,108 @@ class Variable:
         return "STATE" if self.initial == "exact" else "CALCULATED"
 
 
-# What is calculated from the state, and the knowns that it depends on with their dependenciesKind: derivatives ...
-_ALONG = {"u": "dependent", "psi": "dependent"}
-_DERIVATIVES = {
-    axis.velocity: (
-        f"{axis.name.capitalize()} acceleration, {axis.equations[1]}",
-        f"{axis.unit}2",
-        {**dict.fromkeys(axis.signs, "dependent"), axis.external: "tunable", axis.velocity: "dependent"},
-    )
-    for axis in AXES.values()
-} | {
-    "x": ("Velocity over ground northward, u cos ψ + V_N", "m/s", {"V_N": "constant"} | _ALONG),
-    "y": ("Velocity over ground eastward, u sin ψ + V_E", "m/s", {"V_E": "constant"} | _ALONG),
-    "z": ("Rate of change of depth, w", "m/s", {"w": "constant"}),
-    "psi": ("Rate of change of heading, r", "rad/s", {"r": "constant"}),
-}
-# ... and thrust: its commands.
-_COMMANDS_OF = {"F_l": ("u_l",), "F_r": ("u_r",), "F_t": ("u_t",), "tau_rear": tuple(YAW.signs)}
-
-# Which coefficients each calculated variable depends on during initialization.
-_ARM = ("R", "gamma")
-PARAMETERS_OF: dict[str, tuple[str, ...]] = {
-    "F_l": SURGE.thrust_names,
-    "F_r": SURGE.thrust_names,
-    "F_t": HEAVE.thrust_names,
-    "tau_rear": YAW.thrust_names + _ARM,
-} | {
-    f"der({axis.velocity})": (
-        *axis.thrust_names,
-        *(_ARM if axis is YAW else ()),
-        axis.inertia,
-        *(axis.coefficient(kind) for kind in ("a_d", "b_d", "alpha", "beta")),
-    )
-    for axis in AXES.values()
-}
+# ---- What depends on what ------------------------------------------------------------------------------------------
 
 
-def variables(coefficients: Coefficients) -> tuple[Variable, ...]:
+def _driving(layout: Layout, form: VehicleAxis) -> dict[str, str]:
+    """What the force of an axis depends on: commands, or forces that lag behind them."""
+    found = {}
+    for thruster in layout.drivers(form.axis):
+        lags = layout.curve_of[thruster.name].has_lag
+        found |= {f"F_{thruster.name}": "tunable"} if lags else dict.fromkeys(layout.gains[thruster.name], "dependent")
+    return found
+
+
+def _derivatives(layout: Layout) -> dict[str, tuple[Meta, dict[str, str]]]:
+    """The derivative of every state: what it is, and the knowns that it depends on with their dependenciesKind."""
+    found: dict[str, tuple[Meta, dict[str, str]]] = {}
+    for form in layout.axes:
+        axis = form.axis
+        known = {**_driving(layout, form), axis.external: "tunable", axis.velocity: "dependent"}
+        if layout.coupled and axis is not HEAVE:
+            known |= dict.fromkeys((SURGE.velocity, SWAY.velocity, YAW.velocity), "dependent")
+        found[axis.velocity] = Meta(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {axis.equations[1]}"), known
+    along = [axis.velocity for axis in (SURGE, SWAY) if layout.has(axis)]
+    turns = layout.has(YAW)
+    kind = dict.fromkeys([*along, "psi"] if turns else along, "dependent" if turns else "constant")
+    north, east = (_over_ground(layout, *words) for words in (("u cos ψ", "v sin ψ", "-"), ("u sin ψ", "v cos ψ", "+")))
+    if along:
+        found["x"] = Meta("m/s", f"Velocity over ground northward, {north} + V_N"), {"V_N": "constant"} | (
+            kind if turns or SURGE.velocity in along else {}
+        )
+        found["y"] = Meta("m/s", f"Velocity over ground eastward, {east} + V_E"), {"V_E": "constant"} | (
+            kind if turns or SWAY.velocity in along else {}
+        )
+    if layout.has(HEAVE):
+        found["z"] = Meta("m/s", "Rate of change of depth, w"), {"w": "constant"}
+    if turns:
+        found["psi"] = Meta("rad/s", "Rate of change of heading, r"), {"r": "constant"}
+    for thruster in layout.thrusters:
+        if (name := f"F_{thruster.name}") in layout.lagging:
+            commands = dict.fromkeys(layout.gains[thruster.name], "dependent")
+            found[name] = Meta("N/s", f"Rate of change of {name}, (F(c) - F) / T"), {**commands, name: "fixed"}
+    return found
+
+
+def _coefficients_of_thrust(curve: Curve) -> list[str]:
+    return [curve.coefficient(key) for key in curve.keys]
+
+
+def _calculated_of(layout: Layout) -> dict[str, dict[str, str]]:
+    """What each calculated variable of the thrusters depends on."""
+    found: dict[str, dict[str, str]] = {}
+    for name in layout.thrust:
+        of_curve = [t for t in layout.drivers(YAW) if name == f"tau_{t.curve}"] if layout.has(YAW) else []
+        thrusters = of_curve or [t for t in layout.thrusters if name == f"F_{t.name}"]
+        found[name] = {}
+        for thruster in thrusters:
+            if layout.curve_of[thruster.name].has_lag:
+                found[name][f"F_{thruster.name}"] = "constant" if thruster.position else "fixed"
+            else:
+                found[name] |= dict.fromkeys(layout.gains[thruster.name], "dependent")
+    return found
+
+
+def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
+    """The coefficients that each calculated variable depends on during initialization."""
+    found: dict[str, tuple[str, ...]] = {}
+    arm = ("R", "gamma") if layout.has_arm else ()
+    for thruster in layout.thrusters:
+        curve = layout.curve_of[thruster.name]
+        if curve.has_lag:
+            found[f"der(F_{thruster.name})"] = tuple(_coefficients_of_thrust(curve))
+        else:
+            found[f"F_{thruster.name}"] = tuple(_coefficients_of_thrust(curve))
+    for curve in layout.turning_curves:
+        steady = () if curve.has_lag else tuple(_coefficients_of_thrust(curve))
+        found[f"tau_{curve.name}"] = steady + arm
+    for form in layout.axes:
+        axis = form.axis
+        names: list[str] = []
+        for curve in layout.curves:
+            if not curve.has_lag and any(t.curve == curve.name for t in layout.drivers(axis)):
+                names += _coefficients_of_thrust(curve)
+        names += arm if axis is YAW else ()
+        own = [form.coefficient(key) for key in form.keys]
+        names += [axis.inertia, *own, axis.coefficient("alpha"), axis.coefficient("beta")]
+        if layout.coupled and axis is not HEAVE:
+            for other in (layout.kinds[a.name] for a in (SURGE, SWAY, YAW)):
+                names += [other.axis.inertia, *(other.coefficient(key) for key in other.keys if key == "m_a"),
+                          other.axis.coefficient("beta")]  # fmt: skip
+        found[f"der({axis.velocity})"] = tuple(dict.fromkeys(names))
+    return found
+
+
+def _over_ground(layout: Layout, ahead: str, aside: str, sign: str) -> str:
+    """A horizontal velocity over ground in words."""
+    words = [text if layout.has(YAW) else text.split()[0] * (function in text)
+             for axis, text, function in ((SURGE, ahead, "cos"), (SWAY, aside, "cos")) if layout.has(axis)]  # fmt: skip
+    return f" {sign} ".join(filter(None, words)) or "0"
+
+
+def variables(rov: Rov) -> tuple[Variable, ...]:
     """All variables of the FMU of a vehicle, in the order of their value references."""
+    layout = rov.layout
     result: list[Variable] = []
 
     def add(name: str, meta: Meta, causality: str, variability: str, **rest: Any) -> None:
@@ -138,24 +193,26 @@ def variables(coefficients: Coefficients) -> tuple[Variable, ...]:
         given = {"display_unit": UNITS[meta.unit].display, **bounds, **rest}
         result.append(Variable(name, len(result), meta.description, meta.unit, causality, variability, **given))
 
-    for name, meta in declared(Inputs).items():
+    for name, meta in layout.inputs.items():
         add(name, meta, "input", "continuous", start=0.0, nominal=meta.nominal)
-    for name, meta in declared(State).items():
+    for name, meta in layout.state.items():
         add(name, meta, "output", "continuous", initial="exact", start=0.0, nominal=meta.nominal,
             dependencies={name: "constant"})  # fmt: skip
-    for name in declared(State):
-        description, unit, known = _DERIVATIVES[name]
-        add(f"der({name})", Meta(unit, description), "local", "continuous", initial="calculated", derivative_of=name,
+    derivatives, calculated = _derivatives(layout), _calculated_of(layout)
+    for name in layout.state:
+        meta, known = derivatives[name]
+        add(f"der({name})", meta, "local", "continuous", initial="calculated", derivative_of=name,
             dependencies=known)  # fmt: skip
-    for name, meta in declared(Thrust).items():
-        add(name, meta, "output", "continuous", initial="calculated", display_unit=None,
-            dependencies=dict.fromkeys(_COMMANDS_OF[name], "dependent"))  # fmt: skip
-    for name, meta in COEFFICIENTS.items():
+    for name, meta in layout.thrust.items():
+        add(name, meta, "output", "continuous", initial="calculated", display_unit=None, dependencies=calculated[name])
+    for name, meta in layout.coefficients.items():
         add(name, meta, "parameter", "tunable" if meta.tunable else "fixed", initial="exact",
-            start=getattr(coefficients, name),
-            display_unit=None if meta.unit == "1" else UNITS[meta.unit].display)  # fmt: skip
+            start=rov[name], display_unit=None if meta.unit == "1" else UNITS[meta.unit].display)  # fmt: skip
     return tuple(result)
 
+
+ENDS = ("", REVERSE)
+"""Of the keys of what holds forward, and in reverse."""
 
 # Names by the standard (2.2.4) and what is said in each.
 LOG_CATEGORIES = {
@@ -168,21 +225,71 @@ LOG_CATEGORIES = {
 # ---- The same declaration for the C compiler -----------------------------------------------------------------------
 
 
-def model_header() -> str:
-    """model.h: the structs of the mathematics, members in the order of the value references."""
-    structs = {"inputs": Inputs, "state": State, "thrust": Thrust, "coefficients": Coefficients}
-    return render("model.h.j2", structs={name: declared(struct) for name, struct in structs.items()})
+def model_header(rov: Rov) -> str:
+    """model.h: what the vehicle has, for the mathematics; a variable is known by its value reference, REF_<name>."""
+    layout = rov.layout
+    names = [v.name for v in variables(rov) if not v.derivative_of]
+
+    def ref(name: str | None) -> str:
+        return f"REF_{name}" if name is not None else "NONE"
+
+    def if_given(name: str, key: str, of: Curve | VehicleAxis) -> str:
+        return ref(name) if key in of.keys else "NONE"
+
+    curves = [
+        {
+            "name": curve.name,
+            "share": repr(1.0 / curve.together),
+            "a_t": [ref(curve.coefficient(f"a_t{end}")) for end in ENDS],
+            "b_t": [ref(curve.coefficient(f"b_t{end}")) for end in ENDS],
+            "c_0": [if_given(curve.coefficient(f"c_0{end}"), "c_0", curve) for end in ENDS],
+            "lag": if_given(curve.coefficient("T"), "T", curve),
+            "torque": ref(f"tau_{curve.name}" if curve in layout.turning_curves else None),
+        }
+        for curve in layout.curves
+    ]
+    thrusters = [
+        {
+            "name": t.name,
+            "curve": [curve.name for curve in layout.curves].index(t.curve),
+            "force": ref(f"F_{t.name}"),
+            "effect": [repr(t.effect(f.axis)) if t in layout.drivers(f.axis) else "0.0" for f in layout.axes],
+            "by_arm": int(t.position is None and t.arm != 0),
+            "gains": [repr(layout.gains[t.name].get(command, 0.0)) for command in layout.commands],
+        }
+        for t in layout.thrusters
+    ]
+    axes = [
+        {
+            "kind": form.axis.name.upper(),
+            "velocity": ref(form.axis.velocity),
+            "external": ref(form.axis.external),
+            "inertia": ref(form.axis.inertia),
+            "added": if_given(form.coefficient("m_a"), "m_a", form),
+            "a_d": [ref(form.coefficient(f"a_d{end}")) for end in ENDS],
+            "b_d": [ref(form.coefficient(f"b_d{end}")) for end in ENDS],
+            "load": if_given(form.coefficient("F_0"), "F_0", form),
+            "alpha": ref(form.axis.coefficient("alpha")),
+            "beta": ref(form.axis.coefficient("beta")),
+        }
+        for form in layout.axes
+    ]
+    return render(
+        "model.h.j2", layout=layout, names={v.name: v.value_reference for v in variables(rov) if v.name in names},
+        axes=axes, curves=curves, thrusters=thrusters, kinds=list(AXES),
+        n={"inputs": len(layout.inputs), "commands": len(layout.commands), "states": len(layout.state),
+           "lagging": len(layout.lagging), "thrust": len(layout.thrust), "coefficients": len(layout.coefficients)},
+        ref=lambda name: ref(name if name in names else None),
+    )  # fmt: skip
 
 
-def interface_header(variables: tuple[Variable, ...], identifier: str, guid: str) -> str:
+def interface_header(rov: Rov, identifier: str, guid: str) -> str:
     """interface.h: what the FMI layer knows of the variables, and the names of the functions in a static library."""
     return render(
         "interface.h.j2",
-        variables=variables,
+        variables=variables(rov),
         identifier=identifier,
         guid=guid,
-        n_inputs=len(declared(Inputs)),
-        n_states=len(declared(State)),
         log_categories=LOG_CATEGORIES,
         c_double=lambda value, otherwise: otherwise if value is None else repr(value),
     )

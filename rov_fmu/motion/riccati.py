@@ -29,16 +29,24 @@ RISE = 1.0 - 1.0 / e
 _MODERATE = 0.8
 
 
-def advance(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
-    """Return the velocity after h > 0 seconds and the distance covered, both signed: v(h) and the integral of v."""
+def advance(
+    A: float, B: float, C: float, v0: float, h: float, reverse: tuple[float, float] | None = None
+) -> tuple[float, float]:
+    """Return the velocity after h > 0 seconds and the distance covered, both signed: v(h) and the integral of v.
+
+    `reverse` is A and B for v < 0 where they differ.
+    """
     sign = -1.0 if v0 < 0.0 or (v0 == 0.0 and C < 0.0) else 1.0
-    C, v0 = sign * C, sign * v0
+    ahead, behind = (A, B), reverse or (A, B)
+    if sign < 0.0:
+        C, v0, ahead, behind = -C, -v0, behind, ahead
+    A, B = ahead
     # Deceleration is strongest at the start, so the left side bounds the velocity that the step can take away.
     if C < 0.0 and ((B + A * v0) * v0 - C) * h >= v0:
-        turn = time_to_rest(A, B, C, v0)
-        if turn < h:
-            forth = _leg(A, B, C, v0, turn)[1]
-            v, back = _leg(A, B, -C, 0.0, h - turn)
+        rest = time_to_rest(A, B, C, v0)
+        if rest < h:
+            forth = _leg(A, B, C, v0, rest)[1]
+            v, back = _leg(*behind, -C, 0.0, h - rest)
             return -sign * v, sign * (forth - back)
     v, s = _leg(A, B, C, v0, h)
     return sign * v, sign * s
@@ -186,14 +194,21 @@ class Riccati:
     A: float
     B: float
     C: float
+    reverse: tuple[float, float] | None = None
+    """A and B for v < 0, where they differ."""
+
+    def drag(self, sign: float) -> tuple[float, float]:
+        """A and B for velocities of this sign."""
+        return self.reverse if self.reverse and sign < 0.0 else (self.A, self.B)
 
     def acceleration(self, v: float) -> float:
         """v' (18)."""
-        return self.C - (self.B + self.A * abs(v)) * v
+        A, B = self.drag(v)
+        return self.C - (B + A * abs(v)) * v
 
     def advance(self, v: float, h: float) -> tuple[float, float]:
         """Velocity after h > 0 seconds and the distance (angle) covered."""
-        return advance(self.A, self.B, self.C, v, h)
+        return advance(self.A, self.B, self.C, v, h, self.reverse)
 
     def velocity(self, v: float, h: float) -> float:
         """Velocity after h seconds."""
@@ -205,14 +220,14 @@ class Riccati:
 
     def steady_velocity(self) -> float:
         """V_ss."""
-        return steady_velocity(self.A, self.B, self.C)
+        return steady_velocity(*self.drag(self.C), self.C)
 
     def time_constant(self) -> float:
         """Tau of (17), from rest."""
-        return time_constant(self.A, self.B, self.C)
+        return time_constant(*self.drag(self.C), self.C)
 
-    def turning_time(self, v: float) -> float:
-        """When the force brings the motion to rest and turns it; infinite where it does not."""
+    def reversal_time(self, v: float) -> float:
+        """When the force brings the motion to rest and reverses it; infinite where it does not."""
         if (v <= 0.0 or self.C >= 0.0) and (v >= 0.0 or self.C <= 0.0):  # a product would underflow
             return inf
-        return time_to_rest(self.A, self.B, -abs(self.C), abs(v))
+        return time_to_rest(*self.drag(v), -abs(self.C), abs(v))

@@ -1,283 +1,207 @@
-"""The ROV of the paper: axes, coefficients and variables, declared once, and the exact step (standard library only).
+"""A vehicle in motion: thrust, axes, derivatives and the exact step (standard library only).
 
-Signs and symbols follow Fossen/SNAME and the paper: body frame x forward, y starboard, z down; earth frame
-north-east-down; u, w, r are surge, heave and yaw velocity through the water. Heave is positive down.
+Values go by name, as rov_fmu/motion/layout.py declares them: inputs, state, coefficients.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from math import cos, inf, pi, sin
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, expm1, sin
 
-from .path import turning_step
+from . import series
+from .layout import ARM, HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis, arm
 from .riccati import Riccati
 
-# ---- Axes ------------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One axis, and how one command drives it alone: the single declaration of its symbols, units and words.
-
-    A test of an axis is one number held over time, a fraction -1 ... 1 of full thrust; positive moves the vehicle
-    forward, down, or its bow to starboard.
-    """
-
-    name: str
-    velocity: str
-    """Symbol: u, w or r. The coefficients of the axis are a_d_<velocity> ... beta_<velocity>."""
-    unit: str
-    """Of the velocity."""
-    positive: str
-    """Direction of a positive velocity, force or torque."""
-    position: str
-    """What a sensor measures along the axis; its rate is the velocity."""
-    position_unit: str
-    load: str
-    """Unit of force or torque."""
-    external: str
-    """The input that acts on it beside the thrust."""
-    inertia: str
-    """The coefficient that resists acceleration: m_rov or I_r."""
-    signs: Mapping[str, float]
-    """Of the thruster commands that a test holds."""
-    thruster: str
-    """rear or top: its thrust is a_t_<thruster>, b_t_<thruster>."""
-    equations: tuple[str, str]
-    """Of the paper: drag, motion."""
-
-    def coefficient(self, kind: str) -> str:
-        """Name of a coefficient of the axis: kind is a_d, b_d, alpha or beta."""
-        return f"{kind}_{self.velocity}"
-
-    @property
-    def push(self) -> str:
-        """What its thrusters give."""
-        return "thrust" if self.load == "N" else "torque"
-
-    @property
-    def thrust_names(self) -> tuple[str, str]:
-        """The coefficients of its thrust curve."""
-        return f"a_t_{self.thruster}", f"b_t_{self.thruster}"
-
-    def inputs(self, command: float) -> "Inputs":
-        """The inputs that hold a command (fraction of full thrust)."""
-        return Inputs(**{name: sign * command for name, sign in self.signs.items()})
-
-    def held(self, coefficients: "Coefficients", command: float) -> Riccati:
-        """The motion under a held command, (18)."""
-        return axes(coefficients, self.inputs(command))[list(AXES).index(self.name)]
-
-    def response(self, coefficients: "Coefficients", command: float) -> tuple[float, float]:
-        """Signed V_ss, and Tau (17) in s from rest, in closed form."""
-        motion = self.held(coefficients, command)
-        return motion.steady_velocity(), motion.time_constant()
-
-    def force(self, coefficients: "Coefficients", command: float) -> float:
-        """Thrust (N) or torque (N.m) before the tuning α, by (9), (10) and (4)."""
-        F = thrust(coefficients, self.inputs(command))
-        return {"u": F.F_l + F.F_r, "w": F.F_t, "r": F.tau_rear}[self.velocity]
-
-
-SURGE = Axis("surge", "u", "m/s", "forward", "distance", "m", "N", "X_ext", "m_rov", {"u_l": 1.0, "u_r": 1.0}, "rear",
-             ("(14)", "(18a)"))  # fmt: skip
-HEAVE = Axis("heave", "w", "m/s", "down", "depth", "m", "N", "Z_ext", "m_rov", {"u_t": 1.0}, "top", ("(15)", "(18b)"))
-YAW = Axis("yaw", "r", "rad/s", "bow to starboard", "heading", "rad", "N.m", "N_ext", "I_r", {"u_l": 1.0, "u_r": -1.0},
-           "rear", ("(16)", "(18c)"))  # fmt: skip
-AXES = {axis.name: axis for axis in (SURGE, HEAVE, YAW)}
-
-
-# ---- Coefficients and variables --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Meta:
-    """What a coefficient or a variable is: SI unit, words, the values allowed (both ends included), a typical size."""
-
-    unit: str
-    description: str
-    minimum: float = -inf
-    maximum: float = inf
-    nominal: float = 1.0
-    tunable: bool = False
-
-
-def _coefficient(unit: str, description: str, minimum: float, maximum: float, *, tunable: bool = False) -> float:
-    value: float = field(metadata={"meta": Meta(unit, description, minimum, maximum, tunable=tunable)})
-    return value
-
-
-def _variable(unit: str, description: str, nominal: float = 1.0, limit: float = inf) -> float:
-    value: float = field(default=0.0, metadata={"meta": Meta(unit, description, -limit, limit, nominal)})
-    return value
-
-
-def _curve(name: str, kind: str, thruster: str, equation: str) -> float:
-    return _coefficient("N", f"{name} thrust coefficient {kind} of the {thruster}, {equation}", -1e6, 1e6)
-
-
-def _drag(name: str, kind: str, power: str, axis: Axis) -> float:
-    unit = f"{axis.load}.s{power}/{axis.position_unit}{power}"
-    return _coefficient(unit, f"{name} drag coefficient {kind} of {axis.name}, {axis.equations[0]}", 0.0, 1e6)
-
-
-def _tuning(symbol: str, scales: str, axis: Axis) -> float:
-    words = f"Tuning {symbol}_{axis.velocity}: scales {scales} in {axis.name}, {axis.equations[1]}"
-    return _coefficient("1", words, 0.0, 1e3, tunable=True)
-
-
-def _command(which: str, positive: str) -> float:
-    words = f"{which.capitalize()} thruster command u_{which[0]}, positive {positive}; saturates at ±1"
-    return _variable("1", words, limit=1.0)
-
-
-def _load(axis: Axis, examples: str, nominal: float) -> float:
-    return _variable(axis.load, f"Load from outside in {axis.name} ({examples}), positive {axis.positive}", nominal)
-
-
-def _velocity(axis: Axis, of_what: str = " through the water") -> float:
-    words = f"{axis.name.capitalize()} velocity {axis.velocity}{of_what}, positive {axis.positive}"
-    return _variable(axis.unit, words)
-
-
-@dataclass(frozen=True)
-class Coefficients:
-    """The identified coefficients of one vehicle (Table 9)."""
-
-    m_rov: float = _coefficient("kg", "Mass m_rov, (3a), (3b)", 1e-3, 1e6)
-    I_r: float = _coefficient("kg.m2", "Moment of inertia about the vertical axis I_r, (3c)", 1e-6, 1e6)
-    R: float = _coefficient("m", "Distance from the centre of mass to a rear thruster R, (4)", 0.0, 100.0)
-    gamma: float = _coefficient(
-        "rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, pi / 2
-    )
-    a_t_rear: float = _curve("Quadratic", "a_t", "rear pair", "(9)")
-    b_t_rear: float = _curve("Linear", "b_t", "rear pair", "(9)")
-    a_t_top: float = _curve("Quadratic", "a_t", "top thruster", "(10)")
-    b_t_top: float = _curve("Linear", "b_t", "top thruster", "(10)")
-    a_d_u: float = _drag("Quadratic", "a_d", "2", SURGE)
-    b_d_u: float = _drag("Linear", "b_d", "", SURGE)
-    a_d_w: float = _drag("Quadratic", "a_d", "2", HEAVE)
-    b_d_w: float = _drag("Linear", "b_d", "", HEAVE)
-    a_d_r: float = _drag("Quadratic", "a_d", "2", YAW)
-    b_d_r: float = _drag("Linear", "b_d", "", YAW)
-    alpha_u: float = _tuning("α", SURGE.push, SURGE)
-    beta_u: float = _tuning("β", "acceleration", SURGE)
-    alpha_w: float = _tuning("α", HEAVE.push, HEAVE)
-    beta_w: float = _tuning("β", "acceleration", HEAVE)
-    alpha_r: float = _tuning("α", YAW.push, YAW)
-    beta_r: float = _tuning("β", "acceleration", YAW)
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Commands (fractions of full thrust, beyond ±1 saturated), loads from outside (N, N, N.m), current (m/s)."""
-
-    u_l: float = _command("left", "forward")
-    u_r: float = _command("right", "forward")
-    u_t: float = _command("top", "down")
-    X_ext: float = _load(SURGE, "tether, contact", 10.0)
-    Z_ext: float = _load(HEAVE, "tether, ballast", 10.0)
-    N_ext: float = _load(YAW, "tether, contact", 1.0)
-    V_N: float = _variable("m/s", "Velocity of a steady horizontal current, northward")
-    V_E: float = _variable("m/s", "Velocity of a steady horizontal current, eastward")
-
-
-@dataclass(frozen=True)
-class State:
-    """Velocity through the water (m/s, m/s, rad/s) and pose in the earth frame (m, m, m, rad; psi is not wrapped)."""
-
-    u: float = _velocity(SURGE)
-    w: float = _velocity(HEAVE)
-    r: float = _velocity(YAW, "")
-    x: float = _variable("m", "Position north x", 10.0)
-    y: float = _variable("m", "Position east y", 10.0)
-    z: float = _variable("m", "Depth z, positive down", 10.0)
-    psi: float = _variable("rad", "Heading ψ, positive north to east, not wrapped")
-
-
-@dataclass(frozen=True)
-class Thrust:
-    """Force of each thruster (N) and the torque of the rear pair (N.m), before the tuning α."""
-
-    F_l: float = _variable("N", "Thrust of the left thruster F_l, half of (9) for the pair")
-    F_r: float = _variable("N", "Thrust of the right thruster F_r, half of (9) for the pair")
-    F_t: float = _variable("N", "Thrust of the top thruster F_t, (10), positive down")
-    tau_rear: float = _variable("N.m", "Torque of the rear thrusters τ_rear, (4), positive bow to starboard")
-
-
-def declared(struct: type) -> dict[str, Meta]:
-    """The members of one of these classes, in their order."""
-    return {f.name: f.metadata["meta"] for f in fields(struct)}
-
-
-COEFFICIENTS = declared(Coefficients)
-
-
-# ---- The model -------------------------------------------------------------------------------------------------------
+Values = Mapping[str, float]
 
 
 def saturate(command: float) -> float:
-    """A thruster command within ±1."""
+    """A command within ±1."""
     return max(-1.0, min(1.0, command))
 
 
-def thruster_force(a_t: float, b_t: float, command: float) -> float:
-    """Thrust (2): a_t |c| c + b_t c in N."""
-    c = saturate(command)
-    return (a_t * abs(c) + b_t) * c
+@dataclass(frozen=True)
+class Rov:
+    """What a vehicle has, and its numbers: every coefficient of the layout by name."""
 
+    layout: Layout
+    coefficients: Values
 
-def thrust(k: Coefficients, i: Inputs) -> Thrust:
-    """Thrust of the commands: half of (9) for each rear thruster, (10) for the top one, torque by (4)."""
-    F_l = 0.5 * thruster_force(k.a_t_rear, k.b_t_rear, i.u_l)
-    F_r = 0.5 * thruster_force(k.a_t_rear, k.b_t_rear, i.u_r)
-    F_t = thruster_force(k.a_t_top, k.b_t_top, i.u_t)
-    return Thrust(F_l, F_r, F_t, k.R * sin(k.gamma) * (F_l - F_r))
+    def __getitem__(self, name: str) -> float:
+        """A coefficient."""
+        return self.coefficients[name]
 
+    def replaced(self, values: Values) -> "Rov":
+        """With other values of some coefficients."""
+        return Rov(self.layout, {**self.coefficients, **values})
 
-def axes(k: Coefficients, i: Inputs) -> tuple[Riccati, Riccati, Riccati]:
-    """Surge, heave and yaw under held inputs, (18): m v' = β (α F + F_ext - a_d |v| v - b_d v)."""
-    F = thrust(k, i)
+    # ---- Thrust ----
 
-    def axis(m: float, beta: float, a_d: float, b_d: float, force: float) -> Riccati:
-        g = beta / m
-        return Riccati(g * a_d, g * b_d, g * force)
+    def curve_force(self, curve: Curve, command: float) -> float:
+        """Thrust (2) of one thruster in N: a_t m^2 + b_t m, m beyond the dead band, of the direction's curve."""
+        c = saturate(command)
+        end = "_reverse" if c < 0.0 else ""
+        a_t, b_t = (self[curve.coefficient(key + end)] for key in ("a_t", "b_t"))
+        dead = self[curve.coefficient("c_0" + end)] if "c_0" in curve.keys else 0.0
+        m = abs(c) - dead
+        if m <= 0.0:
+            return 0.0
+        force = (a_t * m + b_t) * m / curve.together
+        return -force if c < 0.0 else force
 
-    return (
-        axis(k.m_rov, k.beta_u, k.a_d_u, k.b_d_u, k.alpha_u * (F.F_l + F.F_r) + i.X_ext),
-        axis(k.m_rov, k.beta_w, k.a_d_w, k.b_d_w, k.alpha_w * F.F_t + i.Z_ext),
-        axis(k.I_r, k.beta_r, k.a_d_r, k.b_d_r, k.alpha_r * F.tau_rear + i.N_ext),
-    )
+    def commanded(self, inputs: Values) -> dict[str, float]:
+        """The steady thrust of every thruster (N), by its name, for the commands."""
+        found = {}
+        for thruster in self.layout.thrusters:
+            gains = self.layout.gains[thruster.name]
+            command = sum(gain * saturate(inputs[name]) for name, gain in gains.items())
+            found[thruster.name] = self.curve_force(self.layout.curve_of[thruster.name], command)
+        return found
 
+    def forces(self, inputs: Values, state: Values) -> dict[str, float]:
+        """The thrust of every thruster (N), by its name: the state where it lags behind the commands."""
+        lagging = self.layout.lagging
+        return {name: state[key] if (key := f"F_{name}") in lagging else force
+                for name, force in self.commanded(inputs).items()}  # fmt: skip
 
-def derivatives(k: Coefficients, i: Inputs, s: State) -> State:
-    """Time derivatives of the state: (18) and the kinematics, the current added to the horizontal velocity."""
-    surge, heave, yaw = axes(k, i)
-    return State(
-        u=surge.acceleration(s.u),
-        w=heave.acceleration(s.w),
-        r=yaw.acceleration(s.r),
-        x=s.u * cos(s.psi) + i.V_N,
-        y=s.u * sin(s.psi) + i.V_E,
-        z=s.w,
-        psi=s.r,
-    )
+    def thrust(self, inputs: Values, state: Values) -> dict[str, float]:
+        """The calculated variables of the thrusters by name."""
+        F = self.forces(inputs, state)
+        found = {f"F_{name}": force for name, force in F.items()}
+        for curve in self.layout.turning_curves:
+            found[f"tau_{curve.name}"] = sum(
+                self.effect(t, YAW) * F[t.name] for t in self.layout.thrusters if t.curve == curve.name
+            )
+        return {name: found[name] for name in self.layout.thrust}
 
+    def effect(self, thruster: Thruster, axis: Axis) -> float:
+        """Force along an axis, or torque (m), of 1 N of a thruster."""
+        lever = arm(*(self[name] for name in ARM)) if axis is YAW and thruster.position is None and thruster.arm else 1.0
+        return thruster.effect(axis) * lever
 
-def step(k: Coefficients, i: Inputs, s: State, h: float) -> State:
-    """The state after h > 0 seconds with the inputs held, exact up to rounding whatever the length of h."""
-    surge, heave, yaw = axes(k, i)
-    if s.r == 0.0 and yaw.C == 0.0:
-        (u, ahead), aside, r, turn = surge.advance(s.u, h), 0.0, 0.0, 0.0
-    else:
-        ahead, aside, u, r, turn = turning_step(surge, yaw, s.u, s.r, h)
-    w, depth = heave.advance(s.w, h)
-    c, d = cos(s.psi), sin(s.psi)
-    return State(
-        u=u,
-        w=w,
-        r=r,
-        x=s.x + (ahead * c - aside * d) + i.V_N * h,
-        y=s.y + (ahead * d + aside * c) + i.V_E * h,
-        z=s.z + depth,
-        psi=s.psi + turn,
-    )
+    # ---- Motion ----
+
+    def effective_inertia(self, form: VehicleAxis) -> float:
+        """m/β, which resists acceleration."""
+        added = self[form.coefficient("m_a")] if "m_a" in form.keys else 0.0
+        return (self[form.axis.inertia] + added) / self[form.axis.coefficient("beta")]
+
+    def acceleration_of(self, form: VehicleAxis, thrust: float, load: float = 0.0) -> Riccati:
+        """An axis under a held thrust (before α) and load, (18): m v' = β (α F + F_ext + F_0 - a_d |v| v - b_d v)."""
+        added = self[form.coefficient("m_a")] if "m_a" in form.keys else 0.0
+        gain = self[form.axis.coefficient("beta")] / (self[form.axis.inertia] + added)
+        F_0 = self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0
+        A, B = (gain * self[form.coefficient(key)] for key in ("a_d", "b_d"))
+        reverse = None
+        if "a_d_reverse" in form.keys:
+            reverse = gain * self[form.coefficient("a_d_reverse")], gain * self[form.coefficient("b_d_reverse")]
+        return Riccati(A, B, gain * (self[form.axis.coefficient("alpha")] * thrust + load + F_0), reverse)
+
+    def axes(self, inputs: Values, F: Values) -> tuple[Riccati, ...]:
+        """Every axis under held inputs and forces of the thrusters."""
+        return tuple(
+            self.acceleration_of(
+                form,
+                sum(self.effect(t, form.axis) * F[t.name] for t in self.layout.drivers(form.axis)),
+                inputs[form.axis.external],
+            )
+            for form in self.layout.axes
+        )
+
+    @cached_property
+    def coupling(self) -> series.Coupling | None:
+        """Of surge, sway and yaw, where the vehicle has it."""
+        if not self.layout.coupled:
+            return None
+        M_u, M_v, M_r = (self.effective_inertia(self.layout.kinds[axis.name]) for axis in (SURGE, SWAY, YAW))
+        return series.Coupling(M_v / M_u, M_u / M_v, (M_v - M_u) / M_r)
+
+    def derivatives(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Time derivatives of the state by its names: (18), the coupling, the kinematics with the current, the lags."""
+        layout, F = self.layout, self.forces(inputs, state)
+        axes = zip(layout.axes, self.axes(inputs, F), strict=True)
+        rates = {form.axis.velocity: motion.acceleration(state[form.axis.velocity]) for form, motion in axes}
+        u, v, r, psi = (state.get(name, 0.0) for name in ("u", "v", "r", "psi"))
+        if k := self.coupling:
+            rates["u"] += k.c_u * v * r
+            rates["v"] -= k.c_v * u * r
+            rates["r"] -= k.c_r * u * v
+        if layout.has(SURGE, SWAY):
+            rates["x"] = u * cos(psi) - v * sin(psi) + inputs["V_N"]
+            rates["y"] = u * sin(psi) + v * cos(psi) + inputs["V_E"]
+        if layout.has(HEAVE):
+            rates["z"] = state["w"]
+        if layout.has(YAW):
+            rates["psi"] = r
+        steady = self.commanded(inputs)
+        for name in layout.lagging:
+            thruster = name.removeprefix("F_")
+            rates[name] = (steady[thruster] - state[name]) / self._lag(layout.curve_of[thruster])
+        return rates
+
+    def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
+        """The state after h > 0 seconds with the inputs held, exact up to rounding whatever the length of h."""
+        layout, steady = self.layout, self.commanded(inputs)
+        after = {}
+        for name in layout.lagging:
+            T, target = self._lag(layout.curve_of[name.removeprefix("F_")]), steady[name.removeprefix("F_")]
+            after[name] = state[name] + (state[name] - target) * expm1(-h / T)
+        names = [form.axis.velocity for form in layout.axes]
+        axes, velocities = self.axes(inputs, steady), [state[name] for name in names]
+        u, v, r = (names.index(name) if name in names else None for name in ("u", "v", "r"))
+        flow = series.Flow(axes, self._fades(steady, state), self.coupling, u, v, r)
+        moved = series.advance(flow, velocities, h)
+        if flow.is_free:  # the track alone has no closed form
+            ends = [motion.advance(velocity, h) for motion, velocity in zip(axes, velocities, strict=True)]
+            moved = series.Moved(*zip(*ends, strict=True), moved.track)
+        way = dict(zip(names, moved.distances, strict=True))
+        after |= zip(names, moved.velocities, strict=True)
+        track = moved.track * complex(cos(state.get("psi", 0.0)), sin(state.get("psi", 0.0)))
+        if layout.has(SURGE, SWAY):
+            after["x"] = state["x"] + track.real + inputs["V_N"] * h
+            after["y"] = state["y"] + track.imag + inputs["V_E"] * h
+        if layout.has(HEAVE):
+            after["z"] = state["z"] + way["w"]
+        if layout.has(YAW):
+            after["psi"] = state["psi"] + way["r"]
+        return {name: after[name] for name in layout.state}
+
+    def _lag(self, curve: Curve) -> float:
+        return self[curve.coefficient("T")]
+
+    def _fades(self, steady: Values, state: Values) -> tuple[series.Fade, ...]:
+        """What the lags leave of the forces from before, as acceleration of each axis."""
+        fades = []
+        for curve in (curve for curve in self.layout.curves if curve.has_lag):
+            late = {t.name: state[f"F_{t.name}"] - steady[t.name]
+                    for t in self.layout.thrusters if t.curve == curve.name}  # fmt: skip
+            accelerations = tuple(
+                self[form.axis.coefficient("alpha")]
+                * sum(self.effect(t, form.axis) * late[t.name] for t in self.layout.thrusters if t.name in late)
+                / self.effective_inertia(form)
+                for form in self.layout.axes
+            )
+            if any(accelerations):
+                fades.append(series.Fade(1.0 / self._lag(curve), accelerations))
+        return tuple(fades)
+
+    # ---- One axis alone ----
+
+    def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
+        """All inputs, with the commands that drive an axis at a fraction of full thrust."""
+        signs = self.layout.signs(axis)
+        return {name: command * signs.get(name, 0.0) for name in self.layout.inputs}
+
+    def force(self, axis: Axis, command: float) -> float:
+        """Thrust (N) or torque (N.m) along an axis before the tuning α, by (9), (10) and (4), once it is steady."""
+        F = self.commanded(self.held_inputs(axis, command))
+        return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
+
+    def held(self, axis: Axis, command: float) -> Riccati:
+        """The motion along an axis under a held command, (18), once the thrust is steady."""
+        return self.acceleration_of(self.layout.kinds[axis.name], self.force(axis, command))
+
+    def response(self, axis: Axis, command: float) -> tuple[float, float]:
+        """Signed V_ss, and Tau (17) in s from rest, in closed form."""
+        motion = self.held(axis, command)
+        return motion.steady_velocity(), motion.time_constant()

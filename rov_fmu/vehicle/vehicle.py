@@ -14,7 +14,9 @@ from rov_fmu.files.messages import FileError
 from rov_fmu.files.output import is_same
 from rov_fmu.files.places import FMU_SRC
 from rov_fmu.files.toml_file import Strict, beside, pair, read_checked
-from rov_fmu.motion.rov import COEFFICIENTS, Coefficients, Meta
+from rov_fmu.motion.layout import Layout, Meta
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.paper import PAPER
 
 TABLES = {
     "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
@@ -54,7 +56,8 @@ class Vehicle:
     version: str
     description: str
     source: str
-    coefficients: Coefficients
+    rov: Rov
+    """What it has, and its coefficients."""
     sources: Mapping[str, str]
     """Where each coefficient comes from."""
     command_range: tuple[float, float]
@@ -70,6 +73,11 @@ class Vehicle:
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """95 % confidence intervals of the coefficients that have one."""
     provenance: Provenance | None = None
+
+    @property
+    def layout(self) -> Layout:
+        """What it has."""
+        return self.rov.layout
 
     @property
     def files(self) -> list[Path]:
@@ -89,10 +97,10 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
     checked = read_checked(Path(path), _File, VehicleFileError, coming=coming)
     head = checked.vehicle
-    quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in COEFFICIENTS}
+    quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in PAPER.coefficients}
     return Vehicle(
         **{key: getattr(head, key) for key in Head.model_fields},
-        coefficients=Coefficients(**{name: q.value for name, q in quantities.items()}),
+        rov=Rov(PAPER, {name: q.value for name, q in quantities.items()}),
         sources={name: q.source for name, q in quantities.items()},
         command_range=checked.validity.command_range,
         alternatives=checked.alternatives,
@@ -149,7 +157,7 @@ def _quantity(name: str, meta: Meta) -> Any:
     return create_model(name, __base__=Quantity, **fields)
 
 
-QUANTITIES = {name: _quantity(name, meta) for name, meta in COEFFICIENTS.items()}
+QUANTITIES = {name: _quantity(name, meta) for name, meta in PAPER.coefficients.items()}
 _REQUIRED: dict[str, Any] = {name: (q, ...) for name, q in QUANTITIES.items()}
 _OPTIONAL: dict[str, Any] = {name: (q | None, None) for name, q in QUANTITIES.items()}
 _Coefficients = create_model("_Coefficients", __base__=Strict, **_REQUIRED)
@@ -164,7 +172,7 @@ class Alternative(_Some):  # type: ignore[misc, valid-type]
     @property
     def values(self) -> Mapping[str, float]:
         """By name."""
-        return {n: q.value for n in COEFFICIENTS if (q := getattr(self, n)) is not None}
+        return {n: q.value for n in PAPER.coefficients if (q := getattr(self, n)) is not None}
 
 
 def _identifier(text: str) -> str:

@@ -1,0 +1,16 @@
+"""What a vehicle of the paper has: surge, heave and yaw, a pair of rear thrusters and one on top."""
+
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Curve, Layout, Thruster, VehicleAxis
+
+PAPER = Layout(
+    axes=(VehicleAxis(SURGE), VehicleAxis(HEAVE), VehicleAxis(YAW)),
+    curves=(
+        Curve("rear", together=2, description="rear pair", equation="(9)"),
+        Curve("top", description="top thruster", equation="(10)"),
+    ),
+    thrusters=(
+        Thruster("l", "rear", (1.0, 0.0, 0.0), arm=1, description="left thruster"),
+        Thruster("r", "rear", (1.0, 0.0, 0.0), arm=-1, description="right thruster"),
+        Thruster("t", "top", (0.0, 0.0, 1.0), description="top thruster"),
+    ),
+)
