@@ -104,27 +104,33 @@ def _derivatives(layout: Layout) -> dict[str, tuple[Meta, dict[str, str]]]:
         known = {**_driving(layout, form), axis.external: "tunable", axis.velocity: "dependent"}
         if layout.coupled and axis is not HEAVE:
             known |= dict.fromkeys((SURGE.velocity, SWAY.velocity, YAW.velocity), "dependent")
-        found[axis.velocity] = Meta(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {axis.equations[1]}"), known
-    along = [axis.velocity for axis in (SURGE, SWAY) if layout.has(axis)]
-    turns = layout.has(YAW)
-    kind = dict.fromkeys([*along, "psi"] if turns else along, "dependent" if turns else "constant")
-    north, east = (_over_ground(layout, *words) for words in (("u cos ψ", "v sin ψ", "-"), ("u sin ψ", "v cos ψ", "+")))
-    if along:
-        found["x"] = Meta("m/s", f"Velocity over ground northward, {north} + V_N"), {"V_N": "constant"} | (
-            kind if turns or SURGE.velocity in along else {}
+        found[axis.velocity] = (
+            Meta(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {axis.equations[1]}"),
+            known,
         )
-        found["y"] = Meta("m/s", f"Velocity over ground eastward, {east} + V_E"), {"V_E": "constant"} | (
-            kind if turns or SWAY.velocity in along else {}
-        )
+    if layout.has(SURGE, SWAY):
+        found["x"] = _over_ground(layout, "northward", "V_N", {"u": "+ u cos ψ", "v": "- v sin ψ"})
+        found["y"] = _over_ground(layout, "eastward", "V_E", {"u": "+ u sin ψ", "v": "+ v cos ψ"})
     if layout.has(HEAVE):
         found["z"] = Meta("m/s", "Rate of change of depth, w"), {"w": "constant"}
-    if turns:
+    if layout.has(YAW):
         found["psi"] = Meta("rad/s", "Rate of change of heading, r"), {"r": "constant"}
     for thruster in layout.thrusters:
         if (name := f"F_{thruster.name}") in layout.lagging:
             commands = dict.fromkeys(layout.gains[thruster.name], "dependent")
             found[name] = Meta("N/s", f"Rate of change of {name}, (F(c) - F) / T"), {**commands, name: "fixed"}
     return found
+
+
+def _over_ground(layout: Layout, way: str, current: str, terms: Mapping[str, str]) -> tuple[Meta, dict[str, str]]:
+    """A horizontal velocity over ground: a term of each velocity; ψ is 0 without yaw."""
+    if layout.has(YAW):
+        known, terms = {"psi": "dependent"}, {v: term for v, term in terms.items() if v in layout.velocities}
+    else:
+        known, terms = {}, {v: f"+ {v}" for v, term in terms.items() if v in layout.velocities and "cos" in term}
+    known |= dict.fromkeys(terms, "dependent" if known else "constant")
+    words = " ".join([*terms.values(), f"+ {current}"]).removeprefix("+ ")
+    return Meta("m/s", f"Velocity over ground {way}, {words}"), {current: "constant", **known}
 
 
 def _coefficients_of_thrust(curve: Curve) -> list[str]:
@@ -169,18 +175,11 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
         own = [form.coefficient(key) for key in form.keys]
         names += [axis.inertia, *own, axis.coefficient("alpha"), axis.coefficient("beta")]
         if layout.coupled and axis is not HEAVE:
-            for other in (layout.kinds[a.name] for a in (SURGE, SWAY, YAW)):
+            for other in (layout.kinds[a.name] for a in (SURGE, SWAY)):
                 names += [other.axis.inertia, *(other.coefficient(key) for key in other.keys if key == "m_a"),
                           other.axis.coefficient("beta")]  # fmt: skip
         found[f"der({axis.velocity})"] = tuple(dict.fromkeys(names))
     return found
-
-
-def _over_ground(layout: Layout, ahead: str, aside: str, sign: str) -> str:
-    """A horizontal velocity over ground in words."""
-    words = [text if layout.has(YAW) else text.split()[0] * (function in text)
-             for axis, text, function in ((SURGE, ahead, "cos"), (SWAY, aside, "cos")) if layout.has(axis)]  # fmt: skip
-    return f" {sign} ".join(filter(None, words)) or "0"
 
 
 def variables(rov: Rov) -> tuple[Variable, ...]:

@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 
 from rov_fmu import __version__
-from rov_fmu.export.interface import LOG_CATEGORIES, PARAMETERS_OF, UNITS, Variable
+from rov_fmu.export.interface import LOG_CATEGORIES, UNITS, Variable, parameters_of
 from rov_fmu.files.templates import render
+from rov_fmu.motion.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 
 # What is false is written out too, for FMI++ ends where it is absent.
@@ -62,13 +63,13 @@ def model_description(
         experiment=_EXPERIMENT,
         variables=variables,
         index={v.name: v.index for v in variables},
-        structure=_structure(variables),
+        structure=_structure(variables, vehicle.layout),
     ).encode()
 
 
-def _structure(variables: tuple[Variable, ...]) -> dict[str, dict[int, dict[int, str]]]:
+def _structure(variables: tuple[Variable, ...], layout: Layout) -> dict[str, dict[int, dict[int, str]]]:
     """The lists of <ModelStructure>: by index of an unknown, the kinds of the knowns it depends on, by index."""
-    index = {v.name: v.index for v in variables}
+    index, parameters = {v.name: v.index for v in variables}, parameters_of(layout)
     lists: dict[str, dict[int, dict[int, str]]] = {"Outputs": {}, "Derivatives": {}, "InitialUnknowns": {}}
 
     def add(to: str, variable: Variable, known: Mapping[str, str]) -> None:
@@ -84,5 +85,5 @@ def _structure(variables: tuple[Variable, ...]) -> dict[str, dict[int, dict[int,
         if v.initial == "calculated":
             # Initialization knows no parameters that are fixed: a factor is constant or not (2.2.8).
             at_start = {n: "constant" if kind == "constant" else "dependent" for n, kind in v.dependencies.items()}
-            add("InitialUnknowns", v, at_start | dict.fromkeys(PARAMETERS_OF.get(v.name, ()), "dependent"))
+            add("InitialUnknowns", v, at_start | dict.fromkeys(parameters.get(v.name, ()), "dependent"))
     return lists
