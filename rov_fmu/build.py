@@ -8,7 +8,6 @@ from time import perf_counter
 
 from rov_fmu.export.archive import archive, native_content, python_content
 from rov_fmu.export.compile import PLATFORMS, BuildError, compile_all, host_platform
-from rov_fmu.export.interface import variables
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.files.output import Output, check_targets, write_whole
 from rov_fmu.pages.fmu_page import documentation
@@ -57,7 +56,7 @@ def build(
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}.fmu")
     beside = []
     if osp:
-        description = osp_model_description(variables(vehicle.coefficients))
+        description = osp_model_description(vehicle.layout)
         beside = [Output(osp_path(output, vehicle.identifier), description)]
     check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
     chosen = chosen_platforms(platforms) if native else []
@@ -73,7 +72,7 @@ def build(
     libraries = {f"binaries/{name}/{content.identifier}{PLATFORMS[name].suffix}": b for name, b in binaries.items()}
     packed = archive({**content.files, **libraries})
     notes: list[str] = []
-    draft = Output(output, packed, lambda path: notes.append(_check(path, chosen if native else None)))
+    draft = Output(output, packed, lambda path: notes.append(_check(path, vehicle, chosen if native else None)))
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
     return Built(output, len(packed), content.guid, sizes, seconds, notes[0], [other.path for other in beside])
@@ -91,7 +90,7 @@ def chosen_platforms(names: Sequence[str] | None) -> list[str]:
     return list(dict.fromkeys(host if name == "host" and host else name for name in names))
 
 
-def _check(path: Path, platforms: Sequence[str] | None) -> str:
+def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None) -> str:
     """Validate and run an FMU; what to tell. Raises BuildError."""
     import fmpy
     from fmpy.validation import validate_fmu
@@ -103,5 +102,10 @@ def _check(path: Path, platforms: Sequence[str] | None) -> str:
         return "valid; not run, for it has no binary that FMPy loads on this machine"
     with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
         fmpy.extract(str(path), unzipdir=folder)
-        result = fmpy.simulate_fmu(folder, start_values={"u_l": 0.3, "u_r": 0.3})
-    return f"valid; runs: u_l = u_r = 0.3 gives u = {result['u'][-1]:.4f} m/s after {result['time'][-1]:g} s"
+        axis = vehicle.layout.axes[0].axis
+        start = {name: 0.3 * sign for name, sign in vehicle.layout.signs(axis).items()}
+        result = fmpy.simulate_fmu(folder, start_values=start)
+    by_value = {value: " = ".join(name for name in start if start[name] == value) for value in start.values()}
+    commands = ", ".join(f"{names} = {value:g}" for value, names in by_value.items())
+    end = f"{axis.velocity} = {result[axis.velocity][-1]:.4f} {axis.unit} after {result['time'][-1]:g} s"
+    return f"valid; runs: {commands} gives {end}"

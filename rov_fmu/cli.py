@@ -15,7 +15,7 @@ from rov_fmu import __version__
 from rov_fmu.export.compile import PLATFORMS, BuildError
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.output import check_targets, write_whole
-from rov_fmu.motion.rov import AXES
+from rov_fmu.motion.layout import AXES
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
 
@@ -173,12 +173,14 @@ def _tune(
     if points is not None and (command, v_ss, tau) != (None, None, None):
         raise click.UsageError("tune: --points stands instead of --command, --v-ss and --tau")
     loaded, tested = load_vehicle(vehicle), AXES[axis]
+    if not loaded.layout.has(tested):
+        raise click.UsageError(f"tune: {vehicle}: --axis {axis}: the vehicle has only {', '.join(loaded.layout.kinds)}")
     check_targets(filter(None, (output,)), filter(None, (points,)))
     try:
         if points is not None:
-            tuning = tune_over(loaded.coefficients, tested, read_points(points, tested))
+            tuning = tune_over(loaded.rov, tested, read_points(points, tested))
         elif command is not None and v_ss is not None:
-            tuning = tune(loaded.coefficients, tested, command, v_ss, tau)
+            tuning = tune(loaded.rov, tested, command, v_ss, tau)
         else:
             raise click.UsageError("tune: give --command and --v-ss (and --tau), or --points")
     except TuningError as error:

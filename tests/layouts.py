@@ -47,11 +47,19 @@ LAYOUTS = {
         (Curve("rear", ("a_t", "b_t", "T"), together=2), Curve("top")),
         PAPER.thrusters,
     ),
-    "sway and yaw": Layout(_axes(SWAY, YAW), (Curve("bow"),), (Thruster("b", "bow", (0.0, 1.0, 0.0), (0.5, 0.0, 0.0)),)),
-    "surge and sway without yaw": Layout(
-        _axes(SURGE, SWAY, keys=_EVERY_KEY), (Curve("t200"),), (Thruster("a", "t200", (0.6, 0.8, 0.0), (0.0, 0.0, 0.1)),)
+    "sway and yaw": Layout(
+        _axes(SWAY, YAW), (Curve("bow"),), (Thruster("b", "bow", (0.0, 1.0, 0.0), (0.5, 0.0, 0.0)),)
     ),
-    "heave alone": Layout(_axes(HEAVE, keys=_EVERY_KEY), (Curve("top", ("a_t", "b_t", "T")),), (Thruster("t", "top", (0.0, 0.0, -1.0)),)),
+    "surge and sway without yaw": Layout(
+        _axes(SURGE, SWAY, keys=_EVERY_KEY),
+        (Curve("t200"),),
+        (Thruster("a", "t200", (0.6, 0.8, 0.0), (0.0, 0.0, 0.1)),),
+    ),
+    "heave alone": Layout(
+        _axes(HEAVE, keys=_EVERY_KEY),
+        (Curve("top", ("a_t", "b_t", "T")),),
+        (Thruster("t", "top", (0.0, 0.0, -1.0)),),
+    ),
 }  # fmt: skip
 
 _SIZES = {"m_rov": 13.5, "I_r": 0.37, "R": 0.22, "gamma": 0.42, "a_t": 29.3, "b_t": 31.5, "c_0": 0.087, "T": 0.15,

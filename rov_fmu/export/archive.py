@@ -36,12 +36,12 @@ class Content:
 
 def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
     """The FMU in C, for Co-Simulation and Model Exchange; `pages` go into it by their path."""
-    declared = variables(vehicle.coefficients)
+    declared = variables(vehicle.rov)
     sources = {path.name: path.read_text(encoding="utf-8") for path in sorted(C_SOURCES.iterdir())}
-    sources["model.h"] = model_header()
+    sources["model.h"] = model_header(vehicle.rov)
     describe = partial(model_description, vehicle, declared, interfaces=NATIVE, source_files=(UNITY_FILE,))
     guid = _guid(describe(guid=""), sources)
-    sources["interface.h"] = interface_header(declared, vehicle.identifier, guid)
+    sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid)
     files = {"documentation/licenses/fmi-headers.txt": _fmi_license()}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     return Content(vehicle.identifier, guid, {**_common_files(vehicle, describe(guid=guid)), **pages, **files}, sources)
@@ -49,7 +49,7 @@ def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
 
 def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
     """The FMU in pure Python, for Co-Simulation."""
-    declared = variables(vehicle.coefficients)
+    declared = variables(vehicle.rov)
     sources = python_sources(vehicle, declared)
     describe = partial(model_description, vehicle, declared, interfaces=PYTHON)
     guid = _guid(describe(guid=""), sources)

@@ -28,6 +28,7 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
     declaration = {
         "identifier": vehicle.identifier,
         "log_categories": LOG_CATEGORIES,
+        "layout": asdict(vehicle.layout),
         "variables": [asdict(v) for v in variables],
     }
     return {

@@ -12,12 +12,25 @@ from typing import Any
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.motion import rov
+from rov_fmu.motion import layout, rov
 
-_INPUTS = len(rov.Inputs.__dataclass_fields__)
-_STATE = _INPUTS + len(rov.State.__dataclass_fields__)
-_DERIVATIVE = _STATE + _STATE - _INPUTS
-_THRUST = _DERIVATIVE + len(rov.Thrust.__dataclass_fields__)
+
+def layout_of(given: Any) -> layout.Layout:
+    """What a vehicle has, from what dataclasses.asdict makes of it, by way of JSON."""
+    axes, curves, thrusters = (
+        [
+            {key: tuple(value) if isinstance(value, list) else value for key, value in part.items()}
+            for part in given[kind]
+        ]
+        for kind in ("axes", "curves", "thrusters")
+    )
+    return layout.Layout(
+        tuple(layout.VehicleAxis(layout.AXES[form["axis"]["name"]], form["keys"]) for form in axes),
+        tuple(layout.Curve(**curve) for curve in curves),
+        tuple(layout.Thruster(**thruster) for thruster in thrusters),
+        given["mix"],
+        given["coupled"],
+    )
 
 
 def _time_tolerance(t: float, h: float) -> float:
@@ -34,6 +47,10 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.modelName = declaration["identifier"]
         self.log_categories = declaration["log_categories"]
         self.declared: list[dict[str, Any]] = declaration["variables"]
+        self.layout = layout_of(declaration["layout"])
+        inputs, states = len(self.layout.inputs), len(self.layout.state)
+        self.states = slice(inputs, inputs + states)
+        self.calculated = slice(inputs + states, inputs + 2 * states + len(self.layout.thrust))
         self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
         self.time = 0.0
         self.stop_time: float | None = None
@@ -61,7 +78,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         """Set all values, or none where one is refused."""
         for reference, value in zip(references, values, strict=True):
             v = self.declared[reference]
-            if _STATE <= reference < _THRUST:
+            if self._is_calculated(reference):
                 raise ValueError(f"{v['name']} is calculated and must not be set")
             parameter = v["causality"] == "parameter"
             if not isfinite(value) or (parameter and not v["minimum"] <= value <= v["maximum"]):
@@ -78,10 +95,10 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
 
     def get_real(self, references: list[int]) -> list[float]:
         """Values, the calculated ones from the others."""
-        if any(_STATE <= reference < _THRUST for reference in references):
-            k, inputs, state = self._model()
-            rates, thrust = rov.derivatives(k, inputs, state), rov.thrust(k, inputs)
-            self.values[_STATE:_THRUST] = [*vars(rates).values(), *vars(thrust).values()]
+        if any(map(self._is_calculated, references)):
+            model, inputs, state = self._model()
+            rates, thrust = model.derivatives(inputs, state), model.thrust(inputs, state)
+            self.values[self.calculated] = [*rates.values(), *thrust.values()]
         return [self.values[reference] for reference in references]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -93,13 +110,14 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         if self.stop_time is not None and end > self.stop_time + _time_tolerance(self.stop_time, step_size):
             self.log(f"a step of {step_size!r} s passes the stop time {self.stop_time!r}.", Fmi2Status.error)
             return False
-        after = list(vars(rov.step(*self._model(), step_size)).values())
+        model, inputs, state = self._model()
+        after = list(model.step(inputs, state, step_size).values())
         if not all(map(isfinite, after)):
             self.log(f"the motion overflows within {step_size!r} s.", Fmi2Status.error)
             return False
         if abs(current_time - self.time) > _time_tolerance(self.time, step_size):
             self._warn_once("time", f"the step from t = {current_time!r} does not begin at t = {self.time!r}")
-        self.values[_INPUTS:_STATE], self.time = after, end
+        self.values[self.states], self.time = after, end
         return True
 
     def _warn_once(self, what: int | str, text: str) -> None:
@@ -107,11 +125,16 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             self.warned.add(what)
             self.log(f"{text}; said once.", Fmi2Status.warning)
 
-    def _model(self) -> tuple[rov.Coefficients, rov.Inputs, rov.State]:
+    def _is_calculated(self, reference: int) -> bool:
+        return self.calculated.start <= reference < self.calculated.stop
+
+    def _model(self) -> tuple[rov.Rov, dict[str, float], dict[str, float]]:
+        """The vehicle, its inputs and its state."""
+        inputs, states, k = self.layout.inputs, self.layout.state, self.layout.coefficients
         return (
-            rov.Coefficients(*self.values[_THRUST:]),
-            rov.Inputs(*self.values[:_INPUTS]),
-            rov.State(*self.values[_INPUTS:_STATE]),
+            rov.Rov(self.layout, dict(zip(k, self.values[self.calculated.stop :], strict=True))),
+            dict(zip(inputs, self.values, strict=False)),
+            dict(zip(states, self.values[self.states], strict=True)),
         )
 
     def _get_fmu_state(self) -> dict[str, Any]:
