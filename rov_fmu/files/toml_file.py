@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo
 from pydantic_core import ErrorDetails
@@ -17,23 +17,39 @@ else:
 
 
 class Strict(BaseModel):
-    """A table of a TOML file: no keys but these, no number in quotes."""
+    """A table of a TOML file: no keys but these, no number in quotes. Docstrings are what an editor shows."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True)
 
 
 Checked = TypeVar("Checked", bound=Strict)
+Toml = dict[str, Any]
 
 
 def read_checked(path: Path, model: type[Checked], failure: type[FileError], **context: object) -> Checked:
     """Read a TOML file of the given form; `folder` and what else is given is the context. Raises `failure`."""
+    data = read_toml(path, failure)
+    checked, problems = check(data, model, folder=path.parent, **context)
+    if checked is None:
+        raise failure(*(f"{path}: {told(problem, data)}" for problem in problems))
+    return checked
+
+
+def read_toml(path: Path, failure: type[FileError]) -> Toml:
+    """Read a TOML file of any form. Raises `failure`."""
     text = read_text(path, failure)
     try:
-        return model.model_validate(tomllib.loads(text), context={"folder": path.parent, **context})
-    except ValidationError as error:
-        raise failure(*(f"{path}: {_problem(problem)}" for problem in error.errors())) from error
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise failure(f"{path}: not TOML: {brief(str(error))}") from error
+
+
+def check(data: Toml, model: type[Checked], **context: object) -> tuple[Checked | None, list[ErrorDetails]]:
+    """The data in the given form, or every problem with them."""
+    try:
+        return model.model_validate(data, context=context), []
+    except ValidationError as error:
+        return None, error.errors()
 
 
 def pair(value: object) -> object:
@@ -46,9 +62,9 @@ def beside(name: str, info: ValidationInfo) -> Path:
     return Path((info.context or {})["folder"], name)
 
 
-def _problem(problem: ErrorDetails) -> str:
+def told(problem: ErrorDetails, data: Toml) -> str:
     """A problem of the file in one line: key, value, what is allowed."""
-    key = brief(".".join(map(str, problem["loc"])))
+    key = brief(_key(problem["loc"], data))
     match problem["type"]:
         case "missing":
             return f"{key}: this key is missing"
@@ -59,3 +75,21 @@ def _problem(problem: ErrorDetails) -> str:
     reason = problem["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
     of_table = problem["type"] == "value_error" and isinstance(problem["input"], dict)
     return f"{key}: {reason}" if of_table else f"{key} = {shown(problem['input'])}: {reason}"
+
+
+def _key(place: tuple[int | str, ...], data: Any) -> str:
+    """A place in the file; an entry of a list of tables by its name, or else by its number from 1."""
+    words = ""
+    for step in place:
+        if step == "[key]":  # pydantic's word for a problem with a key itself
+            continue
+        try:
+            data = data[step]
+        except (LookupError, TypeError):
+            data = None
+        if isinstance(step, int) and isinstance(data, dict):
+            name = data.get("name")
+            words += f".{name}" if isinstance(name, str) else f"#{step + 1}"
+        else:
+            words += f".{step}"
+    return words.removeprefix(".")

@@ -8,7 +8,7 @@ surge is a_d_u, a_t_reverse of the curve t200 is a_t_t200_reverse.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, sin
 
@@ -131,6 +131,8 @@ TUNING = {
     "beta": Kind("1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}", 0.0, 1e3, False, True),
 }
 """1 where the file does not give it."""
+LEAST_BETA = 1e-3
+"""Of axes that are coupled."""
 
 
 # ---- What a vehicle has ----------------------------------------------------------------------------------------------
@@ -271,10 +273,14 @@ class Layout:
             words = {"curve": curve.description or f"curve {curve.name}", "equation": curve.equation}
             found |= {curve.coefficient(key): kind.meta(**words) for key, kind in CURVE.items() if key in curve.keys}
         for form in self.axes:
-            words = _words(form.axis)
-            found |= {form.coefficient(key): kind.meta(**words) for key, kind in AXIS.items() if key in form.keys}
+            metas = metas_of(form.axis)
+            found |= {form.coefficient(key): metas[key] for key in AXIS if key in form.keys}
         for form in self.axes:
-            found |= {form.axis.coefficient(key): kind.meta(**_words(form.axis)) for key, kind in TUNING.items()}
+            metas = metas_of(form.axis)
+            found |= {form.axis.coefficient(key): metas[key] for key in TUNING}
+        if self.coupled:  # the effective inertia m/β of each must be finite
+            for beta in (axis.coefficient("beta") for axis in (SURGE, SWAY, YAW)):
+                found[beta] = replace(found[beta], minimum=LEAST_BETA)
         return found
 
     @cached_property
@@ -351,12 +357,13 @@ class Layout:
         return tuple(curve for curve in self.curves if curve.name in driving)
 
 
-def _words(axis: Axis) -> dict[str, str]:
-    """What stands in the unit and the words of a coefficient of an axis."""
+def metas_of(axis: Axis) -> dict[str, Meta]:
+    """Every coefficient that an axis can have, by its key."""
     drag, motion = axis.equations
-    return {"axis": axis.name, "velocity": axis.velocity, "push": axis.push, "drag": drag, "motion": motion,
+    words = {"axis": axis.name, "velocity": axis.velocity, "push": axis.push, "drag": drag, "motion": motion,
             "load": axis.load, "length": axis.position_unit, "inertia": BODY[axis.inertia].unit,
             "positive": axis.positive, "negative": axis.negative}  # fmt: skip
+    return {key: kind.meta(**words) for key, kind in (AXIS | TUNING).items()}
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -14,3 +14,6 @@ PAPER = Layout(
         Thruster("t", "top", (0.0, 0.0, 1.0), description="top thruster"),
     ),
 )
+_SOURCE = "the form of the paper's vehicle: two rear thrusters ahead, one down"
+PAPER_SOURCES = {thruster.name: {"direction": _SOURCE} for thruster in PAPER.thrusters}
+"""Where the directions of its thrusters come from."""

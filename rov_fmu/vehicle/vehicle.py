@@ -1,22 +1,24 @@
 """Vehicle file (TOML) to `Vehicle`, checked: every number has its unit and source, and lies within its bounds."""
 
-import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, create_model
+from typing import Any
 
 from rov_fmu.files.messages import FileError
-from rov_fmu.files.output import is_same
 from rov_fmu.files.places import FMU_SRC
-from rov_fmu.files.toml_file import Strict, beside, pair, read_checked
-from rov_fmu.motion.layout import Layout, Meta
+from rov_fmu.files.toml_file import Toml, check, read_toml, told
+from rov_fmu.motion.layout import Layout
 from rov_fmu.motion.rov import Rov
-from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.first import QUANTITIES as QUANTITIES
+from rov_fmu.vehicle.first import FirstFile, quantities
+from rov_fmu.vehicle.form import Head as Head
+from rov_fmu.vehicle.form import Validity as Validity
+from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
+from rov_fmu.vehicle.quantity import Finite as Finite
+from rov_fmu.vehicle.quantity import Quantity as Quantity
+from rov_fmu.vehicle.schema import UNTUNED, File, where
+from rov_fmu.vehicle.sense import as_far_as_readable, nonsense
 
 TABLES = {
     "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
@@ -47,6 +49,16 @@ class Provenance:
 
 
 @dataclass(frozen=True)
+class Alternative:
+    """Some coefficients that may stand in for the ones used."""
+
+    description: str
+    values: Mapping[str, float]
+    """By name."""
+    sources: Mapping[str, str]
+
+
+@dataclass(frozen=True)
 class Vehicle:
     """An identified ROV."""
 
@@ -62,7 +74,7 @@ class Vehicle:
     """Where each coefficient comes from."""
     command_range: tuple[float, float]
     """Thruster commands over which the model was identified."""
-    alternatives: Mapping[str, "Alternative"]
+    alternatives: Mapping[str, Alternative]
     """Coefficients published beside the ones used."""
     data: Path | None
     """The folder with the published tables."""
@@ -73,6 +85,8 @@ class Vehicle:
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """95 % confidence intervals of the coefficients that have one."""
     provenance: Provenance | None = None
+    thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=lambda: PAPER_SOURCES)
+    """Where `direction` and `position` of each thruster come from, by its name."""
 
     @property
     def layout(self) -> Layout:
@@ -95,159 +109,65 @@ class Vehicle:
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
-    checked = read_checked(Path(path), _File, VehicleFileError, coming=coming)
-    head = checked.vehicle
-    quantities: dict[str, Quantity] = {name: getattr(checked.coefficients, name) for name in PAPER.coefficients}
+    path = Path(path)
+    data = read_toml(path, VehicleFileError)
+    context = {"folder": path.parent, "coming": coming}
+    if "format" in data or "thruster" in data:
+        return _second(path, data, context)
+    first, problems = check(data, FirstFile, **context)
+    if first is None:
+        raise VehicleFileError(*(f"{path}: {told(problem, data)}" for problem in problems))
+    found = quantities(first.coefficients)
+    alternatives = {name: _alternative(a.description, quantities(a)) for name, a in first.alternatives.items()}
+    return _vehicle(path, first, PAPER, found, alternatives)
+
+
+def _second(path: Path, data: Toml, context: Mapping[str, object]) -> Vehicle:
+    """The second version of the file."""
+    file, problems = check(data, File, **context)
+    mistakes = [told(problem, data) for problem in problems]
+    mistakes += nonsense(*as_far_as_readable(data, problems, context), data)
+    if file is None or mistakes:
+        raise VehicleFileError(*(f"{path}: {mistake}" for mistake in mistakes))
+    found: dict[str, Quantity | None] = {}
+    for name, (top, *keys) in where(file.layout):
+        found[name] = getattr(file, top)
+        for key in keys:
+            table: Any = found[name]
+            found[name] = table[key] if isinstance(table, dict) else getattr(table, key)
+    alternatives = {name: _alternative(a.description, a.quantities) for name, a in file.alternatives.items()}
+    thruster_sources = {
+        t.name: {"direction": t.direction.source} | ({"position": t.position.source} if t.position else {})
+        for t in file.thruster
+    }
+    return _vehicle(path, file, file.layout, found, alternatives, thruster_sources)
+
+
+def _alternative(description: str, found: Mapping[str, Quantity]) -> Alternative:
+    values = {name: q.value for name, q in found.items()}
+    return Alternative(description, values, {name: q.source for name, q in found.items()})
+
+
+def _vehicle(
+    path: Path,
+    file: FirstFile | File,
+    layout: Layout,
+    found: Mapping[str, Quantity | None],
+    alternatives: Mapping[str, Alternative],
+    thruster_sources: Mapping[str, Mapping[str, str]] = PAPER_SOURCES,
+) -> Vehicle:
+    head, made = file.vehicle, file.provenance
+    words = {key: getattr(made, key) for key in ("tool", "method", "inputs", "warnings")} if made else {}
     return Vehicle(
         **{key: getattr(head, key) for key in Head.model_fields},
-        rov=Rov(PAPER, {name: q.value for name, q in quantities.items()}),
-        sources={name: q.source for name, q in quantities.items()},
-        command_range=checked.validity.command_range,
-        alternatives=checked.alternatives,
+        rov=Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()}),
+        sources={name: q.source if q else "not given" for name, q in found.items()},
+        command_range=file.validity.command_range,
+        alternatives=alternatives,
         data=path.parent / head.data if head.data else None,
         pictures=path.parent / head.pictures if head.pictures else None,
-        limits=checked.validity.limits,
-        intervals={name: q.interval for name, q in quantities.items() if q.interval},
-        provenance=checked.provenance.plain(path.parent) if checked.provenance else None,
+        limits=file.validity.limits,
+        intervals={name: q.interval for name, q in found.items() if q and q.interval},
+        provenance=Provenance(**words, report=made.report_in(path.parent)) if made else None,
+        thruster_sources=thruster_sources,
     )
-
-
-def _printable(text: str) -> str:
-    if found := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
-        raise ValueError(f"must be without the control character {found[0]!a}")
-    return text
-
-
-_Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_printable)]
-_Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"), AfterValidator(_printable)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-Interval = Annotated[tuple[Finite, Finite], BeforeValidator(pair)]
-"""[low, high] in a TOML file."""
-
-
-def _encloses(interval: tuple[float, float], info: ValidationInfo) -> tuple[float, float]:
-    if not interval[0] <= (value := info.data.get("value", interval[0])) <= interval[1]:
-        raise ValueError(f"must be [low, high] around the value {value}")
-    return interval
-
-
-class Quantity(Strict):
-    """The value of a coefficient, and its 95 % confidence interval if it has one."""
-
-    value: float
-    unit: str
-    source: _Text
-    interval: Annotated[Interval, AfterValidator(_encloses)] | None = None
-
-
-def _quantity(name: str, meta: Meta) -> Any:
-    """A quantity in the unit and within the bounds of its coefficient."""
-
-    def within(value: float) -> float:
-        if not meta.minimum <= value <= meta.maximum:
-            raise ValueError(f"must be within {meta.minimum:g} ... {meta.maximum:.12g} {meta.unit}")
-        return value
-
-    fields: dict[str, Any] = {
-        "value": (Annotated[Finite, AfterValidator(within)], ...),
-        "unit": (Literal[meta.unit], ...),
-    }
-    return create_model(name, __base__=Quantity, **fields)
-
-
-QUANTITIES = {name: _quantity(name, meta) for name, meta in PAPER.coefficients.items()}
-_REQUIRED: dict[str, Any] = {name: (q, ...) for name, q in QUANTITIES.items()}
-_OPTIONAL: dict[str, Any] = {name: (q | None, None) for name, q in QUANTITIES.items()}
-_Coefficients = create_model("_Coefficients", __base__=Strict, **_REQUIRED)
-_Some = create_model("_Some", __base__=Strict, **_OPTIONAL)
-
-
-class Alternative(_Some):  # type: ignore[misc, valid-type]
-    """Some coefficients that may stand in for the ones used."""
-
-    description: _Text
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """By name."""
-        return {n: q.value for n in PAPER.coefficients if (q := getattr(self, n)) is not None}
-
-
-def _identifier(text: str) -> str:
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,99}", text):
-        raise ValueError("must be a C identifier: at most 100 letters, digits and underscores, no digit first")
-    return text
-
-
-_Command = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class Head(Strict):
-    """What a vehicle is called and where it comes from."""
-
-    name: _Name
-    identifier: Annotated[str, AfterValidator(_identifier)]
-    version: _Name
-    description: _Text
-    source: _Text
-
-
-def _folder(name: str, info: ValidationInfo) -> str:
-    if not os.path.isdir(beside(name, info)):  # noqa: PTH112 (Path.is_dir raises on names that cannot be)
-        raise ValueError("there is no such folder beside the file")
-    return name
-
-
-_Folder = Annotated[str, AfterValidator(_folder)]
-
-
-class _FileHead(Head):
-    data: _Folder | None = None
-    pictures: _Folder | None = None
-
-
-def _below(low: float, info: ValidationInfo) -> float:
-    if low >= (high := info.data.get("command_max", inf)):
-        raise ValueError(f"must be less than command_max = {high}")
-    return low
-
-
-class Validity(Strict):
-    """Thruster commands over which the model holds."""
-
-    command_max: _Command
-    command_min: Annotated[_Command, AfterValidator(_below)]
-    limits: Annotated[tuple[_Text, ...], BeforeValidator(pair)] = ()
-
-    @property
-    def command_range(self) -> tuple[float, float]:
-        """From the weakest to the strongest."""
-        return self.command_min, self.command_max
-
-
-def _report(name: str, info: ValidationInfo) -> str:
-    path, coming = beside(name, info), (info.context or {})["coming"]
-    if not (os.path.isfile(path) or (coming and is_same(path, coming))):  # noqa: PTH113 (as above)
-        raise ValueError("there is no such file beside this one")
-    return name
-
-
-class _Provenance(Strict):
-    tool: _Text
-    method: _Text
-    inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
-    warnings: Annotated[tuple[_Text, ...], BeforeValidator(pair)] = ()
-    report: Annotated[_Text, AfterValidator(_report)] | None = None
-
-    def plain(self, folder: Path) -> Provenance:
-        return Provenance(**dict(self) | {"report": folder / self.report if self.report else None})
-
-
-class _File(Strict):
-    vehicle: _FileHead
-    validity: Validity
-    coefficients: _Coefficients  # type: ignore[valid-type]
-    alternatives: dict[str, Alternative] = Field(default={})
-    provenance: _Provenance | None = None

@@ -1,0 +1,105 @@
+"""The tables that are the same in every version of the vehicle file: [vehicle], [validity], [provenance]."""
+
+import os
+import re
+from math import inf
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+
+from rov_fmu.files.output import is_same
+from rov_fmu.files.toml_file import Strict, beside, pair
+from rov_fmu.vehicle.quantity import Name, Text
+
+
+def _identifier(text: str) -> str:
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,99}", text):
+        raise ValueError("must be a C identifier: at most 100 letters, digits and underscores, no digit first")
+    return text
+
+
+class Head(Strict):
+    """What a vehicle is called and where it comes from."""
+
+    name: Name
+    """For people; at most 100 characters."""
+    identifier: Annotated[str, AfterValidator(_identifier)]
+    """A C identifier: modelIdentifier and modelName of the FMU, and its file name."""
+    version: Name
+    """Of the vehicle; goes into the FMU."""
+    description: Text
+    """One sentence; goes into the FMU."""
+    source: Text
+    """Who identified it, where it is published; the FMU's author."""
+
+
+def _folder(name: str, info: ValidationInfo) -> str:
+    if not os.path.isdir(beside(name, info)):  # noqa: PTH112 (Path.is_dir raises on names that cannot be)
+        raise ValueError("there is no such folder beside the file")
+    return name
+
+
+_Folder = Annotated[str, AfterValidator(_folder)]
+
+
+class FileHead(Head):
+    """What a vehicle is called, where it comes from, and the folders beside its file."""
+
+    data: _Folder | None = None
+    """A folder beside the file with the published tables, as `rov-fmu tables` prints them; its files are named and
+    headed as those of `models/videoray/tables`."""
+    pictures: _Folder | None = None
+    """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`; for each
+    that is not there a neutral one is drawn."""
+
+
+_Command = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+def _below(low: float, info: ValidationInfo) -> float:
+    if low >= (high := info.data.get("command_max", inf)):
+        raise ValueError(f"must be less than command_max = {high}")
+    return low
+
+
+class Validity(Strict):
+    """Thruster commands over which the model holds."""
+
+    command_max: _Command
+    """Strongest thruster command over which the model was identified, a fraction of full thrust."""
+    command_min: Annotated[_Command, AfterValidator(_below)]
+    """Weakest one."""
+    limits: Annotated[tuple[Text, ...], BeforeValidator(pair)] = ()
+    """What was found of this vehicle that the model leaves out, in sentences; they stand in the FMU's documentation."""
+
+    @property
+    def command_range(self) -> tuple[float, float]:
+        """From the weakest to the strongest."""
+        return self.command_min, self.command_max
+
+
+def _report(name: str, info: ValidationInfo) -> str:
+    path, coming = beside(name, info), (info.context or {})["coming"]
+    if not (os.path.isfile(path) or (coming and is_same(path, coming))):  # noqa: PTH113 (as above)
+        raise ValueError("there is no such file beside this one")
+    return name
+
+
+class Made(Strict):
+    """What made the file, as `rov-fmu identify` writes it; a file written by hand needs none."""
+
+    tool: Text
+    """What made the file."""
+    method: Text
+    """How."""
+    inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
+    """File name to SHA-256 of every input."""
+    warnings: Annotated[tuple[Text, ...], BeforeValidator(pair)] = ()
+    """What the data do not determine, in sentences."""
+    report: Annotated[Text, AfterValidator(_report)] | None = None
+    """The report, a file beside this one; a build puts it into the FMU."""
+
+    def report_in(self, folder: Path) -> Path | None:
+        """The path of the report."""
+        return folder / self.report if self.report else None

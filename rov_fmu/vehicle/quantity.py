@@ -1,0 +1,71 @@
+"""What tables of every version are made of: words, names, and values with their unit and source."""
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, create_model
+
+from rov_fmu.files.toml_file import Strict, pair
+from rov_fmu.motion.layout import Meta
+
+
+def _printable(text: str) -> str:
+    if found := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
+        raise ValueError(f"must be without the control character {found[0]!a}")
+    return text
+
+
+Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_printable)]
+Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"), AfterValidator(_printable)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _symbol(text: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9_]{1,30}", text):
+        raise ValueError("must be at most 30 letters, digits and underscores")
+    return text
+
+
+Symbol = Annotated[str, AfterValidator(_symbol), WithJsonSchema({"type": "string", "pattern": "^[A-Za-z0-9_]{1,30}$"})]
+"""A part of the names of FMU variables."""
+
+Interval = Annotated[
+    tuple[Finite, Finite],
+    BeforeValidator(pair),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
+]
+"""[low, high] in a TOML file."""
+
+
+def _encloses(interval: tuple[float, float], info: ValidationInfo) -> tuple[float, float]:
+    if not interval[0] <= (value := info.data.get("value", interval[0])) <= interval[1]:
+        raise ValueError(f"must be [low, high] around the value {value}")
+    return interval
+
+
+class Quantity(Strict):
+    """The value of a coefficient, and its 95 % confidence interval if it has one."""
+
+    value: float
+    unit: str
+    source: Text
+    """Where the value comes from."""
+    interval: Annotated[Interval, AfterValidator(_encloses)] | None = None
+    """95 % confidence: [low, high] around the value."""
+
+
+def within(value: float, meta: Meta) -> float:
+    """The value, if it is within the bounds of its coefficient."""
+    if not meta.minimum <= value <= meta.maximum:
+        raise ValueError(f"must be within {meta.minimum:g} ... {meta.maximum:.12g} {meta.unit}")
+    return value
+
+
+def quantity(name: str, meta: Meta) -> Any:
+    """A quantity in the unit and within the bounds of its coefficient."""
+    bounds = {"type": "number", "minimum": meta.minimum, "maximum": meta.maximum}
+    fields: dict[str, Any] = {
+        "value": (Annotated[Finite, AfterValidator(lambda value: within(value, meta)), WithJsonSchema(bounds)], ...),
+        "unit": (Literal[meta.unit], ...),
+    }
+    return create_model(name, __base__=Quantity, __doc__=meta.description, **fields)

@@ -1,0 +1,235 @@
+"""The vehicle file: every table and key, made of the kinds of coefficients that a vehicle can have."""
+
+from collections.abc import Iterator, Mapping
+from math import hypot
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, create_model
+
+from rov_fmu.files.toml_file import Strict, pair
+from rov_fmu.motion import layout
+from rov_fmu.motion.layout import ARM, AXES, AXIS, BODY, CURVE, TUNING, Axis, Kind, Layout, Meta, VehicleAxis
+from rov_fmu.vehicle.form import FileHead, Made, Validity
+from rov_fmu.vehicle.quantity import Finite, Name, Quantity, Symbol, Text, quantity
+
+FORMAT = 2
+UNTUNED = 1.0
+"""α and β where the file does not give them."""
+MOST = 32
+"""Thrusters, curves, inputs: more than any vehicle has."""
+
+
+def _coefficients(name: str, metas: Mapping[str, Meta], kinds: Mapping[str, Kind] | None = None) -> Any:
+    """A table with a coefficient a key; those are needed that are needed by their kind, if these are given."""
+    fields: dict[str, Any] = {}
+    for key, meta in metas.items():
+        form = quantity(f"{name}_{key}", meta)
+        if kinds and key in kinds and kinds[key].needed:
+            fields[key] = (form, Field(description=meta.description))
+        else:
+            fields[key] = (form | None, Field(None, description=meta.description))
+    return create_model(f"_{name}", __base__=Strict, **fields)
+
+
+def given(table: Strict, kinds: Mapping[str, Kind]) -> dict[str, Quantity]:
+    """The coefficients that a table of the file gives, by key."""
+    return {key: q for key in kinds if (q := getattr(table, key)) is not None}
+
+
+# ---- Body, arm, curves, axes -----------------------------------------------------------------------------------------
+
+
+class Body(_coefficients("Body", {key: kind.meta() for key, kind in BODY.items()})):  # type: ignore[misc]
+    """Mass, needed for surge, sway and heave, and moment of inertia, needed for yaw."""
+
+    coupling: bool = False
+    """Whether surge, sway and yaw are coupled: Coriolis and Munk terms of a diagonal mass matrix."""
+
+
+class Arm(_coefficients("Arm", {key: kind.meta() for key, kind in ARM.items()}, ARM)):  # type: ignore[misc]
+    """The arm R sin γ of the thrusters that say `arm`, (4)."""
+
+
+_CURVE = {key: kind.meta(curve="curve", equation="(2)") for key, kind in CURVE.items()}
+
+
+class Curve(_coefficients("Curve", _CURVE, CURVE)):  # type: ignore[misc]
+    """A thrust curve: a_t m² + b_t m, m the command beyond the dead band. In reverse it is mirrored, unless it has
+    coefficients of its own there."""
+
+    description: Name | None = None
+    """Words for what has this curve: "rear pair"."""
+    equation: Name = "(2)"
+    """Where the curve is published."""
+    together: Annotated[int, Field(ge=1, le=MOST)] = 1
+    """How many thrusters gave the force together when the curve was measured."""
+
+
+_axes: dict[str, Any] = {
+    axis.name: (_coefficients(axis.name.capitalize(), layout.metas_of(axis), AXIS) | None, None)
+    for axis in AXES.values()
+}
+
+
+class Axes(create_model("_Axes", __base__=Strict, **_axes)):  # type: ignore[misc]
+    """The axes that the vehicle has."""
+
+
+# ---- Thrusters -------------------------------------------------------------------------------------------------------
+
+
+_FARTHEST = 100.0  # m, from the centre of mass
+
+
+def _vector(vector: object) -> object:
+    if isinstance(vector, list) and len(vector) != 3:
+        raise ValueError("must be three numbers: forward, starboard, down")
+    return pair(vector)
+
+
+def _near(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    if max(map(abs, vector)) > _FARTHEST:
+        raise ValueError(f"must be within -{_FARTHEST:g} ... {_FARTHEST:g} m")
+    return vector
+
+
+def _some_length(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not 1e-6 <= hypot(*vector) <= 1e6:
+        raise ValueError("must have a length, from 1e-6 to 1e6")
+    return vector
+
+
+_Vector = Annotated[
+    tuple[Finite, Finite, Finite],
+    BeforeValidator(_vector),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}),
+]
+
+
+class Direction(Strict):
+    """Of a positive force."""
+
+    value: Annotated[_Vector, AfterValidator(_some_length)]
+    """Forward, starboard, down; of any length but zero."""
+    source: Text
+    """Where it comes from."""
+
+
+class Position(Strict):
+    """From the centre of mass."""
+
+    value: Annotated[_Vector, AfterValidator(_near)]
+    """Forward, starboard, down."""
+    unit: Literal["m"]
+    source: Text
+    """Where it comes from."""
+
+
+class Thruster(Strict):
+    """A thruster: its curve and its place."""
+
+    name: Symbol
+    """Of its command u_<name> and its force F_<name> in the FMU."""
+    description: Name | None = None
+    """Words for it: "left thruster"."""
+    curve: str
+    """Name of its curve."""
+    direction: Direction
+    """Of its force at a positive command."""
+    position: Position | None = None
+    """From the centre of mass; needed for yaw unless it says `arm` or acts straight up or down."""
+    arm: Literal["port", "starboard"] | None = None
+    """Instead of a position: the side of a thruster that pushes ahead with the arm R sin γ, (4)."""
+
+    def plain(self) -> layout.Thruster:
+        """As the mathematics takes it."""
+        x, y, z = self.direction.value
+        length = hypot(x, y, z)
+        return layout.Thruster(
+            self.name,
+            self.curve,
+            (x / length, y / length, z / length),
+            self.position.value if self.position else None,
+            {None: 0, "port": 1, "starboard": -1}[self.arm],
+            self.description or "",
+        )
+
+
+# ---- The file --------------------------------------------------------------------------------------------------------
+
+
+class Alternative(Strict, extra="allow"):
+    """Coefficients published beside the ones used, by their names in the FMU: a_t_rear, a_d_u, ... They go into the
+    documentation, not into the model."""
+
+    __pydantic_extra__: dict[str, Quantity]
+    description: Text
+    """What they are."""
+
+    @property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """By name."""
+        return self.__pydantic_extra__
+
+
+_Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
+
+
+class Parts(Strict):
+    """A vehicle file as far as it could be read."""
+
+    format: Literal[2] | None = None
+    """Version of the form of this file."""
+    vehicle: FileHead | None = None
+    validity: Validity | None = None
+    body: Body | None = None
+    arm: Arm | None = None
+    curves: dict[Symbol, Curve] = Field(default={}, max_length=MOST)
+    """By name, which stands in the names of their coefficients: a_t_<name>."""
+    thruster: list[Thruster] = Field(default=[], max_length=MOST)
+    axes: Axes | None = None
+    inputs: dict[Symbol, dict[str, _Gain]] = Field(default={}, max_length=MOST)
+    """Where one command drives several thrusters: name of the command to the thrusters that it drives, with gains."""
+    alternatives: dict[str, Alternative] = Field(default={})
+    provenance: Made | None = None
+
+    @property
+    def axis_tables(self) -> dict[Axis, Any]:
+        """The axes that the vehicle has."""
+        return {axis: table for name, axis in AXES.items() if (table := getattr(self.axes, name, None)) is not None}
+
+    @property
+    def layout(self) -> Layout:
+        """What the vehicle has."""
+        axes = tuple(VehicleAxis(axis, tuple(given(table, AXIS))) for axis, table in self.axis_tables.items())
+        curves = tuple(
+            layout.Curve(name, tuple(given(curve, CURVE)), curve.together, curve.description or "", curve.equation)
+            for name, curve in self.curves.items()
+        )
+        coupled = bool(self.body and self.body.coupling)
+        return Layout(axes, curves, tuple(t.plain() for t in self.thruster), self.inputs, coupled)
+
+
+class File(Parts):
+    """A vehicle file (TOML): an ROV of any thrusters, axes and curves."""
+
+    format: Literal[2]
+    vehicle: FileHead
+    validity: Validity
+    body: Body
+    curves: dict[Symbol, Curve] = Field(min_length=1, max_length=MOST)
+    """By name, which stands in the names of their coefficients: a_t_<name>."""
+    thruster: list[Thruster] = Field(min_length=1, max_length=MOST)
+    axes: Axes
+
+
+def where(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """The name of each coefficient in the FMU, and the tables and the key where it stands in the vehicle file."""
+    yield from ((key, ("body", key)) for key in BODY if key in of.coefficients)
+    yield from ((key, ("arm", key)) for key in ARM if key in of.coefficients)
+    for curve in of.curves:
+        yield from ((curve.coefficient(key), ("curves", curve.name, key)) for key in CURVE if key in curve.keys)
+    for keys in (AXIS, TUNING):
+        for form in of.axes:
+            has = (key for key in keys if key in form.keys or keys is TUNING)
+            yield from ((form.axis.coefficient(key), ("axes", form.axis.name, key)) for key in has)

@@ -1,0 +1,222 @@
+"""Whether what a vehicle file says makes sense as a vehicle: a line for everything that does not."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from math import hypot, sin
+from typing import Any
+
+from pydantic_core import ErrorDetails
+
+from rov_fmu.files.messages import brief, shown
+from rov_fmu.files.toml_file import Strict, Toml, check
+from rov_fmu.motion.layout import ARM, AXIS, BODY, CURVE, LEAST_BETA, REVERSE, SURGE, SWAY, YAW, Axis, Kind, Layout
+from rov_fmu.vehicle.quantity import Quantity, within
+from rov_fmu.vehicle.schema import Parts, given, where
+
+_PARTS = ("curves", "thruster", "axes", "inputs", "alternatives")
+"""Tables of tables: where one of them has a mistake the others can still be judged."""
+_PARALLEL = 1e-6
+"""Two axes that the thrusters drive in ratios that differ by less can only be driven together."""
+
+
+def as_far_as_readable(
+    data: Toml, problems: Sequence[ErrorDetails], context: Mapping[str, object]
+) -> tuple[Parts, set[str]]:
+    """The file without the tables that have a mistake of form, and the names of the top tables that have one."""
+    parts: dict[str, Any] = dict(data)
+    lost = {str(problem["loc"][0]) for problem in problems}
+    for name in lost:
+        table, bad = parts.pop(name, None), [p["loc"][1] if len(p["loc"]) > 1 else None for p in problems
+                                             if p["loc"][0] == name]  # fmt: skip
+        if name in _PARTS and None not in bad:
+            if isinstance(table, list):
+                parts[name] = [entry for n, entry in enumerate(table) if n not in bad]
+            elif isinstance(table, dict):
+                parts[name] = {key: entry for key, entry in table.items() if key not in bad}
+    readable, _ = check(parts, Parts, **context)
+    assert readable is not None, "all that has a mistake is left out"
+    return readable, lost
+
+
+def nonsense(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
+    """A line for all that makes no sense; what needs a table that has a mistake is not judged."""
+    named = [*_names(parts, lost, data)]
+    yield from named
+    yield from _keys(parts, lost)
+    if lost & {"thruster", "axes", "inputs"} or not parts.axis_tables:
+        return
+    layout = parts.layout
+    yield from _places(parts, layout)
+    yield from _geometry(layout)
+    coupled = [*_coupling(parts, layout)]
+    yield from coupled
+    if not (named or coupled or lost & {"curves", "arm", "body"}):
+        yield from _coincidences(layout)
+        yield from _alternatives(parts, layout)
+
+
+def _line(key: str, reason: str, *value: object) -> str:
+    return f"{brief(key)} = {shown(value[0])}: {reason}" if value else f"{brief(key)}: {reason}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+
+
+# ---- Names and keys --------------------------------------------------------------------------------------------------
+
+
+def _names(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
+    """Of thrusters, curves and inputs."""
+    names = [thruster.name for thruster in parts.thruster]
+    for name in (name for name, count in Counter(names).items() if count > 1):
+        yield _line(f"thruster.{name}.name", "there is more than one thruster of this name", name)
+    curves = list(data["curves"]) if isinstance(data.get("curves"), dict) else []
+    for thruster in parts.thruster:
+        if curves and thruster.curve not in curves:
+            reason = f"there is no such curve, only {_listed(curves)}"
+            yield _line(f"thruster.{thruster.name}.curve", reason, thruster.curve)
+    if "thruster" in lost:
+        return
+    for name in parts.curves:
+        if name not in {thruster.curve for thruster in parts.thruster}:
+            yield _line(f"curves.{name}", "no thruster has this curve")
+    for name, gains in parts.inputs.items():
+        for driven in gains:
+            if driven not in names:
+                yield _line(f"inputs.{name}.{driven}", f"there is no such thruster, only {_listed(names)}")
+    if parts.inputs and "inputs" not in lost:
+        for name in names:
+            if not any(gains.get(name) for gains in parts.inputs.values()):
+                yield _line(f"inputs: no input drives the thruster {name}", "give a gain other than 0 in one of them")
+
+
+def _keys(parts: Parts, lost: set[str]) -> Iterator[str]:
+    """Keys that need others, or have no use."""
+    for name, curve in parts.curves.items():
+        yield from _pairs(f"curves.{name}", given(curve, CURVE))
+        if curve.c_0_reverse and not curve.c_0:
+            yield _line(f"curves.{name}.c_0", "this key is missing, and c_0_reverse is there")
+    for axis, table in parts.axis_tables.items():
+        yield from _pairs(f"axes.{axis.name}", given(table, AXIS))
+    if "axes" in lost:
+        return
+    if not parts.axis_tables:
+        yield _line("axes", "must have at least one of surge, sway, heave, yaw")
+    if parts.body:
+        yield from _needed("body", parts.body, BODY, {axis.inertia: axis for axis in parts.axis_tables})
+    if "thruster" not in lost and "arm" not in lost:
+        turned = {key: YAW for key in ARM if parts.layout.has_arm}
+        if parts.arm:
+            yield from _needed("arm", parts.arm, ARM, turned)
+        elif turned:
+            yield _line("arm", "this table with R and gamma is missing, and a thruster says arm")
+
+
+def _pairs(table: str, keys: Mapping[str, Quantity]) -> Iterator[str]:
+    """a and b in reverse come together."""
+    for one, other in (("a_t", "b_t"), ("b_t", "a_t"), ("a_d", "b_d"), ("b_d", "a_d")):
+        if one + REVERSE in keys and other + REVERSE not in keys:
+            yield _line(f"{table}.{other}{REVERSE}", f"this key is missing, and {one}{REVERSE} is there")
+
+
+def _needed(name: str, table: Strict, kinds: Mapping[str, Kind], needed: Mapping[str, Axis]) -> Iterator[str]:
+    has = given(table, kinds)
+    for key in kinds:
+        if key in needed and key not in has:
+            yield _line(f"{name}.{key}", f"this key is missing, and the vehicle has {needed[key].name}")
+        elif key in has and key not in needed:
+            yield _line(f"{name}.{key}", "nothing of this vehicle needs it")
+
+
+# ---- Geometry --------------------------------------------------------------------------------------------------------
+
+
+def _places(parts: Parts, layout: Layout) -> Iterator[str]:
+    """The place of each thruster, said once and where it matters."""
+    for thruster in layout.thrusters:
+        key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction
+        if thruster.arm and thruster.position:
+            yield _line(f"{key}.arm", "must not stand beside position")
+        elif thruster.arm and x <= 0.0:
+            yield _line(f"{key}.arm", "must be of a thruster that pushes ahead; give its position instead")
+        elif layout.has(YAW) and not thruster.arm and thruster.position is None and hypot(x, y) > _PARALLEL:
+            yield _line(f"{key}.position", "this key, or arm, is missing, and the vehicle has yaw")
+    if layout.has_arm and parts.arm and parts.arm.R and parts.arm.gamma:
+        for name, lever in (("R", parts.arm.R.value), ("gamma", sin(parts.arm.gamma.value))):
+            if lever == 0.0:
+                yield _line(f"arm.{name}.value", "must be more than 0, or the arm R sin γ is none", lever)
+
+
+def _geometry(layout: Layout) -> Iterator[str]:
+    """Whether every axis can be driven, by itself, and everything that drives does."""
+    axes = [form.axis for form in layout.axes]
+    for thruster in layout.thrusters:
+        if not any(thruster in layout.drivers(axis) for axis in axes):
+            reason = f"acts on no axis of the vehicle, which are {_listed([axis.name for axis in axes])}"
+            yield _line(f"thruster.{thruster.name}", reason)
+    free: list[list[float]] = []
+    for axis in axes:
+        if not layout.drivers(axis):
+            reason = "no thruster has an arm about the vertical axis" if axis is YAW else "no thruster drives it"
+            yield _line(f"axes.{axis.name}", reason)
+            continue
+        left = _unit([thruster.effect(axis) for thruster in layout.thrusters])
+        for other in free:
+            along = sum(a * b for a, b in zip(left, other, strict=True))
+            left = [a - along * b for a, b in zip(left, other, strict=True)]
+        if hypot(*left) > _PARALLEL:
+            free.append(_unit(left))
+            if not layout.signs(axis):
+                yield _line(f"axes.{axis.name}", "no input drives it: the gains cancel")
+        else:
+            yield _line(f"axes.{axis.name}", "the thrusters cancel: none moves it without moving the axes before it")
+    for name in layout.mix:
+        if not any(f"u_{name}" in layout.signs(axis) for axis in axes):
+            yield _line(f"inputs.{name}", "drives no axis of the vehicle: the gains are 0 or cancel")
+
+
+def _unit(row: Sequence[float]) -> list[float]:
+    length = hypot(*row)
+    return [part / length for part in row]
+
+
+def _coupling(parts: Parts, layout: Layout) -> Iterator[str]:
+    """Whether what is coupled is there, and has a finite inertia."""
+    if not layout.coupled:
+        return
+    coupled = (SURGE, SWAY, YAW)
+    if missing := [axis.name for axis in coupled if not layout.has(axis)]:
+        yield _line("body.coupling", f"needs surge, sway and yaw; there is no {' and no '.join(missing)}", True)
+        return
+    for axis in coupled:
+        beta = parts.axis_tables[axis].beta
+        if beta and beta.value < LEAST_BETA:
+            reason = f"must be at least {LEAST_BETA:g} where axes are coupled"
+            yield _line(f"axes.{axis.name}.beta.value", reason, beta.value)
+
+
+# ---- Names in the FMU ------------------------------------------------------------------------------------------------
+
+
+def _coincidences(layout: Layout) -> Iterator[str]:
+    """Two variables of the FMU with one name."""
+    names = [*layout.inputs, *layout.state, *layout.thrust, *(name for name, _ in where(layout))]
+    for name in (name for name, count in Counter(names).items() if count > 1):
+        yield _line("curves and thruster", f"their names make {name} stand for two variables of the FMU; rename one")
+
+
+def _alternatives(parts: Parts, layout: Layout) -> Iterator[str]:
+    """Coefficients that the vehicle does not have, or in another unit, or out of bounds."""
+    for title, alternative in parts.alternatives.items():
+        for name, quantity in alternative.quantities.items():
+            key = f"alternatives.{title}.{name}"
+            if (meta := layout.coefficients.get(name)) is None:
+                yield _line(key, "there is no such coefficient of this vehicle")
+                continue
+            if quantity.unit != meta.unit:
+                yield _line(f"{key}.unit", f"must be {meta.unit!r}", quantity.unit)
+            try:
+                within(quantity.value, meta)
+            except ValueError as error:
+                yield _line(f"{key}.value", str(error), quantity.value)
