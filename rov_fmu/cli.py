@@ -178,7 +178,7 @@ def _tune(
     check_targets(filter(None, (output,)), filter(None, (points,)))
     try:
         if points is not None:
-            tuning = tune_over(loaded.rov, tested, read_points(points, tested))
+            tuning = tune_over(loaded.rov, tested, read_points(points, loaded.rov, tested))
         elif command is not None and v_ss is not None:
             tuning = tune(loaded.rov, tested, command, v_ss, tau)
         else:

@@ -9,7 +9,8 @@ from rov_fmu.identify.least_squares import Array, Estimate
 from rov_fmu.identify.output_error import RecordingsFit
 from rov_fmu.identify.quadratic_fit import QuadraticFit
 from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
-from rov_fmu.motion.rov import Coefficients
+from rov_fmu.identify.tank_tests import thrust_names, thruster_of
+from rov_fmu.motion.rov import Rov
 
 
 def on_thrust(thruster: str, fit: QuadraticFit) -> Iterator[str]:
@@ -21,7 +22,7 @@ def on_thrust(thruster: str, fit: QuadraticFit) -> Iterator[str]:
     yield from _asymmetry(fit.x[fit.counts], fit.y[fit.counts], "force", f"thrust_{thruster}")
 
 
-def on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None) -> Iterator[str]:
+def on_axis(result: AxisResult, base: Rov, thrust: QuadraticFit | None) -> Iterator[str]:
     """Warnings about drag and β of an axis."""
     axis, beta = result.axis, result.axis.coefficient("beta")
     if beta in result.assumed:
@@ -39,7 +40,7 @@ def on_axis(result: AxisResult, base: Coefficients, thrust: QuadraticFit | None)
         tested = np.abs(thrust.x[thrust.counts])
         if max(used) > tested.max() + 0.005 or min(used) < tested.min() - 0.005:
             yield (
-                f"commands of {min(used):.0%} to {max(used):.0%} are used, but {axis.thruster} thrust was tested "
+                f"commands of {min(used):.0%} to {max(used):.0%} are used, but {thruster_of(axis)} thrust was tested "
                 f"from {tested.min():.0%} to {tested.max():.0%} only"
             )
     if result.response and not result.recordings:
@@ -86,7 +87,7 @@ def _on_response(fit: ResponseFit) -> Iterator[str]:
             )
 
 
-def _on_recordings(result: AxisResult, fit: RecordingsFit, base: Coefficients) -> Iterator[str]:
+def _on_recordings(result: AxisResult, fit: RecordingsFit, base: Rov) -> Iterator[str]:
     axis = fit.axis
     for s in fit.simulations:
         if s.correlation_time > 3.0 and s.noise > 1e-4 * float(np.ptp(s.measured)):
@@ -98,7 +99,7 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit, base: Coefficients) -
         if share > 0.03:
             yield f"{share:.0%} of the samples of {s.recording.file} are outliers and count less"
     weakest = min((abs(p.command) for p in result.points), default=1.0)
-    if fit.load.is_significant and abs(fit.load.value) > 0.02 * abs(axis.force(base, weakest)):
+    if fit.load.is_significant and abs(fit.load.value) > 0.02 * abs(base.force(axis, weakest)):
         yield (
             f"the recordings show a constant load of {fit.load.value:.3g} {axis.load} (ballast, tether), which "
             f"is not in the model; the other coefficients are biased by it"
@@ -110,14 +111,14 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit, base: Coefficients) -
         )
     tables = [p for p in result.points if p.error is None and p.weight > 0.0]
     for quantity in ("V_ss", "Tau"):
-        off = relative_rms(tables, predict(axis, fit.coefficients, tables), quantity)
+        off = relative_rms(tables, predict(axis, fit.rov, tables), quantity)
         if off > 0.05:
             yield f"{quantity} of the tables is {off:.0%} (RMS) off what the recordings give"
 
 
 def _on_disagreement(fit: RecordingsFit, thrust: QuadraticFit) -> Iterator[str]:
     """Where the recordings bend the thrust curve away from what was tested."""
-    for name in fit.axis.thrust_names:
+    for name in thrust_names(fit.axis):
         if name in fit.estimate.names:
             tested, error = thrust.estimate[name], thrust.estimate.errors[name]
             if abs(fit.estimate[name] - tested) > 3.0 * error:

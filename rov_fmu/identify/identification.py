@@ -12,7 +12,7 @@ from rov_fmu.identify.quadratic_fit import QuadraticFit
 from rov_fmu.identify.response_fit import Point, ResponseFit, predict, relative_rms
 from rov_fmu.identify.step_responses import StepResponse
 from rov_fmu.identify.tank_tests import TankTests
-from rov_fmu.motion.rov import Axis
+from rov_fmu.motion.layout import Axis
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -102,17 +102,17 @@ class Comparison:
 
 def compare(identification: Identification) -> tuple[Comparison, ...]:
     """Every measured V_ss and Tau beside the vehicle, the leave-one-thrust-out fit, and the vehicle to compare with."""
-    found = []
+    found, against = [], identification.against
     for result in identification.axes:
         for quantity in ("V_ss", "Tau"):
             if place := [n for n, p in enumerate(result.points) if p.quantity == quantity]:
                 points = tuple(result.points[n] for n in place)
-                model, against = (
-                    predict(result.axis, v.coefficients, points) if v else np.full(len(points), np.nan)
-                    for v in (identification.vehicle, identification.against)
-                )
-                out = result.response.leave_one_out[place] if result.response else np.full(len(points), np.nan)
-                found.append(Comparison(result, quantity, points, model, out, against))
+                model, none = predict(result.axis, identification.vehicle.rov, points), np.full(len(points), np.nan)
+                out = result.response.leave_one_out[place] if result.response else none
+                other = none
+                if against and against.layout.has(result.axis):
+                    other = predict(result.axis, against.rov, points)
+                found.append(Comparison(result, quantity, points, model, out, other))
     return tuple(found)
 
 

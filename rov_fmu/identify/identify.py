@@ -20,19 +20,30 @@ from rov_fmu.identify.quadratic_fit import QuadraticFit, fit_quadratic
 from rov_fmu.identify.response_fit import Point, drag_and_beta, fit_response, free_coefficients
 from rov_fmu.identify.simulator import prepare
 from rov_fmu.identify.step_responses import AGAINST, StepResponse, steps
-from rov_fmu.identify.tank_tests import LEAST_VELOCITY, MOST_VELOCITY, THRUSTERS, Recording, TankTests
-from rov_fmu.motion.rov import AXES, COEFFICIENTS, Axis, Coefficients
+from rov_fmu.identify.tank_tests import (
+    AXES,
+    LEAST_VELOCITY,
+    MOST_VELOCITY,
+    THRUSTERS,
+    Recording,
+    TankTests,
+    thrust_names,
+    thruster_of,
+)
+from rov_fmu.motion.layout import Axis
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
 
 def identify(tests: TankTests) -> Identification:
     """Identify a vehicle from its tests. Raises DataFileError, VehicleFileError."""
-    rov, known = tests.rov, tests.rov.known
-    against = load_vehicle(rov.against) if rov.against else None
+    given, known = tests.given, tests.given.known
+    against = load_vehicle(given.against) if given.against else None
     thrust = {thruster: fit for thruster in THRUSTERS if (fit := _thrust(tests, thruster))}
-    values = dict.fromkeys(COEFFICIENTS, 1.0) | {name: given.value for name, given in known.items()}  # to begin with
-    sources = {name: given.source for name, given in known.items()}
-    intervals = {name: given.interval for name, given in known.items() if given.interval}
+    values = dict.fromkeys(PAPER.coefficients, 1.0) | {name: q.value for name, q in known.items()}  # to begin with
+    sources = {name: q.source for name, q in known.items()}
+    intervals = {name: q.interval for name, q in known.items() if q.interval}
     for fit in thrust.values():
         weighted = "(7)" if 0.0 in fit.weights else "(6)"
         forces = count(int(fit.counts.sum()), "force")
@@ -41,19 +52,19 @@ def identify(tests: TankTests) -> Identification:
         intervals |= fit.estimate.intervals
     results: list[AxisResult] = []
     for thruster in THRUSTERS:
-        by_axis = _fit_recordings(tests, thruster, Coefficients(**values), thrust.get(thruster))
+        by_axis = _fit_recordings(tests, thruster, Rov(PAPER, values), thrust.get(thruster))
         for recorded in by_axis.values():  # the last word on the thrust curve too
             values |= recorded.estimate.named
             intervals |= recorded.estimate.intervals
             if f"a_t_{thruster}" in recorded.estimate.names:
                 also = f"{sources[f'a_t_{thruster}'].split(',')[0]}, and the recordings"
-                sources |= dict.fromkeys(recorded.axis.thrust_names, also)
-        for axis in (axis for axis in AXES.values() if axis.thruster == thruster):
-            result = _axis(tests, axis, Coefficients(**values), by_axis.get(axis.name), thrust.get(thruster))
+                sources |= dict.fromkeys(thrust_names(recorded.axis), also)
+        for axis in (axis for axis in AXES.values() if thruster_of(axis) == thruster):
+            result = _axis(tests, axis, Rov(PAPER, values), by_axis.get(axis.name), thrust.get(thruster))
             results.append(result)
             if result.response and result.chosen == "points":
                 fitted = result.response
-                values |= {n: getattr(fitted.coefficients, n) for n in (*fitted.estimate.names, *fitted.assumed)}
+                values |= {n: fitted.rov[n] for n in (*fitted.estimate.names, *fitted.assumed)}
                 intervals |= fitted.estimate.intervals
             sources |= dict.fromkeys(drag_and_beta(axis, known), result.method[0].upper() + result.method[1:])
             sources |= result.assumed
@@ -62,13 +73,13 @@ def identify(tests: TankTests) -> Identification:
     warnings += [w for result in results for w in result.warnings]
     method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
     vehicle = Vehicle(
-        **dict(rov.head),
-        coefficients=Coefficients(**values),
+        **dict(given.head),
+        rov=Rov(PAPER, values),
         sources=sources,
-        command_range=rov.command_range or _command_range(results),
+        command_range=given.command_range or _command_range(results),
         alternatives={},
         data=None,
-        limits=rov.limits,
+        limits=given.limits,
         intervals=intervals,
         provenance=Provenance(f"rov-fmu {__version__} identify", method, tests.inputs, tuple(warnings)),
     )
@@ -79,7 +90,7 @@ def _thrust(tests: TankTests, thruster: str) -> QuadraticFit | None:
     """The thrust curve of a thruster, None where it is given."""
     names = (f"a_t_{thruster}", f"b_t_{thruster}")
     rows = tests.thrust.get(thruster, ())
-    if names[0] in tests.rov.known:
+    if names[0] in tests.given.known:
         if rows:
             raise DataFileError(f"{tests.folder}: rov.toml gives {', '.join(names)}, but there is {rows[0].file} too")
         return None
@@ -92,12 +103,12 @@ def _thrust(tests: TankTests, thruster: str) -> QuadraticFit | None:
 
 
 def _fit_recordings(
-    tests: TankTests, thruster: str, base: Coefficients, thrust: QuadraticFit | None
+    tests: TankTests, thruster: str, base: Rov, thrust: QuadraticFit | None
 ) -> dict[str, RecordingsFit]:
     """The fits of the axes that a thruster drives, by axis, where they were recorded."""
     recordings: list[Recording] = []
     for axis in AXES.values():
-        if axis.thruster == thruster and drag_and_beta(axis, tests.rov.known):
+        if thruster_of(axis) == thruster and drag_and_beta(axis, tests.given.known):
             recordings += tests.recordings.get(axis.name, ())
     for recording in recordings:
         path, values = tests.folder / recording.file, recording.values[np.isfinite(recording.values)]
@@ -116,17 +127,17 @@ def _fit_recordings(
             raise DataFileError(f"{path}: moves against the command; forward, down, to starboard is +")
     if not recordings:
         return {}
-    fits = fit_recordings(recordings, base, tests.rov.known, _thrust_uncertainty(thrust))
+    fits = fit_recordings(recordings, base, tests.given.known, _thrust_uncertainty(thrust))
     return {fit.axis.name: fit for fit in fits}
 
 
-def _check_thrust(tests: TankTests, axis: Axis, base: Coefficients, commands: Sequence[float]) -> None:
+def _check_thrust(tests: TankTests, axis: Axis, base: Rov, commands: Sequence[float]) -> None:
     """Where the vehicle moves, the thruster must push it there, at one command at least."""
-    forces = [axis.force(base, command) for command in commands]
+    forces = [base.force(axis, command) for command in commands]
     if commands and all(force * command <= 0.0 for force, command in zip(forces, commands, strict=True)):
         raise DataFileError(
-            f"{tests.folder}: the thrust curve of {axis.thruster} gives {forces[0]:.3g} {axis.load} at a command of "
-            f"{commands[0]:.0%}, where {axis.name} needs a push that way"
+            f"{tests.folder}: the thrust curve of {thruster_of(axis)} gives {forces[0]:.3g} {axis.load} at a command "
+            f"of {commands[0]:.0%}, where {axis.name} needs a push that way"
         )
 
 
@@ -143,16 +154,16 @@ def _thrust_uncertainty(thrust: QuadraticFit | None) -> Estimate | None:
 
 
 def _axis(
-    tests: TankTests, axis: Axis, base: Coefficients, fitted: RecordingsFit | None, thrust: QuadraticFit | None
+    tests: TankTests, axis: Axis, base: Rov, fitted: RecordingsFit | None, thrust: QuadraticFit | None
 ) -> AxisResult:
-    known = tests.rov.known
+    known = tests.given.known
     found = tuple(step for recording in tests.recordings.get(axis.name, ()) for step in steps(recording))
     points = _points(tests, axis, found)
     wanted = set(drag_and_beta(axis, known))
     uncertain = _thrust_uncertainty(thrust)
     of_thrust = uncertain.covariance if uncertain else None
     if fitted and uncertain:
-        of_thrust = fitted.estimate.part(axis.thrust_names).covariance
+        of_thrust = fitted.estimate.part(thrust_names(axis)).covariance
     used = [p for p in points if p.weight > 0.0]
     _check_thrust(tests, axis, base, [p.command for p in used])
     steady = [p for p in used if p.quantity == "V_ss"]
@@ -166,8 +177,8 @@ def _axis(
         )
     drag = None
     if steady:
-        x, y = np.array([p.value for p in steady]), np.array([axis.force(base, p.command) for p in steady])
-        force = getattr(base, axis.coefficient("alpha")) * y
+        x, y = np.array([p.value for p in steady]), np.array([base.force(axis, p.command) for p in steady])
+        force = base[axis.coefficient("alpha")] * y
         groups = np.array([abs(p.command) for p in steady])
         drag = fit_quadratic((axis.coefficient("a_d"), axis.coefficient("b_d")), x, force, groups=groups)
     assumed = dict(response.assumed) if response and not fitted else {}
@@ -195,7 +206,7 @@ def _points(tests: TankTests, axis: Axis, found: tuple[StepResponse, ...]) -> tu
 
 
 def _weight(tests: TankTests, window: str, command: float) -> float:
-    low, high = tests.rov.windows.get(window, (-1.0, 1.0))
+    low, high = tests.given.windows.get(window, (-1.0, 1.0))
     return float(low - 1e-9 <= command <= high + 1e-9)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from rov_fmu.motion.rov import COEFFICIENTS
+from rov_fmu.motion.layout import AXIS, CURVE, TUNING, Kind
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -24,7 +24,7 @@ _LEAST_FACTOR = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Fitted coefficients in the units of COEFFICIENTS, p of them."""
+    """Fitted coefficients in SI units, p of them."""
 
     names: tuple[str, ...]
     values: Array
@@ -69,16 +69,21 @@ class Estimate:
         if not isfinite(error) or not self.degrees_of_freedom > 0.0:
             return None
         reach = quantile(self.degrees_of_freedom) * error
-        meta = COEFFICIENTS[name]
+        kind = kind_of(name)
         if is_factor(name):
             ratio = exp(min(reach / value, 100.0))
-            return value / ratio, min(meta.maximum, value * ratio)
-        return max(meta.minimum, value - reach), min(meta.maximum, value + reach)
+            return value / ratio, min(kind.maximum, value * ratio)
+        return max(kind.minimum, value - reach), min(kind.maximum, value + reach)
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
         """95 % intervals by name, of the coefficients that have one."""
         return {name: found for name in self.names if (found := self.interval(name))}
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Coefficients that stop at the edge of what is physical."""
+        return tuple(n for n, value in self.named.items() if value in (kind_of(n).minimum, kind_of(n).maximum))
 
     def half_band(self, slopes: Array) -> Array:
         """Half the width of the 95 % band, to first order, of numbers with these derivatives by the coefficients.
@@ -101,6 +106,11 @@ class Solution:
     """Of the residuals without the loss."""
 
 
+def kind_of(name: str) -> Kind:
+    """What is declared of a coefficient of forward, of any curve or axis."""
+    return (CURVE | AXIS | TUNING)[name.rpartition("_")[0]]
+
+
 def is_factor(name: str) -> bool:
     """Whether the coefficient is fitted by its logarithm."""
     return name.startswith(("alpha_", "beta_"))
@@ -118,8 +128,8 @@ def external(names: Sequence[str], x: Array) -> dict[str, float]:
 
 def bounds(names: Sequence[str], free: int = 0) -> tuple[Array, Array]:
     """Lower and upper bounds of internal parameters, and of so many free ones after them."""
-    low = [log(_LEAST_FACTOR) if is_factor(n) else COEFFICIENTS[n].minimum for n in names]
-    high = [log(COEFFICIENTS[n].maximum) if is_factor(n) else COEFFICIENTS[n].maximum for n in names]
+    low = [log(_LEAST_FACTOR) if is_factor(n) else kind_of(n).minimum for n in names]
+    high = [log(kind_of(n).maximum) if is_factor(n) else kind_of(n).maximum for n in names]
     return np.array(low + [-np.inf] * free), np.array(high + [np.inf] * free)
 
 

@@ -7,7 +7,7 @@ it; then all axes that the thruster drives are fitted at once. Each recording ad
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -27,8 +27,9 @@ from rov_fmu.identify.least_squares import (
 from rov_fmu.identify.response_fit import drag_and_beta, response_band
 from rov_fmu.identify.simulator import PreparedRecording, Simulator, prepare
 from rov_fmu.identify.step_responses import correlation_time, robust_deviation, white_noise
-from rov_fmu.identify.tank_tests import Recording
-from rov_fmu.motion.rov import Axis, Coefficients
+from rov_fmu.identify.tank_tests import Recording, thrust_names
+from rov_fmu.motion.layout import Axis
+from rov_fmu.motion.rov import Rov
 
 Loss = Literal["huber", "linear"]
 
@@ -78,7 +79,7 @@ class RecordingsFit:
     """Drag and β of one axis from its recordings, and its thrust curve where that took part."""
 
     axis: Axis
-    coefficients: Coefficients
+    rov: Rov
     estimate: Estimate
     simulations: tuple[Simulation, ...]
     load: UnmodelledEffect
@@ -88,12 +89,12 @@ class RecordingsFit:
 
     def band(self, commands: Array) -> tuple[Array, Array, Array, Array]:
         """95 % confidence band of the curves over commands: V_ss low and high, Tau low and high."""
-        return response_band(self.axis, self.coefficients, self.estimate, commands)
+        return response_band(self.axis, self.rov, self.estimate, commands)
 
 
 def fit_recordings(
     recordings: Sequence[Recording],
-    base: Coefficients,
+    base: Rov,
     known: Collection[str] = (),
     thrust: Estimate | None = None,
     loss: Loss = "huber",
@@ -113,20 +114,20 @@ def fit_recordings(
     model = Simulator(data, base, tuple(values), np.array([s for *_, sigma in parts for s in sigma]), thrust)
     start = np.concatenate([internal(model.names, values), *(initial for _, initial, _ in parts)])
     analysis = _ResidualAnalysis(model, _solve(model, start, loss), loss)
-    coefficients = replace(base, **external(model.names, analysis.x))
+    rov = base.replaced(external(model.names, analysis.x))
     whole = estimate(model.names, analysis.x, analysis.covariance(), analysis.degrees_of_freedom, 1.0)
     found = []
     for axis in axes:
-        names = [n for n in model.names if n in axis.thrust_names or n.endswith(f"_{axis.velocity}")]
+        names = [n for n in model.names if n in thrust_names(axis) or n.endswith(f"_{axis.velocity}")]
         simulations = tuple(s for s in analysis.simulations if s.recording.axis is axis)
         columns = model.by_load(axis, analysis.x), analysis.by_delay(axis)
         effects = (analysis.unmodelled_effect(column) for column in columns)
-        found.append(RecordingsFit(axis, coefficients, whole.part(names), simulations, *effects))
+        found.append(RecordingsFit(axis, rov, whole.part(names), simulations, *effects))
     return tuple(found)
 
 
 def _fit_alone(
-    data: tuple[PreparedRecording, ...], base: Coefficients, known: Collection[str], loss: Loss
+    data: tuple[PreparedRecording, ...], base: Rov, known: Collection[str], loss: Loss
 ) -> tuple[dict[str, float], Array, list[float]]:
     """One axis, thrust as it is, from a part of the samples: enough to come near, and fast.
 

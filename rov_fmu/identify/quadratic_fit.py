@@ -7,7 +7,6 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from rov_fmu.identify.least_squares import Array, Estimate, Flags, Solution, bounds, estimate_alike, leave_one_out, rms
-from rov_fmu.motion.rov import COEFFICIENTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +69,6 @@ class QuadraticFit:
     def leave_one_out_error(self) -> float:
         """Leave-one-thrust-out: RMS of measured less predicted, over the points that count."""
         return rms((self.y - self.leave_one_out)[self.counts])
-
-    @property
-    def at_bound(self) -> tuple[str, ...]:
-        """Coefficients that stop at the edge of what is physical."""
-        return tuple(
-            name for name, value in self.estimate.named.items()
-            if value in (COEFFICIENTS[name].minimum, COEFFICIENTS[name].maximum)
-        )  # fmt: skip
 
 
 def fit_quadratic(

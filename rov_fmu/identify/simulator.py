@@ -8,10 +8,11 @@ import numpy as np
 from rov_fmu.identify.least_squares import Array, Estimate, external, internal
 from rov_fmu.identify.response_fit import drag_and_beta
 from rov_fmu.identify.step_responses import velocity, without_spikes
-from rov_fmu.identify.tank_tests import Recording
+from rov_fmu.identify.tank_tests import Recording, thrust_names
 from rov_fmu.identify.trajectory import trajectory
+from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.riccati import Riccati
-from rov_fmu.motion.rov import Axis, Coefficients
+from rov_fmu.motion.rov import Rov
 
 _STEP = 1e-6  # of the differences that stand for derivatives
 
@@ -47,20 +48,21 @@ class PreparedRecording:
         return replace(self, time=self.time[some], values=self.values[some])
 
 
-def prepare(recording: Recording, base: Coefficients) -> PreparedRecording:
+def prepare(recording: Recording, base: Rov) -> PreparedRecording:
     """Find the holds, from the one of the first measured sample on."""
     axis, there = recording.axis, np.isfinite(recording.values)
     time, values = recording.time[there], recording.values[there]
     holds = np.concatenate([[0], np.flatnonzero(np.diff(recording.command)) + 1])
     holds = holds[max(int(np.searchsorted(holds, np.flatnonzero(there)[0], side="right")) - 1, 0) :]
     levels, place = np.unique(recording.command[holds], return_inverse=True)
-    units = [replace(base, **dict(zip(axis.thrust_names, unit, strict=True))) for unit in ((1.0, 0.0), (0.0, 1.0))]
-    thrust = np.array([[axis.force(k, c) for k in units] for c in levels.tolist()])[place]
+    names = thrust_names(axis)
+    units = [base.replaced(dict(zip(names, unit, strict=True))) for unit in ((1.0, 0.0), (0.0, 1.0))]
+    thrust = np.array([[k.force(axis, c) for k in units] for c in levels.tolist()])[place]
     starts = recording.time[holds]
     starts[0] = time[0]
     inner = starts <= time[-1]
     _, v = velocity(time, without_spikes(values), is_position=recording.is_position)
-    force = np.abs(thrust @ [getattr(base, name) for name in axis.thrust_names]).max()
+    force = np.abs(thrust @ [base[name] for name in names]).max()
     speed = float(np.quantile(np.abs(v), 0.95))
     return PreparedRecording(recording, starts[inner], thrust[inner], time, values, speed, float(force))
 
@@ -74,7 +76,7 @@ class Simulator:
     """
 
     data: tuple[PreparedRecording, ...]
-    base: Coefficients
+    base: Rov
     names: tuple[str, ...]
     sigma: Array
     thrust: Estimate | None = None
@@ -91,21 +93,21 @@ class Simulator:
         """Drag half linear, half quadratic, such that the strongest force gives about the highest speed; at rest."""
         fastest = max(self.data, key=lambda d: d.speed)
         axis = fastest.axis
-        drag = getattr(self.base, axis.coefficient("alpha")) * fastest.force / fastest.speed
+        drag = self.base[axis.coefficient("alpha")] * fastest.force / fastest.speed
         kinds = {"a_d": 0.5 * drag / fastest.speed, "b_d": 0.5 * drag, "beta": beta}
         shared = internal(self.names, {axis.coefficient(kind): value for kind, value in kinds.items()})
         return np.concatenate([shared, *(np.array([0.0, d.values[0]][: d.initial_count]) for d in self.data)])
 
     def run(self, data: PreparedRecording, x: Array, initial: Array, load: float = 0.0) -> tuple[Array, Array, Array]:
         """Output, velocity and acceleration at the measured samples, with a constant load (N, N.m) besides."""
-        k, axis = replace(self.base, **external(self.names, x)), data.axis
-        full = axis.held(k, 1.0)
-        forces = data.thrust @ [getattr(k, name) for name in axis.thrust_names]
-        C = full.C / axis.force(k, 1.0) * (forces + load / getattr(k, axis.coefficient("alpha")))
-        v, s = trajectory([Riccati(full.A, full.B, c) for c in C.tolist()], data.starts, float(initial[0]), data.time)
+        k, axis = self.base.replaced(external(self.names, x)), data.axis
+        unit = k.acceleration_of(k.layout.kinds[axis.name], 0.0, 1.0)  # under a load of 1
+        thrust = data.thrust @ [k[name] for name in thrust_names(axis)]
+        C = unit.C * (k[axis.coefficient("alpha")] * thrust + load)
+        v, s = trajectory([Riccati(unit.A, unit.B, c) for c in C.tolist()], data.starts, float(initial[0]), data.time)
         held = C[np.searchsorted(data.starts, data.time, side="right") - 1]
         output = s + initial[1] if data.recording.is_position else v
-        return output, v, held - (full.B + full.A * np.abs(v)) * v
+        return output, v, held - (unit.B + unit.A * np.abs(v)) * v
 
     def residuals(self, x: Array) -> Array:
         """See the class."""
@@ -119,7 +121,7 @@ class Simulator:
         J = np.zeros((self._size, len(x)))
         for d, rows, initial, sigma in self.places:
             here = self.run(d, x, x[initial])[0]
-            concerns = (*d.axis.thrust_names, *drag_and_beta(d.axis))
+            concerns = (*thrust_names(d.axis), *drag_and_beta(d.axis))
             steps = {n: _STEP * max(abs(x[n]), 1e-2) for n, name in enumerate(self.names) if name in concerns}
             for n, h in {**steps, initial.start: _STEP * max(d.speed, 1e-3)}.items():
                 moved = x.copy()

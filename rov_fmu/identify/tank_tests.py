@@ -28,17 +28,30 @@ from pydantic import AfterValidator, BeforeValidator, ValidationInfo, create_mod
 from rov_fmu.files.csv_table import Column, DataFileError, read_columns
 from rov_fmu.files.reading import read_bytes
 from rov_fmu.files.toml_file import Strict, beside, pair, read_checked
-from rov_fmu.motion.rov import AXES, Axis
+from rov_fmu.motion.layout import Axis
+from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import QUANTITIES, Finite, Head, Quantity, Validity, VehicleFileError
 
 ROV_FILE = "rov.toml"
-THRUSTERS = ("rear", "top")
+AXES = {form.axis.name: form.axis for form in PAPER.axes}
+THRUSTERS = tuple(curve.name for curve in PAPER.curves)
+"""Those tested alone or as a pair, by their curves."""
 _NAME = re.compile(
     rf"(?P<kind>thrust|steady|time_constant|log)_(?P<of>{'|'.join((*THRUSTERS, *AXES))})(?:_.*)?\.csv", re.IGNORECASE
 )
 _REQUIRED = ("m_rov", "I_r", "R", "gamma")  # geometry and mass: not identifiable in the tank
 _LEAST_SAMPLES = 20
+
+
+def thruster_of(axis: Axis) -> str:
+    """The one of THRUSTERS that drives an axis."""
+    return PAPER.drivers(axis)[0].curve
+
+
+def thrust_names(axis: Axis) -> tuple[str, str]:
+    """The coefficients of the thrust curve of an axis."""
+    return f"a_t_{thruster_of(axis)}", f"b_t_{thruster_of(axis)}"
 
 
 @dataclass(frozen=True)
@@ -78,7 +91,7 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class Rov:
+class Given:
     """What is given beforehand (rov.toml)."""
 
     head: Head
@@ -98,7 +111,7 @@ class TankTests:
     """All tests of a folder."""
 
     folder: Path
-    rov: Rov
+    given: Given
     thrust: Mapping[str, tuple[Row, ...]]
     """By thruster."""
     steady: Mapping[str, tuple[Row, ...]]
@@ -111,14 +124,14 @@ class TankTests:
     @property
     def files(self) -> list[Path]:
         """Every file that the identification reads."""
-        return [*(self.folder / name for name in self.inputs), *filter(None, (self.rov.against,))]
+        return [*(self.folder / name for name in self.inputs), *filter(None, (self.given.against,))]
 
 
 def load_tank_tests(folder: Path) -> TankTests:
     """Read a folder. Raises DataFileError, VehicleFileError."""
     if not folder.is_dir():
         raise DataFileError(f"{folder}: there is no such folder")
-    rov = _load_rov(folder / ROV_FILE)
+    given = _load_given(folder / ROV_FILE)
     found: dict[str, Any] = {kind: {} for kind in ("thrust", "steady", "time_constant", "log")}
     inputs = {ROV_FILE: _hash(folder / ROV_FILE)}
     for path in sorted(path for path in folder.iterdir() if path.name.lower().endswith(".csv")):
@@ -134,7 +147,7 @@ def load_tank_tests(folder: Path) -> TankTests:
         inputs[path.name] = _hash(path)
     if len(inputs) == 1:
         raise DataFileError(f"{folder}: there are no tests (*.csv) in this folder")
-    return TankTests(folder, rov, found["thrust"], found["steady"], found["time_constant"], found["log"], inputs)
+    return TankTests(folder, given, found["thrust"], found["steady"], found["time_constant"], found["log"], inputs)
 
 
 # ---- rov.toml --------------------------------------------------------------------------------------------------------
@@ -186,9 +199,9 @@ class _RovFile(Strict):
     validity: Validity | None = None
 
 
-def _load_rov(path: Path) -> Rov:
+def _load_given(path: Path) -> Given:
     checked = read_checked(path, _RovFile, VehicleFileError)
-    return Rov(
+    return Given(
         head=checked.vehicle,
         known={name: q for name in _known if (q := getattr(checked.known, name))},
         windows={name: window for name in _windows if (window := getattr(checked.windows, name))},

@@ -32,9 +32,9 @@ def trajectory(axes: Iterable[Riccati], starts: Array, v0: float, times: Array) 
         pieces.append((start, v, s, axis.C))
         if end <= start:
             continue
-        turn = axis.turning_time(v)
-        if turn < end - start:
-            pieces.append((start + turn, 0.0, s + axis.distance(v, turn), axis.C))
+        rest = axis.reversal_time(v)
+        if rest < end - start:
+            pieces.append((start + rest, 0.0, s + axis.distance(v, rest), axis.C))
         rate = sqrt((0.25 * B * B + A * abs(axis.C)) / _REACH)
         if rate * (end - start) > 1.0:
             inside = times[first:last]

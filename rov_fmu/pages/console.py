@@ -37,8 +37,7 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
 
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
-    tuning = (f"{name}_{t.axis.velocity}" for name in ("alpha", "beta"))
-    values = ", ".join(f"{name} = {getattr(vehicle.coefficients, name):g}" for name in tuning)
+    values = ", ".join(f"{name} = {vehicle.rov[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
     compared = [f"{model}\nprinted|\ncomputed|\ndev." for model in ("non-linear", "scaled")]
     headers = "|".join([*compared, "test\nmeasured|\ndev."]).split("|")
     result = table(f"Table {t.number}. {t.axis.name.capitalize()}, {values}", "\ncommand", headers)

@@ -6,7 +6,6 @@ from rich.table import Table
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
 from rov_fmu.identify.tuning import Tuning
-from rov_fmu.motion.rov import COEFFICIENTS
 from rov_fmu.pages.console import DEVIATION, console, table, text
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -35,10 +34,9 @@ def print_identification(identification: Identification) -> None:
 
 def _coefficients(vehicle: Vehicle) -> Table:
     result = table("Coefficients", "name", ("value", "95 % from", "to", "unit"), ("source",))
-    for name, meta in COEFFICIENTS.items():
+    for name, meta in vehicle.layout.coefficients.items():
         low, high = (f"{end:.5g}" for end in vehicle.intervals[name]) if name in vehicle.intervals else ("", "")
-        value = getattr(vehicle.coefficients, name)
-        result.add_row(name, f"{value:.5g}", low, high, meta.unit, vehicle.sources[name])
+        result.add_row(name, f"{vehicle.rov[name]:.5g}", low, high, meta.unit, vehicle.sources[name])
     return result
 
 
@@ -81,7 +79,7 @@ def print_tuning(tuning: Tuning) -> None:
     out = console()
     for kind in ("alpha", "beta"):
         name = tuning.axis.coefficient(kind)
-        line = f"{name} = {getattr(tuning.coefficients, name):.6g}"
+        line = f"{name} = {tuning.rov[name]:.6g}"
         interval = tuning.estimate.intervals.get(name) if tuning.estimate else None
         out.print(line + (f"   95 %: {interval[0]:.4g} ... {interval[1]:.4g}" if interval else ""))
     result = table("", "command", ("quantity", "wanted", "model", "dev."))

@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 
 from rov_fmu.files.output import Output, write_whole
 from rov_fmu.identify.quadratic_fit import fit_quadratic, quadratic
-from rov_fmu.motion.rov import AXES, SURGE, Coefficients
+from rov_fmu.motion.layout import SURGE
+from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.fmu_page import steady_picture, tables_by_axis
 from rov_fmu.pages.plots import draw_steps, finish, measured_step
 from rov_fmu.pages.svg import LIGHT, svg_file
@@ -53,36 +54,36 @@ def write_figures(folder: Path) -> list[Path]:
 
 
 def _draw(figure: Figure, vehicle: Vehicle) -> None:
-    k, other, tables = vehicle.coefficients, vehicle.alternatives["unweighted_rear_thrust"], tables_by_axis(vehicle)
+    k, other, tables = vehicle.rov, vehicle.alternatives["unweighted_rear_thrust"], tables_by_axis(vehicle)
     (rear, top, notes), drag, steps = figure.subplots(3, 3)
     unweighted = other.values["a_t_rear"], other.values["b_t_rear"]
     _curve(rear, 100.0, 1.0, unweighted, "--", "grey", "all points (8)")
-    _curve(rear, 100.0, 1.0, (k.a_t_rear, k.b_t_rear), "-", "blue", "weighted (9)")
+    _curve(rear, 100.0, 1.0, (k["a_t_rear"], k["b_t_rear"]), "-", "blue", "weighted (9)")
     finish(rear, "Figure 5: forward thrust", "command (%)", "$F_l + F_r$ (N)")
-    _curve(top, 100.0, 1.0, (k.a_t_top, k.b_t_top), "-", "blue", "(10)")
+    _curve(top, 100.0, 1.0, (k["a_t_top"], k["b_t_top"]), "-", "blue", "(10)")
     finish(top, "Figure 6: downward thrust", "command (%)", "$F_t$ (N)")
     notes.set_axis_off()
     notes.text(0.0, 0.92, "\n".join(_NOT_PRINTED), transform=notes.transAxes, va="top", linespacing=1.7,
                color=LIGHT["muted"])  # fmt: skip
-    for number, ax, axis in zip((7, 8, 9), drag, AXES, strict=True):
+    for number, ax, axis in zip((7, 8, 9), drag, vehicle.layout.kinds, strict=True):
         _drag(ax, k, tables[axis], f"Figure {number}: {axis} drag")
     for ax, (axis, title) in zip(steps, _STEP_TITLES.items(), strict=True):
         _steps(ax, k, tables[axis], title)
 
 
-def _drag(ax: Axes, k: Coefficients, table: ResponseTable, title: str) -> None:
+def _drag(ax: Axes, k: Rov, table: ResponseTable, title: str) -> None:
     axis = table.axis
     names = (axis.coefficient("a_d"), axis.coefficient("b_d"))
     v = np.array([float(V) for V in table.steady.values()])
-    force = np.array([axis.force(k, float(c) / 100.0) for c in table.steady])
+    force = np.array([k.force(axis, float(c) / 100.0) for c in table.steady])
     end = 1.1 * float(v.max())
     _curve(ax, 1.0, end, fit_quadratic(names, v, force).unbounded, "--", "grey", "least squares of the points")
-    _curve(ax, 1.0, end, (getattr(k, names[0]), getattr(k, names[1])), "-", "blue", axis.equations[0])
+    _curve(ax, 1.0, end, (k[names[0]], k[names[1]]), "-", "blue", axis.equations[0])
     ax.plot(v, force, "o", color=LIGHT["orange"], markersize=4.5, zorder=5, label=f"Table {table.steady_number}")
     finish(ax, title, f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
 
 
-def _steps(ax: Axes, k: Coefficients, table: ResponseTable, title: str) -> None:
+def _steps(ax: Axes, k: Rov, table: ResponseTable, title: str) -> None:
     axis = table.axis
     draw_steps(ax, axis, [measured_step(table, Decimal(command)) for command in _STEPS], [(untuned(k), "--"), (k, "-")])
     if axis is not SURGE:  # there it would stand in the way

@@ -9,7 +9,8 @@ from typing import Literal, TypeVar
 from matplotlib.axes import Axes
 
 from rov_fmu.motion.riccati import RISE
-from rov_fmu.motion.rov import Axis, Coefficients
+from rov_fmu.motion.layout import Axis
+from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.svg import LIGHT
 from rov_fmu.vehicle.published import ResponseTable
 
@@ -55,17 +56,17 @@ def finish(
         ax.legend(loc=where)
 
 
-def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Coefficients, str]]) -> None:
+def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Rov, str]]) -> None:
     """Velocity after steps of the command, of every model (the last is the one to label): measured V_ss are dotted
     lines, measured Tau points at 1 - 1/e of it."""
-    Taus = [axis.response(models[-1][0], step.command)[1] for step in steps]
+    Taus = [models[-1][0].response(axis, step.command)[1] for step in steps]
     Taus += [Tau for step in steps for Tau in step.Tau]
     end = ceil(3.3 * max((Tau for Tau in Taus if isfinite(Tau)), default=3.0))
     t = [end * (n / 45) ** 1.5 for n in range(46)]  # closer where the curve bends
     for role, step in zip(_STEPS, steps, strict=False):
         color = LIGHT[role]
         for k, dashes in models:
-            motion = axis.held(k, step.command)
+            motion = k.held(axis, step.command)
             v = [0.0, *(motion.velocity(0.0, moment) for moment in t[1:])]
             ax.plot(t, v, dashes, color=color, linewidth=1.8 if dashes == "-" else 1.0)
         ax.text(1.015 * end, v[-1], f"{100.0 * step.command:g} %", color=color, va="center", fontsize=8.5)

@@ -8,20 +8,18 @@ from rov_fmu.identify.identification import AxisResult, Comparison, Identificati
 from rov_fmu.identify.least_squares import Array, Flags
 from rov_fmu.identify.output_error import Simulation
 from rov_fmu.identify.quadratic_fit import QuadraticFit, quadratic
-from rov_fmu.identify.response_fit import responses
+from rov_fmu.identify.response_fit import holding_force, responses
 from rov_fmu.identify.step_responses import velocity, without_spikes
-from rov_fmu.motion.rov import Axis
 from rov_fmu.pages.plots import Step, draw_steps, evenly
 from rov_fmu.pages.svg import LIGHT
 from rov_fmu.pages.templates import pretty_unit
-from rov_fmu.vehicle.vehicle import Vehicle
 
 _BINS = 300  # of a recording: as many as one can see
 
 
 def plot_thrust(figure: Figure, results: Identification, fit: QuadraticFit) -> None:
     """Force over command, and the curve of the vehicle where recordings have moved it away from the fit."""
-    curve = [getattr(results.vehicle.coefficients, name) for name in fit.estimate.names]
+    curve = [results.vehicle.rov[name] for name in fit.estimate.names]
     moved = not np.allclose(curve, (fit.a, fit.b), rtol=1e-9)
     above, below, x = _quadratic(figure, fit, 100.0, "grey" if moved else "blue", "fit to the forces")
     if moved:
@@ -32,12 +30,13 @@ def plot_thrust(figure: Figure, results: Identification, fit: QuadraticFit) -> N
 def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> None:
     """Thrust at measured V_ss: the drag that the vehicle takes, and the fit to these forces alone as in (11)-(16)."""
     assert result.drag
-    axis, load = result.axis, pretty_unit(result.axis.load)
+    axis, load, rov = result.axis, pretty_unit(result.axis.load), results.vehicle.rov
     above, below, v = _quadratic(figure, result.drag, 1.0, "grey", "fit to these forces")
-    a, b, alpha = _drag(axis, results.vehicle)
+    a, b, alpha = (rov[axis.coefficient(key)] for key in ("a_d", "b_d", "alpha"))
     above.plot(v, quadratic(v) @ (a, b), color=LIGHT["blue"], label="model")
-    if results.against and (other := _drag(axis, results.against))[2]:
-        scaled = quadratic(v) @ other[:2] * alpha / other[2]
+    other = results.against.rov if results.against and results.against.layout.has(axis) else None
+    if other and (scale := other[axis.coefficient("alpha")]):
+        scaled = [holding_force(other, axis, x) * alpha / scale for x in v.tolist()]
         above.plot(v, scaled, ":", color=LIGHT["teal"], label="compared")
     title = f"Drag ({load}) over ${axis.velocity}$"
     _finish(above, below, title, f"velocity ({axis.unit})", f"residual ({load})")
@@ -64,13 +63,13 @@ def plot_response(
     at = [abs(p.command) for p in points] or list(results.vehicle.command_range)
     c = np.linspace(max(0.5 * min(at), 0.01), min(max(at) + 0.05, 1.0), 46)
     tested = (c >= min(at)) & (c <= max(at))
-    curve = responses(axis, results.vehicle.coefficients, c)[:, which]
+    curve = responses(axis, results.vehicle.rov, c)[:, which]
     if fit := result.recordings or result.response:
         low, high = fit.band(c)[2 * which :][:2]
         _band(above, 100.0 * c, np.maximum(low, 0.0), high, "blue")
     above.plot(100.0 * c, curve, color=LIGHT["blue"], label="model")
-    if results.against:
-        other = responses(axis, results.against.coefficients, c)[:, which]
+    if results.against and results.against.layout.has(axis):
+        other = responses(axis, results.against.rov, c)[:, which]
         above.plot(100.0 * c, other, "--", color=LIGHT["grey"], label="compared")
     top = [*(abs(p.value) for p in points), *curve[tested][np.isfinite(curve[tested])].tolist()]
     above.set_ylim(0.0, 1.25 * max(top, default=1.0) or 1.0)
@@ -93,7 +92,7 @@ def plot_steps(figure: Figure, results: Identification, result: AxisResult) -> N
         V_ss, Tau = ([abs(p.value) for p in here if p.quantity == quantity] for quantity in ("V_ss", "Tau"))
         steps.append(Step(command, V_ss, Tau))
     ax: Axes = figure.subplots()
-    draw_steps(ax, result.axis, steps, [(results.vehicle.coefficients, "-")])
+    draw_steps(ax, result.axis, steps, [(results.vehicle.rov, "-")])
     ax.set_title(f"Steps: ${result.axis.velocity}$ ({result.axis.unit})", loc="left")
 
 
@@ -155,8 +154,3 @@ def _dots(ax: Axes, x: Array, y: Array, counts: Flags, label: str = "") -> None:
 def _diamonds(ax: Axes, x: Array, y: Array) -> None:
     """Leave-one-thrust-out."""
     ax.plot(x, y, "D", color=LIGHT["violet"], markerfacecolor="none", markersize=4.0, zorder=4)
-
-
-def _drag(axis: Axis, vehicle: Vehicle) -> tuple[float, ...]:
-    """a_d, b_d and α."""
-    return tuple(getattr(vehicle.coefficients, axis.coefficient(kind)) for kind in ("a_d", "b_d", "alpha"))

@@ -5,12 +5,13 @@ closed form. Where the two differ, that is shown as it is.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
 from rov_fmu.files.csv_table import Column, DataFileError, read_columns
-from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW, Axis, Coefficients
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.vehicle import TABLES, Vehicle
 
 Cells = tuple[Decimal | None, ...]
@@ -76,9 +77,9 @@ class StepTest:
     steady_columns: tuple[str, ...]
     """Directions of motion in that table; the responses belong to the last."""
 
-    def response(self, coefficients: Coefficients, command: Decimal) -> tuple[float, float]:
+    def response(self, rov: Rov, command: Decimal) -> tuple[float, float]:
         """V_ss and Tau (s) in closed form for a command given in %."""
-        return self.axis.response(coefficients, float(command) / 100.0)
+        return rov.response(self.axis, float(command) / 100.0)
 
 
 @dataclass(frozen=True)
@@ -96,9 +97,9 @@ STEP_TESTS = (
 )
 
 
-def untuned(coefficients: Coefficients) -> Coefficients:
-    """The coefficients with every α and β at 1: the paper's non-linear model."""
-    return replace(coefficients, **{name: 1.0 for name, meta in COEFFICIENTS.items() if meta.tunable})
+def untuned(rov: Rov) -> Rov:
+    """The vehicle with every α and β at 1: the paper's non-linear model."""
+    return rov.replaced({name: 1.0 for name, meta in rov.layout.coefficients.items() if meta.tunable})
 
 
 def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
@@ -108,7 +109,9 @@ def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
     """
     if vehicle.data is None:
         raise DataFileError(f"{vehicle.name}: no published tables, the vehicle file has no key vehicle.data")
-    return tuple(_load_table(vehicle.data, vehicle.coefficients, test) for test in STEP_TESTS)
+    if missing := [test.axis.name for test in STEP_TESTS if not vehicle.layout.has(test.axis)]:
+        raise DataFileError(f"{vehicle.name}: Tables 6-8 are of surge, heave and yaw, it has no {', '.join(missing)}")
+    return tuple(_load_table(vehicle.data, vehicle.rov, test) for test in STEP_TESTS)
 
 
 def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
@@ -127,7 +130,7 @@ def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
     return rows
 
 
-def _load_table(folder: Path, coefficients: Coefficients, test: StepTest) -> ResponseTable:
+def _load_table(folder: Path, rov: Rov, test: StepTest) -> ResponseTable:
     of_responses, of_velocities = (folder / name for name in TABLES[test.axis.name])
     units = {"V_ss": test.axis.unit, "Tau": "s"}
     responses = _read_table(of_responses, {f"{s} {quantity}": units[quantity] for s in _SOURCES for quantity in units})
@@ -139,7 +142,7 @@ def _load_table(folder: Path, coefficients: Coefficients, test: StepTest) -> Res
         measured = steady.get(command) if V_measured is None else V_measured, Tau_measured
         models = [
             Response(*map(Cell, printed[place : place + 2], test.response(k, command), measured))
-            for place, k in ((0, untuned(coefficients)), (2, coefficients))
+            for place, k in ((0, untuned(rov)), (2, rov))
         ]
         rows.append(ResponseRow(command, *models))
     return ResponseTable(**vars(test), rows=tuple(rows), steady=steady)
