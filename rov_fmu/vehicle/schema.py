@@ -15,6 +15,8 @@ from rov_fmu.vehicle.quantity import Finite, Name, Quantity, Symbol, Text, quant
 FORMAT = 2
 UNTUNED = 1.0
 """α and β where the file does not give them."""
+NOT_GIVEN = "not given"
+"""Their source then."""
 MOST = 32
 """Thrusters, curves, inputs: more than any vehicle has."""
 
@@ -144,7 +146,7 @@ class Thruster(Strict):
     def plain(self) -> layout.Thruster:
         """As the mathematics takes it."""
         x, y, z = self.direction.value
-        length = hypot(x, y, z)
+        length = hypot(x, y, z) if abs(hypot(x, y, z) - 1.0) > 1e-12 else 1.0  # a unit vector stays as it is
         return layout.Thruster(
             self.name,
             self.curve,

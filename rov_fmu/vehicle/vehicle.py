@@ -17,7 +17,7 @@ from rov_fmu.vehicle.form import Validity as Validity
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Finite as Finite
 from rov_fmu.vehicle.quantity import Quantity as Quantity
-from rov_fmu.vehicle.schema import UNTUNED, File, where
+from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, File, where
 from rov_fmu.vehicle.sense import as_far_as_readable, nonsense
 
 TABLES = {
@@ -161,7 +161,7 @@ def _vehicle(
     return Vehicle(
         **{key: getattr(head, key) for key in Head.model_fields},
         rov=Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()}),
-        sources={name: q.source if q else "not given" for name, q in found.items()},
+        sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,
         alternatives=alternatives,
         data=path.parent / head.data if head.data else None,

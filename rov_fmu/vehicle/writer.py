@@ -6,27 +6,41 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
-from tomlkit.items import Array, InlineTable
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import Array, InlineTable, Item
 
-from rov_fmu.files.messages import shown
+from rov_fmu.files.messages import brief, shown
 from rov_fmu.files.output import Output, write_whole
 from rov_fmu.files.reading import read_text
-from rov_fmu.motion.rov import COEFFICIENTS
-from rov_fmu.vehicle.vehicle import Head, Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.motion.layout import Curve, Meta, Thruster
+from rov_fmu.vehicle.form import Head
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, where
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 _DIGITS = 6  # significant ones: more than any tank test has, few enough to be the same on every machine
 
 
 def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
-    """The vehicle file, in a folder, of a vehicle without tables, pictures and alternatives."""
+    """The vehicle file, in a folder, of a vehicle."""
     document = tomlkit.document()
     if vehicle.provenance:
         words = "Made from tank tests: [provenance] tells how, and `interval` is 95 % confidence."
         document.add(tomlkit.comment(words)).add(tomlkit.nl())
     low, high = map(_rounded, vehicle.command_range)
-    document["vehicle"] = {key: getattr(vehicle, key) for key in Head.model_fields}
+    beside = {key: getattr(vehicle, key) for key in ("data", "pictures")}
+    folders = {key: _seen_from(folder, path) for key, path in beside.items() if path}
+    document["format"] = FORMAT
+    document["vehicle"] = {key: getattr(vehicle, key) for key in Head.model_fields} | folders
     document["validity"] = {"command_min": low, "command_max": high, **_lines("limits", vehicle.limits)}
-    document["coefficients"] = {name: _quantity(vehicle, name) for name in COEFFICIENTS}
+    entries = {name: _quantity(vehicle, name) for name, source in vehicle.sources.items() if source != NOT_GIVEN}
+    for key, table in hardware(vehicle, entries).items():
+        document[key] = table
+    if vehicle.alternatives:
+        document["alternatives"] = {
+            name: {"description": other.description}
+            | {n: _inline(value, vehicle.layout.coefficients[n], other.sources[n]) for n, value in other.values.items()}
+            for name, other in vehicle.alternatives.items()
+        }
     if made := vehicle.provenance:
         report = {"report": _seen_from(folder, made.report)} if made.report else {}
         head = {"tool": made.tool, "method": made.method, **report, **_lines("warnings", made.warnings)}
@@ -34,10 +48,30 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     return tomlkit.dumps(document)
 
 
+def hardware(vehicle: Vehicle, entries: Mapping[str, Item]) -> dict[str, Any]:
+    """The tables that say what the vehicle has, with the entries of its coefficients."""
+    layout = vehicle.layout
+    tables: dict[str, Any] = {"body": {"coupling": True} if layout.coupled else {}}
+    tables |= {"arm": {}} if layout.has_arm else {}
+    tables["curves"] = {curve.name: _curve(curve) for curve in layout.curves}
+    tables["thruster"] = tomlkit.aot()
+    for thruster in layout.thrusters:
+        tables["thruster"].append(tomlkit.item(_thruster(thruster, vehicle.thruster_sources[thruster.name])))
+    tables["axes"] = {form.axis.name: {} for form in layout.axes}
+    tables |= {"inputs": {name: _inline_of(gains) for name, gains in layout.mix.items()}} if layout.mix else {}
+    for name, (*above, key) in where(layout):
+        table = tables
+        for step in above:
+            table = table[step]
+        if name in entries:
+            table[key] = entries[name]
+    return tables
+
+
 def vehicle_output(vehicle: Vehicle, path: Path) -> Output:
     """The vehicle file to write, perhaps together with its report. Raises VehicleFileError."""
     report = vehicle.provenance.report if vehicle.provenance else None
-    return _checked(path, vehicle_text(vehicle, path.parent), coming=report)
+    return checked(path, vehicle_text(vehicle, path.parent), coming=report)
 
 
 def write_vehicle(vehicle: Vehicle, path: Path) -> None:
@@ -50,23 +84,44 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
 
     `reason` is the source of those that change. Raises as write_vehicle.
     """
-    document: Any = tomlkit.parse(read_text(source, VehicleFileError))
-    if "coefficients" not in document:
-        raise VehicleFileError(f"{source}: cannot be read a second time, as it must be to write it tuned")
+    document, vehicle = read_document(source), load_vehicle(source)
+    places = dict(where(vehicle.layout))
     for name, exact in values.items():
-        entry = document["coefficients"][name]
-        if (value := _rounded(exact)) == entry["value"]:
+        if (value := _rounded(exact)) == vehicle.rov[name]:
             continue
-        entry["value"], entry["source"] = value, reason
-        entry.pop("interval", None)
+        *above, key = places[name] if "format" in document else ("coefficients", name)
+        table = document
+        for step in above:
+            table = table[step]
+        if key in table:
+            table[key]["value"], table[key]["source"] = value, reason
+            table[key].pop("interval", None)
+        else:
+            table[key] = _inline(value, vehicle.layout.coefficients[name], reason)
+    write_whole(moved(document, source, path))
+
+
+def read_document(source: Path) -> Any:
+    """The vehicle file with its comments, to write it otherwise. Raises VehicleFileError."""
+    try:
+        document: Any = tomlkit.parse(read_text(source, VehicleFileError))
+    except TOMLKitError as error:
+        raise VehicleFileError(f"{source}: cannot be written again as it is: {brief(str(error))}") from error
+    if "vehicle" not in document:
+        raise VehicleFileError(f"{source}: cannot be read a second time, as it must be to write it anew")
+    return document
+
+
+def moved(document: Any, source: Path, path: Path) -> Output:
+    """The document to write, what stands beside it as seen from its new place. Raises VehicleFileError."""
     for table, key in (("vehicle", "data"), ("vehicle", "pictures"), ("provenance", "report")):
         if key in document.get(table, {}):
             document[table][key] = _seen_from(path.parent, source.parent / document[table][key])
-    write_whole(_checked(path, tomlkit.dumps(document)))
+    return checked(path, tomlkit.dumps(document))
 
 
-def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
-    """The text of a vehicle file, to write once it has proved to be one."""
+def checked(path: Path, text: str, coming: Path | None = None) -> Output:
+    """The text of a vehicle file, to write once it has proved to be one. Raises VehicleFileError."""
 
     def check(draft: Path) -> None:
         try:
@@ -81,14 +136,40 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
         raise VehicleFileError(f"{path}: {part}: the name of a file that is not Unicode cannot stand here") from error
 
 
-def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
-    value, interval = _rounded(getattr(vehicle.coefficients, name)), vehicle.intervals.get(name)
-    entry = tomlkit.inline_table()
-    entry |= {"value": value, "unit": COEFFICIENTS[name].unit}
-    if interval:
-        entry["interval"] = [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)]
-    entry["source"] = vehicle.sources[name]
+def _curve(curve: Curve) -> dict[str, Any]:
+    words = {key: getattr(curve, key) for key in ("description", "equation", "together")}
+    return {key: word for key, word in words.items() if word != getattr(Curve, key)}
+
+
+def _thruster(thruster: Thruster, sources: Mapping[str, str]) -> dict[str, Any]:
+    entry: dict[str, Any] = {"name": thruster.name}
+    if thruster.description:
+        entry["description"] = thruster.description
+    entry["curve"] = thruster.curve
+    entry["direction"] = _inline_of({"value": [*thruster.direction], "source": sources["direction"]})
+    if thruster.position:
+        position = {"value": [*thruster.position], "unit": "m", "source": sources["position"]}
+        entry["position"] = _inline_of(position)
+    if thruster.arm:
+        entry["arm"] = "port" if thruster.arm > 0 else "starboard"
     return entry
+
+
+def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
+    value, interval = _rounded(vehicle.rov[name]), vehicle.intervals.get(name)
+    ends = [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)] if interval else None
+    return _inline(value, vehicle.layout.coefficients[name], vehicle.sources[name], ends)
+
+
+def _inline(value: float, meta: Meta, source: str, interval: list[float] | None = None) -> InlineTable:
+    ends = {"interval": interval} if interval else {}
+    return _inline_of({"value": value, "unit": meta.unit, **ends, "source": source})
+
+
+def _inline_of(entries: Mapping[str, Any]) -> InlineTable:
+    table = tomlkit.inline_table()
+    table |= dict(entries)
+    return table
 
 
 def _lines(key: str, texts: Iterable[str]) -> dict[str, Array]:

@@ -154,7 +154,7 @@ def test_a_vehicle_out_of_a_pipe_is_refused_where_it_must_be_read_twice(
     os.close(read)
     assert capsys.readouterr() == (
         "",
-        f"rov-fmu: /dev/fd/{read}: cannot be read a second time, as it must be to write it tuned\n",
+        f"rov-fmu: /dev/fd/{read}: cannot be read a second time, as it must be to write it anew\n",
     )
     assert not any(tmp_path.iterdir())
 
