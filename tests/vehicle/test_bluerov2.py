@@ -1,0 +1,279 @@
+"""BlueROV2 and BlueROV2 Heavy: their numbers against their sources, their motion against DOP853."""
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import cos, sin, sqrt
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+from scipy.signal import TransferFunction, step
+
+from rov_fmu.files.toml_file import read_toml
+from rov_fmu.motion.layout import AXES
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+
+BOTH = ["bluerov2", "bluerov2_heavy"]
+NEWTON = 9.80665  # in 1 kgf
+
+
+def file_of(name: str) -> dict[str, Any]:
+    """A vehicle file as it stands."""
+    return read_toml(SHIPPED[name], VehicleFileError)
+
+
+@pytest.fixture(scope="module", params=BOTH)
+def ship(request: pytest.FixtureRequest) -> Vehicle:
+    return load_vehicle(SHIPPED[request.param])
+
+
+# ---- T200 ------------------------------------------------------------------------------------------------------------
+
+
+def points() -> tuple[Any, Any]:
+    """The maker's points: command, thrust in N."""
+    with (SHIPPED["bluerov2"].parent / "t200" / "t200_16_v.csv").open(encoding="utf-8", newline="") as file:
+        pulse, force = np.array([[float(cell) for cell in row] for row in [*csv.reader(file)][1:]]).T
+    assert len(pulse) == 201
+    assert np.all(np.diff(pulse) == 4.0)
+    assert (pulse[0], pulse[-1]) == (1100.0, 1900.0)
+    return (pulse - 1500.0) / 400.0, force * NEWTON
+
+
+def quadratic(a: float, b: float, c_0: float, c: Any) -> Any:
+    m = np.maximum(np.abs(c) - c_0, 0.0)
+    return np.sign(c) * (a * m + b) * m
+
+
+def rms(residuals: Any) -> float:
+    return float(np.sqrt(np.mean(residuals**2)))
+
+
+def test_the_curve_is_that_of_the_makers_points_to_0_35_newton(ship: Vehicle) -> None:
+    c, thrust = points()
+    curve = ship.layout.curves[0]
+    shipped = np.array([ship.rov.curve_force(curve, float(x)) for x in c])
+    assert rms((shipped - thrust)[c > 0.0]) < 0.35
+    assert rms((shipped - thrust)[c < 0.0]) < 0.35
+    assert np.all(shipped[np.abs(c) < 0.0872] == 0.0)
+    assert shipped[-1] == pytest.approx(5.25 * NEWTON, rel=0.04), "forward is the strong side, as the maker states it"
+    assert shipped[0] == pytest.approx(-4.1 * NEWTON, rel=0.04)
+
+
+def test_the_curve_is_the_least_squares_fit(ship: Vehicle) -> None:
+    c, thrust = points()
+
+    def residuals(k: Sequence[float]) -> Any:
+        a, b, a_reverse, b_reverse, c_0 = k
+        return np.where(c > 0.0, quadratic(a, b, c_0, c), quadratic(a_reverse, b_reverse, c_0, c)) - thrust
+
+    fit = least_squares(residuals, [20.0, 20.0, 20.0, 20.0, 0.05], x_scale=[10.0, 10.0, 10.0, 10.0, 0.1])
+    names = ("a_t_t200", "b_t_t200", "a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200")
+    assert [ship.rov[name] for name in names] == pytest.approx(fit.x, rel=5e-4)
+
+
+def test_one_symmetric_quadratic_leaves_nine_times_as_much() -> None:
+    c, thrust = points()
+    fit = least_squares(lambda k: quadratic(k[0], k[1], 0.0, c) - thrust, [20.0, 20.0])
+    assert rms(fit.fun) == pytest.approx(2.92, abs=0.02)
+
+
+def test_the_lag_loses_the_impulse_of_the_published_transfer_function(ship: Vehicle) -> None:
+    t = np.linspace(0.0, 3.0, 300_001)
+    _, rise = step(TransferFunction([6136.0, 108700.0], [1.0, 89.0, 9258.0, 108700.0]), T=t)
+    assert ship.rov["T_t200"] == pytest.approx(float(np.trapezoid(1.0 - rise, t)), abs=5e-5)
+
+
+# ---- ArduSub ---------------------------------------------------------------------------------------------------------
+
+_HORIZONTAL = {"1": (1, 0, -1, 1), "2": (-1, 0, -1, -1), "3": (-1, 0, 1, 1), "4": (1, 0, 1, -1)}
+_VERTICAL = (0, -1, 0, 0)
+ARDUSUB = {
+    "bluerov2": _HORIZONTAL | dict.fromkeys("56", _VERTICAL),
+    "bluerov2_heavy": _HORIZONTAL | dict.fromkeys("5678", _VERTICAL),
+}
+"""Factors of ArduSub's motors by number, frames vectored and vectored_6dof: yaw, throttle (up), forward, lateral."""
+STICKS = {"yaw": (0, 1.0), "heave": (1, -1.0), "surge": (2, 1.0), "sway": (3, 1.0)}
+"""The place of each axis among the factors, and its sign here."""
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_thrusters_are_numbered_and_directed_as_ardusubs_motors(name: str) -> None:
+    layout = load_vehicle(SHIPPED[name]).layout
+    assert [thruster.name for thruster in layout.thrusters] == list(ARDUSUB[name])
+    for thruster in layout.thrusters:
+        for axis, (place, sign) in STICKS.items():
+            factor = sign * ARDUSUB[name][thruster.name][place]
+            effect = thruster.effect(AXES[axis])
+            assert effect == pytest.approx(factor * abs(effect), abs=1e-12), f"{thruster.name} {axis}"
+            assert (abs(effect) > 0.1) == (factor != 0), f"{thruster.name} {axis}"
+
+
+@pytest.mark.parametrize("name", BOTH)
+@pytest.mark.parametrize("axis", STICKS)
+def test_a_stick_moves_its_axis_alone(name: str, axis: str) -> None:
+    """The commands of ArduSub's mixer for one stick give a force along its axis and, by symmetry, along no other."""
+    vehicle, (place, sign) = load_vehicle(SHIPPED[name]), STICKS[axis]
+    inputs = dict.fromkeys(vehicle.layout.inputs, 0.0)
+    inputs |= {f"u_{n}": 0.4 * sign * factors[place] for n, factors in ARDUSUB[name].items()}
+    F = vehicle.rov.commanded(inputs)
+    for other in AXES.values():
+        force = sum(thruster.effect(other) * F[thruster.name] for thruster in vehicle.layout.thrusters)
+        assert (force > 1.0) if other.name == axis else (abs(force) < 1e-12), other.name
+
+
+# ---- Publications ----------------------------------------------------------------------------------------------------
+
+PUBLISHED = {
+    "bluerov2": (11.5, 0.16, 112.8 - 114.8, [(5.5, 4.03, 18.18), (12.7, 6.22, 21.66), (14.57, 5.18, 36.99),
+                                             (0.12, 0.07, 1.55)]),
+    "bluerov2_heavy": (13.5, 0.37, 9.82 * (13.5 - 1000.0 * 0.0134), [(6.36, 13.7, 141.0), (7.12, 0.0, 217.0),
+                                                                     (18.68, 33.0, 190.0), (0.222, 0.0, 1.5)]),
+}  # fmt: skip
+"""Mass, inertia, weight less buoyancy; of surge, sway, heave and yaw added mass, linear and quadratic drag."""
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_the_coefficients_are_those_of_the_publication(name: str) -> None:
+    rov = load_vehicle(SHIPPED[name]).rov
+    mass, inertia, weight, axes = PUBLISHED[name]
+    assert (rov["m_rov"], rov["I_r"]) == (mass, inertia)
+    assert rov["F_0_w"] == pytest.approx(weight, abs=1e-12)
+    for axis, numbers in zip("uvwr", axes, strict=True):
+        assert tuple(rov[f"{key}_{axis}"] for key in ("m_a", "b_d", "a_d")) == numbers
+
+
+@pytest.mark.parametrize("name", BOTH)
+def test_all_thrusters_turn_with_the_arm_of_the_publications(name: str) -> None:
+    """0.1888 m, in Wu's thruster matrix and by von Benzon's positions."""
+    for thruster in load_vehicle(SHIPPED[name]).layout.thrusters[:4]:
+        assert abs(thruster.effect(AXES["yaw"])) == pytest.approx(0.1888, abs=5e-5)
+
+
+# ---- Motion ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Written:
+    """The equations of motion written out again from the vehicle file, as the design states them."""
+
+    file: Mapping[str, Any]
+    signs: list[float] = field(default_factory=lambda: [1.0] * 4)
+    """Of the velocities, held between two reversals: |v| v is s v^2 there, which has all derivatives."""
+    targets: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        def value(entry: Mapping[str, Any]) -> float:
+            return float(entry["value"])
+
+        body, curve = self.file["body"], self.file["curves"]["t200"]
+        self.curve = {k: value(q) for k, q in curve.items() if k != "description"}
+        axes = [{k: value(q) for k, q in self.file["axes"][name].items()} for name in ("surge", "sway", "heave", "yaw")]
+        rest = [value(body["m_rov"])] * 3 + [value(body["I_r"])]
+        self.M = [inertia + axis["m_a"] for inertia, axis in zip(rest, axes, strict=True)]
+        self.A, self.B = ([axis[key] for axis in axes] for key in ("a_d", "b_d"))
+        self.load = [axis.get("F_0", 0.0) for axis in axes]
+        self.effects = []
+        for thruster in self.file["thruster"]:
+            d, p = (np.array(thruster[key]["value"], dtype=float) for key in ("direction", "position"))
+            d /= sqrt(d @ d)
+            self.effects.append([*d, np.cross(p, d)[2]])
+
+    def hold(self, commands: Sequence[float]) -> None:
+        """From now on these commands."""
+        self.targets = []
+        for c in commands:
+            m = max(min(abs(c), 1.0) - self.curve["c_0"], 0.0)
+            end = "" if c > 0.0 else "_reverse"
+            force = self.curve["a_t" + end] * m * m + self.curve["b_t" + end] * m
+            self.targets.append(force if c > 0.0 else -force)
+
+    def rates(self, _t: float, y: Any) -> list[float]:
+        u, v, w, r, psi = (float(y[n]) for n in (0, 1, 2, 3, 7))
+        (M_u, M_v, _, M_r), F = self.M, y[8:].tolist()
+        found = []
+        for n, velocity in enumerate((u, v, w, r)):
+            thrust = sum(e[n] * f for e, f in zip(self.effects, F, strict=True))
+            drag = self.signs[n] * self.A[n] * velocity * velocity + self.B[n] * velocity
+            found.append((thrust + self.load[n] - drag) / self.M[n])
+        found[0] += M_v * v * r / M_u
+        found[1] -= M_u * u * r / M_v
+        found[3] -= (M_v - M_u) * u * v / M_r
+        found += [u * cos(psi) - v * sin(psi), u * sin(psi) + v * cos(psi), w, r]
+        return found + [(target - f) / self.curve["T"] for target, f in zip(self.targets, F, strict=True)]
+
+    def advance(self, y: Any, commands: Sequence[float], h: float) -> tuple[Any, int]:
+        """The state after h seconds by DOP853, cut at every reversal, and how many there were."""
+        self.hold(commands)
+        self.signs = [1.0 if x > 0.0 else -1.0 for x in y[:4]]
+        t, reversals = 0.0, 0
+        while t < h:
+            events = [self._reversal(n) for n in range(4)]
+            part = solve_ivp(self.rates, (t, h), y, "DOP853", events=events, rtol=1e-13, atol=1e-15)
+            assert part.success, part.message
+            t, y = part.t[-1], part.y[:, -1].copy()
+            for n in (n for n in range(4) if len(part.t_events[n])):
+                y[n], self.signs[n] = 0.0, -self.signs[n]
+                reversals += 1
+                assert self.rates(t, y)[n] * self.signs[n] > 0.0, "the velocity goes through zero"
+        return y, reversals
+
+    def _reversal(self, n: int) -> Callable[..., float]:
+        def velocity(_t: float, y: Any) -> float:
+            return float(y[n])
+
+        velocity.terminal, velocity.direction = True, -self.signs[n]  # type: ignore[attr-defined]
+        return velocity
+
+
+def manoeuvre(thrusters: int) -> list[tuple[float, list[float]]]:
+    """30 s of held commands: ahead, turning, aside, astern, and each thruster by itself; some are in the dead band."""
+    random, held = Random(1898), []
+    ends = [0.0, *sorted(random.uniform(0.0, 30.0) for _ in range(23)), 30.0]
+    for start, end in pairwise(ends):
+        surge, sway, yaw, heave = (random.choice((-1.0, -0.5, -0.2, 0.0, 0.3, 0.6, 1.0)) for _ in range(4))
+        commands = [yaw - surge + sway, -yaw - surge - sway, -yaw + surge + sway, yaw + surge - sway]
+        commands += [heave + random.uniform(-0.1, 0.1) for _ in range(thrusters - 4)]
+        held.append((end - start, [max(-1.0, min(1.0, c + random.uniform(-0.05, 0.05))) for c in commands]))
+    return held
+
+
+@pytest.fixture(scope="module")
+def flown() -> list[tuple[float, dict[str, float], dict[str, float]]]:
+    """The Heavy on the manoeuvre by DOP853: length, inputs and state of every held command, after the start."""
+    vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
+    assert vehicle.layout.coupled
+    assert len(vehicle.layout.lagging) == 8
+    names = ("u", "v", "w", "r", "x", "y", "z", "psi", *vehicle.layout.lagging)
+    written, y = Written(file_of("bluerov2_heavy")), np.array([0.2, -0.1, 0.05, 0.3, 0.0, 0.0, 5.0, 1.0] + 8 * [2.0])
+    assert set(names) == set(vehicle.layout.state)
+    quiet = dict.fromkeys(vehicle.layout.inputs, 0.0)
+    found = [(0.0, quiet, dict(zip(names, y.tolist(), strict=True)))]
+    total = 0
+    for h, commands in manoeuvre(8):
+        y, reversals = written.advance(y, commands, h)
+        inputs = quiet | {f"u_{n}": c for n, c in enumerate(commands, 1)}
+        found.append((h, inputs, dict(zip(names, y.tolist(), strict=True))))
+        total += reversals
+    assert total > 20
+    assert abs(found[-1][2]["psi"]) > 3.0
+    return found
+
+
+@pytest.mark.parametrize("longest", [100.0, 0.01])
+def test_the_heavy_moves_as_dop853_says(flown: Any, longest: float) -> None:
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    state, dead = flown[0][2], 0
+    for h, inputs, wanted in flown[1:]:
+        steps = max(1, round(h / longest))
+        for _ in range(steps):
+            state = rov.step(inputs, state, h / steps)
+        dead += sum(0.0 < abs(c) < 0.0872 for c in inputs.values())
+        assert state == pytest.approx(wanted, abs=1e-9, rel=0.0)
+    assert dead > 5
