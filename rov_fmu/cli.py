@@ -1,4 +1,4 @@
-"""The command rov-fmu: build | identify | tune | tables | figures."""
+"""The command rov-fmu: build | identify | tune | convert | schema | tables | figures."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -188,6 +188,24 @@ def _tune(
     if output:
         write_tuned(vehicle, output, *tuned_values(tuning))
     print_tuning(tuning)
+
+
+@_commands.command("convert")
+@_vehicle()
+@click.option("-o", "--output", type=_FILE, required=True, metavar="NEW.toml", help="Vehicle file to write.")
+def _convert(vehicle: Path, output: Path) -> None:
+    """Write a vehicle file of the first version in the form of today, with its comments."""
+    from rov_fmu.vehicle.convert import converted
+
+    write_whole(converted(vehicle, output))
+
+
+@_commands.command("schema")
+def _schema() -> None:
+    """Print the JSON schema of the vehicle file, for editors."""
+    from rov_fmu.vehicle.json_schema import json_schema_text
+
+    click.echo(json_schema_text(), nl=False)
 
 
 @_commands.command("tables")

@@ -216,6 +216,7 @@ class File(Parts):
     """A vehicle file (TOML): an ROV of any thrusters, axes and curves."""
 
     format: Literal[2]
+    """Version of the form of this file."""
     vehicle: FileHead
     validity: Validity
     body: Body
