@@ -29,9 +29,12 @@ from rov_fmu.files.csv_table import Column, DataFileError, read_columns
 from rov_fmu.files.reading import read_bytes
 from rov_fmu.files.toml_file import Strict, beside, pair, read_checked
 from rov_fmu.motion.layout import Axis
+from rov_fmu.vehicle.first import QUANTITIES
+from rov_fmu.vehicle.form import Head, Validity
 from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.quantity import Finite, Quantity
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import QUANTITIES, Finite, Head, Quantity, Validity, VehicleFileError
+from rov_fmu.vehicle.vehicle import VehicleFileError
 
 ROV_FILE = "rov.toml"
 AXES = {form.axis.name: form.axis for form in PAPER.axes}

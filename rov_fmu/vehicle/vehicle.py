@@ -10,13 +10,10 @@ from rov_fmu.files.places import FMU_SRC
 from rov_fmu.files.toml_file import Toml, check, read_toml, told
 from rov_fmu.motion.layout import Layout
 from rov_fmu.motion.rov import Rov
-from rov_fmu.vehicle.first import QUANTITIES as QUANTITIES
 from rov_fmu.vehicle.first import FirstFile, quantities
-from rov_fmu.vehicle.form import Head as Head
-from rov_fmu.vehicle.form import Validity as Validity
+from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
-from rov_fmu.vehicle.quantity import Finite as Finite
-from rov_fmu.vehicle.quantity import Quantity as Quantity
+from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, File, where
 from rov_fmu.vehicle.sense import as_far_as_readable, nonsense
 
