@@ -5,7 +5,7 @@ where they are not, a hyperbola where they coincide, an exponential or a line wi
 holds for complex times too, which is what the pose is integrated with.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -14,7 +14,10 @@ from typing import Any
 from mpmath import mp
 from mpmath.calculus.quadrature import GaussLegendre
 
-from rov_fmu.motion.rov import Coefficients, Inputs, State
+from rov_fmu.motion.rov import Rov
+
+from .equations import Axis, Equations, equations
+from .extrapolation import integrate
 
 DIGITS = 50
 Number = Any  # of mpmath, real or complex
@@ -86,14 +89,19 @@ def _to_pole(t: Number, pole: Number, period: Number) -> Number:
 
 
 class Motion:
-    """One axis over h seconds: one leg, or two where the force turns the motion."""
+    """One axis over h seconds: one leg, or two where the force reverses the motion; `astern` is A and B for v < 0."""
 
-    def __init__(self, A: Number, B: Number, C: Number, v0: Number, h: Number) -> None:
-        A, B, C, v0, self.h = (mp.mpf(number) for number in (A, B, C, v0, h))
+    def __init__(
+        self, A: Number, B: Number, C: Number, v0: Number, h: Number, astern: tuple[Number, Number] | None = None
+    ) -> None:
+        C, v0, self.h = (mp.mpf(number) for number in (C, v0, h))
         sign = -1 if v0 < 0 or (v0 == 0 and C < 0) else 1
+        ahead, astern = ((mp.mpf(a), mp.mpf(b)) for a, b in ((A, B), astern or (A, B)))
+        (A, B), back = (ahead, astern)[::sign]
         self.legs = [Leg(A, B, sign * C, sign * v0, mp.mpf(0), sign, mp.mpf(0))]
-        if sign * C < 0 and v0 != 0 and (turn := self.legs[0].rest()) < h:
-            self.legs.append(Leg(A, B, -sign * C, mp.mpf(0), turn, -sign, self.legs[0].distance(turn)))
+        if sign * C < 0 and v0 != 0 and (rest := self.legs[0].rest()) < h:
+            way = self.legs[0].distance(rest)
+            self.legs.append(Leg(*back, -sign * C, mp.mpf(0), rest, -sign, way))
 
     def end(self) -> tuple[Number, Number, Number]:
         """Velocity, distance and length of the path, there and back."""
@@ -113,14 +121,16 @@ class AxisEnd:
     """Digits to calculate with for a result of 50."""
 
 
-def axis(A: Number, B: Number, C: Number, v0: Number, h: Number) -> AxisEnd:
+def axis(
+    A: Number, B: Number, C: Number, v0: Number, h: Number, astern: tuple[Number, Number] | None = None
+) -> AxisEnd:
     """One axis after h seconds: calculated with more and more digits until 50 of them stay."""
     # Terms cancel by as many digits as the numbers, or their squares, are apart.
-    digits = DIGITS + sum(abs(mp.mag(number)) * 6 // 10 for number in (A, B, C, v0, h) if number != 0)
+    digits = DIGITS + sum(abs(mp.mag(number)) * 6 // 10 for number in (A, B, C, v0, h, *(astern or ())) if number != 0)
     before = None
     while True:
         with mp.workdps(digits):
-            v, s, path = Motion(A, B, C, v0, h).end()
+            v, s, path = Motion(A, B, C, v0, h, astern).end()
             scale = max(abs(v), abs(mp.mpf(v0)))
             limit = mp.mpf(10) ** -DIGITS
             if before and abs(v - before[0]) <= limit * scale and abs(s - before[1]) <= limit * path:
@@ -201,34 +211,43 @@ class Step:
     """The largest velocity on the way, the length of the path, the angle turned there and back."""
 
 
-def coefficients_of(k: Coefficients, i: Inputs) -> tuple[tuple[Number, Number, Number], ...]:
-    """A, B and C of surge, heave and yaw: (2), (4), (9), (10) and (18) as the paper prints them, without rounding."""
-    limited = (min(1, max(-1, mp.mpf(command))) for command in (i.u_l, i.u_r, i.u_t))
-    curves = ((k.a_t_rear, k.b_t_rear, 2), (k.a_t_rear, k.b_t_rear, 2), (k.a_t_top, k.b_t_top, 1))
-    F_l, F_r, F_t = ((a * abs(c) * c + b * c) / share for c, (a, b, share) in zip(limited, curves, strict=True))
-    torque = F_l * k.R * mp.sin(k.gamma) + F_r * k.R * mp.sin(-k.gamma)
-    forces = (k.alpha_u * (F_r + F_l) + i.X_ext, k.alpha_w * F_t + i.Z_ext, k.alpha_r * torque + i.N_ext)
-    return tuple(
-        (mp.mpf(beta) * a_d / m, mp.mpf(beta) * b_d / m, beta * force / m)
-        for m, beta, a_d, b_d, force in (
-            (k.m_rov, k.beta_u, k.a_d_u, k.b_d_u, forces[0]),
-            (k.m_rov, k.beta_w, k.a_d_w, k.b_d_w, forces[1]),
-            (k.I_r, k.beta_r, k.a_d_r, k.b_d_r, forces[2]),
-        )
-    )
-
-
-def step(k: Coefficients, i: Inputs, s: State, h: float) -> Step:
-    """The ROV after h seconds with the inputs held."""
+def step(rov: Rov, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> Step:
+    """The vehicle after h seconds with the inputs held."""
     with mp.workdps(4 * DIGITS):
-        surge, heave, yaw = coefficients_of(k, i)
-    u, w, r = axis(*surge, s.u, h), axis(*heave, s.w, h), axis(*yaw, s.r, h)
-    with mp.workdps(max(u.digits, r.digits)):
-        way = planar(Motion(*surge, s.u, h), Motion(*yaw, s.r, h)) * mp.expj(s.psi)
-        drift = mp.mpc(i.V_N, i.V_E) * h
-        path = u.path + abs(drift)
-        return Step(
-            {"u": u.velocity, "w": w.velocity, "r": r.velocity, "x": s.x + way.real + drift.real,
-             "y": s.y + way.imag + drift.imag, "z": s.z + w.distance, "psi": s.psi + r.distance},
-            {"u": u.scale, "w": w.scale, "r": r.scale, "x": path, "y": path, "z": w.path, "psi": r.path},
-        )  # fmt: skip
+        said = equations(rov, inputs)
+        if said.lags or said.coupled:
+            ended = integrate(said, state, h)
+            found, fastest, ways = ended.state, ended.fastest, ended.ways
+        else:
+            found, fastest, ways = _free(said, state, h)
+        scale = fastest | {name: ways[name] for name in ("x", "y", "z", "psi")}
+        for name in ("x", "y", "z", "psi"):
+            found[name] += mp.mpf(state.get(name, 0))
+        for name, current in (("x", "V_N"), ("y", "V_E")):
+            drift = mp.mpf(inputs.get(current, 0)) * h
+            found[name] += drift
+            scale[name] += abs(drift)
+        scale |= {f"F_{name}": max(abs(lag.target), abs(state[f"F_{name}"])) for name, lag in said.lags.items()}
+        return Step({name: found[name] for name in state}, {name: scale[name] for name in state})
+
+
+_Numbers = dict[str, Number]
+
+
+def _free(said: Equations, state: Mapping[str, float], h: float) -> tuple[_Numbers, _Numbers, _Numbers]:
+    """Velocities, distances and track of a vehicle whose axes have nothing to do with each other; what scales them."""
+    still = Axis((0, 0), (0, 0), mp.zero, {})
+    axes = {name: said.axes.get(name, still) for name in ("u", "v", "w", "r")}
+    forms = {name: (*form.ahead, form.C, state.get(name, 0.0), h, form.astern) for name, form in axes.items()}
+    ends = {name: axis(*form) for name, form in forms.items()}
+    with mp.workdps(max(end.digits for end in ends.values())):
+        u, v, r = (Motion(*forms[name]) for name in ("u", "v", "r"))
+        track = planar(u, r) + 1j * planar(v, r)
+        track *= mp.expj(mp.mpf(state.get("psi", 0)))
+    way = ends["u"].path + ends["v"].path
+    return (
+        {name: ends[name].velocity for name in said.axes}
+        | {"x": track.real, "y": track.imag, "z": ends["w"].distance, "psi": ends["r"].distance},
+        {name: ends[name].scale for name in said.axes},
+        {"x": way, "y": way, "z": ends["w"].path, "psi": ends["r"].path},
+    )

@@ -1,0 +1,152 @@
+"""The equations of motion as DESIGN.md has them, written out once more and without rounding (mpmath).
+
+Of a vehicle they take what is declared (its axes, curves, thrusters, inputs) and its numbers, no formula of
+rov_fmu/motion/.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mpmath import mp
+
+from rov_fmu.motion.layout import Curve, Thruster
+from rov_fmu.motion.rov import Rov
+
+Number = Any  # of mpmath
+PLACES = {"u": 0, "v": 1, "w": 2}
+"""Of a velocity in a thruster's direction."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """v' = C + sum of the late forces' accelerations - B v - A |v| v, without coupling."""
+
+    ahead: tuple[Number, Number]
+    """A and B for v > 0."""
+    astern: tuple[Number, Number]
+    """A and B for v < 0."""
+    C: Number
+    """Of loads and of the thrusters without lag."""
+    late: Mapping[str, Number]
+    """Acceleration by 1 N of each thruster with a lag."""
+
+
+@dataclass(frozen=True)
+class Lag:
+    """F' = (target - F)/T."""
+
+    target: Number
+    T: Number
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Of a vehicle under held inputs; exact numbers by the names of velocities, of thrusters."""
+
+    axes: Mapping[str, Axis]
+    lags: Mapping[str, Lag]
+    inertias: Mapping[str, Number]
+    """m/β, of the coupling."""
+    coupled: bool
+
+    def rates(self, state: Mapping[str, Number], inputs: Mapping[str, float]) -> dict[str, Number]:
+        """Time derivatives of a state."""
+        found: dict[str, Number] = {}
+        u, v, w, r, psi = (state.get(name, 0) for name in ("u", "v", "w", "r", "psi"))
+        for name, axis in self.axes.items():
+            V = state[name]
+            A, B = axis.astern if mp.re(V) < 0 else axis.ahead
+            way = -1 if mp.re(V) < 0 else 1
+            late = sum(gain * state[f"F_{thruster}"] for thruster, gain in axis.late.items())
+            found[name] = axis.C + late - B * V - way * A * V * V
+        if self.coupled:
+            M_u, M_v, M_r = (self.inertias[name] for name in ("u", "v", "r"))
+            found["u"] += M_v * v * r / M_u
+            found["v"] -= M_u * u * r / M_v
+            found["r"] -= (M_v - M_u) * u * v / M_r
+        if "u" in self.axes or "v" in self.axes:
+            found["x"] = u * mp.cos(psi) - v * mp.sin(psi) + inputs["V_N"]
+            found["y"] = u * mp.sin(psi) + v * mp.cos(psi) + inputs["V_E"]
+        if "w" in self.axes:
+            found["z"] = w
+        if "r" in self.axes:
+            found["psi"] = r
+        for name, lag in self.lags.items():
+            found[f"F_{name}"] = (lag.target - state[f"F_{name}"]) / lag.T
+        return found
+
+
+def _limited(command: Number) -> Number:
+    return min(mp.one, max(-mp.one, command))
+
+
+def thrust(rov: Rov, curve: Curve, command: Number) -> Number:
+    """F(c) = a (c - c0)^2 + b (c - c0) beyond the dead band; for c < 0 the same mirrored, of the set for reverse."""
+    keys, reverse = curve.keys, "_reverse" if command < 0 else ""
+
+    def number(key: str) -> Number:
+        name = f"{key}_{curve.name}{reverse}" if key + reverse in keys else f"{key}_{curve.name}"
+        return mp.mpf(rov.coefficients[name])
+
+    beyond = abs(_limited(command)) - (number("c_0") if "c_0" in keys else 0)
+    if beyond <= 0:
+        return mp.zero
+    size = (number("a_t") * beyond**2 + number("b_t") * beyond) / curve.together
+    return -size if reverse else size
+
+
+def steady_forces(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
+    """Of every thruster for the commands, once it does not lag any more."""
+    curves = {curve.name: curve for curve in rov.layout.curves}
+    found = {}
+    for thruster in rov.layout.thrusters:
+        if rov.layout.mix:
+            command = mp.fsum(
+                mp.mpf(gains[thruster.name]) * _limited(mp.mpf(inputs[f"u_{name}"]))
+                for name, gains in rov.layout.mix.items()
+                if thruster.name in gains
+            )
+        else:
+            command = mp.mpf(inputs[f"u_{thruster.name}"])
+        found[thruster.name] = thrust(rov, curves[thruster.curve], command)
+    return found
+
+
+def effect(rov: Rov, thruster: Thruster, velocity: str) -> Number:
+    """Force along an axis of 1 N; torque x Y - y X of a position, R sin γ of an arm, (4)."""
+    if velocity != "r":
+        return mp.mpf(thruster.direction[PLACES[velocity]])
+    if thruster.position is not None:
+        x, y, _ = map(mp.mpf, thruster.position)
+        return x * mp.mpf(thruster.direction[1]) - y * mp.mpf(thruster.direction[0])
+    if not thruster.arm:
+        return mp.zero
+    return thruster.arm * mp.mpf(rov.coefficients["R"]) * mp.sin(mp.mpf(rov.coefficients["gamma"]))
+
+
+def equations(rov: Rov, inputs: Mapping[str, Number]) -> Equations:
+    """Of a vehicle with these inputs, in the precision of mpmath at the time."""
+    k = {name: mp.mpf(value) for name, value in rov.coefficients.items()}
+    F = steady_forces(rov, inputs)
+    lag_of = {curve.name: k[f"T_{curve.name}"] for curve in rov.layout.curves if "T" in curve.keys}
+    lags = {t.name: Lag(F[t.name], lag_of[t.curve]) for t in rov.layout.thrusters if t.curve in lag_of}
+    axes, inertias = {}, {}
+    for velocity in (form.axis.velocity for form in rov.layout.axes):
+        mass = (k["I_r"] if velocity == "r" else k["m_rov"]) + k.get(f"m_a_{velocity}", 0)
+        alpha, beta = k[f"alpha_{velocity}"], k[f"beta_{velocity}"]
+        external = {"u": "X_ext", "v": "Y_ext", "w": "Z_ext", "r": "N_ext"}[velocity]
+        by = {t.name: alpha * effect(rov, t, velocity) for t in rov.layout.thrusters}
+        held = mp.fsum(gain * F[name] for name, gain in by.items() if name not in lags)
+        load = mp.mpf(inputs[external]) + k.get(f"F_0_{velocity}", 0)
+        drag = [k[f"{key}_{velocity}"] for key in ("a_d", "b_d")]
+        reverse = (k.get(f"{key}_{velocity}_reverse") for key in ("a_d", "b_d"))
+        astern = [forward if other is None else other for forward, other in zip(drag, reverse, strict=True)]
+        axes[velocity] = Axis(
+            (beta * drag[0] / mass, beta * drag[1] / mass),
+            (beta * astern[0] / mass, beta * astern[1] / mass),
+            beta * (held + load) / mass,
+            {name: beta * gain / mass for name, gain in by.items() if name in lags},
+        )
+        inertias[velocity] = mass / beta if beta else mp.inf
+    return Equations(axes, lags, inertias, rov.layout.coupled)

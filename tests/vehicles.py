@@ -1,0 +1,167 @@
+"""Vehicles of every kind to try motions on, and random ones; random inputs and states for them."""
+
+import random
+from collections.abc import Mapping
+from math import sqrt
+
+from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+Values = Mapping[str, float]
+State = dict[str, float]
+Case = tuple[Rov, State, State, float]
+"""A vehicle, its inputs and state, and the length of a step."""
+
+_DRAG = ("a_d", "b_d")
+_EITHER = (*_DRAG, "a_d_reverse", "b_d_reverse")
+_ALL = ("m_a", *_EITHER, "F_0")
+_T200 = Curve("t200", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0"))
+_LATE = Curve("t200", (*_T200.keys, "T"))
+_S = sqrt(0.5)
+_PLANAR = (  # four vectored thrusters, as ArduSub numbers them
+    Thruster("1", "t200", (_S, -_S, 0.0), (0.156, 0.111, 0.0)),
+    Thruster("2", "t200", (_S, _S, 0.0), (0.156, -0.111, 0.0)),
+    Thruster("3", "t200", (-_S, -_S, 0.0), (-0.156, 0.111, 0.0)),
+    Thruster("4", "t200", (-_S, _S, 0.0), (-0.156, -0.111, 0.0)),
+)
+_VERTICAL = tuple(Thruster(name, "t200", (0.0, 0.0, -1.0), (0.1, 0.1, 0.0)) for name in "56")
+_PORT = Thruster("l", "t200", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0))
+_STARBOARD = Thruster("r", "t200", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0))
+_NUMBERS = {  # of a BlueROV2 Heavy, and what it has not
+    "m_rov": 13.5, "I_r": 0.37, "R": 0.2, "gamma": 0.5, "m_a_u": 6.3567, "m_a_v": 7.1206, "m_a_w": 18.6863,
+    "m_a_r": 0.2215, "a_d_u": 141.0, "b_d_u": 13.7, "a_d_v": 217.0, "b_d_v": 0.0, "a_d_w": 190.0, "b_d_w": 33.0,
+    "a_d_r": 1.5, "b_d_r": 0.0, "a_d_u_reverse": 190.0, "b_d_u_reverse": 4.0, "a_d_v_reverse": 100.0,
+    "b_d_v_reverse": 3.0, "a_d_w_reverse": 150.0, "b_d_w_reverse": 20.0, "a_d_r_reverse": 0.7, "b_d_r_reverse": 0.2,
+    "F_0_u": 0.0, "F_0_v": 0.3, "F_0_w": -1.5, "F_0_r": 0.01, "a_t_t200": 29.33, "b_t_t200": 31.48,
+    "a_t_t200_reverse": 21.74, "b_t_t200_reverse": 25.54, "c_0_t200": 0.087, "T_t200": 0.15,
+}  # fmt: skip
+
+
+def numbered(layout: Layout, values: Values = _NUMBERS) -> Rov:
+    """With the Heavy's numbers unless others are given; without tuning."""
+    numbers = {**_NUMBERS, **values}
+    return Rov(layout, {name: 1.0 if meta.tunable else numbers[name] for name, meta in layout.coefficients.items()})
+
+
+def _layout(axes: str, curve: Curve, thrusters: tuple[Thruster, ...], keys: tuple[str, ...] = _DRAG,
+            coupled: bool = False, mix: Mapping[str, Mapping[str, float]] | None = None) -> Layout:  # fmt: skip
+    kinds = {"u": SURGE, "v": SWAY, "w": HEAVE, "r": YAW}
+    return Layout(tuple(VehicleAxis(kinds[name], keys) for name in axes), (curve,), thrusters, mix or {}, coupled)
+
+
+_MIX = {
+    "ahead": {"1": 1.0, "2": 1.0, "3": -1.0, "4": -1.0},
+    "aside": {"1": -1.0, "2": 1.0, "3": -1.0, "4": 1.0},
+    "turn": {"1": -0.5, "2": 0.5, "3": 0.5, "4": -0.5},
+    "down": {"5": -1.0, "6": -1.0},
+}
+HEAVY = numbered(_layout("uvwr", _LATE, (*_PLANAR, *_VERTICAL), ("m_a", *_DRAG), coupled=True))
+VEHICLES = {
+    "VideoRay": load_vehicle(VIDEORAY).rov,
+    "Heavy": HEAVY,
+    "BlueROV2": numbered(_layout("uvwr", _T200, (*_PLANAR, *_VERTICAL), ("m_a", *_DRAG))),
+    "with an input mix": numbered(_layout("uvwr", _T200, (*_PLANAR, *_VERTICAL), _ALL, mix=_MIX)),
+    "drag by direction, coupled, late": numbered(_layout("uvwr", _LATE, (*_PLANAR, *_VERTICAL), _ALL, coupled=True)),
+    "coupled without lag": numbered(_layout("uvr", _T200, _PLANAR, _ALL, coupled=True)),
+    "lag without coupling": numbered(_layout("uwr", _LATE, (_PORT, _STARBOARD, *_VERTICAL), _ALL)),
+    "heave only": numbered(_layout("w", _T200, _VERTICAL, _EITHER)),
+    "yaw only": numbered(_layout("r", _T200, (_PORT, _STARBOARD))),
+    "yaw only, late": numbered(_layout("r", _LATE, (_PORT, _STARBOARD))),
+    "surge and sway without yaw": numbered(_layout("uv", _T200, _PLANAR, _EITHER)),
+    "surge without drag": numbered(_layout("ur", _T200, (_PORT, _STARBOARD)), {"a_d_u": 0.0, "b_d_u": 0.0}),
+    "linear drag alone, late": numbered(
+        _layout("ur", _LATE, (_PORT, _STARBOARD)), {"a_d_u": 0.0, "a_d_r": 0.0, "b_d_r": 0.3}
+    ),
+}
+
+
+# ---- Random ones ----
+
+
+def spread(rng: random.Random, low: float, high: float, zero: float = 0.0) -> float:
+    """10^low ... 10^high, all powers alike, and a share of zeros."""
+    return 0.0 if rng.random() < zero else float(10.0 ** rng.uniform(low, high))
+
+
+def random_layout(rng: random.Random) -> Layout:
+    """Any axes, one or two curves, thrusters in any direction and place."""
+    axes = rng.choice(["u", "v", "w", "r", "ur", "uv", "vr", "uwr", "uvr", "uvwr", "uvwr"])
+    curves = []
+    for name in ("main", "aux")[: rng.choice([1, 2])]:
+        keys = rng.choice([("a_t", "b_t"), _T200.keys, (*_T200.keys, "c_0_reverse")])
+        curves.append(Curve(name, (*keys, "T") if rng.random() < 0.5 else keys, rng.choice([1, 2])))
+    thrusters = []
+    for n in range(rng.randint(1, 5)):
+        direction = [rng.choice([0.0, rng.gauss(0.0, 1.0)]) for _ in range(3)]
+        length = sqrt(sum(x * x for x in direction))
+        x, y, z = (part / length for part in direction) if length else (1.0, 0.0, 0.0)
+        position = (rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), 0.0) if rng.random() < 0.7 else None
+        arm = rng.choice([-1, 0, 1]) if position is None else 0
+        thrusters.append(Thruster(f"t{n}", rng.choice(curves).name, (x, y, z), position, arm))
+    mix = {}
+    if rng.random() < 0.3:
+        mix = {name: {t.name: rng.uniform(-1.0, 1.0) for t in thrusters} for name in ("a", "b")}
+    kinds = {"u": SURGE, "v": SWAY, "w": HEAVE, "r": YAW}
+    forms = tuple(VehicleAxis(kinds[name], rng.choice([_DRAG, ("m_a", *_DRAG), _EITHER, _ALL])) for name in axes)
+    return Layout(forms, tuple(curves), tuple(thrusters), mix, {"u", "v", "r"} <= set(axes) and rng.random() < 0.7)
+
+
+def random_vehicle(rng: random.Random) -> Rov:
+    """Of masses and drags that matter to each other; one drag in six is zero."""
+    layout = random_layout(rng)
+    numbers = {}
+    for name, meta in layout.coefficients.items():
+        if meta.tunable:
+            numbers[name] = spread(rng, -0.5, 0.5)
+        elif name.startswith(("a_d", "b_d")):
+            numbers[name] = spread(rng, -1.0, 2.0, zero=1 / 6)
+        elif name.startswith("m_"):
+            numbers[name] = spread(rng, 0.0, 1.5)
+        elif name.startswith(("a_t", "b_t", "F_0")):
+            numbers[name] = rng.uniform(-10.0, 40.0)
+        elif name.startswith("c_0"):
+            numbers[name] = rng.uniform(0.0, 0.3)
+        elif name.startswith("T_"):
+            numbers[name] = spread(rng, -2.0, 0.5)
+        else:
+            numbers[name] = rng.uniform(0.1, 1.5)
+        assert meta.minimum <= numbers[name] <= meta.maximum, name
+    return Rov(layout, numbers)
+
+
+def random_inputs(rng: random.Random, rov: Rov) -> State:
+    """Commands of either sign and beyond full, zeros, loads, current."""
+    found = {}
+    for name in rov.layout.inputs:
+        if name in rov.layout.commands:
+            found[name] = rng.choice([rng.uniform(-1.1, 1.1), rng.uniform(-1.1, 1.1), 0.0])
+        elif name in ("V_N", "V_E"):
+            found[name] = rng.uniform(-0.5, 0.5)
+        else:
+            found[name] = rng.choice([0.0, rng.gauss(0.0, 0.3 if name == "N_ext" else 10.0)])
+    return found
+
+
+def random_state(rng: random.Random, rov: Rov) -> State:
+    """Velocities of the size that a vehicle has, zeros; a pose anywhere near; forces of before."""
+    sizes = {"x": 20.0, "y": 20.0, "z": 20.0, "psi": 3.0, "r": 1.5}
+    found = {}
+    for name in rov.layout.state:
+        if name in ("x", "y", "z", "psi"):
+            found[name] = rng.gauss(0.0, sizes[name])
+        else:
+            size = 10.0 if name in rov.layout.lagging else sizes.get(name, 0.8)
+            found[name] = rng.choice([rng.gauss(0.0, size), rng.gauss(0.0, size), rng.gauss(0.0, size), 0.0])
+    return found
+
+
+def at_rest(rov: Rov) -> State:
+    """All states zero."""
+    return dict.fromkeys(rov.layout.state, 0.0)
+
+
+def still(rov: Rov) -> State:
+    """All inputs zero."""
+    return dict.fromkeys(rov.layout.inputs, 0.0)
