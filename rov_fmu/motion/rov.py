@@ -6,7 +6,7 @@ Values go by name, as rov_fmu/motion/layout.py declares them: inputs, state, coe
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, expm1, sin
+from math import cos, expm1, inf, sin
 
 from . import series
 from .layout import ARM, HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis, arm
@@ -76,20 +76,29 @@ class Rov:
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
         """Force along an axis, or torque (m), of 1 N of a thruster."""
-        lever = arm(*(self[name] for name in ARM)) if axis is YAW and thruster.position is None and thruster.arm else 1.0
-        return thruster.effect(axis) * lever
+        found = thruster.effect(axis)
+        by_arm = axis is YAW and thruster.position is None and thruster.arm
+        return found * arm(*(self[name] for name in ARM)) if by_arm else found
 
     # ---- Motion ----
 
+    def inertia(self, form: VehicleAxis) -> float:
+        """Mass or moment of inertia, with the added mass."""
+        added = self[form.coefficient("m_a")] if "m_a" in form.keys else 0.0
+        return self[form.axis.inertia] + added
+
+    def gain(self, form: VehicleAxis) -> float:
+        """β/m: acceleration by force."""
+        return self[form.axis.coefficient("beta")] / self.inertia(form)
+
     def effective_inertia(self, form: VehicleAxis) -> float:
         """m/β, which resists acceleration."""
-        added = self[form.coefficient("m_a")] if "m_a" in form.keys else 0.0
-        return (self[form.axis.inertia] + added) / self[form.axis.coefficient("beta")]
+        beta = self[form.axis.coefficient("beta")]
+        return self.inertia(form) / beta if beta > 0.0 else inf
 
     def acceleration_of(self, form: VehicleAxis, thrust: float, load: float = 0.0) -> Riccati:
         """An axis under a held thrust (before α) and load, (18): m v' = β (α F + F_ext + F_0 - a_d |v| v - b_d v)."""
-        added = self[form.coefficient("m_a")] if "m_a" in form.keys else 0.0
-        gain = self[form.axis.coefficient("beta")] / (self[form.axis.inertia] + added)
+        gain = self.gain(form)
         F_0 = self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0
         A, B = (gain * self[form.coefficient(key)] for key in ("a_d", "b_d"))
         reverse = None
@@ -102,7 +111,7 @@ class Rov:
         return tuple(
             self.acceleration_of(
                 form,
-                sum(self.effect(t, form.axis) * F[t.name] for t in self.layout.drivers(form.axis)),
+                sum(self.effect(t, form.axis) * F[t.name] for t in self.layout.drivers(form.axis) if t.name in F),
                 inputs[form.axis.external],
             )
             for form in self.layout.axes
@@ -147,13 +156,14 @@ class Rov:
             T, target = self._lag(layout.curve_of[name.removeprefix("F_")]), steady[name.removeprefix("F_")]
             after[name] = state[name] + (state[name] - target) * expm1(-h / T)
         names = [form.axis.velocity for form in layout.axes]
-        axes, velocities = self.axes(inputs, steady), [state[name] for name in names]
+        fades, held = self._fades(steady, state)
+        axes, velocities = self.axes(inputs, held), [state[name] for name in names]
         u, v, r = (names.index(name) if name in names else None for name in ("u", "v", "r"))
-        flow = series.Flow(axes, self._fades(steady, state), self.coupling, u, v, r)
+        flow = series.Flow(axes, fades, self.coupling, u, v, r)
         moved = series.advance(flow, velocities, h)
         if flow.is_free:  # the track alone has no closed form
             ends = [motion.advance(velocity, h) for motion, velocity in zip(axes, velocities, strict=True)]
-            moved = series.Moved(*zip(*ends, strict=True), moved.track)
+            moved = series.Moved(tuple(v for v, _ in ends), tuple(s for _, s in ends), moved.track)
         way = dict(zip(names, moved.distances, strict=True))
         after |= zip(names, moved.velocities, strict=True)
         track = moved.track * complex(cos(state.get("psi", 0.0)), sin(state.get("psi", 0.0)))
@@ -169,21 +179,24 @@ class Rov:
     def _lag(self, curve: Curve) -> float:
         return self[curve.coefficient("T")]
 
-    def _fades(self, steady: Values, state: Values) -> tuple[series.Fade, ...]:
-        """What the lags leave of the forces from before, as acceleration of each axis."""
-        fades = []
+    def _fades(self, steady: Values, state: Values) -> tuple[tuple[series.Fade, ...], dict[str, float]]:
+        """The forces that a lag still changes, as acceleration of each axis; and those of all other thrusters (N)."""
+        fades, held = [], dict(steady)
         for curve in (curve for curve in self.layout.curves if curve.has_lag):
-            late = {t.name: state[f"F_{t.name}"] - steady[t.name]
-                    for t in self.layout.thrusters if t.curve == curve.name}  # fmt: skip
-            accelerations = tuple(
-                self[form.axis.coefficient("alpha")]
-                * sum(self.effect(t, form.axis) * late[t.name] for t in self.layout.thrusters if t.name in late)
-                / self.effective_inertia(form)
-                for form in self.layout.axes
-            )
-            if any(accelerations):
-                fades.append(series.Fade(1.0 / self._lag(curve), accelerations))
-        return tuple(fades)
+            now = {t.name: state[f"F_{t.name}"] for t in self.layout.thrusters if t.curve == curve.name}
+            if any(force != steady[name] for name, force in now.items()):
+                then = {name: held.pop(name) for name in now}
+                fades.append(series.Fade(1.0 / self._lag(curve), self._pushed(now), self._pushed(then)))
+        return tuple(fades), held
+
+    def _pushed(self, F: Values) -> tuple[float, ...]:
+        """Acceleration of each axis by forces of some thrusters."""
+        return tuple(
+            self[form.axis.coefficient("alpha")]
+            * sum(self.effect(t, form.axis) * F[t.name] for t in self.layout.drivers(form.axis) if t.name in F)
+            * self.gain(form)
+            for form in self.layout.axes
+        )
 
     # ---- One axis alone ----
 

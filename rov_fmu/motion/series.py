@@ -1,5 +1,6 @@
-"""Motion by Taylor series, exact up to rounding: for lag and coupling, which have no closed form, and for the track of a
-turn (standard library only).
+"""Motion by Taylor series, exact up to rounding (standard library only).
+
+For what has no closed form: lag and coupling, and the track of a turn.
 
 Between the reversals of its axes all terms of the motion are polynomials of the state. With v = sum of v_n t^n
 
@@ -11,10 +12,10 @@ package for the numerical integration of ODEs by means of high-order Taylor meth
 polynomial: the piece is cut there.
 """
 
-from cmath import exp
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, nan, sin
+from math import cos, exp, expm1, hypot, inf, isfinite, nan, remainder, sin
+from math import tau as full_turn
 
 from .riccati import Riccati
 
@@ -39,10 +40,22 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Fade:
-    """A part of the force of each axis, as acceleration, that fades away as e^(-rate t)."""
+    """A part of the force of each axis, as acceleration: what it is at the start fades into what it becomes."""
 
     rate: float
-    accelerations: tuple[float, ...]
+    now: tuple[float, ...]
+    then: tuple[float, ...]
+
+    def late(self, t: float) -> list[float]:
+        """What differs after t seconds from what it becomes."""
+        fall = exp(-self.rate * t)
+        return [(a - b) * fall for a, b in zip(self.now, self.then, strict=True)]
+
+    def value(self, t: float) -> list[float]:
+        """What it is after t seconds, from the nearer end: next to nothing is left of two large ones otherwise."""
+        if (x := self.rate * t) > 0.7:
+            return [b + d for b, d in zip(self.then, self.late(t), strict=True)]
+        return [a + (a - b) * expm1(-x) for a, b in zip(self.now, self.then, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -74,30 +87,42 @@ class Moved:
 
 def advance(flow: Flow, velocities: Sequence[float], h: float) -> Moved:
     """The motion after h > 0 seconds; not finite where it cannot be computed."""
-    v, gone, track, turn, way_so_far = list(velocities), [0.0] * len(velocities), 0j, 0.0, 0.0
+    v, gone = list(velocities), [0.0] * len(velocities)
+    track, turn, way_so_far = 0j, 0.0, 0.0
     done, tau = 0.0, h
     for _ in range(MOST_PIECES):
         rest = h - done
-        fades = [(f.rate, [d * exp(-f.rate * done).real for d in f.accelerations]) for f in flow.fades]
-        if _is_settled(flow, fades, v):
+        push = [axis.C for axis in flow.axes]
+        for fade in flow.fades:
+            push = [a + b for a, b in zip(push, fade.value(done), strict=True)]
+        fades = [(fade.rate, fade.late(done)) for fade in flow.fades]
+        if _is_settled(flow, push, fades, v):
             angle = v[flow.r] * rest if flow.r is not None else 0.0
-            chord = sin(0.5 * angle) / (0.5 * angle) if angle else 1.0
-            track += _planar(flow, v) * rest * chord * exp(1j * (turn + 0.5 * angle))
+            if not isfinite(turn + angle):
+                break
+            arc = sin(0.5 * angle) / (0.5 * angle) if angle else 1.0  # chord by arc
+            track += _planar(flow, v) * rest * arc * _direction(turn + 0.5 * angle)
             return Moved(tuple(v), tuple(s + x * rest for s, x in zip(gone, v, strict=True)), track)
         if flow.is_free and (left := _straight_rest(flow, v, rest, way_so_far)) is not None:
-            return Moved(tuple(v), tuple(gone), track + left * exp(1j * turn))
-        piece = _Piece(flow, fades, v, min(rest, tau))
-        if not piece.is_finite:
-            tau = 1e-3 * min(rest, tau)
+            return Moved(tuple(v), tuple(gone), track + left * _direction(turn))
+        piece = _Piece(flow, push, fades, v, min(rest, tau))
+        if piece.reach == 0.0:
+            tau = 1e-3 * piece.tau
+            if tau == 0.0:
+                break
             continue
         length = piece.cut()
         end = piece.tau * length
         v = piece.velocities(length)
         chord = piece.track(length)
-        track, way_so_far = track + chord * exp(1j * turn), way_so_far + abs(chord)
+        track += chord * _direction(turn)
+        way_so_far += hypot(chord.real, chord.imag)
         way = piece.distances(length)
-        turn += way[flow.r] if flow.r is not None else 0.0
         gone = [s + x for s, x in zip(gone, way, strict=True)]
+        if not all(map(isfinite, (*gone, *v))):
+            break
+        if flow.r is not None:
+            turn = remainder(turn + way[flow.r], full_turn)  # rounded as a small angle
         if end >= rest:
             return Moved(tuple(v), tuple(gone), track)
         done += end
@@ -108,8 +133,10 @@ def advance(flow: Flow, velocities: Sequence[float], h: float) -> Moved:
 def _straight_rest(flow: Flow, v: Sequence[float], rest: float, way: float) -> complex | None:
     """What is left of the track of a free motion, where it is straight or nothing; None elsewhere.
 
-    A motion that fades away never settles, but no longer matters at some time.
+    A motion that fades away never settles, but no longer matters at some time. Ways there and back are no such end.
     """
+    if any(flow.axes[n].reversal_time(v[n]) < rest for n in (flow.u, flow.v, flow.r) if n is not None):
+        return None
     left, angle = [flow.axes[n].distance(v[n], rest) if n is not None else 0.0 for n in (flow.u, flow.v)], 0.0
     if flow.r is not None:
         angle = flow.axes[flow.r].distance(v[flow.r], rest)
@@ -118,18 +145,26 @@ def _straight_rest(flow: Flow, v: Sequence[float], rest: float, way: float) -> c
     return complex(*left)
 
 
+def _direction(angle: float) -> complex:
+    return complex(cos(angle), sin(angle))
+
+
 def _planar(flow: Flow, v: Sequence[float]) -> complex:
     return complex(v[flow.u] if flow.u is not None else 0.0, v[flow.v] if flow.v is not None else 0.0)
 
 
-def _is_settled(flow: Flow, fades: Sequence[tuple[float, Sequence[float]]], v: Sequence[float]) -> bool:
+def _is_settled(
+    flow: Flow, push: Sequence[float], fades: Sequence[tuple[float, Sequence[float]]], v: Sequence[float]
+) -> bool:
     """Whether what is left of every acceleration is rounding of its terms."""
     rates, sizes = [], []
     for n, (axis, x) in enumerate(zip(flow.axes, v, strict=True)):
         A, B = axis.drag(x)
-        terms = [axis.C, *(d[n] for _, d in fades), -B * x, -A * abs(x) * x]
+        terms = [push[n], -B * x, -A * abs(x) * x]
         rates.append(sum(terms))
         sizes.append(sum(map(abs, terms)))
+        if any(abs(d[n]) > 16.0 * _EPS * sizes[n] for _, d in fades):
+            return False
     if flow.coupling and flow.u is not None and flow.v is not None and flow.r is not None:
         k, (u, w, r) = flow.coupling, (v[flow.u], v[flow.v], v[flow.r])
         for n, term in ((flow.u, k.c_u * w * r), (flow.v, -k.c_v * u * r), (flow.r, -k.c_r * u * w)):
@@ -142,7 +177,12 @@ class _Piece:
     """The polynomials of a piece that begins at the velocities v, in time by tau; they hold for 0 ... reach."""
 
     def __init__(
-        self, flow: Flow, fades: Sequence[tuple[float, Sequence[float]]], v: Sequence[float], tau: float
+        self,
+        flow: Flow,
+        push: Sequence[float],
+        fades: Sequence[tuple[float, Sequence[float]]],
+        v: Sequence[float],
+        tau: float,
     ) -> None:
         self.flow, self.tau = flow, tau
         self.c = [[x] for x in v]
@@ -154,8 +194,7 @@ class _Piece:
             for a, (axis, c) in enumerate(zip(flow.axes, self.c, strict=True)):
                 signs[a] = signs[a] or (c[n] > 0.0) - (c[n] < 0.0)
                 A, B = axis.drag(signs[a])
-                force = axis.C if n == 0 else 0.0
-                force += sum(d[a] * fall for (_, d), fall in zip(fades, falls, strict=True))
+                force = push[a] if n == 0 else sum(d[a] * fall for (_, d), fall in zip(fades, falls, strict=True))
                 changes.append(force - B * c[n] - signs[a] * A * _product(c, c, n))
             falls = [fall * -rate * tau / (n + 1) for (rate, _), fall in zip(fades, falls, strict=True)]
             W = self._planar_product(n)
@@ -172,9 +211,11 @@ class _Piece:
                 c.append(tau * change / (n + 1))
             self.E.append(tau * E / (n + 1))
             self.P.append(tau * W / (n + 1))
-        ends = [x for c in self.c for x in c[-2:]] + [x for p in (self.E, self.P) for x in map(abs, p[-2:])]
-        self.is_finite = all(map(isfinite, ends))
-        self.reach = min(1.0, *(_reach(c) for c in self.c), _reach(list(map(abs, self.E)))) if self.is_finite else 0.0
+        ends = [x for c in self.c for x in c[-2:]]
+        ends += [x for p in (self.E, self.P) for z in p[-2:] for x in (z.real, z.imag)]
+        self.reach = 0.0  # where it overflows
+        if all(map(isfinite, ends)):
+            self.reach = min(1.0, *(_reach(c) for c in self.c), _reach([hypot(z.real, z.imag) for z in self.E]))
 
     def _planar_product(self, n: int) -> complex:
         flow, total = self.flow, 0j
@@ -224,12 +265,13 @@ def _value(c: Sequence[float], t: float) -> float:
 
 
 def _reach(c: Sequence[float]) -> float:
-    """How far the last two terms stay below rounding of one of the first three."""
+    """How far the last two terms stay below rounding of one of the first three that are not zero."""
+    first = next((n for n, x in enumerate(c) if x != 0.0), 0)
 
     def within(n: int) -> float:
         if c[n] == 0.0:
             return inf
-        return max((_EPS * abs(c[k] / c[n])) ** (1.0 / (n - k)) for k in range(3))
+        return max(((_EPS * abs(c[k] / c[n])) ** (1.0 / (n - k)) for k in range(first, min(first + 3, n))), default=0.0)
 
     return min(within(len(c) - 2), within(len(c) - 1))
 
