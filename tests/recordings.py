@@ -9,7 +9,8 @@ import numpy as np
 
 from rov_fmu.identify.least_squares import Array
 from rov_fmu.identify.tank_tests import Recording
-from rov_fmu.motion.rov import HEAVE, SURGE, YAW, Axis, Coefficients
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.motion.rov import Rov
 
 NOISE = {"heave": 0.005, "yaw": radians(0.5), "surge": 0.02}
 """Depth in m, heading in rad, velocity (a camera's) in m/s."""
@@ -69,12 +70,12 @@ def write_log(folder: Path, name: str, recording: Recording) -> Path:
     return path
 
 
-def clean(k: Coefficients, axis: Axis, plan: Sequence[tuple[float, float]], rate: float = 100.0) -> Clean:
+def clean(k: Rov, axis: Axis, plan: Sequence[tuple[float, float]], rate: float = 100.0) -> Clean:
     """Run a plan from rest, one exact step per sample."""
     command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
     v, s = 0.0, 0.0
     velocity, position = [], []
-    axes = {c: axis.held(k, c) for c, _ in plan}
+    axes = {c: k.held(axis, c) for c, _ in plan}
     for c in command.tolist():
         velocity.append(v)
         position.append(s)

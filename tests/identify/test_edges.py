@@ -10,7 +10,7 @@ from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.step_responses import correlation_time, steps, velocity
 from rov_fmu.identify.tank_tests import load_tank_tests
-from rov_fmu.motion.rov import HEAVE
+from rov_fmu.motion.layout import HEAVE
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import TESTS
 from tests.recordings import clean
@@ -49,7 +49,7 @@ def test_residuals_that_tell_no_correlation_count_as_white(residuals: list[float
 
 
 def test_what_is_steady_is_so_to_the_last_sample(vehicle: Vehicle) -> None:
-    recording = clean(vehicle.coefficients, HEAVE, [(0.0, 3.0), (0.3, 30.0)]).noisy(np.random.default_rng(0))
+    recording = clean(vehicle.rov, HEAVE, [(0.0, 3.0), (0.3, 30.0)]).noisy(np.random.default_rng(0))
     (step,) = steps(recording)
     assert step.steady is not None
     assert step.steady[1] == recording.time[-1]

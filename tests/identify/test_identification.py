@@ -17,7 +17,9 @@ from rov_fmu.identify.least_squares import Array, Estimate
 from rov_fmu.identify.quadratic_fit import fit_quadratic
 from rov_fmu.identify.response_fit import Point, fit_response
 from rov_fmu.identify.tank_tests import load_tank_tests
-from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW, Axis, Coefficients
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -29,9 +31,9 @@ COMMANDS = np.arange(0.1, 1.01, 0.1)
 
 
 @pytest.fixture
-def k(vehicle: Vehicle) -> Coefficients:
+def k(vehicle: Vehicle) -> Rov:
     """The VideoRay with every α and β at 1."""
-    return untuned(vehicle.coefficients)
+    return untuned(vehicle.rov)
 
 
 # ---- Thrust and drag, (6)-(16) ---------------------------------------------------------------------------------------
@@ -40,20 +42,20 @@ def k(vehicle: Vehicle) -> Coefficients:
 @pytest.mark.parametrize(
     ("axis", "a_d", "b_d"), [("surge", 4.99, 8.65), ("heave", 24.7, -0.92), ("yaw", 0.0789, 0.163)]
 )
-def test_unweighted_fits_of_tables_3_to_5(axis: str, a_d: float, b_d: float, vehicle: Vehicle, k: Coefficients) -> None:
+def test_unweighted_fits_of_tables_3_to_5(axis: str, a_d: float, b_d: float, vehicle: Vehicle, k: Rov) -> None:
     """Against (9) and (10) they are not (14)-(16): those have weights, or data that are in figures only."""
     table = next(t for t in load_tables(vehicle) if t.axis.name == axis)
     m = table.axis
     commands, V_ss = np.array([(float(c) / 100.0, float(V)) for c, V in table.steady.items()]).T
-    forces = np.array([m.force(k, c) for c in commands.tolist()])
+    forces = np.array([k.force(m, c) for c in commands.tolist()])
     fit = fit_quadratic((m.coefficient("a_d"), m.coefficient("b_d")), V_ss, forces, groups=commands)
     assert fit.unbounded == pytest.approx((a_d, b_d), rel=0.005)
     if b_d > 0.0:
         assert (fit.a, fit.b) == pytest.approx(fit.unbounded)
-        assert fit.at_bound == ()
+        assert fit.estimate.at_bound == ()
     else:
         assert fit.b == 0.0, "drag that pushes is not physical"
-        assert fit.at_bound == (m.coefficient("b_d"),)
+        assert fit.estimate.at_bound == (m.coefficient("b_d"),)
         assert fit.estimate.intervals["b_d_w"] == pytest.approx((0.0, 3.1), rel=0.01)
 
 
@@ -116,64 +118,64 @@ def test_two_points_have_a_curve_but_no_interval() -> None:
 # ---- V_ss and Tau ----------------------------------------------------------------------------------------------------
 
 
-def points_of(m: Axis, k: Coefficients, commands: tuple[float, ...], scatter: Array | None = None) -> list[Point]:
+def points_of(m: Axis, k: Rov, commands: tuple[float, ...], scatter: Array | None = None) -> list[Point]:
     """V_ss and Tau of the model, with relative errors."""
-    found = [Point(q, c, m.response(k, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
+    found = [Point(q, c, k.response(m, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
     factors = 1.0 + (np.zeros(len(found)) if scatter is None else scatter)
     return [replace(p, value=p.value * f) for p, f in zip(found, factors.tolist(), strict=True)]
 
 
 @pytest.mark.parametrize("m", [SURGE, HEAVE, YAW], ids=lambda m: m.name)
 def test_points_of_a_model_give_the_model(m: Axis, vehicle: Vehicle) -> None:
-    k = vehicle.coefficients
+    k = vehicle.rov
     names = [m.coefficient(kind) for kind in ("a_d", "b_d", "beta")]
-    start = replace(k, **dict.fromkeys(names, 1.0))
+    start = k.replaced(dict.fromkeys(names, 1.0))
     fit = fit_response(m, points_of(m, k, (0.2, -0.3, 0.5, 0.7)), start)
     for name in names:
-        assert getattr(fit.coefficients, name) == pytest.approx(getattr(k, name), rel=1e-5)
+        assert fit.rov[name] == pytest.approx(k[name], rel=1e-5)
     assert fit.rms("V_ss") < 1e-7
     assert fit.rms("Tau", leave_one_out=True) < 1e-6
 
 
 def test_intervals_of_points_cover_the_truth(vehicle: Vehicle) -> None:
     """60 seeds of 1 % scatter: 90-99 % in the intervals, and drag never negative."""
-    k, random = vehicle.coefficients, np.random.default_rng(2)
+    k, random = vehicle.rov, np.random.default_rng(2)
     hits: dict[str, list[bool]] = {}
     for _ in range(60):
         fit = fit_response(SURGE, points_of(SURGE, k, (0.2, 0.3, 0.5, 0.7), 0.01 * random.standard_normal(8)), k)
         for name, (low, high) in fit.estimate.intervals.items():
             assert low >= 0.0
-            hits.setdefault(name, []).append(low <= getattr(k, name) <= high)
+            hits.setdefault(name, []).append(low <= k[name] <= high)
     assert all(0.9 <= np.mean(share) <= 0.99 for share in hits.values()), {n: np.mean(s) for n, s in hits.items()}
 
 
-def test_steady_velocities_alone_leave_beta(k: Coefficients) -> None:
+def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
     fit = fit_response(SURGE, [p for p in points_of(SURGE, k, (0.2, 0.5, 0.7)) if p.quantity == "V_ss"], k)
     assert fit.estimate.names == ("a_d_u", "b_d_u")
-    assert fit.coefficients.beta_u == 1.0
+    assert fit.rov["beta_u"] == 1.0
     assert "m_rov/beta_u is not identifiable from V_ss alone" in fit.assumed["beta_u"]
 
 
-def test_one_thrust_leaves_linear_drag(k: Coefficients) -> None:
+def test_one_thrust_leaves_linear_drag(k: Rov) -> None:
     fit = fit_response(HEAVE, points_of(HEAVE, k, (0.3,)), k)
     assert fit.estimate.names == ("a_d_w", "beta_w")
-    assert fit.coefficients.b_d_w == 0.0
+    assert fit.rov["b_d_w"] == 0.0
     assert "b_d_w" in fit.assumed
     assert fit.model == pytest.approx([p.value for p in fit.points])
 
 
-def test_points_without_weight_do_not_count(k: Coefficients) -> None:
+def test_points_without_weight_do_not_count(k: Rov) -> None:
     points = points_of(YAW, k, (0.2, 0.5, 0.7))
     wrong = [replace(p, value=3.0 * p.value, weight=0.0) for p in points[:2]]
     assert fit_response(YAW, [*points, *wrong], k).rms("V_ss") < 1e-7
 
 
-def test_thrust_that_is_uncertain_makes_drag_uncertain(k: Coefficients) -> None:
-    thrust = np.array([k.a_t_top, k.b_t_top])
+def test_thrust_that_is_uncertain_makes_drag_uncertain(k: Rov) -> None:
+    thrust = np.array([k["a_t_top"], k["b_t_top"]])
     fit = fit_response(
         HEAVE, points_of(HEAVE, k, (0.2, 0.5, 0.7)), k, thrust_covariance=0.01 * np.outer(thrust, thrust)
     )
-    assert fit.estimate.errors["a_d_w"] == pytest.approx(0.1 * k.a_d_w, rel=0.01)
+    assert fit.estimate.errors["a_d_w"] == pytest.approx(0.1 * k["a_d_w"], rel=0.01)
     assert fit.estimate.errors["beta_w"] == pytest.approx(0.1, rel=0.01)
 
 
@@ -185,9 +187,9 @@ def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Thrust tests with noise, and nine recordings of 60 s at 100 Hz of the VideoRay with α = 1."""
     folder, random = tmp_path_factory.mktemp("full"), np.random.default_rng(0)
     write_rov(folder)
-    k = replace(load_vehicle(VIDEORAY).coefficients, alpha_u=1.0, alpha_w=1.0, alpha_r=1.0)
+    k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
     for thruster, m in (("rear", SURGE), ("top", HEAVE)):
-        rows = [(c, m.force(k, c) + 0.05 * random.standard_normal()) for c in np.arange(0.1, 0.81, 0.1).tolist()]
+        rows = [(c, k.force(m, c) + 0.05 * random.standard_normal()) for c in np.arange(0.1, 0.81, 0.1).tolist()]
         write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
     for m in AXES:
         for n, plan in enumerate(PLANS[m.name], 1):
@@ -216,14 +218,14 @@ def full(full_folder: Path) -> Identification:
 
 
 def test_full_folder_gives_the_vehicle_back(full: Identification, full_folder: Path) -> None:
-    k, found = load_vehicle(VIDEORAY).coefficients, full.vehicle.coefficients
-    true = replace(k, alpha_u=1.0, alpha_w=1.0, alpha_r=1.0)
+    found = full.vehicle.rov
+    true = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
     for m in AXES:
         for command in np.linspace(0.2, 0.7, 11).tolist():
-            V_ss, Tau = m.response(true, command)
-            assert m.response(found, command) == pytest.approx((V_ss, Tau), rel=0.02)
+            V_ss, Tau = true.response(m, command)
+            assert found.response(m, command) == pytest.approx((V_ss, Tau), rel=0.02)
     for name, (low, high) in full.vehicle.intervals.items():  # that the sensors' scale errs in, all coefficients share
-        assert abs(getattr(true, name) - 0.5 * (low + high)) < 1.6 * 0.5 * (high - low), name
+        assert abs(true[name] - 0.5 * (low + high)) < 1.6 * 0.5 * (high - low), name
     assert set(full.vehicle.intervals) == {
         *("a_t_rear", "b_t_rear", "a_t_top", "b_t_top"),
         *(f"{kind}_{v}" for kind in ("a_d", "b_d", "beta") for v in "uwr"),
@@ -245,12 +247,12 @@ def test_full_folder_to_vehicle_file_in_20_seconds(
     assert "log_yaw_3.csv" in capsys.readouterr().out
     read, made = load_vehicle(path), full.vehicle
     assert [p.name for p in tmp_path.iterdir()] == ["full.toml"]
-    for name in COEFFICIENTS:
-        assert getattr(read.coefficients, name) == pytest.approx(getattr(made.coefficients, name), rel=1e-5)
+    for name in PAPER.coefficients:
+        assert read.rov[name] == pytest.approx(made.rov[name], rel=1e-5)
     assert read.intervals.keys() == made.intervals.keys()
     for name, (low, high) in made.intervals.items():
         assert read.intervals[name] == pytest.approx((low, high), rel=1e-5)
-    assert replace(read, coefficients=made.coefficients, intervals=made.intervals) == made
+    assert replace(read, rov=made.rov, intervals=made.intervals) == made
     assert read.provenance
     assert "heave: output error over 3 recordings" in read.provenance.method
 
@@ -321,11 +323,11 @@ def test_warnings(case: str, tmp_path: Path) -> None:
     assert found.vehicle.provenance.warnings == found.warnings
 
 
-def test_enough_good_data_raise_no_warning(tmp_path: Path, k: Coefficients) -> None:
+def test_enough_good_data_raise_no_warning(tmp_path: Path, k: Rov) -> None:
     tables: dict[str, list[tuple[float, float]]] = {}
     for m in AXES:
         for quantity, kind in enumerate(("steady", "time_constant")):
-            tables[f"{kind}_{m.name}"] = [(c, m.response(k, c)[quantity]) for c in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)]
+            tables[f"{kind}_{m.name}"] = [(c, k.response(m, c)[quantity]) for c in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)]
     assert folder_with(tmp_path, tables).warnings == ()
 
 
@@ -334,17 +336,17 @@ def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
     both = folder_with(tmp_path, tables)
     forward = folder_with(tmp_path, tables, thrust_rear=(0.0, 1.0))
     assert forward.thrust["rear"].weights.tolist() == [1.0] * 4 + [0.0]
-    assert forward.vehicle.coefficients.a_t_rear == pytest.approx(42.9, rel=1e-3)
+    assert forward.vehicle.rov["a_t_rear"] == pytest.approx(42.9, rel=1e-3)
     assert both.thrust["rear"].leave_one_out_error > 1.0
     assert forward.vehicle.sources["a_t_rear"] == "(7) over 4 forces"
     assert both.vehicle.sources["a_t_rear"] == "(6) over 5 forces"
 
 
-def test_drag_as_in_the_paper_stands_beside(tmp_path: Path, k: Coefficients) -> None:
+def test_drag_as_in_the_paper_stands_beside(tmp_path: Path, k: Rov) -> None:
     drag = axis_of(folder_with(tmp_path), "surge").drag
     assert drag
-    assert drag.y == pytest.approx([SURGE.force(k, c) for c, _ in STEADY["surge"]], rel=1e-4)
-    assert drag.a == pytest.approx(k.a_d_u, rel=0.2)
+    assert drag.y == pytest.approx([k.force(SURGE, c) for c, _ in STEADY["surge"]], rel=1e-4)
+    assert drag.a == pytest.approx(k["a_d_u"], rel=0.2)
 
 
 def test_tables_are_checked_against_recordings(full_folder: Path, tmp_path: Path) -> None:
@@ -366,7 +368,7 @@ def test_known_coefficients_are_kept(tmp_path: Path) -> None:
     known = '[known]\nbeta_u = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
     rov.write_text(rov.read_text(encoding="utf-8").replace("[known]\n", known), encoding="utf-8")
     vehicle = identify(load_tank_tests(tmp_path)).vehicle
-    assert (vehicle.coefficients.beta_u, vehicle.sources["beta_u"]) == (0.8, "a guess")
+    assert (vehicle.rov["beta_u"], vehicle.sources["beta_u"]) == (0.8, "a guess")
     assert vehicle.intervals["beta_u"] == (0.7, 0.9)
     assert not any("beta_u" in warning for warning in vehicle.provenance.warnings) if vehicle.provenance else False
 

@@ -14,8 +14,9 @@ from rov_fmu.identify.output_error import RecordingsFit, fit_recordings
 from rov_fmu.identify.quadratic_fit import fit_quadratic
 from rov_fmu.identify.tank_tests import Recording
 from rov_fmu.identify.trajectory import trajectory
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.motion.riccati import Riccati
-from rov_fmu.motion.rov import HEAVE, SURGE, YAW, Axis, Coefficients
+from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import AXES, NOISE, PLANS, clean
 
@@ -24,25 +25,25 @@ Disturb = Callable[[Recording, np.random.Generator], Recording]
 
 
 @pytest.fixture
-def k(vehicle: Vehicle) -> Coefficients:
-    return vehicle.coefficients
+def k(vehicle: Vehicle) -> Rov:
+    return vehicle.rov
 
 
-def unknowing(k: Coefficients, m: Axis) -> Coefficients:
-    """The coefficients without what is to be found."""
-    return replace(k, **{m.coefficient(kind): 1.0 for kind in ("a_d", "b_d", "beta")})
+def unknowing(k: Rov, m: Axis) -> Rov:
+    """The vehicle without what is to be found."""
+    return k.replaced({m.coefficient(kind): 1.0 for kind in ("a_d", "b_d", "beta")})
 
 
-def only(recordings: Sequence[Recording], base: Coefficients, **options: Any) -> RecordingsFit:
+def only(recordings: Sequence[Recording], base: Rov, **options: Any) -> RecordingsFit:
     """The fit of one axis."""
     (fit,) = fit_recordings(recordings, base, **options)
     return fit
 
 
-def steady_error(fit: RecordingsFit, k: Coefficients) -> float:
+def steady_error(fit: RecordingsFit, k: Rov) -> float:
     """The largest relative error of V_ss over 20-70 %."""
     m = fit.axis
-    pairs = [(m.response(fit.coefficients, c)[0], m.response(k, c)[0]) for c in COMMANDS.tolist()]
+    pairs = [(fit.rov.response(m, c)[0], k.response(m, c)[0]) for c in COMMANDS.tolist()]
     return max(abs(found / true - 1.0) for found, true in pairs)
 
 
@@ -73,7 +74,7 @@ def test_trajectory_is_that_of_exact_steps(seed: int) -> None:
 # ---- Round trip ------------------------------------------------------------------------------------------------------
 
 
-def round_trip(k: Coefficients, m: Axis, seeds: Sequence[int], disturb: Disturb | None = None) -> dict[str, float]:
+def round_trip(k: Rov, m: Axis, seeds: Sequence[int], disturb: Disturb | None = None) -> dict[str, float]:
     """Share of seeds in which the 95 % interval covers the truth; V_ss must be within 2 % in all of them."""
     recordings = [clean(k, m, plan) for plan in PLANS[m.name]]
     covered: dict[str, list[bool]] = {}
@@ -83,20 +84,20 @@ def round_trip(k: Coefficients, m: Axis, seeds: Sequence[int], disturb: Disturb 
         fit = only([disturb(r, random) for r in noisy] if disturb else noisy, unknowing(k, m))
         assert steady_error(fit, k) < 0.02
         for name, (low, high) in fit.estimate.intervals.items():
-            covered.setdefault(name, []).append(low <= getattr(k, name) <= high)
+            covered.setdefault(name, []).append(low <= k[name] <= high)
     assert set(covered) == {m.coefficient(kind) for kind in ("a_d", "b_d", "beta")}
     return {name: float(np.mean(hits)) for name, hits in covered.items()}
 
 
 @pytest.mark.parametrize("m", AXES, ids=lambda m: m.name)
-def test_intervals_cover_the_truth(m: Axis, k: Coefficients) -> None:
+def test_intervals_cover_the_truth(m: Axis, k: Rov) -> None:
     """Of four seeds, which are fixed, a 95 % interval misses more than one in 1.4 % of all cases."""
     assert min(round_trip(k, m, range(4)).values()) >= 3 / 4
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("m", AXES, ids=lambda m: m.name)
-def test_intervals_cover_the_truth_in_90_to_99_percent(m: Axis, k: Coefficients) -> None:
+def test_intervals_cover_the_truth_in_90_to_99_percent(m: Axis, k: Rov) -> None:
     shares = round_trip(k, m, range(200))
     assert all(0.9 <= share <= 0.99 for share in shares.values()), shares
 
@@ -115,22 +116,22 @@ def outliers(recording: Recording, random: np.random.Generator) -> Recording:
 
 @pytest.mark.long
 @pytest.mark.parametrize("disturb", [turbulence, outliers])
-def test_intervals_hold_with_coloured_noise_and_outliers(disturb: Disturb, k: Coefficients) -> None:
+def test_intervals_hold_with_coloured_noise_and_outliers(disturb: Disturb, k: Rov) -> None:
     shares = round_trip(k, HEAVE, range(60), disturb)
     assert min(shares.values()) >= 0.88, shares
 
 
-def test_outliers_hardly_move_a_robust_fit(k: Coefficients) -> None:
+def test_outliers_hardly_move_a_robust_fit(k: Rov) -> None:
     random = np.random.default_rng(0)
     recordings = [outliers(clean(k, HEAVE, plan).noisy(random), random) for plan in PLANS["heave"]]
     robust, plain = (only(recordings, unknowing(k, HEAVE), loss=loss) for loss in ("huber", "linear"))
     assert robust.estimate.errors["b_d_w"] < 0.3 * plain.estimate.errors["b_d_w"]
     for name, (low, high) in robust.estimate.intervals.items():
-        assert low <= getattr(k, name) <= high
+        assert low <= k[name] <= high
     assert all(s.outliers > 0.02 * len(s.time) for s in robust.simulations)
 
 
-def test_coloured_noise_widens_the_intervals(k: Coefficients) -> None:
+def test_coloured_noise_widens_the_intervals(k: Rov) -> None:
     random = np.random.default_rng(0)
     white = [clean(k, YAW, plan).noisy(random) for plan in PLANS["yaw"]]
     plain, coloured = (only(r, unknowing(k, YAW)) for r in (white, [turbulence(w, random) for w in white]))
@@ -143,13 +144,13 @@ def test_coloured_noise_widens_the_intervals(k: Coefficients) -> None:
 
 
 @pytest.mark.parametrize(("rate", "plan"), [(10.0, PLANS["yaw"][0]), (33.0, PLANS["yaw"][2]), (400.0, PLANS["yaw"][0])])
-def test_any_rate(rate: float, plan: Sequence[tuple[float, float]], k: Coefficients) -> None:
+def test_any_rate(rate: float, plan: Sequence[tuple[float, float]], k: Rov) -> None:
     fit = only([clean(k, YAW, plan, rate).noisy(np.random.default_rng(1))], unknowing(k, YAW))
     assert steady_error(fit, k) < 0.005
-    assert fit.coefficients.beta_r == pytest.approx(k.beta_r, rel=0.01)
+    assert fit.rov["beta_r"] == pytest.approx(k["beta_r"], rel=0.01)
 
 
-def test_gaps_an_uneven_clock_and_a_start_in_motion(k: Coefficients) -> None:
+def test_gaps_an_uneven_clock_and_a_start_in_motion(k: Rov) -> None:
     whole = clean(k, HEAVE, PLANS["heave"][0])
     random = np.random.default_rng(2)
     recording = whole.noisy(random)
@@ -161,22 +162,22 @@ def test_gaps_an_uneven_clock_and_a_start_in_motion(k: Coefficients) -> None:
     cut = replace(recording, time=time, command=recording.command[some], values=values)
     fit = only([cut], unknowing(k, HEAVE))
     assert steady_error(fit, k) < 0.01
-    assert fit.coefficients.beta_w == pytest.approx(k.beta_w, rel=0.01)
+    assert fit.rov["beta_w"] == pytest.approx(k["beta_w"], rel=0.01)
     assert len(fit.simulations[0].time) == 3000 - np.isnan(values).sum()
 
 
-def test_command_that_never_rests(k: Coefficients) -> None:
+def test_command_that_never_rests(k: Rov) -> None:
     """A joystick: another command at every sample."""
     rate, time = 50.0, np.arange(2000) / 50.0
     commands = 0.45 * np.sin(0.4 * time) + 0.25 * np.sin(1.3 * time)
     recording = clean(k, SURGE, [(c, 1.0 / rate) for c in commands.tolist()], rate).noisy(np.random.default_rng(3))
     fit = only([recording], unknowing(k, SURGE))
     for name, (low, high) in fit.estimate.intervals.items():
-        assert low <= getattr(k, name) <= high
+        assert low <= k[name] <= high
     assert steady_error(fit, k) < 0.02
 
 
-def test_sensors_of_two_kinds_weigh_by_their_noise(k: Coefficients) -> None:
+def test_sensors_of_two_kinds_weigh_by_their_noise(k: Rov) -> None:
     """A bad camera beside a good depth gauge hardly changes the fit; the two have their own noise."""
     random = np.random.default_rng(4)
     depth = clean(k, HEAVE, PLANS["heave"][0]).noisy(random)
@@ -189,74 +190,74 @@ def test_sensors_of_two_kinds_weigh_by_their_noise(k: Coefficients) -> None:
     assert both.estimate.errors["beta_w"] == pytest.approx(alone.estimate.errors["beta_w"], rel=0.3)
 
 
-def test_what_is_known_is_kept(k: Coefficients) -> None:
+def test_what_is_known_is_kept(k: Rov) -> None:
     recordings = [clean(k, YAW, plan).noisy(np.random.default_rng(5)) for plan in PLANS["yaw"]]
-    fit = only(recordings, replace(unknowing(k, YAW), b_d_r=k.b_d_r), known=("b_d_r",))
+    fit = only(recordings, unknowing(k, YAW).replaced({"b_d_r": k["b_d_r"]}), known=("b_d_r",))
     assert fit.estimate.names == ("a_d_r", "beta_r")
-    assert fit.coefficients.b_d_r == k.b_d_r
-    assert fit.coefficients.a_d_r == pytest.approx(k.a_d_r, rel=1e-3)
+    assert fit.rov["b_d_r"] == k["b_d_r"]
+    assert fit.rov["a_d_r"] == pytest.approx(k["a_d_r"], rel=1e-3)
 
 
-def thrust_test(k: Coefficients, thruster: str, spread: float, seed: int) -> Estimate:
+def thrust_test(k: Rov, thruster: str, spread: float, seed: int) -> Estimate:
     """The thrust curve of a bollard pull with a noisy sensor."""
     names = (f"a_t_{thruster}", f"b_t_{thruster}")
     commands = np.arange(0.1, 0.81, 0.1)
-    forces = getattr(k, names[0]) * commands**2 + getattr(k, names[1]) * commands
+    forces = k[names[0]] * commands**2 + k[names[1]] * commands
     noise = spread * np.random.default_rng(seed).standard_normal(len(commands))
     return fit_quadratic(names, commands, forces + noise).estimate
 
 
-def test_scale_of_uncertain_thrust_is_that_of_drag(k: Coefficients) -> None:
+def test_scale_of_uncertain_thrust_is_that_of_drag(k: Rov) -> None:
     """The motion tells A, B and C only: thrust 5 % more uncertain as a whole makes drag and β so, but not V_ss."""
     recordings = [clean(k, YAW, plan).noisy(np.random.default_rng(6)) for plan in PLANS["yaw"]]
-    values = np.array([k.a_t_rear, k.b_t_rear])
+    values = np.array([k["a_t_rear"], k["b_t_rear"]])
     spread = 0.05**2 * np.outer(values, values) + np.diag((1e-3 * values) ** 2)
     fit = only(recordings, unknowing(k, YAW), thrust=Estimate(("a_t_rear", "b_t_rear"), values, spread, 6.0, 1.0))
     for name in ("a_t_rear", "a_d_r", "b_d_r", "beta_r"):
-        assert fit.estimate.errors[name] == pytest.approx(0.05 * getattr(k, name), rel=0.05)
+        assert fit.estimate.errors[name] == pytest.approx(0.05 * k[name], rel=0.05)
     low, high, *_ = fit.band(COMMANDS)
     assert (high - low < 0.001 * high).all()
 
 
-def test_recordings_mend_the_shape_of_the_thrust_curve(k: Coefficients) -> None:
+def test_recordings_mend_the_shape_of_the_thrust_curve(k: Rov) -> None:
     """A sensor of 0.05 N has the weak thrust at 20 % wrong by far; under many commands the motion knows better."""
     recordings = [clean(k, HEAVE, plan).noisy(np.random.default_rng(7)) for plan in PLANS["heave"]]
     thrust = thrust_test(k, "top", 0.05, 3)
-    base = replace(unknowing(k, HEAVE), **thrust.named)
+    base = unknowing(k, HEAVE).replaced(thrust.named)
     taken, mended = only(recordings, base), only(recordings, base, thrust=thrust)
     assert mended.estimate.errors["b_t_top"] < 0.1 * thrust.errors["b_t_top"]
     assert steady_error(mended, k) < 0.1 * steady_error(taken, k)
 
 
-def test_surge_and_yaw_share_the_thrust_of_the_rear_pair(k: Coefficients) -> None:
+def test_surge_and_yaw_share_the_thrust_of_the_rear_pair(k: Rov) -> None:
     random = np.random.default_rng(8)
     recordings = [clean(k, m, plan).noisy(random) for m in (SURGE, YAW) for plan in PLANS[m.name][:2]]
     thrust = thrust_test(k, "rear", 0.3, 4)
-    base = replace(unknowing(unknowing(k, SURGE), YAW), **thrust.named)
+    base = unknowing(unknowing(k, SURGE), YAW).replaced(thrust.named)
     surge, yaw = fit_recordings(recordings, base, thrust=thrust)
-    assert surge.coefficients == yaw.coefficients
+    assert surge.rov == yaw.rov
     assert surge.estimate.names == ("a_t_rear", "b_t_rear", "a_d_u", "b_d_u", "beta_u")
     assert yaw.estimate.names == ("a_t_rear", "b_t_rear", "a_d_r", "b_d_r", "beta_r")
     for fit in (surge, yaw):
         assert steady_error(fit, k) < 0.005
         assert {s.recording.axis.name for s in fit.simulations} == {fit.axis.name}
         for name, (low, high) in fit.estimate.intervals.items():
-            assert low <= getattr(k, name) <= high, name
+            assert low <= k[name] <= high, name
 
 
 # ---- What the model leaves out ---------------------------------------------------------------------------------------
 
 
-def test_nothing_is_suspected_of_a_clean_recording(k: Coefficients) -> None:
+def test_nothing_is_suspected_of_a_clean_recording(k: Rov) -> None:
     recordings = [clean(k, HEAVE, plan).noisy(np.random.default_rng(8)) for plan in PLANS["heave"]]
     fit = only(recordings, unknowing(k, HEAVE))
     assert abs(fit.load.value) < 1e-3
     assert abs(fit.delay.value) < 5e-3
 
 
-def test_ballast_shows_as_a_load(k: Coefficients) -> None:
+def test_ballast_shows_as_a_load(k: Rov) -> None:
     def with_ballast(plan: Sequence[tuple[float, float]]) -> Recording:
-        axes = [replace(HEAVE.held(k, c), C=HEAVE.held(k, c).C + k.beta_w * 0.02 / k.m_rov) for c, _ in plan]
+        axes = [replace(k.held(HEAVE, c), C=k.held(HEAVE, c).C + k["beta_w"] * 0.02 / k["m_rov"]) for c, _ in plan]
         bare = clean(k, HEAVE, plan)
         starts = np.concatenate([[0.0], np.cumsum([hold for _, hold in plan])[:-1]])
         _, depth = trajectory(axes, starts, 0.0, bare.time)
@@ -267,7 +268,7 @@ def test_ballast_shows_as_a_load(k: Coefficients) -> None:
     assert fit.load.value == pytest.approx(0.02, rel=0.3)
 
 
-def test_a_delay_shows(k: Coefficients) -> None:
+def test_a_delay_shows(k: Rov) -> None:
     late = []
     for plan in PLANS["yaw"]:
         recording = clean(k, YAW, plan).noisy(np.random.default_rng(10))
@@ -283,11 +284,11 @@ def noise_on(values: Array, spread: float) -> Array:
     return values + spread * np.random.default_rng(11).standard_normal(len(values))
 
 
-def test_band_encloses_the_truth(k: Coefficients) -> None:
+def test_band_encloses_the_truth(k: Rov) -> None:
     recordings = [clean(k, SURGE, plan).noisy(np.random.default_rng(12)) for plan in PLANS["surge"]]
     fit = only(recordings, unknowing(k, SURGE))
     low, high, early, late = fit.band(COMMANDS)
-    truth = np.array([SURGE.response(k, c) for c in COMMANDS.tolist()])
+    truth = np.array([k.response(SURGE, c) for c in COMMANDS.tolist()])
     assert ((low < truth[:, 0]) & (truth[:, 0] < high)).all()
     assert ((early < truth[:, 1]) & (truth[:, 1] < late)).all()
     assert ((high - low) < 0.01 * truth[:, 0]).all()

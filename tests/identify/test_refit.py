@@ -10,7 +10,7 @@ from rov_fmu.cli import main
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.tank_tests import load_tank_tests
-from rov_fmu.motion.rov import COEFFICIENTS
+from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT, TESTS
@@ -44,8 +44,8 @@ def test_shipped_file_is_what_the_command_writes(tmp_path: Path) -> None:
     )
     assert made == shipped
     one, other = load_vehicle(path), load_vehicle(REFIT)
-    for name in COEFFICIENTS:
-        assert getattr(one.coefficients, name) == pytest.approx(getattr(other.coefficients, name), rel=1e-4)
+    for name in PAPER.coefficients:
+        assert one.rov[name] == pytest.approx(other.rov[name], rel=1e-4)
         assert one.intervals.get(name, nan) == pytest.approx(other.intervals.get(name, nan), rel=1e-3, nan_ok=True)
     assert one.provenance
     assert other.provenance
@@ -109,9 +109,9 @@ def test_against_is_the_papers_scaled_model(vehicle: Vehicle, comparisons: dict[
 
 
 def test_drag_is_physical_and_what_is_not_identifiable_is_said(refit: Identification) -> None:
-    k = refit.vehicle.coefficients
-    assert all(getattr(k, name) >= 0.0 for name in COEFFICIENTS if name.startswith(("a_d", "b_d")))
-    assert k.alpha_u == k.alpha_w == k.alpha_r == k.beta_u == 1.0
+    k = refit.vehicle.rov
+    assert all(k[name] >= 0.0 for name in PAPER.coefficients if name.startswith(("a_d", "b_d")))
+    assert k["alpha_u"] == k["alpha_w"] == k["alpha_r"] == k["beta_u"] == 1.0
     assert "not identifiable from V_ss alone" in refit.vehicle.sources["beta_u"]
     for words in (
         "surge: m_rov/beta_u is not identifiable",

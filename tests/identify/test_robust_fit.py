@@ -6,24 +6,25 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify.output_error import Loss, RecordingsFit, fit_recordings
-from rov_fmu.motion.rov import HEAVE, Coefficients
+from rov_fmu.motion.layout import HEAVE
+from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import PLANS, clean
 
 
-def _fit(k: Coefficients, size: float, loss: Loss = "huber") -> RecordingsFit:
+def _fit(k: Rov, size: float, loss: Loss = "huber") -> RecordingsFit:
     """One recording in heave, every fiftieth sample off by so many standard deviations, to either side in turn."""
     recording = clean(k, HEAVE, PLANS["heave"][0]).noisy(np.random.default_rng(16))
     values = recording.values.copy()
     values[25::100] += 0.005 * size
     values[75::200] -= 0.005 * size
-    unknowing = replace(k, a_d_w=1.0, b_d_w=1.0, beta_w=1.0)
+    unknowing = k.replaced({"a_d_w": 1.0, "b_d_w": 1.0, "beta_w": 1.0})
     (fit,) = fit_recordings([replace(recording, values=values)], unknowing, loss=loss)
     return fit
 
 
 def test_an_outlier_counts_by_its_side_not_its_size(vehicle: Vehicle) -> None:
-    near, far = (_fit(vehicle.coefficients, size) for size in (20.0, 2000.0))
+    near, far = (_fit(vehicle.rov, size) for size in (20.0, 2000.0))
     assert near.simulations[0].outliers == far.simulations[0].outliers
     assert far.estimate.values == pytest.approx(near.estimate.values, rel=1e-5)
     assert far.estimate.covariance == pytest.approx(near.estimate.covariance, rel=1e-3)
@@ -32,13 +33,13 @@ def test_an_outlier_counts_by_its_side_not_its_size(vehicle: Vehicle) -> None:
 
 
 def test_in_a_plain_fit_it_counts_by_its_size(vehicle: Vehicle) -> None:
-    near, far = (_fit(vehicle.coefficients, size, "linear") for size in (20.0, 200.0))
+    near, far = (_fit(vehicle.rov, size, "linear") for size in (20.0, 200.0))
     assert far.load.interval[1] > 5.0 * near.load.interval[1]
     assert far.estimate.errors["beta_w"] > 5.0 * near.estimate.errors["beta_w"]
 
 
 def test_outliers_lie_beyond_two_and_a_half_standard_deviations(vehicle: Vehicle) -> None:
     """1.24 % of normal noise does."""
-    (simulation,) = _fit(vehicle.coefficients, 0.0).simulations
+    (simulation,) = _fit(vehicle.rov, 0.0).simulations
     assert simulation.outliers / len(simulation.time) == pytest.approx(0.0124, abs=0.004)
     assert simulation.noise == pytest.approx(0.005, rel=0.03)

@@ -8,20 +8,20 @@ from scipy.signal import lfilter
 
 from rov_fmu.identify.step_responses import Method, StepResponse, correlation_time, steps, velocity, without_spikes
 from rov_fmu.identify.tank_tests import Recording
-from rov_fmu.motion.rov import HEAVE, SURGE, YAW, Axis
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import AXES, PLANS, clean
 
 
 def record(vehicle: Vehicle, axis: Axis, *plan: tuple[float, float], seed: int = 0, **options: float) -> Recording:
     noise = options.pop("noise", None)
-    return clean(vehicle.coefficients, axis, plan, **options).noisy(np.random.default_rng(seed), noise=noise)
+    return clean(vehicle.rov, axis, plan, **options).noisy(np.random.default_rng(seed), noise=noise)
 
 
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
 @pytest.mark.parametrize("command", [0.2, 0.3, 0.5, 0.7, -0.2, -0.7])
 def test_step_from_rest_gives_both(axis: Axis, command: float, vehicle: Vehicle) -> None:
-    V_ss, Tau = axis.response(vehicle.coefficients, command)
+    V_ss, Tau = vehicle.rov.response(axis, command)
     (step,) = steps(record(vehicle, axis, (0.0, 3.0), (command, 12.0 * Tau + 4.0)))
     assert step.V_ss == pytest.approx(V_ss, rel=0.01)
     assert step.Tau == pytest.approx(Tau, rel=0.1)
@@ -35,22 +35,22 @@ def test_steps_up_and_down_in_both_directions(axis: Axis, vehicle: Vehicle) -> N
     assert [step.command for step in found] == list(commands)
     assert [step.before for step in found] == [0.0, *commands[:-1]]
     for step in found:
-        assert step.V_ss == pytest.approx(axis.response(vehicle.coefficients, step.command)[0], rel=0.01)
+        assert step.V_ss == pytest.approx(vehicle.rov.response(axis, step.command)[0], rel=0.01)
         assert (step.Tau is None) == (step.before != 0.0), "Tau (17) is that of a start from rest"
 
 
 def test_standard_errors_tell_the_scatter(vehicle: Vehicle) -> None:
     """Over 8 seeds: about 95 % within two standard errors, and these not far larger than the scatter."""
     for axis in AXES:
-        recordings = [clean(vehicle.coefficients, axis, plan) for plan in PLANS[axis.name]]
+        recordings = [clean(vehicle.rov, axis, plan) for plan in PLANS[axis.name]]
         found: list[StepResponse] = []
         for seed in range(8):
             random = np.random.default_rng(seed)
             found += [step for recording in recordings for step in steps(recording.noisy(random))]
         for deviations in (
-            [(s.V_ss - axis.response(vehicle.coefficients, s.command)[0]) / s.V_ss_error
+            [(s.V_ss - vehicle.rov.response(axis, s.command)[0]) / s.V_ss_error
              for s in found if s.V_ss is not None and s.V_ss_error],
-            [(s.Tau - axis.response(vehicle.coefficients, s.command)[1]) / s.Tau_error
+            [(s.Tau - vehicle.rov.response(axis, s.command)[1]) / s.Tau_error
              for s in found if s.Tau is not None and s.Tau_error],
         ):  # fmt: skip
             assert len(deviations) >= 15
@@ -100,7 +100,7 @@ def test_spikes_and_gaps_do_not_matter(vehicle: Vehicle) -> None:
 
 @pytest.mark.parametrize("rate", [10.0, 25.0, 250.0])
 def test_any_rate(rate: float, vehicle: Vehicle) -> None:
-    V_ss, Tau = YAW.response(vehicle.coefficients, 0.5)
+    V_ss, Tau = vehicle.rov.response(YAW, 0.5)
     (step,) = steps(record(vehicle, YAW, (0.0, 4.0), (0.5, 16.0), rate=rate))
     assert step.V_ss == pytest.approx(V_ss, rel=0.01)
     assert step.Tau == pytest.approx(Tau, rel=0.05)

@@ -43,10 +43,9 @@ def test_the_folder_of_the_videoray_holds_the_measurements_of_tables_3_to_7(vehi
 
 
 def test_what_no_test_tells_is_table_9s(vehicle: Vehicle) -> None:
-    known = load_tank_tests(TESTS).rov.known
+    known = load_tank_tests(TESTS).given.known
     assert {name: q.value for name, q in known.items()} == {
-        name: getattr(vehicle.coefficients, name)
-        for name in ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top")
+        name: vehicle.rov[name] for name in ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top")
     }
     assert all("Table 9" in q.source for q in known.values())
 
@@ -141,7 +140,7 @@ def test_a_vehicle_to_set_beside_is_seen_from_the_folder(folder: Path, capsys: p
     rov.write_text(text, encoding="utf-8")
     refused(folder, (f"{rov}: against = '../mine.toml': must be a vehicle file", "this folder", "videoray"), capsys)
     shutil.copy(VIDEORAY, folder.parent / "mine.toml")
-    against = load_tank_tests(folder).rov.against
+    against = load_tank_tests(folder).given.against
     assert against
     assert against.samefile(folder.parent / "mine.toml")
 

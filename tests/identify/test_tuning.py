@@ -1,57 +1,57 @@
-"""The tuning guide: α and β in closed form, or over many points."""
+"""The tuning guide: α and β in closed form, or over many points, of any vehicle and by direction."""
 
 import re
-from dataclasses import replace
-from math import inf, nan
+from math import e, inf, nan
 from pathlib import Path
 
 import pytest
+from scipy.integrate import solve_ivp
 
 from rov_fmu.cli import main
 from rov_fmu.identify.response_fit import Point
 from rov_fmu.identify.tuning import TuningError, tune, tune_over
-from rov_fmu.motion.rov import AXES, HEAVE, SURGE, YAW, Axis, Coefficients
+from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.recordings import AXES
 
 HEAVE_AT_30 = ["--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "--tau", "2.209"]
 
 
 @pytest.fixture
-def k(vehicle: Vehicle) -> Coefficients:
-    return vehicle.coefficients
+def k(vehicle: Vehicle) -> Rov:
+    return vehicle.rov
 
 
-def test_heave_at_30_percent_gives_table_9_again(k: Coefficients) -> None:
+def test_heave_at_30_percent_gives_table_9_again(k: Rov) -> None:
     tuning = tune(k, HEAVE, 0.3, 0.175, 2.209)
     assert f"{tuning.alpha:.2f}" == "1.14"
     assert f"{tuning.beta:.2f}" == "0.59"
 
 
-@pytest.mark.parametrize("axis", AXES.values(), ids=lambda m: m.name)
+@pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
 @pytest.mark.parametrize("command", [0.2, 0.7, -0.4])
 @pytest.mark.parametrize(("V_ss", "Tau"), [(0.1, 0.2), (0.5, 3.0), (2.0, 20.0)])
-def test_tuned_model_has_the_wanted_response(
-    axis: Axis, command: float, V_ss: float, Tau: float, k: Coefficients
-) -> None:
+def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: float, Tau: float, k: Rov) -> None:
     V_ss = V_ss if command > 0.0 else -V_ss
-    tuned = tune(k, axis, command, V_ss, Tau).coefficients
-    assert axis.response(tuned, command) == pytest.approx((V_ss, Tau), rel=1e-12)
+    tuned = tune(k, axis, command, V_ss, Tau).rov
+    assert tuned.response(axis, command) == pytest.approx((V_ss, Tau), rel=1e-12)
 
 
-def test_without_time_constant_beta_stays(k: Coefficients) -> None:
-    assert tune(k, YAW, 0.3, 1.5).beta == k.beta_r
+def test_without_time_constant_beta_stays(k: Rov) -> None:
+    assert tune(k, YAW, 0.3, 1.5).beta == k["beta_r"]
 
 
-def test_many_points_of_a_tuned_model_give_its_tuning(k: Coefficients) -> None:
-    wanted = [Point(q, c, YAW.response(k, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in (0.2, 0.4, -0.7)]
+def test_many_points_of_a_tuned_model_give_its_tuning(k: Rov) -> None:
+    wanted = [Point(q, c, k.response(YAW, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in (0.2, 0.4, -0.7)]
     tuning = tune_over(k, YAW, wanted)
     assert [tuning.alpha, tuning.beta] == pytest.approx([1.2, 0.12], rel=1e-6)
     assert tuning.estimate
     assert tuning.estimate.degrees_of_freedom == 4.0
 
 
-def test_scattered_points_have_intervals_and_the_least_error(k: Coefficients) -> None:
+def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
     measured = {"V_ss": {0.2: 1.34, 0.3: 1.51, 0.5: 2.61, 0.7: 4.06}, "Tau": {0.2: 3.05, 0.3: 1.95, 0.5: 1.41}}
     points = [Point(q, c, value, 1.0, "") for q, values in measured.items() for c, value in values.items()]
     tuning = tune_over(k, YAW, points)
@@ -59,8 +59,8 @@ def test_scattered_points_have_intervals_and_the_least_error(k: Coefficients) ->
     assert 0.8 < low < tuning.alpha < high < 1.6
 
     def error(alpha: float, beta: float) -> float:
-        tuned = replace(k, alpha_r=alpha, beta_r=beta)
-        return sum((YAW.response(tuned, p.command)[p.quantity == "Tau"] / p.value - 1.0) ** 2 for p in points)
+        tuned = k.replaced({"alpha_r": alpha, "beta_r": beta})
+        return sum((tuned.response(YAW, p.command)[p.quantity == "Tau"] / p.value - 1.0) ** 2 for p in points)
 
     least = error(tuning.alpha, tuning.beta)
     assert least < error(1.2, 0.12)
@@ -68,9 +68,9 @@ def test_scattered_points_have_intervals_and_the_least_error(k: Coefficients) ->
         assert least < error(a * tuning.alpha, b * tuning.beta)
 
 
-def test_steady_velocities_alone_leave_beta(k: Coefficients) -> None:
+def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
     tuning = tune_over(k, SURGE, [Point("V_ss", c, V, 1.0, "") for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
-    assert tuning.beta == k.beta_u
+    assert tuning.beta == k["beta_u"]
     assert tuning.estimate
     assert tuning.estimate.names == ("alpha_u",)
 
@@ -78,19 +78,97 @@ def test_steady_velocities_alone_leave_beta(k: Coefficients) -> None:
 @pytest.mark.parametrize(
     ("command", "V_ss", "Tau", "named"),
     [
-        (0.3, -0.2, 2.0, "sign of the command"), (0.3, 0.0, 2.0, "sign"), (0.0, 0.2, 2.0, "not 0"),
+        (0.3, -0.2, 2.0, "V_ss = -0.2 m/s needs a thrust of -0.875"), (0.3, 0.0, 2.0, "other than 0"),
+        (-0.3, 0.2, 2.0, "but a command of -0.3 gives -0.59985 N"), (0.0, 0.2, 2.0, "not 0"),
         (30, 0.2, 2.0, "of 30 must"),
         (0.3, 0.2, 0.0, "above 0"), (0.3, 0.2, -1.0, "above 0"), (0.3, nan, 2.0, "V_ss"), (0.3, inf, 2.0, "V_ss"),
         (nan, 0.2, 2.0, "command"), (0.3, 0.2, nan, "Tau"), (0.3, 1e5, 2.0, "alpha_w"), (0.3, 0.2, 1e-9, "beta_w"),
     ],
 )  # fmt: skip
 def test_what_no_tuning_gives(
-    command: float, V_ss: float, Tau: float, named: str, k: Coefficients, capsys: pytest.CaptureFixture[str]
+    command: float, V_ss: float, Tau: float, named: str, k: Rov, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(TuningError, match=re.escape(named)):
         tune(k, HEAVE, command, V_ss, Tau)
     options = [f"--command={command}", f"--v-ss={V_ss}", f"--tau={Tau}"]
     check_refused(["tune", str(VIDEORAY), "--axis", "heave", *options], named, capsys)
+
+
+# ---- Of another vehicle, by direction --------------------------------------------------------------------------------
+
+BUOYANT = Rov(
+    Layout(
+        (VehicleAxis(SWAY), VehicleAxis(HEAVE, ("m_a", "a_d", "b_d", "a_d_reverse", "b_d_reverse", "F_0"))),
+        (Curve("prop", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")),),
+        (
+            Thruster("port", "prop", (0.0, 0.0, 1.0), (0.0, -0.2, 0.0)),
+            Thruster("starboard", "prop", (0.0, 0.0, 1.0), (0.0, 0.2, 0.0)),
+            Thruster("aside", "prop", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
+        ),
+    ),
+    {"m_rov": 11.0, "m_a_w": 14.0, "a_d_v": 60.0, "b_d_v": 2.0, "alpha_v": 0.9, "beta_v": 0.8,
+     "a_d_w": 40.0, "b_d_w": 5.0, "a_d_w_reverse": 70.0, "b_d_w_reverse": 3.0, "F_0_w": -3.0, "alpha_w": 1.1,
+     "beta_w": 0.7, "a_t_prop": 30.0, "b_t_prop": 31.0, "a_t_prop_reverse": 22.0, "b_t_prop_reverse": 25.0,
+     "c_0_prop": 0.08, "c_0_prop_reverse": 0.1},
+)  # fmt: skip
+
+
+def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
+    """Velocity of BUOYANT in heave after so many seconds from rest, its equation written out."""
+    c = abs(command)
+    thrust = 2.0 * (30.0 * (c - 0.08) ** 2 + 31.0 * (c - 0.08))
+    if command < 0.0:
+        thrust = -2.0 * (22.0 * (c - 0.1) ** 2 + 25.0 * (c - 0.1))
+
+    def rate(_: float, state: list[float]) -> list[float]:
+        (v,) = state
+        drag = 40.0 * v * v + 5.0 * v if v > 0.0 else -70.0 * v * v + 3.0 * v
+        return [beta * (alpha * thrust - 3.0 - drag) / 25.0]
+
+    return float(solve_ivp(rate, (0.0, t), [0.0], method="DOP853", rtol=1e-12, atol=1e-12).y[0, -1])
+
+
+@pytest.mark.parametrize(
+    ("command", "V_ss", "Tau"),
+    [(0.5, 0.6, 0.9), (-0.5, -0.5, 0.9), (-0.9, -0.3, 4.0), (0.12, -0.15, 2.0), (1.0, 0.01, 0.5)],
+)
+def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float, Tau: float) -> None:
+    tuning = tune(BUOYANT, HEAVE, command, V_ss, Tau)
+    assert heave_after(100.0 * Tau, command, tuning.alpha, tuning.beta) == pytest.approx(V_ss, rel=1e-9)
+    risen = (1.0 - 1.0 / e) * V_ss
+    assert heave_after(Tau, command, tuning.alpha, tuning.beta) == pytest.approx(risen, rel=1e-9)
+
+
+def test_both_directions_are_tuned_together() -> None:
+    commands = (-0.8, -0.3, 0.3, 0.8)
+    known = BUOYANT.replaced({"alpha_w": 1.3, "beta_w": 0.4})
+    wanted = [Point(q, c, known.response(HEAVE, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
+    assert wanted[0].value * wanted[3].value < 0.0
+    tuning = tune_over(BUOYANT, HEAVE, wanted)
+    assert [tuning.alpha, tuning.beta] == pytest.approx([1.3, 0.4], rel=1e-6)
+
+
+def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
+    tuning = tune(BUOYANT, SWAY, 0.6, 0.4)
+    thrust = 22.0 * 0.5**2 + 25.0 * 0.5
+    assert tuning.alpha == pytest.approx((60.0 * 0.4**2 + 2.0 * 0.4) / thrust, rel=1e-12)
+    assert tuning.beta == 0.8
+
+
+@pytest.mark.parametrize(
+    ("axis", "command", "V_ss", "reason"),
+    [
+        (HEAVE, 0.08, 0.1, "heave: a command of 0.08 gives no thrust, it is within the dead band"),
+        (HEAVE, -0.09, -0.1, "heave: a command of -0.09 gives no thrust, it is within the dead band"),
+        (SWAY, -0.07, -0.1, "sway: a command of -0.07 gives no thrust, it is within the dead band"),
+        (HEAVE, -0.5, -0.1, "heave: V_ss = -0.1 m/s needs a thrust of 2 N, but a command of -0.5 gives -27.04 N; "
+                            "F_0 alone gives -0.186697 m/s"),
+        (SWAY, 0.5, -0.1, "sway: V_ss = -0.1 m/s needs a thrust of -0.8 N, but a command of 0.5 gives 13.52 N"),
+    ],
+)  # fmt: skip
+def test_what_no_tuning_of_a_direction_gives(axis: Axis, command: float, V_ss: float, reason: str) -> None:
+    with pytest.raises(TuningError, match=f"^{re.escape(reason)}$"):
+        tune(BUOYANT, axis, command, V_ss)
 
 
 # ---- rov-fmu tune ----------------------------------------------------------------------------------------------------
@@ -115,7 +193,7 @@ def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path) -> None:
     output = tmp_path / "tuned.toml"
     assert main(["tune", str(VIDEORAY), *HEAVE_AT_30[:4], "--v-ss", "0.2", "--tau", "3", "-o", str(output)]) == 0
     tuned, vehicle = load_vehicle(output), load_vehicle(VIDEORAY)
-    assert HEAVE.response(tuned.coefficients, 0.3) == pytest.approx((0.2, 3.0), rel=1e-5)
+    assert tuned.rov.response(HEAVE, 0.3) == pytest.approx((0.2, 3.0), rel=1e-5)
     assert tuned.sources["alpha_w"] == "Tuned to V_ss = 0.2 at 30%, Tau = 3 at 30%"
     assert tuned.data
     assert vehicle.data
@@ -125,7 +203,7 @@ def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path) -> None:
     assert changed == {"data", "pictures", "alpha_w", "beta_w"}
 
 
-def test_points_of_a_file(tmp_path: Path, k: Coefficients, capsys: pytest.CaptureFixture[str]) -> None:
+def test_points_of_a_file(tmp_path: Path, k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
     points = tmp_path / "points.csv"
     points.write_text(
         "command [%],velocity [cm/s],time constant [s]\n20,11.24490,3.210526\n30,17.49804,\n70,,0.980904\n",
@@ -133,7 +211,7 @@ def test_points_of_a_file(tmp_path: Path, k: Coefficients, capsys: pytest.Captur
     )
     output = tmp_path / "tuned.toml"
     assert main(["tune", str(VIDEORAY), "--axis", "heave", "--points", str(points), "-o", str(output)]) == 0
-    assert load_vehicle(output).coefficients == k, "Table 9 is what the points were made with"
+    assert load_vehicle(output).rov == k, "Table 9 is what the points were made with"
     assert "95 %" in capsys.readouterr().out
 
 
@@ -157,6 +235,7 @@ def test_bad_points(content: str, named: str, tmp_path: Path, capsys: pytest.Cap
     ("options", "named"),
     [
         ([], "--points"), (["--command", "0.3"], "--v-ss"), (["--points", "a.csv", "--tau", "3"], "instead"),
+        (["--axis", "sway", *HEAVE_AT_30[2:]], "sway: the vehicle has only surge, heave, yaw"),
         (["--points", "nowhere.csv"], "nowhere.csv: cannot be read: No such file"),
         ([*HEAVE_AT_30[2:], "-o", "nowhere/tuned.toml"], "no folder"),
     ],

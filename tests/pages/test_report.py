@@ -17,8 +17,9 @@ from rov_fmu.identify.identification import Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Array
 from rov_fmu.identify.tank_tests import load_tank_tests
-from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, SURGE, YAW
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW
 from rov_fmu.pages.report import report_output, report_page
+from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT, TESTS
@@ -40,10 +41,9 @@ def of_recordings(tmp_path_factory: pytest.TempPathFactory) -> Identification:
     """Thrust tests, and a recording of each axis."""
     folder, random = tmp_path_factory.mktemp("logs"), np.random.default_rng(1)
     write_rov(folder, thrust_rear=(0.0, 0.7))
-    k = load_vehicle(VIDEORAY).coefficients
-    k = replace(k, alpha_u=1.0, alpha_w=1.0, alpha_r=1.0)
+    k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
     for thruster, m in (("rear", SURGE), ("top", HEAVE)):
-        rows = [(c, m.force(k, c) + 0.05 * random.standard_normal()) for c in COMMANDS.tolist()]
+        rows = [(c, k.force(m, c) + 0.05 * random.standard_normal()) for c in COMMANDS.tolist()]
         write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
     for m in (SURGE, HEAVE, YAW):
         write_log(folder, "a&b $1", clean(k, m, PLANS[m.name][0], rate=20.0).noisy(random))
@@ -112,9 +112,9 @@ def test_every_warning_is_there_in_words(of_tables: Identification, pages: Mappi
 
 def test_every_coefficient_has_its_interval(results: Identification, page: str) -> None:
     table = {row[0]: row for row in reversed(rows(page)) if len(row) == 7}  # the first of each name
-    for name in COEFFICIENTS:
+    for name in PAPER.coefficients:
         row, interval = table[name], results.vehicle.intervals.get(name)
-        assert row[2] == f"{getattr(results.vehicle.coefficients, name):.5g}"
+        assert row[2] == f"{results.vehicle.rov[name]:.5g}"
         assert row[3:5] == ([f"{end:.4g}" for end in interval] if interval else ["", ""])
         assert row[6] == results.vehicle.sources[name]
 

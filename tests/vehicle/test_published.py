@@ -191,14 +191,14 @@ Responses = Callable[[str, int, str], tuple[float, float]]
 
 
 @pytest.fixture(scope="module")
-def simulated(videoray_dir: Path) -> Iterator[Responses]:
+def simulated(videoray_dir: Path, vehicle: Vehicle) -> Iterator[Responses]:
     """V_ss and Tau of an axis at a command in %, by one of the models, from trajectories of the FMU."""
     tank = Tank(videoray_dir)
 
     @cache
     def responses(axis: str, command: int, model: str) -> tuple[float, float]:
         experiment = next(x for x in STEP_TESTS if x.axis.name == axis)
-        values = {name: sign * command / 100.0 for name, sign in experiment.axis.signs.items()}
+        values = {name: sign * command / 100.0 for name, sign in vehicle.layout.signs(experiment.axis).items()}
         if model == "non_linear":
             values |= {f"{tuning}_{velocity}": 1.0 for tuning in ("alpha", "beta") for velocity in "uwr"}
         tank.start_from_rest(values)
