@@ -20,16 +20,7 @@ from rov_fmu.identify.quadratic_fit import QuadraticFit, fit_quadratic
 from rov_fmu.identify.response_fit import Point, drag_and_beta, fit_response, free_coefficients
 from rov_fmu.identify.simulator import prepare
 from rov_fmu.identify.step_responses import AGAINST, StepResponse, steps
-from rov_fmu.identify.tank_tests import (
-    AXES,
-    LEAST_VELOCITY,
-    MOST_VELOCITY,
-    THRUSTERS,
-    Recording,
-    TankTests,
-    thrust_names,
-    thruster_of,
-)
+from rov_fmu.identify.tank_tests import AXES, THRUSTERS, VELOCITIES, Recording, TankTests, thrust_names, thruster_of
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.paper import PAPER
@@ -52,7 +43,7 @@ def identify(tests: TankTests) -> Identification:
         intervals |= fit.estimate.intervals
     results: list[AxisResult] = []
     for thruster in THRUSTERS:
-        by_axis = _fit_recordings(tests, thruster, Rov(PAPER, values), thrust.get(thruster))
+        by_axis = _fit_recordings(tests, thruster, Rov(PAPER, {**values}), thrust.get(thruster))
         for recorded in by_axis.values():  # the last word on the thrust curve too
             values |= recorded.estimate.named
             intervals |= recorded.estimate.intervals
@@ -60,7 +51,7 @@ def identify(tests: TankTests) -> Identification:
                 also = f"{sources[f'a_t_{thruster}'].split(',')[0]}, and the recordings"
                 sources |= dict.fromkeys(thrust_names(recorded.axis), also)
         for axis in (axis for axis in AXES.values() if thruster_of(axis) == thruster):
-            result = _axis(tests, axis, Rov(PAPER, values), by_axis.get(axis.name), thrust.get(thruster))
+            result = _axis(tests, axis, Rov(PAPER, {**values}), by_axis.get(axis.name), thrust.get(thruster))
             results.append(result)
             if result.response and result.chosen == "points":
                 fitted = result.response
@@ -74,7 +65,7 @@ def identify(tests: TankTests) -> Identification:
     method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
     vehicle = Vehicle(
         **dict(given.head),
-        rov=Rov(PAPER, values),
+        rov=Rov(PAPER, {**values}),
         sources=sources,
         command_range=given.command_range or _command_range(results),
         alternatives={},
@@ -117,10 +108,10 @@ def _fit_recordings(
             raise DataFileError(f"{path}: {still} never changes: nothing is identifiable")
         _check_thrust(tests, recording.axis, base, [1.0])
         speed = prepare(recording, base).speed
-        if not LEAST_VELOCITY <= speed <= MOST_VELOCITY:
+        if not VELOCITIES[0] <= speed <= VELOCITIES[1]:
             raise DataFileError(
                 f"{path}: {recording.quantity} tells of a velocity of {speed:.3g} "
-                f"{recording.axis.unit}: must be {LEAST_VELOCITY:g} at least and {MOST_VELOCITY:g} at most"
+                f"{recording.axis.unit}: must be {VELOCITIES[0]:g} at least and {VELOCITIES[1]:g} at most"
             )
         found = steps(recording)
         if found and all(step.note == AGAINST for step in found):

@@ -224,15 +224,15 @@ _ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
 _TIMES = {"s": 1.0, "ms": 1000.0}
 _FORCE = Column({"N": 1.0}, minimum=-1e6, maximum=1e6)
 _TIME = Column(_TIMES, minimum=-1e10, maximum=1e10)  # a logger's may count from 1970
-LEAST_VELOCITY, MOST_VELOCITY = 1e-5, 1e3
+VELOCITIES = 1e-5, 1e3  # the least and the most
 _MOST_POSITION = 1e7
 
 
-def velocity_column(axis: Axis, *, optional: bool = False, least: float = LEAST_VELOCITY) -> Column:
+def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCITIES[0]) -> Column:
     """A column of velocities along the axis; an optional one may have blanks."""
     lengths = _ANGLES if axis.unit == "rad/s" else _LENGTHS
     units = {f"{unit}/s": per for unit, per in lengths.items()}
-    return Column(units, optional, optional, -MOST_VELOCITY, MOST_VELOCITY, least)
+    return Column(units, optional, optional, -VELOCITIES[1], VELOCITIES[1], least)
 
 
 def time_constant_column(*, optional: bool = False) -> Column:

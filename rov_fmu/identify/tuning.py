@@ -33,16 +33,6 @@ class Tuning:
     """Where they are fitted to many points."""
 
     @property
-    def alpha(self) -> float:
-        """Factor of thrust."""
-        return self.rov[self.axis.coefficient("alpha")]
-
-    @property
-    def beta(self) -> float:
-        """Factor of acceleration."""
-        return self.rov[self.axis.coefficient("beta")]
-
-    @property
     def model(self) -> Array:
         """V_ss or Tau of the tuned model at every point."""
         return predict(self.axis, self.rov, self.points)

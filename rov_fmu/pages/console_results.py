@@ -86,3 +86,8 @@ def print_tuning(tuning: Tuning) -> None:
     for p, value in zip(tuning.points, tuning.model.tolist(), strict=True):
         result.add_row(f"{p.command:.0%}", p.quantity, f"{p.value:.4g}", *_against(value, p.value))
     out.print(result)
+    layout = tuning.rov.layout
+    for curve in {thruster.curve: layout.curve_of[thruster.name] for thruster in layout.drivers(tuning.axis)}.values():
+        if curve.has_lag:
+            T = tuning.rov[curve.coefficient("T")]
+            out.print(f"Tau is that of steady thrust; the lag of curve {curve.name}, T = {T:g} s, comes on top")

@@ -8,8 +8,8 @@ from typing import Literal, TypeVar
 
 from matplotlib.axes import Axes
 
-from rov_fmu.motion.riccati import RISE
 from rov_fmu.motion.layout import Axis
+from rov_fmu.motion.riccati import RISE
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.svg import LIGHT
 from rov_fmu.vehicle.published import ResponseTable

@@ -1,6 +1,7 @@
 """The tuning guide: α and β in closed form, or over many points, of any vehicle and by direction."""
 
 import re
+from dataclasses import replace
 from math import e, inf, nan
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from rov_fmu.identify.response_fit import Point
 from rov_fmu.identify.tuning import TuningError, tune, tune_over
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.pages.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.recordings import AXES
@@ -26,8 +28,8 @@ def k(vehicle: Vehicle) -> Rov:
 
 def test_heave_at_30_percent_gives_table_9_again(k: Rov) -> None:
     tuning = tune(k, HEAVE, 0.3, 0.175, 2.209)
-    assert f"{tuning.alpha:.2f}" == "1.14"
-    assert f"{tuning.beta:.2f}" == "0.59"
+    assert f"{tuning.rov['alpha_w']:.2f}" == "1.14"
+    assert f"{tuning.rov['beta_w']:.2f}" == "0.59"
 
 
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
@@ -40,13 +42,13 @@ def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: f
 
 
 def test_without_time_constant_beta_stays(k: Rov) -> None:
-    assert tune(k, YAW, 0.3, 1.5).beta == k["beta_r"]
+    assert tune(k, YAW, 0.3, 1.5).rov["beta_r"] == k["beta_r"]
 
 
 def test_many_points_of_a_tuned_model_give_its_tuning(k: Rov) -> None:
     wanted = [Point(q, c, k.response(YAW, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in (0.2, 0.4, -0.7)]
     tuning = tune_over(k, YAW, wanted)
-    assert [tuning.alpha, tuning.beta] == pytest.approx([1.2, 0.12], rel=1e-6)
+    assert [tuning.rov["alpha_r"], tuning.rov["beta_r"]] == pytest.approx([1.2, 0.12], rel=1e-6)
     assert tuning.estimate
     assert tuning.estimate.degrees_of_freedom == 4.0
 
@@ -56,21 +58,22 @@ def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
     points = [Point(q, c, value, 1.0, "") for q, values in measured.items() for c, value in values.items()]
     tuning = tune_over(k, YAW, points)
     low, high = tuning.estimate.intervals["alpha_r"] if tuning.estimate else (nan, nan)
-    assert 0.8 < low < tuning.alpha < high < 1.6
+    alpha, beta = tuning.rov["alpha_r"], tuning.rov["beta_r"]
+    assert 0.8 < low < alpha < high < 1.6
 
-    def error(alpha: float, beta: float) -> float:
-        tuned = k.replaced({"alpha_r": alpha, "beta_r": beta})
+    def error(a: float, b: float) -> float:
+        tuned = k.replaced({"alpha_r": a, "beta_r": b})
         return sum((tuned.response(YAW, p.command)[p.quantity == "Tau"] / p.value - 1.0) ** 2 for p in points)
 
-    least = error(tuning.alpha, tuning.beta)
+    least = error(alpha, beta)
     assert least < error(1.2, 0.12)
     for a, b in ((1.01, 1.0), (0.99, 1.0), (1.0, 1.01), (1.0, 0.99)):
-        assert least < error(a * tuning.alpha, b * tuning.beta)
+        assert least < error(a * alpha, b * beta)
 
 
 def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
     tuning = tune_over(k, SURGE, [Point("V_ss", c, V, 1.0, "") for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
-    assert tuning.beta == k["beta_u"]
+    assert tuning.rov["beta_u"] == k["beta_u"]
     assert tuning.estimate
     assert tuning.estimate.names == ("alpha_u",)
 
@@ -133,10 +136,11 @@ def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
     [(0.5, 0.6, 0.9), (-0.5, -0.5, 0.9), (-0.9, -0.3, 4.0), (0.12, -0.15, 2.0), (1.0, 0.01, 0.5)],
 )
 def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float, Tau: float) -> None:
-    tuning = tune(BUOYANT, HEAVE, command, V_ss, Tau)
-    assert heave_after(100.0 * Tau, command, tuning.alpha, tuning.beta) == pytest.approx(V_ss, rel=1e-9)
+    tuned = tune(BUOYANT, HEAVE, command, V_ss, Tau).rov
+    alpha, beta = tuned["alpha_w"], tuned["beta_w"]
+    assert heave_after(100.0 * Tau, command, alpha, beta) == pytest.approx(V_ss, rel=1e-9)
     risen = (1.0 - 1.0 / e) * V_ss
-    assert heave_after(Tau, command, tuning.alpha, tuning.beta) == pytest.approx(risen, rel=1e-9)
+    assert heave_after(Tau, command, alpha, beta) == pytest.approx(risen, rel=1e-9)
 
 
 def test_both_directions_are_tuned_together() -> None:
@@ -145,14 +149,14 @@ def test_both_directions_are_tuned_together() -> None:
     wanted = [Point(q, c, known.response(HEAVE, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
     assert wanted[0].value * wanted[3].value < 0.0
     tuning = tune_over(BUOYANT, HEAVE, wanted)
-    assert [tuning.alpha, tuning.beta] == pytest.approx([1.3, 0.4], rel=1e-6)
+    assert [tuning.rov["alpha_w"], tuning.rov["beta_w"]] == pytest.approx([1.3, 0.4], rel=1e-6)
 
 
 def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
-    tuning = tune(BUOYANT, SWAY, 0.6, 0.4)
+    tuned = tune(BUOYANT, SWAY, 0.6, 0.4).rov
     thrust = 22.0 * 0.5**2 + 25.0 * 0.5
-    assert tuning.alpha == pytest.approx((60.0 * 0.4**2 + 2.0 * 0.4) / thrust, rel=1e-12)
-    assert tuning.beta == 0.8
+    assert tuned["alpha_v"] == pytest.approx((60.0 * 0.4**2 + 2.0 * 0.4) / thrust, rel=1e-12)
+    assert tuned["beta_v"] == 0.8
 
 
 @pytest.mark.parametrize(
@@ -200,7 +204,7 @@ def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path) -> None:
     assert tuned.data.resolve() == vehicle.data
     before, after = VIDEORAY.read_text(encoding="utf-8").splitlines(), output.read_text(encoding="utf-8").splitlines()
     changed = {a.split(" ")[0] for a, b in zip(before, after, strict=True) if a != b}
-    assert changed == {"data", "pictures", "alpha_w", "beta_w"}
+    assert changed == {"data", "pictures", "alpha", "beta"}
 
 
 def test_points_of_a_file(tmp_path: Path, k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
@@ -242,3 +246,13 @@ def test_bad_points(content: str, named: str, tmp_path: Path, capsys: pytest.Cap
 )  # fmt: skip
 def test_bad_options(options: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
     check_refused(["tune", str(VIDEORAY), "--axis", "heave", *options], named, capsys)
+
+
+def test_lag_of_the_thrust_is_told(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
+    print_tuning(tune(k, HEAVE, 0.3, 0.175, 2.209))
+    assert "lag" not in capsys.readouterr().out
+    curves = tuple(replace(curve, keys=(*curve.keys, "T")) for curve in k.layout.curves)
+    late = Rov(replace(k.layout, curves=curves), {**k.coefficients, "T_rear": 0.15, "T_top": 0.2})
+    print_tuning(tune(late, HEAVE, 0.3, 0.175, 2.209))
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "lag" in line)
+    assert "curve top, T = 0.2 s" in line
