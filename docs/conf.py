@@ -1,6 +1,7 @@
 """The site: `sphinx-build -W docs site`. {{ README.md }} stands for that file, {{ coefficients }} for a table."""
 
 import re
+import sys
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -11,6 +12,9 @@ from rov_fmu.motion.rov import COEFFICIENTS
 from rov_fmu.pages.templates import number
 
 ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT))
+
+from docs.compared import tables  # noqa: E402 (it stands beside this file)
 
 project = "rov-fmu"
 release = __version__
@@ -47,6 +51,7 @@ TABLES: dict[str, list[tuple[str, ...]]] = {
             for name, meta in COEFFICIENTS.items()
         ),
     ],
+    **tables(),
     "log_categories": [("category", "what"), ("---",) * 2, *((f"`{n}`", w) for n, w in LOG_CATEGORIES.items())],
 }
 
