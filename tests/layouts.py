@@ -5,6 +5,7 @@ from math import sqrt
 from rov_fmu.motion.layout import AXES, HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _C = sqrt(0.5)
 _CORNERS = {"1": (1, -1, 1, 1), "2": (1, 1, 1, -1), "3": (-1, -1, -1, 1), "4": (-1, 1, -1, -1)}
@@ -73,3 +74,10 @@ def a_rov(layout: Layout) -> Rov:
         size = next(size for key, size in _SIZES.items() if name == key or name.startswith(f"{key}_"))
         values[name] = size * (0.75 if name.endswith("_reverse") else 0.03 if name.endswith("_r") else 1.0)
     return Rov(layout, values)
+
+
+def a_vehicle(layout: Layout) -> Vehicle:
+    """A vehicle of this layout with nothing but its numbers."""
+    rov = a_rov(layout)
+    sources = dict.fromkeys(rov.coefficients, "A tank test")
+    return Vehicle("An ROV", "an_rov", "1", "A test", "A tank", rov, sources, (0.1, 1.0), {}, None)

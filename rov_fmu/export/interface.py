@@ -89,7 +89,7 @@ class Variable:
 
 def _driving(layout: Layout, form: VehicleAxis) -> dict[str, str]:
     """What the force of an axis depends on: commands, or forces that lag behind them."""
-    found = {}
+    found: dict[str, str] = {}
     for thruster in layout.drivers(form.axis):
         lags = layout.curve_of[thruster.name].has_lag
         found |= {f"F_{thruster.name}": "tunable"} if lags else dict.fromkeys(layout.gains[thruster.name], "dependent")
@@ -124,11 +124,11 @@ def _derivatives(layout: Layout) -> dict[str, tuple[Meta, dict[str, str]]]:
 
 def _over_ground(layout: Layout, way: str, current: str, terms: Mapping[str, str]) -> tuple[Meta, dict[str, str]]:
     """A horizontal velocity over ground: a term of each velocity; ψ is 0 without yaw."""
-    if layout.has(YAW):
-        known, terms = {"psi": "dependent"}, {v: term for v, term in terms.items() if v in layout.velocities}
-    else:
-        known, terms = {}, {v: f"+ {v}" for v, term in terms.items() if v in layout.velocities and "cos" in term}
-    known |= dict.fromkeys(terms, "dependent" if known else "constant")
+    turns = layout.has(YAW)
+    known = {"psi": "dependent"} if turns else {}
+    terms = {v: term if turns else f"+ {v}" for v, term in terms.items()
+             if v in layout.velocities and (turns or "cos" in term)}  # fmt: skip
+    known |= dict.fromkeys(terms, "dependent" if turns else "constant")
     words = " ".join([*terms.values(), f"+ {current}"]).removeprefix("+ ")
     return Meta("m/s", f"Velocity over ground {way}, {words}"), {current: "constant", **known}
 

@@ -17,17 +17,15 @@ from rov_fmu.motion import layout, rov
 
 def layout_of(given: Any) -> layout.Layout:
     """What a vehicle has, from what dataclasses.asdict makes of it, by way of JSON."""
-    axes, curves, thrusters = (
-        [
-            {key: tuple(value) if isinstance(value, list) else value for key, value in part.items()}
-            for part in given[kind]
-        ]
-        for kind in ("axes", "curves", "thrusters")
-    )
+
+    def parts(kind: str) -> list[dict[str, Any]]:
+        return [{key: tuple(value) if isinstance(value, list) else value for key, value in part.items()}
+                for part in given[kind]]  # fmt: skip
+
     return layout.Layout(
-        tuple(layout.VehicleAxis(layout.AXES[form["axis"]["name"]], form["keys"]) for form in axes),
-        tuple(layout.Curve(**curve) for curve in curves),
-        tuple(layout.Thruster(**thruster) for thruster in thrusters),
+        tuple(layout.VehicleAxis(layout.AXES[form["axis"]["name"]], form["keys"]) for form in parts("axes")),
+        tuple(layout.Curve(**curve) for curve in parts("curves")),
+        tuple(layout.Thruster(**thruster) for thruster in parts("thrusters")),
         given["mix"],
         given["coupled"],
     )

@@ -1,11 +1,11 @@
 """documentation/index.html: one page that stands alone, with the numbers and plots of the vehicle it is about."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 from functools import partial
-from itertools import groupby
-from math import isfinite
+from itertools import chain, groupby
+from math import isclose, isfinite
 from typing import Any
 
 from markupsafe import Markup
@@ -13,15 +13,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.export.archive import REPORT
-from rov_fmu.export.interface import Variable, variables
-from rov_fmu.motion.rov import AXES, Axis, Coefficients, Inputs, State, step
-from rov_fmu.pages.plots import draw_steps, evenly, finish, measured_step
+from rov_fmu.export.interface import variables
+from rov_fmu.motion.layout import ARM, Axis, Layout
+from rov_fmu.motion.rov import Rov
+from rov_fmu.pages import equations
+from rov_fmu.pages.drawing import VIEWS, draw_thrusters, drawing_size
+from rov_fmu.pages.plots import Step, draw_curve, draw_steps, evenly, finish, measured_step
 from rov_fmu.pages.svg import LIGHT, inline_file, inline_svg, svg_file
 from rov_fmu.pages.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _PANEL = (3.7, 2.9)  # inches
+_FRAMES = {
+    "from_above.svg": "The vehicle from above: x forward, y to starboard",
+    "from_starboard.svg": "The vehicle from starboard: x forward, z down",
+}
 
 
 # ---- The page ------------------------------------------------------------------------------------------------------
@@ -29,42 +36,96 @@ _PANEL = (3.7, 2.9)  # inches
 
 def documentation(vehicle: Vehicle, *, native: bool) -> dict[str, bytes]:
     """The page by its path in the FMU. Raises FileError."""
-    text = documentation_page(vehicle, variables(vehicle.coefficients), native=native)
-    return {"documentation/index.html": text.encode()}
+    return {"documentation/index.html": documentation_page(vehicle, native=native).encode()}
 
 
-def documentation_page(vehicle: Vehicle, variables: tuple[Variable, ...], *, native: bool = True) -> str:
+def documentation_page(vehicle: Vehicle, *, native: bool = True) -> str:
     """The page of a vehicle as HTML, of the native FMU or the one in pure Python.
 
     Without a data folder it goes without tables and measurements.
     """
+    rov, layout = vehicle.rov, vehicle.layout
     tables = tables_by_axis(vehicle)
-    commands = _commands(vehicle, tables.values())
-    steady, steps = (
-        [_plot(f"{label}: {name}", partial(draw, axis=axis, table=tables.get(name))) for name, axis in AXES.items()]
-        for label, draw in (
-            ("V_ss over the command", partial(plot_steady, vehicle=vehicle)),
-            ("Step responses", partial(plot_steps, k=vehicle.coefficients, commands=commands)),
-        )
-    )
+    held = _commands(vehicle, tables.values())
+    axes = [form.axis for form in layout.axes]
+    first = axes[0]
+    start = {name: 0.3 * sign for name, sign in layout.signs(first).items()}
+    rest = dict.fromkeys([*layout.inputs, *layout.state], 0.0)
+    own = [
+        (label, path) for name, label in _FRAMES.items() if (path := vehicle.picture(name)).parent == vehicle.pictures
+    ]
     return page(
         "index.html.j2",
         vehicle=vehicle,
+        layout=layout,
+        is_free=not layout.coupled and not layout.lagging,
+        is_tuned=_is_tuned(rov),
         native=native,
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
-        groups=[list(group) for _, group in groupby(variables, lambda v: (v.causality, v.variability, v.initial))],
-        values=asdict(vehicle.coefficients),
-        reversing=_reversing,
-        tables=[(table, _agreement(table)) for table in tables.values()],
-        moved=step(vehicle.coefficients, Inputs(u_l=0.3, u_r=0.3), State(), 10.0),
-        held=commands,
-        frames=[
-            inline_file("The vehicle from above: x forward, y to starboard", vehicle.picture("from_above.svg")),
-            inline_file("The vehicle from starboard: x forward, z down", vehicle.picture("from_starboard.svg")),
+        groups=[
+            list(group) for _, group in groupby(variables(rov), lambda v: (v.causality, v.variability, v.initial))
         ],
-        steady=steady,
-        steps=steps,
-    )
+        reversing=_reversing,
+        equations=equations.of(layout),
+        same_thrust=not all("a_t_reverse" in curve.keys for curve in layout.curves),
+        same_drag=[form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys],
+        has={*chain(*(form.keys for form in layout.axes), *(curve.keys for curve in layout.curves))},
+        unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
+        arm=[rov[name] for name in ARM] if layout.has_arm else None,
+        tables=[(table, _agreement(table)) for table in tables.values()],
+        start=start,
+        first=first,
+        moved=rov.step(rest | start, rest, 10.0)[first.velocity],
+        moves_at_rest=any(rov.derivatives(rest, rest).values()),
+        held=held,
+        motions=[motion for axis in axes for motion in _motions(rov, axis, held)],
+        frames=[inline_file(label, path) for label, path in own],
+        thrusters=[
+            inline_svg(f"Thrusters {view}", partial(_draw, partial(draw_thrusters, rov=rov, view=view)),
+                       drawing_size(rov, view))
+            for view in VIEWS
+        ],
+        curves=[_plot(f"Thrust curve: {c.name}", partial(draw_curve, rov=rov, curve=c)) for c in layout.curves],
+        steady=[
+            _plot(f"V_ss over the command: {a.name}",
+                  partial(plot_steady, vehicle=vehicle, axis=a, table=tables.get(a.name)))
+            for a in axes
+        ],
+        steps=[
+            _plot(f"Step responses: {a.name}",
+                  partial(plot_steps, rov=rov, axis=a, commands=held, table=tables.get(a.name)))
+            for a in axes
+        ],
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What held commands come to, along one axis and in one direction."""
+
+    axis: Axis
+    way: str
+    """In words where the two directions differ."""
+    signs: Mapping[str, float]
+    responses: Sequence[tuple[float, float]]
+    """V_ss and Tau for each command."""
+
+
+def _motions(rov: Rov, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
+    two = differs_by_direction(rov, axis)
+    for sign, way in ((1.0, axis.positive), (-1.0, axis.negative))[: 1 + two]:
+        signs = {name: sign * of for name, of in rov.layout.signs(axis).items()}
+        responses = [rov.response(axis, sign * float(c) / 100.0) for c in commands]
+        yield Motion(axis, f" {way}" if two else "", signs, responses)
+
+
+def differs_by_direction(rov: Rov, axis: Axis) -> bool:
+    """Whether a negative command gives another motion than the mirror image of the positive one."""
+    for c in (0.1, 0.3, 0.6, 1.0):
+        (V, Tau), (back, Tau_back) = rov.response(axis, c), rov.response(axis, -c)
+        if not (isclose(V, -back, rel_tol=1e-9) and isclose(Tau, Tau_back, rel_tol=1e-9)):
+            return True
+    return False
 
 
 def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
@@ -73,12 +134,13 @@ def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
 
 
 def _commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Decimal]:
-    """Up to four commands (%) for the step responses: those that all tables hold, else across the range."""
+    """Up to four commands (%) for the step responses: those that all tables hold, else tens across the range."""
     rows = [{row.command for row in table.rows} for table in tables]
     common = sorted(set.intersection(*rows)) if rows else []
     if len(common) < 2:
         low, high = (max(1, round(100.0 * end)) for end in vehicle.command_range)
-        common = [Decimal(c) for c in range(low, high + 1)]
+        tens = range(-(-low // 10) * 10, high + 1, 10)
+        common = [Decimal(c) for c in (tens if len(tens) > 1 else range(low, high + 1))]
     return evenly(common)
 
 
@@ -105,50 +167,70 @@ def _is_cut_off(cell: Cell) -> bool:
     return Decimal(cell.computed).quantize(cell.printed, ROUND_DOWN) == cell.printed
 
 
-def _reversing(values: Mapping[str, float]) -> list[tuple[str, float]]:
-    """Thrust curves a_t |c| c + b_t c that point backward at small commands, and the command at which they turn."""
-    curves = [(name.removeprefix("a_t_"), a, values.get(f"b_t_{name.removeprefix('a_t_')}", 0.0))
-              for name, a in values.items() if name.startswith("a_t_")]  # fmt: skip
-    return [(thruster, -b / a) for thruster, a, b in curves if b < 0.0 < a]
+def _reversing(layout: Layout, values: Mapping[str, float]) -> list[tuple[str, float]]:
+    """Thrust curves that point backward at small commands, and the command at which they turn."""
+    found = []
+    for curve in layout.curves:
+        for end, words in (("", ""), ("_reverse", " in reverse")):
+            a, b = (values.get(curve.coefficient(key + end), 0.0) for key in ("a_t", "b_t"))
+            if b < 0.0 < a and f"a_t{end}" in curve.keys:
+                dead = values.get(curve.coefficient("c_0" + end), 0.0) if "c_0" in curve.keys else 0.0
+                found.append((f"{curve.name} thrust{words}", dead - b / a))
+    return found
+
+
+def _is_tuned(rov: Rov) -> bool:
+    return any(rov[name] != 1.0 for name, meta in rov.layout.coefficients.items() if meta.tunable)
 
 
 # ---- Plots ---------------------------------------------------------------------------------------------------------
 
 
 def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
-    """V_ss over the command: both models, the measured points, and the range of the identification."""
-    low, high = (100.0 * end for end in vehicle.command_range)
+    """V_ss over the command: with and without tuning, the measured points, the range of the identification."""
+    rov, (low, high) = vehicle.rov, (100.0 * end for end in vehicle.command_range)
+    least = -100 if differs_by_direction(rov, axis) else 0
     ax.axvspan(low, high, label="identified range", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
-    commands = range(0, 101, 2)
-    for label, k, color, dashes in (
-        ("non-linear, α = β = 1", untuned(vehicle.coefficients), "grey", "--"),
-        ("scaled, tuned α and β", vehicle.coefficients, "blue", "-"),
-    ):
-        V_ss = [axis.response(k, c / 100.0)[0] for c in commands]
-        ax.plot(commands, V_ss, dashes, label=label, color=LIGHT[color], linewidth=1.8)
+    if least:
+        ax.axvspan(-high, -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+    commands = range(least, 101, 2)
+    models = [("tuned α and β", rov, "blue", "-")]
+    if _is_tuned(rov):
+        models.insert(0, ("α = β = 1", untuned(rov), "grey", "--"))
+    for label, model, color, dashes in models:
+        V_ss = [model.response(axis, c / 100.0)[0] for c in commands]
+        name = label if len(models) > 1 else None
+        ax.plot(commands, V_ss, dashes, label=name, color=LIGHT[color], linewidth=1.8)
     if table and table.steady:
         points = [(float(c), float(V)) for c, V in table.steady.items()]
         ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
     finish(ax, rf"{axis.name.capitalize()}: $V_{{ss}}$ ({axis.unit})", "command (%)")
-    ax.set_xlim(0, 100)
+    ax.set_xlim(least, 100)
 
 
-def plot_steps(ax: Axes, k: Coefficients, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:
+def plot_steps(ax: Axes, rov: Rov, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:
     """Velocity after steps of the command from rest, with the measured V_ss and Tau."""
-    draw_steps(ax, axis, [measured_step(table, c) for c in commands], [(k, "-")])
+    steps = [measured_step(table, c) for c in commands]
+    if differs_by_direction(rov, axis):
+        steps += [Step(-step.command) for step in steps]
+    draw_steps(ax, axis, steps, [(rov, "-")])
     ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left")
 
 
 def steady_picture(vehicle: Vehicle) -> str:
-    """V_ss of the three axes side by side as an SVG file."""
-    tables = tables_by_axis(vehicle)
+    """V_ss of all axes side by side as an SVG file."""
+    tables, axes = tables_by_axis(vehicle), [form.axis for form in vehicle.layout.axes]
 
     def draw(figure: Figure) -> None:
-        for ax, axis in zip(figure.subplots(1, 3), AXES.values(), strict=True):
+        for ax, axis in zip(figure.subplots(1, len(axes), squeeze=False)[0], axes, strict=True):
             plot_steady(ax, vehicle, axis, tables.get(axis.name))
 
-    return svg_file(draw, (3 * _PANEL[0], _PANEL[1]), salt="steady") + "\n"
+    return svg_file(draw, (len(axes) * _PANEL[0], _PANEL[1]), salt="steady") + "\n"
+
+
+def _draw(draw: Callable[[Axes], None], figure: Figure) -> None:
+    draw(figure.subplots())
 
 
 def _plot(label: str, draw: Callable[[Axes], None]) -> Markup:
-    return inline_svg(label, lambda figure: draw(figure.subplots()), _PANEL)
+    return inline_svg(label, partial(_draw, draw), _PANEL)

@@ -1,14 +1,15 @@
 """The plot that all pages share: steps of the command from rest, modelled and measured."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
+from itertools import pairwise
 from math import ceil, isfinite
 from typing import Literal, TypeVar
 
 from matplotlib.axes import Axes
 
-from rov_fmu.motion.layout import Axis
+from rov_fmu.motion.layout import Axis, Curve
 from rov_fmu.motion.riccati import RISE
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.svg import LIGHT
@@ -56,6 +57,33 @@ def finish(
         ax.legend(loc=where)
 
 
+def draw_curve(ax: Axes, rov: Rov, curve: Curve) -> None:
+    """Steady thrust of a thruster over its command, reverse and dead band as they are."""
+    commands = {n / 50.0 for n in range(-50, 51)}
+    if "c_0" in curve.keys:
+        ends = -rov[curve.coefficient("c_0_reverse")], rov[curve.coefficient("c_0")]
+        commands |= set(ends)
+        low, high = (100.0 * end for end in ends)
+        ax.axvspan(low, high, label="dead band", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+    c = sorted(commands)
+    ax.plot([100.0 * x for x in c], [rov.curve_force(curve, x) for x in c], color=LIGHT["blue"], linewidth=1.8)
+    finish(ax, f"Curve {curve.name}: thrust (N)", "command (%)")
+    ax.set_xlim(-100, 100)
+
+
+def after_step(rov: Rov, axis: Axis, command: float, times: Sequence[float]) -> list[float]:
+    """Velocity along an axis at each time, the first 0, under a held command from rest; other axes are left out."""
+    if not any(rov.layout.curve_of[thruster.name].has_lag for thruster in rov.layout.drivers(axis)):
+        motion = rov.held(axis, command)
+        return [0.0, *(motion.velocity(0.0, t) for t in times[1:])]
+    alone = Rov(replace(rov.layout, axes=(rov.layout.kinds[axis.name],), coupled=False), rov.coefficients)
+    state, v = dict.fromkeys(alone.layout.state, 0.0), [0.0]
+    for before, t in pairwise(times):
+        state = alone.step(alone.held_inputs(axis, command), state, t - before)
+        v.append(state[axis.velocity])
+    return v
+
+
 def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Rov, str]]) -> None:
     """Velocity after steps of the command, of every model (the last is the one to label): measured V_ss are dotted
     lines, measured Tau points at 1 - 1/e of it."""
@@ -63,18 +91,20 @@ def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tup
     Taus += [Tau for step in steps for Tau in step.Tau]
     end = ceil(3.3 * max((Tau for Tau in Taus if isfinite(Tau)), default=3.0))
     t = [end * (n / 45) ** 1.5 for n in range(46)]  # closer where the curve bends
-    for role, step in zip(_STEPS, steps, strict=False):
-        color = LIGHT[role]
-        for k, dashes in models:
-            motion = k.held(axis, step.command)
-            v = [0.0, *(motion.velocity(0.0, moment) for moment in t[1:])]
+    roles = dict(zip(sorted({abs(step.command) for step in steps}), _STEPS, strict=False))
+    for step in steps:
+        color = LIGHT[roles[abs(step.command)]]
+        for rov, dashes in models:
+            v = after_step(rov, axis, step.command, t)
             ax.plot(t, v, dashes, color=color, linewidth=1.8 if dashes == "-" else 1.0)
-        ax.text(1.015 * end, v[-1], f"{100.0 * step.command:g} %", color=color, va="center", fontsize=8.5)
+        label = f"{100.0 * step.command:g} %".replace("-", "−")
+        ax.text(1.015 * end, v[-1], label, color=color, va="center", fontsize=8.5)
         for V in step.V_ss:
             ax.plot([0, end], [V, V], ":", color=color, linewidth=1.2)
         if step.V_ss:
             at = RISE * (sum(step.V_ss) / len(step.V_ss))
             ax.plot(step.Tau, [at] * len(step.Tau), "o", color=color, markersize=5.0, zorder=5)
     ax.set(xlim=(0, end), xlabel="time (s)")
-    ax.set_ylim(bottom=0.0)
+    if all(step.command >= 0.0 for step in steps):
+        ax.set_ylim(bottom=0.0)
     ax.locator_params(nbins=6)

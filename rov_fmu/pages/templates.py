@@ -4,7 +4,6 @@ from math import isfinite, isnan
 from pathlib import Path
 
 from rov_fmu.files.templates import render
-from rov_fmu.motion.layout import AXES
 from rov_fmu.pages.svg import PALETTE
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -14,7 +13,7 @@ def page(template: str, **content: object) -> str:
     """A page from a template, with these formats as filters."""
     return render(
         template, Path(__file__).parent / "templates", number=number, text=text, unit=pretty_unit,
-        palette=PALETTE, axes=AXES, **content,
+        palette=PALETTE, **content,
     )  # fmt: skip
 
 

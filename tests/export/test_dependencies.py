@@ -10,15 +10,10 @@ from rov_fmu.export.interface import Variable, variables
 from rov_fmu.export.model_description import NATIVE, model_description
 from rov_fmu.motion.layout import Layout
 from rov_fmu.motion.rov import Rov
-from rov_fmu.vehicle.vehicle import Vehicle
-from tests.layouts import LAYOUTS, a_rov
+from tests.layouts import LAYOUTS, a_rov, a_vehicle
 
 Point = dict[str, float]
 Slopes = dict[tuple[str, str], float]
-
-
-def a_vehicle(rov: Rov) -> Vehicle:
-    return Vehicle("An ROV", "rov", "1", "A test", "A tank", rov, {}, (0.0, 1.0), {}, None)
 
 
 def computed(rov: Rov, point: Point) -> Point:
@@ -58,9 +53,9 @@ def vary(values: Sequence[float]) -> bool:
 def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
     """One list of <ModelStructure>."""
     of_rov = variables(rov)
-    root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=NATIVE))
+    root = etree.fromstring(model_description(a_vehicle(rov.layout), of_rov, guid="", interfaces=NATIVE))
     name: Mapping[str, Variable] = {str(v.index): v for v in of_rov}
-    found = {}
+    found: dict[tuple[str, str], str] = {}
     for unknown in root.find(f"ModelStructure/{of}"):
         kinds = zip(unknown.get("dependencies").split(), unknown.get("dependenciesKind").split(), strict=True)
         found |= {(name[unknown.get("index")].name, name[known].name): kind for known, kind in kinds}
