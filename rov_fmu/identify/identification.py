@@ -88,12 +88,12 @@ class Comparison:
     model: Array
     leave_one_out: Array
     """Leave-one-thrust-out: by the fit to the points without those of the same thrust."""
-    against: Array
+    against: Array | None
 
     @property
     def columns(self) -> list[Array]:
         """Of the vehicle, leave-one-thrust-out, and of the vehicle to compare with where there is one."""
-        return [self.model, self.leave_one_out, *([] if np.isnan(self.against).all() else [self.against])]
+        return [self.model, self.leave_one_out, *([] if self.against is None else [self.against])]
 
     def rms(self, model: Array) -> float:
         """RMS relative error over the points that count."""
@@ -109,9 +109,9 @@ def compare(identification: Identification) -> tuple[Comparison, ...]:
                 points = tuple(result.points[n] for n in place)
                 model, none = predict(result.axis, identification.vehicle.rov, points), np.full(len(points), np.nan)
                 out = result.response.leave_one_out[place] if result.response else none
-                other = none
-                if against and against.layout.has(result.axis):
-                    other = predict(result.axis, against.rov, points)
+                other = None
+                if against:
+                    other = predict(result.axis, against.rov, points) if against.layout.has(result.axis) else none
                 found.append(Comparison(result, quantity, points, model, out, other))
     return tuple(found)
 

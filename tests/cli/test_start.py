@@ -14,6 +14,7 @@ import pytest
 from rov_fmu.build import build
 from rov_fmu.cli import main
 from rov_fmu.export.compile import PLATFORMS
+from rov_fmu.motion.layout import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT, TESTS, start
@@ -95,7 +96,7 @@ def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
     assert _completed("tune", "./my") == ["file,./my"]
     assert _completed("build", "--platform", "") == [f"plain,{name}" for name in ("host", *PLATFORMS)]
     assert _completed("build", "--backend", "p") == ["plain,pythonfmu"]
-    assert _completed("tune", "videoray", "--axis", "") == ["plain,surge", "plain,heave", "plain,yaw"]
+    assert _completed("tune", "videoray", "--axis", "") == [f"plain,{name}" for name in AXES]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

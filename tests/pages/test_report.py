@@ -15,12 +15,12 @@ from rov_fmu.cli import main
 from rov_fmu.files.output import write_whole
 from rov_fmu.identify.identification import Identification, compare
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.least_squares import Array
 from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW
+from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.report import report_output, report_page
 from rov_fmu.vehicle.paper import PAPER
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT, TESTS
 from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
@@ -122,11 +122,25 @@ def test_every_coefficient_has_its_interval(results: Identification, page: str) 
 def test_every_measured_point_stands_beside_the_models(of_tables: Identification, pages: Mapping[int, str]) -> None:
     table = rows(pages[id(of_tables)])
     for comparison in compare(of_tables):
-        columns: tuple[Array, ...] = (comparison.model, comparison.leave_one_out, comparison.against)
         for n, p in enumerate(comparison.points):
-            numbers = [f"{column[n]:.4g}".replace("-", "−") for column in columns]
+            numbers = [f"{column[n]:.4g}".replace("-", "−") for column in comparison.columns]
             assert [row for row in table if len(row) == 9 and row[2::2][:3] == numbers and p.source in row[8]]
     assert ["Surge, Vss", "6", "5.3 %", "9.7 %", "16.6 %"] in table
+
+
+def test_a_vehicle_of_another_kind_stands_beside(of_tables: Identification) -> None:
+    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
+    axes = tuple(form for form in heavy.layout.axes if form.axis is not YAW)
+    rov = Rov(replace(heavy.layout, axes=axes, coupled=False), heavy.rov.coefficients)
+    results = replace(of_tables, against=replace(heavy, rov=rov))
+    for comparison in compare(results):
+        assert len(comparison.columns) == 3
+        assert np.isnan(comparison.columns[-1]).all() == (comparison.result.axis is YAW)
+    page = report_page(results)
+    assert f"“compared” is {heavy.name}" in " ".join(page.split())
+    of_yaw = [row for row in rows(page) if "steady_yaw" in row[-1]]
+    assert of_yaw
+    assert all(row[-3:-1] == ["–", "–"] for row in of_yaw)
 
 
 def test_recordings_are_drawn_and_their_holds_listed(of_recordings: Identification, pages: Mapping[int, str]) -> None:

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cache
 from itertools import product
@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 
 from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.published import STEP_TESTS, Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -327,6 +328,13 @@ def test_command_prints_the_tables_side_by_side(tables: Mapping[str, ResponseTab
             for word, deviation in ((words[4], cells[0].from_printed), (words[9], cells[1].from_measured)):
                 assert word.rstrip("*") == ("-" if deviation is None else f"{deviation:+.1%}")
         assert next(lines, None) is None
+
+
+def test_tables_are_of_the_axes_of_the_paper(vehicle: Vehicle) -> None:
+    axes = tuple(form for form in vehicle.layout.axes if form.axis.name != "heave")
+    rov = Rov(replace(vehicle.layout, axes=axes), vehicle.rov.coefficients)
+    with pytest.raises(DataFileError, match="VideoRay Pro 4: Tables 6-8 are of surge, heave and yaw, it has no heave"):
+        load_tables(replace(vehicle, rov=rov))
 
 
 def test_vehicle_without_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
