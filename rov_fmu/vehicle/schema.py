@@ -84,7 +84,7 @@ _FARTHEST = 100.0  # m, from the centre of mass
 
 
 def _vector(vector: object) -> object:
-    if isinstance(vector, list) and len(vector) != 3:
+    if not isinstance(vector, list) or len(vector) != 3:
         raise ValueError("must be three numbers: forward, starboard, down")
     return pair(vector)
 

@@ -46,8 +46,8 @@ def nonsense(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     if lost & {"thruster", "axes", "inputs"} or not parts.axis_tables:
         return
     layout = parts.layout
-    yield from _places(parts, layout)
-    yield from _geometry(layout)
+    placed = [*_places(parts, layout)]
+    yield from placed or _geometry(layout)
     coupled = [*_coupling(parts, layout)]
     yield from coupled
     if not (named or coupled or lost & {"curves", "arm", "body"}):
@@ -104,7 +104,7 @@ def _keys(parts: Parts, lost: set[str]) -> Iterator[str]:
     if not parts.axis_tables:
         yield _line("axes", "must have at least one of surge, sway, heave, yaw")
     if parts.body:
-        yield from _needed("body", parts.body, BODY, {axis.inertia: axis for axis in parts.axis_tables})
+        yield from _needed("body", parts.body, BODY, {axis.inertia: axis for axis in reversed(parts.axis_tables)})
     if "thruster" not in lost and "arm" not in lost:
         turned = {key: YAW for key in ARM if parts.layout.has_arm}
         if parts.arm:
@@ -155,22 +155,26 @@ def _geometry(layout: Layout) -> Iterator[str]:
         if not any(thruster in layout.drivers(axis) for axis in axes):
             reason = f"acts on no axis of the vehicle, which are {_listed([axis.name for axis in axes])}"
             yield _line(f"thruster.{thruster.name}", reason)
-    free: list[list[float]] = []
+    free: list[tuple[str, list[float]]] = []  # axes that can be driven apart, as orthonormal rows of effects
     for axis in axes:
         if not layout.drivers(axis):
             reason = "no thruster has an arm about the vertical axis" if axis is YAW else "no thruster drives it"
             yield _line(f"axes.{axis.name}", reason)
             continue
         left = _unit([thruster.effect(axis) for thruster in layout.thrusters])
-        for other in free:
+        together = []
+        for name, other in free:
             along = sum(a * b for a, b in zip(left, other, strict=True))
             left = [a - along * b for a, b in zip(left, other, strict=True)]
+            together += [name] if abs(along) > _PARALLEL else []
         if hypot(*left) > _PARALLEL:
-            free.append(_unit(left))
+            free.append((axis.name, _unit(left)))
             if not layout.signs(axis):
                 yield _line(f"axes.{axis.name}", "no input drives it: the gains cancel")
         else:
-            yield _line(f"axes.{axis.name}", "the thrusters cancel: none moves it without moving the axes before it")
+            yield _line(
+                f"axes.{axis.name}", f"the thrusters cancel: they drive it only together with {_listed(together)}"
+            )
     for name in layout.mix:
         if not any(f"u_{name}" in layout.signs(axis) for axis in axes):
             yield _line(f"inputs.{name}", "drives no axis of the vehicle: the gains are 0 or cancel")
@@ -203,7 +207,7 @@ def _coincidences(layout: Layout) -> Iterator[str]:
     """Two variables of the FMU with one name."""
     names = [*layout.inputs, *layout.state, *layout.thrust, *(name for name, _ in where(layout))]
     for name in (name for name, count in Counter(names).items() if count > 1):
-        yield _line("curves and thruster", f"their names make {name} stand for two variables of the FMU; rename one")
+        yield _line(name, "two variables of the FMU would have this name; rename a curve or a thruster")
 
 
 def _alternatives(parts: Parts, layout: Layout) -> Iterator[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.motion.rov import COEFFICIENTS, Coefficients
+from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
@@ -16,21 +16,26 @@ from tests.commands import ALONE
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 
 # Stated again as an independent witness of the vehicle file.
-TABLE_9 = Coefficients(
-    m_rov=6.57, I_r=0.105, R=0.22, gamma=0.423,
-    a_t_rear=42.9, b_t_rear=2.711, a_t_top=6.494, b_t_top=0.0513,
-    a_d_u=3.159, b_d_u=9.379, a_d_w=18.72, b_d_w=0.6324, a_d_r=0.1246, b_d_r=0.103,
-    alpha_u=1.1, beta_u=1.0, alpha_w=1.14, beta_w=0.59, alpha_r=1.2, beta_r=0.12,
-)  # fmt: skip
+TABLE_9 = {
+    "m_rov": 6.57, "I_r": 0.105, "R": 0.22, "gamma": 0.423,
+    "a_t_rear": 42.9, "b_t_rear": 2.711, "a_t_top": 6.494, "b_t_top": 0.0513,
+    "a_d_u": 3.159, "b_d_u": 9.379, "a_d_w": 18.72, "b_d_w": 0.6324, "a_d_r": 0.1246, "b_d_r": 0.103,
+    "alpha_u": 1.1, "beta_u": 1.0, "alpha_w": 1.14, "beta_w": 0.59, "alpha_r": 1.2, "beta_r": 0.12,
+}  # fmt: skip
 
 
 def test_videoray_holds_table_9(vehicle: Vehicle) -> None:
-    assert vehicle.coefficients == TABLE_9
+    assert vehicle.rov.coefficients == TABLE_9
+
+
+def test_videoray_has_the_layout_of_the_paper(vehicle: Vehicle) -> None:
+    assert vehicle.layout == PAPER
 
 
 def test_every_coefficient_names_its_equation_or_table(vehicle: Vehicle) -> None:
-    assert set(vehicle.sources) == set(COEFFICIENTS)
+    assert set(vehicle.sources) == set(TABLE_9)
     assert all("Table 9" in source for source in vehicle.sources.values())
+    assert {name: list(words) for name, words in vehicle.thruster_sources.items()} == {n: ["direction"] for n in "lrt"}
 
 
 def test_videoray_keeps_the_unweighted_thrust_curve_beside(vehicle: Vehicle) -> None:
@@ -47,64 +52,64 @@ def test_optional_parts_may_be_absent(tmp_path: Path) -> None:
     vehicle = load_vehicle(path)
     assert vehicle.data is None
     assert vehicle.alternatives == {}
-    assert vehicle.coefficients == TABLE_9
+    assert vehicle.rov.coefficients == TABLE_9
 
 
 def edit(pattern: str, replacement: str) -> Callable[[str], str]:
-    """A change to the text of the VideoRay's file: the one line that matches."""
+    """A change to the text of the VideoRay's file: the first line that matches."""
 
     def change(text: str) -> str:
-        changed, count = re.subn(pattern, lambda _: replacement, text, flags=re.MULTILINE)
-        assert count == 1, f"{pattern} matches {count} times"
+        changed, count = re.subn(pattern, lambda _: replacement, text, count=1, flags=re.MULTILINE)
+        assert count == 1, f"nothing matches {pattern}"
         return changed
 
     return change
 
 
 def value(name: str, text: str) -> Callable[[str], str]:
-    """Another value of a coefficient."""
-    return edit(rf"(?<=^{name} = {{ value = )[^,]*(?=, .*Table 9)", text)
+    """Another value of a coefficient, of the first one with this key."""
+    return edit(rf"(?<=^{name} = {{ value = )[^,]*", text)
 
 
 # What is done to the file, and all that the one line must name: key, value, what is allowed.
 BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "unknown coefficient": (
         edit(r"(?=^R = )", 'mass = { value = 6.57, unit = "kg", source = "" }\n'),
-        ("coefficients.mass", "no such key"),
+        ("arm.mass", "no such key"),
     ),
     "unknown key of a coefficient": (
         edit(r'(?<=^R = { value = 0.22, )unit = "m"', 'unit = "m", error = 0.01'),
-        ("coefficients.R.error", "no such key"),
+        ("arm.R.error", "no such key"),
     ),
     "unknown section": (lambda text: text + "\n[thrusters]\n", ("thrusters", "no such key")),
-    "missing coefficient": (edit(r"^m_rov = .*$", ""), ("coefficients.m_rov", "missing")),
-    "missing value": (edit(r"(?<=^R = { )value = 0.22, ", ""), ("coefficients.R.value", "missing")),
-    "missing unit": (edit(r'(?<=^R = { value = 0.22, )unit = "m", ', ""), ("coefficients.R.unit", "missing")),
+    "missing coefficient": (edit(r"^m_rov = .*$", ""), ("body.m_rov", "missing")),
+    "missing value": (edit(r"(?<=^R = { )value = 0.22, ", ""), ("arm.R.value", "missing")),
+    "missing unit": (edit(r'(?<=^R = { value = 0.22, )unit = "m", ', ""), ("arm.R.unit", "missing")),
     "missing source": (edit(r'(?<=^R = { value = 0.22, unit = "m"), source = .*(?= })', ""), ("R.source", "missing")),
     "missing section": (
-        lambda text: text.split("[validity]")[0] + "[coefficients]" + text.split("[coefficients]")[1],
+        lambda text: text.split("[validity]")[0] + "[body]" + text.split("[body]")[1],
         ("validity", "missing"),
     ),
     "missing name": (edit(r"^name = .*$", ""), ("vehicle.name", "missing")),
-    "number without unit and source": (edit(r"^R = .*$", "R = 0.22"), ("coefficients.R", "0.22")),
+    "number without unit and source": (edit(r"^R = .*$", "R = 0.22"), ("arm.R", "0.22")),
     "empty source": (edit(r'(?<=^R = { value = 0.22, unit = "m", source = )".*"', '""'), ("R.source", "''")),
     "empty name": (edit(r"^name = .*$", 'name = ""'), ("vehicle.name", "''")),
-    "text for a number": (value("m_rov", '"heavy"'), ("coefficients.m_rov.value", "'heavy'", "number")),
-    "number in quotes": (value("m_rov", '"6.57"'), ("coefficients.m_rov.value", "'6.57'", "number")),
-    "boolean for a number": (value("m_rov", "true"), ("coefficients.m_rov.value", "True", "number")),
-    "list for a number": (value("m_rov", "[6.57]"), ("coefficients.m_rov.value", "[6.57]", "number")),
-    "date for a number": (value("m_rov", "2018-07-21"), ("coefficients.m_rov.value", "2018", "number")),
+    "text for a number": (value("m_rov", '"heavy"'), ("body.m_rov.value", "'heavy'", "number")),
+    "number in quotes": (value("m_rov", '"6.57"'), ("body.m_rov.value", "'6.57'", "number")),
+    "boolean for a number": (value("m_rov", "true"), ("body.m_rov.value", "True", "number")),
+    "list for a number": (value("m_rov", "[6.57]"), ("body.m_rov.value", "[6.57]", "number")),
+    "date for a number": (value("m_rov", "2018-07-21"), ("body.m_rov.value", "2018", "number")),
     "number for a text": (edit(r"^name = .*$", "name = 4"), ("vehicle.name", "4", "string")),
-    "negative mass": (value("m_rov", "-6.57"), ("coefficients.m_rov", "-6.57", "0.001")),
-    "no mass": (value("m_rov", "0.0"), ("coefficients.m_rov", "0.0", "0.001")),
-    "negative drag": (value("a_d_w", "-18.72"), ("coefficients.a_d_w", "-18.72", "0 ...")),
-    "gamma in degrees": (value("gamma", "24.2"), ("coefficients.gamma", "24.2", "1.57")),
-    "NaN": (value("m_rov", "nan"), ("coefficients.m_rov.value", "nan", "finite")),
-    "infinity": (value("b_t_top", "inf"), ("coefficients.b_t_top.value", "inf", "finite")),
-    "negative infinity": (value("b_t_top", "-inf"), ("coefficients.b_t_top.value", "-inf", "finite")),
-    "larger than a double": (value("b_t_top", "1e999"), ("coefficients.b_t_top.value", "inf", "finite")),
-    "integer larger than a double": (value("b_t_top", "1" + 400 * "0"), ("coefficients.b_t_top",)),
-    "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), ("coefficients.m_rov", "'lb'", "'kg'")),
+    "negative mass": (value("m_rov", "-6.57"), ("body.m_rov", "-6.57", "0.001")),
+    "no mass": (value("m_rov", "0.0"), ("body.m_rov", "0.0", "0.001")),
+    "negative drag": (value("a_d", "-3.159"), ("axes.surge.a_d.value", "-3.159", "0 ...", "N.s2/m2")),
+    "gamma in degrees": (value("gamma", "24.2"), ("arm.gamma", "24.2", "1.57")),
+    "NaN": (value("m_rov", "nan"), ("body.m_rov.value", "nan", "finite")),
+    "infinity": (value("b_t", "inf"), ("curves.rear.b_t.value", "inf", "finite")),
+    "negative infinity": (value("b_t", "-inf"), ("curves.rear.b_t.value", "-inf", "finite")),
+    "larger than a double": (value("b_t", "1e999"), ("curves.rear.b_t.value", "inf", "finite")),
+    "integer larger than a double": (value("b_t", "1" + 400 * "0"), ("curves.rear.b_t",)),
+    "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), ("body.m_rov", "'lb'", "'kg'")),
     "bad alternative": (
         edit(r"(?<=^a_t_rear = { value = )100.3", "nan"),
         ("alternatives.unweighted_rear_thrust.a_t_rear.value", "nan"),
@@ -125,9 +130,14 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "an endless number": (value("m_rov", "1" * 5000), ("not TOML",)),
     "a key over two lines": (lambda text: text + '\n["two\\nlines"]\n', ("two\\nlines", "no such key")),
     "missing folder": (edit(r"^data = .*$", 'data = "nowhere"'), ("vehicle.data", "'nowhere'", "no such folder")),
-    "not TOML": (edit(r"^\[coefficients\]$", "[coefficients"), ("not TOML", "line ")),
+    "not TOML": (edit(r"^\[body\]$", "[body"), ("not TOML", "line ")),
     "a key twice": (edit(r"(?=^R = )", "R = 1.0\n"), ("not TOML", "line ")),
-    "half a file": (lambda text: text.split("[coefficients]")[0], ("coefficients", "missing")),
+    "another format": (edit("^format = 2$", "format = 3"), ("format = 3", "must be 2")),
+    "no format": (edit("^format = 2$", ""), ("format", "missing")),
+    "half a file of the first version": (
+        lambda text: text.split("[body]")[0].replace("format = 2", ""),
+        ("coefficients", "missing"),
+    ),
 }
 
 
@@ -142,16 +152,17 @@ def bad_file(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, tupl
 
 
 def test_every_mistake_of_a_file_is_told(tmp_path: Path) -> None:
+    """Those of form and those of sense, in one go."""
     path = tmp_path / "bad.toml"
     text = ALONE.replace("m_rov = { value = 6.57", "m_rov = { value = -1.0").replace('"kg.m2"', '"lb"')
     text = text.replace("command_min = 0.2", "command_min = 20").replace("R = {", "radius = {")
-    text = text.replace("[vehicle]", '[vehicle]\ndata = "nowhere"')
+    text = text.replace("[vehicle]", '[vehicle]\ndata = "nowhere"').replace('curve = "top"', 'curve = "bottom"')
     path.write_text(text, encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
         load_vehicle(path)
     lines = str(caught.value).splitlines()
-    wrong = ("vehicle.data = 'nowhere'", "validity.command_min = 20", "coefficients.m_rov.value = -1.0",
-             "coefficients.I_r.unit = 'lb'", "coefficients.R", "coefficients.radius")  # fmt: skip
+    wrong = ("vehicle.data = 'nowhere'", "validity.command_min = 20", "body.m_rov.value = -1.0", "body.I_r.unit = 'lb'",
+             "arm.R: ", "arm.radius", "thruster.t.curve = 'bottom'", "curves.top: no thruster")  # fmt: skip
     assert len(lines) == len(wrong)
     for line, words in zip(lines, wrong, strict=True):
         assert line.startswith(f"{path}: {words}")
@@ -228,9 +239,7 @@ def test_folder_for_a_file(tmp_path: Path) -> None:
 
 def test_not_utf_8(tmp_path: Path) -> None:
     path = tmp_path / "latin.toml"
-    path.write_bytes(
-        TEXT.split("[coefficients]")[0].replace("VideoRay Pro 4", "Röv", 1).replace("β", "b").encode("latin-1")
-    )
+    path.write_bytes(TEXT.split("[body]")[0].replace("VideoRay Pro 4", "Röv", 1).replace("β", "b").encode("latin-1"))
     with pytest.raises(VehicleFileError) as caught:
         load_vehicle(path)
     check_line(str(caught.value), path, ("UTF-8", f"byte {path.read_bytes().index(0xF6)}"))

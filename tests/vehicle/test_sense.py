@@ -1,0 +1,248 @@
+"""What makes no sense as a vehicle: a line for each mistake, with key, value and what is allowed."""
+
+import re
+from math import isclose, sqrt
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomlkit
+
+from rov_fmu.motion.layout import AXIS, CURVE, HEAVE, SURGE, SWAY, YAW
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+
+EVERYTHING = Path(__file__).with_name("everything.toml")
+TEXT = EVERYTHING.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def everything() -> Vehicle:
+    return load_vehicle(EVERYTHING)
+
+
+# ---- A vehicle with every key ----------------------------------------------------------------------------------------
+
+
+def test_it_has_every_key_that_there_is() -> None:
+    for key in (*CURVE, *AXIS, "alpha", "beta", "R", "gamma", "m_rov", "I_r", "coupling"):
+        assert re.search(rf"^{key} = ", TEXT, re.M), key
+
+
+def test_what_it_says_is_what_the_vehicle_has(everything: Vehicle) -> None:
+    layout, rov = everything.layout, everything.rov
+    assert [form.axis for form in layout.axes] == [SURGE, SWAY, HEAVE, YAW]
+    assert layout.coupled
+    assert layout.kinds["heave"].keys == ("m_a", "a_d", "b_d", "a_d_reverse", "b_d_reverse", "F_0")
+    frame, boost = layout.curves
+    assert (frame.name, frame.description, frame.equation, frame.together) == (
+        "frame", "thrusters of the frame", "the maker's table", 1)  # fmt: skip
+    assert (boost.keys, boost.description, boost.equation, boost.together) == (("a_t", "b_t"), "", "(2)", 2)
+    assert set(frame.keys) == set(CURVE)
+    assert (rov["F_0_w"], rov["a_d_w"], rov["a_d_w_reverse"], rov["T_frame"]) == (-1.0, 190.0, 210.0, 0.15)
+    assert (rov["alpha_u"], rov["beta_u"], rov["alpha_r"], rov["beta_r"]) == (1.0, 1.0, 0.9, 0.8)
+    assert set(rov.coefficients) == set(layout.coefficients) == set(everything.sources)
+    assert list(layout.mix) == ["surge", "sway", "yaw", "heave", "boost"]
+    assert everything.intervals == {"m_rov": (13.0, 14.0)}
+    assert everything.thruster_sources["1"] == {"direction": "A", "position": "A"}
+
+
+def test_a_direction_of_any_length_is_a_unit_vector(everything: Vehicle) -> None:
+    first, left = everything.layout.thrusters[0], everything.layout.thrusters[-2]
+    assert all(isclose(part, exact) for part, exact in zip(first.direction, (sqrt(0.5), -sqrt(0.5), 0.0), strict=True))
+    assert left.direction == (1.0, 0.0, 0.0)
+    assert (left.arm, left.position) == (1, None)
+
+
+def test_a_vectored_thruster_turns_by_its_lever(everything: Vehicle) -> None:
+    """Starboard bow, pushing ahead and to port: the bow goes to port, by the distance of its line from the centre."""
+    assert isclose(everything.layout.thrusters[0].effect(YAW), -(0.156 + 0.111) * sqrt(0.5))
+
+
+# ---- Nonsense --------------------------------------------------------------------------------------------------------
+
+
+GONE = object()
+"""In place of a value: the key is not there."""
+
+
+def changed(changes: dict[str, Any]) -> str:
+    """The file with other values at some keys; a thruster is found by its name."""
+    data: Any = tomlkit.parse(TEXT).unwrap()
+    for place, value in changes.items():
+        *above, key = place.split(".")
+        table = data
+        for step in above:
+            table = table[step] if isinstance(table, dict) else next(t for t in table if t.get("name") == step)
+        if isinstance(table, list):
+            table[:] = [thruster for thruster in table if thruster["name"] != key]
+        elif value is GONE:
+            del table[key]
+        else:
+            table[key] = value
+    return tomlkit.dumps(data)
+
+
+def quantity(value: float, unit: str) -> dict[str, Any]:
+    """A value with its unit and a source."""
+    return {"value": value, "unit": unit, "source": "x"}
+
+
+def place(*value: float) -> dict[str, Any]:
+    """Of a thruster."""
+    return {"value": [*value], "unit": "m", "source": "x"}
+
+
+_CURVE = {"a_t": quantity(1.0, "N"), "b_t": quantity(1.0, "N")}
+_ALONE: dict[str, Any] = {"inputs": GONE, "alternatives": GONE, "body.coupling": GONE}
+"""Without what names the parts of a vehicle a second time."""
+_NO_BOOST: dict[str, Any] = {**_ALONE, "thruster.l": GONE, "thruster.r": GONE, "curves.boost": GONE, "arm": GONE}
+
+
+# What is done to the file, and what each of the lines must name, in their order.
+NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
+    # names
+    "a name twice": ({**_ALONE, "thruster.2.name": "1"}, [("thruster.1.name = '1'", "more than one thruster")]),
+    "a name with a space": ({**_ALONE, "thruster.5.name": "top 5"}, [
+        ("thruster.top 5.name = 'top 5'", "at most 30 letters, digits and underscores")]),
+    "no name": ({**_ALONE, "thruster.5.name": GONE}, [("thruster#5.name", "missing")]),
+    "a curve with a dot": ({"curves": {"frame": _CURVE, "boo.st": _CURVE}, "alternatives": GONE}, [
+        ("curves.boo.st = 'boo.st'", "letters, digits"), ("thruster.l.curve = 'boost'", "no such curve, only frame"),
+        ("thruster.r.curve = 'boost'", "no such curve")]),
+    "an unknown curve": ({"thruster.5.curve": "T200"}, [
+        ("thruster.5.curve = 'T200'", "no such curve, only frame, boost")]),
+    "a curve of no thruster": ({"curves.spare": _CURVE}, [("curves.spare: no thruster has this curve",)]),
+    "no curves": ({"curves": {}}, [("curves = {}", "at least 1")]),
+    "no thrusters": ({"thruster": []}, [("thruster = []", "at least 1")]),
+    "coefficients that coincide": ({"curves.frame_reverse": _CURVE, "thruster.5.curve": "frame_reverse"}, [
+        ("a_t_frame_reverse", "two variables"), ("b_t_frame_reverse", "two variables")]),
+    "a force called as a load": ({**_ALONE, "thruster.5.name": "0_w"}, [("F_0_w", "two variables of the FMU")]),
+    # keys that need others, or have no use
+    "half a curve in reverse": ({"curves.frame.b_t_reverse": GONE}, [
+        ("curves.frame.b_t_reverse", "missing", "a_t_reverse is there")]),
+    "half a drag in reverse": ({"axes.heave.a_d_reverse": GONE}, [
+        ("axes.heave.a_d_reverse", "missing", "b_d_reverse is there")]),
+    "a dead band in reverse only": ({"curves.frame.c_0": GONE}, [("curves.frame.c_0", "missing", "c_0_reverse")]),
+    "no drag": ({"axes.sway.b_d": GONE}, [("axes.sway.b_d", "missing")]),
+    "no mass": ({"body.m_rov": GONE}, [("body.m_rov", "missing", "surge")]),
+    "no moment of inertia": ({"body.I_r": GONE}, [("body.I_r", "missing", "yaw")]),
+    "an inertia for nothing": ({**_NO_BOOST, "axes.yaw": GONE}, [("body.I_r", "nothing of this vehicle needs it")]),
+    "no arm": ({"arm": GONE}, [("arm", "R and gamma", "missing", "a thruster says arm")]),
+    "half an arm": ({"arm.gamma": GONE}, [("arm.gamma", "missing")]),
+    "an arm for nothing": ({f"thruster.{n}.{key}": v for n in "lr" for key, v in
+                            (("arm", GONE), ("position", place(0.0, 0.1, 0.0)))}, [
+        ("arm.R", "nothing of this vehicle needs it"), ("arm.gamma", "nothing of this vehicle needs it")]),
+    "an arm of no length": ({"arm.R.value": 0.0}, [("arm.R.value = 0.0", "more than 0")]),
+    "two places": ({"thruster.l.position": place(0.0, 0.1, 0.0)}, [
+        ("thruster.l.arm", "must not stand beside position")]),
+    "an arm of a thruster astern": ({"thruster.l.direction.value": [-1.0, 0.0, 0.0]}, [
+        ("thruster.l.arm", "pushes ahead", "position instead")]),
+    "an arm on top": ({"thruster.l.arm": "top"}, [("thruster.l.arm = 'top'", "'port' or 'starboard'")]),
+    "no place": ({"thruster.1.position": GONE}, [("thruster.1.position", "or arm", "missing", "yaw")]),
+    # numbers
+    "a place beyond any vehicle": ({"thruster.1.position.value": [156, 111, 0.0]}, [
+        ("thruster.1.position.value = [156, 111, 0.0]", "-100 ... 100 m")]),
+    "a place on a plane": ({"thruster.1.position.value": [0.156, 0.111]}, [
+        ("thruster.1.position.value = [0.156, 0.111]", "three numbers")]),
+    "a place in millimetres": ({"thruster.1.position.unit": "mm"}, [("thruster.1.position.unit = 'mm'", "'m'")]),
+    "a direction of no length": ({"thruster.5.direction.value": [0, 0, 0]}, [
+        ("thruster.5.direction.value = [0, 0, 0]", "must have a length")]),
+    "a direction that is no number": ({"thruster.5.direction.value": [0.0, 0.0, float("nan")]}, [
+        ("thruster.5.direction.value", "nan", "finite")]),
+    "a direction in words": ({"thruster.5.direction.value": "up"}, [
+        ("thruster.5.direction.value = 'up'", "three numbers")]),
+    "no thrusters together": ({"curves.boost.together": 0}, [
+        ("curves.boost.together = 0", "greater than or equal to 1")]),
+    "half a thruster": ({"curves.boost.together": 1.5}, [("curves.boost.together = 1.5", "integer")]),
+    "a dead band in percent": ({"curves.frame.c_0.value": 8.7}, [("curves.frame.c_0.value = 8.7", "0 ... 0.9")]),
+    "no lag": ({"curves.frame.T.value": 0.0}, [("curves.frame.T.value = 0.0", "0.001 ... 60 s")]),
+    "drag in another unit": ({"axes.yaw.a_d.unit": "N.s2/m2"}, [
+        ("axes.yaw.a_d.unit = 'N.s2/m2'", "'N.m.s2/rad2'")]),
+    "an unknown axis": ({"axes.roll": {"a_d": quantity(1.0, "N.m.s2/rad2")}}, [("axes.roll", "no such key")]),
+    "a gain beyond sense": ({"inputs.heave.5": 1e3}, [("inputs.heave.5 = 1000.0", "less than or equal to 100")]),
+    # geometry
+    "no axes": ({**_NO_BOOST, "axes": {}}, [
+        ("axes", "at least one of surge, sway, heave, yaw"), ("body.m_rov", "nothing"), ("body.I_r", "nothing")]),
+    "an axis that no thruster drives": ({**_ALONE, "thruster.5.direction.value": [1, 0, 0],
+                                         "thruster.5.position": place(0.0, 0.0, 0.0)}, [
+        ("axes.heave", "no thruster drives it")]),
+    "a thruster that drives no axis": ({**_ALONE, "axes.heave": GONE}, [
+        ("thruster.5", "acts on no axis of the vehicle, which are surge, sway, yaw")]),
+    "a yaw without an arm": ({**_NO_BOOST, **{f"thruster.{n}.position.value": [0, 0, 0] for n in "1234"}}, [
+        ("axes.yaw", "no thruster has an arm about the vertical axis")]),
+    "thrusters that cancel": ({**_NO_BOOST, **{f"thruster.{n}.position.value": [x, 0.0, 0.0] for n, x in
+                               (("1", 1), ("2", 1), ("3", 1), ("4", 1))}}, [
+        ("axes.yaw", "the thrusters cancel", "sway")]),
+    "surge and sway in one": ({**_NO_BOOST, **{f"thruster.{n}.direction.value": [1, 1, 0] for n in "1234"}}, [
+        ("axes.sway", "the thrusters cancel", "surge")]),
+    # coupling
+    "coupling without sway": ({**_NO_BOOST, "body.coupling": True, "axes.sway": GONE}, [
+        ("body.coupling = True", "needs surge, sway and yaw; there is no sway")]),
+    "coupling in heave": ({**_NO_BOOST, "body.coupling": True, "axes.sway": GONE, "axes.yaw": GONE, "body.I_r": GONE}, [
+        ("body.coupling = True", "no sway and no yaw")]),
+    "coupling of an endless inertia": ({"axes.yaw.beta.value": 0.0}, [("axes.yaw.beta.value = 0.0", "at least 0.001")]),
+    # inputs
+    "an input for a thruster that is not there": ({"inputs.heave.6": 1.0}, [
+        ("inputs.heave.6", "no such thruster, only 1, 2, 3, 4, 5, l, r")]),
+    "a thruster no input drives": ({"inputs.boost.r": 0.0}, [("inputs", "no input drives the thruster r")]),
+    "an input that drives nothing": ({"inputs.idle": {"5": 0.0}}, [("inputs.idle", "drives no axis")]),
+    "an input whose thrusters cancel": ({"inputs.spin": {"1": 1.0, "2": 1.0, "3": 1.0, "4": 1.0}}, [
+        ("inputs.spin", "drives no axis", "cancel")]),
+    "an axis no input drives": ({"inputs.yaw": GONE}, [("axes.yaw", "no input drives it")]),
+    # alternatives
+    "an alternative for what is not there": ({"alternatives.other.a_d_p": quantity(1.0, "N")}, [
+        ("alternatives.other.a_d_p", "no such coefficient of this vehicle")]),
+    "an alternative out of bounds": ({"alternatives.other.a_d_u.value": -1.0}, [
+        ("alternatives.other.a_d_u.value = -1.0", "0 ... 1000000 N.s2/m2")]),
+    "an alternative in another unit": ({"alternatives.other.a_d_u.unit": "N"}, [
+        ("alternatives.other.a_d_u.unit = 'N'", "'N.s2/m2'")]),
+    "an alternative without a description": ({"alternatives.other.description": GONE}, [
+        ("alternatives.other.description", "missing")]),
+    # several at once, of form and of sense
+    "many": ({"validity.command_max": 7.0, "curves.frame.b_t_reverse": GONE, "thruster.5.curve": "T200",
+              "axes.yaw.beta.value": 0.0, "inputs.idle": {"5": 0.0}, "alternatives.other.a_d_u.unit": "lb"}, [
+        ("validity.command_max",), ("thruster.5.curve",), ("curves.frame.b_t_reverse",), ("inputs.idle",),
+        ("axes.yaw.beta",)]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", NONSENSE)
+def test_nonsense_is_one_clear_line_a_mistake(case: str, tmp_path: Path) -> None:
+    changes, wanted = NONSENSE[case]
+    path = tmp_path / "rov.toml"
+    path.write_text(changed(changes), encoding="utf-8")
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == len(wanted), lines
+    for line, words in zip(lines, wanted, strict=True):
+        assert line.startswith(f"{path}: {words[0]}")
+        for word in words:
+            assert word in line
+
+
+# ---- What does make sense --------------------------------------------------------------------------------------------
+
+SENSE: dict[str, dict[str, Any]] = {
+    "as it is": {},
+    "an input for each thruster": {"inputs": GONE},
+    "without coupling": {"body.coupling": GONE},
+    "without boosters": _NO_BOOST,
+    "an axis that does not accelerate by itself": {"axes.heave.beta": quantity(0.0, "1")},
+    "a dead band for both directions": {"curves.frame.c_0_reverse": GONE},
+    "without yaw": {**_NO_BOOST, "axes.yaw": GONE, "body.I_r": GONE},
+    "only yaw": {**_NO_BOOST, "axes.surge": GONE, "axes.sway": GONE, "axes.heave": GONE, "body.m_rov": GONE,
+                 "thruster.5": GONE},
+    "only heave": {**_NO_BOOST, "axes.surge": GONE, "axes.sway": GONE, "axes.yaw": GONE, "body.I_r": GONE,
+                   **{f"thruster.{n}": GONE for n in "1234"}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SENSE)
+def test_a_vehicle_has_what_it_says_and_no_more(case: str, tmp_path: Path) -> None:
+    path = tmp_path / "rov.toml"
+    path.write_text(changed(SENSE[case]), encoding="utf-8")
+    vehicle = load_vehicle(path)
+    start = dict.fromkeys(vehicle.layout.state, 0.0)
+    moved = vehicle.rov.step(dict.fromkeys(vehicle.layout.inputs, 0.3), start, 0.01)
+    assert list(moved) == list(start)
+    assert any(moved.values())
