@@ -1,5 +1,6 @@
 """TOML files checked against the form that they must have; a line for every mistake."""
 
+import re
 import sys
 from pathlib import Path
 from typing import Any, TypeVar
@@ -62,6 +63,9 @@ def beside(name: str, info: ValidationInfo) -> Path:
     return Path((info.context or {})["folder"], name)
 
 
+_OF_WHAT = re.compile("^(Input|String|List|Tuple|Dictionary) should ")
+
+
 def told(problem: ErrorDetails, data: Toml) -> str:
     """A problem of the file in one line: key, value, what is allowed."""
     key = brief(_key(problem["loc"], data))
@@ -72,7 +76,8 @@ def told(problem: ErrorDetails, data: Toml) -> str:
             return f"{key}: there is no such key"
         case "model_type":
             return f"{key} = {shown(problem['input'])}: must be a table of keys and values"
-    reason = problem["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+    reason = _OF_WHAT.sub("must ", problem["msg"].removeprefix("Value error, ")).replace(" after validation", "")
+    reason = reason.replace("a valid tuple", "a list")
     of_table = problem["type"] == "value_error" and isinstance(problem["input"], dict)
     return f"{key}: {reason}" if of_table else f"{key} = {shown(problem['input'])}: {reason}"
 
@@ -87,9 +92,6 @@ def _key(place: tuple[int | str, ...], data: Any) -> str:
             data = data[step]
         except (LookupError, TypeError):
             data = None
-        if isinstance(step, int) and isinstance(data, dict):
-            name = data.get("name")
-            words += f".{name}" if isinstance(name, str) else f"#{step + 1}"
-        else:
-            words += f".{step}"
+        name = data.get("name") if isinstance(step, int) and isinstance(data, dict) else step
+        words += f".{name}" if isinstance(name, str) else f"#{int(step) + 1}"
     return words.removeprefix(".")

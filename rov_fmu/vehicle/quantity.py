@@ -57,7 +57,8 @@ class Quantity(Strict):
 def within(value: float, meta: Meta) -> float:
     """The value, if it is within the bounds of its coefficient."""
     if not meta.minimum <= value <= meta.maximum:
-        raise ValueError(f"must be within {meta.minimum:g} ... {meta.maximum:.12g} {meta.unit}")
+        unit = "" if meta.unit == "1" else f" {meta.unit}"
+        raise ValueError(f"must be within {meta.minimum:g} ... {meta.maximum:.12g}{unit}")
     return value
 
 

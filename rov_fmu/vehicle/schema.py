@@ -21,7 +21,9 @@ MOST = 32
 """Thrusters, curves, inputs: more than any vehicle has."""
 
 
-def _coefficients(name: str, metas: Mapping[str, Meta], kinds: Mapping[str, Kind] | None = None) -> Any:
+def _coefficients(
+    name: str, metas: Mapping[str, Meta], kinds: Mapping[str, Kind] | None = None, words: str = ""
+) -> Any:
     """A table with a coefficient a key; those are needed that are needed by their kind, if these are given."""
     fields: dict[str, Any] = {}
     for key, meta in metas.items():
@@ -30,7 +32,7 @@ def _coefficients(name: str, metas: Mapping[str, Meta], kinds: Mapping[str, Kind
             fields[key] = (form, Field(description=meta.description))
         else:
             fields[key] = (form | None, Field(None, description=meta.description))
-    return create_model(f"_{name}", __base__=Strict, **fields)
+    return create_model(f"_{name}", __base__=Strict, __doc__=words, **fields)
 
 
 def given(table: Strict, kinds: Mapping[str, Kind]) -> dict[str, Quantity]:
@@ -67,8 +69,9 @@ class Curve(_coefficients("Curve", _CURVE, CURVE)):  # type: ignore[misc]
     """How many thrusters gave the force together when the curve was measured."""
 
 
+_WORDS = "Velocity {0.velocity} in {0.unit}, positive {0.positive}."
 _axes: dict[str, Any] = {
-    axis.name: (_coefficients(axis.name.capitalize(), layout.metas_of(axis), AXIS) | None, None)
+    axis.name: (_coefficients(axis.name.capitalize(), layout.metas_of(axis), AXIS, _WORDS.format(axis)) | None, None)
     for axis in AXES.values()
 }
 
@@ -193,6 +196,7 @@ class Parts(Strict):
     inputs: dict[Symbol, dict[str, _Gain]] = Field(default={}, max_length=MOST)
     """Where one command drives several thrusters: name of the command to the thrusters that it drives, with gains."""
     alternatives: dict[str, Alternative] = Field(default={})
+    """Coefficients published beside the ones used, under a name each."""
     provenance: Made | None = None
 
     @property
@@ -223,6 +227,7 @@ class File(Parts):
     curves: dict[Symbol, Curve] = Field(min_length=1, max_length=MOST)
     """By name, which stands in the names of their coefficients: a_t_<name>."""
     thruster: list[Thruster] = Field(min_length=1, max_length=MOST)
+    """The thrusters, a table [[thruster]] each, in the order of their variables in the FMU."""
     axes: Axes
 
 

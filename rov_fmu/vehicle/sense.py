@@ -191,7 +191,7 @@ def _coupling(parts: Parts, layout: Layout) -> Iterator[str]:
         return
     coupled = (SURGE, SWAY, YAW)
     if missing := [axis.name for axis in coupled if not layout.has(axis)]:
-        yield _line("body.coupling", f"needs surge, sway and yaw; there is no {' and no '.join(missing)}", True)
+        yield _line("body.coupling", f"needs surge, sway and yaw; there is no {' and no '.join(missing)}")
         return
     for axis in coupled:
         beta = parts.axis_tables[axis].beta

@@ -1,7 +1,6 @@
 """Vehicle files with anything in them: a vehicle that can be built and stepped, or one clear line."""
 
 from collections.abc import Callable
-from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
 
@@ -14,15 +13,16 @@ from rov_fmu.export.archive import archive, native_content
 from rov_fmu.export.interface import variables
 from rov_fmu.export.osp import osp_model_description
 from rov_fmu.identify.tuning import tune, tuned_values
-from rov_fmu.motion.rov import COEFFICIENTS, HEAVE, Inputs, State, step
+from rov_fmu.motion.layout import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
-from rov_fmu.vehicle.writer import write_tuned
+from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import REFIT
 from tests.damage import changed_bytes, changed_lines, changed_toml, fuzz
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
-SOURCES = [VIDEORAY.read_bytes(), REFIT.read_bytes()]
+EVERYTHING, FIRST = (Path(__file__).with_name(name) for name in ("everything.toml", "first_version.toml"))
+SOURCES = [path.read_bytes() for path in (VIDEORAY, REFIT, EVERYTHING, EVERYTHING, FIRST)]
 _BUILT = 10  # of the files that can be read, every so manieth is made into an FMU
 
 
@@ -44,20 +44,23 @@ def check_refusal(error: VehicleFileError, path: Path) -> None:
 
 def check_usable(vehicle: Vehicle) -> None:
     """All numbers within their bounds, and a step that is finite or the NaN that stands for overflow."""
-    for name, value in asdict(vehicle.coefficients).items():
-        assert COEFFICIENTS[name].minimum <= value <= COEFFICIENTS[name].maximum
+    layout = vehicle.layout
+    assert set(vehicle.rov.coefficients) == set(layout.coefficients) == set(vehicle.sources)
+    for name, meta in layout.coefficients.items():
+        assert meta.minimum <= vehicle.rov[name] <= meta.maximum
     low, high = vehicle.command_range
     assert 0.0 <= low < high <= 1.0
     assert all(isfinite(end) for interval in vehicle.intervals.values() for end in interval)
-    after = step(vehicle.coefficients, Inputs(u_l=0.3, u_r=0.2, u_t=-0.1), State(), 0.1)
-    assert all(isfinite(value) for value in asdict(after).values())
+    inputs = dict.fromkeys(layout.inputs, 0.0) | dict(zip(layout.commands, (0.3, 0.2, -0.1, 1.0), strict=False))
+    after = vehicle.rov.step(inputs, dict.fromkeys(layout.state, 0.0), 0.1)
+    assert all(isfinite(value) for value in after.values())
 
 
 def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
     """What FMPy reads and validates of an FMU without binaries."""
     fmu = folder / "only.fmu"
     fmu.write_bytes(archive(native_content(vehicle).files))
-    osp_model_description(variables(vehicle.coefficients))
+    osp_model_description(variables(vehicle.rov))
     return read_model_description(str(fmu), validate=True)
 
 
@@ -85,18 +88,49 @@ def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int
 
 @pytest.mark.parametrize("examples", [20, pytest.param(300, marks=pytest.mark.long)])
 def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> None:
+    tuned = 0
+
+    def check(data: st.DataObject) -> None:
+        nonlocal tuned
+        path.write_bytes(changed_toml(data.draw(st.sampled_from(SOURCES)), data))
+        try:
+            vehicle = load_vehicle(path)
+        except VehicleFileError:
+            return
+        if not vehicle.layout.has(HEAVE):
+            return
+        form = vehicle.layout.kinds["heave"]
+        force, drag = vehicle.rov.force(HEAVE, 0.3), [vehicle.rov[form.coefficient(key)] for key in ("a_d", "b_d")]
+        if force > 1e-3 and max(drag) > 1e-3 and "F_0" not in form.keys:
+            tuning = tune(vehicle.rov, HEAVE, 0.3, min(1.0, 0.1 * force / sum(drag)))
+            write_tuned(path, path.with_name("tuned.toml"), *tuned_values(tuning))
+            assert load_vehicle(path.with_name("tuned.toml")).rov["beta_w"] == vehicle.rov["beta_w"]
+            tuned += 1
+
+    fuzz(check, examples)
+    assert tuned > examples / 20, "the changes must leave some files as good as they were"
+
+
+@pytest.mark.parametrize("examples", [20, pytest.param(300, marks=pytest.mark.long)])
+def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path: Path) -> None:
+    written = path.with_name("written.toml")
+
     def check(data: st.DataObject) -> None:
         path.write_bytes(changed_toml(data.draw(st.sampled_from(SOURCES)), data))
         try:
             vehicle = load_vehicle(path)
         except VehicleFileError:
             return
-        force = HEAVE.force(vehicle.coefficients, 0.3)
-        if force > 1e-3 and max(vehicle.coefficients.a_d_w, vehicle.coefficients.b_d_w) > 1e-3:
-            k = vehicle.coefficients
-            tuning = tune(k, HEAVE, 0.3, min(1.0, 0.1 * force / (k.a_d_w + k.b_d_w)))
-            write_tuned(path, path.with_name("tuned.toml"), *tuned_values(tuning))
-            assert load_vehicle(path.with_name("tuned.toml")).coefficients.beta_w == k.beta_w
+        try:
+            write_vehicle(vehicle, written)
+        except VehicleFileError as error:  # a number that six digits put beyond its bounds
+            check_refusal(error, written)
+            return
+        again = load_vehicle(written)
+        assert again.layout == vehicle.layout
+        assert again.sources == vehicle.sources
+        for name, value in vehicle.rov.coefficients.items():
+            assert again.rov[name] == float(f"{value:.6g}")
 
     fuzz(check, examples)
 
@@ -136,13 +170,13 @@ def _name(text: str) -> Callable[[str], str]:
 
 # What chance hardly finds: what is done to the text, and what the line must name.
 ODD: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
-    "a number of 5000 hexadecimal digits": (_value("0x" + "f" * 5000), ("coefficients.R.value", "0xfff")),
+    "a number of 5000 hexadecimal digits": (_value("0x" + "f" * 5000), ("arm.R.value", "0xfff")),
     "a key of 3000 parts": (lambda text: text.replace('name = "', "name" + ".a" * 3000 + ' = "'), ("vehicle.name",)),
     "lists in lists": (lambda text: text + "deep = " + "[" * 100_000, ("not TOML",)),
     "tables in tables": (lambda text: text + "deep = " + "{a=" * 100_000, ("not TOML",)),
     "a megabyte of one letter": (lambda _: "x" * 10**6, ("not TOML",)),
     "a megabyte of zeros": (lambda _: "\0" * 10**6, ("not TOML",)),
-    "a date and time": (_value("2018-07-21T07:32:00Z"), ("coefficients.R.value", "datetime", "number")),
+    "a date and time": (_value("2018-07-21T07:32:00Z"), ("arm.R.value", "datetime", "number")),
     "a control character": (_name(r'"Video\u001b[31mRay"'), ("vehicle.name", r"\x1b", "control character")),
     "what XML cannot hold": (_name(r'"Video\ufffeRay"'), ("vehicle.name", r"\ufffe")),
     "a name over two lines": (_name(r'"Video\nRay"'), ("vehicle.name", r"Video\nRay")),

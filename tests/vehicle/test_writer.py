@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, VehicleFileError, load_vehicle
-from rov_fmu.vehicle.writer import vehicle_text, write_vehicle
+from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
 from tests.commands import ALONE, REFIT, TESTS
 
+EVERYTHING, FIRST = (Path(__file__).with_name(name) for name in ("everything.toml", "first_version.toml"))
 TEXT = REFIT.read_text(encoding="utf-8")
 HASH = "0123456789abcdef" * 4
 
@@ -33,6 +35,31 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["made.toml"]
 
 
+def test_a_vehicle_with_everything_reads_back(tmp_path: Path) -> None:
+    """Every table and key; the directions, normalised once, stay as they are."""
+    everything, path = load_vehicle(EVERYTHING), tmp_path / "made.toml"
+    write_vehicle(everything, path)
+    assert load_vehicle(path) == everything
+    text = path.read_text(encoding="utf-8")
+    assert text.count("format = 2\n") == 1
+    assert text.count("alpha = ") == 1, "what the file does not give is not written"
+
+
+@pytest.mark.parametrize("source", [EVERYTHING, FIRST, VIDEORAY], ids=lambda path: path.stem)
+def test_tuning_changes_what_it_must_and_nothing_else(source: Path, tmp_path: Path) -> None:
+    before, path = load_vehicle(source), tmp_path / "tuned.toml"
+    kept = float(before.rov["alpha_w"])
+    write_tuned(source, path, {"alpha_w": kept, "beta_w": 0.25, "a_d_w": 12.5}, "a test")
+    after = load_vehicle(path)
+    assert after.rov.coefficients == {**before.rov.coefficients, "beta_w": 0.25, "a_d_w": 12.5}
+    assert after.sources == {**before.sources, "beta_w": "a test", "a_d_w": "a test"}
+    assert (after.layout, after.alternatives, after.limits) == (before.layout, before.alternatives, before.limits)
+    lines = [file.read_text(encoding="utf-8").splitlines() for file in (source, path)]
+    new = [line for line in lines[1] if line not in lines[0]]
+    assert sum("a test" in line for line in new) == 2
+    assert all("a test" in line or line.startswith(("data", "pictures")) for line in new)
+
+
 def test_without_provenance_there_is_none(vehicle: Vehicle, tmp_path: Path) -> None:
     path = tmp_path / "plain.toml"
     write_vehicle(vehicle, path)
@@ -42,20 +69,21 @@ def test_without_provenance_there_is_none(vehicle: Vehicle, tmp_path: Path) -> N
 
 
 def test_interval_encloses_a_rounded_value(vehicle: Vehicle, tmp_path: Path) -> None:
-    k = replace(vehicle.coefficients, a_d_w=18.72000049, b_d_w=0.63240051)
+    rov = vehicle.rov.replaced({"a_d_w": 18.72000049, "b_d_w": 0.63240051})
     narrow = {"a_d_w": (18.72000048, 18.7200005), "b_d_w": (0.6324005, 0.6324006)}
-    write_vehicle(replace(vehicle, coefficients=k, intervals=narrow), tmp_path / "narrow.toml")
+    write_vehicle(replace(vehicle, rov=rov, intervals=narrow), tmp_path / "narrow.toml")
     read = load_vehicle(tmp_path / "narrow.toml")
+    assert set(read.intervals) == set(narrow)
     for name, (low, high) in read.intervals.items():
-        assert low <= getattr(read.coefficients, name) <= high
+        assert low <= read.rov[name] <= high
 
 
 def test_a_file_that_could_not_be_read_is_not_written(vehicle: Vehicle, tmp_path: Path) -> None:
     path = tmp_path / "kept.toml"
     path.write_text("before", encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
-        write_vehicle(replace(vehicle, coefficients=replace(vehicle.coefficients, m_rov=-1.0)), path)
-    assert re.fullmatch(rf"{re.escape(str(path))}: coefficients\.m_rov\.value = -1\.0: .*", str(caught.value))
+        write_vehicle(replace(vehicle, rov=vehicle.rov.replaced({"m_rov": -1.0})), path)
+    assert re.fullmatch(rf"{re.escape(str(path))}: body\.m_rov\.value = -1\.0: .*", str(caught.value))
     assert path.read_text(encoding="utf-8") == "before"
     assert [p.name for p in tmp_path.iterdir()] == ["kept.toml"]
 
@@ -81,11 +109,11 @@ def edit(pattern: str, replacement: str) -> Callable[[str], str]:
 
 
 BAD: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
-    "value outside": (edit(r"interval = \[4\.", "interval = [14."), ("coefficients.a_d_u", "[low, high] around")),
-    "upside down": (edit(r"interval = \[[^]]*\]", "interval = [9.0, 8.0]"), ("coefficients.a_d_u", "around the value")),
-    "three numbers": (edit(r"interval = \[", "interval = [1.0, "), ("coefficients.a_d_u.interval", "2")),
-    "no number": (edit(r"interval = \[[^]]*\]", 'interval = "wide"'), ("coefficients.a_d_u.interval", "'wide'")),
-    "infinite": (edit(r"interval = \[[^]]*\]", "interval = [0.0, inf]"), ("coefficients.a_d_u.interval", "finite")),
+    "value outside": (edit(r"interval = \[4\.", "interval = [14."), ("axes.surge.a_d", "[low, high] around")),
+    "upside down": (edit(r"interval = \[[^]]*\]", "interval = [9.0, 8.0]"), ("axes.surge.a_d", "around the value")),
+    "three numbers": (edit(r"interval = \[", "interval = [1.0, "), ("axes.surge.a_d.interval", "2")),
+    "no number": (edit(r"interval = \[[^]]*\]", 'interval = "wide"'), ("axes.surge.a_d.interval", "'wide'")),
+    "infinite": (edit(r"interval = \[[^]]*\]", "interval = [0.0, inf]"), ("axes.surge.a_d.interval", "finite")),
     "no hash": (edit(r'^"rov.toml" = ".*"', '"rov.toml" = "abc"'), ("provenance.inputs.rov.toml", "'abc'")),
     "no method": (edit(r"^method = .*$", ""), ("provenance.method", "missing")),
     "unknown key": (edit(r"^method = ", "author = 'me'\nmethod = "), ("provenance.author", "no such key")),

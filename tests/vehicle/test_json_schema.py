@@ -1,0 +1,53 @@
+"""The JSON schema of the vehicle file, which editors read, and what it says of itself."""
+
+import json
+from typing import Any
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.files.places import MODELS
+from rov_fmu.motion.layout import AXES as AXIS_KINDS
+from rov_fmu.motion.layout import AXIS, BODY, CURVE, TUNING, metas_of
+from rov_fmu.vehicle.json_schema import json_schema
+
+KEPT = MODELS / "vehicle.schema.json"
+
+
+def test_the_file_in_the_repository_is_the_schema(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    assert capsys.readouterr().out == KEPT.read_text(encoding="utf-8")
+
+
+def test_every_kind_of_coefficient_stands_in_it_with_unit_and_bounds() -> None:
+    tables: dict[str, Any] = json_schema()["$defs"]
+    kinds = {"Body": {key: kind.meta() for key, kind in BODY.items()},
+             "Curve": {key: kind.meta(curve="", equation="") for key, kind in CURVE.items()},
+             **{f"_{axis.name.capitalize()}": metas_of(axis) for axis in AXIS_KINDS.values()}}  # fmt: skip
+    assert {*kinds["_Yaw"]} == {*AXIS, *TUNING}
+    for table, metas in kinds.items():
+        for key, meta in metas.items():
+            entry = tables[tables[table]["properties"][key]["$ref"].removeprefix("#/$defs/")]
+            value, unit = (entry["properties"][name] for name in ("value", "unit"))
+            assert (value["minimum"], value["maximum"], unit["const"]) == (meta.minimum, meta.maximum, meta.unit)
+            assert {"value", "unit", "source"} <= set(entry["required"])
+
+
+def test_no_key_is_without_words() -> None:
+    """An editor shows them where the cursor stands."""
+    schema = json_schema()
+
+    def described(node: dict[str, Any]) -> bool:
+        target = schema["$defs"][node["$ref"].removeprefix("#/$defs/")] if "$ref" in node else node
+        return bool(target.get("description"))
+
+    assert schema["description"]
+    for table in (schema, *schema["$defs"].values()):
+        for key, entry in table["properties"].items():
+            assert described(entry) or key in ("value", "unit"), f"{table['description']} {key}"
+
+
+def test_it_is_plain_json() -> None:
+    text = KEPT.read_text(encoding="utf-8")
+    assert json.loads(text) == json_schema()
+    assert "null" not in text
