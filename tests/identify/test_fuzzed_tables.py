@@ -15,7 +15,7 @@ from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.identify.tuning import read_points
 from rov_fmu.motion.layout import AXES, HEAVE
 from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from tests.commands import TESTS
 from tests.damage import (
@@ -186,11 +186,11 @@ def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_
     words = st.one_of(NUMBERS.filter(lambda x: abs(x) < 10**400), CELLS, st.floats(0.0, 10.0)).map(str)
 
     def check(data: st.DataObject) -> None:
-        axis = data.draw(st.sampled_from(sorted(AXES)))
+        axis, vehicle = data.draw(st.sampled_from(sorted(AXES))), data.draw(st.sampled_from(sorted(SHIPPED)))
         options = [
             f"{name}={data.draw(words)}" for name in ("--command", "--v-ss", "--tau") if data.draw(st.integers(0, 5))
         ]
-        code = main(["tune", str(VIDEORAY), "--axis", axis, *options, "-o", str(tuned)])
+        code = main(["tune", vehicle, "--axis", axis, *options, "-o", str(tuned)])
         printed, _ = tuned_or_one_line(code, tuned, capsys)
         assert "inf" not in printed
 
