@@ -92,7 +92,7 @@ def _completed(*words: str, shell: str = "bash") -> list[str]:
 def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
     commands = ("build", "convert", "figures", "identify", "schema", "tables", "tune")
     assert _completed("") == [f"plain,{name}" for name in commands]
-    assert _completed("build", "video") == ["file,video", *(f"plain,{name}" for name in SHIPPED)]
+    assert _completed("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
     assert _completed("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
     assert _completed("tune", "./my") == ["file,./my"]
     assert _completed("build", "--platform", "") == [f"plain,{name}" for name in ("host", *PLATFORMS)]
