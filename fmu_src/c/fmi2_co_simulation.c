@@ -32,8 +32,11 @@ FMI2_Export fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2V
                 VARIABLES[vr[i]].name);
     }
     calculate(f);
-    for (size_t i = 0; i < nvr; i++) { /* thrust is constant between steps, as the commands are */
-        const double rate = vr[i] < FIRST_CALCULATED ? f->now.values.at[vr[i] + N_STATES] : 0.0;
+    double d[N_VARIABLES] = {0.0}; /* commands are held */
+    memcpy(&d[FIRST_STATE], &f->now.values[FIRST_CALCULATED], N_STATES * sizeof d[0]);
+    rov_tangent(f->now.values, d);
+    for (size_t i = 0; i < nvr; i++) {
+        const double rate = d[vr[i]];
         REQUIRE("fmi2GetRealOutputDerivatives", isfinite(rate), "the derivative of %s overflows.",
                 VARIABLES[vr[i]].name);
         value[i] = rate;
@@ -56,18 +59,20 @@ FMI2_Export fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunication
     REQUIRE("fmi2DoStep", h > 0.0 && isfinite(end), "communicationStepSize = %g at t = %g is not a step forward.", h, t);
     REQUIRE("fmi2DoStep", !f->now.stop_defined || end <= f->now.stop + time_tolerance(f->now.stop, h),
             "a step of %g s from t = %.15g passes stopTime = %.15g.", h, t, f->now.stop);
-    rov_variables *const v = &f->now.values.named;
-    variable_values next;
-    rov_step(&v->coefficients, &f->gains, &v->inputs, &v->state, h, &next.named.state);
-    double sum = 0.0; /* not finite if one is not: zero times it is NaN */
-    for (size_t i = FIRST_STATE; i < FIRST_STATE + N_STATES; i++) {
-        sum += 0.0 * next.at[i];
+    double next[N_STATES], sum = 0.0; /* not finite if one is not: zero times it is NaN */
+    if (!rov_step(f->now.values, &f->gains, h, next)) {
+        f->now.mode = FAILED;
+        FAIL(f, "fmi2DoStep: the motion over %g s from t = %g takes more than MOST_PIECES = %d pieces; the state from before "
+             "is kept.", h, t, (int)MOST_PIECES);
+    }
+    for (size_t i = 0; i < N_STATES; i++) {
+        sum += 0.0 * next[i];
     }
     if (sum != 0.0) {
         f->now.mode = FAILED;
         FAIL(f, "fmi2DoStep: the motion over %g s from t = %g overflows; the state from before is kept.", h, t);
     }
-    v->state = next.named.state;
+    memcpy(&f->now.values[FIRST_STATE], next, sizeof next);
     if (fabs(t - f->now.time) > time_tolerance(f->now.time, h)) {
         WARN_ONCE(f, TIME_JUMPED, "fmi2DoStep: the step from t = %.15g does not begin at t = %.15g, where the FMU is; done "
                   "from its state, and said once.", t, f->now.time);

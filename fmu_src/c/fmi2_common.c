@@ -20,13 +20,13 @@ static void start(fmu *f)
     f->now.type = type;
     f->now.mode = INSTANTIATED;
     for (size_t i = 0; i < N_VARIABLES; i++) {
-        f->now.values.at[i] = VARIABLES[i].start;
+        f->now.values[i] = VARIABLES[i].start;
     }
     memset(f->warned, 0, sizeof f->warned);
     for (int i = 0; i < N_LOG_CATEGORIES; i++) {
         f->log_enabled[i] = i != logEvents || f->logging_on;
     }
-    rov_prepare(&f->now.values.named.coefficients, &f->gains);
+    rov_prepare(f->now.values, &f->gains);
 }
 
 #define REJECT(...)                                                                         \
@@ -160,7 +160,7 @@ FMI2_Export fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[
     if (calculated) {
         calculate(f);
         for (size_t i = 0; i < nvr; i++) {
-            if (!isfinite(f->now.values.at[vr[i]])) {
+            if (!isfinite(f->now.values[vr[i]])) {
                 const bool exchange = f->now.type == fmi2ModelExchange;
                 REFUSE(f, exchange ? fmi2Discard : fmi2Error, exchange ? logStatusDiscard : logStatusError,
                        "fmi2GetReal: %s overflows.", VARIABLES[vr[i]].name);
@@ -168,7 +168,7 @@ FMI2_Export fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[
         }
     }
     for (size_t i = 0; i < nvr; i++) {
-        value[i] = f->now.values.at[vr[i]];
+        value[i] = f->now.values[vr[i]];
     }
     if (f->now.mode == INSTANTIATED) {
         WARN_ONCE(f, READ_EARLY, "fmi2GetReal: done, though the standard has no such call before initialization; said once.");
@@ -200,7 +200,7 @@ FMI2_Export fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[
     for (size_t i = 0; i < nvr; i++) { /* all are checked before any is set */
         REQUIRE("fmi2SetReal", vr[i] < N_VARIABLES, "there is no Real with value reference %u.", vr[i]);
         const variable_info *const info = &VARIABLES[vr[i]];
-        const double old = f->now.values.at[vr[i]];
+        const double old = f->now.values[vr[i]];
         REQUIRE("fmi2SetReal", may_set(f, info->kind), "%s must not be set in %s.", info->name,
                 mode_name(f->now.mode));
         if (!isfinite(value[i])) {
@@ -216,7 +216,7 @@ FMI2_Export fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[
     }
     for (size_t i = 0; i < nvr; i++) {
         const variable_info *const info = &VARIABLES[vr[i]];
-        f->now.values.at[vr[i]] = value[i];
+        f->now.values[vr[i]] = value[i];
         if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
             WARN_ONCE(f, vr[i], "fmi2SetReal: %s = %.15g saturates at %g; said once.", info->name, value[i],
                       value[i] < 0.0 ? info->minimum : info->maximum);
@@ -226,7 +226,7 @@ FMI2_Export fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[
         }
     }
     if (coefficient) {
-        rov_prepare(&f->now.values.named.coefficients, &f->gains);
+        rov_prepare(f->now.values, &f->gains);
     }
     return fmi2OK;
 }
@@ -260,8 +260,7 @@ FMI2_Export fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2V
             (nUnknown == 0 || (vUnknown_ref != NULL && dvUnknown != NULL))
                 && (nKnown == 0 || (vKnown_ref != NULL && dvKnown != NULL)),
             "an argument is NULL.");
-    variable_values d;
-    memset(&d, 0, sizeof d);
+    double d[N_VARIABLES] = {0.0};
     for (size_t i = 0; i < nKnown; i++) {
         const bool exists = vKnown_ref[i] < N_VARIABLES;
         const variable_kind kind = exists ? VARIABLES[vKnown_ref[i]].kind : CALCULATED;
@@ -270,7 +269,7 @@ FMI2_Export fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2V
                 kind == INPUT || kind == STATE || (kind != CALCULATED && f->now.mode == INITIALIZATION),
                 "%s is no known variable in %s.", exists ? VARIABLES[vKnown_ref[i]].name : "an unknown value reference",
                 mode_name(f->now.mode));
-        d.at[vKnown_ref[i]] += dvKnown[i];
+        d[vKnown_ref[i]] += dvKnown[i];
     }
     for (size_t i = 0; i < nUnknown; i++) {
         const bool exists = vUnknown_ref[i] < N_VARIABLES;
@@ -279,13 +278,13 @@ FMI2_Export fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2V
                 "%s is neither an output nor a derivative.",
                 exists ? VARIABLES[vUnknown_ref[i]].name : "an unknown value reference");
     }
-    rov_tangent(&f->now.values.named, &d.named);
+    rov_tangent(f->now.values, d);
     for (size_t i = 0; i < nUnknown; i++) {
-        REQUIRE("fmi2GetDirectionalDerivative", isfinite(d.at[vUnknown_ref[i]]),
+        REQUIRE("fmi2GetDirectionalDerivative", isfinite(d[vUnknown_ref[i]]),
                 "that of %s is not a finite number.", VARIABLES[vUnknown_ref[i]].name);
     }
     for (size_t i = 0; i < nUnknown; i++) {
-        dvUnknown[i] = d.at[vUnknown_ref[i]];
+        dvUnknown[i] = d[vUnknown_ref[i]];
     }
     return fmi2OK;
 }

@@ -16,14 +16,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Any variable by value reference or by name. */
-typedef union {
-    double at[N_VARIABLES];
-    rov_variables named;
-} variable_values;
-
-typedef char one_double_a_variable[sizeof(rov_variables) == N_VARIABLES * sizeof(double) ? 1 : -1];
-
 typedef enum {
     INSTANTIATED = 1,
     INITIALIZATION = 2,
@@ -47,7 +39,7 @@ typedef struct {
     lifecycle mode;
     bool experiment_defined, stop_defined;
     double time, stop;
-    variable_values values;
+    double values[N_VARIABLES]; /* by value reference */
 } fmu_state;
 
 /* What is warned of once: a command that saturates, by value reference, and what importers do against the standard. */
@@ -166,9 +158,8 @@ static void enter(fmu *f, lifecycle mode)
 /* Thrust and derivatives follow from the rest; only GetXXX needs them. */
 static void calculate(fmu *f)
 {
-    rov_variables *const v = &f->now.values.named;
-    rov_thrust_of(&v->coefficients, &f->gains, &v->inputs, &v->thrust);
-    rov_derivatives(&v->coefficients, &f->gains, &v->inputs, &v->state, &v->derivative);
+    rov_thrust_of(f->now.values, &f->gains);
+    rov_derivatives(f->now.values, &f->gains);
 }
 
 #endif

@@ -53,10 +53,10 @@ FMI2_Export fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x
     for (size_t i = 0; i < N_STATES; i++) {
         if (!isfinite(x[i])) {
             DISCARD(f, "fmi2SetContinuousStates: %s = %g is not a finite number; it stays %.15g.",
-                    VARIABLES[FIRST_STATE + i].name, x[i], f->now.values.at[FIRST_STATE + i]);
+                    VARIABLES[FIRST_STATE + i].name, x[i], f->now.values[FIRST_STATE + i]);
         }
     }
-    memcpy(&f->now.values.at[FIRST_STATE], x, N_STATES * sizeof x[0]);
+    memcpy(&f->now.values[FIRST_STATE], x, N_STATES * sizeof x[0]);
     return fmi2OK;
 }
 
@@ -71,11 +71,11 @@ FMI2_Export fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[
     OPEN_STATES("fmi2GetDerivatives", INITIALIZED, derivatives, nx);
     calculate(f);
     for (size_t i = 0; i < N_STATES; i++) {
-        if (!isfinite(f->now.values.at[FIRST_CALCULATED + i])) {
+        if (!isfinite(f->now.values[FIRST_CALCULATED + i])) {
             DISCARD(f, "fmi2GetDerivatives: %s overflows.", VARIABLES[FIRST_CALCULATED + i].name);
         }
     }
-    memcpy(derivatives, &f->now.values.at[FIRST_CALCULATED], N_STATES * sizeof derivatives[0]);
+    memcpy(derivatives, &f->now.values[FIRST_CALCULATED], N_STATES * sizeof derivatives[0]);
     return fmi2OK;
 }
 
@@ -91,7 +91,7 @@ FMI2_Export fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventInd
 FMI2_Export fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
 {
     OPEN_STATES("fmi2GetContinuousStates", INITIALIZED, x, nx);
-    memcpy(x, &f->now.values.at[FIRST_STATE], N_STATES * sizeof x[0]);
+    memcpy(x, &f->now.values[FIRST_STATE], N_STATES * sizeof x[0]);
     return fmi2OK;
 }
 

@@ -60,7 +60,7 @@ static bool is_valid(const fmu_state *s)
                  && (mode & (mode - 1)) == 0 && isfinite(s->time) && !isnan(s->stop)
                  && (s->experiment_defined || mode == INSTANTIATED);
     for (size_t i = 0; i < N_VARIABLES; i++) {
-        const double value = s->values.at[i];
+        const double value = s->values[i];
         const bool bounded = VARIABLES[i].kind == FIXED || VARIABLES[i].kind == TUNABLE;
         valid = valid && isfinite(value)
                 && (!bounded || (value >= VARIABLES[i].minimum && value <= VARIABLES[i].maximum));
@@ -111,7 +111,7 @@ FMI2_Export fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
     REQUIRE("fmi2SetFMUstate", saved != NULL, "FMUstate is NULL or no state of this FMU.");
     REQUIRE("fmi2SetFMUstate", saved->state.type == f->now.type, "the state is of the other interface type.");
     f->now = saved->state;
-    rov_prepare(&f->now.values.named.coefficients, &f->gains);
+    rov_prepare(f->now.values, &f->gains);
     LOG(f, fmi2OK, logEvents, "Restored %s at t = %g s.", mode_name(f->now.mode), f->now.time);
     return fmi2OK;
 }
@@ -159,7 +159,7 @@ FMI2_Export fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUst
     put_double(&to, s->time);
     put_double(&to, s->stop);
     for (size_t i = 0; i < N_VARIABLES; i++) {
-        put_double(&to, VARIABLES[i].kind == CALCULATED ? 0.0 : s->values.at[i]);
+        put_double(&to, VARIABLES[i].kind == CALCULATED ? 0.0 : s->values[i]);
     }
     put_word(&to, checksum(bytes, SERIALIZED_SIZE - 8));
     return fmi2OK;
@@ -192,7 +192,7 @@ FMI2_Export fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte s
     s.time = get_double(&from);
     s.stop = get_double(&from);
     for (size_t i = 0; i < N_VARIABLES; i++) {
-        s.values.at[i] = get_double(&from);
+        s.values[i] = get_double(&from);
     }
     REQUIRE("fmi2DeSerializeFMUstate", is_valid(&s), "the bytes hold values that no run can reach.");
     saved_state *const saved = state_memory(FMUstate);

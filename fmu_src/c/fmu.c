@@ -28,6 +28,8 @@
 
 #include "riccati.c"
 #include "rov.c"
+#include "track.c"
+#include "series.c"
 
 #include "fmi2_common.c"
 #include "fmi2_state.c"

@@ -5,20 +5,22 @@
 #include <stddef.h>
 
 typedef struct {
-    double A; /* quadratic drag, 1/m (1/rad) */
-    double B; /* linear drag, 1/s */
-    double C; /* force, m/s2 (rad/s2) */
+    double A[2]; /* quadratic drag, 1/m (1/rad), for v > 0 and for v < 0 */
+    double B[2]; /* linear drag, 1/s, likewise */
+    double C;    /* force, m/s2 (rad/s2) */
 } riccati;
 
-/* A motion mirrored to v0 >= 0, and the first leg of it: until it turns, or longer than asked for. */
+/* The first leg of a motion: up to its reversal, or longer than asked for; mirrored to v0 >= 0 where `back` is 1. */
 typedef struct {
-    double sign, C, v0, turn;
+    int back;
+    double C, v0, end;
 } riccati_leg;
 
-/* v' at v. */
-static double riccati_acceleration(const riccati *axis, double v)
+/* B v + A |v| v. */
+static inline double riccati_drag(const riccati *axis, double v)
 {
-    return axis->C - (axis->B + axis->A * fabs(v)) * v;
+    const int back = v < 0.0;
+    return (axis->B[back] + axis->A[back] * fabs(v)) * v;
 }
 
 /* The root of |D^2|, D^2 = B^2 + 4 A C with C < 0, with the sign of D^2. */
@@ -49,26 +51,27 @@ static double riccati_time_to_rest(double A, double B, double C, double v0)
     return 2.0 * S * (atanh(x) / x);
 }
 
-/* When the force brings v0 to rest and turns it; infinite where it does not. */
-static double riccati_turning_time(const riccati *axis, double v0)
+/* When the force brings v0 to rest and reverses it; infinite where it does not. */
+static double riccati_reversal_time(const riccati *axis, double v0)
 {
-    if ((v0 <= 0.0 || axis->C >= 0.0) && (v0 >= 0.0 || axis->C <= 0.0)) {
+    if ((v0 <= 0.0 || axis->C >= 0.0) && (v0 >= 0.0 || axis->C <= 0.0)) { /* a product would underflow */
         return INFINITY;
     }
-    return riccati_time_to_rest(axis->A, axis->B, -fabs(axis->C), fabs(v0));
+    return riccati_time_to_rest(axis->A[v0 < 0.0], axis->B[v0 < 0.0], -fabs(axis->C), fabs(v0));
 }
 
 static riccati_leg riccati_first_leg(const riccati *axis, double v0, double h)
 {
-    riccati_leg leg = {1.0, axis->C, v0, h};
+    riccati_leg leg = {0, axis->C, v0, h};
     if (v0 < 0.0 || (v0 == 0.0 && axis->C < 0.0)) {
-        leg.sign = -1.0;
+        leg.back = 1;
         leg.C = -axis->C;
         leg.v0 = -v0;
     }
     /* Deceleration is strongest at the start, so the left side bounds the velocity that the step can take away. */
-    if (leg.C < 0.0 && ((axis->B + axis->A * leg.v0) * leg.v0 - leg.C) * h >= leg.v0) {
-        leg.turn = riccati_time_to_rest(axis->A, axis->B, leg.C, leg.v0);
+    const double A = axis->A[leg.back], B = axis->B[leg.back];
+    if (leg.C < 0.0 && ((B + A * leg.v0) * leg.v0 - leg.C) * h >= leg.v0) {
+        leg.end = riccati_time_to_rest(A, B, leg.C, leg.v0);
     }
     return leg;
 }
@@ -183,16 +186,18 @@ static inline void riccati_leg_advance(double A, double B, double C, double v0, 
 static inline void riccati_advance(const riccati *axis, double v0, double h, double *v, double *s)
 {
     const riccati_leg leg = riccati_first_leg(axis, v0, h);
+    int back = leg.back;
     double forth = 0.0;
-    if (leg.turn < h) {
+    if (leg.end < h) {
         if (s != NULL) {
-            riccati_leg_advance(axis->A, axis->B, leg.C, leg.v0, leg.turn, NULL, &forth);
+            riccati_leg_advance(axis->A[back], axis->B[back], leg.C, leg.v0, leg.end, NULL, &forth);
         }
-        riccati_leg_advance(axis->A, axis->B, -leg.C, 0.0, h - leg.turn, v, s);
+        back = 1 - back;
+        riccati_leg_advance(axis->A[back], axis->B[back], -leg.C, 0.0, h - leg.end, v, s);
     } else {
-        riccati_leg_advance(axis->A, axis->B, leg.C, leg.v0, h, v, s);
+        riccati_leg_advance(axis->A[back], axis->B[back], leg.C, leg.v0, h, v, s);
     }
-    const double sign = leg.turn < h ? -leg.sign : leg.sign;
+    const double sign = back ? -1.0 : 1.0;
     if (v != NULL) {
         *v *= sign;
     }

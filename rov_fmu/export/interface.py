@@ -247,6 +247,9 @@ def model_header(rov: Rov) -> str:
         }
         for curve in layout.curves
     ]
+    most = max(1, *(len(gains) for gains in layout.gains.values()))
+    nothing = (next(iter(layout.commands)), 0.0)
+    driving = {name: [*gains.items(), *[nothing] * (most - len(gains))] for name, gains in layout.gains.items()}
     thrusters = [
         {
             "name": t.name,
@@ -254,14 +257,15 @@ def model_header(rov: Rov) -> str:
             "force": ref(f"F_{t.name}"),
             "effect": [repr(t.effect(f.axis)) if t in layout.drivers(f.axis) else "0.0" for f in layout.axes],
             "by_arm": int(t.position is None and t.arm != 0),
-            "gains": [repr(layout.gains[t.name].get(command, 0.0)) for command in layout.commands],
+            "command": [ref(command) for command, _ in driving[t.name]],
+            "gain": [repr(gain) for _, gain in driving[t.name]],
         }
         for t in layout.thrusters
     ]
+    places = {form.axis.name: place for place, form in enumerate(layout.axes)}
+    kinds = {name.upper(): places.get(name, "NONE") for name in AXES}
     axes = [
         {
-            "kind": form.axis.name.upper(),
-            "velocity": ref(form.axis.velocity),
             "external": ref(form.axis.external),
             "inertia": ref(form.axis.inertia),
             "added": if_given(form.coefficient("m_a"), "m_a", form),
@@ -275,8 +279,8 @@ def model_header(rov: Rov) -> str:
     ]
     return render(
         "model.h.j2", layout=layout, names={v.name: v.value_reference for v in variables(rov) if v.name in names},
-        axes=axes, curves=curves, thrusters=thrusters, kinds=list(AXES),
-        n={"inputs": len(layout.inputs), "commands": len(layout.commands), "states": len(layout.state),
+        axes=axes, curves=curves, thrusters=thrusters, kinds=kinds,
+        n={"drivers": most, "inputs": len(layout.inputs), "commands": len(layout.commands), "states": len(layout.state),
            "lagging": len(layout.lagging), "thrust": len(layout.thrust), "coefficients": len(layout.coefficients)},
         ref=lambda name: ref(name if name in names else None),
     )  # fmt: skip

@@ -1,0 +1,457 @@
+/* The exact step: by Taylor series, and over long steps by the closed form where there is one. Between the reversals of its
+ * axes all terms of the motion are polynomials of the state: with v = sum of v_n t^n
+ *
+ *     v_(n+1) = (C_n - B v_n - A (v^2)_n) / (n + 1),      (v^2)_n = sum of v_j v_(n-j),      A of the direction's sign
+ *
+ * and likewise the force of a lag, C_n = D (-1/T)^n / n!, and the products of the coupling. The coefficients tell how far they
+ * reach (Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
+ * 2005). A reversal is a root of a polynomial: the piece is cut there. The same as rov_fmu/motion/series.py. */
+
+#if defined __GNUC__
+#define SERIES_INLINE static inline __attribute__((always_inline)) /* the first terms without loops: a third of the time */
+#else
+#define SERIES_INLINE static inline
+#endif
+
+enum { ORDER = 19, FIRST_LOOK = 5, ORDER_OF_FEW = 11 };
+static const double TURN_OF_FEW = 0.14, SERIES_REACH = 0.3;
+static const double INVERSE[ORDER + 2] = {
+    0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0, 1.0 / 8.0, 1.0 / 9.0, 1.0 / 10.0,
+    1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0, 1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0, 1.0 / 20.0};
+/* The last two terms of a series against the first ones: then what follows is rounding, for each falls by six at least. */
+static const double SMALL = 4.0 * DBL_EPSILON;
+
+/* What moves, and what the lags of each curve have left of the forces from before, as acceleration. */
+typedef struct {
+    const rov_gains *gains;
+    const double *C;
+    double late[N_CURVES][WIDTH];
+} flow;
+
+/* Polynomials of the velocities in time by tau, what their terms come from, and what they add up to. */
+typedef struct {
+    int order;
+    bool decided;                                     /* whether the directions are known */
+    double tau, c[ORDER + 1][WIDTH];
+    double A[WIDTH], D[WIDTH];                        /* drag in the direction of the motion: D = B + 2 A v_0 */
+    double fall[N_CURVES];                            /* of what the lags have left */
+    double change[WIDTH], mean[WIDTH], others[WIDTH]; /* sums beyond v_1 at the end: v, its mean, sizes */
+} series;
+
+static inline void series_add(series *s, int n)
+{
+    for (int a = 0; a < WIDTH; a++) {
+        s->change[a] += s->c[n][a];
+        s->mean[a] += s->c[n][a] * INVERSE[n + 1];
+        s->others[a] += fabs(s->c[n][a]);
+    }
+}
+
+/* Drag of an axis by the first of the terms up to n that is not 0; false where there is none. */
+static inline bool series_drag(const flow *f, series *s, int a, int n)
+{
+    int first = 0;
+    while (first < n && s->c[first][a] == 0.0) {
+        first++;
+    }
+    const int back = s->c[first][a] < 0.0;
+    s->A[a] = (back ? -s->tau : s->tau) * f->gains->axis[a].A[back];
+    s->D[a] = s->tau * f->gains->axis[a].B[back] + 2.0 * s->A[a] * s->c[0][a];
+    return s->c[first][a] != 0.0;
+}
+
+/* The term after n. */
+SERIES_INLINE void series_term(const flow *f, series *s, int n)
+{
+    double square[WIDTH] = {0.0}, rest[WIDTH] = {0.0}; /* v^2 without v_0; all but the drag of the last term */
+    for (int j = (n - 1) / 2; j > 0; j--) {
+        for (int a = 0; a < WIDTH; a++) {
+            square[a] += s->c[j][a] * s->c[n - j][a];
+        }
+    }
+    for (int a = 0; a < WIDTH; a++) {
+        const double middle = n % 2 == 0 ? s->c[n / 2][a] : 0.0;
+        rest[a] = -s->A[a] * (2.0 * square[a] + middle * middle);
+    }
+    for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
+        s->fall[c] *= -s->tau * f->gains->rate[c] * INVERSE[n];
+        for (int a = 0; a < WIDTH; a++) {
+            rest[a] += s->fall[c] * f->late[c][a];
+        }
+    }
+    if (IS_COUPLED) {
+        double vr = 0.0, ur = 0.0, uv = 0.0;
+        for (int j = 0; j <= n; j++) {
+            vr += s->c[j][V] * s->c[n - j][R];
+            ur += s->c[j][U] * s->c[n - j][R];
+            uv += s->c[j][U] * s->c[n - j][V];
+        }
+        rest[U] += s->tau * f->gains->c_u * vr;
+        rest[V] -= s->tau * f->gains->c_v * ur;
+        rest[R] -= s->tau * f->gains->c_r * uv;
+    }
+    for (int a = 0; a < N_AXES && !IS_FREE && !s->decided; a++) {
+        s->decided = series_drag(f, s, a, n) && (a == 0 || s->decided);
+    }
+    for (int a = 0; a < WIDTH; a++) {
+        s->c[n + 1][a] = INVERSE[n + 1] * rest[a] - INVERSE[n + 1] * s->D[a] * s->c[n][a];
+    }
+    series_add(s, n + 1);
+}
+
+/* Polynomials from v on over tau seconds, of so many terms that the next ones would be rounding; false where ORDER does not
+ * do. */
+static inline bool series_grow(const flow *f, const double v[WIDTH], double tau, series *s)
+{
+    double couple[WIDTH] = {0.0};
+    s->tau = tau;
+    rov_couple(f->gains, v, couple);
+    for (int a = 0; a < WIDTH; a++) {
+        double C = f->C[a] + couple[a];
+        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
+            C += f->late[c][a];
+            s->fall[c] = tau;
+        }
+        s->c[0][a] = v[a];
+        s->c[1][a] = tau * (C - riccati_drag(&f->gains->axis[a], v[a]));
+        s->change[a] = s->mean[a] = s->others[a] = 0.0;
+        const double way = v[a] != 0.0 ? v[a] : s->c[1][a];
+        const int back = way < 0.0;
+        s->A[a] = copysign(tau * f->gains->axis[a].A[back], way);
+        s->D[a] = tau * f->gains->axis[a].B[back] + 2.0 * s->A[a] * v[a];
+    }
+    s->decided = false;
+    series_term(f, s, 1);
+    series_term(f, s, 2);
+    series_term(f, s, 3);
+    series_term(f, s, 4);
+    for (int n = 5;; n += 2) {
+        bool done = true;
+        for (int a = 0; a < WIDTH; a++) {
+            const double size = fabs(s->c[0][a]) + fabs(s->c[1][a]) + fabs(s->c[2][a]);
+            done &= fabs(s->c[n][a]) + fabs(s->c[n - 1][a]) <= SMALL * size + DBL_MIN;
+        }
+        s->order = n;
+        if (done || n == ORDER) {
+            return done;
+        }
+        series_term(f, s, n);
+        series_term(f, s, n + 1);
+    }
+}
+
+/* How far the last two terms stay below rounding of the first ones, up to 1; 0 where they overflow. */
+static double series_reach(const series *s)
+{
+    double reach = 1.0;
+    for (int a = 0; a < N_AXES; a++) {
+        int first = 0;
+        for (int n = 1; n < 3; n++) {
+            first = fabs(s->c[n][a]) > fabs(s->c[first][a]) ? n : first;
+        }
+        const double last = fmax(fabs(s->c[s->order][a]), fabs(s->c[s->order - 1][a]));
+        const double share = SMALL * fabs(s->c[first][a]) / last;
+        if (!isfinite(last)) {
+            return 0.0;
+        }
+        if (share < 1.0) {
+            reach = fmin(reach, pow(share, 1.0 / (s->order - 1 - first)));
+        }
+    }
+    return reach;
+}
+
+/* Make t tau the unit of time. */
+static void series_shorten(series *s, double t)
+{
+    double power = 1.0;
+    for (int n = 0; n <= s->order; n++, power *= t) {
+        for (int a = 0; a < WIDTH; a++) {
+            s->c[n][a] *= power;
+            s->change[a] = n > 1 ? s->change[a] : 0.0;
+            s->mean[a] = n > 1 ? s->mean[a] : 0.0;
+            s->others[a] = n > 1 ? s->others[a] : 0.0;
+        }
+        if (n > 1) {
+            series_add(s, n);
+        }
+    }
+    s->tau *= t;
+}
+
+/* A polynomial at t, as what is added to its start. */
+static double series_value(const series *s, int a, double t)
+{
+    double change = 0.0;
+    for (int n = s->order; n > 0; n--) {
+        change = (change + s->c[n][a]) * t;
+    }
+    return s->c[0][a] + change;
+}
+
+/* The one root of a polynomial that only rises or only falls, by Newton's method within the bounds known. */
+static double series_root(const series *s, int a, double high)
+{
+    double low = 0.0, t = 0.5 * high;
+    for (int i = 0; i < 60; i++) { /* halving finds it in 53 */
+        const double value = series_value(s, a, t);
+        double slope = 0.0;
+        for (int n = s->order; n > 0; n--) {
+            slope = slope * t + n * s->c[n][a];
+        }
+        if (value * s->c[0][a] > 0.0) {
+            low = t;
+        } else {
+            high = t;
+        }
+        const double next = t - value / slope;
+        if (value == 0.0 || next == t || high - low <= DBL_EPSILON * high) {
+            break;
+        }
+        t = next > low && next < high ? next : 0.5 * (low + high);
+    }
+    return t;
+}
+
+/* How far a velocity goes before its sign changes, at most the length; whether it is zero there. */
+static inline double series_sign_kept(const series *s, int a, double length, bool *reverses)
+{
+    const double shortest = 0x1p-20 * length; /* there a velocity that just touches zero has no drag worth a sign */
+    int k = 0;
+    *reverses = false;
+    while (k <= s->order && s->c[k][a] == 0.0) {
+        k++;
+    }
+    for (; k <= s->order && length > shortest; length *= 0.5) {
+        double others = 0.0, slopes = 0.0, power = length;
+        for (int n = k + 1; n <= s->order; n++, power *= length) {
+            others += fabs(s->c[n][a]) * power;
+            slopes += n > 1 ? n * fabs(s->c[n][a]) * power : 0.0;
+        }
+        if (fabs(s->c[k][a]) > others) {
+            break;
+        }
+        if (k == 0 && fabs(s->c[1][a]) * length > slopes) { /* it only rises or only falls */
+            *reverses = series_value(s, a, length) * s->c[0][a] <= 0.0;
+            return *reverses ? series_root(s, a, length) : length;
+        }
+    }
+    return length;
+}
+
+/* The track of a piece by a rule of n places. */
+static inline void series_places(const series *s, int n, double turned, double turn, planar *sum)
+{
+    const double *const places = n == FEW ? PLACES : PLACES + FEW;
+    track_places p;
+    double power[MANY];
+    for (int i = 0; i < n; i++) {
+        p.ahead[i] = s->c[0][U];
+        p.aside[i] = s->c[0][V];
+        p.turn[i] = s->tau * s->c[0][R] * places[i];
+        power[i] = places[i];
+    }
+    for (int k = 1; k <= s->order; k++) {
+        const double angle = s->tau * INVERSE[k + 1] * s->c[k][R];
+        for (int i = 0; i < n; i++) {
+            p.ahead[i] += s->c[k][U] * power[i];
+            p.aside[i] += SWAY == NONE ? 0.0 : s->c[k][V] * power[i];
+            power[i] *= places[i];
+            p.turn[i] += angle * power[i];
+        }
+    }
+    track_add(sum, &p, n == FEW, s->tau, turned, turn);
+}
+
+static inline void series_track(const series *s, double turned, const double way[WIDTH], planar *sum)
+{
+    if (POSE_x == NONE) {
+        return;
+    }
+    if (YAW == NONE || (way[R] == 0.0 && s->c[0][R] == 0.0)) { /* r keeps its sign: it is 0 all along */
+        const planar straight = {way[U], way[V]};
+        track_add_arc(sum, straight, turned, 0.0);
+    } else if (fabs(way[R]) < TURN_OF_FEW && s->order <= ORDER_OF_FEW) {
+        series_places(s, FEW, turned, way[R], sum);
+    } else {
+        series_places(s, MANY, turned, way[R], sum);
+    }
+}
+
+/* The end of a piece as the change of the velocities and the distances; whether it is plain by the sizes of the terms that no
+ * velocity changes its sign on the way, and that it does not turn too much. */
+static inline bool series_end(const series *s, double change[WIDTH], double way[WIDTH])
+{
+    bool plain = true;
+    for (int a = 0; a < WIDTH; a++) {
+        const double c0 = s->c[0][a], c1 = s->c[1][a];
+        plain &= (fabs(c0 + c1) >= s->others[a]) & ((c0 * c1 >= 0.0) | (fabs(c0) > fabs(c1)));
+        change[a] = s->change[a] + c1;
+        way[a] = s->tau * (c0 + (0.5 * c1 + s->mean[a]));
+    }
+    return plain && fabs(way[R]) <= LONGEST_TURN;
+}
+
+/* Whether what is left of every acceleration is rounding of its terms. */
+static bool is_settled(const flow *f, const double v[WIDTH])
+{
+    double couple[WIDTH] = {0.0};
+    rov_couple(f->gains, v, couple);
+    for (int a = 0; a < N_AXES; a++) {
+        const double drag = riccati_drag(&f->gains->axis[a], v[a]);
+        double rate = f->C[a] - drag + couple[a], size = fabs(f->C[a]) + fabs(drag) + fabs(couple[a]);
+        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
+            rate += f->late[c][a];
+            size += fabs(f->late[c][a]);
+        }
+        if (!(fabs(rate) <= 16.0 * DBL_EPSILON * size)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* How much of a piece is taken: as far as its terms reach, of a turn that is not too long, and up to the first reversal,
+ * of the axis *stops. */
+static double series_cut(const series *s, double reach, int *stops)
+{
+    double length = reach, turn = 0.0;
+    for (int n = s->order; n >= 0; n--) {
+        turn += s->tau * fabs(s->c[n][R]) * INVERSE[n + 1];
+    }
+    length = fmin(length, LONGEST_TURN / turn);
+    for (int a = 0; a < N_AXES; a++) {
+        bool reverses;
+        const double end = series_sign_kept(s, a, length, &reverses);
+        *stops = reverses ? a : end < length ? NONE : *stops;
+        length = end;
+    }
+    return length;
+}
+
+/* A step of h seconds: v moves to its end, the distances along the axes and the track go to *way and *sum. False where it
+ * takes too many pieces; of a free motion also where the series does not reach the end at once. */
+static inline bool series_step(flow *f, double v[WIDTH], double h, double way[WIDTH], planar *sum)
+{
+    double tau = h, done = 0.0;
+    series s;
+    for (int pieces = 0; pieces < MOST_PIECES; pieces++) {
+        const double rest = h - done;
+        double change[WIDTH], gone[WIDTH], length = 1.0, reach = 1.0;
+        int stops = NONE;
+        if (!series_grow(f, v, fmin(rest, tau), &s)) {
+            if (IS_FREE) {
+                return false;
+            }
+            reach = series_reach(&s);
+            if (reach == 0.0) { /* it overflows */
+                tau = 1e-3 * s.tau;
+                continue;
+            }
+        }
+        tau = 2.0 * s.tau * reach;
+        if (!series_end(&s, change, gone) || reach < 1.0) {
+            length = series_cut(&s, reach, &stops);
+            if (length < 1.0) {
+                series_shorten(&s, length);
+                series_end(&s, change, gone);
+            }
+        }
+        series_track(&s, way[R], gone, sum);
+        for (int a = 0; a < WIDTH; a++) {
+            v[a] += change[a];
+            way[a] += gone[a];
+        }
+        if (stops != NONE) { /* at rest to the last digit, or what follows would take the branch of before */
+            v[stops] = 0.0;
+        }
+        if (length == 1.0 && s.tau >= rest) {
+            return true;
+        }
+        done += s.tau;
+        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
+            const double fall = exp(-f->gains->rate[c] * s.tau);
+            for (int a = 0; a < N_AXES; a++) {
+                f->late[c][a] *= fall;
+            }
+        }
+        if (!IS_FREE && is_settled(f, v)) {
+            const planar left = {v[U] * (h - done), v[V] * (h - done)};
+            track_add_arc(sum, left, way[R], v[R] * (h - done));
+            for (int a = 0; a < N_AXES; a++) {
+                way[a] += v[a] * (h - done);
+            }
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether a series of ORDER reaches the end of a step: its coefficients fall as (h rate / 2)^n, rate as in panel_length. */
+static inline bool is_in_reach(const rov_gains *gains, const double C[WIDTH], const double v[WIDTH], double h)
+{
+    double longest = SERIES_REACH - 0.5 * SERIES_REACH * h * fabs(v[R]);
+    for (int a = 0; a < N_AXES; a++) {
+        const double A = gains->axis[a].A[v[a] < 0.0], B = gains->axis[a].B[v[a] < 0.0];
+        const double bend = h * (B + 2.0 * A * fabs(v[a])), swing = 4.0 * A * fabs(C[a]) * h * h;
+        longest = bend * bend + swing > SERIES_REACH * SERIES_REACH ? -1.0 : longest;
+    }
+    return longest >= 0.0;
+}
+
+/* The states after h > 0 seconds with the inputs held; not finite only where a result overflows. False where the step takes
+ * more than MOST_PIECES pieces. */
+static bool rov_step(const double at[], const rov_gains *gains, double h, double next[N_STATES])
+{
+    const double *const state = at + FIRST_STATE;
+    double v[WIDTH] = {0.0}, way[WIDTH] = {0.0};
+    planar sum = {0.0, 0.0};
+    rov_held held;
+    flow f = {gains, held.C, {{0.0}}};
+    rov_hold(at, gains, &held);
+    for (int a = 0; a < N_AXES; a++) {
+        v[a] = state[a];
+        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
+            f.late[c][a] = rov_late(gains, &held, state, c, a);
+        }
+    }
+    bool done = (!IS_FREE || is_in_reach(gains, held.C, v, h)) && series_step(&f, v, h, way, &sum);
+    if (IS_FREE && !done) {
+        riccati axis[WIDTH];
+        memcpy(axis, gains->axis, sizeof axis);
+        sum.ahead = sum.aside = 0.0;
+        for (int a = 0; a < N_AXES; a++) {
+            axis[a].C = held.C[a];
+            v[a] = state[a];
+            way[a] = 0.0;
+        }
+        done = closed_step(axis, v, h, way, &sum);
+    }
+    for (int a = 0; a < N_AXES; a++) {
+        next[a] = v[a];
+    }
+    if (POSE_x != NONE) {
+        if (YAW != NONE) {
+            const double psi = rov_value(state, POSE_psi);
+            sum = rotated(sum, cos(psi), sin(psi));
+        }
+        next[POSE_x] = state[POSE_x] + sum.ahead + held.north * h;
+        next[POSE_y] = state[POSE_y] + sum.aside + held.east * h;
+    }
+    if (POSE_z != NONE) {
+        next[POSE_z] = state[POSE_z] + way[HEAVE];
+    }
+    if (POSE_psi != NONE) {
+        next[POSE_psi] = state[POSE_psi] + way[YAW];
+    }
+    for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
+        const double fall = expm1(-gains->rate[c] * h); /* F' = (F(c) - F)/T */
+        for (int t = 0; t < N_THRUSTERS; t++) {
+            if (rov_lags(t) && THRUSTERS[t].curve == c) {
+                const int F = THRUSTERS[t].force - FIRST_STATE;
+                next[F] = state[F] + (state[F] - held.steady[t]) * fall;
+            }
+        }
+    }
+    return done;
+}
