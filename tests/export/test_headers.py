@@ -215,7 +215,7 @@ def test_fused_multiplication_does_not_change_a_bit(
 
 
 _OF_ONE = ("fabs", "sqrt", "sin", "cos", "exp", "log", "log1p", "expm1", "atan", "atanh")
-_OF_TWO = ("fmin", "fmax", "copysign", "hypot", "remainder")
+_OF_TWO = ("fmin", "fmax", "copysign", "hypot", "pow", "remainder")
 # What the sources use of the C library, as Microsoft's headers declare it; those cannot be had from a package.
 _MICROSOFT = {
     "math.h": "#define INFINITY ((float)(1e300 * 1e300))\n#define NAN (-(float)(INFINITY * 0.0f))\n"
