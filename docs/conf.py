@@ -8,8 +8,8 @@ from sphinx.application import Sphinx
 
 from rov_fmu import __version__
 from rov_fmu.export.interface import LOG_CATEGORIES
-from rov_fmu.motion.rov import COEFFICIENTS
 from rov_fmu.pages.templates import number
+from rov_fmu.vehicle.paper import PAPER
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
@@ -48,7 +48,7 @@ TABLES: dict[str, list[tuple[str, ...]]] = {
         ("---",) * 4,
         *(
             (f"`{name}`", meta.unit, f"{number(meta.minimum, 6)}\xa0…\xa0{number(meta.maximum, 6)}", meta.description)
-            for name, meta in COEFFICIENTS.items()
+            for name, meta in PAPER.coefficients.items()
         ),
     ],
     **tables(),
