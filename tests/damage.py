@@ -110,6 +110,24 @@ def changed_toml(content: bytes, data: st.DataObject) -> bytes:
     return tomlkit.dumps(document).encode()
 
 
+def changed_numbers(content: bytes, data: st.DataObject) -> bytes:
+    """Numbers of other sizes, of those that have a place in a TOML file."""
+    document = tomlkit.parse(content.decode()).unwrap()
+    places: list[tuple[Any, Any]] = []
+    tables: list[Any] = [document]
+    while tables:
+        table = tables.pop()
+        for key, value in table.items() if isinstance(table, dict) else enumerate(table):
+            if isinstance(value, dict | list):
+                tables.append(value)
+            elif type(value) in (int, float):
+                places.append((table, key))
+    for _ in range(data.draw(st.integers(1, 3))):
+        table, key = data.draw(st.sampled_from(places))
+        table[key] = data.draw(st.one_of(SIZES.map(lambda size, old=table[key]: old * size), NUMBERS))
+    return tomlkit.dumps(document).encode()
+
+
 def changed_cells(content: bytes, data: st.DataObject) -> bytes:
     """Cells with something else in them, the header's too."""
     rows = [line.split(",") for line in content.decode().splitlines()]

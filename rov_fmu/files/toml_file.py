@@ -77,7 +77,7 @@ def told(problem: ErrorDetails, data: Toml) -> str:
         case "model_type":
             return f"{key} = {shown(problem['input'])}: must be a table of keys and values"
     reason = _OF_WHAT.sub("must ", problem["msg"].removeprefix("Value error, ")).replace(" after validation", "")
-    reason = reason.replace("a valid tuple", "a list")
+    reason = reason.replace("a valid tuple", "a list").replace("a valid dictionary", "a table")
     of_table = problem["type"] == "value_error" and isinstance(problem["input"], dict)
     return f"{key}: {reason}" if of_table else f"{key} = {shown(problem['input'])}: {reason}"
 
@@ -93,5 +93,5 @@ def _key(place: tuple[int | str, ...], data: Any) -> str:
         except (LookupError, TypeError):
             data = None
         name = data.get("name") if isinstance(step, int) and isinstance(data, dict) else step
-        words += f".{name}" if isinstance(name, str) else f"#{int(step) + 1}"
+        words += "." + (name or "''") if isinstance(name, str) else f"#{int(step) + 1}"
     return words.removeprefix(".")

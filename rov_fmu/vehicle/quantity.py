@@ -58,7 +58,7 @@ def within(value: float, meta: Meta) -> float:
     """The value, if it is within the bounds of its coefficient."""
     if not meta.minimum <= value <= meta.maximum:
         unit = "" if meta.unit == "1" else f" {meta.unit}"
-        raise ValueError(f"must be within {meta.minimum:g} ... {meta.maximum:.12g}{unit}")
+        raise ValueError(f"must be within {meta.minimum:.12g} ... {meta.maximum:.12g}{unit}")
     return value
 
 

@@ -18,7 +18,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import REFIT
-from tests.damage import changed_bytes, changed_lines, changed_toml, fuzz
+from tests.damage import changed_bytes, changed_lines, changed_numbers, changed_toml, fuzz
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 EVERYTHING, FIRST = (Path(__file__).with_name(name) for name in ("everything.toml", "first_version.toml"))
@@ -70,7 +70,9 @@ def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int
 
     def check(data: st.DataObject) -> None:
         nonlocal usable
-        change = data.draw(st.sampled_from([changed_toml, changed_toml, changed_lines, changed_bytes]))
+        change = data.draw(
+            st.sampled_from([changed_toml, changed_numbers, changed_numbers, changed_lines, changed_bytes])
+        )
         path.write_bytes(change(data.draw(st.sampled_from(SOURCES)), data))
         try:
             vehicle = load_vehicle(path)
@@ -92,7 +94,7 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
 
     def check(data: st.DataObject) -> None:
         nonlocal tuned
-        path.write_bytes(changed_toml(data.draw(st.sampled_from(SOURCES)), data))
+        path.write_bytes(changed_numbers(data.draw(st.sampled_from(SOURCES)), data))
         try:
             vehicle = load_vehicle(path)
         except VehicleFileError:
@@ -116,7 +118,7 @@ def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path:
     written = path.with_name("written.toml")
 
     def check(data: st.DataObject) -> None:
-        path.write_bytes(changed_toml(data.draw(st.sampled_from(SOURCES)), data))
+        path.write_bytes(changed_numbers(data.draw(st.sampled_from(SOURCES)), data))
         try:
             vehicle = load_vehicle(path)
         except VehicleFileError:
