@@ -1,4 +1,4 @@
-"""The site: `sphinx-build -W docs site`. {{ README.md }} stands for that file, {{ coefficients }} for a table."""
+"""The site: `sphinx-build -W docs site`. {{ README.md }} stands for that file, {{ curve }} for a table."""
 
 import re
 import sys
@@ -8,13 +8,11 @@ from sphinx.application import Sphinx
 
 from rov_fmu import __version__
 from rov_fmu.export.interface import LOG_CATEGORIES
-from rov_fmu.pages.templates import number
-from rov_fmu.vehicle.paper import PAPER
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
-from docs.compared import tables  # noqa: E402 (it stands beside this file)
+from docs import compared, vehicle_file  # noqa: E402 (they stand beside this file)
 
 project = "rov-fmu"
 release = __version__
@@ -43,15 +41,8 @@ html_theme_options = {
 }
 
 TABLES: dict[str, list[tuple[str, ...]]] = {
-    "coefficients": [
-        ("coefficient", "unit", "allowed", "what"),
-        ("---",) * 4,
-        *(
-            (f"`{name}`", meta.unit, f"{number(meta.minimum, 6)}\xa0…\xa0{number(meta.maximum, 6)}", meta.description)
-            for name, meta in PAPER.coefficients.items()
-        ),
-    ],
-    **tables(),
+    **compared.tables(),
+    **vehicle_file.tables(),
     "log_categories": [("category", "what"), ("---",) * 2, *((f"`{n}`", w) for n, w in LOG_CATEGORIES.items())],
 }
 

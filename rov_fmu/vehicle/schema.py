@@ -112,16 +112,17 @@ _Vector = Annotated[
 
 
 class Direction(Strict):
-    """Of a positive force."""
+    """Of its force at a positive command: forward, starboard, down; of any length but zero."""
 
     value: Annotated[_Vector, AfterValidator(_some_length)]
-    """Forward, starboard, down; of any length but zero."""
+    """Forward, starboard, down."""
     source: Text
     """Where it comes from."""
 
 
 class Position(Strict):
-    """From the centre of mass."""
+    """From the centre of mass: forward, starboard, down. Needed for yaw, unless the thruster says `arm` or acts
+    straight up or down."""
 
     value: Annotated[_Vector, AfterValidator(_near)]
     """Forward, starboard, down."""
@@ -134,15 +135,13 @@ class Thruster(Strict):
     """A thruster: its curve and its place."""
 
     name: Symbol
-    """Of its command u_<name> and its force F_<name> in the FMU."""
+    """Stands in the names of its command and its force in the FMU: `u_<name>`, `F_<name>`."""
     description: Name | None = None
     """Words for it: "left thruster"."""
     curve: str
     """Name of its curve."""
     direction: Direction
-    """Of its force at a positive command."""
     position: Position | None = None
-    """From the centre of mass; needed for yaw unless it says `arm` or acts straight up or down."""
     arm: Literal["port", "starboard"] | None = None
     """Instead of a position: the side of a thruster that pushes ahead with the arm R sin γ, (4)."""
 
@@ -190,7 +189,7 @@ class Parts(Strict):
     body: Body | None = None
     arm: Arm | None = None
     curves: dict[Symbol, Curve] = Field(default={}, max_length=MOST)
-    """By name, which stands in the names of their coefficients: a_t_<name>."""
+    """By name, which stands in the names of their coefficients in the FMU: `a_t_<name>`."""
     thruster: list[Thruster] = Field(default=[], max_length=MOST)
     axes: Axes | None = None
     inputs: dict[Symbol, dict[str, _Gain]] = Field(default={}, max_length=MOST)
@@ -225,7 +224,7 @@ class File(Parts):
     validity: Validity
     body: Body
     curves: dict[Symbol, Curve] = Field(min_length=1, max_length=MOST)
-    """By name, which stands in the names of their coefficients: a_t_<name>."""
+    """By name, which stands in the names of their coefficients in the FMU: `a_t_<name>`."""
     thruster: list[Thruster] = Field(min_length=1, max_length=MOST)
     """The thrusters, a table [[thruster]] each, in the order of their variables in the FMU."""
     axes: Axes

@@ -18,6 +18,7 @@ import pytest
 
 from rov_fmu import __version__
 from rov_fmu.cli import main
+from rov_fmu.motion.layout import ARM, AXIS, BODY, CURVE, TUNING
 from rov_fmu.motion.rov import COEFFICIENTS, Inputs, State, Thrust, declared, step
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -234,8 +235,8 @@ def test_site_builds_strictly_and_fetches_nothing(tmp_path: Path) -> None:
     pages = {page.name: page.read_text(encoding="utf-8") for page in tmp_path.glob("*.html")}
     assert {f"{page.stem}.html" for page in (ROOT / "docs").glob("*.md")} <= set(pages)
     assert "ends at u = 0.4729 m/s" in pages["index.html"], "the README is the first page"
-    for coefficient in COEFFICIENTS:
-        assert f">{coefficient}</span>" in pages["vehicle-file.html"]
+    for key in (*BODY, *ARM, *CURVE, *AXIS, *TUNING):
+        assert f">{key}</span>" in pages["vehicle-file.html"]
     for title, page in pages.items():
         assert "{{" not in page, title
         assert not re.findall(r'<(?:script|img|iframe)[^>]*src="(?:https?:)?//|<link[^>]*href="(?:https?:)?//', page), (

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from rov_fmu.cli import main
 from rov_fmu.export.archive import archive, native_content
-from rov_fmu.export.interface import variables
 from rov_fmu.export.osp import osp_model_description
 from rov_fmu.identify.tuning import tune, tuned_values
-from rov_fmu.motion.layout import HEAVE
+from rov_fmu.motion.layout import YAW
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
@@ -60,7 +59,7 @@ def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
     """What FMPy reads and validates of an FMU without binaries."""
     fmu = folder / "only.fmu"
     fmu.write_bytes(archive(native_content(vehicle).files))
-    osp_model_description(variables(vehicle.rov))
+    osp_model_description(vehicle.layout)
     return read_model_description(str(fmu), validate=True)
 
 
@@ -99,14 +98,14 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
             vehicle = load_vehicle(path)
         except VehicleFileError:
             return
-        if not vehicle.layout.has(HEAVE):
+        if not vehicle.layout.has(YAW):
             return
-        form = vehicle.layout.kinds["heave"]
-        force, drag = vehicle.rov.force(HEAVE, 0.3), [vehicle.rov[form.coefficient(key)] for key in ("a_d", "b_d")]
-        if force > 1e-3 and max(drag) > 1e-3 and "F_0" not in form.keys:
-            tuning = tune(vehicle.rov, HEAVE, 0.3, min(1.0, 0.1 * force / sum(drag)))
+        form = vehicle.layout.kinds["yaw"]
+        force, drag = vehicle.rov.force(YAW, 0.3), [vehicle.rov[form.coefficient(key)] for key in ("a_d", "b_d")]
+        if force > 1e-3 and max(drag) > 1e-3:
+            tuning = tune(vehicle.rov, YAW, 0.3, min(1.0, 0.1 * force / sum(drag)))
             write_tuned(path, path.with_name("tuned.toml"), *tuned_values(tuning))
-            assert load_vehicle(path.with_name("tuned.toml")).rov["beta_w"] == vehicle.rov["beta_w"]
+            assert load_vehicle(path.with_name("tuned.toml")).rov["beta_r"] == vehicle.rov["beta_r"]
             tuned += 1
 
     fuzz(check, examples)
