@@ -16,12 +16,18 @@ from rov_fmu.export.compile import BuildError
 from rov_fmu.files.messages import FileError
 from rov_fmu.pages.console import console, table
 from rov_fmu.process import exit_code, run_process
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 from .campaign import Counts, FindingError, build_target, fuzz, pack_corpus, replay, unpack_corpus
 
 _ROUND = 60  # s
+VEHICLES = {
+    "videoray": VIDEORAY,
+    "bare": Path(__file__).with_name("bare.toml"),
+    "bluerov2_heavy": SHIPPED["bluerov2_heavy"],
+}
+"""Closed form; as little as there can be; lag, coupling, curves with reverse and dead band."""
 
 
 def _positive(text: str) -> int:
@@ -38,8 +44,11 @@ def _positive(text: str) -> int:
 @click.option(
     "--jobs", type=_positive, metavar="N", default=cpu_count() or 1, help="Processes (default: one a processor)."
 )
+@click.option("--vehicle", "chosen", type=click.Choice(list(VEHICLES)), help="Only this one (default: all in turn).")
 @click.option("--keep", is_flag=True, help="Put what led to new places into the corpus.")
-def _command(inputs: tuple[Path, ...], calls: int | None, seconds: int | None, jobs: int, keep: bool) -> None:
+def _command(
+    inputs: tuple[Path, ...], calls: int | None, seconds: int | None, jobs: int, chosen: str | None, keep: bool
+) -> None:
     """Turn random bytes into calls of the FMI functions on several instances, and look after each call whether it kept
     its promises, under AddressSanitizer and UndefinedBehaviorSanitizer (clang).
 
@@ -48,26 +57,31 @@ def _command(inputs: tuple[Path, ...], calls: int | None, seconds: int | None, j
     if missing := [path for path in inputs if not path.exists()]:
         raise FileError(f"{missing[0]}: there is no such file")
     with tempfile.TemporaryDirectory(prefix="fuzz-", ignore_cleanup_errors=True) as name:
-        folder = Path(name)
-        target, corpus = folder / "target", folder / "corpus"
-        build_target(native_content(load_vehicle(VIDEORAY)).sources, target)
-        try:
-            if inputs:
-                print(f"{replay(target, inputs, folder).total():,} calls, nothing found")
-                return
-            unpack_corpus(corpus)
-            limit = seconds or (None if calls else _ROUND)
-            _print_counts(*_campaign(target, corpus, jobs, calls, limit))
-        except FindingError as finding:
-            raise FindingError("\n".join([str(finding), *map(_keep, finding.inputs)])) from None
-        if keep:
-            print(f"the corpus now has {pack_corpus(target, corpus)} inputs")
+        corpus = Path(name) / "corpus"
+        names = [chosen] if chosen else list(VEHICLES)
+        targets = {vehicle: Path(name) / vehicle for vehicle in names}
+        for vehicle, target in targets.items():
+            build_target(native_content(load_vehicle(VEHICLES[vehicle])).sources, target)
+        unpack_corpus(corpus)
+        limit, share = seconds or (None if calls else _ROUND), len(targets)
+        for vehicle, target in targets.items():
+            try:
+                if inputs:
+                    print(f"{vehicle}: {replay(target, inputs, Path(name)).total():,} calls, nothing found")
+                    continue
+                counts = _campaign(target, corpus, jobs, calls and calls // share, limit and max(1, limit // share))
+                _print_counts(vehicle, *counts)
+            except FindingError as finding:
+                again = [_keep(vehicle, found) for found in finding.inputs]
+                raise FindingError("\n".join([f"{vehicle}: {finding}", *again])) from None
+        if keep and not inputs:
+            print(f"the corpus now has {pack_corpus(list(targets.values()), corpus)} inputs")
 
 
-def _keep(found: Path) -> str:
+def _keep(vehicle: str, found: Path) -> str:
     """Copy an input here, and say what is in it: on a machine that is thrown away, what is printed is what is left."""
     copy = shutil.copy(found, ".")
-    return f"again with: python -m fuzz {copy}, in base64:\n{b64encode(found.read_bytes()).decode()}"
+    return f"again with: python -m fuzz --vehicle {vehicle} {copy}, in base64:\n{b64encode(found.read_bytes()).decode()}"
 
 
 def _campaign(target: Path, corpus: Path, jobs: int, calls: int | None, seconds: int | None) -> tuple[Counts, float]:
@@ -81,8 +95,8 @@ def _campaign(target: Path, corpus: Path, jobs: int, calls: int | None, seconds:
             return total, spent
 
 
-def _print_counts(counts: Counts, seconds: float) -> None:
-    title = f"{counts.total():,} calls in {seconds:.0f} s, nothing found"
+def _print_counts(vehicle: str, counts: Counts, seconds: float) -> None:
+    title = f"{vehicle}: {counts.total():,} calls in {seconds:.0f} s, nothing found"
     result = table(title, "function", ("accepted", "refused"))
     for name in dict.fromkeys(name for name, _ in counts):
         result.add_row(name, f"{counts[name, True]:,}", f"{counts[name, False]:,}")

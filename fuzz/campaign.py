@@ -40,12 +40,15 @@ def unpack_corpus(folder: Path) -> None:
         kept.extractall(folder)
 
 
-def pack_corpus(target: Path, folder: Path) -> int:
-    """Keep of a folder of inputs those that together reach all that it reaches; how many."""
-    smaller = folder.with_name(f"{folder.name}.smaller")
-    smaller.mkdir()
-    _finish(_start(target, folder.parent, ["-merge=1", "-use_counters=0", str(smaller), str(folder)]), folder.parent)
-    kept = {path.name: path.read_bytes() for path in smaller.iterdir()}
+def pack_corpus(targets: Sequence[Path], folder: Path) -> int:
+    """Keep of a folder of inputs those that together reach all that it reaches in any of the targets; how many."""
+    kept = {}
+    for target in targets:
+        smaller = folder.with_name(f"{target.name}.smaller")
+        smaller.mkdir()
+        arguments = ["-merge=1", "-use_counters=0", str(smaller), str(folder)]
+        _finish(_start(target, folder.parent, arguments), folder.parent)
+        kept |= {path.name: path.read_bytes() for path in smaller.iterdir()}
     CORPUS.write_bytes(archive(kept))
     return len(kept)
 

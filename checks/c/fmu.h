@@ -7,7 +7,6 @@
 
 #include "fmi2FunctionTypes.h"
 
-#include <stddef.h>
 #include <string.h>
 
 #ifdef _WIN32
@@ -24,9 +23,6 @@ typedef void *library;
 static inline library open_library(const char *path) { return dlopen(path, RTLD_NOW | RTLD_LOCAL); }
 static inline void *find_function(library l, const char *name) { return dlsym(l, name); }
 #endif
-
-#define REFERENCE(member) (fmi2ValueReference)(offsetof(rov_variables, member) / sizeof(double))
-enum { N_THRUST = sizeof(rov_thrust) / sizeof(double) };
 
 #define FMI_FUNCTIONS(F)                                                                                              \
     F(Instantiate) F(FreeInstance) F(SetupExperiment) F(EnterInitializationMode) F(ExitInitializationMode)            \

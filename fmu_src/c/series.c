@@ -285,7 +285,8 @@ static inline bool series_end(const series *s, double change[WIDTH], double way[
     bool plain = true;
     for (int a = 0; a < WIDTH; a++) {
         const double c0 = s->c[0][a], c1 = s->c[1][a];
-        plain &= (fabs(c0 + c1) >= s->others[a]) & ((c0 * c1 >= 0.0) | (fabs(c0) > fabs(c1)));
+        const double kept = c0 * c1 < 0.0 ? fabs(c0) - fabs(c1) : fabs(c0) + fabs(c1); /* of the first two, at the end */
+        plain &= kept >= s->others[a];
         change[a] = s->change[a] + c1;
         way[a] = s->tau * (c0 + (0.5 * c1 + s->mean[a]));
     }

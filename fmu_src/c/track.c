@@ -3,7 +3,7 @@
 #include <float.h>
 
 enum {
-    MOST_PIECES = 100000, /* of a step: 1,000 s at rates of 100/s, or 200,000 rad; beyond it is refused */
+    MOST_PIECES = 10000, /* of a step: 1,000 s at rates of 5/s that never settle, or 20,000 rad; beyond it is refused */
     FEW = 4,              /* places of a rule, and terms of sine and cosine that are enough */
     MANY = 8,
     TERMS_FEW = 5,

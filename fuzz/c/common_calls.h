@@ -167,11 +167,11 @@ static void call_fmi2GetReal(slot *s)
     bool good = n == 0 || (vr != NULL && values != NULL), derived = false;
     for (size_t i = 0; i < n && vr != NULL; i++) {
         good = good && vr[i] < N_VARIABLES;
-        derived = derived || (vr[i] >= FIRST_CALCULATED && vr[i] < FIRST_CALCULATED + N_STATES);
+        derived = derived || (vr[i] >= FIRST_CALCULATED && vr[i] < (N_LAGGING > 0 ? FIRST_COEFFICIENT : FIRST_THRUST));
     }
     verdict wanted = legal(s, CALL_fmi2GetReal, good);
     if (wanted == ACCEPTED && derived && !is_moderate(s->f)) {
-        wanted = EITHER; /* a derivative may overflow */
+        wanted = EITHER; /* a derivative may overflow, and what follows from forces that are states */
     }
     check_results("fmi2GetReal", CALL_AS(s, wanted, false, fmi2GetReal, s->f, vr, n, values), values, n);
 }
@@ -205,7 +205,7 @@ static void call_fmi2SetReal(slot *s)
             for (size_t j = i + 1; j < n; j++) {
                 later = later || vr[j] == vr[i];
             }
-            PROPERTY(later || memcmp(&s->f->now.values.at[vr[i]], &values[i], sizeof(double)) == 0, "not set");
+            PROPERTY(later || memcmp(&s->f->now.values[vr[i]], &values[i], sizeof(double)) == 0, "not set");
         }
     }
 }

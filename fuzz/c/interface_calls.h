@@ -48,7 +48,7 @@ static void call_fmi2SetContinuousStates(slot *s)
         good = isfinite(x[i]);
     }
     if (CALL(s, good, true, fmi2SetContinuousStates, s->f, x, n)) {
-        PROPERTY(memcmp(&s->f->now.values.at[FIRST_STATE], x, n * sizeof *x) == 0, "not set");
+        PROPERTY(memcmp(&s->f->now.values[FIRST_STATE], x, n * sizeof *x) == 0, "not set");
     }
 }
 
@@ -116,11 +116,11 @@ static void call_fmi2DoStep(slot *s)
     }
     before_call();
     verdict wanted = legal(s, CALL_fmi2DoStep, good != REFUSED);
-    if (wanted == ACCEPTED && !(good == ACCEPTED && is_moderate(s->f) && h <= 1e30)) {
+    if (wanted == ACCEPTED && !(good == ACCEPTED && is_moderate(s->f) && is_calm(s->f, h))) {
         wanted = EITHER;
     }
     const fmi2Status status = fmi2DoStep(s->f, t, h, take_bool());
-    if (wanted == EITHER && s->f->now.mode == FAILED) { /* it overflows: nothing else may have changed */
+    if (wanted == EITHER && s->f->now.mode == FAILED) { /* it overflows, or takes too many pieces: nothing else may have changed */
         PROPERTY(status == fmi2Error, "a failed step returns %d", (int)status);
         s->at.mode = before(s)->now.mode = FAILED;
     }

@@ -3,21 +3,71 @@
 
 #include "world.h"
 
-/* Where drag balances the force. */
-static double equilibrium(const riccati *axis)
+/* What the forces of the moment, and those that the lags leave, can accelerate each axis by. */
+static void strongest(const fmu *f, double C[N_AXES])
 {
-    const double root = hypot(axis->B, 2.0 * sqrt(axis->A) * sqrt(fabs(axis->C)));
-    return axis->C == 0.0 ? 0.0 : 2.0 * axis->C / (axis->B + root);
+    rov_held held;
+    rov_hold(f->now.values, &f->gains, &held);
+    for (int a = 0; a < N_AXES; a++) {
+        C[a] = held.C[a];
+        for (int t = 0; t < N_THRUSTERS && N_LAGGING > 0; t++) {
+            const double late = rov_lags(t) ? f->now.values[THRUSTERS[t].force] - held.steady[t] : 0.0;
+            C[a] = fabs(C[a]) + fabs(f->gains.push[t][a] * late);
+        }
+    }
+}
+
+/* The fastest that a motion can get along each axis within h. Drag only brakes, and the coupling does no work: the root n of
+ * the sum of M v^2, twice the kinetic energy, grows by no more than that of the sum of F^2/M in a second. */
+static void fastest(const fmu *f, double h, double v[N_AXES])
+{
+    double C[N_AXES], energy = 0.0, power = 0.0;
+    strongest(f, C);
+    for (int a = 0; a < N_AXES; a++) {
+        energy = hypot(energy, f->now.values[FIRST_STATE + a] / sqrt(f->gains.gain[a]));
+        power = hypot(power, C[a] / sqrt(f->gains.gain[a]));
+    }
+    for (int a = 0; a < N_AXES; a++) {
+        const double alone = fabs(f->now.values[FIRST_STATE + a]) + fabs(C[a]) * h;
+        v[a] = IS_COUPLED ? sqrt(f->gains.gain[a]) * (energy + power * h) : alone;
+    }
+}
+
+/* Whether a step takes few enough pieces in any case: its rates come to no more than 1,000 over it. */
+static bool is_calm(const fmu *f, double h)
+{
+    double v[N_AXES], rates;
+    fastest(f, h, v);
+    rates = rov_value(v, YAW);
+    for (int a = 0; a < N_AXES && !IS_FREE; a++) {
+        const double coupling = fabs(f->gains.c_u) + fabs(f->gains.c_v) + fabs(f->gains.c_r);
+        for (int back = 0; back < 2; back++) {
+            rates += f->gains.axis[a].B[back] + f->gains.axis[a].A[back] * v[a];
+        }
+        rates += coupling * v[a];
+    }
+    return h <= 1e30 && rates * h <= 1e3;
+}
+
+/* ---- Axes alone ---- */
+
+/* Where drag balances the force. */
+static double equilibrium(const riccati *axis, double C)
+{
+    const double A = axis->A[C < 0.0], B = axis->B[C < 0.0];
+    const double root = hypot(B, 2.0 * sqrt(A) * sqrt(fabs(C)));
+    return C == 0.0 ? 0.0 : 2.0 * C / (B + root);
 }
 
 /* A velocity has gone from where it was towards its equilibrium and not beyond; without force, to the last bit. */
-static void check_velocity(const char *name, const riccati *axis, double v0, double v)
+static void check_velocity(const char *name, const riccati *axis, double C, double v0, double v)
 {
-    const double limit = equilibrium(axis);
+    const double limit = equilibrium(axis, C);
     PROPERTY(isfinite(v), "%s is %g", name, v);
-    if (axis->C == 0.0) {
+    if (C == 0.0) {
+        const int back = v0 < 0.0;
         PROPERTY(fabs(v) <= fabs(v0) && v * v0 >= 0.0, "%s without force: from %a to %a", name, v0, v);
-        PROPERTY(v == v0 || axis->A > 0.0 || axis->B > 0.0, "%s without drag: from %a to %a", name, v0, v);
+        PROPERTY(v == v0 || axis->A[back] > 0.0 || axis->B[back] > 0.0, "%s without drag: from %a to %a", name, v0, v);
     }
     if (isfinite(limit)) {
         const double rounding = 8.0 * DBL_EPSILON * fmax(fabs(v0), fabs(limit)) + DBL_MIN;
@@ -32,43 +82,72 @@ static double rounding_of_way(double v, double h, double from, double to)
     return 64.0 * DBL_EPSILON * (fabs(v) * h + fabs(from) + fabs(to)) + DBL_MIN * (1.0 + h);
 }
 
-/* A velocity that only rises or only falls covers no less than the lower of its ends would, no more than the higher. */
-static void check_way(const char *name, double v0, double v, double h, double from, double to)
+/* Between two velocities that are the bounds all the way, no less is covered than at the lower and no more than at the
+ * higher. */
+static void check_way(const char *name, double low, double high, double h, double from, double to)
 {
-    const double low = fmin(v0, v) * h, high = fmax(v0, v) * h;
-    const double rounding = rounding_of_way(fmax(fabs(v0), fabs(v)), h, from, to);
-    PROPERTY(!isfinite(rounding) || (to - from >= low - rounding && to - from <= high + rounding),
-             "%s goes from %a to %a in %a, at %a to %a", name, from, to, h, v0, v);
+    const double rounding = rounding_of_way(fmax(fabs(low), fabs(high)), h, from, to);
+    PROPERTY(!isfinite(rounding) || (to - from >= low * h - rounding && to - from <= high * h + rounding),
+             "%s goes from %a to %a in %a, at %a to %a", name, from, to, h, low, high);
 }
 
 /* A turn does not make the way longer. */
-static void check_track(const rov_inputs *in, const rov_state *from, const rov_state *to, double h)
+static void check_track(const double before[], const double after[], double fastest_way, double h)
 {
-    const double fastest = fmax(fabs(from->u), fabs(to->u));
-    const double north = in->V_N * h, east = in->V_E * h;
-    const double way = hypot(to->x - from->x - north, to->y - from->y - east);
-    const double rounding = rounding_of_way(fastest, h, hypot(from->x, from->y), hypot(to->x, to->y))
-                            + rounding_of_way(hypot(in->V_N, in->V_E), h, 0.0, 0.0);
-    PROPERTY(!isfinite(rounding) || way <= fastest * h + rounding, "%a at no more than %a for %a", way, fastest, h);
+    const double *const from = before + FIRST_STATE, *const to = after + FIRST_STATE;
+    const double current[] = {rov_value(before, MAYBE_V_N), rov_value(before, MAYBE_V_E)};
+    const double x = rov_value(from, POSE_x), y = rov_value(from, POSE_y);
+    const double north = rov_value(to, POSE_x), east = rov_value(to, POSE_y);
+    const double way = hypot(north - x - current[0] * h, east - y - current[1] * h);
+    const double rounding = rounding_of_way(fastest_way, h, hypot(x, y), hypot(north, east))
+                            + rounding_of_way(hypot(current[0], current[1]), h, 0.0, 0.0);
+    PROPERTY(!isfinite(rounding) || way <= fastest_way * h + rounding, "%a at no more than %a for %a", way, fastest_way, h);
 }
 
 static void check_step(const fmu *start, const fmu *end, double h)
 {
-    const rov_variables *const v = &start->now.values.named;
-    const rov_gains forced = rov_axes(&v->coefficients, &start->gains, &v->inputs);
-    const rov_state *const from = &v->state, *const to = &end->now.values.named.state;
-    check_velocity("u", &forced.surge, from->u, to->u);
-    check_velocity("w", &forced.heave, from->w, to->w);
-    check_velocity("r", &forced.yaw, from->r, to->r);
-    check_way("z", from->w, to->w, h, from->z, to->z);
-    check_way("psi", from->r, to->r, h, from->psi, to->psi);
-    check_track(&v->inputs, from, to, h);
+    const double *const from = start->now.values + FIRST_STATE, *const to = end->now.values + FIRST_STATE;
+    double C[N_AXES], most[N_AXES], low[N_AXES], high[N_AXES];
+    rov_held held;
+    rov_hold(start->now.values, &start->gains, &held);
+    strongest(start, C);
+    fastest(start, h, most);
+    for (int a = 0; a < N_AXES; a++) {
+        const char *const name = VARIABLES[FIRST_STATE + a].name;
+        const double room = most[a] + 1e-9 * most[a]; /* of thousands of pieces, rounded */
+        if (IS_FREE) {
+            check_velocity(name, &start->gains.axis[a], held.C[a], from[a], to[a]);
+        } else {
+            PROPERTY(isfinite(to[a]) && !(fabs(to[a]) > room + DBL_MIN), "%s: from %a to %a, at most %a", name, from[a], to[a],
+                     most[a]);
+        }
+        low[a] = IS_FREE ? fmin(from[a], to[a]) : -room;
+        high[a] = IS_FREE ? fmax(from[a], to[a]) : room;
+    }
+    for (int t = 0; t < N_THRUSTERS; t++) {
+        if (rov_lags(t)) {
+            const int F = THRUSTERS[t].force - FIRST_STATE;
+            const double rounding = 4.0 * DBL_EPSILON * (fabs(from[F]) + fabs(held.steady[t]));
+            PROPERTY(to[F] >= fmin(from[F], held.steady[t]) - rounding && to[F] <= fmax(from[F], held.steady[t]) + rounding,
+                     "F of thruster %d: from %a to %a, beyond %a", t, from[F], to[F], held.steady[t]);
+        }
+    }
+    if (POSE_z != NONE) {
+        check_way("z", rov_value(low, HEAVE), rov_value(high, HEAVE), h, rov_value(from, POSE_z), rov_value(to, POSE_z));
+    }
+    if (POSE_psi != NONE) {
+        check_way("psi", rov_value(low, YAW), rov_value(high, YAW), h, rov_value(from, POSE_psi), rov_value(to, POSE_psi));
+    }
+    if (POSE_x != NONE) {
+        const double ahead = fmax(fabs(rov_value(low, SURGE)), fabs(rov_value(high, SURGE)));
+        const double aside = fmax(fabs(rov_value(low, SWAY)), fabs(rov_value(high, SWAY)));
+        check_track(start->now.values, end->now.values, hypot(ahead, aside), h);
+    }
 }
 
 /* The gains and the mode are the expected ones; states and thrust can be read and are finite. */
 static void check_instance(const slot *s)
 {
-    enum { N_THRUST = sizeof(rov_thrust) / sizeof(double) };
     fmi2ValueReference vr[N_STATES + N_THRUST];
     double values[N_STATES + N_THRUST];
     for (unsigned i = 0; i < N_STATES + N_THRUST; i++) {
@@ -78,14 +157,15 @@ static void check_instance(const slot *s)
         return;
     }
     rov_gains gains;
-    rov_prepare(&s->f->now.values.named.coefficients, &gains);
+    rov_prepare(s->f->now.values, &gains);
     PROPERTY(memcmp(&gains, &s->f->gains, sizeof gains) == 0, "the gains are those of other coefficients");
     PROPERTY(s->f->now.mode == s->at.mode && s->f->now.type == s->at.type, "in %s instead of %s",
              mode_name(s->f->now.mode), mode_name(s->at.mode));
+    const unsigned n = N_LAGGING > 0 && !is_moderate(s->f) ? N_STATES : N_STATES + N_THRUST; /* a torque may overflow */
     before_call();
-    PROPERTY(fmi2GetReal(s->f, vr, N_STATES + N_THRUST, values) == fmi2OK, "the outputs cannot be read");
+    PROPERTY(fmi2GetReal(s->f, vr, n, values) == fmi2OK, "the outputs cannot be read");
     PROPERTY(is_same(s, true), "to read changes the instance");
-    for (int i = 0; i < N_STATES + N_THRUST; i++) {
+    for (unsigned i = 0; i < n; i++) {
         PROPERTY(isfinite(values[i]), "%s = %g", VARIABLES[vr[i]].name, values[i]);
     }
 }

@@ -121,6 +121,6 @@ static void call_fmi2DeSerializeFMUstate(slot *s)
     const int mode = (int)state->mode;
     PROPERTY((modes & mode) != 0 && (mode & (mode - 1)) == 0, "a state in mode %d", mode);
     for (int i = 0; i < N_VARIABLES; i++) {
-        PROPERTY(isfinite(state->values.at[i]), "a state with %s = %g", VARIABLES[i].name, state->values.at[i]);
+        PROPERTY(isfinite(state->values[i]), "a state with %s = %g", VARIABLES[i].name, state->values[i]);
     }
 }

@@ -84,7 +84,7 @@ static void replay(slot *s)
         position = start;
         trace = 0;
         run(runner, length);
-        note(&runner->f->now.values.at, FIRST_CALCULATED * sizeof(double));
+        note(runner->f->now.values, FIRST_CALCULATED * sizeof(double));
         note(&runner->f->now.time, sizeof(double));
         traces[i] = trace;
     }

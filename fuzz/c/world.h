@@ -160,7 +160,8 @@ static void note(const void *bytes, size_t size)
 static void copy_instance(unsigned char *to, const fmu *from)
 {
     memcpy(to, from, sizeof *from);
-    memset(&((fmu *)(void *)to)->now.values.at[FIRST_CALCULATED], 0, sizeof(rov_state) + sizeof(rov_thrust));
+    memset(&((fmu *)(void *)to)->now.values[FIRST_CALCULATED], 0,
+           (N_STATES + N_THRUST) * sizeof(double));
 }
 
 static fmu *before(const slot *s)
@@ -237,10 +238,13 @@ static bool after_call(const slot *s, call which, verdict wanted, fmi2Status sta
 /* Far from where a result can overflow. */
 static bool is_moderate(const fmu *f)
 {
+    const double coupling[] = {f->gains.c_u, f->gains.c_v, f->gains.c_r};
+    bool moderate = true;
     for (int i = 0; i < FIRST_CALCULATED; i++) {
-        if (fabs(f->now.values.at[i]) > 1e30) {
-            return false;
-        }
+        moderate = moderate && fabs(f->now.values[i]) <= 1e30;
     }
-    return true;
+    for (int i = 0; i < 3; i++) {
+        moderate = moderate && fabs(coupling[i]) <= 1e30; /* nor is a NaN, of beta = 0 */
+    }
+    return moderate;
 }

@@ -21,8 +21,8 @@ from .riccati import Riccati
 
 ORDER = 20
 """Of the polynomials: more costs more than the longer pieces save."""
-MOST_PIECES = 100_000
-"""In a step: 1,000 s at rates of 100/s, which no vehicle has. Beyond, the motion is not computed."""
+MOST_PIECES = 10_000
+"""In a step: 1,000 s at rates of 5/s that never settle, or 20,000 rad. Beyond, the motion is not computed."""
 
 _EPS = 2.0**-53
 _HALVINGS = 20  # down to a millionth of a piece: there a velocity that just touches zero has no drag worth a sign
