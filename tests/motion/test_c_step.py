@@ -1,0 +1,87 @@
+"""A step in C is that in Python and that to 50 digits, for vehicles with and without a closed form."""
+
+import ctypes
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from checks import reference
+from checks.c_programs import compile_c
+from rov_fmu.export.archive import native_content
+from rov_fmu.export.interface import variables
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+Values = dict[str, float]
+Step = Callable[[Rov, Values, Values, float], Values]
+VEHICLES = ("videoray", "bluerov2_heavy")
+
+
+@pytest.fixture(scope="module", params=VEHICLES)
+def vehicle(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Rov, Step]:
+    loaded = load_vehicle(SHIPPED[request.param])
+    output = tmp_path_factory.mktemp("step") / "step.so"
+    sources = native_content(loaded).sources
+    library = ctypes.CDLL(str(compile_c(Path(__file__).with_name("step.c"), output, sources, "-shared", "-fPIC",
+                                        "-Wno-unused-function")))  # fmt: skip
+    library.step.argtypes, library.step.restype = (ctypes.c_void_p, ctypes.c_double), ctypes.c_bool
+
+    def step(rov: Rov, inputs: Values, state: Values, h: float) -> Values:
+        given = {**rov.coefficients, **inputs, **state}
+        names = [variable.name for variable in variables(rov)]
+        at = (ctypes.c_double * len(names))(*(given.get(name, 0.0) for name in names))
+        assert library.step(at, h)
+        return {name: at[names.index(name)] for name in state}
+
+    return loaded.rov, step
+
+
+def case(rov: Rov, rng: random.Random) -> tuple[Values, Values, float]:
+    """Inputs, states and a step; some velocities and forces are 0, commands reach into the dead band and beyond ±1."""
+
+    def number(scale: float) -> float:
+        return 0.0 if rng.random() < 0.15 else rng.gauss(0.0, scale)
+
+    layout = rov.layout
+    inputs = {name: rng.uniform(-1.1, 1.1) if rng.random() < 0.8 else 0.0 for name in layout.commands}
+    inputs |= {name: number(0.3) for name in layout.inputs if name not in inputs}
+    state = {name: number(5.0 if name in layout.lagging else 0.7) for name in layout.state}
+    return inputs, state, 10.0 ** rng.uniform(-6.0, 3.0)
+
+
+@pytest.mark.parametrize(("seed", "cases"), [(1, 60), pytest.param(2, 2000, marks=pytest.mark.long)])
+def test_a_step_in_c_is_that_in_python(vehicle: tuple[Rov, Step], seed: int, cases: int) -> None:
+    rov, step = vehicle
+    rng = random.Random(seed)
+    for _ in range(cases):
+        inputs, state, h = case(rov, rng)
+        found, expected = step(rov, inputs, state, h), rov.step(inputs, state, h)
+        for name, value in expected.items():
+            room = 1e-13 * (1.0 + 10.0 * h) if name in rov.layout.pose else 1e-13 * (1.0 + abs(value))
+            assert abs(found[name] - value) <= room, (name, inputs, state, h)
+
+
+@pytest.mark.parametrize(("seed", "cases"), [(3, 8), pytest.param(4, 200, marks=pytest.mark.long)])
+def test_a_step_in_c_is_exact(vehicle: tuple[Rov, Step], seed: int, cases: int) -> None:
+    """Against 50 digits, by what the error of a velocity and of a pose is measured."""
+    rov, step = vehicle
+    rng = random.Random(seed)
+    for _ in range(cases):
+        inputs, state, h = case(rov, rng)
+        found, exact = step(rov, inputs, state, h), reference.step(rov, inputs, state, h)
+        for name, value in exact.state.items():
+            pose = name in rov.layout.pose
+            room = (1e-13 if pose else 1e-14) * exact.scale[name] + 2.0**-51 * abs(state[name]) * pose
+            assert abs(found[name] - value) <= room, (name, inputs, state, h, float(found[name] - value))
+
+
+def test_a_step_of_too_many_pieces_is_refused(vehicle: tuple[Rov, Step]) -> None:
+    rov, step = vehicle
+    still = dict.fromkeys(rov.layout.inputs, 0.0)
+    state = dict.fromkeys(rov.layout.state, 0.0) | {"u": 1.0, "r": 1e30}
+    frictionless = rov.replaced({"a_d_r": 0.0, "b_d_r": 0.0})
+    with pytest.raises(AssertionError):
+        step(frictionless, still, state, 1.0)
