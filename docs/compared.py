@@ -104,7 +104,7 @@ def _t200(vehicle: Vehicle) -> Table:
         "shipped": np.array([vehicle.rov.curve_force(curve, float(x)) for x in c]),
         "one symmetric quadratic": (a * abs(c) + b) * c,
     }
-    found = _table("", "RMS forward", "RMS in reverse", "furthest", "at full forward")
+    found = _table("", "RMS forward", "RMS in reverse", "furthest", "at 99 % forward")
     for name, model in models.items():
         off = model - thrust
         sides = [float(np.sqrt(np.mean(off[side] ** 2))) for side in (c > 0.0, c < 0.0)]
