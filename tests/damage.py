@@ -113,7 +113,7 @@ def changed_toml(content: bytes, data: st.DataObject) -> bytes:
 def changed_numbers(content: bytes, data: st.DataObject) -> bytes:
     """Numbers of other sizes, of those that have a place in a TOML file."""
     document = tomlkit.parse(content.decode()).unwrap()
-    places: list[tuple[Any, Any]] = []
+    places: list[tuple[Any, Any, float]] = []
     tables: list[Any] = [document]
     while tables:
         table = tables.pop()
@@ -121,10 +121,10 @@ def changed_numbers(content: bytes, data: st.DataObject) -> bytes:
             if isinstance(value, dict | list):
                 tables.append(value)
             elif type(value) in (int, float):
-                places.append((table, key))
+                places.append((table, key, value))
     for _ in range(data.draw(st.integers(1, 3))):
-        table, key = data.draw(st.sampled_from(places))
-        table[key] = data.draw(st.one_of(SIZES.map(lambda size, old=table[key]: old * size), NUMBERS))
+        table, key, value = data.draw(st.sampled_from(places))
+        table[key] = value * data.draw(SIZES) if data.draw(st.booleans()) else data.draw(NUMBERS)
     return tomlkit.dumps(document).encode()
 
 
