@@ -7,7 +7,7 @@ import pytest
 from hypothesis import settings
 
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi2 import Fmu
 
@@ -22,6 +22,11 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture(scope="session")
 def vehicle() -> Vehicle:
     return load_vehicle(VIDEORAY)
+
+
+@pytest.fixture(scope="session")
+def heavy() -> Vehicle:
+    return load_vehicle(SHIPPED["bluerov2_heavy"])
 
 
 @pytest.fixture(scope="session")

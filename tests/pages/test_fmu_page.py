@@ -4,31 +4,36 @@ import re
 import struct
 from collections.abc import Callable
 from dataclasses import replace
+from math import atan2, hypot, sin
 from pathlib import Path
 
 import pytest
 from lxml import html
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 
 from rov_fmu.export.archive import Content, native_content, python_content
 from rov_fmu.export.interface import variables
+from rov_fmu.pages.drawing import draw_thrusters, place
 from rov_fmu.pages.fmu_page import documentation, documentation_page
 from rov_fmu.pages.paper_figures import write_figures
 from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.layouts import LAYOUTS, a_vehicle
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
 
 
 @pytest.fixture(scope="module")
 def page(vehicle: Vehicle) -> str:
-    return documentation_page(vehicle, variables(vehicle.coefficients))
+    return documentation_page(vehicle)
 
 
 @pytest.fixture(scope="module")
 def bare_page(vehicle: Vehicle) -> str:
     """Of a vehicle without a data folder."""
-    return documentation_page(replace(vehicle, data=None), variables(vehicle.coefficients))
+    return documentation_page(replace(vehicle, data=None))
 
 
 def rows(page: str) -> list[list[str]]:
@@ -40,7 +45,7 @@ def test_page_is_whole_html(page: str) -> None:
     assert page.startswith("<!DOCTYPE html>")
     root = html.document_fromstring(page, ensure_head_body=True)
     assert root.get("lang") == "en"
-    assert len(root.findall(".//svg")) == 8
+    assert len(root.findall(".//svg")) == 12
     links = {a.get("href").removeprefix("#") for a in root.iter("a")}
     ids = [e.get("id") for e in root.iter() if isinstance(e.tag, str) and e.get("id")]
     assert links <= set(ids)
@@ -68,16 +73,16 @@ def test_page_is_whole_html(page: str) -> None:
 
 def test_every_variable_has_its_row(page: str, vehicle: Vehicle) -> None:
     table = rows(page)
-    for v in variables(vehicle.coefficients):
+    for v in variables(vehicle.rov):
         unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
         limits = ["" if value is None else number(value) for value in (v.start, v.minimum, v.maximum)]
         assert [v.name, v.description, v.causality, v.variability, unit, *limits] in table
 
 
 def test_every_coefficient_has_its_source(page: str, vehicle: Vehicle) -> None:
-    table = {row[0]: row for row in rows(page) if len(row) == 5}
+    table = {row[0]: row for row in rows(page) if len(row) == 5}  # that of the coefficients comes last
     for name, source in vehicle.sources.items():
-        assert table[name][2] == number(getattr(vehicle.coefficients, name))
+        assert table[name][2] == number(vehicle.rov[name])
         assert table[name][4] == source
 
 
@@ -128,44 +133,39 @@ def test_references_within_plots_resolve(page: str) -> None:
 
 
 def test_small_and_the_same_twice(page: str, vehicle: Vehicle) -> None:
-    assert documentation_page(vehicle, variables(vehicle.coefficients)) == page
+    assert documentation_page(vehicle) == page
     assert len(page.encode()) < 150_000
 
 
 def test_goes_without_a_data_folder(bare_page: str) -> None:
     root = html.fromstring(bare_page)
     assert root.get_element_by_id("tables", None) is None
-    assert len(root.findall(".//svg")) == 8
+    assert len(root.findall(".//svg")) == 12
     assert "printed" not in bare_page
 
 
 def test_text_of_the_vehicle_file_is_escaped(vehicle: Vehicle) -> None:
     odd = replace(vehicle, name=ODD_NAME, description="<script>", data=None)
-    root = html.fromstring(documentation_page(odd, variables(vehicle.coefficients)))
+    root = html.fromstring(documentation_page(odd))
     assert root.findtext(".//h1") == ODD_NAME
     assert not list(root.iter("script"))
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "limits"),
     [
-        {"a_t_rear": 100.3, "b_t_rear": -27.09},
-        {"alpha_u": 0.0, "beta_w": 0.0, "R": 0.0},
-        {"a_d_u": 0.0, "b_d_w": 0.0},
-        {"a_t_top": -6.0},
-        {"m_rov": 1e-3, "a_t_rear": 1e6},
+        ({"a_t_rear": 100.3, "b_t_rear": -27.09}, (0.0, 1.0)),
+        ({"alpha_u": 0.0, "beta_w": 0.0, "R": 0.0, "a_d_u": 0.0, "b_d_w": 0.0, "a_t_top": -6.0}, (0.2, 0.201)),
+        ({"m_rov": 1e-3, "a_t_rear": 1e6}, (0.001, 0.002)),
     ],
     ids=str,
 )
-def test_any_coefficients(vehicle: Vehicle, changes: dict[str, float]) -> None:
-    k = replace(vehicle.coefficients, **changes)
-    page = documentation_page(replace(vehicle, coefficients=k), variables(k))
-    assert ("The rear thrust is negative below 27 %." in page) == (k.b_t_rear < 0.0)
-
-
-@pytest.mark.parametrize("limits", [(0.0, 1.0), (0.2, 0.201), (0.001, 0.002)])
-def test_any_range_of_commands(vehicle: Vehicle, limits: tuple[float, float]) -> None:
-    assert documentation_page(replace(vehicle, command_range=limits, data=None), variables(vehicle.coefficients))
+def test_any_coefficients_and_any_range_of_commands(
+    vehicle: Vehicle, changes: dict[str, float], limits: tuple[float, float]
+) -> None:
+    changed = replace(vehicle, rov=vehicle.rov.replaced(changes), command_range=limits, data=None)
+    page = documentation_page(changed)
+    assert ("The rear thrust is negative below 27 %." in page) == (changed.rov["b_t_rear"] < 0.0)
 
 
 @pytest.mark.parametrize(
@@ -206,8 +206,7 @@ def test_picture_of_the_readme(tmp_path: Path) -> None:
 
 
 def test_the_page_of_the_python_flavour_claims_no_more_than_it_does(vehicle: Vehicle) -> None:
-    declared = variables(vehicle.coefficients)
-    native, python = (documentation_page(vehicle, declared, native=native) for native in (True, False))
+    native, python = (documentation_page(vehicle, native=native) for native in (True, False))
     for claim in ("Model Exchange", "fmi2Discard", "Directional derivatives", "First derivatives"):
         assert claim in native
         assert claim not in python
@@ -232,3 +231,102 @@ def test_nothing_of_the_videoray_stands_in_the_fmu_of_another_vehicle(
             for claim in ("videoray", "#f6b90c", *(limit.lower() for limit in vehicle.limits)):
                 assert claim not in text, (name, claim)
     assert b"It leaks." in files["documentation/index.html"]
+
+
+# ---- Other vehicles ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def heavy_page(heavy: Vehicle) -> str:
+    intervals = {"a_d_u": (130.5, 151.5)}
+    return documentation_page(replace(heavy, intervals=intervals))
+
+
+def words(page: str) -> str:
+    """What a reader sees, without the plots."""
+    root = html.fromstring(page)
+    for plot in root.findall(".//svg"):
+        plot.drop_tree()
+    return " ".join(root.text_content().split())
+
+
+def test_a_vehicle_with_lag_and_coupling_is_told_as_it_is(heavy_page: str) -> None:
+    text, table = words(heavy_page), rows(heavy_page)
+    for said in (
+        "eight thrusters",
+        "surge, sway, heave and yaw",
+        "lag of first order",
+        "Coriolis and Munk",
+        "dead band",
+        "16 continuous states",
+        "a_t_t200_reverse",
+        "tau_t200",
+        "With all inputs zero, the constant load",
+    ):
+        assert said in text, said
+    for said in (
+        "rear thruster",
+        "Table 9",
+        "Tables 6",
+        "closed-form solution",
+        "one axis reads",
+        "R sin",
+        "paper calls",
+    ):
+        assert said not in text, said
+    assert ["1 thruster 1 (front starboard)", "u_1", "t200", "−0.7071, 0.7071, 0", "0.156, 0.111, 0.085"] in table
+    (row,) = [row for row in table if row[0] == "a_d_u" and len(row) == 6]
+    assert row[2:4] == ["141", "130.5 … 151.5"]
+
+
+def test_the_commands_told_drive_the_vehicle_as_told(heavy: Vehicle, heavy_page: str) -> None:
+    """Both directions where they differ, by the equation of the steady state: a_d V^2 + b_d V = F + F_0."""
+    table = {row[0]: row for row in rows(heavy_page) if row and row[0].startswith(("Surge (", "Heave "))}
+    assert table["Heave up (m/s)"][1] == "u_5 = −c, u_6 = −c, u_7 = −c, u_8 = −c"
+    k = heavy.rov
+    for name, end, sign in (("Heave down (m/s)", "", 1.0), ("Heave up (m/s)", "_reverse", -1.0)):
+        V = sign * float(table[name][-2].replace("−", "-"))  # at full command, to three digits
+        m = 1.0 - k["c_0_t200"]
+        force = 4.0 * (k[f"a_t_t200{end}"] * m**2 + k[f"b_t_t200{end}"] * m) + sign * k["F_0_w"]
+        assert k["a_d_w"] * V**2 + k["b_d_w"] * V == pytest.approx(force, rel=2e-3)
+
+
+@pytest.mark.parametrize("kind", ["four thrusters by three commands, no heave", "surge and sway without yaw"])
+def test_what_a_vehicle_does_not_have_is_not_on_its_page(kind: str) -> None:
+    vehicle = a_vehicle(LAYOUTS[kind])
+    page = documentation_page(vehicle)
+    check_refers_to_itself_alone(page)
+    text = words(page)
+    turns = ["psi", "ψ"] if "yaw" in kind else []
+    for name in ("Z_ext", "u_l", "F_t", "tau_rear", "m_a_w", "rear", "top thruster", *turns):
+        assert name not in text, name
+    for v in variables(vehicle.rov):
+        assert v.name in text
+
+
+def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehicle) -> None:
+    """An arrow begins at the thruster and points along its direction; in pixels y is down."""
+    figure = Figure(figsize=(6.0, 6.0))
+    ax = figure.subplots()
+    draw_thrusters(ax, heavy.rov, "from above")
+    arrows = {(round(a.xyann[0], 2), round(a.xyann[1], 2)): a.xy for a in ax.texts if isinstance(a, Annotation)}
+    names = {text.get_text() for text in ax.texts}
+    for thruster in heavy.layout.thrusters:
+        assert f"$F_{{{thruster.name}}}$" in names
+        x, y, _ = thruster.position or (0.0, 0.0, 0.0)
+        if thruster.direction[2] == 0.0:
+            ((start, tip),) = [(a, b) for a, b in arrows.items() if hypot(a[0] - x, a[1] - y) < 0.03]
+            along = tip[0] - start[0], tip[1] - start[1]
+            expected = atan2(thruster.direction[1], thruster.direction[0])
+            assert atan2(along[1], along[0]) == pytest.approx(expected, abs=0.2)
+    assert ax.yaxis_inverted()
+
+
+def test_the_arm_of_the_paper_stands_where_its_torque_says(vehicle: Vehicle) -> None:
+    """(4): x F_y - y F_x of a force ahead is ±R sin γ, behind the centre of mass."""
+    k = vehicle.rov
+    for thruster, side in zip(vehicle.layout.thrusters[:2], (1.0, -1.0), strict=True):
+        x, y, _ = place(k, thruster)
+        assert x < 0.0
+        assert hypot(x, y) == pytest.approx(k["R"])
+        assert -y == pytest.approx(side * k["R"] * sin(k["gamma"]))
