@@ -13,11 +13,9 @@ several rows for one time the first counts; rows between communication points ar
 
 import csv
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, fields, replace
 from math import isfinite
 from pathlib import Path
 
-from rov_fmu.motion.rov import Inputs, State, Thrust, step, thrust
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -25,23 +23,24 @@ POINTS = 301
 POINTS_A_SECOND = 10
 STEP = 1.0 / POINTS_A_SECOND
 DETOUR = 15.0
-OUTPUTS = tuple(f.name for f in (*fields(State), *fields(Thrust)))
+ROV = load_vehicle(VIDEORAY).rov
+OUTPUTS = (*ROV.layout.state, *ROV.layout.thrust)
 
 PARAMETERS = {"m_rov": 7.2, "I_r": 0.12, "a_d_u": 3.5, "b_d_w": 0.9,
               "alpha_u": 1.0, "beta_w": 0.7, "alpha_r": 1.1, "beta_r": 0.25}  # fmt: skip
 
 # The inputs from each time (s) on. They start with rest, so that it does not matter when the first ones are set.
-PHASES = {
-    0.0: Inputs(),
-    1.0: Inputs(u_l=0.3, u_r=0.3),
-    4.0: Inputs(u_l=0.7, u_r=0.6, u_t=0.4),
-    8.0: Inputs(u_l=0.5, u_r=0.2, u_t=0.2),
-    11.0: Inputs(u_l=-0.3, u_r=0.3, u_t=-0.5),
-    14.0: Inputs(u_l=-0.5, u_r=-0.4, u_t=-0.2),
-    17.0: Inputs(u_l=0.4, u_r=0.4, X_ext=-6.0, Z_ext=3.0, N_ext=0.2, V_N=0.3, V_E=-0.2),
-    21.0: Inputs(u_l=1.0, u_r=-1.0, u_t=1.0, X_ext=-6.0, Z_ext=3.0, N_ext=0.2, V_N=0.3, V_E=-0.2),
-    25.0: Inputs(u_l=-0.2, u_r=-0.2, V_N=0.3, V_E=-0.2),
-    28.0: Inputs(V_N=0.3, V_E=-0.2),
+PHASES: dict[float, dict[str, float]] = {
+    0.0: {},
+    1.0: {"u_l": 0.3, "u_r": 0.3},
+    4.0: {"u_l": 0.7, "u_r": 0.6, "u_t": 0.4},
+    8.0: {"u_l": 0.5, "u_r": 0.2, "u_t": 0.2},
+    11.0: {"u_l": -0.3, "u_r": 0.3, "u_t": -0.5},
+    14.0: {"u_l": -0.5, "u_r": -0.4, "u_t": -0.2},
+    17.0: {"u_l": 0.4, "u_r": 0.4, "X_ext": -6.0, "Z_ext": 3.0, "N_ext": 0.2, "V_N": 0.3, "V_E": -0.2},
+    21.0: {"u_l": 1.0, "u_r": -1.0, "u_t": 1.0, "X_ext": -6.0, "Z_ext": 3.0, "N_ext": 0.2, "V_N": 0.3, "V_E": -0.2},
+    25.0: {"u_l": -0.2, "u_r": -0.2, "V_N": 0.3, "V_E": -0.2},
+    28.0: {"V_N": 0.3, "V_E": -0.2},
 }
 
 
@@ -54,35 +53,34 @@ def times() -> list[float]:
     return [n / POINTS_A_SECOND for n in range(POINTS)]
 
 
-def inputs_at(time: float) -> Inputs:
-    """The inputs of the step that starts at a time."""
-    return PHASES[max(start for start in PHASES if start <= time)]
+def inputs_at(time: float) -> dict[str, float]:
+    """All inputs of the step that starts at a time."""
+    return dict.fromkeys(ROV.layout.inputs, 0.0) | PHASES[max(start for start in PHASES if start <= time)]
 
 
 def write_files(folder: Path) -> None:
     """Write what the runners read."""
     _write(folder / "parameters.csv", ("name", "value"), PARAMETERS.items())
-    names = [f.name for f in fields(Inputs)]
+    names = list(ROV.layout.inputs)
     _write(
         folder / "manoeuvre.csv",
         ("time", *names, "detour"),
-        ((t, *asdict(inputs_at(t)).values(), int(t == DETOUR)) for t in times()),
+        ((t, *inputs_at(t).values(), int(t == DETOUR)) for t in times()),
     )
     starts = sorted(PHASES)
-    corners = [(t, PHASES[start]) for start, end in zip(starts, [*starts[1:], times()[-1]], strict=True)
+    corners = [(t, inputs_at(start)) for start, end in zip(starts, [*starts[1:], times()[-1]], strict=True)
                for t in (start, end)]  # fmt: skip
-    _write(folder / "jumps.csv", ("time", *names), ((t, *asdict(inputs).values()) for t, inputs in corners))
+    _write(folder / "jumps.csv", ("time", *names), ((t, *inputs.values()) for t, inputs in corners))
 
 
 def reference() -> list[dict[str, float]]:
     """Time and outputs at each communication point by `rov_fmu.motion.rov`."""
-    coefficients = replace(load_vehicle(VIDEORAY).coefficients, **PARAMETERS)
-    state, inputs = State(), Inputs()
+    rov, state, inputs = ROV.replaced(PARAMETERS), dict.fromkeys(ROV.layout.state, 0.0), inputs_at(0.0)
     rows = []
     for time in times():
         if time > 0.0:
-            state = step(coefficients, inputs, state, STEP)
-        rows.append({"time": time, **asdict(state), **asdict(thrust(coefficients, inputs))})
+            state = rov.step(inputs, state, STEP)
+        rows.append({"time": time, **state, **rov.thrust(inputs, state)})
         inputs = inputs_at(time)
     return rows
 

@@ -7,7 +7,6 @@ Each function gives the outputs at the end of every step, named as "rov.z".
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -17,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from examples.systems import PARAMETER_SET
-from rov_fmu.motion import rov
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 from .autopilot import Autopilot
 from .system import OUTPUTS, STEP, STEPS, STOP, parameter_sets, system_files
@@ -29,24 +29,25 @@ NAMES = [(component, name) for component, names in OUTPUTS.items() for name in n
 def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
     """`rov_fmu.motion.rov` and the autopilot's class in a loop; sequential: the ROV gets the commands without delay."""
     values = parameter_sets()[parameters]
-    names = rov.COEFFICIENTS
-    coefficients = rov.Coefficients(**{n: v for n, v in values["rov"].items() if n in names})
-    inputs = rov.Inputs(**{n: v for n, v in values["rov"].items() if n not in names})
-    state = rov.State()
+    rov = load_vehicle(VIDEORAY).rov
+    layout, given = rov.layout, values["rov"]
+    rov = rov.replaced({name: given[name] for name in layout.coefficients})
+    inputs = dict.fromkeys(layout.inputs, 0.0) | {name: given[name] for name in layout.inputs if name in given}
+    state = dict.fromkeys(layout.state, 0.0)
     autopilot = Autopilot(instance_name="autopilot")
     for name, value in values["autopilot"].items():
         setattr(autopilot, name, value)
 
-    def commands() -> rov.Inputs:
-        return replace(inputs, u_l=autopilot.u_l, u_r=autopilot.u_r, u_t=autopilot.u_t)
+    def commands() -> dict[str, float]:
+        return inputs | {name: getattr(autopilot, name) for name in layout.commands}
 
     rows = []
     for n in range(STEPS):
-        autopilot.z, autopilot.psi = state.z, state.psi
+        autopilot.z, autopilot.psi = state["z"], state["psi"]
         before = commands()
         autopilot.do_step(n * STEP, STEP)
-        state = rov.step(coefficients, commands() if sequential else before, state, STEP)
-        now = {"rov": asdict(state), "autopilot": vars(autopilot)}
+        state = rov.step(commands() if sequential else before, state, STEP)
+        now = {"rov": state, "autopilot": vars(autopilot)}
         rows.append([now[component][name] for component, name in NAMES])
     return _trajectory(rows)
 

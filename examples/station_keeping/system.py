@@ -4,7 +4,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import asdict
 from math import pi
 from pathlib import Path
 
@@ -47,7 +46,7 @@ OUTPUTS = {
 
 def parameter_sets() -> dict[str, dict[str, Values]]:
     """Name to the values of each component: Table 9, and the same with α = β = 1."""
-    table9 = asdict(load_vehicle(VIDEORAY).coefficients)
+    table9 = dict(load_vehicle(VIDEORAY).rov.coefficients)
     untuned = {name: 1.0 if name.startswith(("alpha", "beta")) else value for name, value in table9.items()}
     return {
         DEFAULT: {"rov": {**table9, **SEA}, "autopilot": MISSION},

@@ -27,7 +27,8 @@ from examples.station_keeping.system import (
     system_files,
 )
 from examples.systems import PARAMETER_SET
-from rov_fmu.motion.rov import thruster_force
+from rov_fmu.motion.layout import Curve, Layout
+from rov_fmu.motion.rov import Rov
 
 SETS = tuple(parameter_sets())
 
@@ -109,10 +110,11 @@ COMMANDS = ("u_l", "u_r", "u_t")
 
 @pytest.mark.parametrize("curve", [(42.9, 2.711), (6.494, 0.0513), (5.0, 0.0), (0.0, 5.0)])
 def test_the_thrust_curve_is_that_of_the_model_and_inverted(curve: tuple[float, float]) -> None:
-    thruster = Thruster(*curve)
+    thruster, of_model = Thruster(*curve), Curve("rear")
+    rov = Rov(Layout((), (of_model,), ()), dict(zip(("a_t_rear", "b_t_rear"), curve, strict=True)))
     for command in np.linspace(-1.0, 1.0, 21):
         force = thruster.force(command)
-        assert force == pytest.approx(thruster_force(*curve, command), abs=1e-14)
+        assert force == pytest.approx(rov.curve_force(of_model, command), abs=1e-14)
         assert thruster.command(force) == pytest.approx(command, abs=1e-12)
     assert Thruster(0.0, 0.0).command(1.0) == 0.0
 

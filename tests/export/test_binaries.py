@@ -8,7 +8,7 @@ import struct
 import sys
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
@@ -19,7 +19,7 @@ import pytest
 from checks.c_programs import compile_c, run_program
 from rov_fmu.cli import main
 from rov_fmu.export.compile import PLATFORMS, fmi_headers
-from rov_fmu.motion.rov import Inputs
+from rov_fmu.vehicle.paper import PAPER
 
 lief.logging.disable()
 
@@ -145,7 +145,7 @@ def _recorded_steps() -> str:
         loads = [random_.choice((0.0, random_.gauss(0.0, 3.0))) for _ in range(2)] + [random_.choice((0.0, 0.1))]
         current = [random_.choice((0.0, 0.3)) for _ in range(2)]
         values = [h, *commands, *loads, *current]
-        assert len(values) == 1 + len(fields(Inputs))
+        assert len(values) == 1 + len(PAPER.inputs)
         lines.append(" ".join(struct.pack(">d", value).hex() for value in values))
     return "\n".join(lines) + "\n"
 

@@ -51,7 +51,7 @@ def test_the_archive_is_one_that_every_importer_unpacks(videoray_fmu: Path) -> N
 
 def test_the_description_says_what_the_interface_declares(videoray_dir: Path, vehicle: Vehicle) -> None:
     description = fmpy.read_model_description(str(videoray_dir))
-    declared = variables(vehicle.coefficients)
+    declared = variables(vehicle.rov)
     assert [v.name for v in description.modelVariables] == [v.name for v in declared]
     for read, v in zip(description.modelVariables, declared, strict=True):
         assert read.valueReference == v.value_reference
@@ -98,7 +98,7 @@ def test_another_coefficient_is_another_guid(videoray_fmu: Path, vehicle: Vehicl
     assert _build(tmp_path / "heavier.fmu", str(heavier)) == 0
     guids = [fmpy.read_model_description(str(f)).guid for f in (videoray_fmu, tmp_path / "heavier.fmu")]
     assert guids[0] != guids[1]
-    assert vehicle.coefficients.m_rov == 6.57
+    assert vehicle.rov["m_rov"] == 6.57
 
 
 def test_the_command_line_says_what_it_built(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

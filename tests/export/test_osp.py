@@ -6,10 +6,12 @@ import pytest
 from lxml import etree
 
 from rov_fmu.cli import main
-from rov_fmu.export.interface import UNITS, Variable, variables
+from rov_fmu.export.interface import UNITS, variables
 from rov_fmu.export.osp import osp_model_description, osp_path
+from rov_fmu.motion.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ALONE
+from tests.layouts import LAYOUTS, a_rov
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
 
@@ -26,13 +28,12 @@ SEQUENCE = {
 
 
 @pytest.fixture(scope="module")
-def declared(vehicle: Vehicle) -> dict[str, Variable]:
-    return {v.name: v for v in variables(vehicle.coefficients)}
+def groups(vehicle: Vehicle) -> list[etree._Element]:
+    return groups_of(vehicle.layout)
 
 
-@pytest.fixture(scope="module")
-def groups(declared: dict[str, Variable]) -> list[etree._Element]:
-    root = etree.fromstring(osp_model_description(tuple(declared.values())))
+def groups_of(layout: Layout) -> list[etree._Element]:
+    root = etree.fromstring(osp_model_description(layout))
     assert root.tag == f"{NAMESPACE}OspModelDescription"
     assert dict(root.attrib) == {"version": "1.0"}
     (parent,) = root
@@ -45,26 +46,16 @@ def references(group: etree._Element) -> list[str]:
     return [variable.get("ref") for variable in group]
 
 
-def test_every_input_and_output_is_in_one_group(groups: list[etree._Element], declared: dict[str, Variable]) -> None:
+@pytest.mark.parametrize("kind", LAYOUTS)
+def test_every_input_and_output_is_in_one_group(kind: str) -> None:
+    """Of vehicles of every kind; a group is of one causality, one unit and one variable an axis."""
+    groups = groups_of(LAYOUTS[kind])
+    declared = {v.name: v for v in variables(a_rov(LAYOUTS[kind]))}
     grouped = sorted(name for group in groups for name in references(group))
     assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
-
-
-def test_groups_come_in_the_order_of_the_schema(groups: list[etree._Element]) -> None:
-    elements = [group.tag.removeprefix(NAMESPACE) for group in groups]
-    assert elements == sorted(elements, key=list(SEQUENCE).index)
-    assert set(elements) == set(SEQUENCE)
-
-
-def test_names_of_groups_are_unique(groups: list[etree._Element]) -> None:
     names = [group.get("name") for group in groups]
     assert all(names)
     assert len(set(names)) == len(names)
-
-
-def test_a_group_is_of_one_causality_one_unit_and_one_variable_an_axis(
-    groups: list[etree._Element], declared: dict[str, Variable]
-) -> None:
     for group in groups:
         members = [declared[name] for name in references(group)]
         assert 1 <= len(members) <= 3
@@ -77,11 +68,19 @@ def test_a_group_is_of_one_causality_one_unit_and_one_variable_an_axis(
         assert len(set(axes)) == len(axes)
 
 
+def test_groups_come_in_the_order_of_the_schema(groups: list[etree._Element]) -> None:
+    elements = [group.tag.removeprefix(NAMESPACE) for group in groups]
+    assert elements == sorted(elements, key=list(SEQUENCE).index)
+    assert set(elements) == set(SEQUENCE)
+
+
 @pytest.mark.parametrize(
     ("name", "element", "members"),
     [
         ("thruster_commands", "Generic", {"u_l": None, "u_r": None, "u_t": None}),
         ("external_force", "Force", {"X_ext": "x", "Z_ext": "z"}),
+        ("thrust_t", "Force", {"F_t": "z"}),
+        ("rear_torque", "Torque", {"tau_rear": "z"}),
         ("current", "LinearVelocity", {"V_N": "x", "V_E": "y"}),
         ("velocity", "LinearVelocity", {"u": "x", "w": "z"}),
         ("yaw_rate", "AngularVelocity", {"r": "z"}),
@@ -98,9 +97,9 @@ def test_what_systems_connect_by(
     assert {variable.get("ref"): variable.get("axis") for variable in group} == members
 
 
-def test_a_variable_without_a_group_is_noticed(declared: dict[str, Variable]) -> None:
-    with pytest.raises(KeyError, match="psi"):
-        osp_model_description(tuple(v for v in declared.values() if v.name != "psi"))
+def test_a_force_aslant_has_no_axis(heavy: Vehicle) -> None:
+    axes = {v.get("ref"): v.get("axis") for group in groups_of(heavy.layout) for v in group}
+    assert (axes["F_1"], axes["F_5"]) == (None, "z")
 
 
 # ---- rov-fmu build --osp -------------------------------------------------------------------------------------------
@@ -110,7 +109,7 @@ def _build(path: Path, *arguments: str) -> int:
     return main(["build", "--platform", "host", "-o", str(path), *arguments])
 
 
-def test_the_option_writes_it_beside_the_fmu(tmp_path: Path, vehicle: Vehicle, declared: dict[str, Variable]) -> None:
+def test_the_option_writes_it_beside_the_fmu(tmp_path: Path, vehicle: Vehicle) -> None:
     assert _build(tmp_path / "rov.fmu") == 0
     assert [path.name for path in tmp_path.iterdir()] == ["rov.fmu"]
     assert _build(tmp_path / "rov.fmu", "--osp") == 0
@@ -118,7 +117,7 @@ def test_the_option_writes_it_beside_the_fmu(tmp_path: Path, vehicle: Vehicle, d
     path = tmp_path / "videoray_OspModelDescription.xml"
     assert sorted(tmp_path.iterdir()) == [tmp_path / "rov.fmu", path]
     assert osp_path(tmp_path / "rov.fmu", vehicle.identifier) == path
-    assert path.read_bytes() == osp_model_description(tuple(declared.values()))
+    assert path.read_bytes() == osp_model_description(vehicle.layout)
 
 
 def test_another_vehicle_has_its_own(tmp_path: Path) -> None:

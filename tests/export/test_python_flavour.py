@@ -41,7 +41,7 @@ def _instance(folder: Path) -> FMU2Slave:
 def test_it_is_valid_and_says_what_it_can_do(python_fmu: Path, vehicle: Vehicle) -> None:
     assert validate_fmu(str(python_fmu)) == []
     description = fmpy.read_model_description(str(python_fmu))
-    assert [v.name for v in description.modelVariables] == [v.name for v in variables(vehicle.coefficients)]
+    assert [v.name for v in description.modelVariables] == [v.name for v in variables(vehicle.rov)]
     assert description.modelExchange is None
     can = description.coSimulation
     assert (can.canGetAndSetFMUstate, can.canSerializeFMUstate, can.needsExecutionTool) == (True, True, True)
@@ -56,7 +56,7 @@ def test_its_modules_bear_the_name_of_the_vehicle(python_fmu: Path) -> None:
         "resources/slavemodule.txt",
         "resources/variables.json",
         "resources/videoray_slave.py",
-        *(f"resources/videoray_model/{name}.py" for name in ("__init__", "path", "riccati", "rov")),
+        *(f"resources/videoray_model/{name}.py" for name in ("__init__", "layout", "riccati", "rov", "series")),
     }
 
 
@@ -67,7 +67,7 @@ def _by_kind(declared: tuple[Variable, ...], **wanted: str) -> list[Variable]:
 @pytest.mark.parametrize("seed", range(10))
 def test_both_flavours_move_the_same_way(python_dir: Path, videoray_dir: Path, vehicle: Vehicle, seed: int) -> None:
     random_ = random.Random(seed)
-    declared = variables(vehicle.coefficients)
+    declared = variables(vehicle.rov)
     both = [_instance(python_dir), _instance(videoray_dir)]
     outputs = [v.value_reference for v in declared if v.causality != "parameter"]
     parameters = _by_kind(declared, causality="parameter")
@@ -164,7 +164,7 @@ def test_both_flavours_warn_once_of_what_saturates_and_of_a_jump_in_time(python_
 
 
 def test_what_the_native_one_refuses_is_refused(python_dir: Path, vehicle: Vehicle) -> None:
-    by_name = {v.name: v for v in variables(vehicle.coefficients)}
+    by_name = {v.name: v for v in variables(vehicle.rov)}
     slave = _instance(python_dir)
     slave.enterInitializationMode()
     for name, value in (("u_l", float("nan")), ("Z_ext", float("inf")), ("m_rov", -1.0), ("beta_r", float("nan"))):

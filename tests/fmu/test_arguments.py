@@ -33,7 +33,7 @@ from tests.fmi2 import (
 )
 
 CS, ME = CO_SIMULATION, MODEL_EXCHANGE
-_VR = {v.name: v.value_reference for v in variables(load_vehicle(VIDEORAY).coefficients)}
+_VR = {v.name: v.value_reference for v in variables(load_vehicle(VIDEORAY).rov)}
 U_L, U, DER_U, F_L, BETA_U = (references(_VR[name]) for name in ("u_l", "u", "der(u)", "F_l", "beta_u"))
 NOTHING, U_AND_NOTHING, U_L_AND_NOTHING = (
     references(len(_VR)),

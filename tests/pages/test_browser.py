@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from rov_fmu.export.interface import UNITS, Variable, variables
-from rov_fmu.motion.rov import Inputs, State, step
 from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -42,7 +41,7 @@ _FLAGS = (
 
 @pytest.fixture(scope="module")
 def declared(vehicle: Vehicle) -> tuple[Variable, ...]:
-    return variables(vehicle.coefficients)
+    return variables(vehicle.rov)
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +203,8 @@ def test_the_web_app_offers_the_declared_values_simulates_and_tells_what_the_mod
         "(plot => [plot._fullData.map(trace => trace.y.at(-1)), plot.data.map((trace, n) =>"
         " plot.layout['yaxis' + (n ? n + 1 : '')].title.text)])(document.querySelector('.js-plotly-plot'))"
     )
-    end = vars(step(vehicle.coefficients, Inputs(**COMMANDS), State(), 10.0))
+    rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
+    end = vehicle.rov.step(rest | COMMANDS, rest, 10.0)
     assert titles == [f"{name} [{UNITS[unit].display or unit}]" for name, unit in SHOWN.items()]
     assert titles[0] == "u [knot]"
     assert last == pytest.approx([end[name] * UNITS[unit].factor for name, unit in SHOWN.items()], abs=1e-4)
