@@ -6,12 +6,12 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
 from io import StringIO
+from math import hypot, pi, sin
 from pathlib import Path
 
 import pytest
@@ -19,10 +19,13 @@ import pytest
 from rov_fmu import __version__
 from rov_fmu.cli import main
 from rov_fmu.motion.layout import ARM, AXIS, BODY, CURVE, TUNING
-from rov_fmu.motion.rov import COEFFICIENTS, Inputs, State, Thrust, declared, step
+from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
+from tests.layouts import LAYOUTS
+
+State = dict[str, float]
 
 README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
 PAGES = [
@@ -174,12 +177,42 @@ def test_programs_print_what_is_said(page: Path, workplace: Path) -> None:
             assert f"{float(printed[0]):.{len(value[1])}f}" == value[0].strip()
 
 
+def course(
+    rov: Rov, command: Callable[[float], Mapping[str, float]], seconds: float, h: float, at: float
+) -> list[State]:
+    """The states from rest after each 0.1 s, the command of a step taken at a fraction of it."""
+    state, rows = dict.fromkeys(rov.layout.state, 0.0), []
+    rest = dict.fromkeys(rov.layout.inputs, 0.0)
+    for n in range(round(seconds / h)):
+        state = rov.step(rest | command((n + at) * h), state, h)
+        rows.append(state)
+    return rows[round(0.1 / h) - 1 :: round(0.1 / h)]
+
+
 def test_the_steps_of_the_readme_end_where_it_says(vehicle: Vehicle) -> None:
     text = README.read_text(encoding="utf-8")
-    ahead = step(vehicle.coefficients, Inputs(u_l=0.3, u_r=0.3), State(), 10.0)
-    assert f"ends at u = {ahead.u:.4f} m/s" in text
-    untuned = replace(vehicle.coefficients, alpha_w=1.0, beta_w=1.0)
-    assert f"positive down: {step(untuned, Inputs(u_t=0.3), State(), 20.0).w:.4f} m/s" in text
+    (*_, ahead) = course(vehicle.rov, lambda _: {"u_l": 0.3, "u_r": 0.3}, 10.0, 0.1, 0.0)
+    assert f"ends at u = {ahead['u']:.4f} m/s" in text
+    untuned = vehicle.rov.replaced({"alpha_w": 1.0, "beta_w": 1.0})
+    (*_, down) = course(untuned, lambda _: {"u_t": 0.3}, 20.0, 0.1, 0.0)
+    assert f"positive down: {down['w']:.4f} m/s" in text
+
+
+def test_held_commands_err_as_told(vehicle: Vehicle) -> None:
+    """Against steps a tenth as long, fed with the middle: their error is a hundredth of that."""
+
+    def winding(t: float) -> dict[str, float]:
+        turn = 0.4 * sin(2.0 * pi * t / 20.0)
+        return {"u_l": 0.5 + turn, "u_r": 0.5 - turn}
+
+    true = course(vehicle.rov, winding, 20.0, 0.01, 0.5)
+    told = (ROOT / "docs" / "importers.md").read_text(encoding="utf-8")
+    for what, at, digits in (("start", 0.0, 3), ("middle", 0.5, 4)):
+        rows = course(vehicle.rov, winding, 20.0, 0.1, at)
+        pairs = list(zip(rows, true, strict=True))
+        off = max(hypot(a["x"] - b["x"], a["y"] - b["y"]) for a, b in pairs)
+        in_r = max(abs(a["r"] - b["r"]) for a, b in pairs)
+        assert f"| that of its {what} | {1000.0 * off:.0f} mm | {in_r:.{digits}f} rad/s |" in told
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -200,14 +233,20 @@ def test_tab_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pyt
 # ---- What is said elsewhere too --------------------------------------------------------------------------------------
 
 
-def test_every_variable_is_told() -> None:
+@pytest.mark.parametrize("kind", LAYOUTS)
+def test_every_variable_is_told(kind: str) -> None:
     table = (ROOT / "docs" / "variables.md").read_text(encoding="utf-8")
-    told = set(re.findall(r"`([^`]+)`", table))
-    assert told >= {*declared(Inputs), *declared(State), *declared(Thrust)}
-    tunable = {n for n, meta in COEFFICIENTS.items() if meta.tunable}
-    prefixes = tuple(word.removesuffix("…") for word in told if word.endswith("…"))
-    assert all(n in told or n.startswith(prefixes) for n in COEFFICIENTS)
-    assert tunable <= told
+    layout = LAYOUTS[kind]
+    known = {
+        "thruster": {thruster.name for thruster in layout.thrusters} | set(layout.mix),
+        "curve": {curve.name for curve in layout.curves},
+        "axis": set("uvwr"),
+    }
+    told = {name for name in re.findall(r"`([^`]+)`", table) if "<" not in name}
+    for pattern, of in re.findall(r"`([^`<]+)<(thruster|curve|axis)>`", table):
+        told |= {f"{pattern}{name}" for name in known[of]}
+    names = {*layout.inputs, *layout.state, *layout.thrust, *layout.coefficients}
+    assert {name.removesuffix("_reverse") for name in names} <= told
 
 
 def test_version_is_that_of_the_package() -> None:
