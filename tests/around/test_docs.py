@@ -184,7 +184,7 @@ def course(
     state, rows = dict.fromkeys(rov.layout.state, 0.0), []
     rest = dict.fromkeys(rov.layout.inputs, 0.0)
     for n in range(round(seconds / h)):
-        state = rov.step(rest | command((n + at) * h), state, h)
+        state = rov.step({**rest, **command((n + at) * h)}, state, h)
         rows.append(state)
     return rows[round(0.1 / h) - 1 :: round(0.1 / h)]
 
