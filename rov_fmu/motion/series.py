@@ -96,7 +96,7 @@ def advance(flow: Flow, velocities: Sequence[float], h: float) -> Moved:
         for fade in flow.fades:
             push = [a + b for a, b in zip(push, fade.value(done), strict=True)]
         fades = [(fade.rate, fade.late(done)) for fade in flow.fades]
-        if _is_settled(flow, push, fades, v):
+        if all(settled := _settled(flow, push, fades, v)):
             angle = v[flow.r] * rest if flow.r is not None else 0.0
             if not isfinite(turn + angle):
                 break
@@ -105,7 +105,7 @@ def advance(flow: Flow, velocities: Sequence[float], h: float) -> Moved:
             return Moved(tuple(v), tuple(s + x * rest for s, x in zip(gone, v, strict=True)), track)
         if flow.is_free and (left := _straight_rest(flow, v, rest, way_so_far)) is not None:
             return Moved(tuple(v), tuple(gone), track + left * _direction(turn))
-        piece = _Piece(flow, push, fades, v, min(rest, tau))
+        piece = _Piece(flow, push, fades, v, settled, min(rest, tau))
         if piece.reach == 0.0:
             tau = 1e-3 * piece.tau
             if tau == 0.0:
@@ -153,24 +153,27 @@ def _planar(flow: Flow, v: Sequence[float]) -> complex:
     return complex(v[flow.u] if flow.u is not None else 0.0, v[flow.v] if flow.v is not None else 0.0)
 
 
-def _is_settled(
+def _settled(
     flow: Flow, push: Sequence[float], fades: Sequence[tuple[float, Sequence[float]]], v: Sequence[float]
-) -> bool:
-    """Whether what is left of every acceleration is rounding of its terms."""
-    rates, sizes = [], []
+) -> list[bool]:
+    """Of each axis, whether what is left of its acceleration is rounding of its terms; of coupled ones all or none."""
+    rates, sizes, settled = [], [], []
     for n, (axis, x) in enumerate(zip(flow.axes, v, strict=True)):
         A, B = axis.drag(x)
         terms = [push[n], -B * x, -A * abs(x) * x]
         rates.append(sum(terms))
         sizes.append(sum(map(abs, terms)))
-        if any(abs(d[n]) > 16.0 * _EPS * sizes[n] for _, d in fades):
-            return False
+    coupled: tuple[int, ...] = ()
     if flow.coupling and flow.u is not None and flow.v is not None and flow.r is not None:
-        k, (u, w, r) = flow.coupling, (v[flow.u], v[flow.v], v[flow.r])
-        for n, term in ((flow.u, k.c_u * w * r), (flow.v, -k.c_v * u * r), (flow.r, -k.c_r * u * w)):
+        coupled = flow.u, flow.v, flow.r
+        k, (u, w, r) = flow.coupling, (v[n] for n in coupled)
+        for n, term in zip(coupled, (k.c_u * w * r, -k.c_v * u * r, -k.c_r * u * w), strict=True):
             rates[n] += term
             sizes[n] += abs(term)
-    return all(abs(rate) <= 16.0 * _EPS * size for rate, size in zip(rates, sizes, strict=True))
+    for n, (rate, size) in enumerate(zip(rates, sizes, strict=True)):
+        settled.append(all(abs(x) <= 16.0 * _EPS * size for x in (rate, *(d[n] for _, d in fades))))
+    are_coupled_settled = all(settled[n] for n in coupled)
+    return [is_one and (are_coupled_settled or n not in coupled) for n, is_one in enumerate(settled)]
 
 
 class _Piece:
@@ -182,6 +185,7 @@ class _Piece:
         push: Sequence[float],
         fades: Sequence[tuple[float, Sequence[float]]],
         v: Sequence[float],
+        settled: Sequence[bool],
         tau: float,
     ) -> None:
         self.flow, self.tau = flow, tau
@@ -207,8 +211,8 @@ class _Piece:
                     changes[flow.u] += k.c_u * _product(w, r, n)
                     changes[flow.v] -= k.c_v * _product(u, r, n)
                     changes[flow.r] -= k.c_r * _product(u, w, n)
-            for c, change in zip(self.c, changes, strict=True):
-                c.append(tau * change / (n + 1))
+            for c, change, is_settled in zip(self.c, changes, settled, strict=True):
+                c.append(0.0 if is_settled else tau * change / (n + 1))
             self.E.append(tau * E / (n + 1))
             self.P.append(tau * W / (n + 1))
         ends = [x for c in self.c for x in c[-2:]]
