@@ -52,6 +52,15 @@ def videoray_dir(videoray_fmu: Path) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def heavy_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of the BlueROV2 Heavy, which has sway, lag and coupling."""
+    path = tmp_path_factory.mktemp("heavy") / "heavy.fmu"
+    assert main(["build", "bluerov2_heavy", "--platform", "host", "-o", str(path)]) == 0
+    fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
+    return path.with_suffix("")
+
+
 @pytest.fixture(scope="module")
 def fmu(videoray_dir: Path) -> Fmu:
     """The shared library, loaded for one file of tests."""

@@ -6,7 +6,7 @@ from math import sqrt
 
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.motion.rov import Rov
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 Values = Mapping[str, float]
@@ -57,11 +57,11 @@ _MIX = {
     "turn": {"1": -0.5, "2": 0.5, "3": 0.5, "4": -0.5},
     "down": {"5": -1.0, "6": -1.0},
 }
-HEAVY = numbered(_layout("uvwr", _LATE, (*_PLANAR, *_VERTICAL), ("m_a", *_DRAG), coupled=True))
+VIDEORAY, HEAVY = (load_vehicle(SHIPPED[name]).rov for name in ("videoray", "bluerov2_heavy"))
 VEHICLES = {
-    "VideoRay": load_vehicle(VIDEORAY).rov,
+    "VideoRay": VIDEORAY,
     "Heavy": HEAVY,
-    "BlueROV2": numbered(_layout("uvwr", _T200, (*_PLANAR, *_VERTICAL), ("m_a", *_DRAG))),
+    "neither lag nor coupling": numbered(_layout("uvwr", _T200, (*_PLANAR, *_VERTICAL), ("m_a", *_DRAG))),
     "with an input mix": numbered(_layout("uvwr", _T200, (*_PLANAR, *_VERTICAL), _ALL, mix=_MIX)),
     "drag by direction, coupled, late": numbered(_layout("uvwr", _LATE, (*_PLANAR, *_VERTICAL), _ALL, coupled=True)),
     "coupled without lag": numbered(_layout("uvr", _T200, _PLANAR, _ALL, coupled=True)),
@@ -108,9 +108,9 @@ def random_layout(rng: random.Random) -> Layout:
     return Layout(forms, tuple(curves), tuple(thrusters), mix, {"u", "v", "r"} <= set(axes) and rng.random() < 0.7)
 
 
-def random_vehicle(rng: random.Random) -> Rov:
+def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Rov:
     """Of masses and drags that matter to each other; one drag in six is zero."""
-    layout = random_layout(rng)
+    layout = layout or random_layout(rng)
     numbers = {}
     for name, meta in layout.coefficients.items():
         if meta.tunable:
@@ -155,6 +155,12 @@ def random_state(rng: random.Random, rov: Rov) -> State:
             size = 10.0 if name in rov.layout.lagging else sizes.get(name, 0.8)
             found[name] = rng.choice([rng.gauss(0.0, size), rng.gauss(0.0, size), rng.gauss(0.0, size), 0.0])
     return found
+
+
+def random_case(rng: random.Random, rov: Rov, shortest: float = -6.0, longest: float = 0.3) -> Case:
+    """A step of 10^shortest ... 10^longest seconds, one in six from rest."""
+    state = at_rest(rov) if rng.random() < 1 / 6 else random_state(rng, rov)
+    return rov, random_inputs(rng, rov), state, spread(rng, shortest, longest)
 
 
 def at_rest(rov: Rov) -> State:

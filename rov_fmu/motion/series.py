@@ -103,6 +103,8 @@ def advance(flow: Flow, velocities: Sequence[float], h: float) -> Moved:
             arc = sin(0.5 * angle) / (0.5 * angle) if angle else 1.0  # chord by arc
             track += _planar(flow, v) * rest * arc * _direction(turn + 0.5 * angle)
             return Moved(tuple(v), tuple(s + x * rest for s, x in zip(gone, v, strict=True)), track)
+        if flow.is_free and flow.r is not None and not isfinite(flow.axes[flow.r].distance(v[flow.r], rest)):
+            break
         if flow.is_free and (left := _straight_rest(flow, v, rest, way_so_far)) is not None:
             return Moved(tuple(v), tuple(gone), track + left * _direction(turn))
         piece = _Piece(flow, push, fades, v, settled, min(rest, tau))
