@@ -5,12 +5,10 @@ import random
 import subprocess
 import sys
 import time
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
-from rov_fmu.motion.rov import State
 from tests.fmi2 import ERROR, OK, Fmu
 
 _DRAG = [("a_d_u", "b_d_u"), ("a_d_r", "b_d_r")]
@@ -34,7 +32,7 @@ def _cases() -> list[tuple[float, dict[str, float]]]:
 def step_them_all(folder: str) -> None:
     """Every case in an instance of its own; AssertionError names the one that fails."""
     fmu = Fmu(Path(folder))
-    states = [f.name for f in fields(State)]
+    states = fmu.states
     for h, values in _cases():
         with fmu.instance() as rov:
             rov.start(values)

@@ -1,29 +1,24 @@
-"""Laws of the whole vehicle, pose included: a step of models.dynamics and of the FMU, judged by itself."""
+"""Laws of the whole vehicle, pose included: a step in Python and of the FMU, judged by itself."""
 
+import random
 from collections.abc import Callable
-from dataclasses import fields, replace
 from functools import partial
 from math import cos, hypot, sin, ulp
 
 import pytest
 from hypothesis import strategies as st
 
-from rov_fmu.motion import rov
-from rov_fmu.motion.rov import Coefficients, Inputs, State
-from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.motion.rov import Rov
 from tests.fmi2 import Fmu
-from tests.motion.test_exactness import Case, run
+from tests.motion.steps import Step, in_fmu, in_python
 from tests.motions import DISTANCE, TINY, VELOCITY, hold, memory, path_of, power, signed, size
-
-Step = Callable[[Coefficients, Inputs, State, float], State]
+from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, Case, State, Values, at_rest, random_case, still
 
 POSITION = 1e-14  # of the path: what test_exactness.py promises
 
 # ---- Vehicles, inputs and states ----
 
-ROV = load_vehicle(VIDEORAY).coefficients
-STILL = replace(Coefficients(*[1.0] * len(fields(Coefficients))), a_d_u=0.0, b_d_u=0.0)
+STILL = Rov(VIDEORAY.layout, {**dict.fromkeys(VIDEORAY.coefficients, 1.0), "a_d_u": 0.0, "b_d_u": 0.0})
 PURE, SIGNED = size(-3.0, 2.0), signed(-3.0, 2.0)
 
 
@@ -32,7 +27,8 @@ def rov_cases(draw: st.DrawFn) -> Case:
     """The VideoRay, with commands, loads and current."""
     commands = [draw(signed(-1.0, 0.1)) for _ in range(3)]
     loads, state = ([draw(signed(-3.0, 1.0)) for _ in range(number)] for number in (5, 7))
-    return ROV, Inputs(*commands, *loads), State(*state), draw(power(-3.0, 3.0))
+    inputs = dict(zip(VIDEORAY.layout.inputs, [*commands, *loads], strict=True))
+    return VIDEORAY, inputs, dict(zip(VIDEORAY.layout.state, state, strict=True)), draw(power(-3.0, 3.0))
 
 
 @st.composite
@@ -47,18 +43,22 @@ def bare_cases(draw: st.DrawFn) -> Case:
         velocities.append(draw(SIGNED) * speed)
     pose = [draw(SIGNED) * V * h for _ in "xyz"]
     current = [draw(SIGNED) * V for _ in "NE"]
-    k = replace(STILL, **drag)
-    assert all(value <= rov.COEFFICIENTS[name].maximum for name, value in drag.items())
-    state = State(*[*velocities, *pose, draw(st.floats(-10.0, 10.0))])
-    return k, Inputs(0.0, 0.0, 0.0, *forces, *current), state, h
+    assert all(value <= STILL.layout.coefficients[name].maximum for name, value in drag.items())
+    state = [*velocities, *pose, draw(st.floats(-10.0, 10.0))]
+    inputs = dict(zip(VIDEORAY.layout.inputs, [0.0, 0.0, 0.0, *forces, *current], strict=True))
+    return STILL.replaced(drag), inputs, dict(zip(VIDEORAY.layout.state, state, strict=True)), h
 
 
 CASES = rov_cases() | bare_cases()
 
 
-@pytest.fixture(params=["model", "FMU"])
-def step(request: pytest.FixtureRequest, fmu: Fmu) -> Step:
-    return partial(run, fmu) if request.param == "FMU" else rov.step
+@pytest.fixture(params=["Python", "C"])
+def step(request: pytest.FixtureRequest) -> Step:
+    return in_python if request.param == "Python" else partial(in_fmu, request.getfixturevalue("fmu"))
+
+
+def negated(values: Values, *names: str) -> State:
+    return {name: -value if name in names else value for name, value in values.items()}
 
 
 def for_every(law: Callable[[Step, Case], None]) -> Callable[[Step, int], None]:
@@ -78,29 +78,46 @@ def for_every(law: Callable[[Step, Case], None]) -> Callable[[Step, int], None]:
 @for_every
 def test_port_and_starboard_are_mirror_images_to_the_last_bit(step: Step, case: Case) -> None:
     k, i, s, h = case
-    after = step(*case)
-    inputs = replace(i, u_l=i.u_r, u_r=i.u_l, N_ext=-i.N_ext, V_E=-i.V_E)
-    assert step(k, inputs, replace(s, r=-s.r, y=-s.y, psi=-s.psi), h) == replace(
-        after, r=-after.r, y=-after.y, psi=-after.psi
-    )
+    inputs = negated({**i, "u_l": i["u_r"], "u_r": i["u_l"]}, "N_ext", "V_E")
+    assert step(k, inputs, negated(s, "r", "y", "psi"), h) == negated(step(*case), "r", "y", "psi")
 
 
 @for_every
 def test_up_and_down_are_mirror_images_to_the_last_bit(step: Step, case: Case) -> None:
     k, i, s, h = case
-    after = step(*case)
-    assert step(k, replace(i, u_t=-i.u_t, Z_ext=-i.Z_ext), replace(s, w=-s.w, z=-s.z), h) == replace(
-        after, w=-after.w, z=-after.z
-    )
+    assert step(k, negated(i, "u_t", "Z_ext"), negated(s, "w", "z"), h) == negated(step(*case), "w", "z")
 
 
 @for_every
 def test_ahead_and_astern_are_mirror_images_to_the_last_bit(step: Step, case: Case) -> None:
     """Thrust of the rear pair reversed, its torque kept: each thruster does the opposite of the other."""
     k, i, s, h = case
-    after = step(*case)
-    inputs = replace(i, u_l=-i.u_r, u_r=-i.u_l, X_ext=-i.X_ext, V_N=-i.V_N, V_E=-i.V_E)
-    assert step(k, inputs, replace(s, u=-s.u, x=-s.x, y=-s.y), h) == replace(after, u=-after.u, x=-after.x, y=-after.y)
+    inputs = negated({**i, "u_l": -i["u_r"], "u_r": -i["u_l"]}, "X_ext", "V_N", "V_E")
+    assert step(k, inputs, negated(s, "u", "x", "y"), h) == negated(step(*case), "u", "x", "y")
+
+
+_TWINS = {"1": "2", "2": "1", "3": "4", "4": "3", "5": "6", "6": "5", "7": "8", "8": "7"}
+"""The Heavy's thruster on the other side of each."""
+
+
+@pytest.mark.parametrize("kind", ["Python", "C"])
+def test_port_and_starboard_of_the_heavy_are_mirror_images(request: pytest.FixtureRequest, kind: str) -> None:
+    """Sway, lag and coupling with them; to rounding, for sums go over the thrusters in their order."""
+    step = in_python if kind == "Python" else partial(in_fmu, Fmu(request.getfixturevalue("heavy_dir")))
+
+    def mirrored(values: Values) -> State:
+        swapped = {}
+        for name, value in values.items():
+            head, _, thruster = name.partition("_")
+            swapped[f"{head}_{_TWINS[thruster]}" if thruster in _TWINS else name] = value
+        return negated(swapped, "v", "r", "y", "psi", "Y_ext", "N_ext", "V_E")
+
+    rng = random.Random(11)
+    for _ in range(10):
+        rov, inputs, before, h = random_case(rng, HEAVY)
+        after = mirrored(step(rov, inputs, before, h))
+        found = step(rov, mirrored(inputs), mirrored(before), h)
+        assert found == pytest.approx(after, rel=1e-13, abs=1e-14)
 
 
 # ---- Without force ----
@@ -109,28 +126,59 @@ def test_ahead_and_astern_are_mirror_images_to_the_last_bit(step: Step, case: Ca
 @for_every
 def test_without_force_no_velocity_gains_one_bit_or_changes_its_sign(step: Step, case: Case) -> None:
     k, i, s, h = case
-    after = step(k, Inputs(V_N=i.V_N, V_E=i.V_E), s, h)
+    after = step(k, {**still(k), "V_N": i["V_N"], "V_E": i["V_E"]}, s, h)
     for name in ("u", "w", "r"):
-        first, last = getattr(s, name), getattr(after, name)
-        assert 0.0 <= last <= first or first <= last <= 0.0
-        if getattr(k, f"a_d_{name}") == getattr(k, f"b_d_{name}") == 0.0:
-            assert last == first
+        assert 0.0 <= after[name] <= s[name] or s[name] <= after[name] <= 0.0
+        if k[f"a_d_{name}"] == k[f"b_d_{name}"] == 0.0:
+            assert after[name] == s[name]
+
+
+def energy(rov: Rov, state: Values) -> float:
+    """Kinetic, of the effective inertias."""
+    return 0.5 * sum(rov.effective_inertia(form) * state[form.axis.velocity] ** 2 for form in rov.layout.axes)
+
+
+@pytest.mark.parametrize("vehicle", [name for name, rov in VEHICLES.items() if rov.layout.coupled])
+def test_without_thrust_and_load_energy_only_falls(vehicle: str) -> None:
+    rov = VEHICLES[vehicle].replaced({n: 0.0 for n in VEHICLES[vehicle].coefficients if n.startswith("F_0")})
+    rng = random.Random(vehicle)
+    for _ in range(10):
+        _, _, state, h = random_case(rng, rov, -2.0, 0.0)
+        state |= dict.fromkeys(rov.layout.lagging, 0.0)
+        after = rov.step(still(rov), state, h)
+        assert energy(rov, after) <= energy(rov, state) * (1.0 + 1e-15)
+        assert energy(rov, rov.step(still(rov), after, h)) <= energy(rov, after) * (1.0 + 1e-15)
+
+
+def test_coupling_does_no_work() -> None:
+    """Without drag the energy stays, and what Kirchhoff's equations keep: (M_u u)^2 + (M_v v)^2."""
+    rov = HEAVY.replaced({name: 0.0 for name in HEAVY.coefficients if name.startswith(("a_d", "b_d"))})
+    M_u, M_v = (rov.effective_inertia(rov.layout.kinds[name]) for name in ("surge", "sway"))
+    rng = random.Random(12)
+    for _ in range(10):
+        _, _, state, h = random_case(rng, rov, -2.0, 0.5)
+        state |= dict.fromkeys(rov.layout.lagging, 0.0)
+        after = rov.step(still(rov), state, h)
+        assert energy(rov, after) == pytest.approx(energy(rov, state), rel=1e-14)
+        momenta = [hypot(M_u * s["u"], M_v * s["v"]) for s in (state, after)]
+        assert momenta[1] == pytest.approx(momenta[0], rel=1e-14)
 
 
 # ---- The same anywhere, in any direction ----
 
 
-def drift(i: Inputs, h: float) -> float:
-    return hypot(i.V_N, i.V_E) * h
+def drift(i: Values, h: float) -> float:
+    return hypot(i["V_N"], i["V_E"]) * h
 
 
 @for_every
 def test_a_step_is_the_same_wherever_it_begins(step: Step, case: Case) -> None:
     k, i, s, h = case
-    here, there = step(k, i, replace(s, x=0.0, y=0.0, z=0.0), h), step(*case)
-    assert replace(there, x=0.0, y=0.0, z=0.0) == replace(here, x=0.0, y=0.0, z=0.0)
-    for name in ("x", "y", "z"):
-        start, end, moved = (getattr(state, name) for state in (s, there, here))
+    origin = {"x": 0.0, "y": 0.0, "z": 0.0}
+    here, there = step(k, i, {**s, **origin}, h), step(*case)
+    assert {**there, **origin} == {**here, **origin}
+    for name in origin:
+        start, end, moved = (state[name] for state in (s, there, here))
         # two sums, of which the current's is one: half a unit in the last place of each, here and there
         largest = max(abs(start), abs(end), abs(moved), drift(i, h))
         assert abs(end - (start + moved)) <= 3.0 * ulp(largest)
@@ -142,26 +190,27 @@ def test_a_step_is_the_same_in_every_direction(step: Step, case: Case) -> None:
     k, i, s, h = case
     turned = 2.0
     c, d = cos(turned), sin(turned)
-    still = replace(i, V_N=0.0, V_E=0.0)
-    a = step(k, still, replace(s, x=0.0, y=0.0), h)
-    b = step(k, still, replace(s, x=0.0, y=0.0, psi=s.psi + turned), h)
-    assert replace(b, x=a.x, y=a.y, psi=a.psi) == a
-    assert abs(b.psi - (a.psi + turned)) <= 2.0 * ulp(abs(s.psi) + abs(a.psi) + turned)
-    length = path_of(rov.axes(k, i)[0], s.u, h)
-    allowed = length * (ulp(abs(s.psi) + turned) + 8.0 * ulp(1.0)) + TINY
-    assert abs(b.x - (a.x * c - a.y * d)) <= allowed
-    assert abs(b.y - (a.x * d + a.y * c)) <= allowed
+    calm, origin = {**i, "V_N": 0.0, "V_E": 0.0}, {**s, "x": 0.0, "y": 0.0}
+    a = step(k, calm, origin, h)
+    b = step(k, calm, {**origin, "psi": s["psi"] + turned}, h)
+    assert {**b, "x": a["x"], "y": a["y"], "psi": a["psi"]} == a
+    assert abs(b["psi"] - (a["psi"] + turned)) <= 2.0 * ulp(abs(s["psi"]) + abs(a["psi"]) + turned)
+    length = path_of(k.axes(i, k.commanded(i))[0], s["u"], h)
+    allowed = length * (ulp(abs(s["psi"]) + turned) + 8.0 * ulp(1.0)) + TINY
+    assert abs(b["x"] - (a["x"] * c - a["y"] * d)) <= allowed
+    assert abs(b["y"] - (a["x"] * d + a["y"] * c)) <= allowed
 
 
 @pytest.mark.parametrize("exponent", [-900, -700, -300, 300])
 def test_without_quadratic_drag_a_slow_vehicle_draws_the_path_of_a_fast_one(step: Step, exponent: int) -> None:
-    """To the last bit, for sizes that are powers of two; as yaw turns, surge turns about."""
+    """To the last bit, for sizes that are powers of two; as yaw turns, surge reverses."""
     scale = 2.0**exponent
-    k = replace(STILL, b_d_u=0.5)
+    k = STILL.replaced({"b_d_u": 0.5})
     for X_ext, u in ((-1.0, 1.0), (1.0, -0.25), (0.5, 0.0), (0.0, 1.0)):
-        fast = step(k, Inputs(X_ext=X_ext), State(u=u, r=1.0), 2.0)
-        slow = step(k, Inputs(X_ext=X_ext * scale), State(u=u * scale, r=1.0), 2.0)
-        assert slow == replace(fast, u=fast.u * scale, x=fast.x * scale, y=fast.y * scale)
+        start = {**at_rest(k), "r": 1.0}
+        fast = step(k, {**still(k), "X_ext": X_ext}, {**start, "u": u}, 2.0)
+        slow = step(k, {**still(k), "X_ext": X_ext * scale}, {**start, "u": u * scale}, 2.0)
+        assert slow == {**fast, **{name: fast[name] * scale for name in ("u", "x", "y")}}
 
 
 # ---- Semigroup ----
@@ -173,21 +222,19 @@ def test_two_half_steps_are_one_step(step: Step, case: Case) -> None:
     k, i, s, h = case
     half = 0.5 * h
     once = step(*case)
-    middle = step(k, i, s, half)
-    twice = step(k, i, middle, half)
+    twice = step(k, i, step(k, i, s, half), half)
     passed_on, ways = {}, {}
-    for name, axis in zip("uwr", rov.axes(k, i), strict=True):
-        first, last = getattr(s, name), getattr(once, name)
-        rounding = VELOCITY * max(abs(first), abs(last)) + TINY
-        assert abs(getattr(twice, name) - last) <= 3.0 * rounding
+    for name, axis in zip("uwr", k.axes(i, k.commanded(i)), strict=True):
+        rounding = VELOCITY * max(abs(s[name]), abs(once[name])) + TINY
+        assert abs(twice[name] - once[name]) <= 3.0 * rounding
         passed_on[name] = rounding * memory(axis.A, axis.B, half)
-        ways[name] = path_of(axis, first, h)
-    depth = 2.0 * DISTANCE * ways["w"] + passed_on["w"] + 2.0 * ulp(abs(s.z) + ways["w"])
-    assert abs(twice.z - once.z) <= depth
-    heading = 2.0 * DISTANCE * ways["r"] + passed_on["r"] + 2.0 * ulp(abs(s.psi) + ways["r"])
-    assert abs(twice.psi - once.psi) <= heading
+        ways[name] = path_of(axis, s[name], h)
+    depth = 2.0 * DISTANCE * ways["w"] + passed_on["w"] + 2.0 * ulp(abs(s["z"]) + ways["w"])
+    assert abs(twice["z"] - once["z"]) <= depth
+    heading = 2.0 * DISTANCE * ways["r"] + passed_on["r"] + 2.0 * ulp(abs(s["psi"]) + ways["r"])
+    assert abs(twice["psi"] - once["psi"]) <= heading
     carried = drift(i, h)
     position = ways["u"] * (2.0 * POSITION + heading) + passed_on["u"]
-    position += 3.0 * ulp(max(abs(s.x), abs(s.y)) + ways["u"] + carried)
-    assert abs(twice.x - once.x) <= position
-    assert abs(twice.y - once.y) <= position
+    position += 3.0 * ulp(max(abs(s["x"]), abs(s["y"])) + ways["u"] + carried)
+    assert abs(twice["x"] - once["x"]) <= position
+    assert abs(twice["y"] - once["y"]) <= position

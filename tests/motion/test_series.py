@@ -1,0 +1,122 @@
+"""Where a series may stumble: starts from rest, reversals at every place, forces that fade, what overflows."""
+
+from math import isfinite, nextafter
+from time import process_time
+
+import pytest
+
+from checks import reference
+from rov_fmu.motion import series
+from rov_fmu.motion.rov import Rov
+from tests.motion.steps import errors, in_python, worst
+from tests.vehicles import HEAVY, VEHICLES, State, Values, at_rest, numbered, still
+
+COUPLED, LATE = VEHICLES["coupled without lag"], VEHICLES["lag without coupling"]
+FREE = numbered(VEHICLES["surge without drag"].layout, dict.fromkeys(("a_d_u", "b_d_u", "a_d_r", "b_d_r"), 0.0))
+AHEAD = {"u_1": 0.5, "u_2": 0.6, "u_3": -0.4, "u_4": -0.5}
+BACK = {"F_1": -10.0, "F_2": -10.0, "F_3": 10.0, "F_4": 10.0}
+"""Forces against the commands ahead."""
+M, I_R = FREE["m_rov"], FREE["I_r"]
+
+CASES: dict[str, tuple[Rov, Values, Values, tuple[float, ...]]] = {
+    "from rest, late": (HEAVY, AHEAD, {}, (1e-6, 1e-3, 0.1, 1.0)),
+    "from rest, by one late thruster, which turns and thereby sways": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
+    "from rest, coupled": (COUPLED, {"Y_ext": 3.0, "N_ext": 0.1}, {}, (1e-5, 1e-2, 1.0)),
+    "thrust fades through zero": (HEAVY, AHEAD, {**BACK, "u": -0.3}, (1e-3, 0.1, 0.5)),
+    "the force cancels the thrust of now": (HEAVY, {"X_ext": 28.284271247461902}, BACK, (1e-5, 0.1, 1.0)),
+    "surge and sway without yaw turn it": (COUPLED, {}, {"u": 1.0, "v": 0.5}, (1e-3, 0.3, 2.0)),
+    "sway alone": (COUPLED, {}, {"v": 0.5}, (0.1, 2.0)),
+    "coasting": (HEAVY, {}, {"u": 1.0, "v": 0.1, "r": 0.3}, (0.1, 10.0)),
+    "a velocity of the smallest number": (HEAVY, AHEAD, {"u": 5e-324, "r": 1e-310}, (0.1,)),
+    "a spin": (COUPLED, {}, {"u": 1.0, "r": 100.0}, (0.01, 0.5)),
+    "a lag of a minute": (LATE.replaced({"T_t200": 60.0}), {"u_l": 0.3}, {"u": 1.0, "r": 0.3, "F_l": 1.0}, (1.0, 20.0)),
+    "a lag of a millisecond": (LATE.replaced({"T_t200": 1e-3}), {"u_l": 0.3}, {"u": 1.0, "F_l": 1.0}, (1e-3, 1.0)),
+    "there and back with a turn there and back": (
+        FREE, {"X_ext": -M, "N_ext": -I_R}, {"u": 1.0, "r": 1.0}, (1.0, 2.0, 3.0),
+    ),
+    "there and back in a steady turn": (FREE, {"X_ext": -M}, {"u": 1.0, "r": 1.0}, (1.0, 2.0, 3.0, 100.0)),
+}  # fmt: skip
+
+
+def case(rov: Rov, inputs: Values, state: Values) -> tuple[Rov, State, State]:
+    return rov, {**still(rov), **inputs}, {**at_rest(rov), **state}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_special_is_exact(name: str) -> None:
+    rov, inputs, state, steps = CASES[name]
+    for h in steps:
+        velocity, path = worst(in_python, *case(rov, inputs, state), h)
+        assert velocity <= 1e-14, h
+        assert path <= 1e-13, h
+
+
+# ---- Reversals ----
+
+
+@pytest.mark.parametrize("rov", [HEAVY, LATE, COUPLED], ids=["Heavy", "late", "coupled"])
+def test_a_step_that_ends_at_a_reversal_or_beside_it_is_exact(rov: Rov) -> None:
+    """The time at which surge reverses, found by halving steps; then to the last bits around it."""
+    rov, inputs, state = case(rov, {"X_ext": -20.0}, {"u": 0.4, "r": 0.5})
+    low, high = 0.0, 2.0
+    while nextafter(low, 1.0) < high and high - low > 1e-16:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if rov.step(inputs, state, middle)["u"] > 0.0 else (low, middle)
+    for h in (low, high, high * (1.0 - 1e-9), high * (1.0 + 1e-9), 2.0 * high):
+        velocity, path = worst(in_python, rov, inputs, state, h)
+        assert max(velocity, path) <= 1e-14, h
+
+
+@pytest.mark.parametrize("depth", [0.0, 1e-16, 1e-12, 1e-9, 1e-6, 1e-3, -1e-12, -1e-6])
+def test_a_velocity_that_just_touches_zero_or_nearly_is_exact(depth: float) -> None:
+    """Late thrust turns about while the vehicle slows down; where it would touch zero, a load takes it below."""
+    rov, inputs, state = case(LATE, {"u_l": 0.6, "u_r": 0.6}, {"F_l": -25.0, "F_r": -25.0})
+
+    def lowest(u: float) -> float:
+        return min(rov.step(inputs, {**state, "u": u}, 0.01 * n)["u"] for n in range(1, 60))
+
+    low, high = 0.0, 2.0
+    for _ in range(20):
+        u = 0.5 * (low + high)
+        low, high = (u, high) if lowest(u) < 0.0 else (low, u)
+    for h in (0.2, 0.5):
+        velocity, path = worst(in_python, rov, inputs, {**state, "u": high - depth}, h)
+        assert max(velocity, path) <= 1e-14, h
+
+
+# ---- What goes too far ----
+
+
+@pytest.mark.parametrize(
+    ("rov", "inputs", "state", "h"),
+    [
+        (HEAVY, {}, {"u": 1e200, "v": 1e200, "r": 1e200}, 1.0),
+        (FREE, {}, {"u": 1.0, "r": 1e300}, 1e10),
+        (FREE, {"X_ext": 1e308}, {"r": 1.0}, 1e308),
+        (COUPLED, {"X_ext": 1e308, "Y_ext": -1e308}, {"r": 1e300}, 1e300),
+    ],
+    ids=["velocities", "turn", "way", "all"],
+)
+def test_what_overflows_is_not_finite_at_once(rov: Rov, inputs: Values, state: Values, h: float) -> None:
+    start = process_time()
+    assert not all(map(isfinite, in_python(*case(rov, inputs, state), h).values()))
+    assert process_time() - start < 2.0
+
+
+def test_more_pieces_than_a_step_may_have_are_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    rov, inputs, state = case(COUPLED, {}, {"u": 1.0, "v": 0.2, "r": 3.0})
+    assert all(map(isfinite, rov.step(inputs, state, 5.0).values()))
+    monkeypatch.setattr(series, "MOST_PIECES", 3)
+    assert not all(map(isfinite, rov.step(inputs, state, 5.0).values()))
+
+
+@pytest.mark.parametrize("h", [1e3, 1e6, 1e30])
+def test_once_all_has_settled_a_step_of_any_length_takes_no_longer(h: float) -> None:
+    rov, inputs, state = case(HEAVY, AHEAD, {})
+    start = process_time()
+    found = rov.step(inputs, state, h)
+    assert process_time() - start < 1.0
+    if h == 1e3:
+        exact = reference.step(rov, inputs, state, h)
+        assert max(errors(found, exact.state, exact.scale, state)) <= 1e-14
+    assert all(map(isfinite, found.values()))
