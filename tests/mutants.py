@@ -39,6 +39,7 @@ _TESTS = {
     "fmu_src/c/*": "fmu/test_values fmu/test_lifecycle fmu/test_arguments fmu/test_state fmu/test_state_bytes "
     "fmu/test_model_exchange fmu/test_derivatives around/test_fuzz",
     "rov_fmu/motion/riccati.py": "motion/test_time_to_rest motion/test_riccati motion/test_properties",
+    "rov_fmu/motion/series.py": "motion/test_series motion/test_symmetries motion/test_exactness",
     "rov_fmu/motion/*": "motion/test_rov export/test_declared_numbers motion/test_symmetries motion/test_exactness",
     "rov_fmu/identify/tuning.py": "identify/test_tuning identify/test_fuzzed_tables",
     "rov_fmu/identify/tank_tests.py": "identify/test_edges identify/test_tank_tests identify/test_identification",

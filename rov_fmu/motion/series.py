@@ -293,7 +293,8 @@ def _first_root(c: Sequence[float], length: float) -> tuple[float, bool]:
         if sizes[k] > sum(sizes[k + 1 :]) or length <= shortest:
             return length, False
         if k == 0 and sizes[1] > sum(n * size for n, size in enumerate(sizes[2:], 2)):
-            if _value(c, length) * c[0] > 0.0:
+            value = _value(c, length)
+            if value != 0.0 and (value > 0.0) == (c[0] > 0.0):  # a product would underflow
                 return length, False
             return _root(c, length), True
         length *= 0.5
@@ -306,7 +307,7 @@ def _root(c: Sequence[float], length: float) -> float:
         value = _value(c, t)
         if value == 0.0:
             return t
-        low, high = (t, high) if value * c[0] > 0.0 else (low, t)
+        low, high = (t, high) if (value > 0.0) == (c[0] > 0.0) else (low, t)
         slope = 0.0
         for n in range(len(c) - 1, 0, -1):
             slope = slope * t + n * c[n]

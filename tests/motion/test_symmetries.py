@@ -152,7 +152,7 @@ def test_without_thrust_and_load_energy_only_falls(vehicle: str) -> None:
 
 def test_coupling_does_no_work() -> None:
     """Without drag the energy stays, and what Kirchhoff's equations keep: (M_u u)^2 + (M_v v)^2."""
-    rov = HEAVY.replaced({name: 0.0 for name in HEAVY.coefficients if name.startswith(("a_d", "b_d"))})
+    rov = HEAVY.replaced({name: 0.0 for name in HEAVY.coefficients if name.startswith(("a_d", "b_d", "F_0"))})
     M_u, M_v = (rov.effective_inertia(rov.layout.kinds[name]) for name in ("surge", "sway"))
     rng = random.Random(12)
     for _ in range(10):
