@@ -199,7 +199,7 @@ def test_what_overflows_is_said_at_once(fmu: Fmu, case: Case) -> None:
         start = process_time()
         assert instance.step(0.0, h) == ERROR
         assert process_time() - start < 0.5
-        assert "overflows" in instance.log[-1].text
+        assert any(word in instance.log[-1].text for word in ("overflows", "MOST_PIECES"))
 
 
 # ---- The VideoRay, against an integration of the equations as the paper prints them ----
