@@ -14,13 +14,13 @@ from rov_fmu.build import build
 from rov_fmu.export.compile import BuildError, host_platform
 from rov_fmu.files.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code, run_process
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 from . import archive, fleet, importer, picture, sections
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
-from .steps import Measured, Plan
+from .steps import HeavyPlan, Measured, Plan
 from .work import Work
 
 
@@ -62,15 +62,21 @@ def _command(quick: bool, picture_file: Path | None) -> None:
 
 def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterator[Section]:
     vehicle = load_vehicle(VIDEORAY)
-    k, say = vehicle.coefficients, Console(stderr=True).status
+    rov, say = vehicle.rov, Console(stderr=True).status
     plain_c = PlainC(vehicle, Path(tempfile.mkdtemp(dir=folder))) if measurable() else None
     if plain_c:
         with say("steps in plain C"):
-            plan = Plan(k, effort.commands, effort.known)
+            plan = Plan(rov, effort.commands, effort.known)
             measured = Measured(plain_c, plan.jobs, effort.repetitions)
             yield from sections.plain_c(plan, measured)
             if picture_file:
                 write_whole(Output(picture_file, picture.cost_error_picture(plan, measured).encode()))
+        with say("a vehicle with coupling and lag in plain C"):
+            heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
+            heavier = HeavyPlan(heavy.rov, effort.commands, max(4, effort.known // 4))
+            heavy_c = PlainC(heavy, Path(tempfile.mkdtemp(dir=folder)))
+            measured_heavy = Measured(heavy_c, heavier.jobs, effort.repetitions)
+            yield sections.heavy(heavier, measured_heavy)
     else:
         yield [["Plain C: not measured, the programs are written for Linux on x86-64"]]
     with say("building"):
@@ -83,11 +89,11 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
         loaded = archive.load(native, folders[importer.NATIVE], effort.loads)
         fmpy.extract(str(python), str(folders[importer.PYTHONFMU]))
     with say("a manoeuvre through FMPy"):
-        manoeuvre = Work(k, straight=False, hold=1.0, commands=round(importer.STOP), starts=1)
+        manoeuvre = Work(rov, straight=False, hold=1.0, commands=round(importer.STOP), starts=1)
         simulated = importer.simulate(folders, manoeuvre, effort.manoeuvres)
         yield sections.through_fmpy(simulated, importer.step_through(folders, manoeuvre, effort.manoeuvres))
     with say("many instances and runs"):
-        variations, runs = fleet.Variations(k, effort.runs), {}
+        variations, runs = fleet.Variations(rov, effort.runs), {}
         if plain_c:
             yield sections.instances(fleet.instances(plain_c, effort.repetitions))
             runs["plain C"] = fleet.in_c(plain_c, variations, effort.repetitions)
@@ -97,7 +103,7 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
         yield sections.variations(runs)
     yield from sections.archive(builds, loaded)
     if plain_c:
-        yield sections.promises(plan, measured)
+        yield sections.promises(plan, measured, heavier, measured_heavy)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,21 +1,19 @@
 """Many instances, and many runs of one: in plain C and through FMPy, on one core."""
 
 import time
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
 from rov_fmu.export.interface import variables
-from rov_fmu.motion.rov import COEFFICIENTS, Coefficients
+from rov_fmu.motion.rov import Rov
 
 from .importer import restart
 from .plain_c import PlainC, Reals
-from .work import COMMANDS, STATES, Work, flight
+from .work import Work, flight
 
 INSTANCES = (1, 100, 10_000)
-PARAMETERS = tuple(name for name, meta in COEFFICIENTS.items() if meta.tunable)
-"""Those that vary: every α and β."""
 _HOLD, _COMMANDS = 10.0, 10
 _STEPS, _CHECKED = 200_000, 10
 
@@ -32,20 +30,21 @@ class Runs:
 class Variations:
     """Runs of 100 s, ten commands of 10 s, each with another α and β: within 30 % of the vehicle's."""
 
-    def __init__(self, k: Coefficients, count: int) -> None:
-        self.coefficients = k
-        self.values = np.random.default_rng(1).uniform(0.7, 1.3, (count, len(PARAMETERS)))
-        self.values *= [getattr(k, name) for name in PARAMETERS]
-        self.work = Work(k, False, _HOLD, _COMMANDS, 1)
-        declared = {variable.name: variable.value_reference for variable in variables(k)}
+    def __init__(self, rov: Rov, count: int) -> None:
+        self.rov, layout = rov, rov.layout
+        self.parameters = [name for name, meta in layout.coefficients.items() if meta.tunable]
+        self.values = np.random.default_rng(1).uniform(0.7, 1.3, (count, len(self.parameters)))
+        self.values *= [rov[name] for name in self.parameters]
+        self.work = Work(rov, False, _HOLD, _COMMANDS, 1)
+        declared = {variable.name: variable.value_reference for variable in variables(rov)}
         self.references, self.inputs, self.outputs = (
-            [declared[name] for name in names] for names in (PARAMETERS, COMMANDS, STATES)
+            [declared[name] for name in names] for names in (self.parameters, layout.commands, layout.state)
         )
 
     def error(self, ends: Reals) -> float:
         """Of the first runs."""
-        tuned = [dict(zip(PARAMETERS, values, strict=True)) for values in self.values[:_CHECKED].tolist()]
-        exact = [astuple(flight(replace(self.coefficients, **k), self.work.sequence, _HOLD)[-1]) for k in tuned]
+        tuned = [dict(zip(self.parameters, values, strict=True)) for values in self.values[:_CHECKED].tolist()]
+        exact = [list(flight(self.rov.replaced(k), self.work.sequence, _HOLD)[-1].values()) for k in tuned]
         return float(np.abs(ends[:_CHECKED] - exact).max())
 
 
@@ -71,8 +70,8 @@ def through_fmpy(slave: FMU2Slave, variations: Variations, runs: int, repetition
         start = time.process_time()
         for values in variations.values[:runs].tolist():
             restart(slave, variations.references, values)
-            for n, command in enumerate(variations.work.sequence):
-                slave.setReal(variations.inputs, (command.u_l, command.u_r, command.u_t))
+            for n, command in enumerate(variations.work.array.tolist()):
+                slave.setReal(variations.inputs, command)
                 slave.doStep(currentCommunicationPoint=n * _HOLD, communicationStepSize=_HOLD)
             ends.append(slave.getReal(variations.outputs))
         seconds.append(time.process_time() - start)

@@ -3,7 +3,6 @@
 import time
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,9 @@ import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
 from checks.fmpy_slave import fmpy_slave, keep_loaded
-from rov_fmu.motion.rov import Inputs
 
 from .plain_c import Reals
-from .work import COMMANDS, STATES, Work, flight
+from .work import Work, flight
 
 STOP, INTERVAL = 100.0, 0.01
 NATIVE, PYTHONFMU, MODEL_EXCHANGE = "native", "PythonFMU flavour", "Model Exchange, CVode 1e-6"
@@ -41,10 +39,10 @@ def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> 
     Seconds of processor time in each repetition; the largest error of a state at the end (SI units).
     """
     keep_loaded(folders[PYTHONFMU])
-    end = astuple(flight(manoeuvre.coefficients, manoeuvre.sequence, manoeuvre.hold)[-1])
+    end = flight(manoeuvre.rov, manoeuvre.sequence, manoeuvre.hold)[-1]
     # two rows at each change, as FMPy wants them
-    rows = [((n + k) * manoeuvre.hold, *astuple(c)) for n, c in enumerate(manoeuvre.sequence) for k in (0, 1)]
-    signals = np.array(rows, dtype=[("time", float), *((field.name, float) for field in fields(Inputs))])
+    rows = [((n + k) * manoeuvre.hold, *c.values()) for n, c in enumerate(manoeuvre.sequence) for k in (0, 1)]
+    signals = np.array(rows, dtype=[("time", float), *((name, float) for name in manoeuvre.rov.layout.inputs)])
     seconds, errors = defaultdict(list), {}
     for _ in range(repetitions):
         for name, options in _OPTIONS.items():
@@ -52,29 +50,29 @@ def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> 
             description = fmpy.read_model_description(folder)
             start = time.process_time()
             result = fmpy.simulate_fmu(
-                folder, stop_time=STOP, output_interval=INTERVAL, input=signals, output=STATES, validate=False,
+                folder, stop_time=STOP, output_interval=INTERVAL, input=signals, output=list(end), validate=False,
                 model_description=description, **options,
             )  # fmt: skip
             seconds[name].append(time.process_time() - start)
-            errors[name] = float(max(abs(result[n][-1] - value) for n, value in zip(STATES, end, strict=True)))
+            errors[name] = float(max(abs(result[n][-1] - value) for n, value in end.items()))
     return {name: (np.array(times), errors[name]) for name, times in seconds.items()}
 
 
 def step_through(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, Reals]:
     """Seconds of processor time in each repetition for the same, with nothing but the functions of a step."""
     slaves = {name: fmpy_slave(folder) for name, folder in folders.items()}
-    seconds = defaultdict(list)
+    seconds, rows = defaultdict(list), manoeuvre.array.tolist()
     # both flavours have the same references
     description = fmpy.read_model_description(str(folders[NATIVE]))
     references = {variable.name: variable.valueReference for variable in description.modelVariables}
-    commands, velocities = ([references[name] for name in names] for names in (COMMANDS, ("u", "w", "r")))
+    commands, velocities = ([references[name] for name in names] for names in (manoeuvre.names, ("u", "w", "r")))
     for _ in range(repetitions):
         for name, slave in slaves.items():
             restart(slave)
             start = time.process_time()
             for n in range(round(STOP / INTERVAL)):
-                command = manoeuvre.sequence[int(n * INTERVAL / manoeuvre.hold)]
-                slave.setReal(commands, (command.u_l, command.u_r, command.u_t))
+                command = rows[int(n * INTERVAL / manoeuvre.hold)]
+                slave.setReal(commands, command)
                 slave.doStep(currentCommunicationPoint=n * INTERVAL, communicationStepSize=INTERVAL)
                 slave.getReal(velocities)
             seconds[name].append(time.process_time() - start)

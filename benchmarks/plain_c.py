@@ -17,8 +17,9 @@ from rov_fmu.export.compile import PLATFORMS, compile_all, host_platform
 from rov_fmu.vehicle.vehicle import Vehicle
 
 PLATFORM = "linux64"
-# as steps.py names them: the FMU, the formulas without FMI, the explicit methods, CVODE's
-FMU, CLOSED, EULER, RK4 = "fmu", "closed", "euler", "rk4"
+# as steps.py names them: the FMU, the same with its commands set before every step, the formulas without FMI, the
+# explicit methods, CVODE's
+FMU, FMU_SET, CLOSED, EULER, RK4 = "fmu", "fmu-set", "closed", "euler", "rk4"
 BDF, ADAMS, FIXED_POINT = CVODE = ("bdf", "adams", "adams-fixed")
 _SOURCES = Path(__file__).with_name("c")
 # a library needs but a part of the FMU's sources; what replaces mallinfo came after the GLIBC that is linked here
@@ -42,6 +43,7 @@ class PlainC:
 
     def __init__(self, vehicle: Vehicle, folder: Path) -> None:
         content = native_content(vehicle)
+        self._states = len(vehicle.layout.state)
         fmu = folder / f"{content.identifier}{PLATFORMS[PLATFORM].suffix}"
         fmu.write_bytes(compile_all([PLATFORM], content.sources, content.identifier)[PLATFORM])
 
@@ -65,7 +67,8 @@ class PlainC:
         """
         context = sundials.SUNContext()
         flags = [sundials.SUNContext_Create(sundials.SUN_COMM_NULL, byref(context))]
-        y, rates = sundials.N_VNew_Serial(states, context), sundials.CVRhsFn((f"rates_{states}", self._measure))
+        y = sundials.N_VNew_Serial(states, context)
+        rates = sundials.CVRhsFn((f"rates_{self._which(states)}", self._measure))
         solver = sundials.CVodeCreate(2 if method == BDF else 1, context)
         flags += [sundials.CVodeInit(solver, rates, 0.0, y), sundials.CVodeSetMaxNumSteps(solver, 1_000_000)]
         flags += [sundials_cvode.CVodeSStolerances(c_void_p(solver), c_double(tolerance), c_double(tolerance))]
@@ -80,20 +83,23 @@ class PlainC:
             raise RuntimeError(f"CVODE cannot be set up: {flags}")
         return solver, ctypes.cast(y, c_void_p)
 
+    def _which(self, states: int) -> str:
+        return "all" if states == self._states else "velocities"
+
     def hold(
         self, method: str, states: int, setting: float, h: float, steps: int, commands: Reals, start: Reals
     ) -> tuple[float, Reals]:
-        """Hold commands in turn, each for so many steps of h: seconds a step, and the end (seven states).
+        """Hold commands in turn, each for so many steps of h: seconds a step, and the end (all states).
 
         `setting`: sub-steps, or the tolerance of CVODE.
         """
         function, solver, end = None, (None, None), start.copy()
         if method in CVODE:
             solver = self._solver(states, method, setting)
-        elif method != FMU:
+        elif method not in (FMU, FMU_SET):
             library = self._measure if method == CLOSED else self._explicit
-            function = ctypes.cast(getattr(library, f"{method}_{states}"), c_void_p)
-        substeps = 1 if method in CVODE else round(setting)
+            function = ctypes.cast(getattr(library, f"{method}_{self._which(states)}"), c_void_p)
+        substeps = 0 if method == FMU_SET else 1 if method in CVODE else round(setting)
         each = self._measure.hold(function, *solver, states, h, substeps, steps, len(commands), commands, end)
         return 1e-9 * each, end
 
@@ -104,7 +110,7 @@ class PlainC:
 
     def run_each(self, references: list[int], values: Reals, commands: Reals) -> tuple[float, Reals]:
         """A run of ten commands of 10 s for each row of start values: seconds, and where each ends."""
-        ends = np.empty((len(values), 7))
+        ends = np.empty((len(values), self._states))
         vr = np.array(references, dtype=np.uint32)
         seconds = 1e-9 * self._measure.run_each(len(values), vr, len(vr), values, commands, ends)
         return seconds, ends

@@ -7,13 +7,14 @@ import numpy as np
 from .fleet import INSTANCES, Runs
 from .importer import INTERVAL, NATIVE, STOP
 from .page import Section, digits, duration, error
-from .plain_c import BDF, CLOSED, CVODE, EULER, FMU, RK4, Reals
-from .steps import KINDS, NAMES, SUBSTEP, TARGET, H, Job, Measured, Plan, compared, methods
+from .plain_c import BDF, CLOSED, CVODE, EULER, FMU, FMU_SET, RK4, Reals
+from .steps import KINDS, NAMES, SUBSTEP, TARGET, H, HeavyPlan, Job, Measured, Plan, compared, methods
 
 _STEPS = [f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H]
 _OURS = {FMU: "ours, fmi2DoStep", CLOSED: "ours, without FMI"}
+_SET = {FMU_SET: "ours, fmi2SetReal and fmi2DoStep"}
 _SUBSTEPS = f"sub-steps ≤ {1000 * SUBSTEP:g} ms"
-_NAMES = {**_OURS, RK4: f"RK4, {_SUBSTEPS}", EULER: f"forward Euler, {_SUBSTEPS}"}
+_NAMES = {**_SET, **_OURS, RK4: f"RK4, {_SUBSTEPS}", EULER: f"forward Euler, {_SUBSTEPS}"}
 
 
 def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
@@ -40,6 +41,16 @@ def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
                 section[-1] += [duration(cost), digits(times)]
     headings = ["velocities", "times ours", "and pose, turning", "times ours"]
     yield [[f"A command of 1 s to {error(TARGET)}", *headings], *section]
+
+
+def heavy(plan: HeavyPlan, measured: Measured) -> Section:
+    """All states of a vehicle with coupling and lag."""
+    rows = {"ours, without FMI": plan.ours, _NAMES[RK4]: plan.rk4}
+    return [
+        ["BlueROV2 Heavy, coupling and lag", *_STEPS],
+        *([name, *(f"{duration(measured.cost(job))}  {error(measured.error(job)):>5}" for job in jobs.values())]
+          for name, jobs in rows.items()),
+    ]  # fmt: skip
 
 
 def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[str, Reals]) -> Section:
@@ -87,10 +98,23 @@ def archive(builds: Mapping[str, tuple[int, float, float]], loaded: Sequence[flo
     ]
 
 
-def promises(plan: Plan, measured: Measured) -> Section:
+FINE = 1e-10
+"""The error at which the Heavy is compared with RK4."""
+
+
+def _ratio(measured: Measured, ours: Job, other: Job) -> float:
+    return float(np.median(measured.seconds[ours] / measured.seconds[other]))
+
+
+def promises(plan: Plan, measured: Measured, heavier: HeavyPlan, measured_heavy: Measured) -> Section:
     """What was promised of the cost of a step. Ratios and differences are the medians of those in each repetition."""
     velocity, held = plan.job(CLOSED, 3, SUBSTEP), plan.job(CLOSED, 3, 1.0)
-    step = float(np.median(measured.seconds[velocity] / measured.seconds[plan.job(RK4, 3, SUBSTEP)]))
+    step = _ratio(measured, velocity, plan.job(RK4, 3, SUBSTEP))
+    to_rk4 = {(h, straight): _ratio(measured, plan.job(CLOSED, 7, h, straight), plan.job(RK4, 7, h, straight))
+              for h in (0.001, SUBSTEP) for straight in (False, True)}  # fmt: skip
+    set_too = _ratio(measured, plan.job(FMU_SET, 7, SUBSTEP), plan.job(RK4, 7, SUBSTEP))
+    coupled = _ratio(measured_heavy, heavier.ours[SUBSTEP], heavier.rk4[SUBSTEP])
+    finer = compared(measured_heavy, heavier.sweep, heavier.ours[SUBSTEP], FINE)[1]
     worst = max(measured.error(job) for job in (velocity, held))
     times = {method: compared(measured, plan.sweeps[3, method], held)[1] for method in (RK4, *CVODE)}
     best = min(CVODE, key=lambda method: times[method])
@@ -99,7 +123,13 @@ def promises(plan: Plan, measured: Measured) -> Section:
     fmu, bare = (measured.seconds[plan.job(method, 7, SUBSTEP, straight=True)] for method in (FMU, CLOSED))
     layer = max(0.0, float(np.median(fmu - bare)))
     per = f"at {error(TARGET)} a command of 1 s"
+    steps = [(f"{'straight' if straight else 'turning'} step of all states to one of RK4, {1000 * h:g} ms", found)
+             for (h, straight), found in to_rk4.items()]  # fmt: skip
     made = [
+        *((what, digits(found), "≤ 1.5", found <= 1.5) for what, found in steps),
+        ("turning, with fmi2SetReal and fmi2DoStep, 10 ms", digits(set_too), "≤ 2", set_too <= 2.0),
+        ("Heavy, coupling and lag, to one of RK4, 10 ms", digits(coupled), "≤ 5", coupled <= 5.0),
+        (f"RK4 to ours of the Heavy, to {error(FINE)}", digits(finer), "≥ 5", finer >= 5.0),
         ("velocity step of 3 axes to one of RK4, 10 ms", digits(step), "≤ 1", step <= 1.0),
         ("its error, m/s, rad/s", error(worst), "≤ 1e-14", worst <= 1e-14),
         (f"RK4 to ours, {per}", digits(times[RK4]), "≥ 20", times[RK4] >= 20.0),

@@ -7,9 +7,9 @@ from itertools import chain
 
 import numpy as np
 
-from rov_fmu.motion.rov import Coefficients
+from rov_fmu.motion.rov import Rov
 
-from .plain_c import ADAMS, BDF, CLOSED, CVODE, EULER, FIXED_POINT, FMU, RK4, PlainC, Reals
+from .plain_c import ADAMS, BDF, CLOSED, CVODE, EULER, FIXED_POINT, FMU, FMU_SET, RK4, PlainC, Reals
 from .work import Work
 
 TARGET = 1e-9
@@ -21,7 +21,7 @@ TOLERANCES = (1e-6, 1e-9)
 KINDS = ((3, False), (7, False), (7, True))
 """States, and whether straight, of the table."""
 NAMES = {RK4: "RK4", BDF: "CVODE BDF", ADAMS: "CVODE Adams, Newton", FIXED_POINT: "CVODE Adams"}
-_METHODS = [*((method, 0.0) for method in (FMU, CLOSED, RK4, EULER)),
+_METHODS = [*((method, 0.0) for method in (FMU_SET, FMU, CLOSED, RK4, EULER)),
             *((method, tolerance) for method in (BDF, FIXED_POINT) for tolerance in TOLERANCES)]  # fmt: skip
 _SWEEP = {
     EULER: [10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5],
@@ -35,7 +35,7 @@ _PASS = 4e-3
 
 def methods(states: int) -> list[tuple[str, float]]:
     """Of the table, with the solvers' tolerances. The FMU steps all states."""
-    return _METHODS[states == 3 :]
+    return _METHODS[2 * (states == 3) :]
 
 
 @dataclass(frozen=True)
@@ -83,11 +83,11 @@ class Measured:
 class Plan:
     """What is measured: the table's jobs and, for the picture, cost against error of a held command of 1 s."""
 
-    def __init__(self, coefficients: Coefficients, commands: int, starts: int) -> None:
+    def __init__(self, rov: Rov, commands: int, starts: int) -> None:
         @cache
         def work(straight: bool, long: bool, ahead: bool) -> Work:
             known = 4 if ahead else starts // 4 if long else starts
-            return Work(coefficients, straight, 100.0 if long else 1.0, commands, known, ahead)
+            return Work(rov, straight, 100.0 if long else 1.0, commands, known, ahead)
 
         self._work = work
         self.sweeps = {
@@ -109,6 +109,19 @@ class Plan:
         return Job(method, states, setting, self._work(straight or ahead, h > 1.0, ahead), h)
 
 
+class HeavyPlan:
+    """What is measured of a vehicle with coupling and lag, of all states: its steps, and RK4 ever finer."""
+
+    def __init__(self, rov: Rov, commands: int, starts: int) -> None:
+        states = len(rov.layout.state)
+        short, long = (Work(rov, False, hold, commands, known) for hold, known in ((1.0, starts), (100.0, starts // 4)))
+        works = {h: long if h > 1.0 else short for h in H}
+        self.ours = {h: Job(CLOSED, states, 1.0, work, h) for h, work in works.items()}
+        self.rk4 = {h: Job(RK4, states, max(1.0, round(h / SUBSTEP)), work, h) for h, work in works.items()}
+        self.sweep = [Job(RK4, states, float(2**n), short, SUBSTEP) for n in range(8)]
+        self.jobs = list(dict.fromkeys([*self.ours.values(), *self.rk4.values(), *self.sweep]))
+
+
 def cost_at(measured: Measured, jobs: Sequence[Job], target: float = TARGET) -> Reals:
     """Seconds at which a method reaches an error, in each repetition: between its settings, on logarithmic axes.
 
@@ -124,7 +137,7 @@ def cost_at(measured: Measured, jobs: Sequence[Job], target: float = TARGET) -> 
     )
 
 
-def compared(measured: Measured, jobs: Sequence[Job], ours: Job) -> tuple[float, float]:
-    """Medians at TARGET: the seconds of a method, and how many times ours they are."""
-    costs = cost_at(measured, jobs)
+def compared(measured: Measured, jobs: Sequence[Job], ours: Job, target: float = TARGET) -> tuple[float, float]:
+    """Medians at an error: the seconds of a method, and how many times ours they are."""
+    costs = cost_at(measured, jobs, target)
     return float(np.median(costs)), float(np.median(costs / measured.seconds[ours]))

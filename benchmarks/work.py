@@ -1,8 +1,8 @@
 """The same work for all: seeded commands, held, and where each ends to 50 digits."""
 
 import random
-from collections.abc import Iterable, Sequence
-from dataclasses import astuple, dataclass, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 
@@ -10,26 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from checks import reference
-from rov_fmu.motion import rov
-from rov_fmu.motion.rov import Coefficients, Inputs, State
+from rov_fmu.motion.rov import Rov
 
 SEED = 1
-STATES = tuple(field.name for field in fields(State))
-COMMANDS = ("u_l", "u_r", "u_t")
+Values = Mapping[str, float]
 
 
-def flight(k: Coefficients, commands: Sequence[Inputs], hold: float) -> list[State]:
+def flight(rov: Rov, commands: Sequence[Values], hold: float) -> list[Values]:
     """From rest, and after each command, held for so many s."""
-    return list(accumulate(commands, lambda state, command: rov.step(k, command, state, hold), initial=State()))
+    rest: Values = dict.fromkeys(rov.layout.state, 0.0)
+    return list(accumulate(commands, lambda state, command: rov.step(command, state, hold), initial=rest))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Work:
-    """Commands (u_l, u_r, u_t) of -1 ... 1, each held for `hold` s; the first `starts` of them from known states."""
+    """Commands of -1 ... 1, each held for `hold` s; the first `starts` of them from known states."""
 
-    coefficients: Coefficients
+    rov: Rov
     straight: bool
-    """u_l = u_r, so that the heading stays."""
+    """The first two commands are the same, so that the heading of the VideoRay stays."""
     hold: float
     commands: int
     starts: int
@@ -37,35 +36,43 @@ class Work:
     """All commands positive, so that nothing turns back."""
 
     @cached_property
-    def sequence(self) -> list[Inputs]:
-        """The commands: with another length of the sequence the same ones."""
-        rng = random.Random(SEED)
-        drawn = ([rng.uniform(-1.0, 1.0) for _ in range(3)] for _ in range(self.commands))
-        signed = ([abs(c) for c in commands] if self.ahead else commands for commands in drawn)
-        return [Inputs(left, left if self.straight else right, top) for left, right, top in signed]
+    def names(self) -> tuple[str, ...]:
+        """Of the commands."""
+        return tuple(self.rov.layout.commands)
 
     @cached_property
     def array(self) -> NDArray[np.float64]:
-        """The commands, a row each."""
-        return np.array([[getattr(command, name) for name in COMMANDS] for command in self.sequence])
+        """The commands, a row each: with another length of the sequence the same ones."""
+        rng = random.Random(SEED)
+        drawn = np.array([[rng.uniform(-1.0, 1.0) for _ in self.names] for _ in range(self.commands)])
+        if self.straight:
+            drawn[:, 1] = drawn[:, 0]
+        return np.abs(drawn) if self.ahead else drawn
+
+    @cached_property
+    def sequence(self) -> list[Values]:
+        """All inputs at each command."""
+        still = dict.fromkeys(self.rov.layout.inputs, 0.0)
+        return [still | dict(zip(self.names, row, strict=True)) for row in self.array.tolist()]
 
     @cached_property
     def states(self) -> NDArray[np.float64]:
         """Where the first commands start: each where the one before ends after a second, the first at rest."""
-        return np.array([astuple(s) for s in flight(self.coefficients, self.sequence[: self.starts - 1], 1.0)])
+        return np.array([list(s.values()) for s in flight(self.rov, self.sequence[: self.starts - 1], 1.0)])
 
     @cached_property
-    def ends(self) -> list[dict[str, reference.Number]]:
+    def ends(self) -> list[list[reference.Number]]:
         """The states at the ends of the first commands, to 50 digits."""
+        names = list(self.rov.layout.state)
         return [
-            reference.step(self.coefficients, command, State(*start), self.hold).state
+            list(reference.step(self.rov, command, dict(zip(names, start, strict=True)), self.hold).state.values())
             for command, start in zip(self.sequence, self.states.tolist(), strict=False)
         ]
 
     def error(self, found: Iterable[Sequence[float]]) -> float:
-        """The largest difference of any state (m/s, rad/s, m, rad) of the three or seven that were found."""
+        """The largest difference of any state (SI units) of the first ones that were found."""
         return max(
-            abs(float(end[name] - value))
+            abs(float(exact - value))
             for end, values in zip(self.ends, found, strict=True)
-            for name, value in zip(STATES, values, strict=False)
+            for exact, value in zip(end, values, strict=False)
         )

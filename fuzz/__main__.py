@@ -81,7 +81,8 @@ def _command(
 def _keep(vehicle: str, found: Path) -> str:
     """Copy an input here, and say what is in it: on a machine that is thrown away, what is printed is what is left."""
     copy = shutil.copy(found, ".")
-    return f"again with: python -m fuzz --vehicle {vehicle} {copy}, in base64:\n{b64encode(found.read_bytes()).decode()}"
+    content = b64encode(found.read_bytes()).decode()
+    return f"again with: python -m fuzz --vehicle {vehicle} {copy}, in base64:\n{content}"
 
 
 def _campaign(target: Path, corpus: Path, jobs: int, calls: int | None, seconds: int | None) -> tuple[Counts, float]:

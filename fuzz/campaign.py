@@ -42,7 +42,7 @@ def unpack_corpus(folder: Path) -> None:
 
 def pack_corpus(targets: Sequence[Path], folder: Path) -> int:
     """Keep of a folder of inputs those that together reach all that it reaches in any of the targets; how many."""
-    kept = {}
+    kept: dict[str, bytes] = {}
     for target in targets:
         smaller = folder.with_name(f"{target.name}.smaller")
         smaller.mkdir()

@@ -7,7 +7,7 @@ static inline __attribute__((always_inline)) void runge_kutta(int stages, int n,
 {
     const motion m = *at;
     const double ahead[4] = {0.0, 0.5 * h, 0.5 * h, h}, sixth = h / 6.0, third = h / 3.0;
-    double now[7], to[7], k[4][7];
+    double now[N_STATES], to[N_STATES], k[4][N_STATES];
     memcpy(now, s, (size_t)n * sizeof now[0]);
     for (; steps > 0; steps--) {
         for (int stage = 0; stage < stages; stage++) {
@@ -23,15 +23,15 @@ static inline __attribute__((always_inline)) void runge_kutta(int stages, int n,
     memcpy(s, now, (size_t)n * sizeof now[0]);
 }
 
-#define METHOD(name, stages, n)                                     \
-    void name##_##n(motion *m, state *s, double h, long steps)      \
-    {                                                               \
-        if (n == 7) {                                               \
-            prepare_axes(m);                                        \
-        }                                                           \
-        runge_kutta(stages, n, m, s->at, h, steps);                 \
+#define METHOD(name, stages)                                               \
+    void name##_velocities(motion *m, double *s, double h, long steps)     \
+    {                                                                      \
+        runge_kutta(stages, N_AXES, m, s, h, steps);                       \
+    }                                                                      \
+    void name##_all(motion *m, double *s, double h, long steps)            \
+    {                                                                      \
+        rov_hold(m->at, &m->gains, &m->held);                              \
+        runge_kutta(stages, N_STATES, m, s, h, steps);                     \
     }
-METHOD(euler, 1, 3)
-METHOD(euler, 1, 7)
-METHOD(rk4, 4, 3)
-METHOD(rk4, 4, 7)
+METHOD(euler, 1)
+METHOD(rk4, 4)

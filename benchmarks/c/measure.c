@@ -1,4 +1,4 @@
-/* Times held commands (u_l, u_r, u_t), by one method or another, and the FMU in numbers: a library that plain_c.py
+/* Times held commands, by one method or another, and the FMU in numbers: a library that plain_c.py
  * calls, linked with SUNDIALS. Times are processor time of this thread: what else runs does not count. */
 #define _POSIX_C_SOURCE 200809L
 #include "fmu.h"
@@ -7,7 +7,7 @@
 #include <malloc.h>
 #include <time.h>
 
-enum { N_COMMANDS = 3, HELD = 10 };
+enum { HELD = 10 };
 
 /* All value references; the commands come first. */
 static fmi2ValueReference reference[N_VARIABLES];
@@ -33,34 +33,35 @@ static void start_instance(fmi2Component c, const fmi2ValueReference vr[], size_
 /* Once, before all else. */
 void begin(const char *path)
 {
-    double defaults[N_VARIABLES];
     for (int i = 0; i < N_VARIABLES; i++) {
-        defaults[i] = VARIABLES[i].start;
+        m.at[i] = VARIABLES[i].start;
         reference[i] = (fmi2ValueReference)i;
     }
-    memcpy(&m.coefficients, &defaults[REFERENCE(coefficients)], sizeof m.coefficients);
-    rov_prepare(&m.coefficients, &m.gains);
+    rov_prepare(m.at, &m.gains);
     load_fmu(path);
     rov = new_instance("rov", &CALLBACKS);
 }
 
 /* ---- Methods ---- */
 
-/* The closed form: one step, however long. */
-void closed_3(motion *at, state *s, double h, long steps)
+/* Ours: one step, however long. */
+void closed_velocities(motion *at, double state[N_STATES], double h, long steps)
 {
     (void)steps;
-    for (int i = 0; i < 3; i++) {
-        s->at[i] = riccati_velocity(&at->axis[i], s->at[i], h);
+    for (int a = 0; a < N_AXES; a++) {
+        riccati axis = at->gains.axis[a];
+        axis.C = at->held.C[a];
+        state[a] = riccati_velocity(&axis, state[a], h);
     }
 }
 
-void closed_7(motion *at, state *s, double h, long steps)
+void closed_all(motion *at, double state[N_STATES], double h, long steps)
 {
     (void)steps;
-    rov_state next;
-    rov_step(&at->coefficients, &at->gains, &at->inputs, &s->named, h, &next);
-    s->named = next;
+    double next[N_STATES];
+    memcpy(&at->at[FIRST_STATE], state, sizeof next);
+    CHECK(rov_step(at->at, &at->gains, h, next));
+    memcpy(state, next, sizeof next);
 }
 
 /* SUNDIALS CVODE, of which FMPy ships the libraries and no headers. plain_c.py makes the solvers. */
@@ -71,18 +72,18 @@ int CVodeReInit(handle solver, double t, handle y);
 int CVodeSetStopTime(handle solver, double t);
 int CVode(handle solver, double t, handle y, double *reached, int task);
 
-#define RATES(n)                                                         \
-    int rates_##n(double t, handle y, handle rate, void *user)           \
+#define RATES(name, n)                                                   \
+    int rates_##name(double t, handle y, handle rate, void *user)           \
     {                                                                    \
         (void)t, (void)user;                                             \
         rates(&m, n, N_VGetArrayPointer(y), N_VGetArrayPointer(rate));   \
         return 0;                                                        \
     }
-RATES(3)
-RATES(7)
+RATES(velocities, N_AXES)
+RATES(all, N_STATES)
 
 /* A held command begins anew, for the right side has a jump there, and ends at a stop time. */
-static __attribute__((noinline)) void solve(handle solver, handle y, int states, state *s, double h, long steps)
+static __attribute__((noinline)) void solve(handle solver, handle y, int states, double *s, double h, long steps)
 {
     const size_t size = (size_t)states * sizeof(double);
     double *const now = N_VGetArrayPointer(y), reached, t = 0.0;
@@ -96,51 +97,44 @@ static __attribute__((noinline)) void solve(handle solver, handle y, int states,
 }
 
 /* Hold n commands in turn from the state s on, each for `steps` communication steps of h, by a method in so many
- * sub-steps, by a solver, or, with neither, in the FMU. Nanoseconds a communication step; s becomes the end. */
+ * sub-steps, by a solver, or, with neither, in the FMU; there, without sub-steps, the commands are set before every step.
+ * Nanoseconds a communication step; s becomes the end. */
 double hold(advance *method, handle solver, handle y, int states, double h, long substeps, long steps, long n,
-            const double command[][N_COMMANDS], state *s)
+            const double command[][N_COMMANDS], double s[N_STATES])
 {
-    double(*const force)[3] = malloc((size_t)n * sizeof *force); /* C of each axis */
-    CHECK(force != NULL);
+    rov_held *const held = malloc((size_t)n * sizeof *held);
+    CHECK(held != NULL);
     for (long i = 0; i < n; i++) {
-        m.inputs = (rov_inputs){.u_l = command[i][0], .u_r = command[i][1], .u_t = command[i][2]};
-        prepare_axes(&m);
-        for (int axis = 0; axis < 3; axis++) {
-            force[i][axis] = m.axis[axis].C;
-        }
+        memcpy(m.at, command[i], sizeof command[i]);
+        rov_hold(m.at, &m.gains, &held[i]);
     }
-    if (method == NULL && solver == NULL) {
-        start_instance(rov, STATES, N_STATES, s->at);
+    const bool in_fmu = method == NULL && solver == NULL;
+    if (in_fmu) {
+        start_instance(rov, STATES, N_STATES, s);
     }
     const double start = nanoseconds();
     for (long i = 0; i < n; i++) {
-        if (method != NULL && states == 3) {
-            for (int axis = 0; axis < 3; axis++) {
-                m.axis[axis].C = force[i][axis];
-            }
-        } else if (method != NULL || solver != NULL) {
-            m.inputs = (rov_inputs){.u_l = command[i][0], .u_r = command[i][1], .u_t = command[i][2]};
-        }
+        memcpy(m.at, command[i], sizeof command[i]);
+        m.held = held[i];
         if (method != NULL) {
             for (long step = 0; step < steps; step++) {
                 method(&m, s, h / (double)substeps, substeps);
             }
         } else if (solver != NULL) {
-            prepare_axes(&m);
             solve(solver, y, states, s, h, steps);
         } else {
             double t = 0.0;
-            CHECK(fmi2.SetReal(rov, COMMANDS, N_COMMANDS, command[i]) == fmi2OK);
             for (long step = 0; step < steps; step++, t += h) {
+                CHECK((step > 0 && substeps > 0) || fmi2.SetReal(rov, COMMANDS, N_COMMANDS, command[i]) == fmi2OK);
                 CHECK(fmi2.DoStep(rov, t, h, fmi2True) == fmi2OK);
             }
         }
     }
     const double each = (nanoseconds() - start) / (double)(n * steps);
-    if (method == NULL && solver == NULL) {
-        CHECK(fmi2.GetReal(rov, STATES, N_STATES, s->at) == fmi2OK);
+    if (in_fmu) {
+        CHECK(fmi2.GetReal(rov, STATES, N_STATES, s) == fmi2OK);
     }
-    free(force);
+    free(held);
     return each;
 }
 
@@ -149,7 +143,11 @@ double hold(advance *method, handle solver, handle y, int states, double h, long
 /* n instances that go straight ahead and down, so many rounds of steps in turn: nanoseconds a step; *bytes of each. */
 double step_in_turn(size_t n, size_t rounds, double *bytes)
 {
-    static const double commands[] = {0.5, 0.5, 0.5}, h = 0.01;
+    static const double h = 0.01;
+    double commands[N_COMMANDS];
+    for (int i = 0; i < N_COMMANDS; i++) {
+        commands[i] = 0.5;
+    }
     fmi2Component *const c = malloc(n * sizeof *c);
     CHECK(c != NULL);
     const int before = mallinfo().uordblks; /* in use on the heap */

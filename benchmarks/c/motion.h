@@ -1,47 +1,27 @@
-/* What all methods work on. Three states are the velocities u, w, r; seven are these and the pose.
- *
- * One call advances the state by `steps` steps of h seconds, as an importer's communication step does, and is not
- * inlined into the loop that measures it. */
+/* What all methods work on: the velocities alone, or all states. One call advances the state by `steps` steps of h seconds, as
+ * an importer's communication step does, and is not inlined into the loop that measures it. */
 #pragma once
-
-#include <string.h>
 
 #include "riccati.c"
 #include "rov.c"
-
-typedef union {
-    double at[7];
-    rov_state named;
-} state;
+#include "track.c"
+#include "series.c"
 
 typedef struct {
-    rov_coefficients coefficients;
+    double at[N_VARIABLES]; /* inputs and coefficients */
     rov_gains gains;
-    rov_inputs inputs;
-    riccati axis[3]; /* surge, heave, yaw under the forces of the command */
+    rov_held held; /* the forces of the command: prepared once a communication step, ahead of it for velocities */
 } motion;
 
-typedef void advance(motion *m, state *s, double h, long steps);
-
-/* The forces of the command: once a communication step for seven states, ahead of the measurement for three. */
-static inline void prepare_axes(motion *m)
-{
-    const rov_gains now = rov_axes(&m->coefficients, &m->gains, &m->inputs);
-    m->axis[0] = now.surge;
-    m->axis[1] = now.heave;
-    m->axis[2] = now.yaw;
-}
+typedef void advance(motion *m, double state[N_STATES], double h, long steps);
 
 /* Time derivatives of n states. */
-static inline void rates(const motion *m, int n, const double s[], double rate[])
+static inline void rates(const motion *m, int n, const double s[N_STATES], double rate[N_STATES])
 {
-    for (int i = 0; i < 3; i++) {
-        rate[i] = (m->axis[i].C - m->axis[i].B * s[i]) - m->axis[i].A * fabs(s[i]) * s[i];
+    if (n == N_STATES) {
+        rov_rates(&m->gains, &m->held, s, rate);
     }
-    if (n == 7) {
-        rate[3] = s[0] * cos(s[6]) + m->inputs.V_N;
-        rate[4] = s[0] * sin(s[6]) + m->inputs.V_E;
-        rate[5] = s[1];
-        rate[6] = s[2];
+    for (int a = 0; a < N_AXES && n == N_AXES; a++) {
+        rate[a] = m->held.C[a] - riccati_drag(&m->gains.axis[a], s[a]);
     }
 }

@@ -90,8 +90,11 @@ SERIES_INLINE void series_term(const flow *f, series *s, int n)
         rest[V] -= s->tau * f->gains->c_v * ur;
         rest[R] -= s->tau * f->gains->c_r * uv;
     }
-    for (int a = 0; a < N_AXES && !IS_FREE && !s->decided; a++) {
-        s->decided = series_drag(f, s, a, n) && (a == 0 || s->decided);
+    if (!IS_FREE && !s->decided) {
+        s->decided = true;
+        for (int a = 0; a < N_AXES; a++) {
+            s->decided &= series_drag(f, s, a, n);
+        }
     }
     for (int a = 0; a < WIDTH; a++) {
         s->c[n + 1][a] = INVERSE[n + 1] * rest[a] - INVERSE[n + 1] * s->D[a] * s->c[n][a];

@@ -33,9 +33,9 @@ class Small:
     """All methods on a few commands: those that turn the motion back, and those that do not."""
 
     def __init__(self, vehicle: Vehicle, plain_c: PlainC) -> None:
-        self.work = Work(vehicle.coefficients, False, 1.0, COMMANDS, COMMANDS)
-        self.ahead = Work(vehicle.coefficients, True, 1.0, COMMANDS, COMMANDS, ahead=True)
-        self.long = Work(vehicle.coefficients, False, 100.0, COMMANDS, 4)
+        self.work = Work(vehicle.rov, False, 1.0, COMMANDS, COMMANDS)
+        self.ahead = Work(vehicle.rov, True, 1.0, COMMANDS, COMMANDS, ahead=True)
+        self.long = Work(vehicle.rov, False, 100.0, COMMANDS, 4)
         self.jobs = [
             *(self.ours(method, states, h) for method, states in ((CLOSED, 3), (CLOSED, 7), (FMU, 7))
               for h in (0.01, 1.0, 100.0)),
@@ -107,7 +107,7 @@ def test_every_job_is_timed_in_every_repetition(small: Small) -> None:
 
 @in_plain_c
 def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, plain_c: PlainC) -> None:
-    runs = in_c(plain_c, Variations(vehicle.coefficients, 20), 2)
+    runs = in_c(plain_c, Variations(vehicle.rov, 20), 2)
     assert runs.count == 20
     assert 0.0 < runs.rate < inf
     assert runs.error < 1e-11
