@@ -12,7 +12,7 @@ from checks.legal import MODES, legal_modes
 from fuzz import __main__ as command
 from fuzz.campaign import FindingError, build_target, fuzz, replay, unpack_corpus
 from rov_fmu.export.archive import native_content
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 pytestmark = pytest.mark.skipif(clang() is None, reason="clang with its sanitizers is not installed")
 
@@ -23,8 +23,9 @@ def corpus(tmp_path: Path) -> Path:
     return tmp_path / "corpus"
 
 
-def test_the_corpus_reaches_every_function_and_finds_nothing(vehicle: Vehicle, corpus: Path, tmp_path: Path) -> None:
-    build_target(native_content(vehicle).sources, tmp_path / "target")
+@pytest.mark.parametrize("name", command.VEHICLES)
+def test_the_corpus_reaches_every_function_and_finds_nothing(corpus: Path, tmp_path: Path, name: str) -> None:
+    build_target(native_content(load_vehicle(command.VEHICLES[name])).sources, tmp_path / "target")
     counts = replay(tmp_path / "target", [corpus], tmp_path)
     legal = {name for kind in MODES for name in legal_modes(kind)}
     never = {"fmi2GetStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus"}  # no step is ever pending
@@ -43,7 +44,7 @@ PLANTED = {
     "a refused value stays": (
         "fmi2_common.c",
         "        if (!isfinite(value[i])) {",
-        "        f->now.values.at[vr[i]] = isfinite(value[i]) ? value[i] : old;\n        if (!isfinite(value[i])) {",
+        "        f->now.values[vr[i]] = isfinite(value[i]) ? value[i] : old;\n        if (!isfinite(value[i])) {",
         "fmi2SetReal changes instance",
     ),
     "a value reference is not looked at": (
@@ -90,7 +91,7 @@ PLANTED = {
     ),
     "a restored state steps with the coefficients from before": (
         "fmi2_state.c",
-        "    rov_prepare(&f->now.values.named.coefficients, &f->gains);\n",
+        "    rov_prepare(f->now.values, &f->gains);\n",
         "",
         "the gains are those of other coefficients|goes another way",
     ),
@@ -109,16 +110,32 @@ PLANTED = {
         "beyond its equilibrium",
     ),
     "a dive goes further than its fastest": (
-        "rov.c",
-        ".z = s->z + depth,",
-        ".z = s->z + 1.000001 * depth,",
+        "series.c",
+        "next[POSE_z] = state[POSE_z] + way[HEAVE];",
+        "next[POSE_z] = state[POSE_z] + 1.000001 * way[HEAVE];",
         "broken property .*: z goes from",
     ),
     "a turn makes the way longer": (
-        "rov.c",
-        ".x = s->x + sum.ahead + in->V_N * h,",
-        ".x = s->x + 1.000001 * sum.ahead + in->V_N * h,",
+        "series.c",
+        "next[POSE_x] = state[POSE_x] + sum.ahead + held.north * h;",
+        "next[POSE_x] = state[POSE_x] + 1.000001 * sum.ahead + held.north * h;",
         "at no more than",
+    ),
+}
+
+
+PLANTED_IN_HEAVY = {
+    "the coupling does work": (
+        "series.c",
+        "rest[V] -= s->tau * f->gains->c_v * ur;",
+        "rest[V] += s->tau * f->gains->c_v * ur;",
+        "at most",
+    ),
+    "a lag overshoots": (
+        "series.c",
+        "next[F] = state[F] + (state[F] - held.steady[t]) * fall;",
+        "next[F] = state[F] + 1.01 * (state[F] - held.steady[t]) * fall;",
+        "F of thruster",
     ),
 }
 
@@ -132,24 +149,25 @@ def test_a_finding_can_be_made_again(
     content = replace(content, sources={**content.sources, file: content.sources[file].replace(line, planted)})
     monkeypatch.setattr(command, "native_content", lambda _vehicle: content)
     monkeypatch.chdir(tmp_path)
-    assert command.main([str(corpus)]) == 1
+    assert command.main(["--vehicle", "videoray", str(corpus)]) == 1
     assert told in (words := capsys.readouterr().err)
     (kept,) = tmp_path.glob("finding-*")
-    assert f"again with: python -m fuzz ./{kept.name}, in base64:\n" in words
+    assert f"again with: python -m fuzz --vehicle videoray ./{kept.name}, in base64:\n" in words
     assert b64decode(words.split()[-1]) == kept.read_bytes()
-    assert command.main([kept.name]) == 1
+    assert command.main(["--vehicle", "videoray", kept.name]) == 1
     assert told in capsys.readouterr().err
 
 
 def test_every_defect_has_a_place_to_be_planted(vehicle: Vehicle) -> None:
-    sources = native_content(vehicle).sources
-    assert [name for name, (file, line, *_) in PLANTED.items() if sources[file].count(line) != 1] == []
+    sources, planted = native_content(vehicle).sources, PLANTED | PLANTED_IN_HEAVY
+    assert [name for name, (file, line, *_) in planted.items() if sources[file].count(line) != 1] == []
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", PLANTED)
-def test_a_planted_defect_is_found_within_a_minute(vehicle: Vehicle, corpus: Path, tmp_path: Path, name: str) -> None:
-    file, line, planted, told = PLANTED[name]
+@pytest.mark.parametrize("name", [*PLANTED, *PLANTED_IN_HEAVY])
+def test_a_planted_defect_is_found_within_a_minute(corpus: Path, tmp_path: Path, name: str) -> None:
+    file, line, planted, told = (PLANTED | PLANTED_IN_HEAVY)[name]
+    vehicle = load_vehicle(command.VEHICLES["videoray" if name in PLANTED else "bluerov2_heavy"])
     sources = dict(native_content(vehicle).sources)
     sources[file] = sources[file].replace(line, planted)
     build_target(sources, tmp_path / "target")

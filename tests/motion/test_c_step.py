@@ -48,7 +48,8 @@ def case(rov: Rov, rng: random.Random) -> tuple[Values, Values, float]:
     layout = rov.layout
     inputs = {name: rng.uniform(-1.1, 1.1) if rng.random() < 0.8 else 0.0 for name in layout.commands}
     inputs |= {name: number(0.3) for name in layout.inputs if name not in inputs}
-    state = {name: number(5.0 if name in layout.lagging else 0.7) for name in layout.state}
+    from_rest = rng.random() < 0.15  # there the direction shows by the first term that is not 0
+    state = {name: 0.0 if from_rest else number(5.0 if name in layout.lagging else 0.7) for name in layout.state}
     return inputs, state, 10.0 ** rng.uniform(-6.0, 3.0)
 
 
