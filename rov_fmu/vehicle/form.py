@@ -50,8 +50,8 @@ class FileHead(Head):
     """A folder beside the file with the published tables, as `rov-fmu tables` prints them; its files are named and
     headed as those of `models/videoray/tables`."""
     pictures: _Folder | None = None
-    """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`; for each
-    that is not there a neutral one is drawn."""
+    """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`; a neutral
+    `model.png` where there is none; the thrusters are drawn from their geometry in any case."""
 
 
 _Command = Annotated[float, Field(ge=0.0, le=1.0)]
