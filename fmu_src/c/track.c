@@ -175,7 +175,10 @@ static bool closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, do
     int pieces = 0;
     for (int a = 0; a < N_AXES; a++) {
         from[a] = v[a];
-        riccati_advance(&axis[a], from[a], h, &v[a], &way[a]);
+        way[a] = 0.0;
+        if (v[a] != 0.0 || axis[a].C != 0.0) {
+            riccati_advance(&axis[a], from[a], h, &v[a], &way[a]);
+        }
     }
     if (YAW == NONE || (from[R] == 0.0 && axis[R].C == 0.0)) {
         sum->ahead = way[U];
