@@ -38,14 +38,6 @@ def videoray_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def heavy_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("heavy")
-    assert main(["build", "bluerov2_heavy", "--platform", "host", "-o", str(folder / "rov.fmu")]) == 0
-    fmpy.extract(str(folder / "rov.fmu"), unzipdir=str(folder / "rov"))
-    return folder / "rov"
-
-
-@pytest.fixture(scope="session")
 def videoray_dir(videoray_fmu: Path) -> Path:
     folder = videoray_fmu.with_suffix("")
     fmpy.extract(str(videoray_fmu), unzipdir=str(folder))

@@ -43,7 +43,7 @@ def test_videoray_is_as_far_from_the_tables_as_the_design_says(computed: dict[st
 def test_thrust_is_as_far_from_the_makers_points_as_the_design_says(computed: dict[str, Table]) -> None:
     shipped, symmetric = computed["t200"][2:]
     assert numbers(shipped)[:2] == pytest.approx([0.30, 0.32], abs=0.011)
-    assert numbers(symmetric)[:2] == pytest.approx([2.93, 2.93], abs=0.011)
+    assert numbers(symmetric)[:2] == pytest.approx([2.93, 2.93], abs=0.021)  # every third of the points
 
 
 @pytest.mark.parametrize("column", [1, 2])
