@@ -346,7 +346,7 @@ class Layout:
         found = {f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters
                  if not self.curve_of[t.name].has_lag}  # fmt: skip
         for curve in self.turning_curves:
-            words = f"Torque of the {curve.description or f'thrusters of curve {curve.name}'} τ_{curve.name}"
+            words = f"Torque τ_{curve.name} of the thrusters with the curve of the {curve.description or curve.name}"
             found[f"tau_{curve.name}"] = Meta("N.m", f"{words}, (4), positive bow to starboard")
         return found
 
@@ -385,7 +385,7 @@ def _command(thruster: Thruster) -> Meta:
 
 
 def _thrust(thruster: Thruster, curve: Curve) -> Meta:
-    words = f"Thrust F_{thruster.name} of the {thruster.description or f'thruster {thruster.name}'}"
+    words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
     share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
     return Meta("N", f"{words}, {curve.equation}{share}, positive {_pushes(thruster.direction)}")
 
