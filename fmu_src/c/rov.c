@@ -26,9 +26,9 @@ typedef struct {
     double c_u, c_v, c_r;             /* coupling: M_v/M_u, M_u/M_v, (M_v - M_u)/M_r */
 } rov_gains;
 
-/* What is held over a step. */
+/* What drives the vehicle. */
 typedef struct {
-    double C[WIDTH];            /* acceleration by the steady thrust and the loads */
+    double C[WIDTH];            /* acceleration by the thrust of now and the loads */
     double steady[N_THRUSTERS]; /* thrust that the commands lead to */
     double north, east;         /* current */
 } rov_held;
@@ -132,39 +132,34 @@ static void rov_thrust_of(double at[], const rov_gains *gains)
     }
 }
 
-/* The axes under the steady thrust of the commands, (18): C = (beta/m) (alpha F + F_ext + F_0). */
-static inline void rov_hold(const double at[], const rov_gains *gains, rov_held *held)
+/* The axes under thrust, (18): C = (beta/m) (alpha F + F_ext + F_0). */
+static inline void rov_push(const double at[], const rov_gains *gains, const double F[N_THRUSTERS], double C[WIDTH])
 {
-    for (int t = 0; t < N_THRUSTERS; t++) {
-        held->steady[t] = rov_steady(at, t);
-    }
     for (int a = N_AXES; a < WIDTH; a++) {
-        held->C[a] = 0.0;
+        C[a] = 0.0;
     }
     for (int a = 0; a < N_AXES; a++) {
-        double C = 0.0;
+        double sum = 0.0;
         for (int t = 0; t < N_THRUSTERS; t++) {
-            C += gains->push[t][a] * held->steady[t];
+            sum += gains->push[t][a] * F[t];
         }
-        held->C[a] = C + gains->gain[a] * (at[AXES[a].external] + rov_value(at, AXES[a].load));
+        C[a] = sum + gains->gain[a] * (at[AXES[a].external] + rov_value(at, AXES[a].load));
     }
+}
+
+static inline void rov_hold(const double at[], const rov_gains *gains, rov_held *held)
+{
+    double F[N_THRUSTERS];
+    for (int t = 0; t < N_THRUSTERS; t++) {
+        held->steady[t] = rov_steady(at, t);
+        F[t] = rov_lags(t) ? at[THRUSTERS[t].force] : held->steady[t];
+    }
+    rov_push(at, gains, F, held->C);
     held->north = rov_value(at, MAYBE_V_N);
     held->east = rov_value(at, MAYBE_V_E);
 }
 
 /* ---- Derivatives ---- */
-
-/* What the forces of before that the lags of a curve have left add to the acceleration along an axis. */
-static inline double rov_late(const rov_gains *gains, const rov_held *held, const double state[], int c, int a)
-{
-    double sum = 0.0;
-    for (int t = 0; t < N_THRUSTERS; t++) {
-        if (rov_lags(t) && THRUSTERS[t].curve == c) {
-            sum += gains->push[t][a] * (state[THRUSTERS[t].force - FIRST_STATE] - held->steady[t]);
-        }
-    }
-    return sum;
-}
 
 /* What the coupling adds to the accelerations: Coriolis and Munk terms of a diagonal mass matrix. */
 static inline void rov_couple(const rov_gains *gains, const double v[N_AXES], double rate[N_AXES])
@@ -182,9 +177,6 @@ static inline void rov_rates(const rov_gains *gains, const rov_held *held, const
 {
     for (int a = 0; a < N_AXES; a++) {
         rate[a] = held->C[a] - riccati_drag(&gains->axis[a], state[a]);
-        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
-            rate[a] += rov_late(gains, held, state, c, a);
-        }
     }
     rov_couple(gains, state, rate);
     if (POSE_x != NONE && POSE_y != NONE) {

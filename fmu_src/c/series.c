@@ -22,11 +22,10 @@ static const double INVERSE[ORDER + 2] = {
  * every other one vanishes, so that what follows is half a rounding. */
 static const double SMALL = 16.0 * DBL_EPSILON;
 
-/* What moves, and what the lags of each curve have left of the forces from before, as acceleration. */
+/* What moves, as acceleration: the force of now, what it is once the lags are over, and what each curve's has left. */
 typedef struct {
     const rov_gains *gains;
-    const double *C;
-    double late[N_CURVES][WIDTH];
+    double C[WIDTH], then[WIDTH], late[N_CURVES][WIDTH];
 } flow;
 
 /* Polynomials of the velocities in time by tau, what their terms come from, and what they add up to. */
@@ -103,16 +102,56 @@ SERIES_INLINE void series_term(const flow *f, series *s, int n)
     series_add(s, n + 1);
 }
 
-/* Whether the last two of n terms are small. */
+/* The first term up to n that is not 0; n + 1 where there is none. */
+static inline int series_first(const series *s, int a, int n)
+{
+    int first = 0;
+    while (first <= n && s->c[first][a] == 0.0) {
+        first++;
+    }
+    return first;
+}
+
+/* How large an axis is by the first three terms that are not 0: from rest, lag and coupling begin as a power of t; and the
+ * last terms. Of such a power, only every third may be there. */
+static double series_sizes(const series *s, int a, int n, double *last)
+{
+    const int first = series_first(s, a, n);
+    double size = 0.0;
+    *last = fmax(fabs(s->c[n][a]), fabs(s->c[n - 1][a]));
+    if (first > 1) {
+        *last = fmax(*last, fabs(s->c[n - 2][a]));
+    }
+    for (int k = first; k < first + 3 && k < n - 1; k++) {
+        size = fmax(size, fabs(s->c[k][a]));
+    }
+    return size;
+}
+
+/* Whether an axis that has not moved in n terms may yet do so: where the other two of the coupling move. */
+static inline bool series_waits(const series *s, int n)
+{
+    const int u = series_first(s, U, n) > n, v = series_first(s, V, n) > n, r = series_first(s, R, n) > n;
+    return IS_COUPLED && u + v + r == 1;
+}
+
+/* Whether the last of n terms are small. */
 static inline bool series_is_done(series *s, int n)
 {
-    bool done = true;
+    bool done = IS_FREE || s->decided;
+    s->order = n;
     for (int a = 0; a < WIDTH; a++) {
-        const double size = fabs(s->c[0][a]) + fabs(s->c[1][a]) + fabs(s->c[2][a]);
+        const double size = fabs(s->c[0][a]) + fabs(s->c[1][a]);
         done &= fabs(s->c[n][a]) + fabs(s->c[n - 1][a]) <= SMALL * size + DBL_MIN;
     }
-    s->order = n;
-    return done;
+    for (int a = 0; a < N_AXES && !done; a++) {
+        double last;
+        const double size = series_sizes(s, a, n, &last);
+        if (!(last <= 0.5 * SMALL * size + DBL_MIN)) {
+            return false;
+        }
+    }
+    return done || !series_waits(s, n);
 }
 
 /* Polynomials from v on over tau seconds, of so many terms that the next ones would be rounding; false where ORDER does not
@@ -121,15 +160,13 @@ static inline bool series_grow(const flow *f, const double v[WIDTH], double tau,
 {
     double couple[WIDTH] = {0.0};
     s->tau = tau;
+    for (int c = 0; c < N_CURVES; c++) {
+        s->fall[c] = tau;
+    }
     rov_couple(f->gains, v, couple);
     for (int a = 0; a < WIDTH; a++) {
-        double C = f->C[a] + couple[a];
-        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
-            C += f->late[c][a];
-            s->fall[c] = tau;
-        }
         s->c[0][a] = v[a];
-        s->c[1][a] = tau * (C - riccati_drag(&f->gains->axis[a], v[a]));
+        s->c[1][a] = tau * (f->C[a] + couple[a] - riccati_drag(&f->gains->axis[a], v[a]));
         s->change[a] = s->mean[a] = s->others[a] = 0.0;
         const double way = v[a] != 0.0 ? v[a] : s->c[1][a];
         const int back = way < 0.0;
@@ -162,17 +199,13 @@ static double series_reach(const series *s)
 {
     double reach = 1.0;
     for (int a = 0; a < N_AXES; a++) {
-        int first = 0;
-        for (int n = 1; n < 3; n++) {
-            first = fabs(s->c[n][a]) > fabs(s->c[first][a]) ? n : first;
-        }
-        const double last = fmax(fabs(s->c[s->order][a]), fabs(s->c[s->order - 1][a]));
-        const double share = SMALL * fabs(s->c[first][a]) / last;
+        double last;
+        const double size = series_sizes(s, a, s->order, &last), share = 0.5 * SMALL * size / last;
         if (!isfinite(last)) {
             return 0.0;
         }
         if (share < 1.0) {
-            reach = fmin(reach, pow(share, 1.0 / (s->order - 1 - first)));
+            reach = fmin(reach, pow(share, 1.0 / (s->order - 4)));
         }
     }
     return reach;
@@ -317,12 +350,12 @@ static bool is_settled(const flow *f, const double v[WIDTH])
     rov_couple(f->gains, v, couple);
     for (int a = 0; a < N_AXES; a++) {
         const double drag = riccati_drag(&f->gains->axis[a], v[a]);
-        double rate = f->C[a] - drag + couple[a], size = fabs(f->C[a]) + fabs(drag) + fabs(couple[a]);
+        const double rate = f->C[a] - drag + couple[a], size = fabs(f->C[a]) + fabs(drag) + fabs(couple[a]);
+        double change = fabs(rate);
         for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
-            rate += f->late[c][a];
-            size += fabs(f->late[c][a]);
+            change = fmax(change, fabs(f->late[c][a]));
         }
-        if (!(fabs(rate) <= 16.0 * DBL_EPSILON * size)) {
+        if (!(change <= 8.0 * DBL_EPSILON * size)) {
             return false;
         }
     }
@@ -345,6 +378,23 @@ static double series_cut(const series *s, double reach, int *stops)
         length = end;
     }
     return length;
+}
+
+/* The force after t more seconds: from the end that is nearer, or next to nothing is left of two large numbers. */
+static void flow_pass(flow *f, double t)
+{
+    double left[N_AXES] = {0.0};
+    for (int c = 0; c < N_CURVES; c++) {
+        const double lost = expm1(-f->gains->rate[c] * t);
+        for (int a = 0; a < N_AXES; a++) {
+            f->C[a] += f->late[c][a] * lost;
+            f->late[c][a] *= 1.0 + lost;
+            left[a] += f->late[c][a];
+        }
+    }
+    for (int a = 0; a < N_AXES; a++) {
+        f->C[a] = fabs(left[a]) < 0.5 * fabs(f->then[a]) ? f->then[a] + left[a] : f->C[a];
+    }
 }
 
 /* A step of h seconds: v moves to its end, the distances along the axes and the track go to *way and *sum. False where it
@@ -387,11 +437,8 @@ static inline bool series_step(flow *f, double v[WIDTH], double h, double way[WI
             return true;
         }
         done += s.tau;
-        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
-            const double fall = exp(-f->gains->rate[c] * s.tau);
-            for (int a = 0; a < N_AXES; a++) {
-                f->late[c][a] *= fall;
-            }
+        if (N_LAGGING > 0) {
+            flow_pass(f, s.tau);
         }
         if (!IS_FREE && is_settled(f, v)) {
             const planar left = {v[U] * (h - done), v[V] * (h - done)};
@@ -425,12 +472,16 @@ static bool rov_step(const double at[], const rov_gains *gains, double h, double
     double v[WIDTH] = {0.0}, way[WIDTH] = {0.0};
     planar sum = {0.0, 0.0};
     rov_held held;
-    flow f = {gains, held.C, {{0.0}}};
+    flow f = {.gains = gains};
     rov_hold(at, gains, &held);
+    rov_push(at, gains, held.steady, f.then);
     for (int a = 0; a < N_AXES; a++) {
         v[a] = state[a];
-        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
-            f.late[c][a] = rov_late(gains, &held, state, c, a);
+        f.C[a] = held.C[a];
+        for (int t = 0; t < N_THRUSTERS; t++) {
+            if (rov_lags(t)) {
+                f.late[THRUSTERS[t].curve][a] += gains->push[t][a] * (at[THRUSTERS[t].force] - held.steady[t]);
+            }
         }
     }
     const double lengths = v[R] == 0.0 && held.C[R] == 0.0 ? 3.0 : 1.0; /* straight, the closed form costs less so soon */
