@@ -249,7 +249,7 @@ static double series_root(const series *s, int a, double high)
         for (int n = s->order; n > 0; n--) {
             slope = slope * t + n * s->c[n][a];
         }
-        if (value * s->c[0][a] > 0.0) {
+        if (value != 0.0 && (value > 0.0) == (s->c[0][a] > 0.0)) { /* a product would underflow */
             low = t;
         } else {
             high = t;
@@ -282,7 +282,8 @@ static inline double series_sign_kept(const series *s, int a, double length, boo
             break;
         }
         if (k == 0 && fabs(s->c[1][a]) * length > slopes) { /* it only rises or only falls */
-            *reverses = series_value(s, a, length) * s->c[0][a] <= 0.0;
+            const double end = series_value(s, a, length);
+            *reverses = end == 0.0 || (end > 0.0) != (s->c[0][a] > 0.0);
             return *reverses ? series_root(s, a, length) : length;
         }
     }
@@ -335,7 +336,8 @@ static inline bool series_end(const series *s, double change[WIDTH], double way[
     bool plain = true;
     for (int a = 0; a < WIDTH; a++) {
         const double c0 = s->c[0][a], c1 = s->c[1][a];
-        const double kept = c0 * c1 < 0.0 ? fabs(c0) - fabs(c1) : fabs(c0) + fabs(c1); /* of the first two, at the end */
+        const bool against = (c0 > 0.0 && c1 < 0.0) || (c0 < 0.0 && c1 > 0.0); /* a product would underflow */
+        const double kept = against ? fabs(c0) - fabs(c1) : fabs(c0) + fabs(c1); /* of the first two, at the end */
         plain &= kept >= s->others[a];
         change[a] = s->change[a] + c1;
         way[a] = s->tau * (c0 + (0.5 * c1 + s->mean[a]));
