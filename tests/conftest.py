@@ -6,10 +6,14 @@ import fmpy
 import pytest
 from hypothesis import settings
 
+from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
+from rov_fmu.export.archive import native_content
+from rov_fmu.export.compile import compile_all
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi2 import Fmu
+from tests.vehicles import EVERYTHING
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -44,13 +48,27 @@ def videoray_dir(videoray_fmu: Path) -> Path:
     return folder
 
 
+def unzipped(vehicle: Path, folder: Path) -> Path:
+    """The folder of the FMU of another vehicle, without its page."""
+    content = native_content(load_vehicle(vehicle))
+    (library,) = compile_all(chosen_platforms(["host"]), content.sources, content.identifier).values()
+    binary = f"binaries/{fmpy.platform}/{content.identifier}{fmpy.sharedLibraryExtension}"
+    for name, data in {**content.files, binary: library}.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+    return folder
+
+
 @pytest.fixture(scope="session")
 def heavy_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The FMU of the BlueROV2 Heavy, which has sway, lag and coupling."""
-    path = tmp_path_factory.mktemp("heavy") / "heavy.fmu"
-    assert main(["build", "bluerov2_heavy", "--platform", "host", "-o", str(path)]) == 0
-    fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
-    return path.with_suffix("")
+    return unzipped(SHIPPED["bluerov2_heavy"], tmp_path_factory.mktemp("heavy"))
+
+
+@pytest.fixture(scope="session")
+def everything_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of a vehicle that has all that one can have."""
+    return unzipped(EVERYTHING, tmp_path_factory.mktemp("everything"))
 
 
 @pytest.fixture(scope="module")

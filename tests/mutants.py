@@ -34,8 +34,8 @@ PLACES = ("rov_fmu", "fmu_src/c")
 
 # By file, the first pattern that fits: the default tests that hold it, quick ones first.
 _TESTS = {
-    "fmu_src/c/r*.c": "motion/test_exactness fmu/test_values fmu/test_derivatives motion/test_time_to_rest "
-    "motion/test_extremes motion/test_rov around/test_fuzz",
+    "fmu_src/c/[rst]*.c": "motion/test_c_step motion/test_exactness fmu/test_values fmu/test_derivatives "
+    "motion/test_time_to_rest motion/test_extremes motion/test_rov around/test_fuzz",
     "fmu_src/c/*": "fmu/test_values fmu/test_lifecycle fmu/test_arguments fmu/test_state fmu/test_state_bytes "
     "fmu/test_model_exchange fmu/test_derivatives around/test_fuzz",
     "rov_fmu/motion/riccati.py": "motion/test_time_to_rest motion/test_riccati motion/test_properties",
@@ -118,20 +118,21 @@ def _change(node: ast.AST) -> tuple[str, object] | None:  # noqa: PLR0911
 
 def _in_python(file: str, text: str) -> Iterator[Callable[[], Mutant]]:
     tree = ast.parse(text)
+    parts = [ast.unparse(top) for top in tree.body]
 
-    def make(top: ast.stmt, node: ast.AST, name: str, new: object) -> Mutant:
-        whole, old = ast.unparse(top).splitlines(), getattr(node, name)
+    def make(n: int, node: ast.AST, name: str, new: object) -> Mutant:
+        old = getattr(node, name)
         setattr(node, name, new)
-        lines = zip(whole, ast.unparse(top).splitlines(), strict=False)
-        before, after = next((before.strip(), after.strip()) for before, after in lines if before != after)
-        mutant = Mutant(file, before, after, ast.unparse(tree))
+        changed = ast.unparse(tree.body[n])
         setattr(node, name, old)
-        return mutant
+        lines = zip(parts[n].splitlines(), changed.splitlines(), strict=False)
+        before, after = next((before.strip(), after.strip()) for before, after in lines if before != after)
+        return Mutant(file, before, after, "\n".join([*parts[:n], changed, *parts[n + 1 :]]))
 
-    for top in tree.body:
+    for n, top in enumerate(tree.body):
         for node in _nodes(top):
             if change := _change(node):
-                yield partial(make, top, node, *change)
+                yield partial(make, n, node, *change)
 
 
 # ---- C ---------------------------------------------------------------------------------------------------------------

@@ -1,13 +1,15 @@
-"""Vehicles of every kind to try motions on, and random ones; random inputs and states for them."""
+"""Vehicles of every kind to try laws on, and random ones; random inputs and states for them."""
 
 import random
 from collections.abc import Mapping
 from math import sqrt
+from pathlib import Path
 
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.motion.layout import AXES, CURVE, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 Values = Mapping[str, float]
 State = dict[str, float]
@@ -27,54 +29,74 @@ _PLANAR = (  # four vectored thrusters, as ArduSub numbers them
     Thruster("4", "t200", (-_S, _S, 0.0), (-0.156, -0.111, 0.0)),
 )
 _VERTICAL = tuple(Thruster(name, "t200", (0.0, 0.0, -1.0), (0.1, 0.1, 0.0)) for name in "56")
-_PORT = Thruster("l", "t200", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0))
-_STARBOARD = Thruster("r", "t200", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0))
+_ALL_ROUND = (*_PLANAR, *_VERTICAL)
+_PAIR = (
+    Thruster("l", "t200", (1.0, 0.0, 0.0), (0.0, -0.2, 0.0)),
+    Thruster("r", "t200", (1.0, 0.0, 0.0), (0.0, 0.2, 0.0)),
+)
+_BOW = Thruster("b", "t200", (0.0, 1.0, 0.0), (0.5, 0.0, 0.0))
+_MIX = {
+    "ahead": {"1": 1.0, "2": 1.0, "3": -1.0, "4": -1.0},
+    "aside": {"1": -1.0, "2": 1.0, "3": -1.0, "4": 1.0},
+    "turn": {"1": -0.5, "2": 0.5, "3": 0.5, "4": -0.5},
+}
 _NUMBERS = {  # of a BlueROV2 Heavy, and what it has not
     "m_rov": 13.5, "I_r": 0.37, "R": 0.2, "gamma": 0.5, "m_a_u": 6.3567, "m_a_v": 7.1206, "m_a_w": 18.6863,
     "m_a_r": 0.2215, "a_d_u": 141.0, "b_d_u": 13.7, "a_d_v": 217.0, "b_d_v": 0.0, "a_d_w": 190.0, "b_d_w": 33.0,
     "a_d_r": 1.5, "b_d_r": 0.0, "a_d_u_reverse": 190.0, "b_d_u_reverse": 4.0, "a_d_v_reverse": 100.0,
     "b_d_v_reverse": 3.0, "a_d_w_reverse": 150.0, "b_d_w_reverse": 20.0, "a_d_r_reverse": 0.7, "b_d_r_reverse": 0.2,
-    "F_0_u": 0.0, "F_0_v": 0.3, "F_0_w": -1.5, "F_0_r": 0.01, "a_t_t200": 29.33, "b_t_t200": 31.48,
-    "a_t_t200_reverse": 21.74, "b_t_t200_reverse": 25.54, "c_0_t200": 0.087, "T_t200": 0.15,
+    "F_0_u": 0.1, "F_0_v": 0.3, "F_0_w": -1.5, "F_0_r": 0.01,
 }  # fmt: skip
+_OF_A_CURVE = {"a_t": 29.33, "b_t": 31.48, "a_t_reverse": 21.74, "b_t_reverse": 25.54, "c_0": 0.087,
+               "c_0_reverse": 0.1, "T": 0.15}  # fmt: skip
+assert _OF_A_CURVE.keys() == CURVE.keys()
 
 
-def numbered(layout: Layout, values: Values = _NUMBERS) -> Rov:
+def numbered(layout: Layout, **values: float) -> Rov:
     """With the Heavy's numbers unless others are given; without tuning."""
-    numbers = {**_NUMBERS, **values}
+    numbers = {curve.coefficient(key): _OF_A_CURVE[key] for curve in layout.curves for key in curve.keys}
+    numbers |= _NUMBERS | values
     return Rov(layout, {name: 1.0 if meta.tunable else numbers[name] for name, meta in layout.coefficients.items()})
 
 
-def _layout(axes: str, curve: Curve, thrusters: tuple[Thruster, ...], keys: tuple[str, ...] = _DRAG,
-            coupled: bool = False, mix: Mapping[str, Mapping[str, float]] | None = None) -> Layout:  # fmt: skip
-    kinds = {"u": SURGE, "v": SWAY, "w": HEAVE, "r": YAW}
-    return Layout(tuple(VehicleAxis(kinds[name], keys) for name in axes), (curve,), thrusters, mix or {}, coupled)
+def _axes(names: str, keys: tuple[str, ...] = _DRAG) -> tuple[VehicleAxis, ...]:
+    return tuple(VehicleAxis(axis, keys) for axis in AXES.values() if axis.velocity in names)
 
 
-_MIX = {
-    "ahead": {"1": 1.0, "2": 1.0, "3": -1.0, "4": -1.0},
-    "aside": {"1": -1.0, "2": 1.0, "3": -1.0, "4": 1.0},
-    "turn": {"1": -0.5, "2": 0.5, "3": 0.5, "4": -0.5},
-    "down": {"5": -1.0, "6": -1.0},
-}
+def _rov(axes: str, curve: Curve, thrusters: tuple[Thruster, ...], keys: tuple[str, ...] = _DRAG,
+         coupled: bool = False, mix: Mapping[str, Mapping[str, float]] | None = None) -> Rov:  # fmt: skip
+    return numbered(Layout(_axes(axes, keys), (curve,), thrusters, mix or {}, coupled))
+
+
+EVERYTHING = Path(__file__).parent / "vehicle" / "everything.toml"
 VIDEORAY, HEAVY = (load_vehicle(SHIPPED[name]).rov for name in ("videoray", "bluerov2_heavy"))
 VEHICLES = {
     "VideoRay": VIDEORAY,
     "Heavy": HEAVY,
-    "neither lag nor coupling": numbered(_layout("uvwr", _T200, (*_PLANAR, *_VERTICAL), ("m_a", *_DRAG))),
-    "with an input mix": numbered(_layout("uvwr", _T200, (*_PLANAR, *_VERTICAL), _ALL, mix=_MIX)),
-    "drag by direction, coupled, late": numbered(_layout("uvwr", _LATE, (*_PLANAR, *_VERTICAL), _ALL, coupled=True)),
-    "coupled without lag": numbered(_layout("uvr", _T200, _PLANAR, _ALL, coupled=True)),
-    "lag without coupling": numbered(_layout("uwr", _LATE, (_PORT, _STARBOARD, *_VERTICAL), _ALL)),
-    "heave only": numbered(_layout("w", _T200, _VERTICAL, _EITHER)),
-    "yaw only": numbered(_layout("r", _T200, (_PORT, _STARBOARD))),
-    "yaw only, late": numbered(_layout("r", _LATE, (_PORT, _STARBOARD))),
-    "surge and sway without yaw": numbered(_layout("uv", _T200, _PLANAR, _EITHER)),
-    "surge without drag": numbered(_layout("ur", _T200, (_PORT, _STARBOARD)), {"a_d_u": 0.0, "b_d_u": 0.0}),
-    "linear drag alone, late": numbered(
-        _layout("ur", _LATE, (_PORT, _STARBOARD)), {"a_d_u": 0.0, "a_d_r": 0.0, "b_d_r": 0.3}
+    "neither lag nor coupling": _rov("uvwr", _T200, _ALL_ROUND, ("m_a", *_DRAG)),
+    "with an input mix": _rov("uvwr", _T200, _ALL_ROUND, _ALL, mix={**_MIX, "down": {"5": -1.0, "6": -1.0}}),
+    "drag by direction, coupled, late": _rov("uvwr", _LATE, _ALL_ROUND, _ALL, coupled=True),
+    "coupled without lag, three commands, no heave": _rov(
+        "uvr", Curve("t200", ("a_t", "b_t", "c_0", "c_0_reverse")), _PLANAR, _ALL, coupled=True, mix=_MIX
     ),
+    "lag without coupling": _rov("uwr", _LATE, (*_PAIR, *_VERTICAL), _ALL),
+    "an arm with lag beside a swift thruster": numbered(
+        Layout(_axes("uwr", ("m_a", *_DRAG)), (Curve("rear", ("a_t", "b_t", "T"), 2), Curve("top")), PAPER.thrusters)
+    ),
+    "sway and yaw": _rov("vr", _T200, (_BOW,)),
+    "heave only": _rov("w", _T200, _VERTICAL, _EITHER),
+    "yaw only": _rov("r", _T200, _PAIR),
+    "yaw only, late": _rov("r", _LATE, _PAIR),
+    "surge and sway without yaw": _rov("uv", _T200, _PLANAR, _EITHER),
+    "surge without drag": numbered(Layout(_axes("ur"), (_T200,), _PAIR), a_d_u=0.0, b_d_u=0.0),
+    "linear drag alone, late": numbered(Layout(_axes("ur"), (_LATE,), _PAIR), a_d_u=0.0, a_d_r=0.0, b_d_r=0.3),
 }
+
+
+def a_vehicle(rov: Rov) -> Vehicle:
+    """With nothing but its numbers."""
+    sources = dict.fromkeys(rov.coefficients, "A tank test")
+    return Vehicle("An ROV", "an_rov", "1", "A test", "A tank", rov, sources, (0.1, 1.0), {}, None)
 
 
 # ---- Random ones ----
@@ -103,8 +125,7 @@ def random_layout(rng: random.Random) -> Layout:
     mix = {}
     if rng.random() < 0.3:
         mix = {name: {t.name: rng.uniform(-1.0, 1.0) for t in thrusters} for name in ("a", "b")}
-    kinds = {"u": SURGE, "v": SWAY, "w": HEAVE, "r": YAW}
-    forms = tuple(VehicleAxis(kinds[name], rng.choice([_DRAG, ("m_a", *_DRAG), _EITHER, _ALL])) for name in axes)
+    forms = tuple(VehicleAxis(form.axis, rng.choice([_DRAG, ("m_a", *_DRAG), _EITHER, _ALL])) for form in _axes(axes))
     return Layout(forms, tuple(curves), tuple(thrusters), mix, {"u", "v", "r"} <= set(axes) and rng.random() < 0.7)
 
 

@@ -164,7 +164,8 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
             found[f"F_{thruster.name}"] = tuple(_coefficients_of_thrust(curve))
     for curve in layout.turning_curves:
         steady = () if curve.has_lag else tuple(_coefficients_of_thrust(curve))
-        found[f"tau_{curve.name}"] = steady + arm
+        by_arm = any(t.arm and t.position is None for t in layout.drivers(YAW) if t.curve == curve.name)
+        found[f"tau_{curve.name}"] = steady + (arm if by_arm else ())
     for form in layout.axes:
         axis = form.axis
         names: list[str] = []

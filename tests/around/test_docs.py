@@ -23,7 +23,7 @@ from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
-from tests.layouts import LAYOUTS
+from tests.vehicles import VEHICLES
 
 State = dict[str, float]
 
@@ -233,10 +233,10 @@ def test_tab_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pyt
 # ---- What is said elsewhere too --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", LAYOUTS)
+@pytest.mark.parametrize("kind", VEHICLES)
 def test_every_variable_is_told(kind: str) -> None:
     table = (ROOT / "docs" / "variables.md").read_text(encoding="utf-8")
-    layout = LAYOUTS[kind]
+    layout = VEHICLES[kind].layout
     known = {
         "thruster": {thruster.name for thruster in layout.thrusters} | set(layout.mix),
         "curve": {curve.name for curve in layout.curves},

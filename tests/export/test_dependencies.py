@@ -10,7 +10,7 @@ from rov_fmu.export.interface import Variable, variables
 from rov_fmu.export.model_description import NATIVE, model_description
 from rov_fmu.motion.layout import Layout
 from rov_fmu.motion.rov import Rov
-from tests.layouts import LAYOUTS, a_rov, a_vehicle
+from tests.vehicles import VEHICLES, a_vehicle, numbered
 
 Point = dict[str, float]
 Slopes = dict[tuple[str, str], float]
@@ -53,7 +53,7 @@ def vary(values: Sequence[float]) -> bool:
 def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
     """One list of <ModelStructure>."""
     of_rov = variables(rov)
-    root = etree.fromstring(model_description(a_vehicle(rov.layout), of_rov, guid="", interfaces=NATIVE))
+    root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=NATIVE))
     name: Mapping[str, Variable] = {str(v.index): v for v in of_rov}
     found: dict[tuple[str, str], str] = {}
     for unknown in root.find(f"ModelStructure/{of}"):
@@ -62,9 +62,9 @@ def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
     return found
 
 
-@pytest.mark.parametrize("kind", LAYOUTS)
+@pytest.mark.parametrize("kind", VEHICLES)
 def test_dependencies_are_declared_as_they_are(kind: str) -> None:
-    rov, rng = a_rov(LAYOUTS[kind]), random.Random(1)
+    rov, rng = numbered(VEHICLES[kind].layout), random.Random(1)
     knowns = [*rov.layout.inputs, *rov.layout.state]
     motions = [motion(rov.layout, rng) for _ in range(12)]
     sets = [parameters(rov, rng, tunable) for tunable in ([], [False], [True])]
@@ -85,10 +85,10 @@ def test_dependencies_are_declared_as_they_are(kind: str) -> None:
     assert {pair: s for pair, s in found.items() if pair[0].startswith("der(")} == declared(rov, "Derivatives")
 
 
-@pytest.mark.parametrize("kind", LAYOUTS)
+@pytest.mark.parametrize("kind", VEHICLES)
 def test_initial_dependencies_are_declared_as_they_are(kind: str) -> None:
     """Knowns are inputs, states and coefficients; kinds are constant or dependent alone (2.2.8)."""
-    rov, rng = a_rov(LAYOUTS[kind]), random.Random(2)
+    rov, rng = numbered(VEHICLES[kind].layout), random.Random(2)
     points = [motion(rov.layout, rng) | parameters(rov, rng, [False, True]) for _ in range(16)]
     samples = [slopes(rov, point, list(point)) for point in points]
     values = {pair: [sample[pair] for sample in samples] for pair in samples[0] if pair[0] not in rov.layout.state}

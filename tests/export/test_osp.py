@@ -11,7 +11,7 @@ from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.motion.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ALONE
-from tests.layouts import LAYOUTS, a_rov
+from tests.vehicles import VEHICLES
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
 
@@ -46,11 +46,11 @@ def references(group: etree._Element) -> list[str]:
     return [variable.get("ref") for variable in group]
 
 
-@pytest.mark.parametrize("kind", LAYOUTS)
+@pytest.mark.parametrize("kind", VEHICLES)
 def test_every_input_and_output_is_in_one_group(kind: str) -> None:
     """Of vehicles of every kind; a group is of one causality, one unit and one variable an axis."""
-    groups = groups_of(LAYOUTS[kind])
-    declared = {v.name: v for v in variables(a_rov(LAYOUTS[kind]))}
+    groups = groups_of(VEHICLES[kind].layout)
+    declared = {v.name: v for v in variables(VEHICLES[kind])}
     grouped = sorted(name for group in groups for name in references(group))
     assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
     names = [group.get("name") for group in groups]

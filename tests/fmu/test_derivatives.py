@@ -1,12 +1,17 @@
 """Derivatives are those of the values, and the model structure declares exactly those that can be non-zero."""
 
 import random
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Any
 
 import pytest
+from mpmath import mp
 
+from checks.equations import effect, equations, steady_forces
+from rov_fmu.motion.layout import YAW
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.fmi2 import (
     CO_SIMULATION,
     EVERY_MODE,
@@ -22,12 +27,21 @@ from tests.fmi2 import (
     reals,
     references,
 )
+from tests.vehicles import EVERYTHING, HEAVY, VIDEORAY, State, Values
+
+ROVS = {"videoray_dir": VIDEORAY, "heavy_dir": HEAVY, "everything_dir": load_vehicle(EVERYTHING).rov}
 
 
-@pytest.fixture(scope="module", params=["videoray_dir", "heavy_dir"])
+@pytest.fixture(scope="module", params=ROVS)
 def fmu(request: pytest.FixtureRequest) -> Fmu:
-    """Of a vehicle of the paper, and of one with sway, lag, coupling and dead band."""
+    """Of a vehicle of the paper, of one with sway, lag, coupling and dead band, and of one that has everything."""
     return Fmu(request.getfixturevalue(request.param))
+
+
+@pytest.fixture
+def rov(fmu: Fmu) -> Rov:
+    """The same vehicle."""
+    return next(rov for rov in ROVS.values() if set(rov.layout.inputs) == set(fmu.inputs))
 
 
 def commands(fmu: Fmu) -> list[str]:
@@ -66,32 +80,65 @@ def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> Instanc
 # ---- Directional derivatives ----
 
 
-def difference(rov: Instance, unknowns: Sequence[str], known: str, value: float) -> list[float]:
-    """Central differences by one known, extrapolated to no step: exact for the corner of |c| c at zero as well."""
-
-    def slope(step: float) -> list[float]:
-        sides = []
-        for x in (value + step, value - step):
-            assert rov.set({known: x}) == OK
-            sides.append(rov.get(unknowns))
-        return [(a - b) / (2.0 * step) for a, b in zip(*sides, strict=True)]
-
-    step = 1e-5 * max(abs(value), 1e-3)
-    wide, narrow = slope(step), slope(step / 2.0)
-    assert rov.set({known: value}) == OK
-    return [2.0 * b - a for a, b in zip(wide, narrow, strict=True)]
+def exact(rov: Rov, point: Values) -> dict[str, Any]:
+    """Every output and derivative, by the equations written out again."""
+    k = Rov(rov.layout, {name: point[name] for name in rov.coefficients})
+    rates = equations(k, point).rates({name: mp.mpf(point[name]) for name in rov.layout.state}, point)
+    forces = steady_forces(k, point) | {n.removeprefix("F_"): mp.mpf(point[n]) for n in rov.layout.lagging}
+    found = {name: mp.mpf(point[name]) for name in rov.layout.state} | {f"F_{n}": F for n, F in forces.items()}
+    for curve in rov.layout.curves:
+        turning = (effect(k, t, "r") * forces[t.name] for t in rov.layout.thrusters if t.curve == curve.name)
+        found[f"tau_{curve.name}"] = mp.fsum(turning) if rov.layout.has(YAW) else mp.zero
+    return found | {f"der({name})": rate for name, rate in rates.items()}
 
 
-@pytest.mark.parametrize("kind", MODES)
-def test_directional_derivatives_are_the_slopes_of_the_values(fmu: Fmu, kind: int) -> None:
-    unknowns = fmu.outputs + fmu.derivatives
-    for point in points(fmu, 12, seed=1):
-        with at_point(fmu, kind, INITIALIZATION, point) as rov:
-            scale = [1.0 + abs(value) for value in rov.get(unknowns)]
-            for known, value in point.items():
-                expected = difference(rov, unknowns, known, value)
-                for name, d, e, size in zip(unknowns, rov.derivatives(unknowns, known), expected, scale, strict=True):
-                    assert d == pytest.approx(e, rel=1e-6, abs=1e-6 * size), (name, known, point)
+def slopes(rov: Rov, point: Values, known: str, side: int = 1) -> dict[str, float]:
+    """Of every output and derivative by one known, from one side: in 50 digits all that a double has."""
+    with mp.workdps(50):
+        h = side * mp.mpf(10) ** -18
+        here, near, far = (exact(rov, {**point, known: mp.mpf(point[known]) + n * h}) for n in range(3))
+        return {name: float((4 * near[name] - far[name] - 3 * here[name]) / (2 * h)) for name in here}
+
+
+def check_slopes(rov: Rov, instance: Instance, point: Values, known: str, side: int = 1) -> None:
+    unknowns = instance.fmu.outputs + instance.fmu.derivatives
+    found, expected = instance.derivatives(unknowns, known), slopes(rov, point, known, side)
+    size = max(1.0, *map(abs, expected.values()))  # what a sum of large terms leaves
+    for name, d in zip(unknowns, found, strict=True):
+        assert d == pytest.approx(expected[name], rel=1e-12, abs=1e-14 * size), (name, known, side, point)
+
+
+@pytest.mark.parametrize("number", [3, pytest.param(60, marks=pytest.mark.long)])
+def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
+    """By every input, state and coefficient, of all that is calculated."""
+    for point in points(fmu, number, seed=1):
+        with at_point(fmu, CO_SIMULATION, INITIALIZATION, point) as instance:
+            for known in point:
+                check_slopes(rov, instance, point, known)
+
+
+def kinks(rov: Rov, point: Values) -> Iterator[tuple[State, str, int]]:
+    """Points on the edge of saturation, of a dead band and at rest; what crosses it there, and where its inside is."""
+    layout = rov.layout
+    still = {**point, **dict.fromkeys(layout.commands, 0.0)}
+    for command, sign in product(layout.commands, (1, -1)):
+        yield {**still, command: sign}, command, -sign
+        for thruster in (t for t in layout.thrusters if command in layout.gains[t.name]):
+            gain, curve = layout.gains[thruster.name][command], layout.curve_of[thruster.name]
+            if "c_0" in curve.keys:
+                dead_band = curve.coefficient("c_0" if sign * gain > 0.0 else "c_0_reverse")
+                edge = {**still, command: sign * point[dead_band] / abs(gain)}
+                yield edge, command, -sign
+                yield edge, dead_band, 1
+    for velocity in layout.velocities:
+        yield {**point, velocity: 0.0}, velocity, 1
+
+
+def test_at_a_kink_the_derivative_is_that_of_the_inside(fmu: Fmu, rov: Rov) -> None:
+    """Of commands within ±1, and of the dead band; a velocity at rest is about to go ahead."""
+    for kink, known, inside in kinks(rov, *points(fmu, 1, seed=9)):
+        with at_point(fmu, CO_SIMULATION, INITIALIZATION, kink) as instance:
+            check_slopes(rov, instance, kink, known, inside)
 
 
 @pytest.mark.parametrize(
@@ -103,24 +150,6 @@ def test_directional_derivatives_are_the_same_in_every_mode(fmu: Fmu, kind: int,
         with at_point(fmu, kind, INITIALIZATION, point) as rov, at_point(fmu, kind, mode, point) as later:
             for known in fmu.inputs + fmu.states:
                 assert later.derivatives(unknowns, known) == rov.derivatives(unknowns, known)
-
-
-@pytest.mark.parametrize("corner", [-1.0, 1.0])
-@pytest.mark.parametrize(("command", "thrust"), [("u_l", "F_l"), ("u_r", "F_r"), ("u_t", "F_t")])
-def test_at_full_command_the_derivative_is_that_of_the_inside(
-    videoray_dir: Path, command: str, thrust: str, corner: float
-) -> None:
-    with Fmu(videoray_dir).instance() as rov:
-        rov.reach(INITIALIZATION)
-        values = []
-        for value in (corner, corner * (1.0 - 1e-6)):
-            assert rov.set({command: value}) == OK
-            values += rov.get([thrust])
-        assert rov.set({command: corner}) == OK
-        slope = (values[0] - values[1]) / (corner * 1e-6)
-        assert rov.derivatives([thrust], command) == pytest.approx([slope], rel=1e-5)
-        assert rov.set({command: corner * (1.0 + 1e-9)}) == OK
-        assert rov.derivatives([thrust], command) == [0.0]
 
 
 def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:

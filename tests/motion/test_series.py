@@ -8,10 +8,10 @@ import pytest
 from rov_fmu.motion import series
 from rov_fmu.motion.rov import Rov
 from tests.motion.steps import in_python, worst
-from tests.vehicles import HEAVY, VEHICLES, State, Values, at_rest, numbered, still
+from tests.vehicles import HEAVY, VEHICLES, State, Values, at_rest, still
 
-COUPLED, LATE = VEHICLES["coupled without lag"], VEHICLES["lag without coupling"]
-FREE = numbered(VEHICLES["surge without drag"].layout, dict.fromkeys(("a_d_u", "b_d_u", "a_d_r", "b_d_r"), 0.0))
+COUPLED, LATE = VEHICLES["coupled without lag, three commands, no heave"], VEHICLES["lag without coupling"]
+FREE = VEHICLES["surge without drag"].replaced({"a_d_r": 0.0, "b_d_r": 0.0})
 AHEAD = {"u_1": 0.5, "u_2": 0.6, "u_3": -0.4, "u_4": -0.5}
 BACK = {"F_1": -10.0, "F_2": -10.0, "F_3": 10.0, "F_4": 10.0}
 """Forces against the commands ahead."""

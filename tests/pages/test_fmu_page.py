@@ -20,7 +20,7 @@ from rov_fmu.pages.paper_figures import write_figures
 from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.layouts import LAYOUTS, a_vehicle
+from tests.vehicles import VEHICLES, a_vehicle
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
 
@@ -291,9 +291,9 @@ def test_the_commands_told_drive_the_vehicle_as_told(heavy: Vehicle, heavy_page:
         assert k["a_d_w"] * V**2 + k["b_d_w"] * V == pytest.approx(force, rel=2e-3)
 
 
-@pytest.mark.parametrize("kind", ["four thrusters by three commands, no heave", "surge and sway without yaw"])
+@pytest.mark.parametrize("kind", ["coupled without lag, three commands, no heave", "surge and sway without yaw"])
 def test_what_a_vehicle_does_not_have_is_not_on_its_page(kind: str) -> None:
-    vehicle = a_vehicle(LAYOUTS[kind])
+    vehicle = a_vehicle(VEHICLES[kind])
     page = documentation_page(vehicle)
     check_refers_to_itself_alone(page)
     text = words(page)

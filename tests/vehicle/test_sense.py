@@ -187,7 +187,7 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "an input that drives nothing": ({"inputs.idle": {"5": 0.0}}, [("inputs.idle", "drives no axis")]),
     "an input whose thrusters cancel": ({"inputs.spin": {"1": 1.0, "2": 1.0, "3": 1.0, "4": 1.0}}, [
         ("inputs.spin", "drives no axis", "cancel")]),
-    "an axis no input drives": ({"inputs.yaw": GONE}, [("axes.yaw", "no input drives it")]),
+    "an axis no input drives": ({"inputs.yaw": GONE, "inputs.boost.r": 1.0}, [("axes.yaw", "no input drives it")]),
     # alternatives
     "an alternative for what is not there": ({"alternatives.other.a_d_p": quantity(1.0, "N")}, [
         ("alternatives.other.a_d_p", "no such coefficient of this vehicle")]),
