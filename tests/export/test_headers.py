@@ -140,7 +140,7 @@ def test_a_shared_library_has_plain_names_and_flies_the_same(
 
 def test_as_cpp_they_fly_the_same(fmu: Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path) -> None:
     """Not pedantically so: compound literals are an extension there, of GCC and Clang."""
-    command = [compiler()[0], "c++", "-x", "c++", "-std=c++17", "-O2"]
+    command = [*compiler(), "-x", "c++", "-std=c++17", "-O2"]
     library = _compile(fmu, headers["2.0.0"], command, tmp_path / "videoray.so", ("-Wall", "-Wextra", "-Werror"))
     assert _exports(library) == _exports(fmu.library)
     _flies_the_same(fmu, library, shipped)

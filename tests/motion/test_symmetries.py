@@ -9,10 +9,11 @@ import pytest
 from hypothesis import strategies as st
 
 from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.fmi2 import Fmu
 from tests.motion.steps import Step, in_fmu, in_python
 from tests.motions import DISTANCE, TINY, VELOCITY, hold, memory, path_of, power, signed, size
-from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, Case, State, Values, at_rest, random_case, still
+from tests.vehicles import EVERYTHING, HEAVY, VEHICLES, VIDEORAY, Case, State, Values, at_rest, random_case, still
 
 POSITION = 1e-14  # of the path: what test_exactness.py promises
 
@@ -214,6 +215,22 @@ def test_without_quadratic_drag_a_slow_vehicle_draws_the_path_of_a_fast_one(step
 
 
 # ---- Semigroup ----
+
+
+@pytest.mark.parametrize("cases", [10, pytest.param(200, marks=pytest.mark.long)])
+@pytest.mark.parametrize(("folder", "rov"), [("heavy_dir", HEAVY), ("everything_dir", load_vehicle(EVERYTHING).rov)])
+def test_parts_of_a_step_of_coupled_vehicles_are_the_step(
+    request: pytest.FixtureRequest, folder: str, rov: Rov, cases: int
+) -> None:
+    """Of any length, in Python and in C; what rounding between them does dies out or adds up over the time."""
+    fmu, rng = Fmu(request.getfixturevalue(folder)), random.Random(13)
+    for _ in range(cases):
+        _, inputs, before, h = random_case(rng, rov, -4.0, 0.5)
+        first = h * rng.uniform(0.1, 0.9)
+        for step in (in_python, partial(in_fmu, fmu)):
+            whole = step(rov, inputs, before, h)
+            parts = step(rov, inputs, step(rov, inputs, before, first), h - first)
+            assert parts == pytest.approx(whole, rel=1e-13, abs=1e-13)
 
 
 @for_every

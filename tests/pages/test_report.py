@@ -163,7 +163,10 @@ CASES: Mapping[str, Tables] = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+_SOME = ("one thrust", "backward too")
+
+
+@pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in CASES])
 def test_any_data(case: str, tmp_path: Path) -> None:
     text = text_of(report_page(folder_with(tmp_path, CASES[case])))
     assert "nan" not in re.findall(r"[a-z]+", text)
@@ -208,13 +211,21 @@ def test_a_place_that_cannot_be_is_named(
     assert not list(tmp_path.iterdir()), "no vehicle file without the report that it names"
 
 
+@pytest.fixture(scope="module")
+def with_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a vehicle file that names its report, in another folder."""
+    folder = tmp_path_factory.mktemp("identified")
+    (folder / "pages").mkdir()
+    options = ["-o", str(folder / "vehicle.toml"), "--report", str(folder / "pages" / "report.html")]
+    assert main(["identify", str(TESTS), *options]) == 0
+    return folder
+
+
 @pytest.fixture
-def identified(tmp_path: Path) -> Path:
-    """A vehicle file that names its report, in another folder."""
-    (tmp_path / "pages").mkdir()
-    path = tmp_path / "vehicle.toml"
-    assert main(["identify", str(TESTS), "-o", str(path), "--report", str(tmp_path / "pages" / "report.html")]) == 0
-    return path
+def identified(with_report: Path, tmp_path: Path) -> Path:
+    """A copy of it."""
+    shutil.copytree(with_report, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "vehicle.toml"
 
 
 @pytest.mark.parametrize("backend", [["--platform", "host"], ["--backend", "pythonfmu"]])

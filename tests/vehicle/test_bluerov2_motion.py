@@ -14,7 +14,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from checks.fmpy_slave import fmpy_slave
-from rov_fmu.cli import main
 from rov_fmu.files.toml_file import read_toml
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
@@ -148,17 +147,10 @@ def test_the_heavy_moves_as_dop853_says(flown: Flown, longest: float) -> None:
     assert dead > 5
 
 
-@pytest.fixture(scope="module")
-def heavy_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("heavy") / "heavy.fmu"
-    assert main(["build", "bluerov2_heavy", "--platform", "host", "-o", str(path)]) == 0
-    return Path(fmpy.extract(str(path), unzipdir=str(path.with_suffix(""))))
-
-
 @pytest.mark.parametrize("longest", [100.0, 0.01])
-def test_its_fmu_moves_as_dop853_says(flown: Flown, heavy_fmu: Path, longest: float) -> None:
-    references = {v.name: v.valueReference for v in fmpy.read_model_description(str(heavy_fmu)).modelVariables}
-    slave, t = fmpy_slave(heavy_fmu), 0.0
+def test_its_fmu_moves_as_dop853_says(flown: Flown, heavy_dir: Path, longest: float) -> None:
+    references = {v.name: v.valueReference for v in fmpy.read_model_description(str(heavy_dir)).modelVariables}
+    slave, t = fmpy_slave(heavy_dir), 0.0
 
     def put(values: Mapping[str, float]) -> None:
         slave.setReal([references[name] for name in values], list(values.values()))
