@@ -129,16 +129,19 @@ def test_what_may_not_be_read_is_one_line_that_names_it(copied: Path, tmp_path: 
         _check(said, Path(command.name).name)
 
 
-def test_a_folder_that_may_not_be_read_is_named(copied: Path, tmp_path: Path) -> None:
+_LONG = [pytest.param(*case, marks=pytest.mark.long) for case in (("tests", 0o000), ("tests", 0o300), ("tables", 0o600))]
+
+
+@pytest.mark.parametrize(("name", "mode"), [("tests", 0o600), ("tables", 0o000), *_LONG])
+def test_a_folder_that_may_not_be_read_is_named(copied: Path, tmp_path: Path, name: str, mode: int) -> None:
     (tmp_path / "temporary").mkdir()
     commands = {
         "tests": Command("tests", lambda f: ["identify", str(f / "tests")]),
         "tables": Command("tables", lambda f: ["tables", str(f / "videoray.toml")]),
     }
-    for name, mode in (("tests", 0o000), ("tests", 0o600), ("tests", 0o300), ("tables", 0o000), ("tables", 0o600)):
-        (copied / name).chmod(mode)
-        ((code, said),) = run_elsewhere([(commands[name], copied)], tmp_path / "temporary", bound_by_permissions())
-        (copied / name).chmod(0o755)
-        assert code == 2
-        assert "Permission denied" in said
-        _check(said, str(copied / name))
+    (copied / name).chmod(mode)
+    ((code, said),) = run_elsewhere([(commands[name], copied)], tmp_path / "temporary", bound_by_permissions())
+    (copied / name).chmod(0o755)
+    assert code == 2
+    assert "Permission denied" in said
+    _check(said, str(copied / name))

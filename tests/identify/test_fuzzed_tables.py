@@ -86,7 +86,7 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [8, pytest.param(30, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [5, pytest.param(30, marks=pytest.mark.long)])
 @pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", "time_constant_yaw.csv", "thrust_top.csv", LOG])
 def test_any_folder_is_identified_or_one_clear_line(
     only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys

@@ -34,7 +34,7 @@ def for_every(
     """Make a law a test: at these places, on some hundred motions, and on many more in the long run."""
 
     def decorate(law: Callable[..., None]) -> Callable[[int], None]:
-        @pytest.mark.parametrize("motions", [300, pytest.param(3000, marks=pytest.mark.long)])
+        @pytest.mark.parametrize("motions", [150, pytest.param(3000, marks=pytest.mark.long)])
         def test(motions: int) -> None:
             hold(law, motions, *strategies, at=at)
 

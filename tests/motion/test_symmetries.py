@@ -65,7 +65,7 @@ def negated(values: Values, *names: str) -> State:
 def for_every(law: Callable[[Step, Case], None]) -> Callable[[Step, int], None]:
     """Make a law a test of some hundred cases, and of many more in the long run."""
 
-    @pytest.mark.parametrize("cases", [100, pytest.param(500, marks=pytest.mark.long)])
+    @pytest.mark.parametrize("cases", [50, pytest.param(500, marks=pytest.mark.long)])
     def test(step: Step, cases: int) -> None:
         hold(lambda case: law(step, case), cases, CASES)
 

@@ -134,7 +134,7 @@ def flown() -> Flown:
     return found
 
 
-@pytest.mark.parametrize("longest", [100.0, 0.01])
+@pytest.mark.parametrize("longest", [100.0, pytest.param(0.01, marks=pytest.mark.long)])
 def test_the_heavy_moves_as_dop853_says(flown: Flown, longest: float) -> None:
     rov = load_vehicle(HEAVY).rov
     state, dead = flown[0][2], 0
