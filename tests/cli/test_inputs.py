@@ -129,10 +129,10 @@ def test_what_may_not_be_read_is_one_line_that_names_it(copied: Path, tmp_path: 
         _check(said, Path(command.name).name)
 
 
-_LONG = [pytest.param(*case, marks=pytest.mark.long) for case in (("tests", 0o000), ("tests", 0o300), ("tables", 0o600))]
+_MORE = [pytest.param(*of, marks=pytest.mark.long) for of in (("tests", 0o000), ("tests", 0o300), ("tables", 0o600))]
 
 
-@pytest.mark.parametrize(("name", "mode"), [("tests", 0o600), ("tables", 0o000), *_LONG])
+@pytest.mark.parametrize(("name", "mode"), [("tests", 0o600), ("tables", 0o000), *_MORE])
 def test_a_folder_that_may_not_be_read_is_named(copied: Path, tmp_path: Path, name: str, mode: int) -> None:
     (tmp_path / "temporary").mkdir()
     commands = {
