@@ -1,8 +1,13 @@
 /* Exact motion of one axis under a held force: v' = C - B v - A |v| v with A, B >= 0.
- * The same formulas as rov_fmu/motion/riccati.py, which derives them. No state, no allocation, no errno. */
+ * No state, no allocation, no errno. */
 #include <math.h>
 #include <stdbool.h>
-#include <stddef.h>
+
+#if defined __GNUC__
+#define INLINE static inline __attribute__((always_inline)) /* what is not asked for is not computed; terms without loops */
+#else
+#define INLINE static inline
+#endif
 
 typedef struct {
     double A[2]; /* quadratic drag, 1/m (1/rad), for v > 0 and for v < 0 */
@@ -10,11 +15,9 @@ typedef struct {
     double C;    /* force, m/s2 (rad/s2) */
 } riccati;
 
-/* The first leg of a motion: up to its reversal, or longer than asked for; mirrored to v0 >= 0 where `back` is 1. */
 typedef struct {
-    int back;
-    double C, v0, end;
-} riccati_leg;
+    double v, s; /* velocity, and its integral */
+} riccati_motion;
 
 /* B v + A |v| v. */
 static inline double riccati_drag(const riccati *axis, double v)
@@ -34,7 +37,7 @@ static double riccati_signed_root(double A, double B, double C)
     return copysign(sqrt(fabs(B - root)) * sqrt(B + root), B - root);
 }
 
-/* Time at which C < 0 stops v0 > 0. */
+/* Time at which C < 0 stops v0 > 0: T = (2/D) artanh(D S), S = v0/(B v0 - 2 C) (R1), an arcus tangent where D^2 < 0 (R2). */
 static double riccati_time_to_rest(double A, double B, double C, double v0)
 {
     const double D = riccati_signed_root(A, B, C);
@@ -58,22 +61,6 @@ static double riccati_reversal_time(const riccati *axis, double v0)
         return INFINITY;
     }
     return riccati_time_to_rest(axis->A[v0 < 0.0], axis->B[v0 < 0.0], -fabs(axis->C), fabs(v0));
-}
-
-static riccati_leg riccati_first_leg(const riccati *axis, double v0, double h)
-{
-    riccati_leg leg = {0, axis->C, v0, h};
-    if (v0 < 0.0 || (v0 == 0.0 && axis->C < 0.0)) {
-        leg.back = 1;
-        leg.C = -axis->C;
-        leg.v0 = -v0;
-    }
-    /* Deceleration is strongest at the start, so the left side bounds the velocity that the step can take away. */
-    const double A = axis->A[leg.back], B = axis->B[leg.back];
-    if (leg.C < 0.0 && ((B + A * leg.v0) * leg.v0 - leg.C) * h >= leg.v0) {
-        leg.end = riccati_time_to_rest(A, B, leg.C, leg.v0);
-    }
-    return leg;
 }
 
 /* tanh(sqrt(x))/sqrt(x) = n/m by the continued fraction of tanh: exact to the last digit for |x| < 0.9. */
@@ -104,7 +91,7 @@ static inline riccati_fraction riccati_difference(double x, double y)
                               (c[1].m + c[2].m * first) + (c[3].m * second + c[4].m * third)};
 }
 
-/* v = (v0 (1 - b f) + c f) / (1 + (b + a v0) f), f = N/M, keep = M - b N. Taken as the change from v0, unless that is
+/* (R3) with f = N/M, keep = M - b N. Taken as the change from v0, unless that is
  * most of v0: rounding then never makes drag push, and what is steady stays. */
 static inline double riccati_end_velocity(double a, double b, double c, double v0, double N, double M, double keep)
 {
@@ -113,7 +100,14 @@ static inline double riccati_end_velocity(double a, double b, double c, double v
     return change > -0.5 * v0 ? v0 + change : (v0 * keep + c * N) / growth;
 }
 
-/* X/h where |q| is moderate: rov_fmu/motion/riccati.py derives it. g = tanh(r/2)/(r/2), also at r = b; n, m are those of g. */
+/* X/h = v0 Y + C h W (R4) where |q| is moderate, x = q/4, from g = tanh(r/2)/(r/2) = n/m, which is g_b at r = b: with
+ * t = r g/2 and t_b = b g_b/2
+ *
+ *     exp(-b) = (1 - t_b)/(1 + t_b),    cosh(r) = (1 + t^2)/(1 - t^2),    sinh(r)/r = g/(1 - t^2)
+ *     Y = (1 - t_b) g / ((1 + t_b) (1 - t^2))                                                                          (R5)
+ *     W = (g^2 + b (2 + b g) dg) / (2 (1 + t_b) (1 - t^2)),   dg = (g - g_b)/(q - b^2)                                 (R6)
+ *
+ * and dg is that of n and m, where no difference is left. */
 static inline double riccati_mean(double b, double c, double x, double v0, double n, double m)
 {
     const double y = 0.25 * b * b, half = 0.5 * b;
@@ -123,99 +117,60 @@ static inline double riccati_mean(double b, double c, double x, double v0, doubl
     return (v0 * coasting + c * pushed) / ((at_b.m + half * at_b.n) * (m * m - x * n * n));
 }
 
-/* One leg, v0 >= 0 and v keeps its sign: v(h) into *v and its integral into *s, where they are not NULL.
+/* The motion after h while v >= 0 keeps its sign. With b = B h/2, q = b^2 + A C h^2, r = sqrt(q) and l1, l2 = -b +- r, the
+ * linear equation y'' + B y' = A C y, y(0) = 1, y'(0) = A v0, gives v = y'/(A y) and the distance s = ln(y)/A:
  *
- * v with f = tanh(r)/r, r^2 = q; s = ln(1 + A X)/A, X linear in v0 and C, both free of cancellation. */
-static inline void riccati_leg_advance(double A, double B, double C, double v0, double h, double *v, double *s)
+ *     v = (v0 (1 - b f) + C h f) / (1 + (b + A h v0) f),      f = tanh(r)/r                                            (R3)
+ *     s = ln(1 + A X)/A,      X = h (v0 Y + C h W)                                                                      (R4)
+ *
+ * where Y and W are the divided differences of exp and of (exp(l) - 1)/l over l1 and l2. */
+INLINE riccati_motion riccati_leg(double A, double B, double C, double v0, double h)
 {
-    const double a = A * h, b = 0.5 * B * h, c = C * h;
-    const double q = b * b + a * c;
+    const double a = A * h, b = 0.5 * B * h, c = C * h, q = b * b + a * c;
+    riccati_motion end;
     double mean; /* X/h */
-    if (q > -0.8 && q < 0.8 && v != NULL) {
-        const riccati_fraction f = riccati_tanh(q);
-        *v = riccati_end_velocity(a, b, c, v0, f.n, f.m, f.m - b * f.n);
-        v = NULL;
-        if (s == NULL) {
-            return;
-        }
-    }
     if (q > -0.8 && q < 3.2) {
         const double x = 0.25 * q;
         const riccati_fraction g = riccati_tanh(x);
-        if (v != NULL) { /* f = g/(1 + x g^2) */
-            const double N = g.n * g.m, M = g.m * g.m + x * g.n * g.n;
-            *v = riccati_end_velocity(a, b, c, v0, N, M, M - b * N);
-        }
-        if (s == NULL) {
-            return;
-        }
+        const double N = g.n * g.m, M = g.m * g.m + x * g.n * g.n; /* f = g/(1 + x g^2) */
+        end.v = riccati_end_velocity(a, b, c, v0, N, M, M - b * N);
         mean = riccati_mean(b, c, x, v0, g.n, g.m);
     } else if (q < 0.0) {
-        const double root = sqrt(-q), x = cos(root), y = sin(root) / root;
-        if (v != NULL) {
-            *v = riccati_end_velocity(a, b, c, v0, y, x, x - b * y);
-        }
-        const double fade = exp(-b);
+        const double root = sqrt(-q), x = cos(root), y = sin(root) / root, fade = exp(-b);
+        end.v = riccati_end_velocity(a, b, c, v0, y, x, x - b * y);
         mean = v0 * fade * y + (fade * (x + b * y) - 1.0) / a;
     } else {
         const double root = q < 1e300 ? sqrt(q) : hypot(b, sqrt(a) * sqrt(c));
         const double l1 = a * (c / (root + b)), l2 = -(root + b); /* root - b without cancellation, and -root - b */
         const bool is_settled = root > 20.0 && root - b > 2.0;    /* nothing is left of the start */
-        const double decay = is_settled ? 0.0 : exp(-2.0 * root), gain = 1.0 - decay;
-        const double M = root * (1.0 + decay);
-        if (v != NULL) {
-            *v = riccati_end_velocity(a, b, c, v0, gain, M, l1 - decay * l2);
-        }
-        if (s == NULL) {
-            return;
-        }
+        const double decay = is_settled ? 0.0 : exp(-2.0 * root), gain = 1.0 - decay, M = root * (1.0 + decay);
+        end.v = riccati_end_velocity(a, b, c, v0, gain, M, l1 - decay * l2);
         if (l1 > 1.0) { /* exp(l1) may overflow */
-            *s = h * ((l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a);
-            return;
+            end.s = h * ((l1 + log(0.5 * (M + (b + a * v0) * gain) / root)) / a);
+            return end;
         }
         const double rise = expm1(l1), fall = decay * (1.0 + rise) - 1.0; /* exp - 1 at l1 and l2 */
         mean = (v0 * (rise - fall) + c * ((l1 != 0.0 ? rise / l1 : 1.0) - fall / l2)) / (2.0 * root);
     }
-    if (s != NULL) {
-        const double p = a * mean;
-        *s = h * mean * (p > 0.0 ? log1p(p) / p : 1.0);
-    }
+    const double p = a * mean;
+    end.s = h * mean * (p > 0.0 ? log1p(p) / p : 1.0);
+    return end;
 }
 
-/* v(h) from v0 into *v and the integral of v from 0 to h into *s, h > 0; either may be NULL. */
-static inline void riccati_advance(const riccati *axis, double v0, double h, double *v, double *s)
+/* The motion after h > 0 seconds from v0, from leg to leg at its reversal. */
+INLINE riccati_motion riccati_advance(const riccati *axis, double v0, double h)
 {
-    const riccati_leg leg = riccati_first_leg(axis, v0, h);
-    int back = leg.back;
-    double forth = 0.0;
-    if (leg.end < h) {
-        if (s != NULL) {
-            riccati_leg_advance(axis->A[back], axis->B[back], leg.C, leg.v0, leg.end, NULL, &forth);
+    int back = v0 < 0.0 || (v0 == 0.0 && axis->C < 0.0);
+    double A = axis->A[back], B = axis->B[back], C = back ? -axis->C : axis->C, v = fabs(v0), gone = 0.0;
+    /* Deceleration is strongest at the start, so the left side bounds the velocity that the step can take away. */
+    if (C < 0.0 && ((B + A * v) * v - C) * h >= v) {
+        const double end = riccati_time_to_rest(A, B, C, v);
+        if (end < h) {
+            gone = riccati_leg(A, B, C, v, end).s;
+            back = !back;
+            A = axis->A[back], B = axis->B[back], C = -C, v = 0.0, h -= end;
         }
-        back = 1 - back;
-        riccati_leg_advance(axis->A[back], axis->B[back], -leg.C, 0.0, h - leg.end, v, s);
-    } else {
-        riccati_leg_advance(axis->A[back], axis->B[back], leg.C, leg.v0, h, v, s);
     }
-    const double sign = back ? -1.0 : 1.0;
-    if (v != NULL) {
-        *v *= sign;
-    }
-    if (s != NULL) {
-        *s = sign * (*s - forth);
-    }
-}
-
-static double riccati_velocity(const riccati *axis, double v0, double h)
-{
-    double v;
-    riccati_advance(axis, v0, h, &v, NULL);
-    return v;
-}
-
-static double riccati_distance(const riccati *axis, double v0, double h)
-{
-    double s;
-    riccati_advance(axis, v0, h, NULL, &s);
-    return s;
+    const riccati_motion end = riccati_leg(A, B, C, v, h);
+    return (riccati_motion){back ? -end.v : end.v, back ? gone - end.s : end.s - gone};
 }

@@ -7,12 +7,6 @@
  * reach (Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
  * 2005). A reversal is a root of a polynomial: the piece is cut there. The same as rov_fmu/motion/series.py. */
 
-#if defined __GNUC__
-#define SERIES_INLINE static inline __attribute__((always_inline)) /* the first terms without loops: a third of the time */
-#else
-#define SERIES_INLINE static inline
-#endif
-
 enum { ORDER = 19, ORDER_OF_FEW = 11 };
 static const double TURN_OF_FEW = 0.14, SERIES_REACH = 0.3;
 static const double INVERSE[ORDER + 2] = {
@@ -47,21 +41,27 @@ static inline void series_add(series *s, int n)
     }
 }
 
-/* Drag of an axis by the first of the terms up to n that is not 0; false where there is none. */
-static inline bool series_drag(const flow *f, series *s, int a, int n)
+/* The first term up to n that is not 0; n + 1 where there is none. */
+static inline int series_first(const series *s, int a, int n)
 {
     int first = 0;
-    while (first < n && s->c[first][a] == 0.0) {
+    while (first <= n && s->c[first][a] == 0.0) {
         first++;
     }
-    const int back = s->c[first][a] < 0.0;
+    return first;
+}
+
+/* Drag of an axis by its direction, that of the first of the terms up to n that is not 0; false where there is none. */
+static inline bool series_drag(const flow *f, series *s, int a, int n)
+{
+    const int first = series_first(s, a, n), back = first <= n && s->c[first][a] < 0.0;
     s->A[a] = (back ? -s->tau : s->tau) * f->gains->axis[a].A[back];
     s->D[a] = s->tau * f->gains->axis[a].B[back] + 2.0 * s->A[a] * s->c[0][a];
-    return s->c[first][a] != 0.0;
+    return first <= n;
 }
 
 /* The term after n. */
-SERIES_INLINE void series_term(const flow *f, series *s, int n)
+INLINE void series_term(const flow *f, series *s, int n)
 {
     double square[WIDTH] = {0.0}, rest[WIDTH] = {0.0}; /* v^2 without v_0; all but the drag of the last term */
     for (int j = (n - 1) / 2; j > 0; j--) {
@@ -100,16 +100,6 @@ SERIES_INLINE void series_term(const flow *f, series *s, int n)
         s->c[n + 1][a] = INVERSE[n + 1] * rest[a] - INVERSE[n + 1] * s->D[a] * s->c[n][a];
     }
     series_add(s, n + 1);
-}
-
-/* The first term up to n that is not 0; n + 1 where there is none. */
-static inline int series_first(const series *s, int a, int n)
-{
-    int first = 0;
-    while (first <= n && s->c[first][a] == 0.0) {
-        first++;
-    }
-    return first;
 }
 
 /* How large an axis is by the first three terms that are not 0: from rest, lag and coupling begin as a power of t; and the
@@ -239,39 +229,27 @@ static double series_value(const series *s, int a, double t)
     return s->c[0][a] + change;
 }
 
-/* The one root of a polynomial that only rises or only falls, by Newton's method within the bounds known. */
-static double series_root(const series *s, int a, double high)
+/* The one root of a polynomial whose slope stays within a quarter of its first one, by Newton's method. */
+static double series_root(const series *s, int a)
 {
-    double low = 0.0, t = 0.5 * high;
-    for (int i = 0; i < 60; i++) { /* halving finds it in 53 */
-        const double value = series_value(s, a, t);
+    double t = 0.0, next = -s->c[0][a] / s->c[1][a];
+    for (int i = 0; i < 60 && fabs(next - t) > DBL_EPSILON * next; i++) {
         double slope = 0.0;
+        t = next;
         for (int n = s->order; n > 0; n--) {
             slope = slope * t + n * s->c[n][a];
         }
-        if (value != 0.0 && (value > 0.0) == (s->c[0][a] > 0.0)) { /* a product would underflow */
-            low = t;
-        } else {
-            high = t;
-        }
-        const double next = t - value / slope;
-        if (value == 0.0 || next == t || high - low <= DBL_EPSILON * high) {
-            break;
-        }
-        t = next > low && next < high ? next : 0.5 * (low + high);
+        next = t - series_value(s, a, t) / slope;
     }
-    return t;
+    return next;
 }
 
 /* How far a velocity goes before its sign changes, at most the length; whether it is zero there. */
 static inline double series_sign_kept(const series *s, int a, double length, bool *reverses)
 {
     const double shortest = 0x1p-20 * length; /* there a velocity that just touches zero has no drag worth a sign */
-    int k = 0;
+    int k = series_first(s, a, s->order);
     *reverses = false;
-    while (k <= s->order && s->c[k][a] == 0.0) {
-        k++;
-    }
     for (; k <= s->order && length > shortest; length *= 0.5) {
         double others = 0.0, slopes = 0.0, power = length;
         for (int n = k + 1; n <= s->order; n++, power *= length) {
@@ -281,10 +259,10 @@ static inline double series_sign_kept(const series *s, int a, double length, boo
         if (fabs(s->c[k][a]) > others) {
             break;
         }
-        if (k == 0 && fabs(s->c[1][a]) * length > slopes) { /* it only rises or only falls */
+        if (k == 0 && fabs(s->c[1][a]) * length > 4.0 * slopes) { /* it only rises or only falls */
             const double end = series_value(s, a, length);
             *reverses = end == 0.0 || (end > 0.0) != (s->c[0][a] > 0.0);
-            return *reverses ? series_root(s, a, length) : length;
+            return *reverses ? fmin(length, series_root(s, a)) : length;
         }
     }
     return length;

@@ -10,9 +10,8 @@ enum {
     TERMS_MANY = 10
 };
 
-/* The rules on 0 ... 1. Eight places are exact to rounding up to a time of 1 by the bending rate and a turn of 2 rad, four up
- * to a share of that: the error of n is f^(2n) (n!)^4 / ((2n + 1) (2n)!^3), and f has no pole within 2 by the rate. */
-static const double LONGEST_TURN = 2.0, SHARE_OF_FEW = 0.07, FULL_TURN = 6.283185307179586;
+/* The rules on 0 ... 1. Eight places are exact to rounding up to a time of 1 by the bending rate and a turn of 2 rad: the error of n is f^(2n) (n!)^4 / ((2n + 1) (2n)!^3), and f has no pole within 2 by the rate. */
+static const double LONGEST_TURN = 2.0, FULL_TURN = 6.283185307179586;
 static const double PLACES[] = {
     0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629, /* four */
     0.01985507175123188, 0.10166676129318664, 0.23723379504183550, 0.40828267875217510, /* eight */
@@ -40,16 +39,16 @@ static inline planar rotated(planar p, double cosine, double sine)
 /* Cosine and sine to rounding: five terms up to 0.07 rad, ten up to 1 rad, half of the longest turn. */
 static inline planar small_turn(double angle, int terms)
 {
-    static const double even[TERMS_MANY] = {1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40320.0, -1.0 / 3628800.0,
-        1.0 / 479001600.0, -1.0 / 87178291200.0, 1.0 / 20922789888000.0, -1.0 / 6402373705728000.0};
-    static const double odd[TERMS_MANY] = {1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362880.0,
-        -1.0 / 39916800.0, 1.0 / 6227020800.0, -1.0 / 1307674368000.0, 1.0 / 355687428096000.0,
-        -1.0 / 121645100408832000.0};
+    static const double share[2 * TERMS_MANY] = { /* 1/n! */
+        1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0, 1.0 / 40320.0, 1.0 / 362880.0,
+        1.0 / 3628800.0, 1.0 / 39916800.0, 1.0 / 479001600.0, 1.0 / 6227020800.0, 1.0 / 87178291200.0,
+        1.0 / 1307674368000.0, 1.0 / 20922789888000.0, 1.0 / 355687428096000.0, 1.0 / 6402373705728000.0,
+        1.0 / 121645100408832000.0};
     const double square = angle * angle;
-    planar p = {even[terms - 1], odd[terms - 1]};
-    for (int k = terms - 2; k >= 0; k--) {
-        p.ahead = p.ahead * square + even[k];
-        p.aside = p.aside * square + odd[k];
+    planar p = {share[2 * terms - 2], share[2 * terms - 1]};
+    for (int k = 2 * terms - 4; k >= 0; k -= 2) {
+        p.ahead = share[k] - p.ahead * square;
+        p.aside = share[k + 1] - p.aside * square;
     }
     p.aside *= angle;
     return p;
@@ -98,14 +97,10 @@ static void track_add_arc(planar *sum, planar way, double turned, double turn)
 
 static const int PLANE[] = {U, V, R};
 
-static inline double lane_velocity(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
+INLINE riccati_motion lane_motion(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
 {
-    return lane < N_AXES ? riccati_velocity(&axis[lane], v[lane], t) : 0.0;
-}
-
-static inline double lane_distance(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
-{
-    return lane < N_AXES ? riccati_distance(&axis[lane], v[lane], t) : 0.0;
+    const riccati_motion rest = {0.0, 0.0};
+    return lane < N_AXES ? riccati_advance(&axis[lane], v[lane], t) : rest;
 }
 
 /* How long one panel of eight may be. An axis bends at the rate D = B + 2 A |v| + 2 sqrt(A |C|), but as it settles less of
@@ -135,33 +130,32 @@ static bool closed_leg(const riccati axis[WIDTH], double v[WIDTH], double rest, 
 {
     while (++*pieces < MOST_PIECES) {
         bool is_settled;
-        const double panel = panel_length(axis, v, &is_settled), length = fmin(rest, panel);
+        const double length = fmin(rest, panel_length(axis, v, &is_settled));
         if (length < rest) {
-            const planar left = {lane_distance(axis, v, U, rest), lane_distance(axis, v, V, rest)};
-            const double turn = lane_distance(axis, v, R, rest), size = fabs(left.ahead) + fabs(left.aside);
+            const planar left = {lane_motion(axis, v, U, rest).s, lane_motion(axis, v, V, rest).s};
+            const double turn = lane_motion(axis, v, R, rest).s, size = fabs(left.ahead) + fabs(left.aside);
             const double gone = fabs(sum->ahead) + fabs(sum->aside);
             if (is_settled || fabs(turn) < DBL_EPSILON / 4.0 || size <= DBL_EPSILON / 16.0 * gone + DBL_MIN) {
                 track_add_arc(sum, left, turned, turn);
                 return true;
             }
         }
-        const bool is_short = length < SHARE_OF_FEW * panel;
-        const double *const places = is_short ? PLACES : PLACES + FEW;
+        const double turn = lane_motion(axis, v, R, length).s;
         track_places p;
-        for (int i = 0; i < (is_short ? FEW : MANY); i++) {
-            p.ahead[i] = lane_velocity(axis, v, U, length * places[i]);
-            p.aside[i] = lane_velocity(axis, v, V, length * places[i]);
-            p.turn[i] = lane_distance(axis, v, R, length * places[i]);
+        for (int i = 0; i < MANY; i++) {
+            const double t = length * PLACES[FEW + i];
+            p.ahead[i] = lane_motion(axis, v, U, t).v;
+            p.aside[i] = lane_motion(axis, v, V, t).v;
+            p.turn[i] = lane_motion(axis, v, R, t).s;
         }
-        const double turn = lane_distance(axis, v, R, length);
-        track_add(sum, &p, is_short, length, turned, turn);
+        track_add(sum, &p, false, length, turned, turn);
         if (length == rest || !isfinite(sum->ahead + turn)) {
             return true;
         }
         rest -= length;
         turned = remainder(turned + turn, FULL_TURN); /* rounded as a small angle */
         for (int i = 0; i < 3; i++) {
-            v[PLANE[i]] = lane_velocity(axis, v, PLANE[i], length);
+            v[PLANE[i]] = lane_motion(axis, v, PLANE[i], length).v;
         }
     }
     return false;
@@ -177,7 +171,9 @@ static bool closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, do
         from[a] = v[a];
         way[a] = 0.0;
         if (v[a] != 0.0 || axis[a].C != 0.0) {
-            riccati_advance(&axis[a], from[a], h, &v[a], &way[a]);
+            const riccati_motion end = riccati_advance(&axis[a], from[a], h);
+            v[a] = end.v;
+            way[a] = end.s;
         }
     }
     if (YAW == NONE || (from[R] == 0.0 && axis[R].C == 0.0)) {
@@ -194,9 +190,9 @@ static bool closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, do
             end = reversal[i] > start ? fmin(end, reversal[i]) : end;
             /* at rest to the last digit, or what follows would take the branch of before the reversal */
             at[PLANE[i]] = start == 0.0 ? from[PLANE[i]] : reversal[i] == start ? 0.0
-                           : lane_velocity(axis, from, PLANE[i], start);
+                           : lane_motion(axis, from, PLANE[i], start).v;
         }
-        const double turned = start == 0.0 ? 0.0 : lane_distance(axis, from, R, start);
+        const double turned = start == 0.0 ? 0.0 : lane_motion(axis, from, R, start).s;
         if (!closed_leg(axis, at, end - start, turned, sum, &pieces)) {
             return false;
         }
