@@ -51,7 +51,7 @@ void closed_velocities(motion *at, double state[N_STATES], double h, long steps)
     for (int a = 0; a < N_AXES; a++) {
         riccati axis = at->gains.axis[a];
         axis.C = at->held.C[a];
-        state[a] = riccati_velocity(&axis, state[a], h);
+        state[a] = riccati_advance(&axis, state[a], h).v;
     }
 }
 

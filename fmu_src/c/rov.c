@@ -29,7 +29,8 @@ typedef struct {
 /* What drives the vehicle. */
 typedef struct {
     double C[WIDTH];            /* acceleration by the thrust of now and the loads */
-    double steady[N_THRUSTERS]; /* thrust that the commands lead to */
+    double F[N_THRUSTERS];      /* that thrust */
+    double steady[N_THRUSTERS]; /* what the commands lead to */
     double north, east;         /* current */
 } rov_held;
 
@@ -149,12 +150,11 @@ static inline void rov_push(const double at[], const rov_gains *gains, const dou
 
 static inline void rov_hold(const double at[], const rov_gains *gains, rov_held *held)
 {
-    double F[N_THRUSTERS];
     for (int t = 0; t < N_THRUSTERS; t++) {
         held->steady[t] = rov_steady(at, t);
-        F[t] = rov_lags(t) ? at[THRUSTERS[t].force] : held->steady[t];
+        held->F[t] = rov_lags(t) ? at[THRUSTERS[t].force] : held->steady[t];
     }
-    rov_push(at, gains, F, held->C);
+    rov_push(at, gains, held->F, held->C);
     held->north = rov_value(at, MAYBE_V_N);
     held->east = rov_value(at, MAYBE_V_E);
 }
@@ -177,6 +177,9 @@ static inline void rov_rates(const rov_gains *gains, const rov_held *held, const
 {
     for (int a = 0; a < N_AXES; a++) {
         rate[a] = held->C[a] - riccati_drag(&gains->axis[a], state[a]);
+        for (int t = 0; t < N_THRUSTERS && N_LAGGING > 0; t++) {
+            rate[a] += rov_lags(t) ? gains->push[t][a] * (state[THRUSTERS[t].force - FIRST_STATE] - held->F[t]) : 0.0;
+        }
     }
     rov_couple(gains, state, rate);
     if (POSE_x != NONE && POSE_y != NONE) {
