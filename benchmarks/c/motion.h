@@ -6,6 +6,7 @@
 #include "rov.c"
 #include "track.c"
 #include "series.c"
+#include "rov_step.c"
 
 typedef struct {
     double at[N_VARIABLES]; /* inputs and coefficients */

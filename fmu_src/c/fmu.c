@@ -30,6 +30,7 @@
 #include "rov.c"
 #include "track.c"
 #include "series.c"
+#include "rov_step.c"
 
 #include "fmi2_common.c"
 #include "fmi2_state.c"

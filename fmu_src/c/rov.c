@@ -1,5 +1,5 @@
-/* The ROV as tables (model.h) and numbers: thrust, derivatives, tangents. The same formulas as rov_fmu/motion/rov.py; the
- * numbers in brackets are the paper's equations. Units and signs are those of that module. No state, no allocation.
+/* The ROV as tables (model.h) and numbers: thrust, derivatives, tangents. The numbers in brackets are
+ * the paper's equations. Units are SI, signs those of Fossen and SNAME, z down. No state, no allocation.
  *
  * `at` holds all variables by value reference, `state` and `rate` the states in their order. */
 #include "model.h"
@@ -171,28 +171,36 @@ static inline void rov_couple(const rov_gains *gains, const double v[N_AXES], do
     }
 }
 
+/* How the pose moves by velocities, with a current; the same of ways, and of changes. */
+static inline void rov_pose(double psi, const double v[WIDTH], double north, double east, double rate[N_STATES])
+{
+    if (POSE_x != NONE) {
+        const double cosine = cos(psi), sine = sin(psi);
+        rate[POSE_x] = v[U] * cosine - v[V] * sine + north;
+        rate[POSE_y] = v[U] * sine + v[V] * cosine + east;
+    }
+    if (POSE_z != NONE) {
+        rate[POSE_z] = v[HEAVE];
+    }
+    if (POSE_psi != NONE) {
+        rate[POSE_psi] = v[YAW];
+    }
+}
+
 /* Time derivatives of a state: (18), the coupling, the kinematics with the current, the lags. */
 static inline void rov_rates(const rov_gains *gains, const rov_held *held, const double state[N_STATES],
                              double rate[N_STATES])
 {
+    double v[WIDTH] = {0.0};
     for (int a = 0; a < N_AXES; a++) {
+        v[a] = state[a];
         rate[a] = held->C[a] - riccati_drag(&gains->axis[a], state[a]);
         for (int t = 0; t < N_THRUSTERS && N_LAGGING > 0; t++) {
             rate[a] += rov_lags(t) ? gains->push[t][a] * (state[THRUSTERS[t].force - FIRST_STATE] - held->F[t]) : 0.0;
         }
     }
     rov_couple(gains, state, rate);
-    if (POSE_x != NONE && POSE_y != NONE) {
-        const double psi = rov_value(state, POSE_psi), ahead = rov_value(state, SURGE), aside = rov_value(state, SWAY);
-        rate[POSE_x] = ahead * cos(psi) - aside * sin(psi) + held->north;
-        rate[POSE_y] = ahead * sin(psi) + aside * cos(psi) + held->east;
-    }
-    if (POSE_z != NONE) {
-        rate[POSE_z] = rov_value(state, HEAVE);
-    }
-    if (POSE_psi != NONE) {
-        rate[POSE_psi] = rov_value(state, YAW);
-    }
+    rov_pose(rov_value(state, POSE_psi), v, held->north, held->east, rate);
     for (int t = 0; t < N_THRUSTERS; t++) {
         if (rov_lags(t)) {
             const int F = THRUSTERS[t].force - FIRST_STATE;
@@ -302,17 +310,11 @@ static void rov_tangent(const double at[], double d[])
         rate[V] -= gains.c_v * (du * r + u * dr) + rov_ratio_tangent(gain, dgain, V, U) * u * r;
         rate[R] -= gains.c_r * (du * w + u * dw) + dc_r * u * w;
     }
-    if (POSE_x != NONE && POSE_y != NONE) {
-        const double psi = rov_value(v, POSE_psi), turn = rov_value(dv, POSE_psi);
-        const double u = rov_value(v, SURGE), w = rov_value(v, SWAY), du = rov_value(dv, SURGE), dw = rov_value(dv, SWAY);
-        const double ahead = du - w * turn, aside = dw + u * turn; /* the heading turns what goes ahead to the side */
-        rate[POSE_x] = ahead * cos(psi) - aside * sin(psi) + rov_value(d, MAYBE_V_N);
-        rate[POSE_y] = ahead * sin(psi) + aside * cos(psi) + rov_value(d, MAYBE_V_E);
+    double change[WIDTH] = {0.0};
+    memcpy(change, dv, sizeof(double[N_AXES]));
+    if (POSE_psi != NONE) { /* the heading turns what goes ahead to the side */
+        change[U] -= rov_value(v, SWAY) * dv[POSE_psi];
+        change[V] += rov_value(v, SURGE) * dv[POSE_psi];
     }
-    if (POSE_z != NONE) {
-        rate[POSE_z] = rov_value(dv, HEAVE);
-    }
-    if (POSE_psi != NONE) {
-        rate[POSE_psi] = rov_value(dv, YAW);
-    }
+    rov_pose(rov_value(v, POSE_psi), change, rov_value(d, MAYBE_V_N), rov_value(d, MAYBE_V_E), rate);
 }

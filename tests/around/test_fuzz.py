@@ -110,15 +110,15 @@ PLANTED = {
         "beyond its equilibrium",
     ),
     "a dive goes further than its fastest": (
-        "series.c",
-        "next[POSE_z] = state[POSE_z] + way[HEAVE];",
-        "next[POSE_z] = state[POSE_z] + 1.000001 * way[HEAVE];",
+        "rov_step.c",
+        "    rov_pose(rov_value(state, POSE_psi), way,",
+        "    way[HEAVE] *= 1.000001;\n    rov_pose(rov_value(state, POSE_psi), way,",
         "broken property .*: z goes from",
     ),
     "a turn makes the way longer": (
-        "series.c",
-        "next[POSE_x] = state[POSE_x] + sum.ahead + held.north * h;",
-        "next[POSE_x] = state[POSE_x] + 1.000001 * sum.ahead + held.north * h;",
+        "rov_step.c",
+        "way[U] = sum.ahead;",
+        "way[U] = 1.000001 * sum.ahead;",
         "at no more than",
     ),
 }
@@ -132,9 +132,9 @@ PLANTED_IN_HEAVY = {
         "at most",
     ),
     "a lag overshoots": (
-        "series.c",
-        "next[F] = state[F] + (state[F] - held.steady[t]) * fall;",
-        "next[F] = state[F] + 1.01 * (state[F] - held.steady[t]) * fall;",
+        "rov_step.c",
+        "(held.F[t] - held.steady[t]) * expm1(",
+        "1.01 * (held.F[t] - held.steady[t]) * expm1(",
         "F of thruster",
     ),
 }

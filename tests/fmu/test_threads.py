@@ -51,7 +51,7 @@ def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
 @pytest.mark.parametrize(
     ("sanitizers", "file", "line", "fault", "report"),
     [
-        ("thread", "series.c", "    rov_held held;\n", "static rov_held held;", "data race"),
+        ("thread", "rov_step.c", "    rov_held held;\n", "static rov_held held;", "data race"),
         ("address", "fmi2_common.c", "    free(c);\n", "(void)c;", "detected memory leaks"),
     ],
     ids=["shared variable", "lost instance"],

@@ -3,6 +3,7 @@
 #include "rov.c"
 #include "track.c"
 #include "series.c"
+#include "rov_step.c"
 
 bool step(double at[N_VARIABLES], double h)
 {

@@ -1,0 +1,178 @@
+/* The exact step: by Taylor series (series.c), and over long steps by the closed form (track.c) where there is one. A
+ * reversal is a root of a polynomial: the piece is cut there. */
+
+/* Whether what is left of every acceleration is rounding of its terms. */
+static bool is_settled(const flow *f, const double v[WIDTH])
+{
+    double couple[WIDTH] = {0.0};
+    rov_couple(f->gains, v, couple);
+    for (int a = 0; a < N_AXES; a++) {
+        const double drag = riccati_drag(&f->gains->axis[a], v[a]);
+        const double rate = f->C[a] - drag + couple[a], size = fabs(f->C[a]) + fabs(drag) + fabs(couple[a]);
+        double change = fabs(rate);
+        for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
+            change = fmax(change, fabs(f->late[c][a]));
+        }
+        if (!(change <= 8.0 * DBL_EPSILON * size)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* How much of a piece is taken: as far as its terms reach, of a turn that is not too long, and up to the first reversal,
+ * of the axis *stops. */
+static double series_cut(const series *s, double reach, int *stops)
+{
+    double length = reach, turn = 0.0;
+    for (int n = s->order; n >= 0; n--) {
+        turn += s->tau * fabs(s->c[n][R]) * INVERSE[n + 1];
+    }
+    length = fmin(length, LONGEST_TURN / turn);
+    for (int a = 0; a < N_AXES; a++) {
+        bool reverses;
+        const double end = series_sign_kept(s, a, length, &reverses);
+        *stops = reverses ? a : end < length ? NONE : *stops;
+        length = end;
+    }
+    return length;
+}
+
+/* The force after t more seconds: from the end that is nearer, or next to nothing is left of two large numbers. */
+static void flow_pass(flow *f, double t)
+{
+    double left[N_AXES] = {0.0};
+    for (int c = 0; c < N_CURVES; c++) {
+        const double lost = expm1(-f->gains->rate[c] * t);
+        for (int a = 0; a < N_AXES; a++) {
+            f->C[a] += f->late[c][a] * lost;
+            f->late[c][a] *= 1.0 + lost;
+            left[a] += f->late[c][a];
+        }
+    }
+    for (int a = 0; a < N_AXES; a++) {
+        f->C[a] = fabs(left[a]) < 0.5 * fabs(f->then[a]) ? f->then[a] + left[a] : f->C[a];
+    }
+}
+
+/* A step of h seconds: v moves to its end, the distances along the axes and the track go to *way and *sum. False where it
+ * takes too many pieces; of a free motion also where the series does not reach the end at once. */
+static inline bool series_step(flow *f, double v[WIDTH], double h, double way[WIDTH], planar *sum)
+{
+    double tau = h, done = 0.0;
+    series s;
+    for (int pieces = 0; pieces < MOST_PIECES; pieces++) {
+        const double rest = h - done;
+        double change[WIDTH], gone[WIDTH], length = 1.0, reach = 1.0;
+        int stops = NONE;
+        if (!series_grow(f, v, fmin(rest, tau), &s)) {
+            if (IS_FREE) {
+                return false;
+            }
+            reach = series_reach(&s);
+            if (reach == 0.0) { /* it overflows */
+                tau = 1e-3 * s.tau;
+                continue;
+            }
+        }
+        tau = 2.0 * s.tau * reach;
+        if (!series_end(&s, change, gone) || reach < 1.0) {
+            length = series_cut(&s, reach, &stops);
+            if (length < 1.0) {
+                series_shorten(&s, length);
+                series_end(&s, change, gone);
+            }
+        }
+        series_track(&s, way[R], gone, sum);
+        for (int a = 0; a < WIDTH; a++) {
+            v[a] += change[a];
+            way[a] += gone[a];
+        }
+        if (stops != NONE) { /* at rest to the last digit, or what follows would take the branch of before */
+            v[stops] = 0.0;
+        }
+        if (length == 1.0 && s.tau >= rest) {
+            return true;
+        }
+        done += s.tau;
+        if (N_LAGGING > 0) {
+            flow_pass(f, s.tau);
+        }
+        if (!IS_FREE && is_settled(f, v)) {
+            const planar left = {v[U] * (h - done), v[V] * (h - done)};
+            track_add_arc(sum, left, way[R], v[R] * (h - done));
+            for (int a = 0; a < N_AXES; a++) {
+                way[a] += v[a] * (h - done);
+            }
+            return true;
+        }
+    }
+    return false;
+}
+
+static const double SERIES_REACH = 0.3;
+
+/* Whether a series of ORDER reaches the end of a step: its coefficients fall as (h rate / 2)^n, rate as in panel_length. */
+static inline bool is_in_reach(const rov_gains *gains, const double C[WIDTH], const double v[WIDTH], double h)
+{
+    double longest = SERIES_REACH - 0.5 * SERIES_REACH * h * fabs(v[R]);
+    for (int a = 0; a < N_AXES; a++) {
+        const double A = gains->axis[a].A[v[a] < 0.0], B = gains->axis[a].B[v[a] < 0.0];
+        const double bend = h * (B + 2.0 * A * fabs(v[a])), swing = 4.0 * A * fabs(C[a]) * h * h;
+        longest = bend * bend + swing > SERIES_REACH * SERIES_REACH ? -1.0 : longest;
+    }
+    return longest >= 0.0;
+}
+
+/* The states after h > 0 seconds with the inputs held; not finite only where a result overflows. False where the step takes
+ * more than MOST_PIECES pieces. */
+static bool rov_step(const double at[], const rov_gains *gains, double h, double next[N_STATES])
+{
+    const double *const state = at + FIRST_STATE;
+    double v[WIDTH] = {0.0}, way[WIDTH] = {0.0}, change[N_STATES] = {0.0};
+    planar sum = {0.0, 0.0};
+    rov_held held;
+    flow f = {.gains = gains};
+    rov_hold(at, gains, &held);
+    rov_push(at, gains, held.steady, f.then);
+    for (int a = 0; a < N_AXES; a++) {
+        v[a] = state[a];
+        f.C[a] = held.C[a];
+        for (int t = 0; t < N_THRUSTERS; t++) {
+            if (rov_lags(t)) {
+                f.late[THRUSTERS[t].curve][a] += gains->push[t][a] * (at[THRUSTERS[t].force] - held.steady[t]);
+            }
+        }
+    }
+    const double lengths = v[R] == 0.0 && held.C[R] == 0.0 ? 3.0 : 1.0; /* straight, the closed form costs less so soon */
+    bool done = (!IS_FREE || is_in_reach(gains, held.C, v, lengths * h)) && series_step(&f, v, h, way, &sum);
+    if (IS_FREE && !done) {
+        riccati axis[WIDTH];
+        memcpy(axis, gains->axis, sizeof axis);
+        sum.ahead = sum.aside = 0.0;
+        for (int a = 0; a < N_AXES; a++) {
+            axis[a].C = held.C[a];
+            v[a] = state[a];
+            way[a] = 0.0;
+        }
+        done = closed_step(axis, v, h, way, &sum);
+    }
+    for (int a = 0; a < N_AXES; a++) {
+        next[a] = v[a];
+    }
+    if (POSE_x != NONE) {
+        way[U] = sum.ahead;
+        way[V] = sum.aside;
+    }
+    rov_pose(rov_value(state, POSE_psi), way, held.north * h, held.east * h, change);
+    for (int t = 0; t < N_THRUSTERS; t++) {
+        if (rov_lags(t)) { /* F' = (F(c) - F)/T */
+            change[THRUSTERS[t].force - FIRST_STATE] =
+                (held.F[t] - held.steady[t]) * expm1(-gains->rate[THRUSTERS[t].curve] * h);
+        }
+    }
+    for (int s = N_AXES; s < N_STATES; s++) {
+        next[s] = state[s] + change[s];
+    }
+    return done;
+}
