@@ -183,7 +183,7 @@ static inline bool series_grow(const flow *f, const double v[WIDTH], double tau,
     return done;
 }
 
-/* How far the last two terms stay below rounding of the first ones, up to 1; 0 where they overflow. */
+/* How far the last terms stay below rounding of the first ones, up to 1; 0 where they overflow. */
 static double series_reach(const series *s)
 {
     double reach = 1.0;
