@@ -132,7 +132,7 @@ static bool rov_step(const double at[], const rov_gains *gains, double h, double
     double v[WIDTH] = {0.0}, way[WIDTH] = {0.0}, change[N_STATES] = {0.0};
     planar sum = {0.0, 0.0};
     rov_held held;
-    flow f = {.gains = gains};
+    flow f = {gains, {0.0}, {0.0}, {{0.0}}};
     rov_hold(at, gains, &held);
     rov_push(at, gains, held.steady, f.then);
     for (int a = 0; a < N_AXES; a++) {
