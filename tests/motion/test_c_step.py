@@ -85,6 +85,14 @@ def test_a_step_in_c_is_exact(
             assert abs(found[name] - value) <= room, (name, inputs, state, h, float(found[name] - value))
 
 
+def test_the_smallest_velocity_is_turned_back(vehicle: tuple[Rov, Step]) -> None:
+    """A product of it and of the force against it is 0, and yet it changes its direction at once."""
+    rov, step = vehicle
+    inputs = dict.fromkeys(rov.layout.inputs, 0.0) | {"X_ext": -5.0}
+    rest = dict.fromkeys(rov.layout.state, 0.0)
+    assert step(rov, inputs, rest | {"u": 5e-324}, 0.1) == pytest.approx(step(rov, inputs, rest, 0.1), rel=1e-13)
+
+
 def test_a_step_of_too_many_pieces_is_refused(vehicle: tuple[Rov, Step]) -> None:
     rov, step = vehicle
     still = dict.fromkeys(rov.layout.inputs, 0.0)
