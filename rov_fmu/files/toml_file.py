@@ -1,7 +1,10 @@
 """TOML files checked against the form that they must have; a line for every mistake."""
 
+import json
 import re
 import sys
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,6 +28,7 @@ class Strict(BaseModel):
 
 Checked = TypeVar("Checked", bound=Strict)
 Toml = dict[str, Any]
+_Place = Sequence[int | str]
 
 
 def read_checked(path: Path, model: type[Checked], failure: type[FileError], **context: object) -> Checked:
@@ -32,7 +36,7 @@ def read_checked(path: Path, model: type[Checked], failure: type[FileError], **c
     data = read_toml(path, failure)
     checked, problems = check(data, model, folder=path.parent, **context)
     if checked is None:
-        raise failure(*(f"{path}: {told(problem, data)}" for problem in problems))
+        raise failure(*(f"{path}: {line}" for line in told(problems, data, model)))
     return checked
 
 
@@ -42,7 +46,9 @@ def read_toml(path: Path, failure: type[FileError]) -> Toml:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise failure(f"{path}: not TOML: {brief(str(error))}") from error
+        found = re.search(r"at line (\d+)", str(error))
+        line = text.split("\n")[int(found[1]) - 1].strip() if found else ""
+        raise failure(f"{path}: not TOML: {brief(str(error))}{': ' if line else ''}{brief(line)}") from error
 
 
 def check(data: Toml, model: type[Checked], **context: object) -> tuple[Checked | None, list[ErrorDetails]]:
@@ -63,35 +69,149 @@ def beside(name: str, info: ValidationInfo) -> Path:
     return Path((info.context or {})["folder"], name)
 
 
+# ---- Problems in words -----------------------------------------------------------------------------------------------
+
+_REASONS = {
+    "bool_type": "must be true or false",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "list_type": "must be a list",
+    "string_type": "must be text in quotes",
+    "tuple_type": "must be a list",
+}
 _OF_WHAT = re.compile("^(Input|String|List|Tuple|Dictionary) should ")
+_MOST = 10
+"""Names that a line lists."""
 
 
-def told(problem: ErrorDetails, data: Toml) -> str:
-    """A problem of the file in one line: key, value, what is allowed."""
-    key = brief(_key(problem["loc"], data))
-    match problem["type"]:
-        case "missing":
-            return f"{key}: this key is missing"
-        case "extra_forbidden":
-            return f"{key}: there is no such key"
-        case "model_type":
-            return f"{key} = {shown(problem['input'])}: must be a table of keys and values"
-    reason = _OF_WHAT.sub("must ", problem["msg"].removeprefix("Value error, ")).replace(" after validation", "")
-    reason = reason.replace("a valid tuple", "a list").replace("a valid dictionary", "a table")
-    of_table = problem["type"] == "value_error" and isinstance(problem["input"], dict)
-    return f"{key}: {reason}" if of_table else f"{key} = {shown(problem['input'])}: {reason}"
+def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> list[str]:
+    """Problems of the file in a line each: key, value, what is allowed."""
+    form = _Form(model)
+    return [_told(p, data, form) for p in problems if p["type"] != "missing" or not _misspelt(p["loc"], problems, form)]
 
 
-def _key(place: tuple[int | str, ...], data: Any) -> str:
+def listed(names: Iterable[str]) -> str:
+    """Names in a line, and not endlessly many."""
+    some = [*names]
+    return ", ".join(some[:_MOST]) + (", ..." if len(some) > _MOST else "")
+
+
+def label(table: str, entries: Sequence[Any], number: int) -> str:
+    """An entry of a list of tables by its name, or by its number from 1 where it has none of its own."""
+    names = [entry.get("name") if isinstance(entry, dict) else None for entry in entries]
+    name = names[number]
+    own = isinstance(name, str) and names.count(name) == 1
+    return f"{table}.{name or repr('')}" if own else f"{table}#{number + 1}"
+
+
+class _Form:
+    """What a model says of each place in its file."""
+
+    def __init__(self, model: type[Strict]) -> None:
+        self._schema = model.model_json_schema()
+
+    def at(self, place: _Place) -> dict[str, Any]:
+        """The JSON schema of a place; an empty one where there is none."""
+        found = self._schema
+        for step in place:
+            of_any = [found.get("additionalProperties"), *found.get("patternProperties", {}).values()]
+            inner = [found.get("items") if isinstance(step, int) else found.get("properties", {}).get(step), *of_any]
+            found = self._resolved(next((form for form in inner if isinstance(form, dict)), {}))
+        return found
+
+    def keys(self, place: _Place) -> list[str]:
+        """Those that a table may have."""
+        return [*self.at(place).get("properties", ())]
+
+    def near(self, place: _Place) -> str | None:
+        """The key that one that is none must mean."""
+        return next(iter(get_close_matches(str(place[-1]), self.keys(place[:-1]), 1)), None)
+
+    def written(self, place: _Place) -> str:
+        """How a table, or a list of tables, is written."""
+        form = self.at(place)
+        key = ".".join(str(step) for step in place if isinstance(step, str))
+        if form.get("type") == "array" or isinstance(place[-1], int):
+            return f"a list of tables: write [[{key}]]"
+        if "value" not in form.get("properties", ()):
+            return f"a table: write [{key}]"
+        constants = {name: _constant(self.at((*place, name))) for name in form["required"]}
+        pairs = (f"{name} = {json.dumps(value) if value else '...'}" for name, value in constants.items())
+        return f"{{ {', '.join(pairs)} }}"
+
+    def _resolved(self, form: dict[str, Any]) -> dict[str, Any]:
+        """Without references, and without null, which TOML has not."""
+        for choice in (*form.get("allOf", ()), *form.get("anyOf", ())):
+            if choice != {"type": "null"}:
+                return self._resolved(choice)
+        if "$ref" in form:
+            return self._resolved(self._schema["$defs"][form["$ref"].removeprefix("#/$defs/")])
+        return form
+
+
+def _constant(form: dict[str, Any]) -> Any:
+    """The one value that a key may have."""
+    one = form.get("enum", [form.get("const")])
+    return one[0] if len(one) == 1 else None
+
+
+def _misspelt(place: _Place, problems: Iterable[ErrorDetails], form: _Form) -> bool:
+    """Whether a key is missing because it stands there as another."""
+    unknown = (p["loc"] for p in problems if p["type"] == "extra_forbidden")
+    return any(other[:-1] == place[:-1] and form.near(other) == place[-1] for other in unknown)
+
+
+def _told(problem: ErrorDetails, data: Toml, form: _Form) -> str:
+    place, value, kind = problem["loc"], problem["input"], problem["type"]
+    key, of_table = brief(_key(place, data)), isinstance(value, dict)
+    if kind == "missing":
+        constant = _constant(form.at(place))
+        return f"{key}: this key is missing" + (f": write {place[-1]} = {json.dumps(constant)}" if constant else "")
+    if kind == "extra_forbidden":
+        allowed, near = form.keys(place[:-1]), form.near(place)
+        many = near and len(allowed) > _MOST
+        return f"{key}: there is no such key" + (f"; did you mean {near}?" if many else f", only {listed(allowed)}")
+    reason = _reason(problem, form)
+    *above, last = place
+    if isinstance(last, int) and not of_table and form.at(place).get("type") != "object":
+        place, reason = tuple(above), f"entry {last + 1} {reason}"  # shown in its list
+        value = _at(place, data)
+        key = brief(_key(place, data))
+    hidden = of_table and kind in ("value_error", "list_type")
+    return f"{key}: {reason}" if hidden else f"{key} = {shown(value)}: {reason}"
+
+
+def _reason(problem: ErrorDetails, form: _Form) -> str:
+    """What is allowed."""
+    kind, place = problem["type"], problem["loc"]
+    here = form.at(place)
+    if kind in ("model_type", "dict_type") or (kind == "list_type" and form.keys((*place, 0))):
+        return f"must be {form.written(place)}"
+    if kind in ("greater_than_equal", "less_than_equal") and "minimum" in here and "maximum" in here:
+        return f"must be within {here['minimum']:g} ... {here['maximum']:g}"
+    if kind == "float_type" and type(problem["input"]) is int:
+        return "must be a number of at most 308 digits"
+    if kind in _REASONS:
+        return _REASONS[kind]
+    return _OF_WHAT.sub("must ", problem["msg"].removeprefix("Value error, ")).replace(" after validation", "")
+
+
+def _at(place: _Place, data: Any) -> Any:
+    for step in place:
+        data = data[step]
+    return data
+
+
+def _key(place: _Place, data: Any) -> str:
     """A place in the file; an entry of a list of tables by its name, or else by its number from 1."""
     words = ""
     for step in place:
         if step == "[key]":  # pydantic's word for a problem with a key itself
             continue
+        words = label(words, data, step) if isinstance(step, int) else f"{words}.{step or repr('')}"
         try:
             data = data[step]
         except (LookupError, TypeError):
             data = None
-        name = data.get("name") if isinstance(step, int) and isinstance(data, dict) else step
-        words += "." + (name or "''") if isinstance(name, str) else f"#{int(step) + 1}"
     return words.removeprefix(".")

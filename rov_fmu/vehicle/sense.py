@@ -8,8 +8,22 @@ from typing import Any
 from pydantic_core import ErrorDetails
 
 from rov_fmu.files.messages import brief, shown
-from rov_fmu.files.toml_file import Strict, Toml, check
-from rov_fmu.motion.layout import ARM, AXIS, BODY, CURVE, LEAST_BETA, REVERSE, SURGE, SWAY, YAW, Axis, Kind, Layout
+from rov_fmu.files.toml_file import Strict, Toml, check, label, listed
+from rov_fmu.motion.layout import (
+    ARM,
+    AXIS,
+    BODY,
+    CURVE,
+    LEAST_BETA,
+    REVERSE,
+    SURGE,
+    SWAY,
+    YAW,
+    Axis,
+    Curve,
+    Kind,
+    Layout,
+)
 from rov_fmu.vehicle.quantity import Quantity, within
 from rov_fmu.vehicle.schema import Parts, given, where
 
@@ -48,6 +62,8 @@ def nonsense(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     layout = parts.layout
     placed = [*_places(parts, layout)]
     yield from placed or _geometry(layout)
+    if not (placed or named):
+        yield from _mixed(layout)
     coupled = [*_coupling(parts, layout)]
     yield from coupled
     if not (named or coupled or lost & {"curves", "arm", "body"}):
@@ -59,42 +75,66 @@ def _line(key: str, reason: str, *value: object) -> str:
     return f"{brief(key)} = {shown(value[0])}: {reason}" if value else f"{brief(key)}: {reason}"
 
 
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
-
-
 # ---- Names and keys --------------------------------------------------------------------------------------------------
 
 
 def _names(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     """Of thrusters, curves and inputs."""
-    names = [thruster.name for thruster in parts.thruster]
-    for name in (name for name, count in Counter(names).items() if count > 1):
-        yield _line(f"thruster.{name}.name", "there is more than one thruster of this name", name)
+    entries = data["thruster"] if isinstance(data.get("thruster"), list) else []
+    found = [(n, entry) for n, entry in enumerate(entries) if isinstance(entry, dict)]
+    named = [(n, entry["name"]) for n, entry in found if isinstance(entry.get("name"), str)]
+    yield from _alike("thruster", [(f"#{n + 1}", name) for n, name in named])
     curves = list(data["curves"]) if isinstance(data.get("curves"), dict) else []
-    for thruster in parts.thruster:
-        if curves and thruster.curve not in curves:
-            reason = f"there is no such curve, only {_listed(curves)}"
-            yield _line(f"thruster.{thruster.name}.curve", reason, thruster.curve)
+    yield from _alike("curves", [(f".{name}", name) for name in curves])
+    yield from _alike("inputs", [(f".{name}", name) for name in parts.inputs])
+    for n, entry in found:
+        if curves and isinstance(curve := entry.get("curve"), str) and curve not in curves:
+            reason = f"there is no such curve, only {listed(curves)}"
+            yield _line(f"{label('thruster', entries, n)}.curve", reason, curve)
     if "thruster" in lost:
         return
     for name in parts.curves:
         if name not in {thruster.curve for thruster in parts.thruster}:
             yield _line(f"curves.{name}", "no thruster has this curve")
-    for name, gains in parts.inputs.items():
+    if "inputs" not in lost:
+        yield from _gains(parts.inputs, [name for _, name in named])
+
+
+def _alike(table: str, names: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Names that one before has too, but for upper and lower case."""
+    before: dict[str, tuple[str, str]] = {}
+    for key, name in names:
+        first, other = before.setdefault(name.casefold(), (key, name))
+        if key != first:
+            alike = "this name" if other == name else f"the name {shown(other)}: they differ only in case"
+            yield _line(f"{table}{key}{'.name' if table == 'thruster' else ''}", f"{table}{first} has {alike}", name)
+
+
+def _gains(inputs: Mapping[str, Mapping[str, float]], names: Sequence[str]) -> Iterator[str]:
+    """Inputs that drive what is not there, or nothing; and only where there are none, thrusters that none drives."""
+    wrong = False
+    for name, gains in inputs.items():
         for driven in gains:
             if driven not in names:
-                yield _line(f"inputs.{name}.{driven}", f"there is no such thruster, only {_listed(names)}")
-    if parts.inputs and "inputs" not in lost:
-        for name in names:
-            if not any(gains.get(name) for gains in parts.inputs.values()):
-                yield _line(f"inputs: no input drives the thruster {name}", "give a gain other than 0 in one of them")
+                yield _line(f"inputs.{name}.{driven}", f"there is no such thruster, only {listed(names)}")
+                wrong = True
+        if not any(gains.values()):
+            yield _line(f"inputs.{name}", "drives no thruster: give one a gain other than 0")
+            wrong = True
+    for name in names if inputs and not wrong else ():
+        if not any(gains.get(name) for gains in inputs.values()):
+            yield _line(f"inputs: no input drives the thruster {name}", "give a gain other than 0 in one of them")
 
 
 def _keys(parts: Parts, lost: set[str]) -> Iterator[str]:
     """Keys that need others, or have no use."""
     for name, curve in parts.curves.items():
-        yield from _pairs(f"curves.{name}", given(curve, CURVE))
+        quantities = given(curve, CURVE)
+        yield from (lame := [*_pairs(f"curves.{name}", quantities)])
+        if not lame:
+            form = Curve(name, tuple(quantities))
+            values = {form.coefficient(key): q.value for key, q in quantities.items()}
+            yield from no_thrust(form, values, f"curves.{name}")
         if curve.c_0_reverse and not curve.c_0:
             yield _line(f"curves.{name}.c_0", "this key is missing, and c_0_reverse is there")
     for axis, table in parts.axis_tables.items():
@@ -103,6 +143,7 @@ def _keys(parts: Parts, lost: set[str]) -> Iterator[str]:
         return
     if not parts.axis_tables:
         yield _line("axes", "must have at least one of surge, sway, heave, yaw")
+        return
     if parts.body:
         yield from _needed("body", parts.body, BODY, {axis.inertia: axis for axis in reversed(parts.axis_tables)})
     if "thruster" not in lost and "arm" not in lost:
@@ -118,6 +159,17 @@ def _pairs(table: str, keys: Mapping[str, Quantity]) -> Iterator[str]:
     for one, other in (("a_t", "b_t"), ("b_t", "a_t"), ("a_d", "b_d"), ("b_d", "a_d")):
         if one + REVERSE in keys and other + REVERSE not in keys:
             yield _line(f"{table}.{other}{REVERSE}", f"this key is missing, and {one}{REVERSE} is there")
+
+
+def no_thrust(curve: Curve, values: Mapping[str, float], place: str) -> Iterator[str]:
+    """A line where full command gives no thrust its way, as coefficients of the wrong sign do."""
+    for end in ("", REVERSE) if any(key.endswith(REVERSE) for key in curve.keys) else ("",):
+        a_t, b_t, c_0 = (curve.coefficient(key + end) for key in ("a_t", "b_t", "c_0"))
+        m = 1.0 - values.get(c_0, 0.0)
+        if (force := (values[a_t] * m + values[b_t]) * m) <= 0.0:
+            where_to = " in reverse" if end else ""
+            reason = f"must give a force above 0 at full command{where_to}, but {a_t} and {b_t} give {force:g} N"
+            yield _line(place, reason)
 
 
 def _needed(name: str, table: Strict, kinds: Mapping[str, Kind], needed: Mapping[str, Axis]) -> Iterator[str]:
@@ -153,7 +205,7 @@ def _geometry(layout: Layout) -> Iterator[str]:
     axes = [form.axis for form in layout.axes]
     for thruster in layout.thrusters:
         if not any(thruster in layout.drivers(axis) for axis in axes):
-            reason = f"acts on no axis of the vehicle, which are {_listed([axis.name for axis in axes])}"
+            reason = f"acts on no axis of the vehicle, which are {listed([axis.name for axis in axes])}"
             yield _line(f"thruster.{thruster.name}", reason)
     free: list[tuple[str, list[float]]] = []  # axes that can be driven apart, as orthonormal rows of effects
     for axis in axes:
@@ -169,15 +221,20 @@ def _geometry(layout: Layout) -> Iterator[str]:
             together += [name] if abs(along) > _PARALLEL else []
         if hypot(*left) > _PARALLEL:
             free.append((axis.name, _unit(left)))
-            if not layout.signs(axis):
-                yield _line(f"axes.{axis.name}", "no input drives it: the gains cancel")
         else:
             yield _line(
-                f"axes.{axis.name}", f"the thrusters cancel: they drive it only together with {_listed(together)}"
+                f"axes.{axis.name}", f"the thrusters cancel: they drive it only together with {listed(together)}"
             )
-    for name in layout.mix:
-        if not any(f"u_{name}" in layout.signs(axis) for axis in axes):
-            yield _line(f"inputs.{name}", "drives no axis of the vehicle: the gains are 0 or cancel")
+
+
+def _mixed(layout: Layout) -> Iterator[str]:
+    """Inputs whose gains cancel; and only where there are none, axes that no input drives."""
+    driven = {axis: layout.signs(axis) for axis in (form.axis for form in layout.axes) if layout.drivers(axis)}
+    idle = [name for name in layout.mix if not any(f"u_{name}" in signs for signs in driven.values())]
+    for name in idle:
+        yield _line(f"inputs.{name}", "drives no axis of the vehicle: its gains cancel")
+    for axis in (axis for axis, signs in driven.items() if not (signs or idle)):
+        yield _line(f"axes.{axis.name}", "no input drives it: the gains cancel")
 
 
 def _unit(row: Sequence[float]) -> list[float]:

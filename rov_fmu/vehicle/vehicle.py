@@ -14,8 +14,8 @@ from rov_fmu.vehicle.first import FirstFile, quantities
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Quantity
-from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, File, where
-from rov_fmu.vehicle.sense import as_far_as_readable, nonsense
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, File, where
+from rov_fmu.vehicle.sense import as_far_as_readable, no_thrust, nonsense
 
 TABLES = {
     "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
@@ -25,6 +25,8 @@ TABLES = {
 """Files of published tables in the data folder, by axis: responses, and measured steady velocities."""
 PICTURES = ("model.png", "from_above.svg", "from_starboard.svg")
 """Files in the folder of pictures."""
+_SECOND = {"format", "body", "arm", "curves", "thruster", "axes", "inputs"}
+"""Keys that tell the second version of the file."""
 
 
 class VehicleFileError(FileError):
@@ -109,12 +111,17 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     path = Path(path)
     data = read_toml(path, VehicleFileError)
     context = {"folder": path.parent, "coming": coming}
-    if "format" in data or "thruster" in data:
+    if "format" in data or "coefficients" not in data:
+        if not data.keys() & _SECOND:
+            raise VehicleFileError(f"{path}: format: this key is missing: write format = {FORMAT}")
         return _second(path, data, context)
     first, problems = check(data, FirstFile, **context)
     if first is None:
-        raise VehicleFileError(*(f"{path}: {told(problem, data)}" for problem in problems))
+        raise VehicleFileError(*(f"{path}: {mistake}" for mistake in told(problems, data, FirstFile)))
     found = quantities(first.coefficients)
+    values = {name: q.value for name, q in found.items()}
+    if weak := [line for curve in PAPER.curves for line in no_thrust(curve, values, "coefficients")]:
+        raise VehicleFileError(*(f"{path}: {line}" for line in weak))
     alternatives = {name: _alternative(a.description, quantities(a)) for name, a in first.alternatives.items()}
     return _vehicle(path, first, PAPER, found, alternatives)
 
@@ -122,7 +129,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
 def _second(path: Path, data: Toml, context: Mapping[str, object]) -> Vehicle:
     """The second version of the file."""
     file, problems = check(data, File, **context)
-    mistakes = [told(problem, data) for problem in problems]
+    mistakes = told(problems, data, File)
     mistakes += nonsense(*as_far_as_readable(data, problems, context), data)
     if file is None or mistakes:
         raise VehicleFileError(*(f"{path}: {mistake}" for mistake in mistakes))

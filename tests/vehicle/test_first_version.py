@@ -30,7 +30,11 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
         lambda text: text.replace("R = {", "radius = {", 1),
         ("coefficients.radius", "no such key"),
     ),
-    "missing section": (lambda text: text.replace(COEFFICIENTS, ""), ("coefficients", "missing")),
+    "missing section": (lambda text: text.replace(COEFFICIENTS, ""), ("format: this key is missing",)),
+    "thrust of the wrong sign": (
+        lambda text: text.replace("a_t_top = { value = ", "a_t_top = { value = -"),
+        ("coefficients: must give a force above 0 at full command, but a_t_top and b_t_top give -6.4427 N",),
+    ),
     "negative mass": (lambda text: text.replace("6.57", "-6.57"), ("coefficients.m_rov.value", "-6.57", "0.001")),
     "wrong unit": (lambda text: text.replace('"kg"', '"lb"'), ("coefficients.m_rov.unit", "'lb'", "'kg'")),
     "a table of today": (lambda text: text + "\n[axes]\n", ("axes", "no such key")),

@@ -101,7 +101,16 @@ _NO_BOOST: dict[str, Any] = {**_ALONE, "thruster.l": GONE, "thruster.r": GONE, "
 # What is done to the file, and what each of the lines must name, in their order.
 NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     # names
-    "a name twice": ({**_ALONE, "thruster.2.name": "1"}, [("thruster.1.name = '1'", "more than one thruster")]),
+    "a name twice": ({**_ALONE, "thruster.2.name": "1"}, [
+        ("thruster#2.name = '1': thruster#1 has this name",)]),
+    "a name and a curve that is not there twice": ({**_ALONE, "thruster.2.curve": "T200", "thruster.2.name": "1"}, [
+        ("thruster#2.name = '1'",), ("thruster#2.curve = 'T200'", "no such curve")]),
+    "names of thrusters that differ in case": ({**_ALONE, "thruster.l.name": "R"}, [
+        ("thruster#7.name = 'r': thruster#6 has the name 'R': they differ only in case",)]),
+    "names of curves that differ in case": ({"curves.Frame": _CURVE, "thruster.5.curve": "Frame"}, [
+        ("curves.Frame = 'Frame': curves.frame has the name 'frame'", "only in case")]),
+    "names of inputs that differ in case": ({"inputs.Yaw": {"l": 1.0}}, [
+        ("inputs.Yaw = 'Yaw': inputs.yaw has the name 'yaw'", "only in case")]),
     "a name with a space": ({**_ALONE, "thruster.5.name": "top 5"}, [
         ("thruster.top 5.name = 'top 5'", "at most 30 letters, digits and underscores")]),
     "no name": ({**_ALONE, "thruster.5.name": GONE}, [("thruster#5.name", "missing")]),
@@ -146,22 +155,36 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "a place in millimetres": ({"thruster.1.position.unit": "mm"}, [("thruster.1.position.unit = 'mm'", "'m'")]),
     "a direction of no length": ({"thruster.5.direction.value": [0, 0, 0]}, [
         ("thruster.5.direction.value = [0, 0, 0]", "must have a length")]),
-    "a direction that is no number": ({"thruster.5.direction.value": [0.0, 0.0, float("nan")]}, [
-        ("thruster.5.direction.value", "nan", "finite")]),
+    "a direction that is no number": ({"thruster.5.direction.value": [0.0, float("nan"), 1.0]}, [
+        ("thruster.5.direction.value = [0.0, nan, 1.0]: entry 2 must be a finite number",)]),
+    "a direction without its source": ({"thruster.5.direction": [0, 0, 1]}, [
+        ("thruster.5.direction = [0, 0, 1]: must be { value = ..., source = ... }",)]),
+    "a thruster without its key": ({"thruster": {"name": "1"}}, [
+        ("thruster: must be a list of tables: write [[thruster]]",)]),
     "a direction in words": ({"thruster.5.direction.value": "up"}, [
         ("thruster.5.direction.value = 'up'", "three numbers")]),
     "no thrusters together": ({"curves.boost.together": 0}, [
-        ("curves.boost.together = 0", "greater than or equal to 1")]),
-    "half a thruster": ({"curves.boost.together": 1.5}, [("curves.boost.together = 1.5", "integer")]),
+        ("curves.boost.together = 0", "must be within 1 ... 32")]),
+    "half a thruster": ({"curves.boost.together": 1.5}, [("curves.boost.together = 1.5", "must be a whole number")]),
     "a dead band in percent": ({"curves.frame.c_0.value": 8.7}, [("curves.frame.c_0.value = 8.7", "0 ... 0.9")]),
     "no lag": ({"curves.frame.T.value": 0.0}, [("curves.frame.T.value = 0.0", "0.001 ... 60 s")]),
     "drag in another unit": ({"axes.yaw.a_d.unit": "N.s2/m2"}, [
         ("axes.yaw.a_d.unit = 'N.s2/m2'", "'N.m.s2/rad2'")]),
-    "an unknown axis": ({"axes.roll": {"a_d": quantity(1.0, "N.m.s2/rad2")}}, [("axes.roll", "no such key")]),
-    "a gain beyond sense": ({"inputs.heave.5": 1e3}, [("inputs.heave.5 = 1000.0", "less than or equal to 100")]),
+    "an unknown axis": ({"axes.roll": {"a_d": quantity(1.0, "N.m.s2/rad2")}}, [
+        ("axes.roll: there is no such key, only surge, sway, heave, yaw",)]),
+    "a gain beyond sense": ({"inputs.heave.5": 1e3}, [("inputs.heave.5 = 1000.0", "must be within -100 ... 100")]),
+    # thrust
+    "thrust of the wrong sign": ({"curves.boost.a_t.value": -200.0, "curves.boost.b_t.value": 10.0}, [
+        ("curves.boost: must give a force above 0 at full command, but a_t_boost and b_t_boost give -190 N",)]),
+    "no thrust": ({"curves.boost.a_t.value": 0.0, "curves.boost.b_t.value": 0.0}, [
+        ("curves.boost: must give a force above 0", "give 0 N")]),
+    "thrust in reverse of the wrong sign": ({"curves.frame.a_t_reverse.value": -100.0}, [
+        ("curves.frame: must give a force above 0 at full command in reverse", "a_t_frame_reverse")]),
+    "no thrust beyond a dead band": ({"curves.boost.a_t.value": 100.0, "curves.boost.b_t.value": -27.0,
+                                      "curves.boost.c_0": quantity(0.8, "1")}, [("curves.boost: must give a force",)]),
     # geometry
     "no axes": ({**_NO_BOOST, "axes": {}}, [
-        ("axes", "at least one of surge, sway, heave, yaw"), ("body.m_rov", "nothing"), ("body.I_r", "nothing")]),
+        ("axes", "at least one of surge, sway, heave, yaw")]),
     "an axis that no thruster drives": ({**_ALONE, "thruster.5.direction.value": [1, 0, 0],
                                          "thruster.5.position": place(0.0, 0.0, 0.0)}, [
         ("axes.heave", "no thruster drives it")]),
@@ -184,7 +207,12 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "an input for a thruster that is not there": ({"inputs.heave.6": 1.0}, [
         ("inputs.heave.6", "no such thruster, only 1, 2, 3, 4, 5, l, r")]),
     "a thruster no input drives": ({"inputs.boost.r": 0.0}, [("inputs", "no input drives the thruster r")]),
-    "an input that drives nothing": ({"inputs.idle": {"5": 0.0}}, [("inputs.idle", "drives no axis")]),
+    "an input that drives nothing": ({"inputs.idle": {"5": 0.0}}, [
+        ("inputs.idle: drives no thruster: give one a gain other than 0",)]),
+    "the only input of a thruster empty": ({"inputs.heave": {}}, [("inputs.heave: drives no thruster",)]),
+    "the only input of a thruster misspelt": ({"inputs.heave": {"6": 1.0}}, [("inputs.heave.6", "no such thruster")]),
+    "a list for an input": ({"inputs.heave": ["5"]}, [
+        ("inputs.heave = ['5']: must be a table: write [inputs.heave]",)]),
     "an input whose thrusters cancel": ({"inputs.spin": {"1": 1.0, "2": 1.0, "3": 1.0, "4": 1.0}}, [
         ("inputs.spin", "drives no axis", "cancel")]),
     "an axis no input drives": ({"inputs.yaw": GONE, "inputs.boost.r": 1.0}, [("axes.yaw", "no input drives it")]),
@@ -200,7 +228,7 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     # several at once, of form and of sense
     "many": ({"validity.command_max": 7.0, "curves.frame.b_t_reverse": GONE, "thruster.5.curve": "T200",
               "axes.yaw.beta.value": 0.0, "inputs.idle": {"5": 0.0}, "alternatives.other.a_d_u.unit": "lb"}, [
-        ("validity.command_max",), ("thruster.5.curve",), ("curves.frame.b_t_reverse",), ("inputs.idle",),
+        ("validity.command_max",), ("thruster.5.curve",), ("inputs.idle",), ("curves.frame.b_t_reverse",),
         ("axes.yaw.beta",)]),
 }  # fmt: skip
 

@@ -75,7 +75,7 @@ def value(name: str, text: str) -> Callable[[str], str]:
 BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "unknown coefficient": (
         edit(r"(?=^R = )", 'mass = { value = 6.57, unit = "kg", source = "" }\n'),
-        ("arm.mass", "no such key"),
+        ("arm.mass: there is no such key, only R, gamma",),
     ),
     "unknown key of a coefficient": (
         edit(r'(?<=^R = { value = 0.22, )unit = "m"', 'unit = "m", error = 0.01'),
@@ -84,22 +84,28 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "unknown section": (lambda text: text + "\n[thrusters]\n", ("thrusters", "no such key")),
     "missing coefficient": (edit(r"^m_rov = .*$", ""), ("body.m_rov", "missing")),
     "missing value": (edit(r"(?<=^R = { )value = 0.22, ", ""), ("arm.R.value", "missing")),
-    "missing unit": (edit(r'(?<=^R = { value = 0.22, )unit = "m", ', ""), ("arm.R.unit", "missing")),
+    "missing unit": (
+        edit(r'(?<=^R = { value = 0.22, )unit = "m", ', ""),
+        ('arm.R.unit: this key is missing: write unit = "m"',),
+    ),
     "missing source": (edit(r'(?<=^R = { value = 0.22, unit = "m"), source = .*(?= })', ""), ("R.source", "missing")),
     "missing section": (
         lambda text: text.split("[validity]")[0] + "[body]" + text.split("[body]")[1],
         ("validity", "missing"),
     ),
     "missing name": (edit(r"^name = .*$", ""), ("vehicle.name", "missing")),
-    "number without unit and source": (edit(r"^R = .*$", "R = 0.22"), ("arm.R", "0.22")),
+    "number without unit and source": (
+        edit(r"^R = .*$", "R = 0.22"),
+        ('arm.R = 0.22: must be { value = ..., unit = "m", source = ... }',),
+    ),
     "empty source": (edit(r'(?<=^R = { value = 0.22, unit = "m", source = )".*"', '""'), ("R.source", "''")),
     "empty name": (edit(r"^name = .*$", 'name = ""'), ("vehicle.name", "''")),
     "text for a number": (value("m_rov", '"heavy"'), ("body.m_rov.value", "'heavy'", "number")),
     "number in quotes": (value("m_rov", '"6.57"'), ("body.m_rov.value", "'6.57'", "number")),
     "boolean for a number": (value("m_rov", "true"), ("body.m_rov.value", "True", "number")),
-    "list for a number": (value("m_rov", "[6.57]"), ("body.m_rov.value", "[6.57]", "number")),
+    "list for a number": (value("m_rov", "[6.57]"), ("body.m_rov.value = [6.57]: must be a number",)),
     "date for a number": (value("m_rov", "2018-07-21"), ("body.m_rov.value", "2018", "number")),
-    "number for a text": (edit(r"^name = .*$", "name = 4"), ("vehicle.name", "4", "string")),
+    "number for a text": (edit(r"^name = .*$", "name = 4"), ("vehicle.name", "4", "must be text in quotes")),
     "negative mass": (value("m_rov", "-6.57"), ("body.m_rov", "-6.57", "0.001")),
     "no mass": (value("m_rov", "0.0"), ("body.m_rov", "0.0", "0.001")),
     "negative drag": (value("a_d", "-3.159"), ("axes.surge.a_d.value", "-3.159", "0 ...", "N.s2/m2")),
@@ -108,7 +114,7 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "infinity": (value("b_t", "inf"), ("curves.rear.b_t.value", "inf", "finite")),
     "negative infinity": (value("b_t", "-inf"), ("curves.rear.b_t.value", "-inf", "finite")),
     "larger than a double": (value("b_t", "1e999"), ("curves.rear.b_t.value", "inf", "finite")),
-    "integer larger than a double": (value("b_t", "1" + 400 * "0"), ("curves.rear.b_t",)),
+    "integer larger than a double": (value("b_t", "1" + 400 * "0"), ("curves.rear.b_t", "at most 308 digits")),
     "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), ("body.m_rov", "'lb'", "'kg'")),
     "bad alternative": (
         edit(r"(?<=^a_t_rear = { value = )100.3", "nan"),
@@ -130,13 +136,23 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "an endless number": (value("m_rov", "1" * 5000), ("not TOML",)),
     "a key over two lines": (lambda text: text + '\n["two\\nlines"]\n', ("two\\nlines", "no such key")),
     "missing folder": (edit(r"^data = .*$", 'data = "nowhere"'), ("vehicle.data", "'nowhere'", "no such folder")),
-    "not TOML": (edit(r"^\[body\]$", "[body"), ("not TOML", "line ")),
-    "a key twice": (edit(r"(?=^R = )", "R = 1.0\n"), ("not TOML", "line ")),
+    "not TOML": (edit(r"^\[body\]$", "[body"), ("not TOML", "line ", ": [body")),
+    "a key twice": (edit(r"(?=^R = )", "R = 1.0\n"), ("not TOML", "line ", ": R = {")),
     "another format": (edit("^format = 2$", "format = 3"), ("format = 3", "must be 2")),
-    "no format": (edit("^format = 2$", ""), ("format", "missing")),
+    "no format": (edit("^format = 2$", ""), ("format: this key is missing: write format = 2",)),
     "half a file of the first version": (
         lambda text: text.split("[body]")[0].replace("format = 2", ""),
-        ("coefficients", "missing"),
+        ("format: this key is missing: write format = 2",),
+    ),
+    "nothing": (lambda _: "", ("format: this key is missing: write format = 2",)),
+    "an unknown table": (edit(r"^\[body\]$", "[bodyy]"), ("bodyy: there is no such key; did you mean body?",)),
+    "text for a boolean": (
+        edit(r"^\[body\]$", '[body]\ncoupling = "yes"'),
+        ("body.coupling = 'yes': must be true or false",),
+    ),
+    "a number in a list of texts": (
+        edit(r"^limits = \[", "limits = [3, "),
+        ("validity.limits = [3, ", "entry 1 must be text in quotes"),
     ),
 }
 

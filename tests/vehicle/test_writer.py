@@ -112,7 +112,7 @@ BAD: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "value outside": (edit(r"interval = \[4\.", "interval = [14."), ("axes.surge.a_d", "[low, high] around")),
     "upside down": (edit(r"interval = \[[^]]*\]", "interval = [9.0, 8.0]"), ("axes.surge.a_d", "around the value")),
     "three numbers": (edit(r"interval = \[", "interval = [1.0, "), ("axes.surge.a_d.interval", "2")),
-    "no number": (edit(r"interval = \[[^]]*\]", 'interval = "wide"'), ("axes.surge.a_d.interval", "'wide'")),
+    "no number": (edit(r"interval = \[[^]]*\]", 'interval = "wide"'), ("interval = 'wide': must be a list",)),
     "infinite": (edit(r"interval = \[[^]]*\]", "interval = [0.0, inf]"), ("axes.surge.a_d.interval", "finite")),
     "no hash": (edit(r'^"rov.toml" = ".*"', '"rov.toml" = "abc"'), ("provenance.inputs.rov.toml", "'abc'")),
     "no method": (edit(r"^method = .*$", ""), ("provenance.method", "missing")),
