@@ -311,7 +311,7 @@ def _root(c: Sequence[float], length: float) -> float:
         slope = 0.0
         for n in range(len(c) - 1, 0, -1):
             slope = slope * t + n * c[n]
-        new = t - value / slope
+        new = t - value / slope if slope != 0.0 else low  # it may underflow
         if not low < new < high:
             new = 0.5 * (low + high)
         if new == t or high - low <= 2.0**-52 * high:
