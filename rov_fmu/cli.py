@@ -154,7 +154,11 @@ def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
 @_commands.command("tune")
 @_vehicle()
 @click.option("--axis", required=True, type=click.Choice(list(AXES)))
-@click.option("--command", type=float, help="Fraction of full thrust: 30 % is 0.3.")
+@click.option(
+    "--command",
+    type=float,
+    help="Held by every input that drives the axis, positive along it: 30 % of full thrust is 0.3.",
+)
 @click.option("--v-ss", type=float, help="Wanted steady velocity at this command, m/s or rad/s.")
 @click.option("--tau", type=float, help="Wanted time constant at this command, s; without it beta stays.")
 @click.option("--points", type=_FILE, metavar="POINTS.csv",

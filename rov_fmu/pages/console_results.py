@@ -71,7 +71,7 @@ def _summary(comparisons: Iterable[Comparison], other: Sequence[str]) -> Table:
 
 
 def _against(value: float, measured: float) -> tuple[str, str]:
-    return text(value, ".4f"), text(value / measured - 1.0, DEVIATION)
+    return text(value, ".4f"), text(round(value / measured - 1.0, 3) + 0.0, DEVIATION)  # and no -0.0
 
 
 def print_tuning(tuning: Tuning) -> None:
@@ -87,6 +87,9 @@ def print_tuning(tuning: Tuning) -> None:
         result.add_row(f"{p.command:.0%}", p.quantity, f"{p.value:.4g}", *_against(value, p.value))
     out.print(result)
     layout = tuning.rov.layout
+    for command in dict.fromkeys(p.command for p in tuning.points):
+        inputs = ", ".join(f"{name} = {command * sign:g}" for name, sign in layout.signs(tuning.axis).items())
+        out.print(f"A command of {command:.0%} of {tuning.axis.name}: {inputs}", soft_wrap=True)
     for curve in {thruster.curve: layout.curve_of[thruster.name] for thruster in layout.drivers(tuning.axis)}.values():
         if curve.has_lag:
             T = tuning.rov[curve.coefficient("T")]

@@ -6,15 +6,16 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Comment, Item
 
-from rov_fmu.files.output import Output
+from rov_fmu.files.output import Output, check_targets
 from rov_fmu.vehicle.schema import FORMAT
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import hardware, moved, read_document
 
 
 def converted(source: Path, path: Path) -> Output:
-    """The file to write, checked. Raises VehicleFileError."""
+    """The file to write, checked. Raises VehicleFileError, and WriteError where it would overwrite what it reads."""
     vehicle, document = load_vehicle(source), read_document(source)
+    check_targets([path], [source, *vehicle.files])
     if "format" in document:
         raise VehicleFileError(f"{source}: format = {FORMAT}: needs no conversion; the first version has no format")
     new = tomlkit.document()

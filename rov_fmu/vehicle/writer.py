@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
@@ -167,9 +167,10 @@ def _inline(value: float, meta: Meta, source: str, interval: list[float] | None 
 
 
 def _inline_of(entries: Mapping[str, Any]) -> InlineTable:
+    """With spaces inside the braces, as people write it."""
     table = tomlkit.inline_table()
     table |= dict(entries)
-    return table
+    return cast(InlineTable, tomlkit.value(f"{{ {table.as_string()[1:-1]} }}"))
 
 
 def _lines(key: str, texts: Iterable[str]) -> dict[str, Array]:

@@ -32,6 +32,23 @@ def test_heave_at_30_percent_gives_table_9_again(k: Rov) -> None:
     assert f"{tuning.rov['beta_w']:.2f}" == "0.59"
 
 
+def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
+    """A yaw to starboard: left ahead, right astern, by the paper's (4)."""
+    points = [Point("V_ss", command, sign * 0.5, 1.0, "") for command, sign in ((0.3, 1), (-0.4, -1))]
+    print_tuning(tune_over(k, YAW, points))
+    said = capsys.readouterr().out
+    assert "A command of 30% of yaw: u_l = 0.3, u_r = -0.3\n" in said
+    assert "A command of -40% of yaw: u_l = -0.4, u_r = 0.4\n" in said
+
+
+def test_a_deviation_of_nothing_has_no_sign(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
+    tuned = tune(k, HEAVE, 0.3, 0.175)
+    print_tuning(replace(tuned, points=(Point("V_ss", 0.3, 0.175 * (1.0 + 1e-5), 1.0, ""),)))
+    said = capsys.readouterr().out
+    assert "+0.0%" in said
+    assert "-0.0%" not in said
+
+
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
 @pytest.mark.parametrize("command", [0.2, 0.7, -0.4])
 @pytest.mark.parametrize(("V_ss", "Tau"), [(0.1, 0.2), (0.5, 3.0), (2.0, 20.0)])

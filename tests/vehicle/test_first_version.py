@@ -89,6 +89,7 @@ def test_a_converted_file_reads_as_the_one_that_ships(tmp_path: Path) -> None:
     sources = re.compile(r"^(direction = .*|data = .*|pictures = .*)\n", re.M)
     converted, shipped = ((sources.sub("", p.read_text(encoding="utf-8"))) for p in (tmp_path / "new.toml", VIDEORAY))
     assert converted == shipped
+    assert "{value" not in (tmp_path / "new.toml").read_text(encoding="utf-8")
 
 
 def test_comments_go_with_their_coefficients(tmp_path: Path) -> None:
