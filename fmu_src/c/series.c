@@ -143,6 +143,12 @@ static inline bool series_is_done(series *s, int n)
     return done || !series_waits(s, n);
 }
 
+/* The same, not inline: a tenth of the library less. */
+static void series_next(const flow *f, series *s, int n)
+{
+    series_term(f, s, n);
+}
+
 /* Polynomials from v on over tau seconds, of so many terms that the next ones would be rounding; false where ORDER does not
  * do. */
 static inline bool series_grow(const flow *f, const double v[WIDTH], double tau, series *s)
@@ -176,8 +182,8 @@ static inline bool series_grow(const flow *f, const double v[WIDTH], double tau,
     series_term(f, s, 8);
     bool done = series_is_done(s, 9);
     for (int n = 9; !done && n < ORDER; n += 2) {
-        series_term(f, s, n);
-        series_term(f, s, n + 1);
+        series_next(f, s, n);
+        series_next(f, s, n + 1);
         done = series_is_done(s, n + 2);
     }
     return done;

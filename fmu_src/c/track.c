@@ -97,10 +97,14 @@ static void track_add_arc(planar *sum, planar way, double turned, double turn)
 
 static const int PLANE[] = {U, V, R};
 
-INLINE riccati_motion lane_motion(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
+static double lane_velocity(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
 {
-    const riccati_motion rest = {0.0, 0.0};
-    return lane < N_AXES ? riccati_advance(&axis[lane], v[lane], t) : rest;
+    return lane < N_AXES ? riccati_advance(&axis[lane], v[lane], t).v : 0.0;
+}
+
+static double lane_distance(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
+{
+    return lane < N_AXES ? riccati_advance(&axis[lane], v[lane], t).s : 0.0;
 }
 
 /* How long one panel of eight may be. An axis bends at the rate D = B + 2 A |v| + 2 sqrt(A |C|), but as it settles less of
@@ -132,21 +136,21 @@ static bool closed_leg(const riccati axis[WIDTH], double v[WIDTH], double rest, 
         bool is_settled;
         const double length = fmin(rest, panel_length(axis, v, &is_settled));
         if (length < rest) {
-            const planar left = {lane_motion(axis, v, U, rest).s, lane_motion(axis, v, V, rest).s};
-            const double turn = lane_motion(axis, v, R, rest).s, size = fabs(left.ahead) + fabs(left.aside);
+            const planar left = {lane_distance(axis, v, U, rest), lane_distance(axis, v, V, rest)};
+            const double turn = lane_distance(axis, v, R, rest), size = fabs(left.ahead) + fabs(left.aside);
             const double gone = fabs(sum->ahead) + fabs(sum->aside);
             if (is_settled || fabs(turn) < DBL_EPSILON / 4.0 || size <= DBL_EPSILON / 16.0 * gone + DBL_MIN) {
                 track_add_arc(sum, left, turned, turn);
                 return true;
             }
         }
-        const double turn = lane_motion(axis, v, R, length).s;
+        const double turn = lane_distance(axis, v, R, length);
         track_places p;
         for (int i = 0; i < MANY; i++) {
             const double t = length * PLACES[FEW + i];
-            p.ahead[i] = lane_motion(axis, v, U, t).v;
-            p.aside[i] = lane_motion(axis, v, V, t).v;
-            p.turn[i] = lane_motion(axis, v, R, t).s;
+            p.ahead[i] = lane_velocity(axis, v, U, t);
+            p.aside[i] = lane_velocity(axis, v, V, t);
+            p.turn[i] = lane_distance(axis, v, R, t);
         }
         track_add(sum, &p, false, length, turned, turn);
         if (length == rest || !isfinite(sum->ahead + turn)) {
@@ -155,7 +159,7 @@ static bool closed_leg(const riccati axis[WIDTH], double v[WIDTH], double rest, 
         rest -= length;
         turned = remainder(turned + turn, FULL_TURN); /* rounded as a small angle */
         for (int i = 0; i < 3; i++) {
-            v[PLANE[i]] = lane_motion(axis, v, PLANE[i], length).v;
+            v[PLANE[i]] = lane_velocity(axis, v, PLANE[i], length);
         }
     }
     return false;
@@ -190,9 +194,9 @@ static bool closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, do
             end = reversal[i] > start ? fmin(end, reversal[i]) : end;
             /* at rest to the last digit, or what follows would take the branch of before the reversal */
             at[PLANE[i]] = start == 0.0 ? from[PLANE[i]] : reversal[i] == start ? 0.0
-                           : lane_motion(axis, from, PLANE[i], start).v;
+                           : lane_velocity(axis, from, PLANE[i], start);
         }
-        const double turned = start == 0.0 ? 0.0 : lane_motion(axis, from, R, start).s;
+        const double turned = start == 0.0 ? 0.0 : lane_distance(axis, from, R, start);
         if (!closed_leg(axis, at, end - start, turned, sum, &pieces)) {
             return false;
         }

@@ -43,9 +43,9 @@ def _binary(binaries: Path, name: str) -> Path:
     return binaries / name / f"videoray{PLATFORMS[name].suffix}"
 
 
-def test_one_archive_holds_all_platforms_in_700_kb(binaries: Path) -> None:
+def test_one_archive_holds_all_platforms_in_400_kb(binaries: Path) -> None:
     archive = binaries.parent.parent / "videoray.fmu"
-    assert archive.stat().st_size <= 700_000
+    assert archive.stat().st_size <= 400_000
     with zipfile.ZipFile(archive) as content:
         names = {n for n in content.namelist() if n.startswith("binaries/")}
     assert names == {f"binaries/{name}/videoray{p.suffix}" for name, p in PLATFORMS.items()}
