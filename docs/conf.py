@@ -1,4 +1,4 @@
-"""The site: `sphinx-build -W docs site`. {{ README.md }} stands for that file, {{ curve }} for a table."""
+"""The site: `sphinx-build -W docs site`. {{ README.md }} stands for that file, {{ t200 }} for a table."""
 
 import re
 import sys
@@ -7,12 +7,11 @@ from pathlib import Path
 from sphinx.application import Sphinx
 
 from rov_fmu import __version__
-from rov_fmu.export.interface import LOG_CATEGORIES
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
-from docs import compared, vehicle_file  # noqa: E402 (they stand beside this file)
+from docs import compared, reference  # noqa: E402 (they stand beside this file)
 
 project = "rov-fmu"
 release = __version__
@@ -40,11 +39,7 @@ html_theme_options = {
     "dark_css_variables": {"color-brand-primary": "#6db3f2", "color-brand-content": "#6db3f2"},
 }
 
-TABLES: dict[str, list[tuple[str, ...]]] = {
-    **compared.tables(),
-    **vehicle_file.tables(),
-    "log_categories": [("category", "what"), ("---",) * 2, *((f"`{n}`", w) for n, w in LOG_CATEGORIES.items())],
-}
+TABLES = compared.tables()
 
 
 def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
@@ -52,7 +47,7 @@ def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
 
     def text(match: re.Match[str]) -> str:
         if match[1] in TABLES:
-            return "\n".join(f"| {' | '.join(row)} |" for row in TABLES[match[1]])
+            return reference.markdown(TABLES[match[1]])
         whole = (ROOT / match[1]).read_text(encoding="utf-8").replace("](docs/", "](")
         whole = re.sub(r"\]\((CHANGELOG|CONTRIBUTING)\.md\)", lambda name: f"]({name[1].lower()}.md)", whole)
         return re.sub(r"\[([^\]]+)\]\(CITATION\.cff\)", r"\1 (`CITATION.cff`)", whole)

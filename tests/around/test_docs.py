@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from docs import reference
 from rov_fmu import __version__
 from rov_fmu.cli import main
 from rov_fmu.motion.layout import ARM, AXIS, BODY, CURVE, TUNING
@@ -115,7 +116,7 @@ def test_commands_and_options_exist(page: Path) -> None:
 
 def test_there_are_commands_to_look_at() -> None:
     said = {" ".join(module_of(words)[0]) for page in PAGES for words in commands(page)}
-    wanted = [f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "tables", "figures")]
+    wanted = [f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "convert", "tables", "figures")]
     assert {*wanted, "build_fmu.py", "-m interop", "-m fuzz", "-m benchmarks"} <= said
 
 
@@ -247,6 +248,21 @@ def test_every_variable_is_told(kind: str) -> None:
         told |= {f"{pattern}{name}" for name in known[of]}
     names = {*layout.inputs, *layout.state, *layout.thrust, *layout.coefficients}
     assert {name.removesuffix("_reverse") for name in names} <= told
+
+
+@pytest.mark.parametrize("page", reference.PAGES, ids=name)
+def test_tables_that_follow_from_the_code_are_as_it_has_them(page: Path) -> None:
+    """`python -m docs.reference` writes them."""
+    text = page.read_text(encoding="utf-8")
+    assert text == reference.filled(text)
+    assert "{{" not in text
+
+
+def test_every_such_table_stands_in_a_page() -> None:
+    pages = "".join(page.read_text(encoding="utf-8") for page in reference.PAGES)
+    for name, table in reference.tables().items():
+        assert len(table) > 2
+        assert f"<!-- table: {name} -->\n\n{reference.markdown(table)}\n\n<!-- end -->" in pages
 
 
 def test_version_is_that_of_the_package() -> None:

@@ -1,12 +1,19 @@
-"""The tables and keys of the vehicle file, as its schema has them: the tables of vehicle-file.md."""
+"""Tables of the pages that follow from the code; `python -m docs.reference` writes them anew.
 
+They stand in the pages, so that these can be read in a checkout, each between its name and an end, in comments.
+"""
+
+import re
+from pathlib import Path
 from typing import Any
 
+from rov_fmu.export.interface import LOG_CATEGORIES
 from rov_fmu.motion.layout import AXES
 from rov_fmu.pages.templates import number
 from rov_fmu.vehicle.json_schema import json_schema
 
 Table = list[tuple[str, ...]]
+PAGES = [Path(__file__).with_name(name) for name in ("vehicle-file.md", "variables.md")]
 
 _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number", "object": "table", "array": "list"}
 
@@ -16,7 +23,24 @@ def tables() -> dict[str, Table]:
     schema = json_schema()
     named = {"vehicle": "FileHead", "provenance": "Made"} | {f"axis_{name}": f"_{name.capitalize()}" for name in AXES}
     named |= {name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster")}
-    return {"file": _table(schema, schema)} | {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
+    categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
+    found: dict[str, Table] = {"log_categories": categories, "file": _table(schema, schema)}
+    return found | {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
+
+
+def markdown(table: Table) -> str:
+    """As a page has it."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in table)
+
+
+def filled(page: str) -> str:
+    """The text of a page with its tables as they are to be."""
+    found = tables()
+
+    def text(match: re.Match[str]) -> str:
+        return f"{match[1]}\n\n{markdown(found[match[2]])}\n\n"
+
+    return re.sub(r"(<!-- table: (\w+) -->)\n.*?(?=<!-- end -->)", text, page, flags=re.DOTALL)
 
 
 def _table(table: dict[str, Any], schema: dict[str, Any]) -> Table:
@@ -40,3 +64,8 @@ def _allowed(entry: dict[str, Any]) -> str:
     if entry.get("minItems") == entry.get("maxItems", 0):
         return f"{entry['minItems']} numbers"
     return _TYPES.get(entry.get("type", ""), "number")
+
+
+if __name__ == "__main__":
+    for path in PAGES:
+        path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
