@@ -50,7 +50,7 @@ class Axis:
 
 
 SURGE = Axis("surge", "u", "m/s", "forward", "astern", "distance", "m", "N", "X_ext", "m_rov", ("(14)", "(18a)"))
-SWAY = Axis("sway", "v", "m/s", "to starboard", "to port", "distance", "m", "N", "Y_ext", "m_rov", ("(1)", "(18)"))
+SWAY = Axis("sway", "v", "m/s", "to starboard", "to port", "distance", "m", "N", "Y_ext", "m_rov", ("(18)", "(18)"))
 HEAVE = Axis("heave", "w", "m/s", "down", "up", "depth", "m", "N", "Z_ext", "m_rov", ("(15)", "(18b)"))
 YAW = Axis("yaw", "r", "rad/s", "bow to starboard", "bow to port", "heading", "rad", "N.m", "N_ext", "I_r",
            ("(16)", "(18c)"))  # fmt: skip
@@ -117,7 +117,7 @@ CURVE = {
     "T": Kind("s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False),
 }
 AXIS = {
-    "m_a": Kind("{inertia}", "Added mass m_a of {axis}", 0.0, 1e6, needed=False),
+    "m_a": Kind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
     "a_d": Kind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}, {drag}", 0.0, 1e6),
     "b_d": Kind("{load}.s/{length}", "Linear drag coefficient b_d of {axis}, {drag}", 0.0, 1e6),
     "a_d_reverse": Kind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis} {negative}", 0.0, 1e6,
@@ -346,8 +346,10 @@ class Layout:
         found = {f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters
                  if not self.curve_of[t.name].has_lag}  # fmt: skip
         for curve in self.turning_curves:
-            words = f"Torque τ_{curve.name} of the thrusters with the curve of the {curve.description or curve.name}"
-            found[f"tau_{curve.name}"] = Meta("N.m", f"{words}, (4), positive bow to starboard")
+            of = f"of the {curve.description}" if curve.description else curve.name
+            by_arm = any(t.curve == curve.name and t.position is None for t in self.drivers(YAW))
+            words = f"Torque τ_{curve.name} of the thrusters with the curve {of}{', (4)' if by_arm else ''}"
+            found[f"tau_{curve.name}"] = Meta("N.m", f"{words}, positive bow to starboard")
         return found
 
     @cached_property
@@ -362,6 +364,7 @@ def metas_of(axis: Axis) -> dict[str, Meta]:
     drag, motion = axis.equations
     words = {"axis": axis.name, "velocity": axis.velocity, "push": axis.push, "drag": drag, "motion": motion,
             "load": axis.load, "length": axis.position_unit, "inertia": BODY[axis.inertia].unit,
+            "what": "moment of inertia" if axis is YAW else "mass",
             "positive": axis.positive, "negative": axis.negative}  # fmt: skip
     return {key: kind.meta(**words) for key, kind in (AXIS | TUNING).items()}
 
@@ -379,9 +382,8 @@ def _pushes(direction: tuple[float, float, float]) -> str:
 
 
 def _command(thruster: Thruster) -> Meta:
-    words = f"{thruster.description or f'thruster {thruster.name}'} command u_{thruster.name}"
-    text = f"{words[0].upper()}{words[1:]}, positive {_pushes(thruster.direction)}; saturates at ±1"
-    return Meta("1", text, -1.0, 1.0)
+    words = f"Command u_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
+    return Meta("1", f"{words}, positive {_pushes(thruster.direction)}; saturates at ±1", -1.0, 1.0)
 
 
 def _thrust(thruster: Thruster, curve: Curve) -> Meta:

@@ -1,15 +1,16 @@
 """The vehicle's thrusters drawn from its geometry: from above and from starboard."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, cos, degrees, hypot, sin
-from typing import Any, Literal
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, Wedge
 
 from rov_fmu.motion.layout import AXES, HEAVE, SURGE, SWAY, YAW, Axis, Thruster
 from rov_fmu.motion.rov import Rov
+from rov_fmu.pages.labels import AROUND, Place, Space
 from rov_fmu.pages.svg import LIGHT
 
 Point = tuple[float, float, float]
@@ -36,11 +37,17 @@ def place(rov: Rov, thruster: Thruster) -> Point:
 class _Mark:
     """Thrusters that look the same in a view: where, and the direction of a positive force."""
 
-    at: tuple[float, float]
-    along: tuple[float, float]
+    at: Place
+    along: Place
     toward: float
     """Of the direction, the part toward who looks."""
     label: str
+    width: float
+    """Of the label, in inches."""
+
+    def tip(self, size: float) -> Place:
+        """The end of its arrow."""
+        return self.at[0] + 0.5 * size * self.along[0], self.at[1] + 0.5 * size * self.along[1]
 
 
 def _marks(rov: Rov, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
@@ -50,41 +57,120 @@ def _marks(rov: Rov, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
         along = d[0], d[_INDEX[down]]
         hidden = toward * d[_INDEX[sight]] if hypot(*along) < 0.1 else 0.0
         key = tuple(round(part, 3) + 0.0 for part in (at[0], at[_INDEX[down]], *along, hidden))
-        seen.setdefault(key, []).append(thruster.name.replace("_", r"\_"))
+        seen.setdefault(key, []).append(thruster.name)
     for (x, y, dx, dy, hidden), names in seen.items():
-        yield _Mark((x, y), (dx, dy), hidden, ", ".join(rf"$F_{{{name}}}$" for name in names))
+        label = ", ".join("$F_{" + name.replace("_", r"\_") + "}$" for name in names)
+        yield _Mark((x, y), (dx, dy), hidden, label, sum(0.16 + 0.06 * len(name) for name in names) - 0.08)
 
 
-def _extent(rov: Rov, view: str) -> tuple[float, tuple[tuple[float, float], tuple[float, float]]]:
-    """How far thrusters are from the centre of mass (m), and the limits of a drawing; the second run downward."""
-    places = [place(rov, thruster) for thruster in rov.layout.thrusters]
-    size = max([_SMALLEST, *(abs(part) for at in places for part in at)])
-    across = [at[_INDEX[VIEWS[view][0]]] for at in places]
-    low, high = max(1.1 * size, max(across) + 0.75 * size), min(-0.4 * size, min(across) - 0.4 * size)
-    return size, ((-1.5 * size, 1.75 * size), (low, high))
+@dataclass(frozen=True)
+class _Scene:
+    """What a view shows, in metres; the second coordinate runs downward."""
+
+    marks: list[_Mark]
+    labels: list[tuple[str, Place, str]]
+    """Text, centre and colour."""
+    size: float
+    """How far thrusters are from the centre of mass."""
+    limits: tuple[Place, Place]
 
 
-def drawing_size(rov: Rov, view: str) -> tuple[float, float]:
+def _scene(rov: Rov, view: str) -> _Scene:
+    """A view, at the scale that both views share."""
+    inch = 0.9 * _size(rov)
+    for _ in range(3):  # the larger the part of the drawing that text takes, the smaller the rest
+        scenes = {name: _arranged(rov, name, inch) for name in VIEWS}
+        left, right = zip(*(scene.limits[0] for scene in scenes.values()), strict=True)
+        inch = (max(right) - min(left)) / _WIDTH
+    return replace(scenes[view], limits=((min(left), max(right)), scenes[view].limits[1]))
+
+
+def _size(rov: Rov) -> float:
+    return max([_SMALLEST, *(abs(part) for thruster in rov.layout.thrusters for part in place(rov, thruster))])
+
+
+def _arranged(rov: Rov, view: str, inch: float) -> _Scene:
+    """A view with its names, where an inch is so many metres."""
+    down, sight, toward = VIEWS[view]
+    size = _size(rov)
+    space = Space(inch, [(-1.2 * size, 0.0)])  # the width of a drawing with little in it
+    marks = list(_marks(rov, down, sight, toward))
+    ends = {SURGE: (1.4 * size, 0.0), down: (0.0, 0.9 * size)}
+    for end in ends.values():
+        space.line((0.0, 0.0), end)
+    tail, tip = _turn(size)
+    if turns := down is SWAY and rov.layout.has(YAW):
+        space.line(tail, (1.27 * size, 0.0))
+        space.line((1.27 * size, 0.0), tip)
+    for mark in marks:
+        space.ring(mark.at, 0.1 * size)
+        if not mark.toward:
+            space.line(mark.at, mark.tip(size))
+    labels = []
+    if down is SWAY and rov.layout.has_arm:
+        x, y, _ = _armed(rov)
+        space.line((0.0, 0.0), (x, y))
+        space.line((0.0, 0.0), (1.15 * x, 0.0))
+        gamma, far, side = atan2(abs(y), -x), 0.38 * size, -1.0 if y < 0.0 else 1.0
+        labels = [("$R$", (0.68 * x, 0.68 * y - 0.12 * side * size), "muted"),
+                  (r"$\gamma$", (-far * cos(gamma / 2.0), side * far * sin(gamma / 2.0)), "muted")]  # fmt: skip
+        for _, at, _ in labels:
+            space.box(at, 0.1)
+    for axis, end in ends.items():
+        words = rf"${_LETTERS[axis]}, {axis.velocity}$" if rov.layout.has(axis) else f"${_LETTERS[axis]}$"
+        ahead = end[0] / hypot(*end), end[1] / hypot(*end)
+        labels.append((words, space.name(0.3 if "," in words else 0.1, [(end, 0.0, [ahead, *AROUND])]), "ink"))
+    if turns:
+        at = space.name(0.3, [(tip, 0.0, [AROUND[5], AROUND[2], AROUND[0]]), (tail, 0.0, [AROUND[4], AROUND[1]])])
+        labels.append((r"$\psi, r$", at, "ink"))
+    for mark in marks:
+        dx, dy = (part / (hypot(*mark.along) or 1.0) for part in mark.along)
+        behind, beside = (-dx, -dy), [(dy, -dx), (-dy, dx)]
+        around = [(mark.at, 0.1 * size, [behind, *sorted(beside, key=lambda way: way[1]), *AROUND]),
+                  (mark.tip(size), 0.0, [(dx, dy), *AROUND])]  # fmt: skip
+        at = space.name(mark.width, [(mark.at, 0.1 * size, AROUND)] if mark.toward else around)
+        labels.append((mark.label, at, "blue"))
+    (left, right), (high, low) = space.limits()
+    edge = 0.06 * inch
+    has_scale = any(any(place(rov, thruster)) for thruster in rov.layout.thrusters)
+    low += (0.3 if has_scale else 0.06) * inch
+    return _Scene(marks, labels, size, ((left - edge, right + edge), (low, high - edge)))
+
+
+def _armed(rov: Rov) -> Point:
+    return next(place(rov, t) for t in rov.layout.thrusters if t.position is None and t.arm)
+
+
+def _turn(size: float) -> tuple[Place, Place]:
+    """Where the arrow of a positive turn begins and ends."""
+    tail, tip = ((1.27 * size * cos(angle), 1.27 * size * sin(angle)) for angle in (-0.25, 0.25))
+    return tail, tip
+
+
+def drawing_size(rov: Rov, view: str) -> Place:
     """Width and height in inches that fit a drawing."""
-    _, ((left, right), (low, high)) = _extent(rov, view)
+    (left, right), (low, high) = _scene(rov, view).limits
     return _WIDTH, _WIDTH * (low - high) / (right - left) + 0.3
 
 
 def draw_thrusters(ax: Axes, rov: Rov, view: str) -> None:
     """Centre of mass, body frame, thrusters with the direction of a positive force, R and γ where they are given."""
-    down, sight, toward = VIEWS[view]
-    marks = list(_marks(rov, down, sight, toward))
-    places = [place(rov, thruster) for thruster in rov.layout.thrusters]
-    size, limits = _extent(rov, view)
-    _draw_frame(ax, rov, down, size)
-    for mark in marks:
+    down = VIEWS[view][0]
+    scene = _scene(rov, view)
+    size = scene.size
+    _draw_frame(ax, size, turns=down is SWAY and rov.layout.has(YAW))
+    if not any(mark.toward and hypot(*mark.at) < 0.05 * size for mark in scene.marks):
+        _draw_centre(ax, size)
+    for mark in scene.marks:
         _draw_mark(ax, mark, size)
     if down is SWAY and rov.layout.has_arm:
-        _draw_arm(ax, next(place(rov, t) for t in rov.layout.thrusters if t.position is None and t.arm), size)
-    ax.set(aspect="equal", xlim=limits[0], ylim=limits[1])
+        _draw_arm(ax, _armed(rov), size)
+    for text, at, color in scene.labels:
+        ax.text(*at, text, color=LIGHT[color], zorder=8, ha="center", va="center")
+    ax.set(aspect="equal", xlim=scene.limits[0], ylim=scene.limits[1])
     ax.grid(visible=False)
     ax.spines[:].set_visible(False)
-    if any(map(any, places)):
+    if any(any(place(rov, thruster)) for thruster in rov.layout.thrusters):
         _draw_scale(ax, size)
     ax.set(xticks=[], yticks=[])
     ax.set_title(view.capitalize(), loc="left")
@@ -99,42 +185,25 @@ def _draw_mark(ax: Axes, mark: _Mark, size: float) -> None:
     (x, y), (dx, dy), r = mark.at, mark.along, 0.1 * size
     ax.add_patch(Circle(mark.at, r, facecolor=LIGHT["panel"], edgecolor=LIGHT["metal"], linewidth=1.4, zorder=3))
     if not mark.toward:
-        _arrow(ax, (x + dx * r, y + dy * r), (x + dx * 5.0 * r, y + dy * 5.0 * r), "blue")
+        _arrow(ax, (x + dx * r, y + dy * r), mark.tip(size), "blue")
     elif mark.toward > 0.0:  # the point of an arrow
         ax.add_patch(Circle(mark.at, 0.3 * r, color=LIGHT["blue"], zorder=4))
     else:  # its feathers
         a = 0.7 * r
         for way in (-1, 1):
             ax.plot([x - a, x + a], [y - way * a, y + way * a], color=LIGHT["blue"], linewidth=1.4, zorder=4)
-    label_x, label_y, ha = _label_place(mark, r)
-    ax.text(label_x, label_y, mark.label, color=LIGHT["blue"], zorder=5, ha=ha, va="center")
 
 
-def _label_place(mark: _Mark, r: float) -> tuple[float, float, Literal["left", "center", "right"]]:
-    """Where the name stands, clear of the arrow and of the body's axes."""
-    (x, y), (dx, dy) = mark.at, mark.along
-    if mark.toward:
-        return (x + 1.6 * r, y, "left") if abs(x) < r else (x, y + (2.1 * r if y > r else -2.1 * r), "center")
-    if abs(dy) < 0.1:
-        return x, y - 2.1 * r, "center"
-    if abs(dx) < 0.1:  # beside the tip
-        tip = y + dy * 6.2 * r
-        return (x + 0.5 * r, tip, "left") if abs(x) < r else (x, tip, "center")
-    return x - 2.3 * r * dx, y - 2.3 * r * dy, "right" if dx > 0.0 else "left"
-
-
-def _draw_frame(ax: Axes, rov: Rov, down: Axis, size: float) -> None:
-    """Axes of the body, and the centre of mass, in which they begin."""
-    for axis, end, where in ((SURGE, (1.4 * size, 0.0), {"ha": "left", "va": "center"}),
-                             (down, (0.0, 0.9 * size), {"ha": "center", "va": "top"})):  # fmt: skip
+def _draw_frame(ax: Axes, size: float, *, turns: bool) -> None:
+    """Axes of the body."""
+    for end in ((1.4 * size, 0.0), (0.0, 0.9 * size)):
         _arrow(ax, (0.0, 0.0), end, "ink", linewidth=1.0)
-        words = rf"${_LETTERS[axis]}, {axis.velocity}$" if rov.layout.has(axis) else f"${_LETTERS[axis]}$"
-        ax.text(1.03 * end[0], 1.06 * end[1], words, color=LIGHT["ink"], **where)  # type: ignore[arg-type]
-    if down is SWAY and rov.layout.has(YAW):
-        turn = 1.27 * size
-        tail, tip = ((turn * cos(angle), turn * sin(angle)) for angle in (-0.25, 0.25))
-        _arrow(ax, tail, tip, "ink", linewidth=1.0, connectionstyle="arc3,rad=0.13")
-        ax.text(1.03 * tip[0], tip[1] + 0.06 * size, r"$\psi, r$", color=LIGHT["ink"], ha="left", va="top")
+    if turns:
+        _arrow(ax, *_turn(size), "ink", linewidth=1.0, connectionstyle="arc3,rad=0.13")
+
+
+def _draw_centre(ax: Axes, size: float) -> None:
+    """The centre of mass."""
     r = 0.055 * size
     ax.add_patch(Circle((0.0, 0.0), r, facecolor=LIGHT["page"], edgecolor=LIGHT["ink"], linewidth=1.0, zorder=6))
     for angle in (0.0, 180.0):
@@ -142,26 +211,21 @@ def _draw_frame(ax: Axes, rov: Rov, down: Axis, size: float) -> None:
 
 
 def _draw_arm(ax: Axes, at: Point, size: float) -> None:
-    """R from the centre of mass to a rear thruster, and γ from the centre line."""
+    """Lines of R from the centre of mass to a rear thruster, and of γ from the centre line."""
     x, y, _ = at
     dashed: Any = {"color": LIGHT["muted"], "linewidth": 1.0, "dashes": (4, 3), "zorder": 1}
     ax.plot([0.0, x], [0.0, y], **dashed)
     ax.plot([0.0, 1.15 * x], [0.0, 0.0], **dashed)
-    gamma, side = atan2(abs(y), -x), -1.0 if y < 0.0 else 1.0
-    angle = degrees(gamma)
+    angle = degrees(atan2(abs(y), -x))
     start = 180.0 if y < 0.0 else 180.0 - angle
     arc = 1.1 * size * 0.5
     ax.add_patch(Arc((0.0, 0.0), arc, arc, theta1=start, theta2=start + angle, color=LIGHT["muted"], linewidth=1.0))
-    far, half = 0.38 * size, gamma / 2.0
-    words: Any = {"color": LIGHT["muted"], "ha": "center", "va": "center"}
-    ax.text(0.68 * x, 0.68 * y - 0.12 * side * size, "$R$", **words)
-    ax.text(-far * cos(half), side * far * sin(half), r"$\gamma$", **words)
 
 
 def _draw_scale(ax: Axes, size: float) -> None:
     """A bar of a length that one reads at once."""
     decade = 10.0 ** next(n for n in range(3, -4, -1) if 10.0**n <= 0.6 * size)
     length = next(step * decade for step in (5.0, 2.0, 1.0) if step * decade <= 0.6 * size)
-    y, x = ax.get_ylim()[0] - 0.08 * size, -1.5 * size
+    y, x = ax.get_ylim()[0] - 0.08 * size, ax.get_xlim()[0]
     ax.plot([x, x + length], [y, y], color=LIGHT["muted"], linewidth=2.0, solid_capstyle="butt")
     ax.text(x + length + 0.06 * size, y, f"{length:g} m", color=LIGHT["muted"], ha="left", va="center", fontsize=8.5)

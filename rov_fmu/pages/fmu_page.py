@@ -67,8 +67,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True) -> str:
         ],
         reversing=_reversing,
         equations=equations.of(layout),
-        same_thrust=not all("a_t_reverse" in curve.keys for curve in layout.curves),
-        same_drag=[form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys],
+        mirrored=_mirrored(layout),
         has={*chain(*(form.keys for form in layout.axes), *(curve.keys for curve in layout.curves))},
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         arm=[rov[name] for name in ARM] if layout.has_arm else None,
@@ -109,6 +108,8 @@ class Motion:
     signs: Mapping[str, float]
     responses: Sequence[tuple[float, float]]
     """V_ss and Tau for each command."""
+    beside: Sequence[tuple[Axis, float]]
+    """Other axes that the last command pushes too, and the force or torque."""
 
 
 def _motions(rov: Rov, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
@@ -116,7 +117,17 @@ def _motions(rov: Rov, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Moti
     for sign, way in ((1.0, axis.positive), (-1.0, axis.negative))[: 1 + two]:
         signs = {name: sign * of for name, of in rov.layout.signs(axis).items()}
         responses = [rov.response(axis, sign * float(c) / 100.0) for c in commands]
-        yield Motion(axis, f" {way}" if two else "", signs, responses)
+        last = sign * float(commands[-1]) / 100.0
+        yield Motion(axis, f" {way}" if two else "", signs, responses, list(_beside(rov, axis, last)))
+
+
+def _beside(rov: Rov, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
+    """The other axes that the commands of one push, as where thrust in reverse is weaker."""
+    F = rov.commanded(rov.held_inputs(axis, command))
+    for other in (form.axis for form in rov.layout.axes if form.axis is not axis):
+        pushes = [rov.effect(t, other) * F[t.name] for t in rov.layout.drivers(other)]
+        if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
+            yield other, sum(pushes)
 
 
 def differs_by_direction(rov: Rov, axis: Axis) -> bool:
@@ -179,6 +190,18 @@ def _reversing(layout: Layout, values: Mapping[str, float]) -> list[tuple[str, f
     return found
 
 
+def _mirrored(layout: Layout) -> str:
+    """Which thrust and drag are in reverse the mirror image of forward."""
+    found = []
+    for what, of, same, n in (
+        ("thrust", "of curve", [c.name for c in layout.curves if "a_t_reverse" not in c.keys], len(layout.curves)),
+        ("drag", "in", [f.axis.name for f in layout.axes if "a_d_reverse" not in f.keys], len(layout.axes)),
+    ):
+        if same:
+            found.append(what if len(same) == n else f"{what} {of} {', '.join(same)}")
+    return " and ".join(found)
+
+
 def _is_tuned(rov: Rov) -> bool:
     return any(rov[name] != 1.0 for name, meta in rov.layout.coefficients.items() if meta.tunable)
 
@@ -187,10 +210,10 @@ def _is_tuned(rov: Rov) -> bool:
 
 
 def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
-    """V_ss over the command: with and without tuning, the measured points, the range of the identification."""
+    """V_ss over the command: with and without tuning, the measured points, the range they hold for."""
     rov, (low, high) = vehicle.rov, (100.0 * end for end in vehicle.command_range)
     least = -100 if differs_by_direction(rov, axis) else 0
-    ax.axvspan(low, high, label="identified range", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+    ax.axvspan(low, high, label="range of the model", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     if least:
         ax.axvspan(-high, -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     commands = range(least, 101, 2)

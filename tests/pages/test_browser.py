@@ -98,7 +98,7 @@ def test_the_documentation_asks_for_nothing_and_fits(
     assert seen.asked == [url]
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width  # nothing to scroll sideways for
     plots = seen.page.locator("svg")
-    assert plots.count() == 8
+    assert plots.count() == 12
     for plot in plots.all():
         box = plot.bounding_box()
         assert box is not None

@@ -14,7 +14,7 @@ from matplotlib.text import Annotation
 
 from rov_fmu.export.archive import Content, native_content, python_content
 from rov_fmu.export.interface import variables
-from rov_fmu.pages.drawing import draw_thrusters, place
+from rov_fmu.pages.drawing import VIEWS, draw_thrusters, drawing_size, place
 from rov_fmu.pages.fmu_page import documentation, documentation_page
 from rov_fmu.pages.paper_figures import write_figures
 from rov_fmu.pages.templates import number, pretty_unit
@@ -102,7 +102,7 @@ def test_published_tables_side_by_side(page: str, vehicle: Vehicle) -> None:
 
 def test_says_where_it_is_valid(page: str) -> None:
     text = " ".join(html.fromstring(page).text_content().split())
-    assert "identified for commands of 20–70 %" in text
+    assert "hold for commands of 20–70 %" in text
     assert "rear thrust is then negative below 27 %" in text  # curve (8), the alternative
 
 
@@ -330,3 +330,77 @@ def test_the_arm_of_the_paper_stands_where_its_torque_says(vehicle: Vehicle) -> 
         assert x < 0.0
         assert hypot(x, y) == pytest.approx(k["R"])
         assert -y == pytest.approx(side * k["R"] * sin(k["gamma"]))
+
+
+@pytest.mark.parametrize(
+    ("kind", "absent"),
+    [
+        ("heave only", ("north,", "current", "each axis", "axes heave", "x north", "(4)")),
+        ("yaw only", ("depth", "Depth", "buoyancy", "Buoyancy", "current", "each axis", "(4)")),
+    ],
+)
+def test_a_vehicle_of_one_axis_is_told_as_one(kind: str, absent: tuple[str, ...]) -> None:
+    text = words(documentation_page(a_vehicle(VEHICLES[kind])))
+    for name in absent:
+        assert name not in text, name
+    assert f"drive {kind.split(maxsplit=1)[0]} with quadratic and linear drag" in text
+
+
+def test_directions_that_differ_are_not_said_to_mirror() -> None:
+    def told(kind: str) -> str:
+        return words(documentation_page(a_vehicle(VEHICLES[kind])))
+
+    assert "change sign with the direction" not in told("drag by direction, coupled, late")
+    assert "Directions. Drag only changes sign" in told("yaw only")
+
+
+def test_what_commands_push_beside_their_axis_is_told() -> None:
+    """A turn of a pair: one thruster ahead, one in reverse, which is weaker; F = a_t m^2 + b_t m, m = 1 - c_0."""
+    rov = VEHICLES["lag without coupling"]
+    table = {row[0]: row for row in rows(documentation_page(a_vehicle(rov))) if len(row) > 2}
+    m = 1.0 - rov["c_0_t200"]
+    ahead, back = (rov[f"a_t_t200{end}"] * m**2 + rov[f"b_t_t200{end}"] * m for end in ("", "_reverse"))
+    hold = "u_l = c, u_r = −c"
+    assert table["Yaw bow to starboard (rad/s)"][1] == f"{hold}also pushes surge with {number(ahead - back, 3)} N"
+    assert table["Surge forward (m/s)"][1] == "u_l = c, u_r = c"
+
+
+def test_a_sum_has_its_signs_before_its_numbers() -> None:
+    page = documentation_page(a_vehicle(VEHICLES["with an input mix"]))
+    sums = {"".join(math.text_content().split()) for math in html.fromstring(page).iter("math")}
+    assert {"c1=uahead−uaside−0.5uturn", "c2=uahead+uaside+0.5uturn", "c5=−udown"} <= sums
+
+
+def test_words_of_variables_fit_what_they_are_of(vehicle: Vehicle) -> None:
+    layout, other = vehicle.layout, VEHICLES["neither lag nor coupling"].layout
+    assert layout.inputs["u_l"].description == "Command u_l: left thruster, positive forward; saturates at ±1"
+    assert "(4)" in layout.thrust["tau_rear"].description
+    assert "(4)" not in other.thrust["tau_t200"].description
+    assert other.coefficients["m_a_r"].description == "Added moment of inertia m_a of yaw"
+    assert other.coefficients["m_a_u"].description == "Added mass m_a of surge"
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("kind", ["paper", "neither lag nor coupling", "heave only", "yaw only", "sway and yaw"])
+def test_a_drawing_holds_its_arrows_and_names_which_do_not_cover_each_other(
+    vehicle: Vehicle, kind: str, view: str
+) -> None:
+    rov = vehicle.rov if kind == "paper" else VEHICLES[kind]
+    figure = Figure(figsize=drawing_size(rov, view), layout="constrained")
+    ax = figure.subplots()
+    draw_thrusters(ax, rov, view)
+    figure.draw_without_rendering()
+    names = [text for text in ax.texts if text.get_text()]
+    boxes = [text.get_window_extent() for text in names]
+    for text, box in zip(names, boxes, strict=True):
+        assert box.x0 >= 0.0, text
+        assert box.y0 >= 0.0, text
+        assert box.x1 <= figure.bbox.x1, text
+        assert box.y1 <= ax.bbox.y1, text
+        assert sum(box.overlaps(other) for other in boxes) == 1, text
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    tips = [text.xy for text in ax.texts if isinstance(text, Annotation)]
+    assert tips
+    for x, y in tips:
+        assert left < x < right
+        assert high < y < low
