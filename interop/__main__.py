@@ -1,4 +1,4 @@
-"""Run videoray.fmu through independent importers with one manoeuvre, and compare them with rov_fmu.motion.rov."""
+"""Fly vehicles in independent importers, a manoeuvre each, and compare them with rov_fmu.motion.rov."""
 
 import argparse
 import sys
@@ -13,9 +13,9 @@ from rich.table import Column, Table
 
 from rov_fmu import cli
 
-from .importers import HERE, KITS, chosen
+from .importers import HERE, KITS, Importer, chosen
 from .install import InstallError, install
-from .manoeuvre import reference
+from .manoeuvre import MANOEUVRES
 from .run import Outcome, Verdict, run
 
 STYLES = {Verdict.DIFFERS: "red", Verdict.FAILED: "red", Verdict.NOT_RUN: "yellow"}
@@ -27,7 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add = parser.add_argument
     add("names", nargs="*", metavar="NAME", help=f"importer (see --list) or kit: {', '.join(KITS)}; what is named must "
         "run (default: all that are installed)")  # fmt: skip
-    add("--fmu", type=Path, metavar="FILE", help="FMU of the VideoRay (default: built for this)")
+    add("--vehicle", choices=MANOEUVRES, metavar="NAME", help=f"{' or '.join(MANOEUVRES)} (default: both)")
+    add("--fmu", type=Path, metavar="FILE", help="FMU of that vehicle (default: built for this)")
     add("--install", action="store_true", help="install the kits instead of running (Linux)")
     add("--list", action="store_true", help="list the importers instead of running them")
     add("--tools", type=Path, default=HERE / ".tools", metavar="FOLDER", help="where the importers are installed "
@@ -35,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         importers = chosen(options.names)
+        if options.fmu and not options.vehicle:
+            raise LookupError("--fmu goes with --vehicle")
         if options.fmu and not options.fmu.is_file():
             raise LookupError(f"{options.fmu}: there is no such file")
     except LookupError as error:
@@ -48,12 +51,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.install:
         # All kits, whether or not one fails.
         return max([_install(kit, tools, console) for kit in dict.fromkeys(importer.kit for importer in importers)])
+    outcomes = []
     with tempfile.TemporaryDirectory() as folder:
-        fmu = options.fmu or _built(Path(folder))
-        expected, outcomes = reference(), []
-        for importer in importers:
-            with console.status(f"{importer.title}, {importer.interface}"):
-                outcomes.append(run(importer, fmu, tools, expected))
+        for vehicle in [options.vehicle] if options.vehicle else MANOEUVRES:
+            fmu = options.fmu or _built(vehicle, Path(folder))
+            for importer in importers:
+                with console.status(f"{importer.title}, {importer.interface}: {vehicle}"):
+                    outcomes.append(run(importer, fmu, tools, MANOEUVRES[vehicle]))
     _show(outcomes, console)
     # What was asked for by name must run.
     bad = {Verdict.DIFFERS, Verdict.FAILED, *([Verdict.NOT_RUN] if options.names else [])}
@@ -70,27 +74,33 @@ def _install(kit: str, tools: Path, console: Console) -> int:
     return 0
 
 
-def _built(folder: Path) -> Path:
-    fmu = folder / "videoray.fmu"
+def _built(vehicle: str, folder: Path) -> Path:
+    fmu = folder / f"{vehicle}.fmu"
     with redirect_stdout(StringIO()):
-        code = cli.main(["build", "--platform", "host", "-o", str(fmu)])
+        code = cli.main(["build", vehicle, "--platform", "host", "-o", str(fmu)])
     if code:
         raise SystemExit(code)
     return fmu
 
 
 def _show(outcomes: Sequence[Outcome], console: Console) -> None:
-    table = Table("importer", "version", "FMI interface", Column("max. difference", justify="right"), "verdict",
-                  title="The same manoeuvre, 30 s, in every importer; SI units", title_justify="left")  # fmt: skip
+    """A row for each importer, a column for each vehicle; then what is to be said of one."""
+    vehicles = dict.fromkeys(outcome.vehicle for outcome in outcomes)
+    table = Table("importer", "version", "FMI interface", *(Column(name, justify="right") for name in vehicles),
+                  title="The largest difference, 30 s, SI units", title_justify="left")  # fmt: skip
+    rows: dict[Importer, list[str]] = {}
     for outcome in outcomes:
-        importer, size = outcome.importer, outcome.difference
-        shown = "" if size is None else f"{size:.1e}" if size else "0"
-        table.add_row(importer.title, importer.version, importer.interface, shown, outcome.verdict.value,
-                      style=STYLES.get(outcome.verdict))  # fmt: skip
+        shown = "" if outcome.difference is None else f"{outcome.difference:.1e}"
+        if outcome.verdict is not Verdict.AGREES:
+            shown = f"{shown} {outcome.verdict.value}".strip()
+        style = STYLES.get(outcome.verdict, "default")
+        rows.setdefault(outcome.importer, []).append(f"[{style}]{shown}[/]")
+    for importer, cells in rows.items():
+        table.add_row(importer.title, importer.version, importer.interface, *cells)
     console.print(table)
     for outcome in outcomes:
         if outcome.reason:
-            console.print(f"{outcome.importer.name} {outcome.verdict.value}: {outcome.reason}")
+            console.print(f"{outcome.importer.name} {outcome.verdict.value}, {outcome.vehicle}: {outcome.reason}")
         for line in outcome.log.strip().splitlines()[-15:]:
             console.print(f"    {line}", markup=False)
 

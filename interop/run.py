@@ -6,13 +6,13 @@ import shutil
 import signal
 import subprocess
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from pathlib import Path
 
 from .importers import HERE, Importer
-from .manoeuvre import ResultError, difference, write_files
+from .manoeuvre import Manoeuvre, ResultError
 
 ROOT = HERE.parent
 TIMEOUT = 300.0
@@ -36,36 +36,39 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """One row of the table."""
+    """One cell of the table."""
 
     importer: Importer
+    vehicle: str
     verdict: Verdict
     difference: float | None = None
     reason: str = ""
     log: str = ""
 
 
-def run(importer: Importer, fmu: Path, tools: Path, expected: Sequence[dict[str, float]]) -> Outcome:
+def run(importer: Importer, fmu: Path, tools: Path, manoeuvre: Manoeuvre) -> Outcome:
     """Let an importer fly the manoeuvre, or check the FMU."""
+    outcome = partial(Outcome, importer, manoeuvre.vehicle)
     if reason := obstacle(importer, tools):
-        return Outcome(importer, Verdict.NOT_RUN, reason=reason)
+        return outcome(Verdict.NOT_RUN, reason=reason)
     with tempfile.TemporaryDirectory(prefix="interop-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
-        shutil.copy(fmu, folder / "videoray.fmu")
-        write_files(folder)
+        shutil.copy(fmu, folder / "rov.fmu")
+        manoeuvre.write_files(folder)
         code, log = _call(importer, folder, tools)
         log = without_places(log, folder, tools)
         if code != 0:
-            return Outcome(importer, Verdict.FAILED, reason=code_name(code), log=log)
+            return outcome(Verdict.FAILED, reason=code_name(code), log=log)
         if importer.tolerance is None:
-            return Outcome(importer, Verdict.NO_FINDING)
+            return outcome(Verdict.NO_FINDING)
         try:
             results = sorted(folder.glob("result*.csv")) or [folder / "result.csv"]
-            largest = max(difference(result, expected) for result in results)
+            largest = max(map(manoeuvre.difference, results))
         except ResultError as error:
-            return Outcome(importer, Verdict.FAILED, reason=str(error), log=log)
-    verdict = Verdict.AGREES if largest <= importer.tolerance else Verdict.DIFFERS
-    return Outcome(importer, verdict, largest)
+            return outcome(Verdict.FAILED, reason=str(error), log=log)
+    tolerance = importer.late if importer.late and manoeuvre.rov.layout.lagging else importer.tolerance
+    verdict = Verdict.AGREES if largest <= tolerance else Verdict.DIFFERS
+    return outcome(verdict, largest)
 
 
 def obstacle(importer: Importer, tools: Path) -> str:

@@ -1,1 +1,1 @@
-"""One small program for each importer, run in a folder that holds videoray.fmu and the manoeuvre."""
+"""One small program for each importer, run in a folder that holds rov.fmu and the manoeuvre."""

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-FMU = "videoray.fmu"
-OUTPUTS = ("u", "w", "r", "x", "y", "z", "psi", "F_l", "F_r", "F_t", "tau_rear")
-FULL = {"u_l": 1.0, "u_r": -1.0, "u_t": 1.0}
-"""The commands of the detour."""
+FMU = "rov.fmu"
+OUTPUTS = tuple(Path("outputs.txt").read_text().split())
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,12 @@ class Step:
 
 def parameters() -> dict[str, float]:
     """The parameters to set before the initialization."""
-    return {row["name"]: float(row["value"]) for row in _read("parameters.csv")}
+    return _values("parameters.csv")
+
+
+def detour() -> dict[str, float]:
+    """The commands of the detour."""
+    return _values("detour.csv")
 
 
 def steps() -> list[Step]:
@@ -54,6 +57,10 @@ def write(rows: Iterable[Iterable[float]], path: str = "result.csv") -> None:
     """Write rows of time and outputs."""
     with Path(path).open("w", newline="") as file:
         csv.writer(file).writerows([("time", *OUTPUTS), *rows])
+
+
+def _values(path: str) -> dict[str, float]:
+    return {row["name"]: float(row["value"]) for row in _read(path)}
 
 
 def _read(path: str) -> list[dict[str, str]]:

@@ -7,4 +7,4 @@ case $1 in
     me) input=jumps.csv interface=model-exchange interval=1e-4 ;;
 esac
 # shellcheck disable=SC2086
-fmi-sim --model videoray.fmu -i $input -o result.csv $interface -f 30 --output-interval $interval $parameters
+fmi-sim --model rov.fmu -i $input -o result.csv $interface -f 30 --output-interval $interval $parameters

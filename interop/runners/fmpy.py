@@ -12,7 +12,7 @@ from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Slave
 from fmpy.util import read_csv, write_csv
 
-from interop.runners.flight import FMU, FULL, OUTPUTS, Step, fly, parameters
+from interop.runners.flight import FMU, OUTPUTS, Step, detour, fly, parameters
 
 
 class Slave:
@@ -53,7 +53,7 @@ def by_hand() -> None:
             state = rov.fmu.getFMUState()
             kept = rov.fmu.serializeFMUState(state)
             rov.fmu.freeFMUState(state)
-            rov.put(FULL)
+            rov.put(detour())
             rov.step(step.start, 1.0)
             state = rov.fmu.deserializeFMUState(kept)
             rov.fmu.setFMUState(state)

@@ -1,4 +1,4 @@
-"""Independent importers fly the manoeuvre as `rov_fmu.motion.rov` does, and the harness notices where one does not."""
+"""Independent importers fly as `rov_fmu.motion.rov` does, and the harness notices where one does not."""
 
 import csv
 import re
@@ -15,57 +15,69 @@ import pytest
 from interop.__main__ import main
 from interop.importers import EXACT, HERE, IMPORTERS, KITS, RUNNERS, Importer, pinned
 from interop.install import install
-from interop.manoeuvre import (
-    DETOUR,
-    OUTPUTS,
-    PARAMETERS,
-    PHASES,
-    ROV,
-    ResultError,
-    difference,
-    inputs_at,
-    reference,
-    times,
-    write_files,
-)
+from interop.manoeuvre import DETOUR, MANOEUVRES, TIMES, Manoeuvre, ResultError
 from interop.run import Verdict, run, without_places
+from rov_fmu import cli
 
 TOOLS = HERE / ".tools"
+SIMPLE = MANOEUVRES["videoray"]
+
+
+@pytest.fixture(scope="session", params=MANOEUVRES.values(), ids=list(MANOEUVRES))
+def manoeuvre(request: pytest.FixtureRequest) -> Manoeuvre:
+    found: Manoeuvre = request.param
+    return found
+
 
 # ---- The manoeuvre ---------------------------------------------------------------------------------------------------
 
 
-def test_manoeuvre_shows_what_it_promises() -> None:
-    phases = [PHASES[start] for start in sorted(PHASES)]
-    assert times()[0] == 0.0
-    assert times()[-1] == 30.0
-    assert set(PHASES) | {DETOUR} <= set(times()), "the inputs change, and the detour starts, at communication points"
-    assert phases[0] == {}, "it does not matter when an importer sets the first inputs"
-    for name in ROV.layout.inputs:
-        values = [inputs.get(name, 0.0) for inputs in phases]
+def test_manoeuvre_shows_what_it_promises(manoeuvre: Manoeuvre) -> None:
+    layout, starts = manoeuvre.rov.layout, sorted(manoeuvre.phases)
+    phases = [manoeuvre.inputs_at(start) for start in starts]
+    assert TIMES[0] == 0.0
+    assert TIMES[-1] == 30.0
+    assert {*starts, DETOUR} <= set(TIMES), "the inputs change, and the detour starts, at communication points"
+    assert not any(phases[0].values()), "it does not matter when an importer sets the first inputs"
+    for name in layout.inputs:
+        values = [inputs[name] for inputs in phases]
         assert any(values), f"{name} is used"
-        if name in ROV.layout.commands:
+        if name in layout.commands:
             changes = list(pairwise(values))
             assert any(0.0 <= a < b for a, b in changes), f"{name} steps up"
             assert any(a > b > 0.0 for a, b in changes), f"{name} steps down"
             assert any(a * b < 0.0 for a, b in changes), f"{name} steps through zero"
-    rows = reference()
-    for name in ("u", "w", "r"):
-        assert min(row[name] for row in rows) < -0.1 < 0.1 < max(row[name] for row in rows), f"{name} changes sign"
-    assert {ROV.layout.coefficients[name].tunable for name in PARAMETERS} == {True, False}
+    for name in layout.velocities:
+        values = [row[name] for row in manoeuvre.reference]
+        assert min(values) < -0.1 < 0.1 < max(values), f"{name} changes sign"
+    assert {layout.coefficients[name].tunable for name in manoeuvre.parameters} == {True, False}
 
 
-def test_files_say_the_same(tmp_path: Path) -> None:
-    write_files(tmp_path)
+def test_there_is_a_manoeuvre_with_sway_lag_coupling_and_dead_band() -> None:
+    heavy = MANOEUVRES["bluerov2_heavy"]
+    assert heavy.rov.layout.coupled
+    assert set(heavy.rov.layout.lagging) == {f"F_{n}" for n in range(1, 9)}
+    dead = heavy.parameters["c_0_t200"]
+    held = [heavy.inputs_at(time)[name] for time in heavy.phases for name in heavy.rov.layout.commands]
+    assert any(0.0 < command < dead for command in held)
+
+
+def test_files_say_the_same(tmp_path: Path, manoeuvre: Manoeuvre) -> None:
+    manoeuvre.write_files(tmp_path)
     with (tmp_path / "manoeuvre.csv").open(newline="") as file:
         held = [[float(value) for value in row] for row in list(csv.reader(file))[1:]]
     with (tmp_path / "jumps.csv").open(newline="") as file:
         corners = [[float(value) for value in row] for row in list(csv.reader(file))[1:]]
     for time, *inputs, detour in held:
-        assert inputs == list(inputs_at(time).values())
+        assert inputs == list(manoeuvre.inputs_at(time).values())
         assert detour == (time == DETOUR)
         if time < 30.0:
             assert inputs == next(after for at, *after in reversed(corners) if at <= time)
+    with (tmp_path / "detour.csv").open(newline="") as file:
+        detour_commands = {row["name"]: float(row["value"]) for row in csv.DictReader(file)}
+    assert list(detour_commands) == list(manoeuvre.rov.layout.commands)
+    assert set(detour_commands.values()) == {1.0, -1.0}
+    assert (tmp_path / "outputs.txt").read_text().split() == list(manoeuvre.reference[0])[1:]
 
 
 # ---- The comparison --------------------------------------------------------------------------------------------------
@@ -79,19 +91,23 @@ def write_result(path: Path, rows: list[dict[str, float]]) -> Path:
     return path
 
 
-def test_reference_agrees_with_itself(tmp_path: Path) -> None:
-    expected = reference()
+def test_reference_agrees_with_itself(tmp_path: Path, manoeuvre: Manoeuvre) -> None:
+    expected = manoeuvre.reference
     between = [row | {"time": row["time"] + 0.05, "u": 99.0} for row in expected]
     rows = sorted(expected + between, key=lambda row: row["time"])
-    assert difference(write_result(tmp_path / "result.csv", rows), expected) == 0.0
+    assert manoeuvre.difference(write_result(tmp_path / "result.csv", rows)) == 0.0
 
 
-@pytest.mark.parametrize("name", OUTPUTS)
+@pytest.mark.parametrize(
+    ("manoeuvre", "name"),
+    [(m, name) for m in MANOEUVRES.values() for name in m.outputs],
+    ids=lambda p: getattr(p, "vehicle", p),
+)
 @pytest.mark.parametrize("point", [0, 150, 300])
-def test_difference_is_noticed(tmp_path: Path, name: str, point: int) -> None:
-    rows = reference()
+def test_difference_is_noticed(tmp_path: Path, manoeuvre: Manoeuvre, name: str, point: int) -> None:
+    rows = [*manoeuvre.reference]
     rows[point] = rows[point] | {name: rows[point][name] + 1e-6}
-    assert difference(write_result(tmp_path / "result.csv", rows), reference()) == pytest.approx(1e-6)
+    assert manoeuvre.difference(write_result(tmp_path / "result.csv", rows)) == pytest.approx(1e-6)
 
 
 @pytest.mark.parametrize(
@@ -109,12 +125,12 @@ def test_incomplete_result_is_an_error(
     tmp_path: Path, spoil: Callable[[list[dict[str, float]]], list[dict[str, float]]], message: str
 ) -> None:
     with pytest.raises(ResultError, match=message):
-        difference(write_result(tmp_path / "result.csv", spoil(reference())), reference())
+        SIMPLE.difference(write_result(tmp_path / "result.csv", spoil(SIMPLE.reference)))
 
 
 def test_missing_result_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(ResultError, match=r"result\.csv cannot be read"):
-        difference(tmp_path / "result.csv", reference())
+        SIMPLE.difference(tmp_path / "result.csv")
 
 
 # ---- The command -----------------------------------------------------------------------------------------------------
@@ -153,7 +169,7 @@ def test_verdict(
     tolerance: float | None,
     verdict: Verdict,
 ) -> None:
-    rows = reference()
+    rows = [*SIMPLE.reference]
     if program == "differ":
         rows[200] = rows[200] | {"w": rows[200]["w"] + 1e-7}
     if program in {"agree", "differ"}:
@@ -161,10 +177,21 @@ def test_verdict(
     fmu = tmp_path / "any.fmu"
     fmu.touch()
     importer = replace(PRETEND, command=("{python}", "-c", program), tolerance=tolerance)
-    outcome = run(importer, fmu, tools, reference())
+    outcome = run(importer, fmu, tools, SIMPLE)
     assert outcome.verdict is verdict
     monkeypatch.setattr("interop.importers.IMPORTERS", (importer,))
-    assert main(["--fmu", str(fmu), "--tools", str(tools)]) == (0 if verdict.is_good else 1)
+    assert main(["--vehicle", "videoray", "--fmu", str(fmu), "--tools", str(tools)]) == (0 if verdict.is_good else 1)
+
+
+@pytest.mark.parametrize("manoeuvre", MANOEUVRES.values(), ids=lambda manoeuvre: manoeuvre.vehicle)
+def test_thrust_that_lags_has_a_tolerance_of_its_own(tmp_path: Path, tools: Path, manoeuvre: Manoeuvre) -> None:
+    rows = [*manoeuvre.reference]
+    rows[200] = rows[200] | {"w": rows[200]["w"] + 1e-7}
+    program = COPY.format(source=str(write_result(tmp_path / "given.csv", rows)))
+    importer = replace(PRETEND, command=("{python}", "-c", program), late=1e-6)
+    (tmp_path / "any.fmu").touch()
+    expected = Verdict.AGREES if manoeuvre.vehicle == "bluerov2_heavy" else Verdict.DIFFERS
+    assert run(importer, tmp_path / "any.fmu", tools, manoeuvre).verdict is expected
 
 
 def test_importer_that_is_not_installed(
@@ -173,14 +200,14 @@ def test_importer_that_is_not_installed(
     fmu = tmp_path / "any.fmu"
     fmu.touch()
     monkeypatch.setattr("interop.importers.IMPORTERS", (PRETEND,))
-    arguments = ["--fmu", str(fmu), "--tools", str(tmp_path)]
+    arguments = ["--vehicle", "videoray", "--fmu", str(fmu), "--tools", str(tmp_path)]
     assert main(arguments) == 0
     assert "python -m interop --install python" in capsys.readouterr().out
     assert main([*arguments, "pretend"]) == 1, "what is asked for by name must run"
     assert main([*arguments, "python"]) == 1
 
 
-@pytest.mark.parametrize("arguments", [["nothing"], ["--fmu", "nothing.fmu"]])
+@pytest.mark.parametrize("arguments", [["nothing"], ["--vehicle", "videoray", "--fmu", "nothing.fmu"]])
 def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(arguments) == 2
     assert capsys.readouterr().err.startswith("interop: nothing")
@@ -260,14 +287,16 @@ def test_no_registry_is_named() -> None:
 
 
 @pytest.fixture(scope="session")
-def expected() -> list[dict[str, float]]:
-    return reference()
+def fmu(manoeuvre: Manoeuvre, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("FMU für Tests") / "any.fmu"
+    assert cli.main(["build", manoeuvre.vehicle, "--platform", "host", "-o", str(path)]) == 0
+    return path
 
 
 @pytest.mark.interop
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
-def test_importer(importer: Importer, videoray_fmu: Path, expected: list[dict[str, float]]) -> None:
-    outcome = run(importer, videoray_fmu, TOOLS, expected)
+def test_importer(importer: Importer, fmu: Path, manoeuvre: Manoeuvre) -> None:
+    outcome = run(importer, fmu, TOOLS, manoeuvre)
     if outcome.verdict is Verdict.NOT_RUN:
         pytest.skip(outcome.reason)
     assert outcome.verdict.is_good, f"{outcome.reason} {outcome.difference} {outcome.log[-2000:]}"

@@ -14,12 +14,11 @@ import no.ntnu.ihb.fmi4j.importer.fmi2.Fmu;
  * pointer, which the standard takes for a state to be reused.
  */
 public class Fly {
-    static final String[] OUTPUTS = "u,w,r,x,y,z,psi,F_l,F_r,F_t,tau_rear".split(",");
-
     public static void main(String[] arguments) throws Exception {
+        List<String> outputs = Files.readAllLines(Path.of("outputs.txt"));
         List<String> rows = Files.readAllLines(Path.of("manoeuvre.csv"));
         String[] names = rows.get(0).split(",");
-        try (Fmu fmu = Fmu.from(new File("videoray.fmu"));
+        try (Fmu fmu = Fmu.from(new File("rov.fmu"));
                 CoSimulationSlave rov = fmu.asCoSimulationFmu().newInstance("rov");
                 PrintWriter result = new PrintWriter("result.csv")) {
             rov.setupExperiment();
@@ -29,8 +28,8 @@ public class Fly {
             }
             rov.enterInitializationMode();
             rov.exitInitializationMode();
-            result.println("time," + String.join(",", OUTPUTS));
-            print(result, 0.0, rov);
+            result.println("time," + String.join(",", outputs));
+            print(result, 0.0, rov, outputs);
             for (int n = 1; n + 1 < rows.size(); n++) {
                 String[] row = rows.get(n).split(",");
                 double start = Double.parseDouble(row[0]);
@@ -41,15 +40,15 @@ public class Fly {
                 if (!rov.doStep(start, end - start)) {
                     throw new IllegalStateException("the FMU answered " + rov.getLastStatus());
                 }
-                print(result, end, rov);
+                print(result, end, rov, outputs);
             }
             rov.terminate();
         }
     }
 
-    static void print(PrintWriter result, double time, CoSimulationSlave rov) {
+    static void print(PrintWriter result, double time, CoSimulationSlave rov, List<String> outputs) {
         result.print(time);
-        for (String name : OUTPUTS) {
+        for (String name : outputs) {
             result.print("," + readReal(rov, name).getValue());
         }
         result.println();

@@ -1,3 +1,4 @@
+import java.io.IOException;
 import java.io.PrintWriter;
 import java.nio.file.Files;
 import java.nio.file.Path;
@@ -9,28 +10,24 @@ import org.javafmi.wrapper.v2.Access;
 
 /** JavaFMI, Co-Simulation: variables by name, the state saved and restored on the way. */
 public class Fly {
-    static final String[] OUTPUTS = "u,w,r,x,y,z,psi,F_l,F_r,F_t,tau_rear".split(",");
-
     public static void main(String[] arguments) throws Exception {
+        List<String> outputs = Files.readAllLines(Path.of("outputs.txt"));
         List<String> rows = Files.readAllLines(Path.of("manoeuvre.csv"));
         String[] names = rows.get(0).split(",");
         int detour = names.length - 1;
-        Simulation rov = new Simulation("videoray.fmu");
+        Simulation rov = new Simulation("rov.fmu");
         Access access = new Access(rov);
-        for (String line : Files.readAllLines(Path.of("parameters.csv")).stream().skip(1).toList()) {
-            String[] parameter = line.split(",");
-            rov.write(parameter[0]).with(Double.parseDouble(parameter[1]));
-        }
+        write("parameters.csv", rov);
         check(rov.init(0.0));
         try (PrintWriter result = new PrintWriter("result.csv")) {
-            result.println("time," + String.join(",", OUTPUTS));
-            print(result, 0.0, rov);
+            result.println("time," + String.join(",", outputs));
+            print(result, 0.0, rov, outputs);
             for (int n = 1; n + 1 < rows.size(); n++) {
                 String[] row = rows.get(n).split(",");
                 double end = Double.parseDouble(rows.get(n + 1).split(",")[0]);
                 if (row[detour].equals("1")) {
                     State state = access.getState(State.newEmptyState());
-                    rov.write("u_l").with(1.0);
+                    write("detour.csv", rov);
                     check(access.doStep(rov.getCurrentTime(), 1.0));
                     check(access.setState(state));
                     access.freeState(state);
@@ -39,15 +36,22 @@ public class Fly {
                     rov.write(names[i]).with(Double.parseDouble(row[i]));
                 }
                 check(rov.doStep(0.1));
-                print(result, end, rov);
+                print(result, end, rov, outputs);
             }
         }
         rov.terminate();
     }
 
-    static void print(PrintWriter result, double time, Simulation rov) {
+    static void write(String file, Simulation rov) throws IOException {
+        for (String line : Files.readAllLines(Path.of(file)).stream().skip(1).toList()) {
+            String[] pair = line.split(",");
+            rov.write(pair[0]).with(Double.parseDouble(pair[1]));
+        }
+    }
+
+    static void print(PrintWriter result, double time, Simulation rov, List<String> outputs) {
         result.print(time);
-        for (String name : OUTPUTS) {
+        for (String name : outputs) {
             result.print("," + rov.read(name).asDouble());
         }
         result.println();

@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 from zipfile import ZipFile
 
-from interop.runners.flight import FMU, OUTPUTS, parameters, steps
+from interop.runners.flight import FMU, OUTPUTS, detour, parameters, steps
 
 
 def listed(values: Iterable[object]) -> str:
@@ -22,13 +22,14 @@ def listed(values: Iterable[object]) -> str:
 description = ET.fromstring(ZipFile(FMU).read("modelDescription.xml"))
 reference = {v.attrib["name"]: v.attrib["valueReference"] for v in description.iter("ScalarVariable")}
 flight = steps()
-references = {"parameters": parameters(), "inputs": flight[0].inputs, "outputs": OUTPUTS}
+references = {"parameters": parameters(), "commands": detour(), "inputs": flight[0].inputs, "outputs": OUTPUTS}
 filled = Template(Path(__file__).with_name("fly.mabl").read_text()).substitute(
     {name: listed(reference[variable] for variable in variables) for name, variables in references.items()},
     **{f"n_{name}": len(variables) for name, variables in references.items()},
     guid=description.attrib["guid"],
     fmu=Path(FMU).resolve().as_uri(),
     values=listed(parameters().values()),
+    full=listed(detour().values()),
     names=listed(f'"{name}"' for name in OUTPUTS),
     shown=listed(f"shown[{n}]" for n in range(len(OUTPUTS))),
     n_flight=len(flight) * len(flight[0].inputs),
