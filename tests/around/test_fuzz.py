@@ -101,7 +101,7 @@ PLANTED = {
         "riccati.c",
         "const double change = (c - (b + drag) * v0) * N / growth;",
         "const double change = (c - (3.0 * b - drag) * v0) * N / growth;",
-        "without force|beyond its equilibrium",
+        "without force|beyond its equilibrium|at no more than",
     ),
     "a thrust turns the vehicle past its steady rate": (
         "riccati.c",
@@ -125,10 +125,10 @@ PLANTED = {
 
 
 PLANTED_IN_HEAVY = {
-    "the coupling does work": (
-        "series.c",
-        "rest[V] -= s->tau * f->gains->c_v * ur;",
-        "rest[V] += s->tau * f->gains->c_v * ur;",
+    "the coupling does a lot of work": (
+        "rov.c",
+        "rate[V] -= gains->c_v * v[U] * v[R];",
+        "rate[V] += 100.0 * gains->c_v * v[U] * v[R];",
         "at most",
     ),
     "a lag overshoots": (
