@@ -30,10 +30,10 @@ static inline double riccati_drag(const riccati *axis, double v)
 static double riccati_signed_root(double A, double B, double C)
 {
     const double D2 = B * B + 4.0 * A * C;
-    if (fabs(D2) > 1e-290) {
+    if (fabs(D2) > 1e-290 && fabs(D2) < 1e300) {
         return copysign(sqrt(fabs(D2)), D2);
     }
-    const double root = 2.0 * sqrt(A) * sqrt(-C); /* B^2 and A C may have underflowed */
+    const double root = 2.0 * sqrt(A) * sqrt(-C); /* B^2 or A C may have underflowed, or overflown */
     return copysign(sqrt(fabs(B - root)) * sqrt(B + root), B - root);
 }
 

@@ -69,9 +69,9 @@ def time_to_rest(A: float, B: float, C: float, v0: float) -> float:
 def _signed_root(A: float, B: float, C: float) -> float:
     """The root of |D^2|, D^2 = B^2 + 4 A C with C < 0, with the sign of D^2."""
     D2 = B * B + 4.0 * A * C
-    if abs(D2) > 1e-290:
+    if 1e-290 < abs(D2) < 1e300:
         return copysign(sqrt(abs(D2)), D2)
-    root = 2.0 * sqrt(A) * sqrt(-C)  # B^2 and A C may have underflowed
+    root = 2.0 * sqrt(A) * sqrt(-C)  # B^2 or A C may have underflowed, or overflown
     return copysign(sqrt(abs(B - root)) * sqrt(B + root), B - root)
 
 

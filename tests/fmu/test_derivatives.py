@@ -66,8 +66,9 @@ def random_parameters(
 
 
 def points(fmu: Fmu, n: int, seed: int) -> list[dict[str, float]]:
-    rng = random.Random(seed)
-    return [random_motion(fmu, rng) | random_parameters(fmu, rng) for _ in range(n)]
+    rng = random.Random(seed)  # no zeros: beside an input that saturates they put the mix on the corner
+    motions = ({name: x or rng.uniform(-0.9, 0.9) for name, x in random_motion(fmu, rng).items()} for _ in range(n))
+    return [motion | random_parameters(fmu, rng) for motion in motions]
 
 
 def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> Instance:

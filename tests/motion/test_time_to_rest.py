@@ -19,6 +19,13 @@ CASES = [
     for part in (0.5, 0.8, 1.0)
     for v0 in (1e-3, 0.3, 1.0, 40.0)
 ]
+# D^2 overflows by A C, and by B^2; here and where it underflows it comes from roots.
+CASES += [
+    (50.0, 1.0, -1e307, 40.0),
+    (6.5, 0.4, -2.7e307, 1.0),
+    (0.5, 1e160, -1e160, 0.3),
+    (1e-150, 1e-160, -1e-150, 0.3),
+]
 
 
 @pytest.fixture(scope="module", params=["Python", "C"])
