@@ -24,11 +24,7 @@ static bool is_settled(const flow *f, const double v[WIDTH])
  * of the axis *stops. */
 static double series_cut(const series *s, double reach, int *stops)
 {
-    double length = reach, turn = 0.0;
-    for (int n = s->order; n >= 0; n--) {
-        turn += s->tau * fabs(s->c[n][R]) * INVERSE[n + 1];
-    }
-    length = fmin(length, LONGEST_TURN / turn);
+    double length = reach * fmin(1.0, LONGEST_TURN / series_turn(s, reach));
     for (int a = 0; a < N_AXES; a++) {
         bool reverses;
         const double end = series_sign_kept(s, a, length, &reverses);

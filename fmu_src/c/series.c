@@ -8,6 +8,8 @@
 
 enum { ORDER = 19, ORDER_OF_FEW = 11 };
 static const double TURN_OF_FEW = 0.14; /* up to which, and to which order, the rule of four is enough */
+/* How much of that the rate may change by: an angle b t^2 asks for twice the order, the error of four is 1e-6 b^4. */
+static const double BEND_OF_FEW = 0.002;
 static const double INVERSE[ORDER + 2] = {
     0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0, 1.0 / 8.0, 1.0 / 9.0, 1.0 / 10.0,
     1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0, 1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0, 1.0 / 20.0};
@@ -273,6 +275,17 @@ static inline double series_sign_kept(const series *s, int a, double length, boo
     return length;
 }
 
+/* What the rule of eight must follow over a piece of t tau: the turn by its power t^n weighs as much as the order that it asks
+ * for, up to 4: LONGEST_TURN at a steady rate, half a radian of a turn that begins at rest. */
+static inline double series_turn(const series *s, double t)
+{
+    double rate = 0.0;
+    for (int n = s->order; n > 1; n--) {
+        rate = (rate + fabs(s->c[n][R])) * t;
+    }
+    return s->tau * t * (fabs(s->c[0][R]) + t * (2.0 * fabs(s->c[1][R]) + 4.0 * rate));
+}
+
 /* The track of a piece by a rule of n places. */
 static inline void series_places(const series *s, int n, double turned, double turn, planar *sum)
 {
@@ -305,7 +318,8 @@ static inline void series_track(const series *s, double turned, const double way
     if (YAW == NONE || (way[R] == 0.0 && s->c[0][R] == 0.0)) { /* r keeps its sign: it is 0 all along */
         const planar straight = {way[U], way[V]};
         track_add_arc(sum, straight, turned, 0.0);
-    } else if (fabs(way[R]) < TURN_OF_FEW && s->order <= ORDER_OF_FEW) {
+    } else if (fabs(way[R]) < TURN_OF_FEW && s->order <= ORDER_OF_FEW
+               && s->tau * (fabs(s->c[1][R]) + s->others[R]) <= BEND_OF_FEW) {
         series_places(s, FEW, turned, way[R], sum);
     } else {
         series_places(s, MANY, turned, way[R], sum);
@@ -325,5 +339,5 @@ static inline bool series_end(const series *s, double change[WIDTH], double way[
         change[a] = s->change[a] + c1;
         way[a] = s->tau * (c0 + (0.5 * c1 + s->mean[a]));
     }
-    return plain && fabs(way[R]) <= LONGEST_TURN;
+    return plain && series_turn(s, 1.0) <= LONGEST_TURN;
 }

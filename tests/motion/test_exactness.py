@@ -161,6 +161,28 @@ def test_a_spin_that_drag_slows_down_is_exact(step: Step, A: float, r: float, h:
         assert abs(abs(found["psi"]) - turn) <= 4e-16 * turn
 
 
+def spin_up(turn: float, h: float) -> float:
+    """The angular acceleration of a turn from rest: its angle goes with the square of the time."""
+    return 2.0 * turn / h**2
+
+
+@pytest.mark.parametrize("turn", [0.01, 0.05, 0.12, 0.7, 2.0, 4.0])
+@pytest.mark.parametrize("h", [1e-3, 0.1])
+def test_a_turn_that_begins_at_rest_is_exact(step: Step, turn: float, h: float) -> None:
+    C = spin_up(turn, h)
+    hold(step, [of_axes(Riccati(0.1, 0.2, 0.0), Riccati(0.0, B, C), 0.5, r, h)
+                for B in (0.0, 0.3) for r in (0.0, 0.1 * C * h)])  # fmt: skip
+
+
+@pytest.mark.parametrize("turn", [0.05, 0.12, 2.0])
+def test_a_turn_of_the_heavy_that_begins_at_rest_is_exact(heavy: Step, turn: float) -> None:
+    """By a load, and by thrust that has still to end or to begin."""
+    inputs, before, h = still(HEAVY), {**at_rest(HEAVY), "u": 0.5, "v": -0.2}, 0.01
+    load = spin_up(turn, h) * (HEAVY["I_r"] + HEAVY["m_a_r"])
+    late = {name: load for name in before if name.startswith("F_")}
+    hold(heavy, [(HEAVY, {**inputs, "N_ext": load}, before, h), (HEAVY, inputs, {**before, **late}, h)])
+
+
 # As above, and h: turns in which something is huge, next to nothing, or both.
 FAR = {
     "a steady turn longer than the age of the universe": (
