@@ -88,7 +88,8 @@ _MOST = 10
 def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> list[str]:
     """Problems of the file in a line each: key, value, what is allowed."""
     form = _Form(model)
-    return [_told(p, data, form) for p in problems if p["type"] != "missing" or not _misspelt(p["loc"], problems, form)]
+    shown = (p for p in problems if p["type"] != "missing" or not _misspelt(p["loc"], problems, form))
+    return [*dict.fromkeys(_told(p, data, form) for p in shown)]
 
 
 def listed(names: Iterable[str]) -> str:
@@ -100,7 +101,7 @@ def listed(names: Iterable[str]) -> str:
 def label(table: str, entries: Sequence[Any], number: int) -> str:
     """An entry of a list of tables by its name, or by its number from 1 where it has none of its own."""
     names = [entry.get("name") if isinstance(entry, dict) else None for entry in entries]
-    name = names[number]
+    name = names[number] if number < len(names) else None
     own = isinstance(name, str) and names.count(name) == 1
     return f"{table}.{name or repr('')}" if own else f"{table}#{number + 1}"
 
@@ -131,7 +132,7 @@ class _Form:
     def written(self, place: _Place) -> str:
         """How a table, or a list of tables, is written."""
         form = self.at(place)
-        key = ".".join(str(step) for step in place if isinstance(step, str))
+        key = brief(".".join(str(step) for step in place if isinstance(step, str)))
         if form.get("type") == "array" or isinstance(place[-1], int):
             return f"a list of tables: write [[{key}]]"
         if "value" not in form.get("properties", ()):
@@ -165,6 +166,10 @@ def _misspelt(place: _Place, problems: Iterable[ErrorDetails], form: _Form) -> b
 def _told(problem: ErrorDetails, data: Toml, form: _Form) -> str:
     place, value, kind = problem["loc"], problem["input"], problem["type"]
     key, of_table = brief(_key(place, data)), isinstance(value, dict)
+    if kind == "missing" and isinstance(place[-1], int):  # of a list, for each entry that is not there
+        place = place[:-1]
+        entries, number = shown(_at(place, data)), form.at(place)["minItems"]
+        return f"{brief(_key(place, data))} = {entries}: must have {number} entries"
     if kind == "missing":
         constant = _constant(form.at(place))
         return f"{key}: this key is missing" + (f": write {place[-1]} = {json.dumps(constant)}" if constant else "")
@@ -178,6 +183,7 @@ def _told(problem: ErrorDetails, data: Toml, form: _Form) -> str:
         place, reason = tuple(above), f"entry {last + 1} {reason}"  # shown in its list
         value = _at(place, data)
         key = brief(_key(place, data))
+    value = [*value] if isinstance(value, tuple) else value  # as TOML has it
     hidden = of_table and kind in ("value_error", "list_type")
     return f"{key}: {reason}" if hidden else f"{key} = {shown(value)}: {reason}"
 

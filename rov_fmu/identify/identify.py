@@ -24,7 +24,11 @@ from rov_fmu.identify.tank_tests import AXES, THRUSTERS, VELOCITIES, Recording, 
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.sense import no_thrust
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
+
+_LEAST_PUSH = 1e-6
+"""N or N m, less than moves any vehicle: what is fitted to it would overflow."""
 
 
 def identify(tests: TankTests) -> Identification:
@@ -59,6 +63,10 @@ def identify(tests: TankTests) -> Identification:
                 intervals |= fitted.estimate.intervals
             sources |= dict.fromkeys(drag_and_beta(axis, known), result.method[0].upper() + result.method[1:])
             sources |= result.assumed
+    for curve in PAPER.curves:
+        place = "rov.toml" if f"a_t_{curve.name}" in known else f"thrust_{curve.name}*.csv"
+        if backward := [*no_thrust(curve, values, place)]:
+            raise DataFileError(f"{tests.folder}: {backward[0]}")
     results.sort(key=lambda result: list(AXES).index(result.axis.name))
     warnings = [f"{t} thrust: {words}" for t, fit in thrust.items() for words in diagnostics.on_thrust(t, fit)]
     warnings += [w for result in results for w in result.warnings]
@@ -125,7 +133,7 @@ def _fit_recordings(
 def _check_thrust(tests: TankTests, axis: Axis, base: Rov, commands: Sequence[float]) -> None:
     """Where the vehicle moves, the thruster must push it there, at one command at least."""
     forces = [base.force(axis, command) for command in commands]
-    if commands and all(force * command <= 0.0 for force, command in zip(forces, commands, strict=True)):
+    if commands and all(np.sign(c) * force < _LEAST_PUSH for force, c in zip(forces, commands, strict=True)):
         raise DataFileError(
             f"{tests.folder}: the thrust curve of {thruster_of(axis)} gives {forces[0]:.3g} {axis.load} at a command "
             f"of {commands[0]:.0%}, where {axis.name} needs a push that way"

@@ -87,7 +87,7 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
     document, vehicle = read_document(source), load_vehicle(source)
     places = dict(where(vehicle.layout))
     for name, exact in values.items():
-        if (value := _rounded(exact)) == vehicle.rov[name]:
+        if (value := _rounded(exact)) == _rounded(vehicle.rov[name]):
             continue
         *above, key = places[name] if "format" in document else ("coefficients", name)
         table = document

@@ -222,19 +222,31 @@ def test_any_published_tables_are_shown_or_one_clear_line(examples: int, tmp_pat
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("forces", ["20,0\n50,0\n", "20,-0.001\n50,0.01\n70,3\n", "20,1\n50,1\n70,0.5\n100,-0.02\n"])
+HARDLY = [
+    "20,0;50,0",
+    "20,-0.001;50,0.01;70,3",
+    "20,1;50,1;70,0.5;100,-0.02",
+    "20,0;50,0;70,0;-50,-1.6",
+    "20,0;50,1e-200",
+]
+
+
+@pytest.mark.parametrize("forces", HARDLY)
 @pytest.mark.parametrize("recorded", [True, False])
 def test_a_thrust_curve_that_hardly_pushes_is_one_clear_line_or_a_vehicle(
-    forces: str, recorded: bool, tests: Path, capsys: Capsys
+    forces: str, recorded: bool, tests: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
-    (tests / "thrust_top.csv").write_text(f"command [%],force [N]\n{forces}", encoding="utf-8")
+    rows = forces.replace(";", "\n")
+    (tests / "thrust_top.csv").write_text(f"command [%],force [N]\n{rows}\n", encoding="utf-8")
     if not recorded:
         (tests / LOG).unlink()
-    code = main(["identify", str(tests)])
+    code = main(["identify", str(tests), "-o", str(tmp_path / "rov.toml")])
     printed, said = capsys.readouterr()
-    assert code in (0, 2)
     assert "nan" not in printed
-    assert code == 0 or "the thrust curve of top gives" in said
+    if code:
+        assert code == 2
+        check_line(said.removesuffix("\n"), tests)
+        assert "the thrust curve of top gives" in said or "thrust_top*.csv: must give a force above 0" in said
 
 
 def test_names_that_are_no_text_are_one_clear_line(tests: Path, capsys: Capsys) -> None:

@@ -113,6 +113,16 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "NaN": (value("m_rov", "nan"), ("body.m_rov.value", "nan", "finite")),
     "infinity": (value("b_t", "inf"), ("curves.rear.b_t.value", "inf", "finite")),
     "negative infinity": (value("b_t", "-inf"), ("curves.rear.b_t.value", "-inf", "finite")),
+    "an interval without ends": (value("m_rov", "6.57, interval = []"), ("m_rov.interval = []: must have 2 entries",)),
+    "an interval of one end": (value("m_rov", "6.57, interval = [6]"), ("interval = [6]: must have 2 entries",)),
+    "an interval of three": (
+        value("m_rov", "6.57, interval = [6, 7, 8]"),
+        ("interval = [6, 7, 8]: must have at most 2",),
+    ),
+    "a table with an endless name that is none": (
+        lambda text: f"{text}\n[alternatives]\n{'x' * 300} = ''",
+        ("alternatives.xx", "must be a table: write [altern", "x..."),
+    ),
     "larger than a double": (value("b_t", "1e999"), ("curves.rear.b_t.value", "inf", "finite")),
     "integer larger than a double": (value("b_t", "1" + 400 * "0"), ("curves.rear.b_t", "at most 308 digits")),
     "wrong unit": (edit(r'(?<=^m_rov = { value = 6.57, unit = )"kg"', '"lb"'), ("body.m_rov", "'lb'", "'kg'")),
