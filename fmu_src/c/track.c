@@ -102,9 +102,14 @@ static double lane_velocity(const riccati axis[WIDTH], const double v[WIDTH], in
     return lane < N_AXES ? riccati_advance(&axis[lane], v[lane], t).v : 0.0;
 }
 
-static double lane_distance(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
+static riccati_motion lane_motion(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
 {
-    return lane < N_AXES ? riccati_advance(&axis[lane], v[lane], t).s : 0.0;
+    return riccati_advance(&axis[lane], v[lane], t);
+}
+
+static inline double lane_distance(const riccati axis[WIDTH], const double v[WIDTH], int lane, double t)
+{
+    return lane < N_AXES ? lane_motion(axis, v, lane, t).s : 0.0;
 }
 
 /* How long one panel of eight may be. An axis bends at the rate D = B + 2 A |v| + 2 sqrt(A |C|), but as it settles less of
@@ -175,7 +180,7 @@ static bool closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, do
         from[a] = v[a];
         way[a] = 0.0;
         if (v[a] != 0.0 || axis[a].C != 0.0) {
-            const riccati_motion end = riccati_advance(&axis[a], from[a], h);
+            const riccati_motion end = lane_motion(axis, from, a, h);
             v[a] = end.v;
             way[a] = end.s;
         }

@@ -11,7 +11,7 @@ from tests.cli.test_wheel import CONSTRAINTS, built, environment, interpreter
 from tests.commands import ROOT
 
 _BUILDS = {"native": ("--platform", "linux64", "--platform", "win64"), "pythonfmu": ("--backend", "pythonfmu")}
-_OTHERS = [f"3.{minor}" for minor in range(10, 15) if minor != sys.version_info.minor]
+_OLDEST, _NEWEST = 10, 14  # Python 3, as pyproject.toml has it
 
 
 def _built(folder: Path, *command: str) -> dict[str, str]:
@@ -43,10 +43,11 @@ def pinned(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("version", _OTHERS)
-def test_built_by_another_python_from_the_wheel(pinned: dict[str, str], tmp_path: Path, version: str) -> None:
-    python = interpreter(version)
-    if python is None:
-        pytest.skip(f"there is no Python {version} here")
+@pytest.mark.parametrize("order", [1, -1], ids=["oldest", "newest"])
+def test_built_by_another_python_from_the_wheel(pinned: dict[str, str], tmp_path: Path, order: int) -> None:
+    """By the oldest and by the newest Python that is here."""
+    others = [f"3.{minor}" for minor in range(_OLDEST, _NEWEST + 1) if minor != sys.version_info.minor]
+    if (python := next(filter(None, map(interpreter, others[::order])), None)) is None:
+        pytest.skip("there is no other Python here")
     made = environment(tmp_path / "venv", "-c", CONSTRAINTS, built("wheel", tmp_path / "dist"), python=python)
     assert _built(tmp_path, str(made.bin / "rov-fmu"), "build") == pinned
