@@ -17,6 +17,8 @@ ROOT = Path(__file__).parent.parent
 REFIT = SHIPPED["videoray_refit"]
 TESTS = REFIT.parent / "tank_tests"
 """The tank tests that ship."""
+BARE = ROOT / "fuzz" / "bare.toml"
+"""A vehicle that is built soon: one axis, one thruster."""
 ALONE = re.sub(r"^(data|pictures) = .*\n", "", VIDEORAY.read_text(encoding="utf-8"), flags=re.M)
 """The VideoRay's vehicle file without the folders beside it."""
 _TUNE = ["tune", str(VIDEORAY), "--axis", "heave", "--command", "0.3", "--v-ss", "0.2"]
@@ -37,10 +39,10 @@ class Command:
 
 
 COMMANDS = {
-    "the FMU": Command("rov.fmu", lambda path: ["build", "--platform", "host", "-o", str(path)]),
+    "the FMU": Command("rov.fmu", lambda path: ["build", str(BARE), "--platform", "host", "-o", str(path)]),
     "its OSP description": Command(
-        "videoray_OspModelDescription.xml",
-        lambda path: ["build", "--platform", "host", "--osp", "-o", str(path.with_name("rov.fmu"))],
+        "bare_OspModelDescription.xml",
+        lambda path: ["build", str(BARE), "--platform", "host", "--osp", "-o", str(path.with_name("rov.fmu"))],
     ),
     "the vehicle": Command("rov.toml", lambda path: ["identify", str(TESTS), "-o", str(path)]),
     "the report": Command("report.html", lambda path: ["identify", str(TESTS), "--report", str(path)]),

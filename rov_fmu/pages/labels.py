@@ -56,7 +56,8 @@ class Space:
         return (min(x), max(x)), (min(y), max(y))
 
     def _hidden(self, center: Place, half: Place) -> int:
-        return sum(all(abs(p - c) <= h for p, c, h in zip(point, center, half, strict=True)) for point in self.busy)
+        (x, y), (w, h) = center, half
+        return sum(abs(at - x) <= w and abs(down - y) <= h for at, down in self.busy)
 
 
 def _between(start: Place, end: Place, part: float) -> Place:

@@ -23,7 +23,9 @@ def corpus(tmp_path: Path) -> Path:
     return tmp_path / "corpus"
 
 
-@pytest.mark.parametrize("name", command.VEHICLES)
+@pytest.mark.parametrize(
+    "name", [n if n == "videoray" else pytest.param(n, marks=pytest.mark.long) for n in command.VEHICLES]
+)
 def test_the_corpus_reaches_every_function_and_finds_nothing(corpus: Path, tmp_path: Path, name: str) -> None:
     build_target(native_content(load_vehicle(command.VEHICLES[name])).sources, tmp_path / "target")
     counts = replay(tmp_path / "target", [corpus], tmp_path)
@@ -140,6 +142,7 @@ PLANTED_IN_HEAVY = {
 }
 
 
+@pytest.mark.long
 def test_a_finding_can_be_made_again(
     vehicle: Vehicle, corpus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

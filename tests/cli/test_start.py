@@ -17,7 +17,7 @@ from rov_fmu.export.compile import PLATFORMS
 from rov_fmu.motion.layout import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.commands import ROOT, TESTS, start
+from tests.commands import BARE, ROOT, TESTS, start
 
 _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
 _posix = pytest.mark.skipif(os.name != "posix", reason="terminals and signals are POSIX")
@@ -112,12 +112,14 @@ def test_the_script_for_a_shell_is_there(shell: str) -> None:
 
 # ---- Progress --------------------------------------------------------------------------------------------------------
 
+_BUILD = ["build", str(BARE), "--platform=host", "-o"]
+
 
 @_posix
 def test_a_build_tells_its_progress_on_a_terminal(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
     plain = {"TERM": "xterm", "NO_COLOR": "1"}
-    process = start(["build", "--platform=host", "-o", str(tmp_path / "x.fmu")], environment=plain, stdout=theirs)
+    process = start([*_BUILD, str(tmp_path / "x.fmu")], environment=plain, stdout=theirs)
     os.close(theirs)
     said = b""
     while part := _read(ours):
@@ -138,7 +140,7 @@ def _read(terminal: int) -> bytes:
 
 
 def test_a_build_is_quiet_where_there_is_no_terminal(tmp_path: Path) -> None:
-    process = start(["build", "--platform=host", "-o", str(tmp_path / "x.fmu")], stdout=subprocess.PIPE)
+    process = start([*_BUILD, str(tmp_path / "x.fmu")], stdout=subprocess.PIPE)
     out, said = process.communicate(timeout=60)
     assert (process.returncode, said) == (0, "")
     assert "compiling" not in out

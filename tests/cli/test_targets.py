@@ -93,7 +93,7 @@ def bound_by_permissions() -> list[str]:
 
 
 @_posix
-@pytest.mark.parametrize("what", ["folder", "files"])
+@pytest.mark.parametrize("what", ["folder", pytest.param("files", marks=pytest.mark.long)])
 def test_what_is_read_only_stays(what: str, tmp_path: Path) -> None:
     target, temporary = full_folder(tmp_path)
     for path in target.iterdir():

@@ -13,14 +13,14 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.export import compile as fmu_compile
-from tests.commands import ROOT
+from tests.commands import BARE, ROOT
 
 _SCRIPT = str(ROOT / "build_fmu.py")
 _OLD = b"the old one"
 
 
 def _build(output: Path, *arguments: str) -> int:
-    return main(["build", "--platform", "host", "-o", str(output), *arguments])
+    return main(["build", str(BARE), "--platform", "host", "-o", str(output), *arguments])
 
 
 @pytest.fixture

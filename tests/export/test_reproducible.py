@@ -3,6 +3,7 @@
 import hashlib
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -14,32 +15,34 @@ _BUILDS = {"native": ("--platform", "linux64", "--platform", "win64"), "pythonfm
 _OLDEST, _NEWEST = 10, 14  # Python 3, as pyproject.toml has it
 
 
-def _built(folder: Path, *command: str) -> dict[str, str]:
+def _built(folder: Path, *command: str, flavours: Sequence[str] = tuple(_BUILDS)) -> dict[str, str]:
     """Build both flavours with a command; their hashes."""
     hashes = {}
-    for name, arguments in _BUILDS.items():
+    for name in flavours:
+        arguments = _BUILDS[name]
         fmu = folder / f"{name}.fmu"
         subprocess.run([*command, *arguments, "-o", str(fmu)], check=True, capture_output=True, cwd=folder)
         hashes[name] = hashlib.sha256(fmu.read_bytes()).hexdigest()
     return hashes
 
 
-def _from_checkout(python: str, folder: Path) -> dict[str, str]:
-    return _built(folder, python, str(ROOT / "build_fmu.py"))
+_CHECKOUT = str(ROOT / "build_fmu.py")
 
 
-def test_built_in_another_folder(tmp_path: Path) -> None:
+@pytest.mark.parametrize("flavour", ["native", pytest.param("pythonfmu", marks=pytest.mark.long)])
+def test_built_in_another_folder(flavour: str, tmp_path: Path) -> None:
     one, other = tmp_path / "here", tmp_path / "deep" / "er and other"
     for folder in (one, other):
         folder.mkdir(parents=True)
-    assert _from_checkout(sys.executable, other) == _from_checkout(sys.executable, one)
+    here, there = (_built(folder, sys.executable, _CHECKOUT, flavours=[flavour]) for folder in (one, other))
+    assert here == there
 
 
 @pytest.fixture(scope="module")
 def pinned(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Built by this Python from the checkout, with the versions of constraints.txt."""
     folder = tmp_path_factory.mktemp("pinned")
-    return _from_checkout(environment(folder / "venv", "-c", CONSTRAINTS, ROOT).python, folder)
+    return _built(folder, environment(folder / "venv", "-c", CONSTRAINTS, ROOT).python, _CHECKOUT)
 
 
 @pytest.mark.long

@@ -66,7 +66,7 @@ def check_line(text: str, folder: Path) -> None:
         assert len(line.replace(str(folder), "")) < 350
 
 
-@pytest.mark.parametrize("examples", [150, pytest.param(2000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [100, pytest.param(2000, marks=pytest.mark.long)])
 def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_path: Path) -> None:
     folder = tmp_path / "changed"
 
@@ -86,7 +86,7 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [5, pytest.param(30, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [3, pytest.param(30, marks=pytest.mark.long)])
 @pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", "time_constant_yaw.csv", "thrust_top.csv", LOG])
 def test_any_folder_is_identified_or_one_clear_line(
     only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys
@@ -165,7 +165,7 @@ def tuned_or_one_line(code: int, tuned: Path, capsys: Capsys) -> tuple[str, str]
     return printed, said
 
 
-@pytest.mark.parametrize("examples", [50, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [20, pytest.param(1000, marks=pytest.mark.long)])
 def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     points, tuned = tmp_path / "points.csv", tmp_path / "tuned.toml"
     content = b"command [%],velocity [cm/s],time constant [s]\n20,11,3.2\n30,17.5,2.2\n70,37,1\n"
@@ -180,7 +180,7 @@ def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [150, pytest.param(2000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [60, pytest.param(2000, marks=pytest.mark.long)])
 def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     tuned = tmp_path / "tuned.toml"
     words = st.one_of(NUMBERS.filter(lambda x: abs(x) < 10**400), CELLS, st.floats(0.0, 10.0)).map(str)
@@ -197,7 +197,7 @@ def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [50, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [20, pytest.param(1000, marks=pytest.mark.long)])
 def test_any_published_tables_are_shown_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     original = VIDEORAY.parent / "tables"
     vehicle = tmp_path / "videoray.toml"

@@ -63,7 +63,7 @@ def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
     return read_model_description(str(fmu), validate=True)
 
 
-@pytest.mark.parametrize("examples", [100, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [60, pytest.param(1000, marks=pytest.mark.long)])
 def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int, path: Path) -> None:
     usable = 0
 
@@ -200,7 +200,9 @@ def test_what_chance_hardly_finds_is_one_clear_line(case: str, path: Path) -> No
         assert word in str(caught.value)
 
 
-@pytest.mark.parametrize("identifier", ["int", "x" * 100, "__init__"])
+@pytest.mark.parametrize(
+    "identifier", ["x" * 100, *(pytest.param(word, marks=pytest.mark.long) for word in ("int", "__init__"))]
+)
 def test_any_identifier_makes_an_fmu(identifier: str, path: Path) -> None:
     path.write_text(TEXT.replace('identifier = "videoray"', f'identifier = "{identifier}"'), encoding="utf-8")
     fmu = path.with_name("out.fmu")
