@@ -105,6 +105,8 @@ static void call_fmi2GetRealOutputDerivatives(slot *s)
     }
 }
 
+static unsigned wild; /* steps of an input that may take many pieces */
+
 static void call_fmi2DoStep(slot *s)
 {
     static const double usual[] = {1e-3, 1e-2, 0.1, 1.0, 100.0, 1000.0};
@@ -118,6 +120,7 @@ static void call_fmi2DoStep(slot *s)
     verdict wanted = legal(s, CALL_fmi2DoStep, good != REFUSED);
     if (wanted == ACCEPTED && !(good == ACCEPTED && is_moderate(s->f) && is_calm(s->f, h))) {
         wanted = EITHER;
+        wild++;
     }
     const fmi2Status status = fmi2DoStep(s->f, t, h, take_bool());
     if (wanted == EITHER && s->f->now.mode == FAILED) { /* it overflows, or takes too many pieces: nothing else may have changed */
