@@ -10,7 +10,8 @@ enum {
     TERMS_MANY = 10
 };
 
-/* The rules on 0 ... 1. Eight places are exact to rounding up to a time of 1 by the bending rate and a turn of 2 rad: the error of n is f^(2n) (n!)^4 / ((2n + 1) (2n)!^3), and f has no pole within 2 by the rate. */
+/* The rules on 0 ... 1. Eight places are exact to rounding up to a time of 1 by the bending rate and a turn of 2 rad: the
+ * error of n is f^(2n) (n!)^4 / ((2n + 1) (2n)!^3), and f has no pole within 2 by the rate. */
 static const double LONGEST_TURN = 2.0, FULL_TURN = 6.283185307179586;
 static const double PLACES[] = {
     0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629, /* four */

@@ -88,8 +88,8 @@ _MOST = 10
 def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> list[str]:
     """Problems of the file in a line each: key, value, what is allowed."""
     form = _Form(model)
-    shown = (p for p in problems if p["type"] != "missing" or not _misspelt(p["loc"], problems, form))
-    return [*dict.fromkeys(_told(p, data, form) for p in shown)]
+    to_tell = (p for p in problems if p["type"] != "missing" or not _misspelt(p["loc"], problems, form))
+    return [*dict.fromkeys(_told(p, data, form) for p in to_tell)]
 
 
 def listed(names: Iterable[str]) -> str:

@@ -64,9 +64,10 @@ def _marks(rov: Rov, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
 
 
 @dataclass(frozen=True)
-class _Scene:
+class Scene:
     """What a view shows, in metres; the second coordinate runs downward."""
 
+    view: str
     marks: list[_Mark]
     labels: list[tuple[str, Place, str]]
     """Text, centre and colour."""
@@ -74,22 +75,29 @@ class _Scene:
     """How far thrusters are from the centre of mass."""
     limits: tuple[Place, Place]
 
+    @property
+    def inches(self) -> Place:
+        """Width and height of a drawing that it fits."""
+        (left, right), (low, high) = self.limits
+        return _WIDTH, _WIDTH * (low - high) / (right - left) + 0.3
 
-def _scene(rov: Rov, view: str) -> _Scene:
-    """A view, at the scale that both views share."""
+
+def scenes(rov: Rov) -> dict[str, Scene]:
+    """By view, at the scale that both share."""
     inch = 0.9 * _size(rov)
     for _ in range(3):  # the larger the part of the drawing that text takes, the smaller the rest
-        scenes = {name: _arranged(rov, name, inch) for name in VIEWS}
-        left, right = zip(*(scene.limits[0] for scene in scenes.values()), strict=True)
+        found = {view: _arranged(rov, view, inch) for view in VIEWS}
+        left, right = zip(*(scene.limits[0] for scene in found.values()), strict=True)
         inch = (max(right) - min(left)) / _WIDTH
-    return replace(scenes[view], limits=((min(left), max(right)), scenes[view].limits[1]))
+    across = min(left), max(right)
+    return {view: replace(scene, limits=(across, scene.limits[1])) for view, scene in found.items()}
 
 
 def _size(rov: Rov) -> float:
     return max([_SMALLEST, *(abs(part) for thruster in rov.layout.thrusters for part in place(rov, thruster))])
 
 
-def _arranged(rov: Rov, view: str, inch: float) -> _Scene:
+def _arranged(rov: Rov, view: str, inch: float) -> Scene:
     """A view with its names, where an inch is so many metres."""
     down, sight, toward = VIEWS[view]
     size = _size(rov)
@@ -134,7 +142,7 @@ def _arranged(rov: Rov, view: str, inch: float) -> _Scene:
     edge = 0.06 * inch
     has_scale = any(any(place(rov, thruster)) for thruster in rov.layout.thrusters)
     low += (0.3 if has_scale else 0.06) * inch
-    return _Scene(marks, labels, size, ((left - edge, right + edge), (low, high - edge)))
+    return Scene(view, marks, labels, size, ((left - edge, right + edge), (low, high - edge)))
 
 
 def _armed(rov: Rov) -> Point:
@@ -147,17 +155,9 @@ def _turn(size: float) -> tuple[Place, Place]:
     return tail, tip
 
 
-def drawing_size(rov: Rov, view: str) -> Place:
-    """Width and height in inches that fit a drawing."""
-    (left, right), (low, high) = _scene(rov, view).limits
-    return _WIDTH, _WIDTH * (low - high) / (right - left) + 0.3
-
-
-def draw_thrusters(ax: Axes, rov: Rov, view: str) -> None:
+def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
     """Centre of mass, body frame, thrusters with the direction of a positive force, R and γ where they are given."""
-    down = VIEWS[view][0]
-    scene = _scene(rov, view)
-    size = scene.size
+    down, size = VIEWS[scene.view][0], scene.size
     _draw_frame(ax, size, turns=down is SWAY and rov.layout.has(YAW))
     if not any(mark.toward and hypot(*mark.at) < 0.05 * size for mark in scene.marks):
         _draw_centre(ax, size)
@@ -173,7 +173,7 @@ def draw_thrusters(ax: Axes, rov: Rov, view: str) -> None:
     if any(any(place(rov, thruster)) for thruster in rov.layout.thrusters):
         _draw_scale(ax, size)
     ax.set(xticks=[], yticks=[])
-    ax.set_title(view.capitalize(), loc="left")
+    ax.set_title(scene.view.capitalize(), loc="left")
 
 
 def _arrow(ax: Axes, start: tuple[float, float], end: tuple[float, float], color: str, **how: Any) -> None:

@@ -17,7 +17,7 @@ from rov_fmu.export.interface import variables
 from rov_fmu.motion.layout import ARM, Axis, Layout
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages import equations
-from rov_fmu.pages.drawing import VIEWS, draw_thrusters, drawing_size
+from rov_fmu.pages.drawing import draw_thrusters, scenes
 from rov_fmu.pages.plots import Step, draw_curve, draw_steps, evenly, finish, measured_step
 from rov_fmu.pages.svg import LIGHT, inline_file, inline_svg, svg_file
 from rov_fmu.pages.templates import page
@@ -80,9 +80,8 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True) -> str:
         motions=[motion for axis in axes for motion in _motions(rov, axis, held)],
         frames=[inline_file(label, path) for label, path in own],
         thrusters=[
-            inline_svg(f"Thrusters {view}", partial(_draw, partial(draw_thrusters, rov=rov, view=view)),
-                       drawing_size(rov, view))
-            for view in VIEWS
+            inline_svg(f"Thrusters {view}", partial(_draw, partial(draw_thrusters, rov=rov, scene=scene)), scene.inches)
+            for view, scene in scenes(rov).items()
         ],
         curves=[_plot(f"Thrust curve: {c.name}", partial(draw_curve, rov=rov, curve=c)) for c in layout.curves],
         steady=[

@@ -16,7 +16,7 @@ _OLDEST, _NEWEST = 10, 14  # Python 3, as pyproject.toml has it
 
 
 def _built(folder: Path, *command: str, flavours: Sequence[str] = tuple(_BUILDS)) -> dict[str, str]:
-    """Build both flavours with a command; their hashes."""
+    """Build flavours with a command; their hashes."""
     hashes = {}
     for name in flavours:
         arguments = _BUILDS[name]

@@ -14,7 +14,7 @@ from matplotlib.text import Annotation
 
 from rov_fmu.export.archive import Content, native_content, python_content
 from rov_fmu.export.interface import variables
-from rov_fmu.pages.drawing import VIEWS, draw_thrusters, drawing_size, place
+from rov_fmu.pages.drawing import VIEWS, draw_thrusters, place, scenes
 from rov_fmu.pages.fmu_page import documentation, documentation_page
 from rov_fmu.pages.paper_figures import write_figures
 from rov_fmu.pages.templates import number, pretty_unit
@@ -308,7 +308,7 @@ def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehi
     """An arrow begins at the thruster and points along its direction; in pixels y is down."""
     figure = Figure(figsize=(6.0, 6.0))
     ax = figure.subplots()
-    draw_thrusters(ax, heavy.rov, "from above")
+    draw_thrusters(ax, heavy.rov, scenes(heavy.rov)["from above"])
     arrows = {(round(a.xyann[0], 2), round(a.xyann[1], 2)): a.xy for a in ax.texts if isinstance(a, Annotation)}
     names = {text.get_text() for text in ax.texts}
     for thruster in heavy.layout.thrusters:
@@ -386,9 +386,10 @@ def test_a_drawing_holds_its_arrows_and_names_which_do_not_cover_each_other(
     vehicle: Vehicle, kind: str, view: str
 ) -> None:
     rov = vehicle.rov if kind == "paper" else VEHICLES[kind]
-    figure = Figure(figsize=drawing_size(rov, view), layout="constrained")
+    scene = scenes(rov)[view]
+    figure = Figure(figsize=scene.inches, layout="constrained")
     ax = figure.subplots()
-    draw_thrusters(ax, rov, view)
+    draw_thrusters(ax, rov, scene)
     figure.draw_without_rendering()
     names = [text for text in ax.texts if text.get_text()]
     boxes = [text.get_window_extent() for text in names]
