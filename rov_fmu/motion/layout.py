@@ -212,6 +212,19 @@ class Layout:
     coupled: bool = False
     """Whether surge, sway and yaw are coupled: Coriolis and Munk terms of a diagonal mass matrix."""
 
+    def extended(self, names: Iterable[str]) -> "Layout":
+        """With these coefficients besides, of its curves and axes."""
+        wanted = set(names)
+
+        def keys(kinds: Iterable[str], has: tuple[str, ...], of: str) -> tuple[str, ...]:
+            return tuple(key for key in kinds if key in has or coefficient_name(key, of) in wanted)
+
+        return replace(
+            self,
+            axes=tuple(replace(form, keys=keys(AXIS, form.keys, form.axis.velocity)) for form in self.axes),
+            curves=tuple(replace(curve, keys=keys(CURVE, curve.keys, curve.name)) for curve in self.curves),
+        )
+
     # -- looked up --
 
     @cached_property

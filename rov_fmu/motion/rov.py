@@ -35,6 +35,10 @@ class Rov:
         """With other values of some coefficients."""
         return Rov(self.layout, {**self.coefficients, **values})
 
+    def extended(self, values: Values) -> "Rov":
+        """With these coefficients, which its layout may not have yet."""
+        return Rov(self.layout.extended(values), {**self.coefficients, **values})
+
     # ---- Thrust ----
 
     def curve_force(self, curve: Curve, command: float) -> float:
@@ -96,15 +100,18 @@ class Rov:
         beta = self[form.axis.coefficient("beta")]
         return self.inertia(form) / beta if beta > 0.0 else inf
 
+    def load(self, form: VehicleAxis) -> float:
+        """Constant load F_0 (N, N.m), where the axis has one."""
+        return self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0
+
     def acceleration_of(self, form: VehicleAxis, thrust: float, load: float = 0.0) -> Riccati:
         """An axis under a held thrust (before α) and load, (18): m v' = β (α F + F_ext + F_0 - a_d |v| v - b_d v)."""
         gain = self.gain(form)
-        F_0 = self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0
         A, B = (gain * self[form.coefficient(key)] for key in ("a_d", "b_d"))
         reverse = None
         if "a_d_reverse" in form.keys:
             reverse = gain * self[form.coefficient("a_d_reverse")], gain * self[form.coefficient("b_d_reverse")]
-        return Riccati(A, B, gain * (self[form.axis.coefficient("alpha")] * thrust + load + F_0), reverse)
+        return Riccati(A, B, gain * (self[form.axis.coefficient("alpha")] * thrust + load + self.load(form)), reverse)
 
     def axes(self, inputs: Values, F: Values) -> tuple[Riccati, ...]:
         """Every axis under held inputs and forces of the thrusters."""
@@ -209,6 +216,10 @@ class Rov:
         """Thrust (N) or torque (N.m) along an axis before the tuning α, by (9), (10) and (4), once it is steady."""
         F = self.commanded(self.held_inputs(axis, command))
         return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
+
+    def strongest(self, axis: Axis) -> float:
+        """The strongest thrust or torque along an axis, before the tuning α, whichever way."""
+        return max(abs(self.force(axis, c)) for c in (1.0, -1.0))
 
     def held(self, axis: Axis, command: float) -> Riccati:
         """The motion along an axis under a held command, (18), once the thrust is steady."""

@@ -40,6 +40,21 @@ def given(table: Strict, kinds: Mapping[str, Kind]) -> dict[str, Quantity]:
     return {key: q for key in kinds if (q := getattr(table, key)) is not None}
 
 
+def keys(table: Strict, kinds: Mapping[str, Kind]) -> tuple[str, ...]:
+    """The coefficients that a vehicle has by a table of the file: those needed, and those given."""
+    has = given(table, kinds)
+    return tuple(key for key, kind in kinds.items() if key in has or kind.needed)
+
+
+def _opened(form: Any, kinds: Mapping[str, Kind]) -> Any:
+    """A table none of whose coefficients is needed."""
+    fields: dict[str, Any] = {
+        key: (field.annotation | None, Field(None, description=field.description))
+        for key, field in form.model_fields.items() if key in kinds and field.is_required()
+    }  # fmt: skip
+    return create_model(f"_Open{form.__name__}", __base__=form, __doc__=form.__doc__, **fields)
+
+
 # ---- Body, arm, curves, axes -----------------------------------------------------------------------------------------
 
 
@@ -70,14 +85,20 @@ class Curve(_coefficients("Curve", _CURVE, CURVE)):  # type: ignore[misc]
 
 
 _WORDS = "Velocity {0.velocity} in {0.unit}, positive {0.positive}."
-_axes: dict[str, Any] = {
-    axis.name: (_coefficients(axis.name.capitalize(), layout.metas_of(axis), AXIS, _WORDS.format(axis)) | None, None)
+_tables = {
+    axis.name: _coefficients(axis.name.capitalize(), layout.metas_of(axis), AXIS, _WORDS.format(axis))
     for axis in AXES.values()
 }
+_axes: dict[str, Any] = {name: (table | None, None) for name, table in _tables.items()}
+_open_axes: dict[str, Any] = {name: (_opened(table, AXIS) | None, None) for name, table in _tables.items()}
 
 
 class Axes(create_model("_Axes", __base__=Strict, **_axes)):  # type: ignore[misc]
     """The axes that the vehicle has."""
+
+
+OpenArm, OpenCurve = _opened(Arm, ARM), _opened(Curve, CURVE)
+OpenAxes = create_model("_OpenAxes", __base__=Strict, __doc__=Axes.__doc__, **_open_axes)
 
 
 # ---- Thrusters -------------------------------------------------------------------------------------------------------
@@ -179,13 +200,18 @@ class Alternative(Strict, extra="allow"):
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
 
 
-class Parts(Strict):
-    """A vehicle file as far as it could be read."""
+class _Opening(Strict):
+    """What stands first in a vehicle file."""
 
     format: Literal[2] | None = None
     """Version of the form of this file."""
     vehicle: FileHead | None = None
     validity: Validity | None = None
+
+
+class Hardware(Strict):
+    """The tables that say what a vehicle has."""
+
     body: Body | None = None
     arm: Arm | None = None
     curves: dict[Symbol, Curve] = Field(default={}, max_length=MOST)
@@ -194,9 +220,6 @@ class Parts(Strict):
     axes: Axes | None = None
     inputs: dict[Symbol, dict[str, _Gain]] = Field(default={}, max_length=MOST)
     """Where one command drives several thrusters: name of the command to the thrusters that it drives, with gains."""
-    alternatives: dict[str, Alternative] = Field(default={})
-    """Coefficients published beside the ones used, under a name each."""
-    provenance: Made | None = None
 
     @property
     def axis_tables(self) -> dict[Axis, Any]:
@@ -206,13 +229,45 @@ class Parts(Strict):
     @property
     def layout(self) -> Layout:
         """What the vehicle has."""
-        axes = tuple(VehicleAxis(axis, tuple(given(table, AXIS))) for axis, table in self.axis_tables.items())
+        axes = tuple(VehicleAxis(axis, keys(table, AXIS)) for axis, table in self.axis_tables.items())
         curves = tuple(
-            layout.Curve(name, tuple(given(curve, CURVE)), curve.together, curve.description or "", curve.equation)
+            layout.Curve(name, keys(curve, CURVE), curve.together, curve.description or "", curve.equation)
             for name, curve in self.curves.items()
         )
         coupled = bool(self.body and self.body.coupling)
         return Layout(axes, curves, tuple(t.plain() for t in self.thruster), self.inputs, coupled)
+
+    def quantities(self, of: Layout) -> dict[str, Quantity | None]:
+        """Every coefficient that a vehicle has, as these tables give it; None where they do not."""
+        found: dict[str, Quantity | None] = {}
+        for name, place in where(of):
+            table: Any = self
+            for key in place:
+                table = table.get(key) if isinstance(table, dict) else getattr(table, key, None)
+            found[name] = table
+        return found
+
+    @property
+    def thruster_sources(self) -> dict[str, dict[str, str]]:
+        """Where `direction` and `position` of each thruster come from, by its name."""
+        return {t.name: {"direction": t.direction.source} | ({"position": t.position.source} if t.position else {})
+                for t in self.thruster}  # fmt: skip
+
+
+class OpenHardware(Hardware):
+    """The same without the coefficients that are yet to be found."""
+
+    arm: OpenArm | None = None  # type: ignore[valid-type]
+    curves: dict[Symbol, OpenCurve] = Field(default={}, max_length=MOST)  # type: ignore[valid-type]
+    axes: OpenAxes | None = None  # type: ignore[valid-type]
+
+
+class Parts(Hardware, _Opening):
+    """A vehicle file as far as it could be read."""
+
+    alternatives: dict[str, Alternative] = Field(default={})
+    """Coefficients published beside the ones used, under a name each."""
+    provenance: Made | None = None
 
 
 class File(Parts):

@@ -1,14 +1,13 @@
 """Whether what a vehicle file says makes sense as a vehicle: a line for everything that does not."""
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from math import hypot, sin
-from typing import Any
+from math import sin
+from typing import Any, TypeVar
 
 from pydantic_core import ErrorDetails
 
-from rov_fmu.files.messages import brief, shown
-from rov_fmu.files.toml_file import Strict, Toml, check, label, listed
+from rov_fmu.files.messages import shown
+from rov_fmu.files.toml_file import Strict, Toml, check, label, line, listed
 from rov_fmu.motion.layout import (
     ARM,
     AXIS,
@@ -23,19 +22,20 @@ from rov_fmu.motion.layout import (
     Curve,
     Kind,
     Layout,
+    Meta,
 )
+from rov_fmu.vehicle.geometry import coincidences, geometry, mixed, places
 from rov_fmu.vehicle.quantity import Quantity, within
-from rov_fmu.vehicle.schema import Parts, given, where
+from rov_fmu.vehicle.schema import Hardware, Parts, given
 
-_PARTS = ("curves", "thruster", "axes", "inputs", "alternatives")
+_Form = TypeVar("_Form", bound=Hardware)
+_PARTS = ("curves", "thruster", "axes", "inputs", "alternatives", "known", "windows")
 """Tables of tables: where one of them has a mistake the others can still be judged."""
-_PARALLEL = 1e-6
-"""Two axes that the thrusters drive in ratios that differ by less can only be driven together."""
 
 
 def as_far_as_readable(
-    data: Toml, problems: Sequence[ErrorDetails], context: Mapping[str, object]
-) -> tuple[Parts, set[str]]:
+    data: Toml, problems: Sequence[ErrorDetails], context: Mapping[str, object], form: type[_Form]
+) -> tuple[_Form, set[str]]:
     """The file without the tables that have a mistake of form, and the names of the top tables that have one."""
     parts: dict[str, Any] = dict(data)
     lost = {str(problem["loc"][0]) for problem in problems}
@@ -47,7 +47,7 @@ def as_far_as_readable(
                 parts[name] = [entry for n, entry in enumerate(table) if n not in bad]
             elif isinstance(table, dict):
                 parts[name] = {key: entry for key, entry in table.items() if key not in bad}
-    readable, _ = check(parts, Parts, **context)
+    readable, _ = check(parts, form, **context)
     assert readable is not None, "all that has a mistake is left out"
     return readable, lost
 
@@ -56,29 +56,33 @@ def nonsense(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     """A line for all that makes no sense; what needs a table that has a mistake is not judged."""
     named = [*_names(parts, lost, data)]
     yield from named
-    yield from _keys(parts, lost)
+    yield from _keys(parts)
+    yield from _needs(parts, lost)
     if lost & {"thruster", "axes", "inputs"} or not parts.axis_tables:
         return
     layout = parts.layout
-    placed = [*_places(parts, layout)]
-    yield from placed or _geometry(layout)
+    placed = [*places(layout), *_lever(parts, layout)]
+    yield from placed or geometry(layout)
     if not (placed or named):
-        yield from _mixed(layout)
+        yield from mixed(layout)
     coupled = [*_coupling(parts, layout)]
     yield from coupled
     if not (named or coupled or lost & {"curves", "arm", "body"}):
-        yield from _coincidences(layout)
-        yield from _alternatives(parts, layout)
+        yield from coincidences(layout)
+        for title, alternative in parts.alternatives.items():
+            yield from misgiven(f"alternatives.{title}", alternative.quantities, layout.coefficients)
 
 
-def _line(key: str, reason: str, *value: object) -> str:
-    return f"{brief(key)} = {shown(value[0])}: {reason}" if value else f"{brief(key)}: {reason}"
+def incoherent(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
+    """A line for names that are none or double, and for keys that need others, whether or not all of it is given."""
+    yield from _names(parts, lost, data)
+    yield from _keys(parts)
 
 
 # ---- Names and keys --------------------------------------------------------------------------------------------------
 
 
-def _names(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
+def _names(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
     """Of thrusters, curves and inputs."""
     entries = data["thruster"] if isinstance(data.get("thruster"), list) else []
     found = [(n, entry) for n, entry in enumerate(entries) if isinstance(entry, dict)]
@@ -90,12 +94,12 @@ def _names(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     for n, entry in found:
         if curves and isinstance(curve := entry.get("curve"), str) and curve not in curves:
             reason = f"there is no such curve, only {listed(curves)}"
-            yield _line(f"{label('thruster', entries, n)}.curve", reason, curve)
+            yield line(f"{label('thruster', entries, n)}.curve", reason, curve)
     if "thruster" in lost:
         return
     for name in parts.curves:
         if name not in {thruster.curve for thruster in parts.thruster}:
-            yield _line(f"curves.{name}", "no thruster has this curve")
+            yield line(f"curves.{name}", "no thruster has this curve")
     if "inputs" not in lost:
         yield from _gains(parts.inputs, [name for _, name in named])
 
@@ -107,7 +111,7 @@ def _alike(table: str, names: Sequence[tuple[str, str]]) -> Iterator[str]:
         first, other = before.setdefault(name.casefold(), (key, name))
         if key != first:
             alike = "this name" if other == name else f"the name {shown(other)}: they differ only in case"
-            yield _line(f"{table}{key}{'.name' if table == 'thruster' else ''}", f"{table}{first} has {alike}", name)
+            yield line(f"{table}{key}{'.name' if table == 'thruster' else ''}", f"{table}{first} has {alike}", name)
 
 
 def _gains(inputs: Mapping[str, Mapping[str, float]], names: Sequence[str]) -> Iterator[str]:
@@ -116,33 +120,37 @@ def _gains(inputs: Mapping[str, Mapping[str, float]], names: Sequence[str]) -> I
     for name, gains in inputs.items():
         for driven in gains:
             if driven not in names:
-                yield _line(f"inputs.{name}.{driven}", f"there is no such thruster, only {listed(names)}")
+                yield line(f"inputs.{name}.{driven}", f"there is no such thruster, only {listed(names)}")
                 wrong = True
         if not any(gains.values()):
-            yield _line(f"inputs.{name}", "drives no thruster: give one a gain other than 0")
+            yield line(f"inputs.{name}", "drives no thruster: give one a gain other than 0")
             wrong = True
     for name in names if inputs and not wrong else ():
         if not any(gains.get(name) for gains in inputs.values()):
-            yield _line(f"inputs: no input drives the thruster {name}", "give a gain other than 0 in one of them")
+            yield line(f"inputs: no input drives the thruster {name}", "give a gain other than 0 in one of them")
 
 
-def _keys(parts: Parts, lost: set[str]) -> Iterator[str]:
-    """Keys that need others, or have no use."""
+def _keys(parts: Hardware) -> Iterator[str]:
+    """Keys that need others."""
     for name, curve in parts.curves.items():
         quantities = given(curve, CURVE)
         yield from (lame := [*_pairs(f"curves.{name}", quantities)])
-        if not lame:
+        if not lame and {"a_t", "b_t"} <= quantities.keys():
             form = Curve(name, tuple(quantities))
             values = {form.coefficient(key): q.value for key, q in quantities.items()}
             yield from no_thrust(form, values, f"curves.{name}")
         if curve.c_0_reverse and not curve.c_0:
-            yield _line(f"curves.{name}.c_0", "this key is missing, and c_0_reverse is there")
+            yield line(f"curves.{name}.c_0", "this key is missing, and c_0_reverse is there")
     for axis, table in parts.axis_tables.items():
         yield from _pairs(f"axes.{axis.name}", given(table, AXIS))
+
+
+def _needs(parts: Parts, lost: set[str]) -> Iterator[str]:
+    """Tables that others need, or that have no use."""
     if "axes" in lost:
         return
     if not parts.axis_tables:
-        yield _line("axes", "must have at least one of surge, sway, heave, yaw")
+        yield line("axes", "must have at least one of surge, sway, heave, yaw")
         return
     if parts.body:
         yield from _needed("body", parts.body, BODY, {axis.inertia: axis for axis in reversed(parts.axis_tables)})
@@ -151,14 +159,14 @@ def _keys(parts: Parts, lost: set[str]) -> Iterator[str]:
         if parts.arm:
             yield from _needed("arm", parts.arm, ARM, turned)
         elif turned:
-            yield _line("arm", "this table with R and gamma is missing, and a thruster says arm")
+            yield line("arm", "this table with R and gamma is missing, and a thruster says arm")
 
 
 def _pairs(table: str, keys: Mapping[str, Quantity]) -> Iterator[str]:
     """a and b in reverse come together."""
     for one, other in (("a_t", "b_t"), ("b_t", "a_t"), ("a_d", "b_d"), ("b_d", "a_d")):
         if one + REVERSE in keys and other + REVERSE not in keys:
-            yield _line(f"{table}.{other}{REVERSE}", f"this key is missing, and {one}{REVERSE} is there")
+            yield line(f"{table}.{other}{REVERSE}", f"this key is missing, and {one}{REVERSE} is there")
 
 
 def no_thrust(curve: Curve, values: Mapping[str, float], place: str) -> Iterator[str]:
@@ -169,77 +177,27 @@ def no_thrust(curve: Curve, values: Mapping[str, float], place: str) -> Iterator
         if (force := (values[a_t] * m + values[b_t]) * m) <= 0.0:
             where_to = " in reverse" if end else ""
             reason = f"must give a force above 0 at full command{where_to}, but {a_t} and {b_t} give {force:g} N"
-            yield _line(place, reason)
+            yield line(place, reason)
 
 
 def _needed(name: str, table: Strict, kinds: Mapping[str, Kind], needed: Mapping[str, Axis]) -> Iterator[str]:
     has = given(table, kinds)
     for key in kinds:
         if key in needed and key not in has:
-            yield _line(f"{name}.{key}", f"this key is missing, and the vehicle has {needed[key].name}")
+            yield line(f"{name}.{key}", f"this key is missing, and the vehicle has {needed[key].name}")
         elif key in has and key not in needed:
-            yield _line(f"{name}.{key}", "nothing of this vehicle needs it")
+            yield line(f"{name}.{key}", "nothing of this vehicle needs it")
 
 
-# ---- Geometry --------------------------------------------------------------------------------------------------------
+# ---- Arm, coupling, coefficients -------------------------------------------------------------------------------------
 
 
-def _places(parts: Parts, layout: Layout) -> Iterator[str]:
-    """The place of each thruster, said once and where it matters."""
-    for thruster in layout.thrusters:
-        key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction
-        if thruster.arm and thruster.position:
-            yield _line(f"{key}.arm", "must not stand beside position")
-        elif thruster.arm and x <= 0.0:
-            yield _line(f"{key}.arm", "must be of a thruster that pushes ahead; give its position instead")
-        elif layout.has(YAW) and not thruster.arm and thruster.position is None and hypot(x, y) > _PARALLEL:
-            yield _line(f"{key}.position", "this key, or arm, is missing, and the vehicle has yaw")
+def _lever(parts: Parts, layout: Layout) -> Iterator[str]:
+    """The arm, where there is one."""
     if layout.has_arm and parts.arm and parts.arm.R and parts.arm.gamma:
         for name, lever in (("R", parts.arm.R.value), ("gamma", sin(parts.arm.gamma.value))):
             if lever == 0.0:
-                yield _line(f"arm.{name}.value", "must be more than 0, or the arm R sin γ is none", lever)
-
-
-def _geometry(layout: Layout) -> Iterator[str]:
-    """Whether every axis can be driven, by itself, and everything that drives does."""
-    axes = [form.axis for form in layout.axes]
-    for thruster in layout.thrusters:
-        if not any(thruster in layout.drivers(axis) for axis in axes):
-            reason = f"acts on no axis of the vehicle, which are {listed([axis.name for axis in axes])}"
-            yield _line(f"thruster.{thruster.name}", reason)
-    free: list[tuple[str, list[float]]] = []  # axes that can be driven apart, as orthonormal rows of effects
-    for axis in axes:
-        if not layout.drivers(axis):
-            reason = "no thruster has an arm about the vertical axis" if axis is YAW else "no thruster drives it"
-            yield _line(f"axes.{axis.name}", reason)
-            continue
-        left = _unit([thruster.effect(axis) for thruster in layout.thrusters])
-        together = []
-        for name, other in free:
-            along = sum(a * b for a, b in zip(left, other, strict=True))
-            left = [a - along * b for a, b in zip(left, other, strict=True)]
-            together += [name] if abs(along) > _PARALLEL else []
-        if hypot(*left) > _PARALLEL:
-            free.append((axis.name, _unit(left)))
-        else:
-            yield _line(
-                f"axes.{axis.name}", f"the thrusters cancel: they drive it only together with {listed(together)}"
-            )
-
-
-def _mixed(layout: Layout) -> Iterator[str]:
-    """Inputs whose gains cancel; and only where there are none, axes that no input drives."""
-    driven = {axis: layout.signs(axis) for axis in (form.axis for form in layout.axes) if layout.drivers(axis)}
-    idle = [name for name in layout.mix if not any(f"u_{name}" in signs for signs in driven.values())]
-    for name in idle:
-        yield _line(f"inputs.{name}", "drives no axis of the vehicle: its gains cancel")
-    for axis in (axis for axis, signs in driven.items() if not (signs or idle)):
-        yield _line(f"axes.{axis.name}", "no input drives it: the gains cancel")
-
-
-def _unit(row: Sequence[float]) -> list[float]:
-    length = hypot(*row)
-    return [part / length for part in row]
+                yield line(f"arm.{name}.value", "must be more than 0, or the arm R sin γ is none", lever)
 
 
 def _coupling(parts: Parts, layout: Layout) -> Iterator[str]:
@@ -248,36 +206,25 @@ def _coupling(parts: Parts, layout: Layout) -> Iterator[str]:
         return
     coupled = (SURGE, SWAY, YAW)
     if missing := [axis.name for axis in coupled if not layout.has(axis)]:
-        yield _line("body.coupling", f"needs surge, sway and yaw; there is no {' and no '.join(missing)}")
+        yield line("body.coupling", f"needs surge, sway and yaw; there is no {' and no '.join(missing)}")
         return
     for axis in coupled:
         beta = parts.axis_tables[axis].beta
         if beta and beta.value < LEAST_BETA:
             reason = f"must be at least {LEAST_BETA:g} where axes are coupled"
-            yield _line(f"axes.{axis.name}.beta.value", reason, beta.value)
+            yield line(f"axes.{axis.name}.beta.value", reason, beta.value)
 
 
-# ---- Names in the FMU ------------------------------------------------------------------------------------------------
-
-
-def _coincidences(layout: Layout) -> Iterator[str]:
-    """Two variables of the FMU with one name."""
-    names = [*layout.inputs, *layout.state, *layout.thrust, *(name for name, _ in where(layout))]
-    for name in (name for name, count in Counter(names).items() if count > 1):
-        yield _line(name, "two variables of the FMU would have this name; rename a curve or a thruster")
-
-
-def _alternatives(parts: Parts, layout: Layout) -> Iterator[str]:
-    """Coefficients that the vehicle does not have, or in another unit, or out of bounds."""
-    for title, alternative in parts.alternatives.items():
-        for name, quantity in alternative.quantities.items():
-            key = f"alternatives.{title}.{name}"
-            if (meta := layout.coefficients.get(name)) is None:
-                yield _line(key, "there is no such coefficient of this vehicle")
-                continue
-            if quantity.unit != meta.unit:
-                yield _line(f"{key}.unit", f"must be {meta.unit!r}", quantity.unit)
-            try:
-                within(quantity.value, meta)
-            except ValueError as error:
-                yield _line(f"{key}.value", str(error), quantity.value)
+def misgiven(table: str, found: Mapping[str, Quantity], metas: Mapping[str, Meta]) -> Iterator[str]:
+    """Coefficients by name that the vehicle does not have, or in another unit, or out of bounds."""
+    for name, quantity in found.items():
+        key = f"{table}.{name}"
+        if (meta := metas.get(name)) is None:
+            yield line(key, "there is no such coefficient of this vehicle")
+            continue
+        if quantity.unit != meta.unit:
+            yield line(f"{key}.unit", f"must be {meta.unit!r}", quantity.unit)
+        try:
+            within(quantity.value, meta)
+        except ValueError as error:
+            yield line(f"{key}.value", str(error), quantity.value)

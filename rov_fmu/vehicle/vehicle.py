@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.places import FMU_SRC
@@ -14,7 +13,7 @@ from rov_fmu.vehicle.first import FirstFile, quantities
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Quantity
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, File, where
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, File, Parts
 from rov_fmu.vehicle.sense import as_far_as_readable, no_thrust, nonsense
 
 TABLES = {
@@ -130,21 +129,12 @@ def _second(path: Path, data: Toml, context: Mapping[str, object]) -> Vehicle:
     """The second version of the file."""
     file, problems = check(data, File, **context)
     mistakes = told(problems, data, File)
-    mistakes += nonsense(*as_far_as_readable(data, problems, context), data)
+    mistakes += nonsense(*as_far_as_readable(data, problems, context, Parts), data)
     if file is None or mistakes:
         raise VehicleFileError(*(f"{path}: {mistake}" for mistake in mistakes))
-    found: dict[str, Quantity | None] = {}
-    for name, (top, *keys) in where(file.layout):
-        found[name] = getattr(file, top)
-        for key in keys:
-            table: Any = found[name]
-            found[name] = table[key] if isinstance(table, dict) else getattr(table, key)
     alternatives = {name: _alternative(a.description, a.quantities) for name, a in file.alternatives.items()}
-    thruster_sources = {
-        t.name: {"direction": t.direction.source} | ({"position": t.position.source} if t.position else {})
-        for t in file.thruster
-    }
-    return _vehicle(path, file, file.layout, found, alternatives, thruster_sources)
+    found = file.quantities(file.layout)
+    return _vehicle(path, file, file.layout, found, alternatives, file.thruster_sources)
 
 
 def _alternative(description: str, found: Mapping[str, Quantity]) -> Alternative:

@@ -352,7 +352,7 @@ HEAVE, YAW, SURGE_STEADY = "table6_heave_response.csv", "table7_yaw_response.csv
 BAD_TABLES: dict[str, tuple[str, str, str, tuple[str, ...]]] = {
     "text for a number": (HEAVE, "1.76", "slow", ("line 2", "'non-linear Tau [s]'", "'slow'", "number")),
     "decimal comma": (HEAVE, "1.33", '"1,33"', ("line 3", "'non-linear Tau [s]'", "'1,33'", "number")),
-    "NaN": (HEAVE, "0.30", "nan", ("line 4", "'scaled V_ss [m/s]'", "'nan'", "number")),
+    "NaN": (HEAVE, "\n50,", "\nnan,", ("line 4", "'command [%]'", "'nan'", "number")),
     "larger than a double": (HEAVE, "0.30", "1e400", ("line 4", "'scaled V_ss [m/s]'", "'1e400'", "number")),
     "far larger": (HEAVE, "0.30", "1e99999999999999999999", ("line 4", "'scaled V_ss [m/s]'", "number")),
     "underscore": (HEAVE, "0.30", "0.3_0", ("line 4", "'scaled V_ss [m/s]'", "'0.3_0'", "number")),
