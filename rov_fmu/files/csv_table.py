@@ -3,9 +3,9 @@
 import csv
 import io
 import re
-from collections.abc import Container, Iterator, Mapping
-from dataclasses import dataclass
-from math import isfinite, nan
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from math import isfinite, isnan, nan
 from pathlib import Path
 
 from rov_fmu.files.messages import FileError, brief, shown
@@ -13,10 +13,14 @@ from rov_fmu.files.reading import read_text
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 _HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]+)\]")
+_BLANKS = ("", "-", "nan")
+_MOST = 10  # lines on one file
+
+Conversion = Callable[[float], float]
 
 
 class DataFileError(FileError):
-    """A file of data that cannot be used: one line with file, line, column, value and reason."""
+    """A file of data that cannot be used: a line each with file, line, column, value and reason."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +30,18 @@ class Column:
     units: Mapping[str, float]
     optional: bool = False
     blanks: bool = False
-    """Whether its cells may be empty; they read as NaN, as do those that a row of an optional column lacks."""
+    """Whether its cells may be empty, `-` or `nan`; they read as NaN, as do those that a row of an optional column
+    lacks."""
     minimum: float | None = None
     maximum: float | None = None
     """In the first unit."""
     least: float = 0.0
     """Magnitude, of a number other than zero; in the first unit."""
+    also: tuple[str, ...] = ()
+    """Other names of it, where the unit is one of these."""
+    conversions: Mapping[str, Callable[[tuple[float, ...]], Conversion]] = field(default_factory=dict)
+    """Units that are no mere factor. Numbers may follow them, `[us 1500 400]`, and tell the conversion to the first
+    unit; ValueError with the reason where they cannot. The bounds are not for them."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +51,16 @@ class Columns:
     path: Path
     headers: Mapping[str, str]
     """As they stand there, by column."""
+    units: Mapping[str, str]
+    """By column, without the numbers that may follow one."""
     texts: Mapping[str, list[str]]
-    """The cells as they stand there."""
+    """The cells as they stand there, but for decimal commas and blanks, which are empty."""
     values: Mapping[str, list[float]]
     lines: list[int]
+    unread: Mapping[str, int]
+    """Of a loose reading, by column: how many cells are neither numbers nor blank; they read as NaN."""
+    torn: int
+    """Of a loose reading: how many rows were left out, as they have more cells than the header."""
 
     def error(self, row: int, column: str, reason: str) -> DataFileError:
         """The one line for a number that cannot be."""
@@ -52,89 +68,126 @@ class Columns:
         return DataFileError(f"{self.path}, line {self.lines[row]}, column {header} = {text}: {reason}")
 
 
-def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = False) -> Columns:
-    """Read the columns, in any order, with headers such as `command [%]`. Raises DataFileError.
+@dataclass(frozen=True)
+class _Found:
+    """A column of the file at hand."""
 
-    `others` lets the file have columns besides, which are not read.
+    name: str
+    column: Column
+    unit: str
+    convert: Conversion
+    per: float
+
+
+def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = False, loose: bool = False) -> Columns:
+    """Read the columns, in any order, with headers such as `command [%]`. Raises DataFileError with all that is wrong.
+
+    `others` lets the file have columns besides, which are not read. `loose` is for logs: a cell that is missing or no
+    number reads as NaN, and a row with too many cells is left out.
     """
-    lines = _csv_lines(path)
+    text = read_text(path, DataFileError)
+    separator = _separator(text)
+    lines = _csv_lines(path, text, separator)
     line, header = next(lines, (1, []))
-    read: dict[int, tuple[str, float, Column]] = {}
-    for place, title in enumerate(header):
-        try:
-            if found := _column(title, columns, [name for name, *_ in read.values()], others):
-                read[place] = found
-        except ValueError as error:
-            raise DataFileError(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}") from None
-    names = [name for name, *_ in read.values()]
-    for name, column in columns.items():
-        if name not in names and not column.optional:
-            raise DataFileError(f"{path}, line {line}, column {len(header) + 1}: {_title(name, column)!r} is missing")
-    headers = {name: header[place] for place, (name, *_) in read.items()}
-    table = Columns(path, headers, {name: [] for name in names}, {name: [] for name in names}, [])
+    found = _header(path, line, header, columns, others)
+    names = [column.name for column in found.values()]
+    values: dict[str, list[float]] = {name: [] for name in names}
+    texts: dict[str, list[str]] = {name: [] for name in names}
+    numbers: list[int] = []
+    unread = dict.fromkeys(names, 0)
+    torn: list[str] = []
+    wrong: list[str] = []
     for line, cells in lines:
         if len(cells) > len(header):
-            text = shown(cells[len(header)])
-            raise DataFileError(f"{path}, line {line}, column {len(header) + 1} = {text}: there is no such column")
-        for place, (name, per, column) in read.items():
-            text = cells[place] if place < len(cells) else ""
+            told = (
+                f"{path}, line {line}, column {len(header) + 1} = {shown(cells[len(header)])}: there is no such column"
+            )
+            (torn if loose else wrong).append(f"{told}{_comma_hint(cells, separator)}")
+            continue
+        numbers.append(line)
+        for place, column in found.items():
+            there = place < len(cells)
+            cell = _plain(cells[place], separator) if there else ""
             try:
-                if place >= len(cells) and not column.optional:
-                    raise ValueError("this cell is missing")
-                table.values[name].append(_value(text, per, column))
+                value = _value(cell, there, column, loose)
             except ValueError as error:
-                value = f" = {shown(text)}" if text else ""
-                raise DataFileError(f"{path}, line {line}, column {shown(header[place])}{value}: {error}") from None
-            table.texts[name].append(text)
-        table.lines.append(line)
-    if not table.lines:
+                told = f" = {shown(cell)}" if cell else ""
+                wrong.append(f"{path}, line {line}, column {shown(header[place])}{told}: {error}")
+                continue
+            values[column.name].append(value)
+            unread[column.name] += isnan(value) and not _is_blank(cell)
+            texts[column.name].append("" if isnan(value) else cell)
+    if len(torn) > len(numbers):
+        wrong.append(torn[0])
+    if wrong:
+        raise DataFileError(*wrong[:_MOST], *([f"{path}: {len(wrong) - _MOST} more"] if len(wrong) > _MOST else []))
+    if not numbers:
         raise DataFileError(f"{path}, line {line}: no rows below the header")
-    return table
+    headers = {column.name: header[place] for place, column in found.items()}
+    units = {column.name: column.unit for column in found.values()}
+    return Columns(path, headers, units, texts, values, numbers, unread, len(torn))
 
 
-def _csv_lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Number and cells of every line that is not blank."""
-    reader = csv.reader(io.StringIO(read_text(path, DataFileError), newline=""), strict=True)
+# ---- Cells -----------------------------------------------------------------------------------------------------------
+
+
+def _separator(text: str) -> str:
+    """What parts the cells: whichever of comma, semicolon and tabulator the header has most of."""
+    header = next(filter(str.strip, text.split("\n")), "")
+    return max(",;\t", key=header.count)
+
+
+def _csv_lines(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
+    """Number and cells of every line that is not blank; without blank cells at the end that the header lacks."""
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    width = 0
     try:
-        for cells in reader:
-            if any(map(str.strip, cells)):
-                yield reader.line_num, [cell.strip() for cell in cells]
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if any(cells):
+                while len(cells) > width and not cells[-1]:
+                    cells.pop()
+                width = width or len(cells)
+                yield reader.line_num, cells
     except csv.Error as error:
         raise DataFileError(f"{path}, line {reader.line_num}: {error}") from error
 
 
-def _column(
-    title: str, columns: Mapping[str, Column], above: Container[str], others: bool
-) -> tuple[str, float, Column] | None:
-    """Name, unit and column of a header; None for one that is not read. Raises ValueError with the reason alone."""
-    match = _HEADER.fullmatch(title)
-    name = match["name"] if match else title
-    if name not in columns:
-        if others:
-            return None
-        known = ", ".join(_title(n, c) for n, c in columns.items())
-        raise ValueError(f"there is no such column, but {known}")
-    column = columns[name]
-    if not match or match["unit"] not in column.units:
-        raise ValueError(f"must be {' or '.join(repr(f'{name} [{unit}]') for unit in column.units)}")
-    if name in above:
-        raise ValueError("there is such a column before")
-    return name, column.units[match["unit"]], column
+def _plain(text: str, separator: str) -> str:
+    """With a decimal point, where a decimal comma can be told from what parts the cells."""
+    with_point = text.replace(",", ".", 1)
+    return with_point if separator != "," and _NUMBER.fullmatch(with_point) else text
 
 
-def _title(name: str, column: Column) -> str:
-    return f"{name} [{next(iter(column.units))}]"
+def _comma_hint(cells: list[str], separator: str) -> str:
+    commas = separator == "," and all(_NUMBER.fullmatch(cell) for cell in cells)
+    return " (are these decimal commas? They need ; between the columns)" if commas else ""
 
 
-def _value(text: str, per: float, column: Column) -> float:
+def _is_blank(text: str) -> bool:
+    return text.casefold() in _BLANKS
+
+
+def _number(text: str) -> float | None:
+    number = float(text) if _NUMBER.fullmatch(text) else nan
+    return number if isfinite(number) else None
+
+
+def _value(text: str, there: bool, found: _Found, loose: bool) -> float:
     """The number of a cell in the first unit. Raises ValueError with the reason alone."""
+    column, per = found.column, found.per
+    if _is_blank(text) and (loose or (column.blanks and (there or column.optional))):
+        return nan
     if not text:
-        if column.blanks:
-            return nan
         raise ValueError("this cell is missing")
-    if not _NUMBER.fullmatch(text) or not isfinite(plain := float(text)):
-        raise ValueError("must be a number")
-    value = plain / per
+    if (number := _number(text)) is None:
+        if loose:
+            return nan
+        commas = "," in text and _NUMBER.fullmatch(text.replace(",", ".", 1))
+        raise ValueError(f"must be a number{' with a decimal point, unless ; parts the columns' if commas else ''}")
+    value = found.convert(number)
+    if found.unit in column.conversions:
+        return value
     if column.minimum is not None and value < column.minimum:
         raise ValueError(f"must be at least {column.minimum * per:g}")
     if column.maximum is not None and value > column.maximum:
@@ -142,3 +195,78 @@ def _value(text: str, per: float, column: Column) -> float:
     if 0.0 < abs(value) < column.least:
         raise ValueError(f"must be 0, or {column.least * per:g} at least, or {-column.least * per:g} at most")
     return value
+
+
+# ---- Headers ---------------------------------------------------------------------------------------------------------
+
+
+def _header(path: Path, line: int, header: list[str], columns: Mapping[str, Column], others: bool) -> dict[int, _Found]:
+    """The columns that are read, by their places."""
+    found: dict[int, _Found] = {}
+    wrong = []
+    for place, title in enumerate(header):
+        try:
+            if column := _column(title, columns, others):
+                if any(column.name == before.name for before in found.values()):
+                    raise ValueError("there is such a column before")
+                found[place] = column
+        except ValueError as error:
+            wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}")
+    names = {column.name for column in found.values()}
+    missing = [repr(_title(n, c)) for n, c in columns.items() if n not in names and not c.optional]
+    if missing and not wrong:
+        wrong.append(f"{path}, line {line}, column {len(header) + 1}: {', and so is '.join(_is_missing(missing))}")
+    if wrong:
+        raise DataFileError(*wrong[:_MOST])
+    return found
+
+
+def _is_missing(titles: list[str]) -> list[str]:
+    return [f"{titles[0]} is missing", *titles[1:]]
+
+
+def _column(title: str, columns: Mapping[str, Column], others: bool) -> _Found | None:
+    """The column of a header, in any case; None for one that is not read. Raises ValueError with the reason alone."""
+    match = _HEADER.fullmatch(title)
+    name = _folded(match["name"] if match else title)
+    word, *numbers = match["unit"].split() if match else [""]
+    for key, column in columns.items():
+        if name in map(_folded, (key, *column.also)) and (unit := _unit(word, column)):
+            return _Found(key, column, unit, *_conversion(unit, numbers, column))
+    for key, column in columns.items():
+        if _folded(key) == name:
+            raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(column))}")
+    if others:
+        return None
+    known = ", ".join(_title(n, c) for n, c in columns.items())
+    raise ValueError(f"there is no such column, but {known}")
+
+
+def _conversion(unit: str, numbers: list[str], column: Column) -> tuple[Conversion, float]:
+    """From a number of the file to the first unit, and how many of its unit make one of the first."""
+    if unit in column.conversions:
+        given = tuple(n for n in map(_number, numbers) if n is not None)
+        if len(given) < len(numbers):
+            raise ValueError(f"only numbers may follow {unit}")
+        return column.conversions[unit](given), 1.0
+    if numbers:
+        raise ValueError(f"must be [{unit}] alone")
+    per = column.units[unit]
+    return lambda number: number / per, per
+
+
+def _folded(text: str) -> str:
+    return " ".join(text.casefold().split())
+
+
+def _units(column: Column) -> list[str]:
+    return [*column.units, *column.conversions]
+
+
+def _unit(word: str, column: Column) -> str | None:
+    """The unit as the column names it."""
+    return next((unit for unit in _units(column) if unit.casefold() == word.casefold()), None)
+
+
+def _title(name: str, column: Column) -> str:
+    return f"{name} [{next(iter(column.units))}]"

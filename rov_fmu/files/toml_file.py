@@ -87,6 +87,8 @@ _MOST = 10
 
 def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> list[str]:
     """Problems of the file in a line each: key, value, what is allowed."""
+    if not problems:  # the form takes long to write out
+        return []
     form = _Form(model)
     to_tell = (p for p in problems if p["type"] != "missing" or not _misspelt(p["loc"], problems, form))
     return [*dict.fromkeys(_told(p, data, form) for p in to_tell)]
@@ -96,6 +98,11 @@ def listed(names: Iterable[str]) -> str:
     """Names in a line, and not endlessly many."""
     some = [*names]
     return ", ".join(some[:_MOST]) + (", ..." if len(some) > _MOST else "")
+
+
+def line(key: str, reason: str, *value: object) -> str:
+    """What is wrong with a key, or with its value."""
+    return f"{brief(key)} = {shown(value[0])}: {reason}" if value else f"{brief(key)}: {reason}"
 
 
 def label(table: str, entries: Sequence[Any], number: int) -> str:

@@ -1,112 +1,34 @@
-"""A folder of tank tests (CSV) and what is given beforehand (rov.toml), read and checked.
+"""A folder of tank tests and what is given beforehand (rov.toml), read and checked.
 
-The name of a file, in small or capital letters, says what it holds and of which thruster or axis; what follows an
-underscore is free:
+The name of a file, in small or capital letters, says what it holds and of which thrust curve or axis of the vehicle;
+what follows an underscore is free:
 
-    thrust_<rear|top>*.csv                     command, force                  bollard pull, (6)-(10)
-    steady_<surge|heave|yaw>*.csv              command, velocity               Tables 3-5
-    time_constant_<surge|heave|yaw>*.csv       command, time constant          (17), Tables 6-8
-    log_<surge|heave|yaw>*.csv                 time, command, and distance, depth or heading, or velocity
+    thrust_<curve>*.csv                        command, force                  bollard pull, (6)-(10)
+    steady_<surge|sway|heave|yaw>*.csv         command, velocity               Tables 3-5
+    time_constant_<surge|sway|heave|yaw>*.csv  command, time constant          (17), Tables 6-8
+    log_<surge|sway|heave|yaw>*.csv            time, command, and distance, depth or heading, or velocity
+    log_*.csv, *.bin, *.tlog                   time, commands, and the motion of several axes
 
-Every column has its unit in its header: `command [%]`. Commands are those of an Axis; a rear command is that of
-both rear thrusters, opposite in yaw. Numbers leave this module in SI units, commands as fractions of full thrust.
+Commands are those of an Axis; a command of a thrust curve is that of all thrusters that were tested together.
 """
 
 import hashlib
-import os
-import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from math import pi
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, ValidationInfo, create_model, model_validator
-
-from rov_fmu.files.csv_table import Column, DataFileError, read_columns
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.files.messages import FileError
 from rov_fmu.files.reading import read_bytes
-from rov_fmu.files.toml_file import Strict, beside, pair, read_checked
-from rov_fmu.motion.layout import Axis
-from rov_fmu.vehicle.first import QUANTITIES
-from rov_fmu.vehicle.form import Head, Validity
-from rov_fmu.vehicle.paper import PAPER
-from rov_fmu.vehicle.quantity import Finite, Quantity
-from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.identify.given import ROV_FILE, Said, read_said
+from rov_fmu.identify.logs import read_log
+from rov_fmu.identify.narrowing import Given, Tested, narrowed
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.tables import Row, read_rows
+from rov_fmu.motion.layout import AXES, Axis, Layout
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
-ROV_FILE = "rov.toml"
-AXES = {form.axis.name: form.axis for form in PAPER.axes}
-THRUSTERS = tuple(curve.name for curve in PAPER.curves)
-"""Those tested alone or as a pair, by their curves."""
-_NAME = re.compile(
-    rf"(?P<kind>thrust|steady|time_constant|log)_(?P<of>{'|'.join((*THRUSTERS, *AXES))})(?:_.*)?\.csv", re.IGNORECASE
-)
-_REQUIRED = ("m_rov", "I_r", "R", "gamma")  # geometry and mass: not identifiable in the tank
-_LEAST_SAMPLES = 20
-
-
-def thruster_of(axis: Axis) -> str:
-    """The one of THRUSTERS that drives an axis."""
-    return PAPER.drivers(axis)[0].curve
-
-
-def thrust_names(axis: Axis) -> tuple[str, str]:
-    """The coefficients of the thrust curve of an axis."""
-    return f"a_t_{thruster_of(axis)}", f"b_t_{thruster_of(axis)}"
-
-
-@dataclass(frozen=True)
-class Row:
-    """One measured number: force (N), velocity (m/s, rad/s) or time constant (s) at a held command."""
-
-    file: str
-    line: int
-    command: float
-    value: float
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """Command and motion over time, n samples; SI units, the heading unwrapped."""
-
-    file: str
-    axis: Axis
-    quantity: str
-    """`velocity`, or the position whose rate it is: distance, depth, heading."""
-    time: NDArray[np.float64]
-    """s, ascending, from 0."""
-    command: NDArray[np.float64]
-    """Held from its time to the next one."""
-    values: NDArray[np.float64]
-    """NaN where the sensor has none."""
-
-    @property
-    def is_position(self) -> bool:
-        """Whether the velocity is the rate of the values."""
-        return self.quantity != "velocity"
-
-    @property
-    def unit(self) -> str:
-        """Of the values."""
-        return self.axis.position_unit if self.is_position else self.axis.unit
-
-
-@dataclass(frozen=True)
-class Given:
-    """What is given beforehand (rov.toml)."""
-
-    head: Head
-    known: Mapping[str, Quantity]
-    """Coefficients that are given, not identified: mass, moment of inertia, geometry, maybe more."""
-    windows: Mapping[str, tuple[float, float]]
-    """Of thrust_rear, thrust_top, surge, heave, yaw: rows at commands outside weigh nothing, (7)."""
-    command_range: tuple[float, float] | None
-    against: Path | None
-    """A vehicle file to set beside."""
-    limits: tuple[str, ...] = ()
-    """What was found of the vehicle that the model leaves out, in sentences."""
+_LOGS = (".bin", ".tlog")
 
 
 @dataclass(frozen=True)
@@ -116,173 +38,159 @@ class TankTests:
     folder: Path
     given: Given
     thrust: Mapping[str, tuple[Row, ...]]
-    """By thruster."""
+    """By curve of the vehicle."""
     steady: Mapping[str, tuple[Row, ...]]
     """By axis, as the next two."""
     time_constants: Mapping[str, tuple[Row, ...]]
     recordings: Mapping[str, tuple[Recording, ...]]
     inputs: Mapping[str, str]
     """SHA-256 of every file read, by its name."""
+    notes: tuple[str, ...] = ()
+    """What was left out of the vehicle and of the files, in sentences."""
 
     @property
     def files(self) -> list[Path]:
         """Every file that the identification reads."""
-        return [*(self.folder / name for name in self.inputs), *filter(None, (self.given.against,))]
+        return [*(self.folder / name for name in self.inputs), *filter(None, (self.given.against, self.given.base))]
 
 
 def load_tank_tests(folder: Path) -> TankTests:
-    """Read a folder. Raises DataFileError, VehicleFileError."""
+    """Read a folder. Raises DataFileError, VehicleFileError with a line for everything that is wrong."""
     if not folder.is_dir():
         raise DataFileError(f"{folder}: there is no such folder")
-    given = _load_given(folder / ROV_FILE)
-    found: dict[str, Any] = {kind: {} for kind in ("thrust", "steady", "time_constant", "log")}
-    inputs = {ROV_FILE: _hash(folder / ROV_FILE)}
-    for path in sorted(path for path in folder.iterdir() if path.name.lower().endswith(".csv")):
-        match = _NAME.fullmatch(path.name)
-        kind, of = (match["kind"].lower(), match["of"].lower()) if match else ("", "")
-        if of not in (THRUSTERS if kind == "thrust" else AXES) or not path.name.isprintable():
+    said, of_vehicle = _said(folder / ROV_FILE)
+    found = _Found(folder, said.layout if said else None)
+    paths = sorted(path for path in folder.iterdir() if path.name.lower().endswith((".csv", *_LOGS)))
+    if not paths:
+        raise VehicleFileError(*of_vehicle, f"{folder}: there are no tests (*.csv, *.bin, *.tlog) in this folder")
+    for path in paths:
+        found.read(path)
+    given, missing, notes = None, list[str](), list[str]()
+    tested = found.tested(said)
+    if said and (tested.axes or not found.problems):  # otherwise it is a file that cannot be read that has the axes
+        given, missing, notes = narrowed(said, tested, folder)
+    if problems := [*of_vehicle, *found.problems, *missing]:
+        all_of_vehicle = all(line.startswith(str(folder / ROV_FILE)) for line in problems)
+        raise (VehicleFileError if all_of_vehicle else DataFileError)(*problems)
+    assert given
+    return found.tests(given, notes)
+
+
+def _said(path: Path) -> tuple[Said | None, list[str]]:
+    try:
+        return read_said(path)
+    except VehicleFileError as error:
+        if not path.exists():
+            words = "No such file: it must tell the vehicle's name and what no test does, such as its mass"
+            raise VehicleFileError(f"{path}: {words}") from None
+        if not path.is_file():
+            raise
+        return None, str(error).splitlines()
+
+
+# ---- Files -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Found:
+    """What the files of a folder hold, one after the other, and what is wrong with them."""
+
+    folder: Path
+    layout: Layout | None
+    """Of all that the vehicle may have; None where that is not known."""
+    problems: list[str] = field(default_factory=list)
+    files: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    """By kind of test and what it is of, as the next; those that cannot be read too."""
+    rows: dict[tuple[str, str], list[Row]] = field(default_factory=dict)
+    recordings: dict[str, list[Recording]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    inputs: dict[str, str] = field(default_factory=dict)
+
+    def read(self, path: Path) -> None:
+        """Read one file."""
+        try:
+            self.inputs[path.name] = _hash(path)
+            kind, of = self._name(path)
+            self.files.setdefault((kind, of), []).append(path.name)
+            if kind == "log":
+                self._log(path, AXES.get(of))
+            else:
+                self.rows.setdefault((kind, of), []).extend(read_rows(path, kind, AXES.get(of)))
+        except FileError as error:
+            self.problems += str(error).splitlines()
+
+    def _log(self, path: Path, axis: Axis | None) -> None:
+        if not self.layout:
+            return
+        log = read_log(path, self.layout, axis)
+        self.notes += log.notes
+        for recording in log.recordings:
+            self.recordings.setdefault(recording.axis.name, []).append(recording)
+
+    def _name(self, path: Path) -> tuple[str, str]:
+        """Kind of test, and the curve or axis it is of; no axis where a log tells itself."""
+        curves = [curve.name for curve in self.layout.curves] if self.layout else None
+        kind, of = _parts(path.stem.lower(), curves)
+        if path.suffix.lower() in _LOGS:
+            kind, of = "log", of if kind == "log" else ""
+        if not (kind and path.name.isprintable()) or (not of and kind != "log"):
+            names = _either(curves or ["the name of a curve"])
             raise DataFileError(
-                f"{path}: no name of a test; thrust_ begins one, then rear or top, or steady_, time_constant_ or log_, "
-                "then surge, heave or yaw, then _ and any printable characters"
+                f"{path}: no name of a test; thrust_ begins one, then {names}, or steady_, time_constant_ or log_, "
+                f"then {_either(self.layout.kinds if self.layout else AXES)}, then _ and any printable characters"
             )
-        read = [_recording(path, AXES[of])] if kind == "log" else _rows(path, kind, of)
-        found[kind][of] = (*found[kind].get(of, ()), *read)
-        inputs[path.name] = _hash(path)
-    if len(inputs) == 1:
-        raise DataFileError(f"{folder}: there are no tests (*.csv) in this folder")
-    return TankTests(folder, given, found["thrust"], found["steady"], found["time_constant"], found["log"], inputs)
+        if self.layout and of in AXES and kind != "thrust" and not self.layout.signs(AXES[of]):
+            raise DataFileError(f"{path}: no thruster of the vehicle drives {of}")
+        return kind, of
 
+    def tested(self, said: Said | None) -> Tested:
+        """What there are tests of."""
 
-# ---- rov.toml --------------------------------------------------------------------------------------------------------
+        def of(kind: str) -> list[str]:
+            return [what for which, what in self.files if which == kind]
 
+        def backward(kind: str, what: str) -> bool:
+            low = said.windows.get(f"thrust_{what}" if kind == "thrust" else what, (-1.0, 1.0))[0] if said else -1.0
+            return any(low <= row.command < 0.0 for row in self.rows.get((kind, what), ()))
 
-def _window(window: tuple[float, float]) -> tuple[float, float]:
-    if not -1.0 <= window[0] < window[1] <= 1.0:
-        raise ValueError("must be [low, high] within -1 ... 1, fractions of full thrust: 20 % is 0.2")
-    return window
-
-
-_Window = Annotated[tuple[Finite, Finite], BeforeValidator(pair), AfterValidator(_window)]
-_known: dict[str, Any] = {name: (q, ...) if name in _REQUIRED else (q | None, None) for name, q in QUANTITIES.items()}
-_AnyKnown = create_model("_AnyKnown", __base__=Strict, **_known)
-
-
-class _Known(_AnyKnown):  # type: ignore[misc, valid-type]
-    @model_validator(mode="after")
-    def _whole_curves(self) -> "_Known":
-        for names in ((f"a_t_{thruster}", f"b_t_{thruster}") for thruster in THRUSTERS):
-            given = [name for name in names if getattr(self, name)]
-            if len(given) == 1:
-                raise ValueError(f"{given[0]} is given, but {min(set(names) - set(given))} is not")
-        return self
-
-
-_windows: dict[str, Any] = dict.fromkeys((*(f"thrust_{t}" for t in THRUSTERS), *AXES), (_Window | None, None))
-_Windows = create_model("_Windows", __base__=Strict, **_windows)
-
-
-def _vehicle(name: str, info: ValidationInfo) -> str:
-    if not _vehicle_file(name, beside(name, info)):
-        raise ValueError(
-            f"must be a vehicle file, seen from this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
+        return Tested(
+            {name: (self.files["thrust", name][0], backward("thrust", name)) for name in of("thrust")},
+            {name: backward("steady", name) for name in of("steady")},
+            of("time_constant"),
+            [*filter(None, of("log")), *self.recordings],
         )
-    return name
+
+    def tests(self, given: Given, notes: Iterable[str]) -> TankTests:
+        """All of it."""
+        curves = {curve.name for curve in given.rov.layout.curves}
+
+        def rows(kind: str) -> dict[str, tuple[Row, ...]]:
+            return {of: tuple(found) for (which, of), found in self.rows.items()
+                    if which == kind and (kind != "thrust" or of in curves)}  # fmt: skip
+
+        recordings = {name: tuple(found) for name, found in self.recordings.items()}
+        inputs = {ROV_FILE: _hash(self.folder / ROV_FILE)}
+        inputs |= {given.base_name: _hash(given.base)} if given.base else {}
+        parts = rows("thrust"), rows("steady"), rows("time_constant"), recordings
+        return TankTests(self.folder, given, *parts, inputs | self.inputs, (*notes, *self.notes))
 
 
-def _vehicle_file(name: str, path: Path) -> Path | None:
-    """The vehicle file at a path, or the one that ships under the name."""
-    return path if os.path.isfile(path) else SHIPPED.get(name)  # noqa: PTH113 (as in vehicle.py)
+def _parts(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
+    """What the name of a file says: kind of test, and the longest name of a curve or axis that follows, if any.
+
+    Without curves any name may be that of one.
+    """
+    for kind in ("thrust", "steady", "time_constant", "log"):
+        if (rest := stem.removeprefix(f"{kind}_")) != stem:
+            names = AXES if kind != "thrust" else [rest] if curves is None else curves
+            fitting = (name for name in names if f"{rest}_".startswith(f"{name.lower()}_"))
+            return kind, max(fitting, key=len, default="")
+    return "", ""
 
 
-class _RovFile(Strict):
-    against: Annotated[str, AfterValidator(_vehicle)] | None = None
-    vehicle: Head
-    known: _Known
-    windows: _Windows = _Windows()  # type: ignore[valid-type]
-    validity: Validity | None = None
-
-
-def _load_given(path: Path) -> Given:
-    checked = read_checked(path, _RovFile, VehicleFileError)
-    return Given(
-        head=checked.vehicle,
-        known={name: q for name in _known if (q := getattr(checked.known, name))},
-        windows={name: window for name in _windows if (window := getattr(checked.windows, name))},
-        command_range=checked.validity.command_range if checked.validity else None,
-        against=_vehicle_file(checked.against, path.parent / checked.against) if checked.against else None,
-        limits=checked.validity.limits if checked.validity else (),
-    )
-
-
-# ---- CSV files -------------------------------------------------------------------------------------------------------
-
-# The bounds are far beyond any vehicle; what passes them is a slip, and numbers without any would overflow in a fit.
-_COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
-HELD_COMMAND = replace(_COMMAND, least=1e-4)
-_LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-_ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
-_TIMES = {"s": 1.0, "ms": 1000.0}
-_FORCE = Column({"N": 1.0}, minimum=-1e6, maximum=1e6)
-_TIME = Column(_TIMES, minimum=-1e10, maximum=1e10)  # a logger's may count from 1970
-VELOCITIES = 1e-5, 1e3  # the least and the most
-_MOST_POSITION = 1e7
-
-
-def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCITIES[0]) -> Column:
-    """A column of velocities along the axis; an optional one may have blanks."""
-    lengths = _ANGLES if axis.unit == "rad/s" else _LENGTHS
-    units = {f"{unit}/s": per for unit, per in lengths.items()}
-    return Column(units, optional, optional, -VELOCITIES[1], VELOCITIES[1], least)
-
-
-def time_constant_column(*, optional: bool = False) -> Column:
-    """A column of time constants; an optional one may have blanks."""
-    return Column(_TIMES, optional, optional, maximum=1e5, least=1e-4)
-
-
-def _rows(path: Path, kind: str, of: str) -> Iterator[Row]:
-    """Rows of command, and force, velocity or time constant."""
-    name = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}[kind]
-    column = _FORCE if kind == "thrust" else velocity_column(AXES[of]) if kind == "steady" else time_constant_column()
-    table = read_columns(path, {"command": HELD_COMMAND, name: column})
-    noise = 0.05 * max(map(abs, table.values[name]))
-    numbers = zip(table.lines, table.values["command"], table.values[name], strict=True)
-    for n, (line, command, value) in enumerate(numbers):
-        if kind == "thrust" and command * value < 0.0 and abs(value) > noise:
-            raise table.error(n, name, "must have the sign of the command, for a thruster pushes where it is told to")
-        if kind != "thrust" and command == 0.0:
-            raise table.error(n, "command", "must not be zero, for nothing moves")
-        if kind == "steady" and command * value <= 0.0:
-            raise table.error(n, name, "must have the sign of the command: forward, down, bow to starboard is +")
-        if kind == "time_constant" and value <= 0.0:
-            raise table.error(n, name, "must be above 0")
-        yield Row(path.name, line, command, value)
-
-
-def _recording(path: Path, axis: Axis) -> Recording:
-    """Time, command and motion; the position where there are both position and velocity."""
-    units = _ANGLES if axis.position_unit == "rad" else _LENGTHS
-    columns = {
-        "time": _TIME,
-        "command": _COMMAND,
-        axis.position: Column(units, True, True, -_MOST_POSITION, _MOST_POSITION),
-        "velocity": velocity_column(axis, optional=True, least=0.0),
-    }
-    table = read_columns(path, columns, others=True)
-    quantity = next((name for name in (axis.position, "velocity") if name in table.values), None)
-    if not quantity:
-        wanted = " or ".join(f"'{name} [{next(iter(columns[name].units))}]'" for name in (axis.position, "velocity"))
-        raise DataFileError(f"{path}, line 1: column {wanted} is missing")
-    time, values = np.array(table.values["time"]), np.array(table.values[quantity])
-    backward = np.flatnonzero(np.diff(time) <= 0.0)
-    if backward.size:
-        raise table.error(int(backward[0]) + 1, "time", "must be later than in the row above")
-    there = np.isfinite(values)
-    if there.sum() < _LEAST_SAMPLES:
-        raise DataFileError(f"{path}: {there.sum()} samples of {quantity}, at least {_LEAST_SAMPLES} are needed")
-    if quantity == "heading":
-        values[there] = np.unwrap(values[there])
-    return Recording(path.name, axis, quantity, time - time[0], np.array(table.values["command"]), values)
+def _either(names: Iterable[str]) -> str:
+    *first, last = [*names] or [""]
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def _hash(path: Path) -> str:

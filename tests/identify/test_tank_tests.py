@@ -1,6 +1,7 @@
 """A folder of tank tests: what is read from it, and one clear line for whatever is wrong with it."""
 
 import hashlib
+import re
 import shutil
 from collections.abc import Callable
 from math import pi, radians
@@ -11,7 +12,8 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.identify.tank_tests import Row, TankTests, load_tank_tests
+from rov_fmu.identify.tables import Row
+from rov_fmu.identify.tank_tests import TankTests, load_tank_tests
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -63,6 +65,7 @@ def test_columns_in_any_order_and_unit(folder: Path) -> None:
     (folder / "thrust_rear_a.csv").write_text("command [%],force [N]\n50,12.5\n0,0\n", encoding="utf-8")
     (folder / "thrust_rear_b.csv").write_text("force [N],command [%]\n-3,-20\n", encoding="utf-8")
     (folder / "time_constant_yaw.csv").write_text("command [%],time constant [ms]\n20,3050\n", encoding="utf-8")
+    without_curve(folder, "rear")
     found = load_tank_tests(folder)
     assert [(row.command, row.value) for row in found.steady["yaw"]] == [(0.2, pytest.approx(pi / 2)), (-0.4, -pi)]
     assert found.thrust["rear"] == (
@@ -71,6 +74,12 @@ def test_columns_in_any_order_and_unit(folder: Path) -> None:
         Row("thrust_rear_b.csv", 2, -0.2, -3.0),
     )
     assert found.time_constants["yaw"][0].value == pytest.approx(3.05)
+
+
+def without_curve(folder: Path, name: str) -> None:
+    """With a thrust curve that is not given."""
+    path = folder / "rov.toml"
+    path.write_text(re.sub(rf"^[ab]_t_{name} .*$", "", path.read_text(encoding="utf-8"), flags=re.M), encoding="utf-8")
 
 
 def log(folder: Path, axis: str, header: str, rows: list[str]) -> TankTests:
@@ -102,6 +111,13 @@ def test_recording_of_a_camera(folder: Path) -> None:
     (recording,) = log(folder, "surge", "time [s],command [%],velocity [cm/s]", rows).recordings["surge"]
     assert not recording.is_position
     assert recording.values[0] == pytest.approx(0.2)
+
+
+def test_what_was_left_out_of_logs_is_told(folder: Path) -> None:
+    rows = [f"{n},30,{n}" for n in [*range(30), 29]]
+    assert log(folder, "heave", "time [s],command [%],depth [m]", rows).notes == (
+        "log_heave.csv: 1 repeated time stamp merged",
+    )
 
 
 def test_as_spreadsheets_save_them(folder: Path) -> None:
@@ -189,13 +205,15 @@ BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
     "reverse thrust as magnitude": (
         "thrust_rear.csv", "command [%],force [N]\n50,9\n-50,6\n", ("line 3", "'force [N]' = 6", "sign of the command")
     ),
-    "time goes back": ("log_heave.csv", LOG + "0,30,0\n0.1,30,0\n0.1,30,0\n", ("line 4", "'time [s]' = 0.1", "later")),
+    "time goes back": ("log_heave.csv", LOG + "0,30,0\n0.1,30,0\n0,30,0\n", ("line 4", "'time [s]' = 0:", "goes back")),
     "too few samples": ("log_heave.csv", LOG + "0,30,0\n0.1,30,\n0.2,30,\n", ("1 samples of depth", "20")),
-    "command missing": ("log_heave.csv", LOG + "0,,0\n", ("line 2", "'command [%]'", "missing")),
+    "command missing": ("log_heave.csv", LOG + "0,,0\n", ("no row has both a time and a command",)),
+    "fractions as percent": ("steady_surge.csv", STEADY + "0.2,0.3\n", ("'command [%]'", "fractions under [%]")),
     "nothing measured": ("log_heave.csv", "time [s],command [%]\n0,0\n", ("line 1", "'depth [m]' or 'velocity [m/s]'")),
     "heading in heave": ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", ("line 1", "'depth [m]' or")),
     "unknown name": ("stedy_surge.csv", STEADY, ("no name of a test", "steady_")),
-    "no axis": ("steady_sway.csv", STEADY, ("no name of a test", "surge, heave or yaw")),
+    "no axis": ("steady_sway.csv", STEADY, ("no thruster of the vehicle drives sway",)),
+    "unknown axis": ("steady_roll.csv", STEADY, ("no name of a test", "surge, heave or yaw")),
     "no thruster": ("thrust_left.csv", STEADY, ("no name of a test", "rear or top")),
 }  # fmt: skip
 
@@ -204,6 +222,7 @@ BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
 def test_bad_file_is_one_clear_line(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     name, content, named = BAD[case]
     path = folder / name
+    without_curve(folder, name.removesuffix(".csv").rpartition("_")[2])
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     refused(folder, (str(path), *named), capsys)
 
@@ -218,7 +237,10 @@ def edit(old: str, new: str) -> Callable[[str], str]:
 
 BAD_ROV: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "no mass": (edit("m_rov = ", "# "), ("known.m_rov", "missing")),
-    "unknown coefficient": (edit("[windows]", "mass = 1.0\n[windows]"), ("known.mass", "no such key")),
+    "unknown coefficient": (
+        edit("[windows]", "mass = 1.0\n[windows]"),
+        ("known.mass", "no such coefficient of this vehicle"),
+    ),
     "unit": (edit('"kg"', '"lb"'), ("known.m_rov", "'lb'", "'kg'")),
     "unknown window": (edit("heave = [0.2, 0.7]", "sway = [0.2, 0.7]"), ("windows.sway", "no such key")),
     "window of three": (edit("[0.2, 0.7]", "[0.2, 0.5, 0.7]"), ("windows.heave", "2")),
@@ -253,8 +275,9 @@ def test_every_mistake_of_a_rov_file_is_told(folder: Path) -> None:
     path.write_text(text + "\n[validity]\ncommand_min = 0.7\ncommand_max = 0.2\n", encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
         load_tank_tests(folder)
-    wrong = ("against = 'nowhere.toml'", "vehicle.identifier = 'video ray'", "known.m_rov.unit = 'lb'", "windows.sway",
-             "validity.command_min = 0.7: must be less than command_max = 0.2")  # fmt: skip
+    wrong = ("against = 'nowhere.toml'", "vehicle.identifier = 'video ray'",
+             "validity.command_min = 0.7: must be less than command_max = 0.2",
+             "known.m_rov.unit = 'lb': must be 'kg'", "windows.sway: there is no such key")  # fmt: skip
     lines = str(caught.value).splitlines()
     assert len(lines) == len(wrong)
     for line, words in zip(lines, wrong, strict=True):

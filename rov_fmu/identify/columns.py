@@ -1,0 +1,76 @@
+"""The columns of tank tests and logs: units, bounds, and what is certainly a slip.
+
+Numbers leave them in SI units, commands as fractions of full thrust. The bounds are far beyond any vehicle; what passes
+them is a slip, and numbers without any would overflow in a fit.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from math import pi
+
+from rov_fmu.files.csv_table import Column, Columns, DataFileError
+from rov_fmu.files.messages import shown
+from rov_fmu.motion.layout import Axis
+
+NEUTRAL, SPAN = 1500.0, 400.0
+"""µs: the pulse that stops a thruster, and how far from it is full thrust (ArduSub, T200)."""
+NO_OUTPUT = (0.0, 65535.0)
+"""µs: what autopilots log where they give no pulse."""
+
+
+def pulses(numbers: tuple[float, ...] = ()) -> Callable[[float], float]:
+    """From the width of a pulse (µs) to the command, not yet saturated, by neutral and span. Raises ValueError.
+
+    The span is negative for a thruster that turns the other way round.
+    """
+    neutral, span = numbers if len(numbers) == 2 else (NEUTRAL, 0.0 if numbers else SPAN)
+    if span == 0.0 or neutral <= 0.0:
+        raise ValueError("must be [us], or [us NEUTRAL SPAN] such as [us 1500 400]")
+    return lambda pulse: 0.0 if pulse in NO_OUTPUT else (pulse - neutral) / span
+
+
+PULSES = ("us", "µs")
+LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
+ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
+TIMES = {"s": 1.0, "ms": 1000.0}
+VELOCITIES = 1e-5, 1e3  # the least and the most
+_MOST_POSITION = 1e7
+
+COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
+HELD_COMMAND = replace(COMMAND, least=1e-4)
+LOGGED_COMMAND = replace(COMMAND, conversions=dict.fromkeys(PULSES, pulses))
+FORCE = Column({"N": 1.0}, minimum=-1e6, maximum=1e6)
+TIME = Column(TIMES, minimum=-1e10, maximum=1e10)  # a logger's may count from 1970
+
+
+def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCITIES[0]) -> Column:
+    """A column of velocities along the axis; an optional one may have blanks."""
+    lengths = ANGLES if axis.unit == "rad/s" else LENGTHS
+    units = {f"{unit}/s": per for unit, per in lengths.items()}
+    return Column(units, optional, optional, -VELOCITIES[1], VELOCITIES[1], least)
+
+
+def position_column(axis: Axis) -> Column:
+    """A column of what a sensor measures along the axis; it may have blanks."""
+    units = ANGLES if axis.position_unit == "rad" else LENGTHS
+    return Column(units, True, True, -_MOST_POSITION, _MOST_POSITION)
+
+
+def time_constant_column(*, optional: bool = False) -> Column:
+    """A column of time constants; an optional one may have blanks."""
+    return Column(TIMES, optional, optional, maximum=1e5, least=1e-4)
+
+
+def refuse_slips(table: Columns, commands: Iterable[str]) -> None:
+    """Raise DataFileError where the commands cannot be in the unit of their header: fractions under [%] or [us]."""
+    names = [name for name in commands if name in table.values]
+    for units, most, told in (
+        (("%",), 1.0, "no command beyond 1 %: fractions under [%]? Write [1]"),
+        (PULSES, 1.0, "no pulse beyond 1 us: fractions under [us]? Write [1]"),
+        (PULSES, 100.0, "no pulse beyond 100 us: percent under [us]? Write [%]"),
+    ):
+        of = [name for name in names if table.units[name] in units]
+        sizes = [abs(float(text)) for name in of for text in table.texts[name] if text]
+        if any(sizes) and max(sizes) <= most:
+            titles = ", ".join(shown(table.headers[name]) for name in of)
+            raise DataFileError(f"{table.path}, column {titles}: {told}")

@@ -1,0 +1,233 @@
+"""Logs of one test or of a whole dive, as they come: CSV files here, MAVLink logs in mavlink.py.
+
+A CSV log has a column `time`; commands, as `command` of the axis that the log is of, or as a column for each input of
+the vehicle (`u_<name>`) or for each thruster; and what was measured. What cannot be used is left out, counted and told.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rov_fmu.files.csv_table import Column, Columns, DataFileError, read_columns
+from rov_fmu.files.messages import shown
+from rov_fmu.identify.columns import (
+    LOGGED_COMMAND,
+    NO_OUTPUT,
+    PULSES,
+    TIME,
+    position_column,
+    refuse_slips,
+    velocity_column,
+)
+from rov_fmu.identify.least_squares import Array
+from rov_fmu.identify.mavlink import SUFFIXES, read_mavlink
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.signals import LEAST_SAMPLES, Commands, Signal, recordings_of, unwrapped
+from rov_fmu.motion.layout import HEAVE, YAW, Axis, Layout
+
+_MOST_BACK = 0.2  # of the rows: with more of them out of order the time begins anew
+_COMMAND = "command"
+_STATES = {HEAVE: "z", YAW: "psi"}
+"""What the FMU calls a position."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """What a log yields."""
+
+    recordings: tuple[Recording, ...]
+    notes: tuple[str, ...] = ()
+    """What was left out and why, with the name of the file; counted."""
+
+
+def read_log(path: Path, layout: Layout, axis: Axis | None = None) -> Log:
+    """Every axis of the vehicle that the log tells of, or the one that it is of. Raises DataFileError."""
+    if path.suffix.lower() in SUFFIXES:
+        commands, signals, notes = read_mavlink(path, layout)
+        return _log(path, layout, commands, signals, notes, axis)
+    sensors = _sensors([axis] if axis else [form.axis for form in layout.axes], of_one=axis is not None)
+    kinds = {"inputs": _inputs(layout), "thrusters": _thrusters(layout), "axis": {_COMMAND: _LOGGED} if axis else {}}
+    columns = {"time": TIME, **kinds["axis"], **kinds["inputs"], **kinds["thrusters"]}
+    columns |= {name: sensor.column for name, sensor in sensors.items()}
+    table = read_columns(path, columns, others=True, loose=True)
+    kind, commanding = _commanding(table, kinds, sensors)
+    refuse_slips(table, commanding)
+    time, values, notes = _cleaned(table, commanding)
+    signals = _signals(sensors, time, values)
+    if kind == "axis":
+        return Log((_of_one_command(path, signals[0], values[_COMMAND]),), _named(path, notes))
+    notes += tuple(f"no column of {name}, which is taken as 0" for name in kinds[kind] if name not in values)
+    reaching = _reaching(layout, values) if kind == "inputs" else _each(layout, values)
+    return _log(path, layout, Commands(time, reaching), signals, notes)
+
+
+def _log(
+    path: Path,
+    layout: Layout,
+    commands: Commands,
+    signals: Iterable[Signal],
+    notes: Iterable[str],
+    axis: Axis | None = None,
+) -> Log:
+    found, reasons = recordings_of(path.name, layout, commands, signals, axis)
+    if not found:
+        raise DataFileError(*(f"{path}: {reason}" for reason in reasons or ["nothing measured of any axis"]))
+    return Log(found, _named(path, (*notes, *reasons)))
+
+
+def _named(path: Path, notes: Iterable[str]) -> tuple[str, ...]:
+    return tuple(f"{path.name}: {note}" for note in notes)
+
+
+def _of_one_command(path: Path, signal: Signal, command: Array) -> Recording:
+    """Of an axis whose thrusters follow one command."""
+    if (count := int(np.isfinite(signal.values).sum())) < LEAST_SAMPLES:
+        raise DataFileError(f"{path}: {count} samples of {signal.quantity}, at least {LEAST_SAMPLES} are needed")
+    values = unwrapped(signal.values) if signal.quantity == "heading" else signal.values
+    return Recording(path.name, signal.axis, signal.quantity, signal.time - signal.time[0], command, values)
+
+
+# ---- Columns ---------------------------------------------------------------------------------------------------------
+
+_LOGGED = replace(LOGGED_COMMAND, optional=True)
+
+
+@dataclass(frozen=True)
+class _Sensor:
+    """A column of motion."""
+
+    axis: Axis
+    quantity: str
+    column: Column
+
+
+def _sensors(axes: Iterable[Axis], *, of_one: bool) -> dict[str, _Sensor]:
+    """By the names of their columns, positions before velocities; in a log of one axis the name needs not say which."""
+    found = {}
+    for axis in axes:
+        for quantity in (axis.position, "velocity"):
+            velocity = quantity == "velocity"
+            column = velocity_column(axis, optional=True, least=0.0) if velocity else position_column(axis)
+            long, state = f"{axis.name} {quantity}", axis.velocity if velocity else _STATES.get(axis)
+            name = quantity if of_one or (axis in _STATES and not velocity) else long
+            column = replace(column, also=tuple(filter(None, (long, state))))
+            found[name] = _Sensor(axis, quantity, column)
+    return found
+
+
+def _inputs(layout: Layout) -> dict[str, Column]:
+    """The inputs of the vehicle; where each drives one thruster, by the name of the thruster too."""
+    names = {f"u_{t.name}": (t.name,) for t in layout.thrusters} if not layout.mix else {}
+    return {name: replace(_LOGGED, also=names.get(name, ())) for name in layout.commands}
+
+
+def _thrusters(layout: Layout) -> dict[str, Column]:
+    """The thrusters, where inputs drive several."""
+    return {f"thruster {t.name}": replace(_LOGGED, also=(t.name,)) for t in layout.thrusters} if layout.mix else {}
+
+
+def _commanding(
+    table: Columns, kinds: Mapping[str, Mapping[str, Column]], sensors: Mapping[str, _Sensor]
+) -> tuple[str, list[str]]:
+    """The kind of the commands and their columns. Raises DataFileError, for motion too."""
+    found = {kind: names for kind, of in kinds.items() if (names := [name for name in of if name in table.values])}
+    wrong = []
+    if not found:
+        wanted = " or ".join(", ".join(of) for of in kinds.values() if of)
+        wrong.append(f"no column of commands: {wanted}, each in [%], [1] or [us]")
+    if len(found) > 1:
+        headers = ", ".join(shown(table.headers[names[0]]) for names in found.values())
+        wrong.append(f"columns {headers}: the commands of the axis, of the inputs or of the thrusters, not several")
+    if not any(name in table.values for name in sensors):
+        titles = " or ".join(f"'{name} [{next(iter(s.column.units))}]'" for name, s in sensors.items())
+        wrong.append(f"column {titles} is missing")
+    if wrong:
+        raise DataFileError(*(f"{table.path}, line 1: {reason}" for reason in wrong))
+    return next(iter(found.items()))
+
+
+# ---- Rows ------------------------------------------------------------------------------------------------------------
+
+
+def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Array], tuple[str, ...]]:
+    """Ascending time (s), columns, commands within ±1, and what was left out or changed. Raises DataFileError."""
+    columns = {name: np.array(values) for name, values in table.values.items()}
+    timed = np.isfinite(columns["time"])
+    commanded = np.all([np.isfinite(columns[name]) for name in commanding], axis=0)
+    rows = np.flatnonzero(timed & commanded)
+    if not rows.size:
+        raise DataFileError(f"{table.path}: no row has both a time and a command")
+    time = columns["time"][rows]
+    back = np.flatnonzero(time < np.maximum.accumulate(time))
+    if back.size > _MOST_BACK * rows.size:
+        raise table.error(int(rows[back[0]]), "time", "the time goes back, and stays back: two logs in one file?")
+    rows = rows[np.argsort(time, kind="stable")]
+    time = columns["time"][rows]
+    first = np.concatenate([[True], np.diff(time) > 0.0])
+    columns = {name: _merged(values[rows], first, commanded=name in commanding) for name, values in columns.items()}
+    told = (
+        (back.size, "row", "out of order sorted"),
+        (int((~first).sum()), "repeated time stamp", "merged"),
+        (int((~timed).sum()), "row", "without a time left out"),
+        (int((timed & ~commanded).sum()), "row", "without a command left out"),
+        (table.torn, "row", "with more cells than the header left out"),
+        *((n, "cell", f"of {name} without a number taken as blank")
+          for name, n in table.unread.items() if name != "time" and name not in commanding),
+    )  # fmt: skip
+    notes = [", ".join(f"{n} {what}{'s' if n > 1 else ''} {done}" for n, what, done in told if n)]
+    notes += _on_pulses(table, commanding)
+    return time[first], columns, tuple(filter(None, notes))
+
+
+def _merged(values: Array, first: Array, *, commanded: bool) -> Array:
+    """One value for each time: the last command, which is the one that is held; the last that was measured."""
+    groups = np.cumsum(first) - 1
+    found = np.full(groups[-1] + 1, np.nan)
+    there = np.isfinite(values)
+    found[groups[there]] = values[there]
+    return np.clip(found, -1.0, 1.0) if commanded else found
+
+
+def _on_pulses(table: Columns, commanding: Iterable[str]) -> list[str]:
+    """How many were none, and how many are beyond full thrust."""
+    notes = []
+    for name in commanding:
+        if table.units[name] in PULSES:
+            none = sum(float(text) in NO_OUTPUT for text in table.texts[name] if text)
+            beyond = sum(abs(value) > 1.0 for value in table.values[name])
+            told = [f"{none} of 0 or 65535 us taken as no command"] if none else []
+            told += [f"{beyond} beyond full thrust taken as full thrust"] if beyond else []
+            notes += [f"pulses of {name}: {', '.join(told)}"] if told else []
+    return notes
+
+
+# ---- Commands and motion ---------------------------------------------------------------------------------------------
+
+
+def _reaching(layout: Layout, inputs: Mapping[str, Array]) -> dict[str, Array]:
+    """What reaches each thruster of the inputs, within ±1; an input without a column is 0."""
+    still = np.zeros_like(inputs["time"])
+    return {
+        name: np.clip(sum((gain * inputs.get(of, still) for of, gain in gains.items()), still), -1.0, 1.0)
+        for name, gains in layout.gains.items()
+    }
+
+
+def _each(layout: Layout, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """The columns of the thrusters; one without is at 0."""
+    still = np.zeros_like(columns["time"])
+    return {t.name: columns.get(f"thruster {t.name}", still) for t in layout.thrusters}
+
+
+def _signals(sensors: Mapping[str, _Sensor], time: Array, columns: Mapping[str, Array]) -> list[Signal]:
+    """What was measured of each axis: the position, unless the velocity alone has enough samples."""
+    found: dict[str, Signal] = {}
+    for name, sensor in sensors.items():
+        if name in columns:
+            signal = Signal(sensor.axis, sensor.quantity, time, columns[name])
+            before = found.get(sensor.axis.name)
+            if not before or np.isfinite(before.values).sum() < LEAST_SAMPLES:
+                found[sensor.axis.name] = signal
+    return list(found.values())

@@ -1,0 +1,65 @@
+"""What a test must have at least, so that anything can be fitted to it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.files.toml_file import listed
+from rov_fmu.identify.columns import VELOCITIES
+from rov_fmu.identify.driving import curves_of
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.runs import prepare
+from rov_fmu.identify.slips import slips
+from rov_fmu.identify.tables import Row
+from rov_fmu.identify.tank_tests import TankTests
+from rov_fmu.motion.layout import Axis
+from rov_fmu.motion.rov import Rov
+
+_LEAST_PUSH = 1e-6
+"""N or N m, less than moves any vehicle: what is fitted to it would overflow."""
+
+
+def check_push(folder: Path, axis: Axis, base: Rov, commands: Sequence[float]) -> None:
+    """Where the vehicle moves, its thrusters must push it there, at one command at least. Raises DataFileError."""
+    forces, names = [base.force(axis, c) for c in commands], listed(c.name for c in curves_of(base.layout, axis))
+    if commands and all(np.sign(c) * force < _LEAST_PUSH for force, c in zip(forces, commands, strict=True)):
+        raise DataFileError(
+            f"{folder}: the thrust curve of {names} gives {forces[0]:.3g} {axis.load} at a command "
+            f"of {commands[0]:.0%}, where {axis.name} needs a push that way"
+        )
+
+
+def check_recording(folder: Path, recording: Recording, base: Rov) -> None:
+    """Commands and motion must change. Raises DataFileError."""
+    path, values = folder / recording.file, recording.values[np.isfinite(recording.values)]
+    moves = np.ptp(recording.reaching(base.layout), axis=0).any() or recording.reaching(base.layout).any()
+    if still := "command" if not moves else recording.quantity if np.ptp(values) == 0.0 else None:
+        raise DataFileError(f"{path}: {still} never changes: nothing is identifiable")
+    speed = prepare(recording, base).speed
+    if not VELOCITIES[0] <= speed <= VELOCITIES[1]:
+        raise DataFileError(
+            f"{path}: {recording.quantity} tells of a velocity of {speed:.3g} "
+            f"{recording.axis.unit}: must be {VELOCITIES[0]:g} at least and {VELOCITIES[1]:g} at most"
+        )
+
+
+def check_slips(tests: TankTests, axes: Sequence[Axis], base: Rov) -> list[str]:
+    """What may be slips of units and signs, in sentences. Raises DataFileError with a line for each that is one."""
+    axes = [axis for axis in axes if max(base.force(axis, c) for c in (1.0, -1.0)) >= _LEAST_PUSH]  # told elsewhere
+    recordings = {axis.name: tests.recordings.get(axis.name, ()) for axis in axes}
+    steady, time_constants = (
+        {axis.name: _by_file(rows.get(axis.name, ())) for axis in axes} for rows in (tests.steady, tests.time_constants)
+    )
+    findings = slips(recordings, base, tests.given.known, steady, time_constants)
+    if certain := [f"{tests.folder / finding.file}: {finding.words}" for finding in findings if finding.certain]:
+        raise DataFileError(*certain)
+    return [finding.sentence for finding in findings]
+
+
+def _by_file(rows: Sequence[Row]) -> dict[str, list[tuple[float, float]]]:
+    found: dict[str, list[tuple[float, float]]] = {}
+    for row in rows:
+        found.setdefault(row.file, []).append((row.command, row.value))
+    return found

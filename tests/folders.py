@@ -1,0 +1,72 @@
+"""Folders of tank tests of vehicles of any form, small; what rov.toml may say."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rov_fmu.identify.given import ROV_FILE
+from rov_fmu.identify.tank_tests import TankTests, load_tank_tests
+from rov_fmu.motion.layout import YAW, Axis
+from rov_fmu.motion.rov import Rov
+
+HEAD = """
+[vehicle]
+name = "Mine"
+identifier = "mine"
+version = "1"
+description = "Mine"
+source = "A tank"
+"""
+BLUEROV2 = f'base = "bluerov2"\n{HEAD}'
+MASS = 'm_rov = { value = 6.57, unit = "kg", source = "weighed" }\n'
+TURNS = 'I_r = { value = 0.105, unit = "kg.m2", source = "drawn" }\n'
+ARM = 'R = { value = 0.22, unit = "m", source = "drawn" }\ngamma = { value = 0.423, unit = "rad", source = "drawn" }\n'
+TOP = "".join(
+    f'{name}_top = {{ value = {value}, unit = "N", source = "pulled" }}\n'
+    for name, value in (("a_t", 6.494), ("b_t", 0.0513))
+)
+THRUSTER = """
+[[thruster]]
+name = "{name}"
+curve = "t200"
+direction = {{ value = [{x}, {y}, {z}], source = "drawn: {name}" }}
+"""
+PLACE = 'position = {{ value = [{0}, {1}, 0], unit = "m", source = "drawn too" }}\n'
+PLACES = {"1": (-1, 1, 0.15, 0.11), "2": (-1, -1, 0.15, -0.11), "3": (1, 1, -0.15, 0.11), "4": (1, -1, -0.15, -0.11)}
+VECTORED = (
+    HEAD
+    + f"[body]\n{MASS}{TURNS}[curves.t200]\n"
+    + "".join(THRUSTER.format(name=name, x=x, y=y, z=0) + PLACE.format(*at) for name, (x, y, *at) in PLACES.items())
+    + '[axes.sway]\nm_a = { value = 7.1, unit = "kg", source = "a strip" }\n'
+)
+DOWN = HEAD + f"[known]\n{MASS}\n[curves.t200]\n" + THRUSTER.format(name="v", x=0, y=0, z=1)
+
+FORCE, SPEED, RATE = "command [1],force [N]", "command [1],velocity [m/s]", "command [1],velocity [rad/s]"
+TAU = "command [1],time constant [s]"
+COMMANDS = (0.2, 0.4, 0.6, 0.8, -0.3, -0.7)
+
+
+def folder_of(folder: Path, rov: str, tables: Mapping[str, str]) -> Path:
+    """A folder of tests."""
+    folder.mkdir(exist_ok=True)
+    (folder / ROV_FILE).write_text(rov, encoding="utf-8")
+    for name, text in tables.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def responses(k: Rov, axis: Axis) -> dict[str, str]:
+    """Steady velocities and time constants of a vehicle, in closed form."""
+    rows = [(c, *k.response(axis, c)) for c in COMMANDS]
+    steady = "".join(f"{c},{V:.6f}\n" for c, V, _ in rows)
+    taus = "".join(f"{c},{T:.6f}\n" for c, _, T in rows)
+    return {f"steady_{axis.name}.csv": f"{RATE if axis is YAW else SPEED}\n{steady}",
+            f"time_constant_{axis.name}.csv": f"{TAU}\n{taus}"}  # fmt: skip
+
+
+def pulled(a: float, b: float) -> str:
+    """Forces of a curve."""
+    return f"{FORCE}\n" + "".join(f"{c},{(a * abs(c) + b) * c:.6f}\n" for c in COMMANDS)
+
+
+def read(folder: Path, rov: str, tables: Mapping[str, str]) -> TankTests:
+    return load_tank_tests(folder_of(folder, rov, tables))

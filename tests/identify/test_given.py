@@ -1,0 +1,265 @@
+"""Folders of tests of vehicles of any form: what rov.toml says, what is left of the vehicle, what is known of it."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.identify.given import ROV_FILE
+from rov_fmu.identify.identification import Identification
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.writer import write_vehicle
+from tests.commands import TESTS
+from tests.folders import (
+    BLUEROV2,
+    DOWN,
+    FORCE,
+    HEAD,
+    MASS,
+    RATE,
+    SPEED,
+    TOP,
+    TURNS,
+    VECTORED,
+    folder_of,
+    pulled,
+    read,
+    responses,
+)
+from tests.recordings import clean, write_log
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def read_again(found: Identification, path: Path) -> None:
+    """The vehicle is one that its file can hold."""
+    write_vehicle(found.vehicle, path)
+    assert load_vehicle(path).layout == found.vehicle.layout
+    assert load_vehicle(path).thruster_sources == found.vehicle.thruster_sources
+
+
+# ---- A vehicle to begin from -----------------------------------------------------------------------------------------
+
+
+def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
+    base = load_vehicle(SHIPPED["bluerov2"])
+    k = base.rov.replaced({"a_d_v": 30.0, "b_d_v": 9.0, "beta_v": 0.8})
+    tests = read(tmp_path / "tests", BLUEROV2, responses(k, SWAY))
+    assert tests.given.rov.layout == base.layout
+    assert {*base.layout.coefficients} - {*tests.given.known} == {
+        "a_d_v", "b_d_v", *(f"{kind}_{v}" for kind in ("alpha", "beta") for v in "uvwr"),
+    }  # fmt: skip
+    assert tests.inputs.keys() == {ROV_FILE, "bluerov2", "steady_sway.csv", "time_constant_sway.csv"}
+    found = identify(tests)
+    assert [found.vehicle.rov[name] for name in ("a_d_v", "b_d_v", "beta_v")] == pytest.approx(
+        [30.0, 9.0, 0.8], rel=1e-3
+    )
+    same = {*base.layout.coefficients} - {"a_d_v", "b_d_v", "beta_v", "alpha_v"}
+    assert {name: found.vehicle.rov[name] for name in same} == {name: base.rov[name] for name in same}
+    assert {name: found.vehicle.sources[name] for name in same} == {name: base.sources[name] for name in same}
+    assert found.vehicle.thruster_sources == base.thruster_sources
+    assert found.warnings == (), "untested axes are as they were, which is no shortcoming of the data"
+    read_again(found, tmp_path / "mine.toml")
+
+
+def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
+    """F_0 too: another vehicle is trimmed another way."""
+    base = load_vehicle(SHIPPED["bluerov2"]).rov
+    folder = folder_of(tmp_path / "tests", BLUEROV2, {})
+    true = base.replaced({"F_0_w": 0.0, "a_d_w": 50.0, "b_d_w": 8.0, "beta_w": 0.9})
+    plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
+    write_log(folder, "a", clean(true, HEAVE, plan, 20.0).noisy(np.random.default_rng(0), noise=0.002))
+    tests = load_tank_tests(folder)
+    assert tests.given.rov.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
+    assert not {"F_0_w", "a_d_w", "b_d_w", "beta_w"} & {*tests.given.known}
+    found = identify(tests).vehicle
+    for name in ("a_d_w", "b_d_w", "beta_w"):
+        assert found.rov[name] == pytest.approx(true[name], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("commands", "keys"),
+    [((0.3, 0.6), ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "T")), ((0.3, 0.6, -0.4), ("a_t", "b_t", "T"))],
+)
+def test_thrust_ahead_leaves_reverse_as_it_is(
+    commands: tuple[float, ...], keys: tuple[str, ...], tmp_path: Path
+) -> None:
+    base = load_vehicle(SHIPPED["bluerov2"]).rov
+    curve = base.layout.curves[0]
+    rows = "".join(f"{c},{1.1 * base.curve_force(curve, c):.6f}\n" for c in commands)
+    tests = read(tmp_path, BLUEROV2, {"thrust_T200.csv": f"{FORCE}\n{rows}"})
+    assert tests.given.rov.layout.curves[0].keys == keys
+    if len(commands) == 2:
+        found = identify(tests).vehicle.rov
+        assert found.curve_force(curve, 0.6) == pytest.approx(1.1 * base.curve_force(curve, 0.6), rel=1e-4)
+        assert found.curve_force(curve, -0.6) == base.curve_force(curve, -0.6)
+
+
+def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
+    """A bow thruster makes the vehicle sway, which its file does not have."""
+    text = SHIPPED["bluerov2"].read_text(encoding="utf-8").replace("coupling = true", "")
+    text = text[: text.index("[axes.sway]")] + text[text.index("[axes.heave]") :]
+    folder = folder_of(tmp_path / "tests", HEAD, {})
+    (folder / "old.toml").write_text(text, encoding="utf-8")
+    table = '[axes.sway]\nm_a = { value = 7.0, unit = "kg", source = "a strip" }\n'
+    k = load_vehicle(SHIPPED["bluerov2"]).rov.replaced({"m_a_v": 7.0})
+    for also, keys in (("", ("a_d", "b_d")), (table, ("m_a", "a_d", "b_d"))):
+        tests = read(folder, f'base = "old.toml"\n{HEAD}{also}', responses(k, SWAY))
+        assert [*tests.given.rov.layout.kinds] == ["surge", "sway", "heave", "yaw"]
+        assert tests.given.rov.layout.kinds["sway"].keys == keys
+    found = identify(tests).vehicle.rov
+    assert found.response(SWAY, 0.5) == pytest.approx(k.response(SWAY, 0.5), rel=1e-3)
+    assert folder / "old.toml" in tests.files
+
+
+# ---- Hardware tables -------------------------------------------------------------------------------------------------
+
+
+def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
+    tables = {"thrust_t200.csv": pulled(30.0, 20.0)}
+    known = {"m_rov": 6.57, "I_r": 0.105, "m_a_v": 7.1, "a_t_t200": 30.0, "b_t_t200": 20.0}
+    drag = {"a_d_u": 18.0, "b_d_u": 4.0, "a_d_v": 22.0, "b_d_v": 6.0, "a_d_r": 1.5, "b_d_r": 0.1}
+    placeholder = read(tmp_path / "all", VECTORED, tables | {
+        "steady_surge.csv": f"{SPEED}\n0.1,0.1\n", "steady_sway.csv": f"{SPEED}\n0.1,0.1\n",
+        "steady_yaw.csv": f"{RATE}\n0.1,0.1\n"})  # fmt: skip
+    layout = placeholder.given.rov.layout
+    true = Rov(layout, dict.fromkeys(layout.coefficients, 1.0) | known | drag)
+    for axis in (SURGE, SWAY, YAW):
+        tables |= responses(true, axis)
+    found = identify(read(tmp_path / "tests", VECTORED, tables))
+    assert [*found.vehicle.layout.kinds] == ["surge", "sway", "yaw"]
+    for name, value in (known | drag | {"beta_u": 1.0, "beta_v": 1.0, "beta_r": 1.0}).items():
+        assert found.vehicle.rov[name] == pytest.approx(value, rel=2e-3), name
+    assert found.vehicle.sources["m_a_v"] == "a strip"
+    assert found.vehicle.thruster_sources["3"] == {"direction": "drawn: 3", "position": "drawn too"}
+    assert found.vehicle.layout.signs(SWAY) == {"u_1": 1.0, "u_2": -1.0, "u_3": 1.0, "u_4": -1.0}
+    read_again(found, tmp_path / "mine.toml")
+
+
+def test_one_thruster_down(tmp_path: Path) -> None:
+    rows = f"{SPEED}\n0.2,0.2\n0.4,0.35\n0.8,0.6\n"
+    found = identify(read(tmp_path / "tests", DOWN, {"thrust_t200.csv": pulled(30.0, 20.0), "steady_heave.csv": rows}))
+    assert [*found.vehicle.layout.kinds] == ["heave"]
+    assert found.vehicle.rov["m_rov"] == 6.57
+    read_again(found, tmp_path / "mine.toml")
+
+
+def test_inputs_are_narrowed_too(tmp_path: Path) -> None:
+    """Without yaw the input that turns goes."""
+    mix = (
+        "[inputs]\nahead = { 3 = 1.0, 4 = 1.0, 1 = -1.0, 2 = -1.0 }\nturn = { 3 = -1.0, 4 = 1.0, 1 = 1.0, 2 = -1.0 }\n"
+    )
+    rows = {"thrust_t200.csv": pulled(30.0, 20.0), "steady_surge.csv": f"{SPEED}\n0.2,0.2\n0.4,0.35\n0.8,0.6\n"}
+    tests = read(tmp_path, VECTORED + mix, rows)
+    assert [*tests.given.rov.layout.mix] == ["ahead"]
+    assert len(tests.given.rov.layout.thrusters) == 4
+    assert tests.notes == ("sway: neither tested nor known (a_d_v, b_d_v), so the vehicle has no sway",)
+
+
+def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:
+    rov = VECTORED.replace("[body]", "[body]\ncoupling = true")
+    tables = {f"steady_{name}.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n" for name in ("surge", "sway")}
+    tables["thrust_t200.csv"] = pulled(30.0, 20.0)
+    tests = read(tmp_path, rov, tables)
+    assert not tests.given.rov.layout.coupled
+    assert tests.notes == ("surge, sway and yaw are not coupled, which needs all three",)
+    tests = read(tmp_path, rov, tables | {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n"})
+    assert tests.given.rov.layout.coupled
+    assert tests.notes == ()
+
+
+# ---- The paper's form ------------------------------------------------------------------------------------------------
+
+
+def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "tests", f"{HEAD}[known]\n{MASS}{TOP}", {})
+    k = load_vehicle(VIDEORAY).rov.replaced({"alpha_w": 1.0})
+    plan = ((0.0, 2.0), (0.3, 6.0), (-0.5, 6.0), (0.7, 6.0))
+    write_log(folder, "a", clean(k, HEAVE, plan, 10.0).noisy(np.random.default_rng(0)))
+    tests = load_tank_tests(folder)
+    layout = tests.given.rov.layout
+    assert [*layout.kinds] == ["heave"]
+    assert [t.name for t in layout.thrusters] == ["t"]
+    assert [curve.name for curve in layout.curves] == ["top"]
+    assert set(layout.coefficients) == {"m_rov", "a_t_top", "b_t_top", "a_d_w", "b_d_w", "alpha_w", "beta_w"}
+    assert tests.notes == (
+        "surge, yaw: neither tested nor known (a_d_u, b_d_u, a_d_r, b_d_r), so the vehicle has no surge and no yaw",
+    )
+    found = identify(tests)
+    assert found.vehicle.rov["beta_w"] == pytest.approx(k["beta_w"], rel=0.1)
+    read_again(found, tmp_path / "mine.toml")
+
+
+def test_what_no_axis_needs_is_not_used(tmp_path: Path) -> None:
+    tests = read(tmp_path, f"{HEAD}[known]\n{MASS}{TOP}{TURNS}", {
+        "steady_heave.csv": f"{SPEED}\n0.3,0.2\n", "thrust_rear.csv": pulled(40.0, 2.0)})  # fmt: skip
+    assert tests.given.known.keys() == {"m_rov", "a_t_top", "b_t_top"}
+    assert tests.thrust == {}
+    assert tests.notes[1].startswith("thrust_rear.csv: the thrusters of curve rear act on no axis")
+
+
+def test_any_coefficient_may_be_known(tmp_path: Path) -> None:
+    more = (
+        'm_a_w = { value = 3.0, unit = "kg", source = "a sphere" }\nT_top = { value = 0.1, unit = "s", source = "s" }\n'
+    )
+    given = read(tmp_path, f"{HEAD}[known]\n{MASS}{TOP}{more}", {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
+    assert given.rov.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
+    assert given.rov.layout.curves[0].has_lag
+    assert (given.rov["m_a_w"], given.known["m_a_w"].source) == (3.0, "a sphere")
+
+
+@pytest.mark.parametrize(("lag", "curves"), [("true", ("rear", "top")), ('["top"]', ("top",)), ("[]", ())])
+def test_lag_to_be_found(lag: str, curves: tuple[str, ...], tmp_path: Path) -> None:
+    tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
+    with (tests / ROV_FILE).open("a", encoding="utf-8") as file:
+        file.write(f"\n[fit]\nlag = {lag}\n")
+    assert load_tank_tests(tests).given.lag == curves
+
+
+def test_the_lag_of_a_base_is_found_anew_where_asked(tmp_path: Path) -> None:
+    rows = {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}
+    given = read(tmp_path, f"{BLUEROV2}[fit]\nlag = true\n", rows).given
+    assert given.lag == ("t200",)
+    assert "T_t200" not in given.rov.layout.coefficients
+
+
+def test_what_is_known_stands_instead_of_base_and_tests(tmp_path: Path) -> None:
+    known = """[known]
+m_rov = { value = 12.0, unit = "kg", source = "weighed" }
+a_d_v = { value = 25.0, unit = "N.s2/m2", source = "a tow" }
+"""
+    base = load_vehicle(SHIPPED["bluerov2"])
+    given = read(tmp_path, BLUEROV2 + known, {"steady_sway.csv": f"{SPEED}\n0.3,0.2\n"}).given
+    assert (given.rov["m_rov"], given.known["m_rov"].source) == (12.0, "weighed")
+    assert (given.rov["a_d_v"], given.known["a_d_v"].source) == (25.0, "a tow")
+    assert "b_d_v" not in given.known
+    assert given.known["I_r"].source == base.sources["I_r"]
+    assert given.limits == base.limits
+
+
+def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:
+    """The force begins at 10 %: the forces ahead are those of the command beyond."""
+    curve = "".join(
+        f'{key} = {{ value = {value}, unit = "{unit}", source = "s" }}\n'
+        for key, value, unit in (("a_t_reverse", 20.0, "N"), ("b_t_reverse", 15.0, "N"), ("c_0", 0.1, "1"))
+    )
+    rows = "".join(f"{c},{(30.0 * (c - 0.1) + 20.0) * (c - 0.1):.6f}\n" for c in (0.2, 0.5, 0.8))
+    rov = DOWN.replace("[curves.t200]\n", f"[curves.t200]\n{curve}")
+    heave = f"{SPEED}\n0.3,0.2\n0.6,0.4\n0.8,0.5\n"
+    found = identify(read(tmp_path, rov, {"thrust_t200.csv": f"{FORCE}\n{rows}", "steady_heave.csv": heave})).vehicle
+    values = [found.rov[f"{key}_t200{end}"] for end in ("", "_reverse") for key in ("a_t", "b_t")]
+    assert values == pytest.approx([30.0, 20.0, 20.0, 15.0], rel=1e-4)
+
+
+def test_the_rov_toml_of_the_docs(tmp_path: Path) -> None:
+    (text,) = re.findall(r"```toml\n(base = .*?)```", (DOCS / "identify.md").read_text(encoding="utf-8"), re.DOTALL)
+    given = read(tmp_path, text, {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
+    assert given.head.name == "Our BlueROV2"
+    assert given.rov.layout == load_vehicle(SHIPPED["bluerov2"]).layout

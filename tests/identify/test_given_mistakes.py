@@ -1,0 +1,248 @@
+"""What rov.toml, the files and both together may not say: a line for each mistake, all in one go."""
+
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+
+import pytest
+from hypothesis import strategies as st
+
+from rov_fmu.files.messages import FileError
+from rov_fmu.identify.given import ROV_FILE
+from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.vehicle.geometry import impossible
+from tests.damage import changed_toml, fuzz
+from tests.folders import (
+    BLUEROV2,
+    DOWN,
+    FORCE,
+    HEAD,
+    MASS,
+    PLACE,
+    RATE,
+    SPEED,
+    TAU,
+    TOP,
+    TURNS,
+    VECTORED,
+    folder_of,
+    pulled,
+)
+
+HEAVE_ALONE = {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n"}
+WITH_THRUST = HEAVE_ALONE | {"thrust_t200.csv": pulled(30.0, 20.0)}
+# rov.toml, the tables, and the lines, as they begin after the name of the folder.
+WRONG: dict[str, tuple[str, Mapping[str, str], tuple[str, ...]]] = {
+    "no such base": (
+        f'base = "bluerov3"\n{HEAD}',
+        HEAVE_ALONE,
+        ("/rov.toml: base = 'bluerov3': must be a vehicle file, seen from",),
+    ),
+    "a base beside thrusters": (
+        'base = "bluerov2"\n' + VECTORED,
+        {},
+        tuple(f"/rov.toml: {name}: must not stand beside base" for name in ("body", "curves", "thruster")),
+    ),
+    "curves without thrusters": (
+        f"{HEAD}[curves.t200]\n",
+        HEAVE_ALONE,
+        ("/rov.toml: thruster: this table is missing, and there is curves: write [[t",),
+    ),
+    "no curve at all": (
+        VECTORED.replace("[curves.t200]", "[curves]"),
+        {},
+        ("/rov.toml: curves: this table is missing, and there is body: write [curves.<name>]",),
+    ),
+    "body alone": (
+        f"{HEAD}[body]\n{MASS}",
+        {},
+        (
+            "/rov.toml: curves: this table is missing, and there is body",
+            "/rov.toml: thruster: this table is missing, and",
+        ),
+    ),
+    "no such curve": (
+        DOWN.replace('curve = "t200"', 'curve = "t100"'),
+        WITH_THRUST,
+        (
+            "/rov.toml: thruster.v.curve = 't100': there is no such curve, only t200",
+            "/rov.toml: curves.t200: no thruster",
+        ),
+    ),
+    "drag of one direction": (
+        DOWN + '[axes.heave]\na_d_reverse = { value = 1.0, unit = "N.s2/m2", source = "s" }\n',
+        WITH_THRUST,
+        ("/rov.toml: axes.heave.b_d_reverse: this key is missing, and a_d_reverse is there",),
+    ),
+    "half a curve in its table": (
+        DOWN.replace("[curves.t200]", '[curves.t200]\na_t = { value = 1.0, unit = "N", source = "s" }'),
+        HEAVE_ALONE,
+        ("/rov.toml: curves.t200: a_t_t200 is given, but b_t_t200 is not",),
+    ),
+    "given twice": (DOWN + f"[body]\n{MASS}", WITH_THRUST, ("/rov.toml: known.m_rov: is given in [body] too",)),
+    "no mass": (
+        DOWN.replace(MASS, ""),
+        WITH_THRUST,
+        ("/rov.toml: known.m_rov: this key is missing, and the vehicle has he",),
+    ),
+    "no moment of inertia": (
+        VECTORED.replace(TURNS, ""),
+        {"thrust_t200.csv": pulled(30.0, 20.0), "steady_yaw.csv": f"{RATE}\n0.3,0.2\n"},
+        ("/rov.toml: known.I_r: this key is missing, and the vehicle has yaw",),
+    ),
+    "no arm": (
+        f"{HEAD}[known]\n{TURNS}",
+        {"thrust_rear.csv": pulled(40.0, 2.0), "steady_yaw.csv": f"{RATE}\n0.3,0.2\n"},
+        (
+            "/rov.toml: known.R: this key is missing, and",
+            "/rov.toml: known.gamma: this key is missing, and the vehicle has yaw",
+        ),
+    ),
+    "no place": (
+        VECTORED.replace(PLACE.format(0.15, 0.11), ""),
+        {"thrust_t200.csv": pulled(1.0, 1.0), "steady_yaw.csv": f"{RATE}\n0.3,0.2\n"},
+        ("/rov.toml: thruster.1.position: this key, or arm, is missing, and the vehicle has yaw",),
+    ),
+    "an axis that no thruster drives": (
+        DOWN,
+        WITH_THRUST | {"steady_surge.csv": f"{SPEED}\n0.3,0.2\n"},
+        ("/steady_surge.csv: no thruster of the vehicle drives surge",),
+    ),
+    "no thrust": (DOWN, HEAVE_ALONE, (": no thrust_t200*.csv, and rov.toml does not give a_t_t200",)),
+    "thrust alone": (
+        DOWN,
+        {"thrust_t200.csv": pulled(30.0, 20.0)},
+        (": no axis is tested: there is no steady_, time_co",),
+    ),
+    "thrust given and tested": (
+        DOWN.replace("[curves.t200]", "[curves.t200]\n" + TOP.replace("_top", "")),
+        WITH_THRUST,
+        (": rov.toml gives a_t_t200, b_t_t200, but there is thrust_t200.csv too",),
+    ),
+    "nothing that tells of drag": (
+        DOWN,
+        {"thrust_t200.csv": pulled(30.0, 20.0), "time_constant_heave.csv": f"{TAU}\n0.3,2\n"},
+        (": no steady_heave*.csv or log_heave*.csv that counts, and rov.toml does not give a_d_w, b_d_w",),
+    ),
+    "one file, whose name is none": (
+        DOWN,
+        {"steadyheave.csv": f"{SPEED}\n0.3,0.2\n"},
+        ("/steadyheave.csv: no name of a test",),
+    ),
+    "unknown coefficient": (
+        f"{BLUEROV2}[known]\nmass = 11.5\n",
+        HEAVE_ALONE,
+        ("/rov.toml: known.mass: there is no such coefficient of this vehicle",),
+    ),
+    "misspelt coefficient": (
+        f'{BLUEROV2}[known]\nm_rv = {{ value = 9.0, unit = "kg", source = "s" }}\n',
+        HEAVE_ALONE,
+        ("/rov.toml: known.m_rv: there is no such coefficient of this vehicle; did you mean m_rov?",),
+    ),
+    "out of bounds": (
+        f'{BLUEROV2}[known]\nm_a_w = {{ value = -1.0, unit = "N", source = "s" }}\n',
+        HEAVE_ALONE,
+        (
+            "/rov.toml: known.m_a_w.unit = 'N': must be 'kg'",
+            "/rov.toml: known.m_a_w.value = -1.0: must be within 0 ... 1",
+        ),
+    ),
+    "window of another vehicle": (
+        f"{BLUEROV2}[windows]\nthrust_rear = [0.0, 0.5]\n",
+        HEAVE_ALONE,
+        ("/rov.toml: windows.thrust_rear: there is no such key, only thrust_t200, surge, sway, heave, yaw",),
+    ),
+    "lag of no curve": (
+        f'{BLUEROV2}[fit]\nlag = ["rear"]\n',
+        HEAVE_ALONE,
+        ("/rov.toml: fit.lag = 'rear': there is no such curve, only t200",),
+    ),
+    "lag in words": (
+        f'{BLUEROV2}[fit]\nlag = "t200"\n',
+        HEAVE_ALONE,
+        ("/rov.toml: fit.lag = 't200': must be true, or a list of curves",),
+    ),
+    "lag given": (
+        f'{BLUEROV2}[known]\nT_t200 = {{ value = 0.1, unit = "s", source = "s" }}\n[fit]\nlag = true\n',
+        HEAVE_ALONE,
+        ("/rov.toml: fit.lag = 't200': T_t200 is given, so it cannot be fitted too",),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_is_told(case: str, tmp_path: Path) -> None:
+    rov, tables, lines = WRONG[case]
+    folder = folder_of(tmp_path / "tests", rov, tables or HEAVE_ALONE)
+    with pytest.raises(FileError) as caught:
+        load_tank_tests(folder)
+    told = str(caught.value).splitlines()
+    assert len(told) == len(lines), told
+    for line, words in zip(told, lines, strict=True):
+        assert line.startswith(f"{folder}{words}")
+
+
+def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
+    """Of rov.toml, of each file each line that is wrong, of names, and what is missing."""
+    rov = f"{HEAD}[known]\n{MASS.replace('kg', 'lb')}[windows]\nsway = [0.1, 0.2]\n"
+    tables = {
+        "log_yaw.csv": "time [s],command [%]\n0,0\n",
+        "steady_heave.csv": f"{SPEED}\n0.3,0.2\n0,1\n0.3,-0.2\n",
+        "steady_surge.csv": f"{SPEED}\n0.3,fast\n",
+        "stedy_surge.csv": f"{SPEED}\n0.3,0.2\n",
+        "thrust_left.csv": f"{FORCE}\n0.3,0.2\n",
+        "thrust_rear.csv": f"{FORCE}\n0.3,10\n-0.3,7\n",
+    }
+    folder = folder_of(tmp_path / "tests", rov, tables)
+    with pytest.raises(FileError) as caught:
+        load_tank_tests(folder)
+    starts = [
+        "/rov.toml: known.m_rov.unit = 'lb'", "/rov.toml: windows.sway",
+        "/log_yaw.csv, line 1", "/steady_heave.csv, line 3, column 'command [1]' = 0", "/steady_heave.csv, line 4",
+        "/steady_surge.csv, line 2", "/stedy_surge.csv: no name of a test", "/thrust_left.csv: no name of a test",
+        "/thrust_rear.csv, line 3", "/rov.toml: known.I_r", "/rov.toml: known.R", "/rov.toml: known.gamma",
+        ": no thrust_top*.csv",
+    ]  # fmt: skip
+    lines = str(caught.value).splitlines()
+    assert [line[: len(str(folder)) + len(start)] for line, start in zip(lines, starts, strict=True)] == [
+        f"{folder}{start}" for start in starts
+    ]
+
+
+def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "tests", "base =", {"thrust_any.csv": f"{FORCE}\n0.3,x\n", "steady_roll.csv": ""})
+    with pytest.raises(FileError) as caught:
+        load_tank_tests(folder)
+    told = str(caught.value).splitlines()
+    assert [line[len(str(folder)) :].split(":")[0] for line in told] == [
+        "/rov.toml", "/steady_roll.csv", "/thrust_any.csv, line 2, column 'force [N]' = 'x'",
+    ]  # fmt: skip
+    assert "a curve" in told[1]
+
+
+def check_lines(text: str, folder: Path) -> None:
+    """Each can be printed, and begins with a file or the folder."""
+    assert all(line.startswith(str(folder)) and line.isprintable() for line in text.splitlines())
+
+
+@pytest.mark.parametrize("examples", [8, pytest.param(2000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("rov", [BLUEROV2 + '[known]\nm_a_w = { value = 1.0, unit = "kg", source = "s" }\n', VECTORED])
+def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int, tmp_path: Path) -> None:
+    tables = {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n", "steady_surge.csv": f"{SPEED}\n0.3,0.2\n"}
+    folder = folder_of(tmp_path / "tests", rov, tables | {"thrust_t200.csv": pulled(30.0, 20.0)})
+
+    def check(data: st.DataObject) -> None:
+        (folder / ROV_FILE).write_bytes(changed_toml(rov.encode(), data))
+        try:
+            given = load_tank_tests(folder).given
+        except FileError as error:
+            check_lines(str(error), folder)
+            return
+        layout = given.rov.layout
+        assert [*impossible(layout)] == []
+        assert {"surge", "yaw"} <= layout.kinds.keys()
+        assert given.rov.coefficients.keys() == layout.coefficients.keys() >= given.known.keys()
+        assert all(isfinite(value) for value in given.rov.coefficients.values())
+        assert given.thruster_sources.keys() == {thruster.name for thruster in layout.thrusters}
+
+    fuzz(check, examples)

@@ -1,0 +1,242 @@
+"""Logs as loggers and spreadsheets save them: what is read, what is left out and told, what is refused."""
+
+from collections.abc import Sequence
+from math import radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.identify.logs import Log, read_log
+from rov_fmu.identify.recording import Recording
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.vehicle.paper import PAPER
+
+N = 40
+STEP = [0.3 * (n >= 10) for n in range(N)]
+MIXED = Layout(
+    axes=(VehicleAxis(SURGE), VehicleAxis(YAW)),
+    curves=(Curve("rear"),),
+    thrusters=(
+        Thruster("l", "rear", (1.0, 0.0, 0.0), (-0.2, -0.1, 0.0)),
+        Thruster("r", "rear", (1.0, 0.0, 0.0), (-0.2, 0.1, 0.0)),
+    ),
+    mix={"ahead": {"l": 1.0, "r": 1.0}, "turn": {"l": 0.5, "r": -0.5}},
+)
+
+
+def read(folder: Path, header: str, rows: Sequence[str], axis: Axis | None = None, layout: Layout = PAPER) -> Log:
+    path = folder / "log.csv"
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    return read_log(path, layout, axis)
+
+
+def of_axis(log: Log, name: str) -> Recording:
+    (recording,) = (recording for recording in log.recordings if recording.axis.name == name)
+    return recording
+
+
+# ---- Rows that cannot be used ----------------------------------------------------------------------------------------
+
+
+def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{100 * STEP[n]},{n}" for n in range(N)]
+    rows[5], rows[6] = rows[6], rows[5]  # 0.6 before 0.5
+    rows[21:21] = ["2.05,,5", "2.06,on,5", "2.07,-,5", "2.08,30,x", "2.09,3,4,5"]
+    rows[20:20] = ["1.9,30,", "1.9,25,77", ",30,5", "nan,30,5"]
+    log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+    (recording,) = log.recordings
+    assert log.notes == (
+        "log.csv: 1 row out of order sorted, 2 repeated time stamps merged, 2 rows without a time left out, "
+        "3 rows without a command left out, 1 row with more cells than the header left out, "
+        "1 cell of depth without a number taken as blank",
+    )
+    there = np.isfinite(recording.values)
+    assert recording.time[~there] == pytest.approx([2.08])
+    expected = 0.01 * np.arange(N)
+    expected[19] = 0.77
+    assert recording.values[there] == pytest.approx(expected)
+    assert recording.time[there] == pytest.approx(0.1 * np.arange(N))
+    assert recording.command is not None
+    assert recording.command[there] == pytest.approx([0.25 if n == 19 else STEP[n] for n in range(N)])
+
+
+def test_a_log_without_fault_has_no_notes(tmp_path: Path) -> None:
+    assert read(tmp_path, "time [s],command [%],depth [cm]", [f"{n},30,{n}" for n in range(N)], HEAVE).notes == ()
+
+
+def test_two_logs_in_one_file_are_refused(tmp_path: Path) -> None:
+    rows = [f"{n % 30},30,{n}" for n in range(60)]
+    with pytest.raises(DataFileError, match=r"line 32, column 'time \[s\]' = 0: the time goes back, and stays back"):
+        read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        (["0,30,1"] * 100, "1 samples of depth, at least 20 are needed"),
+        ([f"{n},,1" for n in range(N)], "no row has both a time and a command"),
+        ([f"{n},30,-" for n in range(N)], "0 samples of depth"),
+        ([f"{n / 10:.1f},30,1".replace(".", ",") for n in range(N)], "decimal commas"),
+        ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command beyond 1 %: fractions"),
+    ],
+)  # fmt: skip
+def test_logs_of_which_nothing_is_left_are_refused(rows: list[str], told: str, tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match=told):
+        read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+
+
+def test_as_a_european_spreadsheet_saves_it(tmp_path: Path) -> None:
+    rows = [f"{n / 10}; {100 * STEP[n]} ;{n / 100};".replace(".", ",") for n in range(N)]
+    (recording,) = read(tmp_path, "TIME [s] ;Command[%]; Depth [M];", rows, HEAVE).recordings
+    assert recording.time == pytest.approx(0.1 * np.arange(N))
+    assert recording.command == pytest.approx(STEP)
+    assert recording.values == pytest.approx(0.01 * np.arange(N))
+
+
+# ---- Several commands ------------------------------------------------------------------------------------------------
+
+
+def test_a_dive_tells_of_every_axis_that_is_driven(tmp_path: Path) -> None:
+    """First down, then ahead, then about, by pulses of 1500 ± 400 µs, fractions and percent."""
+    rows = []
+    for n in range(90):
+        left, right, top = 0.4 * (n >= 30), 0.4 * (30 <= n < 60) - 0.4 * (n >= 60), 0.5 * (n < 30)
+        motion = f"{n / 50},{(350 + n) % 360},{n / 100}"
+        rows.append(f"{n / 10},{1500 + 400 * left:.0f},{right},{100 * top},{motion},ok")
+    header = "time [s],u_l [us],u_r [1],t [%],depth [m],heading [deg],Surge Velocity [m/s],mode"
+    log = read(tmp_path, header, rows)
+    surge, heave, yaw = (of_axis(log, name) for name in ("surge", "heave", "yaw"))
+    assert heave.quantity == "depth"
+    assert heave.values == pytest.approx(np.arange(90) / 50)
+    assert yaw.values == pytest.approx(np.radians(350 + np.arange(90)))
+    assert surge.quantity == "velocity"
+    assert heave.thrusters["t"] == pytest.approx([0.5] * 30 + [0.0] * 60)
+    assert heave.thrusters["r"] == pytest.approx([0.0] * 30 + [0.4] * 30 + [-0.4] * 30)
+    assert {recording.command is None for recording in log.recordings} == {True}, "no axis was driven alone"
+    assert log.notes == ()
+
+
+def test_a_command_of_the_axis_where_the_thrusters_follow_its_pattern(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{STEP[n]},{-STEP[n]},0,{n}" for n in range(N)]
+    (recording,) = read(tmp_path, "time [s],u_l [1],u_r [1],u_t [1],heading [deg]", rows, YAW).recordings
+    assert recording.command == pytest.approx(STEP)
+
+
+def test_names_of_the_fmu(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{STEP[n]},{-STEP[n]},{STEP[n]},{n / 10},{n / 100},{n}" for n in range(N)]
+    log = read(tmp_path, "time [s],u_l [1],u_r [1],u_t [1],r [deg/s],w [m/s],u [V]", rows)
+    assert {recording.axis: recording.quantity for recording in log.recordings} == {HEAVE: "velocity", YAW: "velocity"}
+    assert of_axis(log, "yaw").values == pytest.approx(np.radians(0.1 * np.arange(N)))
+
+
+def test_position_wins_unless_the_velocity_alone_has_samples(tmp_path: Path) -> None:
+    header = "time [s],u_t [1],depth [m],heave velocity [m/s]"
+    full = [f"{n / 10},{STEP[n]},{n},{n / 100}" for n in range(N)]
+    assert of_axis(read(tmp_path, header, full), "heave").quantity == "depth"
+    few = [f"{n / 10},{STEP[n]},{n if n < 10 else ''},{n / 100}" for n in range(N)]
+    assert of_axis(read(tmp_path, header, few), "heave").quantity == "velocity"
+
+
+def test_axes_that_the_thrusters_do_nothing_along_are_told(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{STEP[n]},{STEP[n]},{n},{n},1.5" for n in range(N)]
+    log = read(tmp_path, "time [s],u_l [1],u_r [1],surge distance [m],heading [deg],depth [m]", rows)
+    assert [recording.axis for recording in log.recordings] == [SURGE]
+    assert log.notes == (
+        "log.csv: no column of u_t, which is taken as 0",
+        "log.csv: no recording of heave: the depth never changes",
+        "log.csv: no recording of yaw: what the thrusters do along it never changes",
+    )
+
+
+def test_inputs_are_mixed_and_saturated_and_thrusters_are_not(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{0.8 * (n > 9)},{STEP[n]},{n}" for n in range(N)]
+    (recording,) = read(tmp_path, "time [s],u_ahead [1],u_turn [1],heading [deg]", rows, layout=MIXED).recordings
+    assert (recording.thrusters["l"][-1], recording.thrusters["r"][-1]) == pytest.approx((0.95, 0.65))
+    (recording,) = read(tmp_path, "time [s],l [1],R [1],heading [deg]", rows, layout=MIXED).recordings
+    assert (recording.thrusters["l"][-1], recording.thrusters["r"][-1]) == pytest.approx((0.8, 0.3))
+    rows = [f"{n / 10},{0.9 * (n > 9)},{0.9 * (n > 9)},{n}" for n in range(N)]
+    (recording,) = read(tmp_path, "time [s],u_ahead [1],u_turn [1],heading [deg]", rows, layout=MIXED).recordings
+    assert (recording.thrusters["l"][-1], recording.thrusters["r"][-1]) == pytest.approx((1.0, 0.45))
+
+
+# ---- Pulses ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("unit", "pulse", "command"),
+    [
+        ("us", 1700, 0.5),
+        ("µs", 1300, -0.5),
+        ("US", 1500, 0.0),
+        ("us 1520 500", 1770, 0.5),
+        ("us 1500 -400", 1700, -0.5),
+        ("us", 1100, -1.0),
+    ],
+)
+def test_a_pulse_is_a_command_by_neutral_and_span(unit: str, pulse: float, command: float, tmp_path: Path) -> None:
+    rows = [f"{n / 10},{pulse if n >= 20 else 1900 if n >= 10 else 1500},{n}" for n in range(N)]
+    (recording,) = read(tmp_path, f"time [s],command [{unit}],depth [m]", rows, HEAVE).recordings
+    assert recording.command is not None
+    assert recording.command[-1] == pytest.approx(command)
+
+
+def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
+    pulses = [0, 65535, *[1500] * 8, 2000, 900, *[1700] * 28]
+    log = read(tmp_path, "time [s],u_t [us],depth [m]", [f"{n},{p},{n}" for n, p in enumerate(pulses)])
+    assert of_axis(log, "heave").thrusters["t"][[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
+    assert log.notes[0] == (
+        "log.csv: pulses of u_t: 2 of 0 or 65535 us taken as no command, 2 beyond full thrust taken as full thrust"
+    )
+
+
+# ---- What is refused -------------------------------------------------------------------------------------------------
+
+REFUSED = {
+    "no commands": ("time [s],depth [m]", "0,1", "line 1: no column of commands: u_l, u_r, u_t, each in"),
+    "no motion": ("time [s],u_t [%]", "0,1", "line 1: column 'surge distance [m]' or 'surge velocity [m/s]' or 'depth"),
+    "no such unit": ("time [s],u_t [V],depth [m]", "0,1,1", "'u_t [V]': must be 'u_t [%]' or 'u_t [1]' or 'u_t [us]'"),
+    "span of none": ("time [s],u_t [us 1500 0],depth [m]", "0,1,1", "must be [us], or [us NEUTRAL SPAN] such as"),
+    "neutral alone": ("time [s],u_t [us 1500],depth [m]", "0,1,1", "must be [us], or [us NEUTRAL SPAN] such as"),
+    "span in words": ("time [s],u_t [us 1500 wide],depth [m]", "0,1,1", "only numbers may follow us"),
+    "a number behind %": ("time [s],u_t [% 100],depth [m]", "0,1,1", "must be [%] alone"),
+    "twice": ("time [s],u_t [%],t [1],depth [m]", "0,1,1,1", "there is such a column before"),
+    "percent as fractions": ("time [s],u_t [1],depth [m]", "0,30,1", "line 2, column 'u_t [1]' = '30': must be at"),
+    "fractions as pulses": ("time [s],u_t [us],depth [m]", "0,0.5,1", "no pulse beyond 1 us: fractions under [us]?"),
+    "percent as pulses": ("time [s],u_t [us],depth [m]", "0,50,1", "no pulse beyond 100 us: percent under [us]?"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_is_one_clear_line(case: str, tmp_path: Path) -> None:
+    header, row, told = REFUSED[case]
+    with pytest.raises(DataFileError) as error:
+        read(tmp_path, header, [row])
+    assert str(error.value).startswith(str(tmp_path / "log.csv"))
+    assert told in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_two_kinds_of_commands_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match=r"columns 'u_t \[%\]', 'command \[%\]': the commands of the axis"):
+        read(tmp_path, "time [s],command [%],u_t [%],depth [m]", ["0,0,0,0"], HEAVE)
+
+
+def test_nothing_of_use_is_a_line_for_each_axis(tmp_path: Path) -> None:
+    rows = [f"{n / 10},0.3,{n},1" for n in range(N)]
+    with pytest.raises(DataFileError) as error:
+        read(tmp_path, "time [s],u_t [1],depth [m],heading [deg]", rows)
+    path = tmp_path / "log.csv"
+    assert str(error.value).splitlines() == [
+        f"{path}: no recording of heave: what the thrusters do along it never changes",
+        f"{path}: no recording of yaw: the heading never changes",
+    ]
+
+
+def test_a_heading_is_unwrapped_over_blanks(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{STEP[n]},{-STEP[n]},{(350 + 5 * n) % 360 if n % 2 else ''}" for n in range(2 * N) if n < N] + [
+        f"{N / 10 + n / 10},0.3,-0.3,{(350 + 5 * (N + n)) % 360}" for n in range(10)
+    ]
+    (recording,) = read(tmp_path, "time [s],u_l [1],u_r [1],heading [deg]", rows).recordings
+    assert recording.values[-1] == pytest.approx(radians(350 + 5 * (N + 9)))
