@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.tank_tests import Recording
+from rov_fmu.identify.recording import Recording
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.motion.rov import Rov
 
@@ -60,6 +60,7 @@ def write_log(folder: Path, name: str, recording: Recording) -> Path:
     heading = recording.quantity == "heading"
     values = np.degrees(recording.values) % 360.0 if heading else recording.values
     unit = "deg" if heading else "m" if recording.is_position else recording.axis.unit
+    assert recording.command is not None
     rows = [f"time [s],command [%],{recording.quantity} [{unit}]"]
     rows += [
         f"{t:.4f},{100.0 * c:g},{'' if np.isnan(v) else f'{v:.5f}'}"

@@ -17,6 +17,7 @@ from rov_fmu.motion.layout import AXIS, CURVE, TUNING, Kind
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Loss = Literal["huber", "linear"]
 LEVEL = 0.95
 _RANK = 1e-6  # singular values below this fraction of the largest belong to what is not identifiable
 _LEAST_FACTOR = 1e-6
@@ -107,8 +108,8 @@ class Solution:
 
 
 def kind_of(name: str) -> Kind:
-    """What is declared of a coefficient of forward, of any curve or axis."""
-    return (CURVE | AXIS | TUNING)[name.rpartition("_")[0]]
+    """What is declared of a coefficient of any curve or axis."""
+    return next(kind for key, kind in (CURVE | AXIS | TUNING).items() if name.startswith(f"{key}_"))
 
 
 def is_factor(name: str) -> bool:
@@ -139,18 +140,34 @@ def minimize(
     limits: tuple[Array, Array],
     *,
     jacobian: Callable[[Array], Array] | None = None,
-    loss: Literal["linear", "soft_l1", "huber"] = "linear",
+    loss: Loss = "linear",
     threshold: float = 1.0,
+    tolerance: float = 1e-10,
+    far: bool = False,
 ) -> Solution:
-    """Bounded least squares by SciPy; with a robust loss residuals beyond the threshold count less than squared."""
+    """Bounded least squares by SciPy; with a robust loss residuals beyond the threshold count less than squared.
+
+    `far` is for starts far off: the trust region then keeps away from the bounds until the end.
+    """
     low, high = limits
-    options: dict[str, Any] = {"jac": jacobian or "3-point", "bounds": limits, "method": "dogbox"}
-    result = least_squares(
-        residuals, np.clip(start, low, high), x_scale="jac", loss=loss, f_scale=threshold, max_nfev=200,
-        xtol=1e-10, ftol=1e-12, gtol=1e-12, **options,
-    )  # fmt: skip
-    plain = least_squares(residuals, result.x, max_nfev=1, **options)
-    return Solution(result.x, plain.fun, plain.jac)
+    start = np.clip(start, low, high)
+    options: dict[str, Any] = {"jac": jacobian or "3-point", "bounds": limits}
+    ends = {"xtol": tolerance, "ftol": 0.01 * tolerance, "gtol": 0.01 * tolerance}
+    for method in ("trf", "dogbox") if far else ("dogbox",):
+        result = least_squares(
+            residuals,
+            start,
+            method=method,
+            x_scale="jac",
+            loss=loss,
+            f_scale=threshold,
+            max_nfev=100,
+            **ends,
+            **options,
+        )
+        start = np.clip(result.x, low, high)
+    plain = least_squares(residuals, start, method="dogbox", max_nfev=1, **options)
+    return Solution(start, plain.fun, plain.jac)
 
 
 def fit_named(residuals: Callable[[dict[str, float]], Array], start: Mapping[str, float]) -> Solution:

@@ -1,153 +1,223 @@
-"""Recordings as a function of the coefficients: what the model's sensors would have measured, and its derivatives."""
+"""Recordings as a function of what is fitted: what the model's sensors would have measured, and its derivatives."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
-from rov_fmu.identify.least_squares import Array, Estimate, external, internal
-from rov_fmu.identify.response_fit import drag_and_beta
-from rov_fmu.identify.step_responses import velocity, without_spikes
-from rov_fmu.identify.tank_tests import Recording, thrust_names
-from rov_fmu.identify.trajectory import trajectory
-from rov_fmu.motion.layout import Axis
-from rov_fmu.motion.riccati import Riccati
+from rov_fmu.identify.coupling import EAST, NORTH, Current
+from rov_fmu.identify.extras import Extra, with_extras
+from rov_fmu.identify.least_squares import Array, Estimate, Loss, Solution, external, internal, minimize
+from rov_fmu.identify.limits import limits
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.runs import ForcedRun, PreparedRecording, at_samples, forced_run, joined, steps_of
+from rov_fmu.identify.sensitivity import Sensitivity
+from rov_fmu.identify.trajectory import REACH, Motion, MotionError, motion
 from rov_fmu.motion.rov import Rov
 
-_STEP = 1e-6  # of the differences that stand for derivatives
+HUBER = 2.5
+"""Residuals beyond so many standard deviations count by their size, not its square."""
+
+Slopes = dict[str | Extra | int, Array]
+"""By coefficient (internal), extra, and initial value (0: velocity, 1: position); n each."""
 
 
 @dataclass(frozen=True, eq=False)
-class PreparedRecording:
-    """A recording ready to be simulated: holds of the command with the thrust they give, and the measured samples."""
+class Output:
+    """What a recording would have measured, n each; and its derivatives."""
 
-    recording: Recording
-    starts: Array
-    thrust: Array
-    """holds x 2: force before α for a_t = 1 and for b_t = 1."""
-    time: Array
     values: Array
-    speed: float
-    """About the highest."""
-    force: float
-    """The strongest, before α."""
-
-    @property
-    def axis(self) -> Axis:
-        """Its axis."""
-        return self.recording.axis
-
-    @property
-    def initial_count(self) -> int:
-        """Number of its initial values: of the velocity, of the position where that is measured."""
-        return 2 if self.recording.is_position else 1
-
-    def thinned(self) -> "PreparedRecording":
-        """With some 500 of its samples."""
-        some = slice(None, None, max(1, len(self.time) // 500))
-        return replace(self, time=self.time[some], values=self.values[some])
-
-
-def prepare(recording: Recording, base: Rov) -> PreparedRecording:
-    """Find the holds, from the one of the first measured sample on."""
-    axis, there = recording.axis, np.isfinite(recording.values)
-    time, values = recording.time[there], recording.values[there]
-    holds = np.concatenate([[0], np.flatnonzero(np.diff(recording.command)) + 1])
-    holds = holds[max(int(np.searchsorted(holds, np.flatnonzero(there)[0], side="right")) - 1, 0) :]
-    levels, place = np.unique(recording.command[holds], return_inverse=True)
-    names = thrust_names(axis)
-    units = [base.replaced(dict(zip(names, unit, strict=True))) for unit in ((1.0, 0.0), (0.0, 1.0))]
-    thrust = np.array([[k.force(axis, c) for k in units] for c in levels.tolist()])[place]
-    starts = recording.time[holds]
-    starts[0] = time[0]
-    inner = starts <= time[-1]
-    _, v = velocity(time, without_spikes(values), is_position=recording.is_position)
-    force = np.abs(thrust @ [base[name] for name in names]).max()
-    speed = float(np.quantile(np.abs(v), 0.95))
-    return PreparedRecording(recording, starts[inner], thrust[inner], time, values, speed, float(force))
+    velocity: Array
+    """Through the water."""
+    slopes: Slopes = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Simulator:
-    """Recordings as a function of x: named coefficients (internal parameters), then each recording's initial values.
+    """Recordings as a function of x: named coefficients (internal parameters), extras, then initial values.
 
     Residuals are modelled less measured, in standard deviations (sigma, one a recording), one recording after the
-    other; the thrust coefficients, where they are among the names, stand behind as two more that were measured.
+    other; behind them stand the thrust coefficients that were measured, as residuals of their estimate, and the extras.
     """
 
     data: tuple[PreparedRecording, ...]
     base: Rov
     names: tuple[str, ...]
+    extras: tuple[Extra, ...]
     sigma: Array
     thrust: Estimate | None = None
+    likely: Array | None = None
+    """How far each extra is likely to be from none at all (standard deviation); None where nothing is said of that."""
+    _last: dict[str, tuple[Array, list[ForcedRun], Motion]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def places(self) -> list[tuple[PreparedRecording, slice, slice, float]]:
         """Each recording, its rows of the residuals, its initial values in x, its standard deviation."""
         rows = np.cumsum([0, *(len(d.time) for d in self.data)]).tolist()
-        initial = np.cumsum([len(self.names), *(d.initial_count for d in self.data)]).tolist()
+        initial = np.cumsum([self.shared, *(d.initial_count for d in self.data)]).tolist()
         slices = ([slice(*ends) for ends in pairwise(bounds)] for bounds in (rows, initial))
         return list(zip(self.data, *slices, self.sigma.tolist(), strict=True))
 
-    def start(self, beta: float) -> Array:
-        """Drag half linear, half quadratic, such that the strongest force gives about the highest speed; at rest."""
-        fastest = max(self.data, key=lambda d: d.speed)
-        axis = fastest.axis
-        drag = self.base[axis.coefficient("alpha")] * fastest.force / fastest.speed
-        kinds = {"a_d": 0.5 * drag / fastest.speed, "b_d": 0.5 * drag, "beta": beta}
-        shared = internal(self.names, {axis.coefficient(kind): value for kind, value in kinds.items()})
-        return np.concatenate([shared, *(np.array([0.0, d.values[0]][: d.initial_count]) for d in self.data)])
+    @property
+    def shared(self) -> int:
+        """How many of x are not initial values."""
+        return len(self.names) + len(self.extras)
 
-    def run(self, data: PreparedRecording, x: Array, initial: Array, load: float = 0.0) -> tuple[Array, Array, Array]:
-        """Output, velocity and acceleration at the measured samples, with a constant load (N, N.m) besides."""
-        k, axis = self.base.replaced(external(self.names, x)), data.axis
-        unit = k.acceleration_of(k.layout.kinds[axis.name], 0.0, 1.0)  # under a load of 1
-        thrust = data.thrust @ [k[name] for name in thrust_names(axis)]
-        C = unit.C * (k[axis.coefficient("alpha")] * thrust + load)
-        v, s = trajectory([Riccati(unit.A, unit.B, c) for c in C.tolist()], data.starts, float(initial[0]), data.time)
-        held = C[np.searchsorted(data.starts, data.time, side="right") - 1]
-        output = s + initial[1] if data.recording.is_position else v
-        return output, v, held - (unit.B + unit.A * np.abs(v)) * v
+    def rov(self, x: Array) -> Rov:
+        """The vehicle with the coefficients of x, and with what the extras make of it."""
+        return with_extras(self.base.replaced(external(self.names, x)), self.extra_values(x))
+
+    def extra_values(self, x: Array) -> dict[Extra, float]:
+        """The extras of x."""
+        return dict(zip(self.extras, x[len(self.names) : self.shared].tolist(), strict=True))
+
+    def start(self, coefficients: dict[str, float], extras: dict[Extra, float]) -> Array:
+        """x with these numbers, the first measured positions, and the velocities there."""
+        shared = [*internal(self.names, coefficients), *(extras.get(extra, extra.neutral) for extra in self.extras)]
+        initial = (np.array([d.velocity[0], d.values[0]][: d.initial_count]) for d in self.data)
+        return np.concatenate([np.array(shared), *initial])
+
+    def places_of(self, extras: Collection[Extra]) -> list[int]:
+        """Where in x all stands but the other extras."""
+        p = len(self.names)
+        other = {n for n, extra in enumerate(self.extras, p) if extra not in extras}
+        return [n for n in range(self.shared + sum(d.initial_count for d in self.data)) if n not in other]
+
+    # ---- Forward ----
+
+    def run(self, x: Array, *, slopes: bool = False) -> list[Output]:
+        """Every recording. Raises MotionError."""
+        rov, values = self.rov(x), self.extra_values(x)
+        forced, moved = self._moved(x, rov)
+        by_end, by_way = moved.slopes() if slopes else (None, None)
+        outputs, ends = [], pairwise([*moved.steps.first.tolist(), len(moved.steps.h)])
+        for f, (d, _, initial, _), place in zip(forced, self.places, ends, strict=True):
+            here, current = slice(*place), self._sum(values, d.recording, "current")
+            v = np.append(moved.v[here], moved.end[here][-1])[f.run.sample]
+            found: Slopes = {}
+            if d.recording.is_position:
+                output = x[initial][1] + at_samples(f.run, moved.way[here]) + current * (d.time - d.time[0])
+            else:
+                output = v + current
+            output = output + self._flow(values, d) @ d.carried
+            if by_end is not None and by_way is not None:
+                sensitivity = Sensitivity(rov, f, moved.steps.part(here), by_end.part(here), by_way.part(here))
+                found = self._slopes(rov, x, d, sensitivity)
+            outputs.append(Output(output, v, found))
+        return outputs
+
+    def _moved(self, x: Array, rov: Rov) -> tuple[list[ForcedRun], Motion]:
+        """The last one is kept: its derivatives are asked for next, and the motion for another x is near it."""
+        last = self._last.get("last")
+        if last is not None and np.array_equal(last[0], x):
+            return last[1], last[2]
+        values = self.extra_values(x)
+        starts = np.array([x[place.start] for _, _, place, _ in self.places])
+        forced = [
+            forced_run(rov, d, self._sum(values, d.recording, "delay"), v, self._flow(values, d))
+            for d, v in zip(self.data, starts, strict=True)
+        ]
+        pairs = list(zip(forced, self.data, strict=True))
+        steps = joined([steps_of(rov, f, self._sum(values, d.recording, "load")) for f, d in pairs])
+        guesses = [np.concatenate([np.interp(f.run.start, d.time, d.velocity) for f, d in pairs])]
+        if last is not None and len(last[2].v) == len(guesses[0]):
+            guesses.insert(0, last[2].v)
+        precision = 1e-12 if all(d.reach <= REACH for d in self.data) else 1e-7
+        moved = motion(steps, starts, *guesses, precision=precision)
+        self._last["last"] = x.copy(), forced, moved
+        return forced, moved
+
+    def _sum(self, values: dict[Extra, float], recording: Recording, kind: str) -> float:
+        """Of the extras of a kind in a recording, but for the load of an axis, which is among the coefficients."""
+        found = (extra for extra in self.extras if extra.kind == kind and extra.concerns(recording))
+        return sum(values[extra] for extra in found if kind != "load" or extra.is_of_file)
+
+    def _flow(self, values: dict[Extra, float], data: PreparedRecording) -> Current:
+        """The current north and east in a recording."""
+        north, east = (self._sum(values, data.recording, kind) for kind in (NORTH, EAST))
+        return data.current[0] + north, data.current[1] + east
+
+    def _slopes(self, rov: Rov, x: Array, data: PreparedRecording, sensitivity: Sensitivity) -> Slopes:
+        """A ratio in reverse changes what it scales, and so does what that is the multiple of."""
+        ratios = {extra: value for extra, value in self.extra_values(x).items() if extra.pairs()}
+        own_names = ("lag", "dead band")
+        named = {e: next(iter(e.coefficients(rov, 0.0))) for e in self.extras if e.kind in own_names}
+        inner = [name for extra in ratios for name, _ in extra.pairs()]
+        own = [extra for extra in self.extras if extra.concerns(data.recording)]
+        found = sensitivity.by(data, [*self.names, *inner, *named.values()], own)
+        for extra, ratio in ratios.items():
+            for reverse, forward in extra.pairs():
+                if (slope := found.pop(reverse, None)) is not None:
+                    found[extra] = found.get(extra, 0.0) + rov[forward] * slope
+                    if forward in self.names:
+                        found[forward] = found[forward] + ratio * slope
+        for extra, name in named.items():
+            if (slope := found.pop(name, None)) is not None:
+                found[extra] = slope
+        return found
 
     def residuals(self, x: Array) -> Array:
-        """See the class."""
-        parts = [(self.run(d, x, x[initial])[0] - d.values) / sigma for d, _, initial, sigma in self.places]
+        """See the class. NaN where the motion cannot be computed: the search steps back from there."""
+        try:
+            outputs = self.run(x)
+        except MotionError:
+            return np.full(self._size, np.nan)
+        parts = [(output.values - d.values) / sigma
+                 for output, (d, _, _, sigma) in zip(outputs, self.places, strict=True)]  # fmt: skip
         if self.thrust:
-            parts.append(self._whitening @ (x[:2] - self.thrust.values))
+            parts.append(self._whitening @ (x[self._of_thrust] - self.thrust.values))
+        if self.likely is not None:
+            neutral = np.array([extra.neutral for extra in self.extras])
+            parts.append((x[len(self.names) : self.shared] - neutral) / self.likely)
         return np.concatenate(parts)
 
     def jacobian(self, x: Array) -> Array:
-        """Of the residuals, by forward differences."""
+        """Of the residuals."""
         J = np.zeros((self._size, len(x)))
-        for d, rows, initial, sigma in self.places:
-            here = self.run(d, x, x[initial])[0]
-            concerns = (*thrust_names(d.axis), *drag_and_beta(d.axis))
-            steps = {n: _STEP * max(abs(x[n]), 1e-2) for n, name in enumerate(self.names) if name in concerns}
-            for n, h in {**steps, initial.start: _STEP * max(d.speed, 1e-3)}.items():
-                moved = x.copy()
-                moved[n] += h
-                J[rows, n] = (self.run(d, moved, moved[initial])[0] - here) / ((moved[n] - x[n]) * sigma)
-            if d.recording.is_position:
-                J[rows, initial.start + 1] = 1.0 / sigma
+        shared: list[str | Extra] = [*self.names, *self.extras]
+        columns = {key: n for n, key in enumerate(shared)}
+        for output, (_, rows, initial, sigma) in zip(self.run(x, slopes=True), self.places, strict=True):
+            for key, slope in output.slopes.items():
+                J[rows, initial.start + key if isinstance(key, int) else columns[key]] = slope / sigma
         if self.thrust:
-            J[-2:, :2] = self._whitening
+            first = sum(len(d.time) for d in self.data)
+            J[first : first + len(self._of_thrust), self._of_thrust] = self._whitening
+        if self.likely is not None:
+            J[self._size - len(self.extras) :, len(self.names) : self.shared] = np.diag(1.0 / self.likely)
         return J
-
-    def by_load(self, axis: Axis, x: Array) -> Array:
-        """Derivative of the residuals by a constant load on an axis."""
-        column = np.zeros(self._size)
-        for d, rows, initial, sigma in self.places:
-            if d.axis is axis and (h := 1e-4 * d.force):
-                up, down = (self.run(d, x, x[initial], load)[0] for load in (h, -h))
-                column[rows] = (up - down) / (2.0 * h * sigma)
-        return column
 
     @property
     def _size(self) -> int:
         """How many residuals there are."""
-        return sum(len(d.time) for d in self.data) + 2 * bool(self.thrust)
+        said = len(self.extras) if self.likely is not None else 0
+        return sum(len(d.time) for d in self.data) + (len(self.thrust.names) if self.thrust else 0) + said
 
-    @property
+    @cached_property
+    def _of_thrust(self) -> list[int]:
+        assert self.thrust
+        return [self.names.index(name) for name in self.thrust.names]
+
+    @cached_property
     def _whitening(self) -> Array:
         assert self.thrust
-        return np.linalg.inv(np.linalg.cholesky(self.thrust.covariance))
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.thrust.covariance)))
+
+
+def solve(model: Simulator, start: Array, loss: Loss, tolerance: float = 1e-8) -> Solution:
+    """The best fit within the limits; with much tolerance one that is near it. Raises MotionError."""
+    inside = limits(model.base, model.data, model.names, model.extras, len(start))
+    start = np.clip(start, *inside)
+    if not np.isfinite(model.residuals(start)).all():
+        raise MotionError("the motion cannot be computed with these coefficients")
+    return minimize(
+        model.residuals,
+        start,
+        inside,
+        jacobian=model.jacobian,
+        loss=loss,
+        threshold=HUBER,
+        tolerance=tolerance,
+        far=True,
+    )

@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import correlate, savgol_coeffs, savgol_filter
 
 from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.tank_tests import Recording
+from rov_fmu.identify.recording import Recording
 from rov_fmu.motion.riccati import RISE
 
 Method = Literal["savitzky-golay", "moving average"]
@@ -54,11 +54,13 @@ class StepResponse:
 
 
 def steps(recording: Recording) -> tuple[StepResponse, ...]:
-    """The held commands of a recording, other than zero, one after the other."""
+    """The held commands of a recording, other than zero, one after the other; none where the axis had no command."""
+    if recording.command is None:
+        return ()
     there = np.isfinite(recording.values)
     time, values = recording.time[there], without_spikes(recording.values[there])
     found = []
-    for start, end, before, command in _holds(recording):
+    for start, end, before, command in _holds(recording.time, recording.command):
         if command == 0.0:
             continue
         step = StepResponse(recording.file, start, end, before, command)
@@ -121,14 +123,14 @@ def correlation_time(residuals: Array) -> float:
     return 1.0 + 2.0 * float(rho[: chance[0] if chance.size else n].sum())
 
 
-def _holds(recording: Recording) -> Iterator[tuple[float, float, float | None, float]]:
+def _holds(time: Array, commands: Array) -> Iterator[tuple[float, float, float | None, float]]:
     """Start and end (s), the command before, and the command of every stretch over which it stays the same."""
-    changes = np.flatnonzero(np.abs(np.diff(recording.command)) > _SAME_COMMAND) + 1
+    changes = np.flatnonzero(np.abs(np.diff(commands)) > _SAME_COMMAND) + 1
     before = None
-    for first, last in pairwise([0, *changes.tolist(), len(recording.time)]):
-        command = float(np.median(recording.command[first:last]))
-        end = recording.time[min(last, len(recording.time) - 1)]
-        yield float(recording.time[first]), float(end), before, command
+    for first, last in pairwise([0, *changes.tolist(), len(time)]):
+        command = float(np.median(commands[first:last]))
+        end = time[min(last, len(time) - 1)]
+        yield float(time[first]), float(end), before, command
         before = command
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.step_responses import Method, StepResponse, correlation_time, steps, velocity, without_spikes
-from rov_fmu.identify.tank_tests import Recording
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import AXES, PLANS, clean

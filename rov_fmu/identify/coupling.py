@@ -1,0 +1,95 @@
+"""What the log tells of the other axes acts on an axis: coupling, and water that flows along the surface.
+
+The other velocities are measured, so surge, sway and yaw stay motions of one axis each, with one more held force:
+M_v v r in surge, -M_u u r in sway, -(M_v - M_u) u v in yaw, M = m/β, u and v through the water.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from rov_fmu.identify.least_squares import Array
+from rov_fmu.identify.recording import Recording
+from rov_fmu.motion.layout import SURGE, SWAY, YAW, Axis, Layout
+from rov_fmu.motion.rov import Rov
+
+Current = tuple[float, float]
+"""Of the water, north and east, m/s."""
+NORTH: Final = "current north"
+EAST: Final = "current east"
+
+_OTHERS = {SURGE.name: ("v", "r"), SWAY.name: ("u", "r"), YAW.name: ("u", "v")}
+_BETAS = SURGE.coefficient("beta"), SWAY.coefficient("beta")
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """The force of coupling along an axis (N, N.m), and its derivatives by log β of surge and sway and the current."""
+
+    force: Array
+    slopes: Mapping[str, Array]
+
+    def at(self, here: Array, time: Array) -> "Coupling":
+        """At other times."""
+        slopes = {name: np.interp(time, here, slope) for name, slope in self.slopes.items()}
+        return Coupling(np.interp(time, here, self.force), slopes)
+
+
+def is_coupled(layout: Layout, axis: Axis) -> bool:
+    """Whether the other axes of the vehicle act on one."""
+    return layout.coupled and axis.name in _OTHERS
+
+
+def is_told(recording: Recording) -> bool:
+    """Whether the log tells what coupling needs to know."""
+    return recording.beside.keys() >= set(_OTHERS.get(recording.axis.name, ()))
+
+
+def coupling(rov: Rov, recording: Recording, current: Current) -> Coupling | None:
+    """At the times of the recording; None where there is none, or the log does not tell."""
+    if not is_coupled(rov.layout, recording.axis) or not is_told(recording):
+        return None
+    M_u, M_v = (rov.effective_inertia(rov.layout.kinds[axis.name]) for axis in (SURGE, SWAY))
+    beside = recording.beside
+    (c, s), still = _heading(recording), np.zeros(len(recording.time))
+    north, east = current
+    u = beside.get("u", still) - (north * c + east * s)
+    v = beside.get("v", still) - (east * c - north * s)
+    r = beside.get("r", still)
+    if recording.axis is SURGE:
+        force = M_v * v * r
+        return Coupling(force, dict(zip((_BETAS[1], NORTH, EAST), (-force, M_v * r * s, -M_v * r * c), strict=True)))
+    if recording.axis is SWAY:
+        force = -M_u * u * r
+        return Coupling(force, dict(zip((_BETAS[0], NORTH, EAST), (-force, M_u * r * c, M_u * r * s), strict=True)))
+    M = M_v - M_u
+    slopes = (-M_u * u * v, M_v * u * v, M * (c * v - s * u), M * (s * v + c * u))
+    return Coupling(-M * u * v, dict(zip((*_BETAS, NORTH, EAST), slopes, strict=True)))
+
+
+def is_in_flow(recording: Recording) -> bool:
+    """Whether a current north and east is seen along the axis, whichever way the vehicle heads."""
+    return recording.axis in (SURGE, SWAY) and "psi" in recording.beside
+
+
+def carried(recording: Recording, time: Array) -> Array:
+    """2 x n: what water at 1 m/s, north and east, adds to the samples at these times."""
+    if not is_in_flow(recording):
+        return np.zeros((2, len(time)))
+    c, s = _heading(recording)
+    along = np.array([c, s] if recording.axis is SURGE else [-s, c])
+    if recording.is_position:
+        along = cumulative_trapezoid(along, recording.time, initial=0.0)
+    found = np.array([np.interp(time, recording.time, row) for row in along])
+    return found - found[:, :1] if recording.is_position else found
+
+
+def _heading(recording: Recording) -> tuple[Array, Array]:
+    """Its cosine and sine; both 0 where it is not known, as the current is not then."""
+    psi = recording.beside.get("psi")
+    if psi is None:
+        return np.zeros(len(recording.time)), np.zeros(len(recording.time))
+    return np.cos(psi), np.sin(psi)

@@ -1,0 +1,77 @@
+"""A BlueROV2 on a dive: surge, sway, heave and yaw at once, coupled, lagging and in a current (checks/pool.py)."""
+
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from checks.pool import Array, swim
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.signals import Commands, Signal, recordings_of
+from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+LAG = 0.15
+"""s, of the thrusters."""
+CURRENT = (0.06, -0.03)
+"""m/s, north and east."""
+TRUTH: Rov = load_vehicle(SHIPPED["bluerov2"]).rov.replaced({"T_t200": LAG})
+AXES = (SURGE, SWAY, HEAVE, YAW)
+RATE = 10.0
+NOISE = {"velocity": 0.01, "distance": 0.02, "depth": 0.005, "heading": radians(0.3)}
+_STICKS = ((0.4, 4.0), (0.3, 4.0), (0.45, 5.0), (0.18, 3.0))
+"""By axis: the most to either side, and for how long about it stays (s)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dive:
+    """n samples without noise, SI units."""
+
+    commands: Commands
+    motion: dict[str, Array]
+
+    def recorded(self, noise: float = 1.0, seed: int = 0, quantity: str = "velocity") -> tuple[Recording, ...]:
+        """As its sensors tell it, velocities or distances over ground; noise in standard deviations."""
+        random, time = np.random.default_rng(seed), self.commands.time
+        psi, (north, east) = self.motion["psi"], CURRENT
+        c, s = np.cos(psi), np.sin(psi)
+        ground = {
+            SURGE: self.motion["u"] + north * c + east * s,
+            SWAY: self.motion["v"] - north * s + east * c,
+        }
+        if quantity == "distance":  # by trapezia, fine beside what is looked for
+            steps = {axis: 0.5 * (v[1:] + v[:-1]) / RATE for axis, v in ground.items()}
+            ground = {axis: np.concatenate([[0.0], np.cumsum(step)]) for axis, step in steps.items()}
+        clean = [(axis, quantity, values) for axis, values in ground.items()]
+        clean += [(HEAVE, "depth", self.motion["z"]), (YAW, "heading", psi)]
+        signals = [
+            Signal(axis, of, time, values + noise * NOISE[of] * random.standard_normal(len(time)))
+            for axis, of, values in clean
+        ]
+        found, reasons = recordings_of("dive.tlog", TRUTH.layout, self.commands, signals)
+        assert not reasons
+        return found
+
+
+def dive(seconds: float, seed: int = 0) -> Dive:
+    """Each stick stays for a few seconds and then moves elsewhere, often back to the middle."""
+    random, n = np.random.default_rng(seed), round(seconds * RATE)
+    time = np.arange(n) / RATE
+    sticks = [_stick(random, n, *stick) for stick in _STICKS]
+    thrusters = {}
+    for t in TRUTH.layout.thrusters:
+        signs = [np.sign(round(TRUTH.effect(t, axis), 6)) for axis in AXES]
+        pushes = (sign * stick for sign, stick in zip(signs, sticks, strict=True))
+        thrusters[t.name] = np.clip(sum(pushes, np.zeros(n)), -1.0, 1.0)
+    return Dive(Commands(time, thrusters), swim(TRUTH, time, thrusters, current=CURRENT))
+
+
+def _stick(random: np.random.Generator, n: int, most: float, hold: float) -> Array:
+    found, side = np.zeros(round(2.0 * RATE)), most
+    while len(found) < n:
+        level = 0.0 if random.random() < 1 / 3 else side * random.uniform(0.4, 1.0)
+        side = -side if level else side
+        found = np.append(found, np.full(round(RATE * hold * random.uniform(0.5, 1.5)), level))
+    return found[:n]

@@ -1,0 +1,62 @@
+"""The pool of the tests (checks/pool.py) against the exact step: two ways to one motion, each the other's truth."""
+
+import random
+
+import numpy as np
+import pytest
+
+from checks.pool import Array, swim
+from rov_fmu.motion.layout import HEAVE
+from rov_fmu.motion.rov import Rov
+from tests.pool import run, with_more
+from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
+
+STEP, PLAN = 0.25, ((0.0, 1.0), (0.6, 2.0), (-0.4, 2.0))
+
+
+@pytest.mark.parametrize("name", [name for name, k in VEHICLES.items() if not k.layout.mix])
+def test_a_swim_is_that_of_the_exact_step(name: str) -> None:
+    """Random commands, every thruster its own, held for 1 s each; a current; what a vehicle has not has no effect."""
+    k = VEHICLES[name]
+    rng = random.Random(name)
+    held = {t.name: [0.0, *(rng.uniform(-0.9, 0.9) for _ in range(5))] for t in k.layout.thrusters}
+    time: Array = STEP * np.arange(25.0)
+    commands = {name: np.append(np.repeat(levels, 4), 0.0) for name, levels in held.items()}
+    motion = swim(k, time, commands, current=(0.1, -0.2))
+    state = at_rest(k)
+    flow = {"V_N": 0.1, "V_E": -0.2} if {"x", "y"} <= k.layout.pose.keys() else {}
+    for n in range(len(time) - 1):
+        inputs = still(k) | flow | {f"u_{name}": float(values[n]) for name, values in commands.items()}
+        state = k.step(inputs, state, STEP)
+        for symbol in {*k.layout.velocities, *k.layout.pose}:
+            assert motion[symbol][n + 1] == pytest.approx(state[symbol], rel=1e-7, abs=1e-8), (symbol, n)
+
+
+def late(k: Rov, delay: float) -> Array:
+    return run(k, HEAVE, PLAN, 20.0, delay=delay).velocity
+
+
+def test_a_delay_moves_the_motion_in_time() -> None:
+    k = with_more(VIDEORAY, T_top=0.3, F_0_w=0.0)
+    assert late(k, 0.2)[4:] == pytest.approx(late(k, 0.0)[:-4], abs=1e-9)
+    assert np.abs(late(k, 0.2) - late(k, 0.0)).max() > 0.01
+
+
+def test_noise_is_as_strong_as_asked_and_repeats() -> None:
+    clean = run(VIDEORAY, HEAVE, ((0.0, 100.0),), 50.0)
+    for colour in (0.0, 0.9):
+        errors = [clean.recorded(np.random.default_rng(1), "depth", noise=2.0, colour=colour).values for _ in range(2)]
+        assert (errors[0] == errors[1]).all()
+        assert np.std(errors[0]) == pytest.approx(0.01, rel=0.1)
+        assert np.corrcoef(errors[0][1:], errors[0][:-1])[0, 1] == pytest.approx(colour, abs=0.05)
+
+
+def test_a_current_carries_distances_and_the_velocity_over_ground() -> None:
+    plan = ((0.0, 4.0),)
+    drifting = run(VIDEORAY, HEAVE, plan, 10.0)
+    assert not drifting.position.any()
+    from_there = run(VIDEORAY, VIDEORAY.layout.axes[0].axis, plan, 10.0, current=0.1)
+    assert from_there.position == pytest.approx(0.1 * from_there.time)
+    assert not from_there.velocity.any()
+    quiet = from_there.recorded(np.random.default_rng(0), "velocity", noise=0.0)
+    assert quiet.values == pytest.approx(0.1)

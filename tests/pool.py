@@ -1,0 +1,94 @@
+"""Tank tests in a pool that is not ideal: what is recorded there, by an integrator of its own (checks/pool.py)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import radians
+
+import numpy as np
+from scipy.signal import lfilter
+
+from checks.pool import Array, swim
+from rov_fmu.identify.recording import Recording
+from rov_fmu.motion.layout import AXIS, CURVE, Axis, coefficient_name
+from rov_fmu.motion.rov import Rov
+
+Plan = Sequence[tuple[float, float]]
+"""Commands and how long each is held, s."""
+
+PATTERNS: dict[str, dict[str, float]] = {
+    "surge": {"l": 1.0, "r": 1.0},
+    "heave": {"t": 1.0},
+    "yaw": {"l": 1.0, "r": -1.0},
+}
+"""The thrusters of the VideoRay that drive an axis."""
+NOISE = {"depth": 0.005, "heading": radians(0.5), "distance": 0.02, "velocity": 0.02}
+"""Standard deviations of the sensors: m, rad, m, m/s."""
+
+
+def with_more(k: Rov, **values: float) -> Rov:
+    """The vehicle with other coefficients, those too that its layout has not had: F_0_w, T_top, a_t_rear_reverse …"""
+    axes, curves = [], []
+    for form in k.layout.axes:
+        more = [key for key in AXIS if coefficient_name(key, form.axis.velocity) in values and key not in form.keys]
+        axes.append(replace(form, keys=(*form.keys, *more)))
+    for curve in k.layout.curves:
+        more = [key for key in CURVE if coefficient_name(key, curve.name) in values and key not in curve.keys]
+        curves.append(replace(curve, keys=(*curve.keys, *more)))
+    layout = replace(k.layout, axes=tuple(axes), curves=tuple(curves))
+    assert values.keys() <= layout.coefficients.keys()
+    return Rov(layout, {**k.coefficients, **values})
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One axis without noise; n samples, SI units."""
+
+    axis: Axis
+    time: Array
+    command: Array
+    velocity: Array
+    """Through the water."""
+    position: Array
+    """Over ground: the current carries distances along."""
+    current: float = 0.0
+    """m/s, along the axis."""
+
+    def recorded(
+        self,
+        random: np.random.Generator,
+        quantity: str,
+        file: str = "log.csv",
+        *,
+        noise: float = 1.0,
+        colour: float = 0.0,
+        jitter: float = 0.0,
+    ) -> Recording:
+        """What a sensor makes of it, and its velocity over ground. `noise` is in standard deviations of the sensor.
+
+        `colour` is the correlation of one sample's noise with the next; stamps err by `jitter` (s).
+        """
+        values = self.velocity + self.current if quantity == "velocity" else self.position
+        taken = self.time + jitter * random.standard_normal(len(self.time))
+        white = random.standard_normal(len(self.time))
+        errors = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], white) if colour else white
+        values = np.interp(taken, self.time, values) + noise * NOISE[quantity] * errors
+        return Recording(file, self.axis, quantity, self.time, self.command, values)
+
+
+def run(
+    k: Rov,
+    axis: Axis,
+    plan: Plan,
+    rate: float,
+    *,
+    delay: float = 0.0,
+    current: float = 0.0,
+    pattern: Mapping[str, float] | None = None,
+) -> Run:
+    """Run a plan from rest along one axis; the delay is that of the commands (s), the current flows along (m/s)."""
+    command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
+    time = np.arange(len(command)) / rate
+    thrusters = {name: sign * command for name, sign in (pattern or PATTERNS[axis.name]).items()}
+    motion = swim(k, time, thrusters, delay, (current, 0.0))
+    place = {"surge": "x", "sway": "y", "heave": "z", "yaw": "psi"}[axis.name]
+    return Run(axis, time, command, motion[axis.velocity], motion[place], current)
