@@ -1,29 +1,36 @@
 """What is not identifiable from the data, and what speaks against the model, in words."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from rov_fmu.files.toml_file import listed
+from rov_fmu.identify.coupling import is_coupled, is_told
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Array, Estimate
-from rov_fmu.identify.output_error import RecordingsFit
-from rov_fmu.identify.quadratic_fit import QuadraticFit
+from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
-from rov_fmu.identify.tank_tests import thrust_names, thruster_of
+from rov_fmu.identify.thrust_fit import ThrustFit
+from rov_fmu.motion.layout import REVERSE
 from rov_fmu.motion.rov import Rov
 
 
-def on_thrust(thruster: str, fit: QuadraticFit) -> Iterator[str]:
+def on_thrust(thruster: str, fit: ThrustFit) -> Iterator[str]:
     """Warnings about a thrust curve."""
     if fit.estimate.degrees_of_freedom <= 0.0:
         yield f"{fit.counts.sum()} points for two coefficients leave no degree of freedom, so there are no intervals"
-    if fit.b < 0.0 < fit.a:
-        yield f"the curve points backward below {-fit.b / fit.a:.0%}; weigh high commands out (windows)"
-    yield from _asymmetry(fit.x[fit.counts], fit.y[fit.counts], "force", f"thrust_{thruster}")
+    for end, words in (("", ""), (REVERSE, " in reverse")) if "a_t" + REVERSE in fit.curve.keys else (("", ""),):
+        a_t, b_t = (fit.values[fit.curve.coefficient(key + end)] for key in ("a_t", "b_t"))
+        if b_t < 0.0 < a_t:
+            yield f"the curve{words} points backward below {-b_t / a_t:.0%}; weigh high commands out (windows)"
+    x = fit.x[fit.counts]
+    told = np.abs(fit.y[fit.counts]) > 2.0 * fit.residual_rms
+    x = x[told]
+    yield from _asymmetry(x, fit.y[fit.counts][told], fit.value(x), "force", f"thrust_{thruster}")
 
 
-def on_axis(result: AxisResult, base: Rov, thrust: QuadraticFit | None) -> Iterator[str]:
-    """Warnings about drag and β of an axis."""
+def on_axis(result: AxisResult, base: Rov, thrust: Mapping[str, ThrustFit]) -> Iterator[str]:
+    """Warnings about drag and β of an axis; `thrust` is of the curves that drive it, where they were tested."""
     axis, beta = result.axis, result.axis.coefficient("beta")
     if beta in result.assumed:
         yield (
@@ -34,28 +41,32 @@ def on_axis(result: AxisResult, base: Rov, thrust: QuadraticFit | None) -> Itera
         yield from _on_drag(result, result.estimate)
     steady = [p for p in result.points if p.quantity == "V_ss"]
     x, y = np.array([p.command for p in steady]), np.array([p.value for p in steady])
-    yield from _asymmetry(x, y, "V_ss", axis.name)
+    fitted = result.recordings or result.response
+    model = predict(axis, fitted.rov if fitted else base, steady)
+    yield from _asymmetry(x, y, model, "V_ss", axis.name)
     used = [abs(p.command) for p in result.points if p.weight > 0.0]
-    if thrust is not None and used:
-        tested = np.abs(thrust.x[thrust.counts])
+    for name, fit in thrust.items() if used else ():
+        tested = np.abs(fit.x[fit.counts])
         if max(used) > tested.max() + 0.005 or min(used) < tested.min() - 0.005:
             yield (
-                f"commands of {min(used):.0%} to {max(used):.0%} are used, but {thruster_of(axis)} thrust was tested "
+                f"commands of {min(used):.0%} to {max(used):.0%} are used, but {name} thrust was tested "
                 f"from {tested.min():.0%} to {tested.max():.0%} only"
             )
     if result.response and not result.recordings:
         yield from _on_response(result.response)
     if result.recordings:
-        yield from _on_recordings(result, result.recordings, base)
-        if thrust is not None:
-            yield from _on_disagreement(result.recordings, thrust)
+        yield from _on_recordings(result, result.recordings)
+        for fit in thrust.values():
+            yield from _on_disagreement(result.recordings, fit)
 
 
 def _on_drag(result: AxisResult, estimate: Estimate) -> Iterator[str]:
-    a_d, b_d = result.axis.coefficient("a_d"), result.axis.coefficient("b_d")
     if estimate.degrees_of_freedom <= 0.0:
         yield "as many coefficients as measurements leave no degree of freedom, so there are no intervals"
-    elif a_d in estimate.names and b_d in estimate.names:
+    for end in ("", REVERSE):
+        a_d, b_d = (result.axis.coefficient(key + end) for key in ("a_d", "b_d"))
+        if not {a_d, b_d} <= set(estimate.names) or estimate.degrees_of_freedom <= 0.0:
+            continue
         wide = []
         for name in (a_d, b_d):
             interval = estimate.interval(name)
@@ -70,8 +81,9 @@ def _on_drag(result: AxisResult, estimate: Estimate) -> Iterator[str]:
                 f"quadratic and linear drag are hardly identifiable apart: {', '.join(wide)}{together}; "
                 f"identifiable is their sum at the velocities tested"
             )
+    b_d = result.axis.coefficient("b_d")
     for name in estimate.names:
-        if estimate[name] == 0.0:
+        if estimate[name] == 0.0 and name not in result.assumed:
             by_forces = result.drag if not result.recordings else None
             asked = f" (by (11)-(13) alone {by_forces.unbounded[name == b_d]:.3g})" if by_forces else ""
             yield f"{name} is at its bound of 0, the fit without bounds is negative{asked}, which drag cannot be"
@@ -87,9 +99,14 @@ def _on_response(fit: ResponseFit) -> Iterator[str]:
             )
 
 
-def _on_recordings(result: AxisResult, fit: RecordingsFit, base: Rov) -> Iterator[str]:
+def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[str]:
     axis = fit.axis
     for s in fit.simulations:
+        if is_coupled(fit.rov.layout, axis) and s.recording.command is None and not is_told(s.recording):
+            yield (
+                f"{s.recording.file} does not tell how fast the vehicle moves along or about the other axes, so their "
+                f"coupling with {axis.name} is left out of the fit"
+            )
         if s.correlation_time > 3.0 and s.noise > 1e-4 * float(np.ptp(s.measured)):
             yield (
                 f"the residuals of {s.recording.file} are correlated over {s.correlation_time:.0f} samples, "
@@ -98,17 +115,19 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit, base: Rov) -> Iterato
         share = s.outliers / len(s.time)
         if share > 0.03:
             yield f"{share:.0%} of the samples of {s.recording.file} are outliers and count less"
-    weakest = min((abs(p.command) for p in result.points), default=1.0)
-    if fit.load.is_significant and abs(fit.load.value) > 0.02 * abs(base.force(axis, weakest)):
+    if fit.disagreement:
+        low, high = (f"{end(fit.disagreement.values()):.2g}" for end in (min, max))
         yield (
-            f"the recordings show a constant load of {fit.load.value:.3g} {axis.load} (ballast, tether), which "
-            f"is not in the model; the other coefficients are biased by it"
+            f"the recordings disagree on {listed(fit.disagreement)} by more than their residuals explain, so the model "
+            f"misses something; intervals are {low if low == high else f'{low} to {high}'} times as wide for it"
         )
-    if fit.delay.is_significant and abs(fit.delay.value) > 0.02:
-        yield (
-            f"the motion {'lags' if fit.delay.value > 0.0 else 'leads'} the commands by "
-            f"{abs(fit.delay.value):.2f} s beyond what the model gives; a delay is not in the model and biases beta"
-        )
+    held_out = fit.held_out
+    if held_out.fit < 0.5 * held_out.possible:
+        what = "the other half" if held_out.by_halves else "the others"
+        yield f"each recording is predicted by {what} with a fit of {held_out.fit:.0f} % only: do not trust this axis"
+    for effect in fit.effects:
+        if effect.kept:
+            yield _WORDS[effect.kind].format(effect.of, _number(effect.value), effect.unit, _range(effect))
     tables = [p for p in result.points if p.error is None and p.weight > 0.0]
     for quantity in ("V_ss", "Tau"):
         off = relative_rms(tables, predict(axis, fit.rov, tables), quantity)
@@ -116,9 +135,40 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit, base: Rov) -> Iterato
             yield f"{quantity} of the tables is {off:.0%} (RMS) off what the recordings give"
 
 
-def _on_disagreement(fit: RecordingsFit, thrust: QuadraticFit) -> Iterator[str]:
+_WORDS = {
+    "load": "a constant load of {1} {2}{3} acts in {0} (net weight, tether), and is in the model",
+    "delay": "the motion of {0} follows the commands {1} s late{3}; the delay is not in the model but told with it",
+    "current": "the water moved at {1} {2}{3} in {0}, which is taken out",
+    "current north": "the water moved north at {1} {2}{3} in {0}, which is taken out",
+    "current east": "the water moved east at {1} {2}{3} in {0}, which is taken out",
+    "dead band": "thrust of {0} begins at a command of {1}{3}, and that is in the model",
+    "lag": "the thrust of {0} lags by {1} s{3}, and is in the model",
+    "reverse thrust": "{0} thrust in reverse is {1} times that ahead{3}, and is in the model",
+    "reverse drag": "drag of {0} in reverse is {1} times that ahead{3}, and is in the model",
+}
+
+
+def on_delay(fit: RecordingsFit) -> Iterator[str]:
+    """What to put in front of the commands."""
+    for effect in fit.effects:
+        if effect.kept and effect.kind == "delay" and effect.of == fit.axis.name and effect.value > 0.0:
+            yield (
+                f"The motion in {fit.axis.name} followed the commands {_number(effect.value)} s late{_range(effect)}: "
+                f"the model has no delay, put one in front of the commands."
+            )
+
+
+def _range(effect: Effect) -> str:
+    return f" ({_number(effect.interval[0])} to {_number(effect.interval[1])})" if effect.interval else ""
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _on_disagreement(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[str]:
     """Where the recordings bend the thrust curve away from what was tested."""
-    for name in thrust_names(fit.axis):
+    for name in thrust.estimate.names:
         if name in fit.estimate.names:
             tested, error = thrust.estimate[name], thrust.estimate.errors[name]
             if abs(fit.estimate[name] - tested) > 3.0 * error:
@@ -128,16 +178,20 @@ def _on_disagreement(fit: RecordingsFit, thrust: QuadraticFit) -> Iterator[str]:
                 )
 
 
-def _asymmetry(x: Array, y: Array, what: str, window: str) -> Iterator[str]:
-    """Both directions at the same command, where they differ by more than 5 %."""
+def _asymmetry(x: Array, y: Array, model: Array, what: str, window: str) -> Iterator[str]:
+    """Both directions at the same command, where they differ by more than 5 %, and that from what the model gives."""
     ratios = {}
     for level in np.unique(np.round(np.abs(x[x < 0.0]), 6)).tolist():
-        back, forth = (np.abs(y[np.isclose(x, sign * level)]) for sign in (-1.0, 1.0))
-        if forth.size and forth.mean() > 0.0:
-            ratios[level] = float(back.mean() / forth.mean()) - 1.0
-    if ratios and max(map(abs, ratios.values())) > 0.05:
-        level = max(ratios, key=lambda c: abs(ratios[c]))
-        yield (
-            f"{what} differs by {ratios[level]:+.0%} from positive to negative commands at {level:.0%}, which "
-            f"the model takes as equal; windows.{window} picks a direction"
-        )
+        back, forth = np.isclose(x, -level), np.isclose(x, level)
+        if forth.any() and y[forth].mean() > 0.0 and model[forth].mean() > 0.0:
+            measured, modelled = (-float(part[back].mean() / part[forth].mean()) for part in (y, model))
+            ratios[level] = measured - 1.0, measured / modelled - 1.0 if modelled else np.inf, modelled - 1.0
+    if ratios:
+        level = max(ratios, key=lambda c: abs(ratios[c][1]))
+        measured, beyond, modelled = ratios[level]
+        if abs(beyond) > 0.05:
+            takes = "as equal" if abs(modelled) < 5e-4 else f"to differ by {modelled:+.0%}"
+            yield (
+                f"{what} differs by {measured:+.0%} from positive to negative commands at {level:.0%}, which "
+                f"the model takes {takes}; windows.{window} picks a direction"
+            )

@@ -6,12 +6,17 @@ from typing import Literal
 
 import numpy as np
 
+from rov_fmu.identify.drag_forms import Point
+from rov_fmu.identify.held_out import HeldOut
 from rov_fmu.identify.least_squares import Array, Estimate
-from rov_fmu.identify.output_error import RecordingsFit
+from rov_fmu.identify.next_test import NextTest
 from rov_fmu.identify.quadratic_fit import QuadraticFit
-from rov_fmu.identify.response_fit import Point, ResponseFit, predict, relative_rms
+from rov_fmu.identify.recordings_fit import RecordingsFit
+from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.identify.step_responses import StepResponse
 from rov_fmu.identify.tank_tests import TankTests
+from rov_fmu.identify.thrust_fit import ThrustFit
+from rov_fmu.identify.trajectory import MotionError
 from rov_fmu.motion.layout import Axis
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -34,6 +39,16 @@ class AxisResult:
     assumed: Mapping[str, str]
     """Coefficients that are not identifiable, and what is assumed instead."""
     warnings: tuple[str, ...]
+    next_test: NextTest | None = None
+    """What would narrow the widest interval."""
+
+    @property
+    def held_out(self) -> HeldOut | None:
+        """Each recording predicted by the others; None where that cannot be computed."""
+        try:
+            return self.recordings.held_out if self.recordings else None
+        except MotionError:
+            return None
 
     @property
     def chosen(self) -> Literal["recordings", "points", "known"]:
@@ -50,7 +65,7 @@ class AxisResult:
     def method(self) -> str:
         """The chosen one in words."""
         if self.recordings:
-            return f"output error over {count(len(self.recordings.simulations), 'recording')}"
+            return self.recordings.method
         if self.response:
             used = [p.quantity for p in self.response.points if p.weight > 0.0]
             counts = " and ".join(f"{n} {q}" for q in ("V_ss", "Tau") if (n := used.count(q)))
@@ -64,11 +79,17 @@ class Identification:
 
     tests: TankTests
     vehicle: Vehicle
-    thrust: Mapping[str, QuadraticFit]
+    thrust: Mapping[str, ThrustFit]
     """By thruster, where it was tested; force (N) over command."""
     axes: tuple[AxisResult, ...]
     against: Vehicle | None
     """A vehicle to set beside."""
+
+    @property
+    def next_tests(self) -> tuple[NextTest, ...]:
+        """What to measure next, the axis with the widest relative interval first."""
+        found = (test for result in self.axes if (test := result.next_test))
+        return tuple(sorted(found, key=lambda test: -test.width))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -114,9 +135,3 @@ def compare(identification: Identification) -> tuple[Comparison, ...]:
                     other = predict(result.axis, against.rov, points) if against.layout.has(result.axis) else none
                 found.append(Comparison(result, quantity, points, model, out, other))
     return tuple(found)
-
-
-def count(n: int, what: str) -> str:
-    """1 force, 2 forces."""
-    many = f"{what.removesuffix('y')}ies" if what.endswith("y") else f"{what}s"
-    return f"{n} {what if n == 1 else many}"

@@ -1,195 +1,256 @@
 """From a folder of tank tests to a vehicle: thrust, then drag and β of every axis, and what is not identifiable.
 
-An axis with recordings takes its coefficients from them (output error), and they have a say in the thrust curve too;
+An axis with recordings takes its coefficients from them (output error), and they have a say in the thrust curves too;
 one without, from the measured points V_ss and Tau. The points, of tables and of recordings, are fitted in either case,
 so the two can be set side by side.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rov_fmu import __version__
 from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.files.toml_file import listed
 from rov_fmu.identify import diagnostics
-from rov_fmu.identify.identification import AxisResult, Identification, count
-from rov_fmu.identify.least_squares import Estimate, quantile
-from rov_fmu.identify.output_error import RecordingsFit, fit_recordings
-from rov_fmu.identify.quadratic_fit import QuadraticFit, fit_quadratic
-from rov_fmu.identify.response_fit import Point, drag_and_beta, fit_response, free_coefficients
-from rov_fmu.identify.simulator import prepare
-from rov_fmu.identify.step_responses import AGAINST, StepResponse, steps
-from rov_fmu.identify.tank_tests import AXES, THRUSTERS, VELOCITIES, Recording, TankTests, thrust_names, thruster_of
-from rov_fmu.motion.layout import Axis
+from rov_fmu.identify.drag_forms import Point, drag_and_beta, free_coefficients
+from rov_fmu.identify.driving import connected, curves_of
+from rov_fmu.identify.grouping import grouped
+from rov_fmu.identify.identification import AxisResult, Identification
+from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.limits import NoFitError
+from rov_fmu.identify.next_test import NOISE, NextTest, Sensor, next_test
+from rov_fmu.identify.output_error import fit_recordings
+from rov_fmu.identify.quadratic_fit import fit_quadratic
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.recordings_fit import RecordingsFit, count
+from rov_fmu.identify.response_fit import ResponseFit, fit_response
+from rov_fmu.identify.slips import beta_out_of_range
+from rov_fmu.identify.step_responses import StepResponse, steps
+from rov_fmu.identify.tank_tests import TankTests
+from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, measured
+from rov_fmu.identify.trajectory import MotionError
+from rov_fmu.identify.usable import check_push, check_recording, check_slips
+from rov_fmu.motion.layout import Axis, Curve
 from rov_fmu.motion.rov import Rov
-from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.schema import NOT_GIVEN
 from rov_fmu.vehicle.sense import no_thrust
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
-_LEAST_PUSH = 1e-6
-"""N or N m, less than moves any vehicle: what is fitted to it would overflow."""
+Progress = Callable[[str, float], None]
+"""Told what is done next, and the share of all that is done."""
+
+_ASSUMED_ALPHA = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
+_ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
 
 
-def identify(tests: TankTests) -> Identification:
+def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Identification:
     """Identify a vehicle from its tests. Raises DataFileError, VehicleFileError."""
-    given, known = tests.given, tests.given.known
+    given = tests.given
     against = load_vehicle(given.against) if given.against else None
-    thrust = {thruster: fit for thruster in THRUSTERS if (fit := _thrust(tests, thruster))}
-    values = dict.fromkeys(PAPER.coefficients, 1.0) | {name: q.value for name, q in known.items()}  # to begin with
-    sources = {name: q.source for name, q in known.items()}
-    intervals = {name: q.interval for name, q in known.items() if q.interval}
+    on_progress("thrust curves", 0.0)
+    thrust = {curve.name: fit for curve in given.rov.layout.curves if (fit := _thrust(tests, curve))}
+    found = _Found(tests)
     for fit in thrust.values():
-        weighted = "(7)" if 0.0 in fit.weights else "(6)"
-        forces = count(int(fit.counts.sum()), "force")
-        values |= fit.estimate.named
-        sources |= dict.fromkeys(fit.estimate.names, f"{weighted} over {forces}")
-        intervals |= fit.estimate.intervals
+        found.take_thrust(fit)
     results: list[AxisResult] = []
-    for thruster in THRUSTERS:
-        by_axis = _fit_recordings(tests, thruster, Rov(PAPER, {**values}), thrust.get(thruster))
-        for recorded in by_axis.values():  # the last word on the thrust curve too
-            values |= recorded.estimate.named
-            intervals |= recorded.estimate.intervals
-            if f"a_t_{thruster}" in recorded.estimate.names:
-                also = f"{sources[f'a_t_{thruster}'].split(',')[0]}, and the recordings"
-                sources |= dict.fromkeys(thrust_names(recorded.axis), also)
-        for axis in (axis for axis in AXES.values() if thruster_of(axis) == thruster):
-            result = _axis(tests, axis, Rov(PAPER, {**values}), by_axis.get(axis.name), thrust.get(thruster))
+    doubts: list[str] = []
+    for curves, axes in connected(given.rov.layout):
+        on_progress(
+            f"recordings of {listed(axis.name for axis in axes)}", 0.9 * len(results) / len(given.rov.layout.axes)
+        )
+        tested = {curve.name: thrust[curve.name] for curve in curves if curve.name in thrust}
+        doubts += check_slips(tests, axes, found.rov)
+        recorded = _fit_recordings(tests, axes, found.rov, tested)
+        for fit_of_axis in recorded.values():  # the last word on the thrust curves too
+            found.take_recordings(fit_of_axis)
+        for axis in axes:
+            result = _axis(tests, axis, found.rov, recorded.get(axis.name), tested)
             results.append(result)
-            if result.response and result.chosen == "points":
-                fitted = result.response
-                values |= {n: fitted.rov[n] for n in (*fitted.estimate.names, *fitted.assumed)}
-                intervals |= fitted.estimate.intervals
-            sources |= dict.fromkeys(drag_and_beta(axis, known), result.method[0].upper() + result.method[1:])
-            sources |= result.assumed
-    for curve in PAPER.curves:
-        place = "rov.toml" if f"a_t_{curve.name}" in known else f"thrust_{curve.name}*.csv"
-        if backward := [*no_thrust(curve, values, place)]:
+            found.take(result)
+    for curve in found.rov.layout.curves:
+        place = "rov.toml" if f"a_t_{curve.name}" in given.known else f"thrust_{curve.name}*.csv"
+        if backward := [*no_thrust(curve, found.rov.coefficients, place)]:
             raise DataFileError(f"{tests.folder}: {backward[0]}")
-    results.sort(key=lambda result: list(AXES).index(result.axis.name))
+    results.sort(key=lambda result: [*given.rov.layout.kinds].index(result.axis.name))
+    on_progress("what to measure next", 0.95)
+    results = [replace(result, next_test=_next_test(result, found.rov)) for result in results]
     warnings = [f"{t} thrust: {words}" for t, fit in thrust.items() for words in diagnostics.on_thrust(t, fit)]
     warnings += [w for result in results for w in result.warnings]
-    method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
-    vehicle = Vehicle(
-        **dict(given.head),
-        rov=Rov(PAPER, {**values}),
-        sources=sources,
-        command_range=given.command_range or _command_range(results),
-        alternatives={},
-        data=None,
-        limits=given.limits,
-        intervals=intervals,
-        provenance=Provenance(f"rov-fmu {__version__} identify", method, tests.inputs, tuple(warnings)),
-    )
+    warnings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
+    vehicle = found.vehicle(results, [*tests.notes, *doubts, *warnings])
     return Identification(tests, vehicle, thrust, tuple(results), against)
 
 
-def _thrust(tests: TankTests, thruster: str) -> QuadraticFit | None:
-    """The thrust curve of a thruster, None where it is given."""
-    names = (f"a_t_{thruster}", f"b_t_{thruster}")
-    rows = tests.thrust.get(thruster, ())
-    if names[0] in tests.given.known:
-        if rows:
-            raise DataFileError(f"{tests.folder}: rov.toml gives {', '.join(names)}, but there is {rows[0].file} too")
-        return None
-    if not rows:
-        raise DataFileError(f"{tests.folder}: no thrust_{thruster}*.csv, and rov.toml does not give {names[0]}")
-    weights = np.array([_weight(tests, f"thrust_{thruster}", row.command) for row in rows])
-    if len({abs(row.command) for row, weight in zip(rows, weights, strict=True) if weight and row.command}) < 2:
-        raise DataFileError(f"{tests.folder}: thrust_{thruster}*.csv: two commands at least must count")
-    return fit_quadratic(names, np.array([r.command for r in rows]), np.array([r.value for r in rows]), weights)
+@dataclass
+class _Found:
+    """The vehicle as far as it is known, and where each number comes from."""
 
+    tests: TankTests
+    rov: Rov = field(init=False)
+    sources: dict[str, str] = field(init=False)
+    intervals: dict[str, tuple[float, float]] = field(init=False)
 
-def _fit_recordings(
-    tests: TankTests, thruster: str, base: Rov, thrust: QuadraticFit | None
-) -> dict[str, RecordingsFit]:
-    """The fits of the axes that a thruster drives, by axis, where they were recorded."""
-    recordings: list[Recording] = []
-    for axis in AXES.values():
-        if thruster_of(axis) == thruster and drag_and_beta(axis, tests.given.known):
-            recordings += tests.recordings.get(axis.name, ())
-    for recording in recordings:
-        path, values = tests.folder / recording.file, recording.values[np.isfinite(recording.values)]
-        still = "command" if not recording.command.any() else recording.quantity if np.ptp(values) == 0.0 else None
-        if still:
-            raise DataFileError(f"{path}: {still} never changes: nothing is identifiable")
-        _check_thrust(tests, recording.axis, base, [1.0])
-        speed = prepare(recording, base).speed
-        if not VELOCITIES[0] <= speed <= VELOCITIES[1]:
-            raise DataFileError(
-                f"{path}: {recording.quantity} tells of a velocity of {speed:.3g} "
-                f"{recording.axis.unit}: must be {VELOCITIES[0]:g} at least and {VELOCITIES[1]:g} at most"
-            )
-        found = steps(recording)
-        if found and all(step.note == AGAINST for step in found):
-            raise DataFileError(f"{path}: moves against the command; forward, down, to starboard is +")
-    if not recordings:
-        return {}
-    fits = fit_recordings(recordings, base, tests.given.known, _thrust_uncertainty(thrust))
-    return {fit.axis.name: fit for fit in fits}
+    def __post_init__(self) -> None:
+        given = self.tests.given
+        self.rov = given.rov
+        known = {name: q.source for name, q in given.known.items()}
+        self.sources = dict.fromkeys(given.rov.layout.coefficients, NOT_GIVEN) | known
+        self.intervals = {name: q.interval for name, q in given.known.items() if q.interval}
 
+    def take_thrust(self, fit: ThrustFit) -> None:
+        """A thrust curve by tests."""
+        self.rov = self.rov.extended(fit.values)
+        weighted = "(7)" if 0.0 in fit.weights else "(6)"
+        forces = count(int(fit.counts.sum()), "force")
+        self._take(fit.estimate, f"{weighted} over {forces}")
 
-def _check_thrust(tests: TankTests, axis: Axis, base: Rov, commands: Sequence[float]) -> None:
-    """Where the vehicle moves, the thruster must push it there, at one command at least."""
-    forces = [base.force(axis, command) for command in commands]
-    if commands and all(np.sign(c) * force < _LEAST_PUSH for force, c in zip(forces, commands, strict=True)):
-        raise DataFileError(
-            f"{tests.folder}: the thrust curve of {thruster_of(axis)} gives {forces[0]:.3g} {axis.load} at a command "
-            f"of {commands[0]:.0%}, where {axis.name} needs a push that way"
+    def take_recordings(self, fit: RecordingsFit) -> None:
+        """What recordings tell; of thrust curves that were tested they have a part."""
+        values = {name: fit.rov[name] for name in fit.estimate.names}
+        self.rov = self.rov.extended(values)
+        for name in fit.estimate.names:
+            before = self.sources.get(name, NOT_GIVEN)
+            tested = before if before.startswith("(") else ""
+            self.sources[name] = f"{tested.split(',')[0]}, and the recordings" if tested else _sentence(fit.method)
+        self.intervals |= fit.estimate.intervals
+
+    def take(self, result: AxisResult) -> None:
+        """What is chosen of an axis."""
+        if result.response and result.chosen == "points":
+            fitted = result.response
+            self.rov = self.rov.extended({n: fitted.rov[n] for n in (*fitted.estimate.names, *fitted.assumed)})
+            self._take(fitted.estimate, _sentence(result.method))
+        self.sources |= result.assumed
+
+    def _take(self, estimate: Estimate, source: str) -> None:
+        self.sources |= dict.fromkeys(estimate.names, source)
+        self.intervals |= estimate.intervals
+
+    def vehicle(self, results: Sequence[AxisResult], warnings: Sequence[str]) -> Vehicle:
+        """The vehicle with its provenance."""
+        given, names = self.tests.given, self.rov.layout.coefficients
+        method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
+        made = Provenance(
+            f"rov-fmu {__version__} identify", method, self.tests.inputs, grouped(warnings, self.tests.inputs)
+        )
+        delays = (words for result in results if result.recordings for words in diagnostics.on_delay(result.recordings))
+        return Vehicle(
+            **dict(given.head),
+            rov=Rov(self.rov.layout, {name: self.rov[name] for name in names}),
+            sources={name: self.sources[name] for name in names},
+            command_range=given.command_range or _command_range(results, self.rov),
+            alternatives={},
+            data=None,
+            limits=(*given.limits, *delays),
+            intervals={name: self.intervals[name] for name in names if name in self.intervals},
+            provenance=made,
+            thruster_sources=given.thruster_sources,
         )
 
 
-def _thrust_uncertainty(thrust: QuadraticFit | None) -> Estimate | None:
-    """The thrust curve as something measured; None where there is no telling how well, or it is exact.
+def _sentence(words: str) -> str:
+    return words[0].upper() + words[1:]
 
-    Few forces tell their own scatter badly, which Student's distribution counts; from here on the normal one is used.
-    """
-    if thrust is None or not np.isfinite(thrust.estimate.covariance).all():
+
+# ---- Thrust and recordings -------------------------------------------------------------------------------------------
+
+
+def _thrust(tests: TankTests, curve: Curve) -> ThrustFit | None:
+    """A thrust curve; None where there are no tests of it."""
+    rows, window = tests.thrust.get(curve.name, ()), f"thrust_{curve.name}"
+    if not rows:
         return None
-    exact = np.sqrt(np.diag(thrust.estimate.covariance)).max() < 1e-6 * np.abs(thrust.estimate.values).max()
-    few = quantile(thrust.estimate.degrees_of_freedom) / quantile(np.inf)
-    return None if exact else replace(thrust.estimate, covariance=few**2 * thrust.estimate.covariance)
+    weights = np.array([_weight(tests, window, row.command) for row in rows])
+    if len({abs(row.command) for row, weight in zip(rows, weights, strict=True) if weight and row.command}) < 2:
+        raise DataFileError(f"{tests.folder}: {window}*.csv: two commands at least must count")
+    commands, forces = (np.array([getattr(row, key) for row in rows]) for key in ("command", "value"))
+    return fit_thrust(curve, commands, forces, weights, {name: q.value for name, q in tests.given.known.items()})
+
+
+def _fit_recordings(
+    tests: TankTests, axes: Sequence[Axis], base: Rov, thrust: Mapping[str, ThrustFit]
+) -> dict[str, RecordingsFit]:
+    """The fits of axes with thrust curves in common, by axis, where they were recorded."""
+    recordings: list[Recording] = []
+    for axis in axes:
+        if drag_and_beta(axis, tests.given.known):
+            recordings += tests.recordings.get(axis.name, ())
+    for recording in recordings:
+        check_push(tests.folder, recording.axis, base, [1.0])
+        check_recording(tests.folder, recording, base)
+    if not recordings:
+        return {}
+    try:
+        fits = fit_recordings(recordings, base, tests.given.known, measured(thrust.values()), lag=tests.given.lag)
+        return {fit.axis.name: fit.widened() for fit in fits}
+    except NoFitError as error:
+        raise DataFileError(f"{tests.folder}: {error}") from None
+    except MotionError as error:
+        files = listed(dict.fromkeys(recording.file for recording in recordings))
+        raise DataFileError(f"{tests.folder}: {files}: {error}: check units and signs") from None
+
+
+# ---- One axis --------------------------------------------------------------------------------------------------------
 
 
 def _axis(
-    tests: TankTests, axis: Axis, base: Rov, fitted: RecordingsFit | None, thrust: QuadraticFit | None
+    tests: TankTests, axis: Axis, base: Rov, fitted: RecordingsFit | None, thrust: Mapping[str, ThrustFit]
 ) -> AxisResult:
     known = tests.given.known
     found = tuple(step for recording in tests.recordings.get(axis.name, ()) for step in steps(recording))
-    points = _points(tests, axis, found)
-    wanted = set(drag_and_beta(axis, known))
-    uncertain = _thrust_uncertainty(thrust)
-    of_thrust = uncertain.covariance if uncertain else None
-    if fitted and uncertain:
-        of_thrust = fitted.estimate.part(thrust_names(axis)).covariance
+    points = _points(tests, axis, [_in_time(step, fitted) for step in found])
+    driving = {curve.name: thrust[curve.name] for curve in curves_of(base.layout, axis) if curve.name in thrust}
     used = [p for p in points if p.weight > 0.0]
-    _check_thrust(tests, axis, base, [p.command for p in used])
-    steady = [p for p in used if p.quantity == "V_ss"]
-    enough = bool(steady) or wanted <= {axis.coefficient("beta")}
-    identifiable = enough and free_coefficients(axis, used, known)[0]
-    response = fit_response(axis, points, base, known, of_thrust) if identifiable else None
+    check_push(tests.folder, axis, base, [p.command for p in used])
+    response = _response(axis, points, base, known, _thrust_of(fitted, driving))
+    wanted = set(drag_and_beta(axis, known))
     if not fitted and not response and (missing := sorted(wanted - {axis.coefficient("beta")})):
         raise DataFileError(
             f"{tests.folder}: no steady_{axis.name}*.csv or log_{axis.name}*.csv that counts, and rov.toml does not "
             f"give {', '.join(missing)}"
         )
     drag = None
-    if steady:
+    if steady := [p for p in used if p.quantity == "V_ss"]:
         x, y = np.array([p.value for p in steady]), np.array([base.force(axis, p.command) for p in steady])
         force = base[axis.coefficient("alpha")] * y
         groups = np.array([abs(p.command) for p in steady])
         drag = fit_quadratic((axis.coefficient("a_d"), axis.coefficient("b_d")), x, force, groups=groups)
     assumed = dict(response.assumed) if response and not fitted else {}
-    if (alpha := axis.coefficient("alpha")) not in known:
-        assumed[alpha] = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
-    if not fitted and not response and (beta := axis.coefficient("beta")) not in known:
-        assumed[beta] = "Not identifiable from these tests; assumed 1"
+    if points or fitted:
+        alpha, beta = axis.coefficient("alpha"), axis.coefficient("beta")
+        assumed |= {} if alpha in known else {alpha: _ASSUMED_ALPHA}
+        assumed |= {} if fitted or response or beta in known else {beta: _ASSUMED_BETA}
     result = AxisResult(axis, points, found, drag, response, fitted, assumed, ())
-    return replace(result, warnings=tuple(f"{axis.name}: {w}" for w in diagnostics.on_axis(result, base, thrust)))
+    return replace(result, warnings=tuple(f"{axis.name}: {w}" for w in diagnostics.on_axis(result, base, driving)))
 
 
-def _points(tests: TankTests, axis: Axis, found: tuple[StepResponse, ...]) -> tuple[Point, ...]:
+def _response(
+    axis: Axis, points: Sequence[Point], base: Rov, known: Mapping[str, object], thrust: Estimate | None
+) -> ResponseFit | None:
+    """The fit to the points, where they tell anything."""
+    used = [p for p in points if p.weight > 0.0]
+    wanted = set(drag_and_beta(axis, known))
+    enough = any(p.quantity == "V_ss" for p in used) or wanted <= {axis.coefficient("beta")}
+    if not enough or not free_coefficients(axis, used, known)[0]:
+        return None
+    return fit_response(axis, points, base, known, thrust)
+
+
+def _thrust_of(fitted: RecordingsFit | None, thrust: Mapping[str, ThrustFit]) -> Estimate | None:
+    """The thrust curves of an axis as the tests and its recordings have them."""
+    uncertain = measured(thrust.values())
+    return fitted.estimate.part(uncertain.names) if fitted and uncertain else uncertain
+
+
+def _in_time(step: StepResponse, fitted: RecordingsFit | None) -> StepResponse:
+    """With the time constant from when the commands act: a delay is none of the model's."""
+    late = fitted.delay_of(step.file) if fitted else 0.0
+    return replace(step, Tau=step.Tau - late) if step.Tau is not None and step.Tau > late else step
+
+
+def _points(tests: TankTests, axis: Axis, found: Sequence[StepResponse]) -> tuple[Point, ...]:
     """Rows of the tables, then the responses of the recordings."""
     points = [
         Point(quantity, row.command, row.value, _weight(tests, axis.name, row.command), f"{row.file}, line {row.line}")
@@ -204,16 +265,32 @@ def _points(tests: TankTests, axis: Axis, found: tuple[StepResponse, ...]) -> tu
     return tuple(points)
 
 
+def _next_test(result: AxisResult, rov: Rov) -> NextTest | None:
+    """What to measure next on an axis, by the sensor of its recordings or a plain one."""
+    if result.estimate is None:
+        return None
+    fit = result.recordings
+    quantity = fit.simulations[0].recording.quantity if fit else result.axis.position
+    noise = max(s.noise * np.sqrt(s.correlation_time) for s in fit.simulations) if fit else NOISE[quantity]
+    return next_test(result.axis, rov, result.estimate, Sensor(quantity, max(float(noise), 1e-9)))
+
+
 def _weight(tests: TankTests, window: str, command: float) -> float:
     low, high = tests.given.windows.get(window, (-1.0, 1.0))
     return float(low - 1e-9 <= command <= high + 1e-9)
 
 
-def _command_range(results: list[AxisResult]) -> tuple[float, float]:
+def _command_range(results: Sequence[AxisResult], rov: Rov) -> tuple[float, float]:
     """From the weakest to the strongest command that counts."""
-    used = [abs(p.command) for result in results for p in result.points if p.weight > 0.0]
-    recorded = [s.recording.command for result in results if result.recordings for s in result.recordings.simulations]
-    commands = set(np.round(np.abs(np.concatenate([used, *recorded])), 6).tolist())
-    commands -= {0.0}
+
+    def used() -> Iterator[float]:
+        for result in results:
+            yield from (abs(p.command) for p in result.points if p.weight > 0.0)
+            for s in result.recordings.simulations if result.recordings else ():
+                recording = s.recording
+                command = recording.command if recording.command is not None else recording.reaching(rov.layout)
+                yield from np.unique(np.abs(command)).tolist()
+
+    commands = {round(c, 6) for c in used()} - {0.0}
     low, high = min(commands, default=0.0), max(commands, default=1.0)
     return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))

@@ -1,95 +1,43 @@
-"""Drag and β from whole recordings: the simulated output against the measured one (output error).
+"""Drag, β and what else acts, from whole recordings: the simulated output against the measured one (output error).
 
 What the sensor measures is fitted, depth or heading and not its derivative, so white noise of the sensor stays white.
-Commands and motion tell A, B and C of v' = C - B v - A |v| v: with thrust, inertia and α given, a_d, b_d and β. Motion
-under many commands tells the shape of the thrust curve too, so a curve from tests takes part, as uncertain as they left
-it; then all axes that the thruster drives are fitted at once. Each recording adds its first velocity and position.
+Commands and motion tell A, B and C of v' = C - B v - A |v| v: with thrust, inertia and α given, a_d, b_d and β; and the
+load, the delay, the current, the lag, and what differs in reverse, as far as they show. Motion under many commands
+tells the shape of the thrust curve too, so a curve from tests takes part, as uncertain as they left it; then all axes
+that share it are fitted at once. Each recording adds its first velocity and position.
 """
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from rov_fmu.identify.least_squares import (
-    Array,
-    Estimate,
-    Solution,
-    bounds,
-    covariance,
-    estimate,
-    external,
-    internal,
-    minimize,
-    quantile,
-)
-from rov_fmu.identify.response_fit import drag_and_beta, response_band
-from rov_fmu.identify.simulator import PreparedRecording, Simulator, prepare
-from rov_fmu.identify.step_responses import correlation_time, robust_deviation, white_noise
-from rov_fmu.identify.tank_tests import Recording, thrust_names
-from rov_fmu.motion.layout import Axis
+from rov_fmu.identify.coupling import EAST, NORTH, is_in_flow
+from rov_fmu.identify.driving import curves_of
+from rov_fmu.identify.extras import Extra
+from rov_fmu.identify.held_out import HeldOut, hold_out
+from rov_fmu.identify.least_squares import Array, Estimate, Loss, external
+from rov_fmu.identify.limits import refuse_nonsense
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.recordings_fit import Effect, RecordingsFit, effects_of, estimate_of
+from rov_fmu.identify.residual_analysis import ResidualAnalysis
+from rov_fmu.identify.runs import PreparedRecording, axes_of, prepare
+from rov_fmu.identify.selection import candidates, earn_their_place, likely
+from rov_fmu.identify.simulator import Simulator, solve
+from rov_fmu.identify.step_responses import robust_deviation, white_noise
+from rov_fmu.identify.trajectory import MotionError
+from rov_fmu.motion.layout import YAW, Axis
 from rov_fmu.motion.rov import Rov
 
-Loss = Literal["huber", "linear"]
-
-_HUBER = 2.5  # residuals beyond so many standard deviations count by their size, not its square
 _BETAS = (0.03, 0.1, 0.3, 1.0, 3.0)  # to begin with
-
-
-@dataclass(frozen=True, eq=False)
-class Simulation:
-    """A recording beside the fitted model; arrays over the measured samples, SI units."""
-
-    recording: Recording
-    time: Array
-    measured: Array
-    modelled: Array
-    velocity: Array
-    """Of the model, and so is the acceleration."""
-    acceleration: Array
-    noise: float
-    """Standard deviation of the residuals, robust."""
-    correlation_time: float
-    """Of the residuals, in samples; 1 where they are white."""
-    outliers: int
-    """Samples farther off than 2.5 standard deviations, which count less than their square."""
-
-    @property
-    def residuals(self) -> Array:
-        """Measured less modelled."""
-        return self.measured - self.modelled
-
-
-@dataclass(frozen=True)
-class UnmodelledEffect:
-    """An effect that is not in the model, estimated to first order beside the fit: value and 95 % interval."""
-
-    value: float
-    interval: tuple[float, float]
-
-    @property
-    def is_significant(self) -> bool:
-        """Whether the interval leaves zero out."""
-        return self.interval[0] * self.interval[1] > 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class RecordingsFit:
-    """Drag and β of one axis from its recordings, and its thrust curve where that took part."""
-
-    axis: Axis
-    rov: Rov
-    estimate: Estimate
-    simulations: tuple[Simulation, ...]
-    load: UnmodelledEffect
-    """A constant force (N) or torque (N.m) beside thrust and drag: ballast, tether."""
-    delay: UnmodelledEffect
-    """Time (s) from the command to the thrust, or by which the clocks differ."""
-
-    def band(self, commands: Array) -> tuple[Array, Array, Array, Array]:
-        """95 % confidence band of the curves over commands: V_ss low and high, Tau low and high."""
-        return response_band(self.axis, self.rov, self.estimate, commands)
+_DELAYS = (0.0, 0.3)
+_STARTS = 3
+_BEYOND_DOUBT = 10.0  # standard errors: no recording has to be left out to see it
+_GOOD = 1.5  # cost of a sample: white noise has 1.36, so there is nothing better to find
+_FEW = 200  # samples of a recording, to begin with
+_LONG = 100.0  # s of a recording, to begin with
 
 
 def fit_recordings(
@@ -98,100 +46,236 @@ def fit_recordings(
     known: Collection[str] = (),
     thrust: Estimate | None = None,
     loss: Loss = "huber",
+    lag: Collection[str] = (),
 ) -> tuple[RecordingsFit, ...]:
-    """Fit what is not known of a_d, b_d and β of every axis recorded; `base` holds the rest, α included.
+    """Fit what is not known of drag and β of every axis recorded, and what else acts; `base` holds the rest, and α.
 
-    `thrust` is the estimate of a_t and b_t by tests, where they are not known; all recordings must be of its thruster.
-    The intervals count the correlation that the residuals have beyond white noise.
+    `thrust` is the estimate of curves by tests, where they are not known; `lag` has the curves whose lag is sought.
+    The intervals count the correlation that the residuals have beyond white noise. Raises MotionError,
+    NoFitError.
     """
-    axes = list({r.axis.name: r.axis for r in recordings}.values())
-    by_axis = [tuple(prepare(r, base) for r in recordings if r.axis is axis) for axis in axes]
-    data = tuple(d for part in by_axis for d in part)
-    parts = [_fit_alone(part, base, known, loss) for part in by_axis]
-    values = dict(thrust.named if thrust else {})
-    for found_alone, *_ in parts:
-        values |= found_alone
-    model = Simulator(data, base, tuple(values), np.array([s for *_, sigma in parts for s in sigma]), thrust)
-    start = np.concatenate([internal(model.names, values), *(initial for _, initial, _ in parts)])
-    analysis = _ResidualAnalysis(model, _solve(model, start, loss), loss)
-    rov = base.replaced(external(model.names, analysis.x))
-    whole = estimate(model.names, analysis.x, analysis.covariance(), analysis.degrees_of_freedom, 1.0)
-    found = []
-    for axis in axes:
-        names = [n for n in model.names if n in thrust_names(axis) or n.endswith(f"_{axis.velocity}")]
-        simulations = tuple(s for s in analysis.simulations if s.recording.axis is axis)
-        columns = model.by_load(axis, analysis.x), analysis.by_delay(axis)
-        effects = (analysis.unmodelled_effect(column) for column in columns)
-        found.append(RecordingsFit(axis, rov, whole.part(names), simulations, *effects))
-    return tuple(found)
+    order = list(base.layout.kinds)
+    data = tuple(prepare(r, base) for r in sorted(recordings, key=lambda r: order.index(r.axis.name)))
+    with threadpool_limits(1, user_api="blas"):  # for systems this small threads only get in each other's way
+        return _Fit(data, base, known, thrust, loss).choose(tuple(candidates(data, base, known, lag)))
 
 
-def _fit_alone(
-    data: tuple[PreparedRecording, ...], base: Rov, known: Collection[str], loss: Loss
-) -> tuple[dict[str, float], Array, list[float]]:
-    """One axis, thrust as it is, from a part of the samples: enough to come near, and fast.
+def drag_and_beta(base: Rov, axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:
+    """Names of the coefficients of drag and β of an axis, as far as they are not known."""
+    form = base.layout.kinds[axis.name]
+    names = (form.coefficient(key) for key in ("a_d", "b_d", "a_d_reverse", "b_d_reverse", "beta"))
+    return tuple(name for name in dict.fromkeys(names) if name not in known)
 
-    Coefficients, initial values of the recordings, and the standard deviation of each one's residuals, robust.
-    """
-    names = drag_and_beta(data[0].axis, known)
-    sigma = np.array([_at_least(white_noise(d.values), d) for d in data])
-    thin = Simulator(tuple(d.thinned() for d in data), base, names, sigma)
-    starts = (thin.start(beta) for beta in _BETAS)
-    start = min(starts, key=lambda x: float(np.sum(np.sqrt(1.0 + thin.residuals(x) ** 2))))
-    x = _solve(thin, start, "soft_l1" if loss == "huber" else loss).x
-    plain = Simulator(data, base, names, np.ones(len(data)))
-    residuals = plain.residuals(x)
-    noise = [_at_least(robust_deviation(residuals[rows]), d) for d, rows, *_ in plain.places]
-    return external(names, x), x[len(names) :], noise
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The recordings of some axes, to fit one model or another to."""
+
+    data: tuple[PreparedRecording, ...]
+    base: Rov
+    known: Collection[str]
+    thrust: Estimate | None
+    loss: Loss
+
+    @property
+    def axes(self) -> list[Axis]:
+        """Those recorded."""
+        return axes_of(self.data)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The coefficients to find: of thrust, then of each axis."""
+        drag = (name for axis in self.axes for name in drag_and_beta(self.base, axis, self.known))
+        return (*(self.thrust.names if self.thrust else ()), *drag)
+
+    def choose(self, extras: tuple[Extra, ...]) -> tuple[RecordingsFit, ...]:
+        """Begin near, look for every extra, and leave out what does not earn its place."""
+        coefficients, values = dict(self.thrust.named if self.thrust else {}), {e: _begin(e) for e in extras}
+        noise = np.array([_at_least(white_noise(d.values), d) for d in self.data])
+        for axis in self.axes:
+            alone = replace(self, data=tuple(_glimpse(d) for d in self.data if d.axis is axis), thrust=None)
+            near, found = alone.near(
+                axis,
+                [e for e in extras if e.of == axis.name or e.is_current or e.kind in ("lag", "dead band")],
+                noise[[d.axis is axis for d in self.data]],
+            )
+            coefficients |= near
+            values |= found
+        model = replace(self, data=tuple(d.thinned() for d in self.data)).model(extras, noise, said=True)
+        x = solve(model, model.start(coefficients, values), "linear", 1e-4).x
+        refuse_nonsense(self.base, model.data, model.names, extras, x)
+        noise = self.noise(extras, x)
+        whole = self.analysed(self.model(extras, noise, said=True), x, 1e-5)  # what cannot be told is slow to settle
+        kept, x = earn_their_place(whole)
+        chosen = self.analysed(self.model(kept, noise), x)
+        while (fewer := earn_their_place(chosen))[0] != kept:  # what was dropped was so to first order
+            kept, x = fewer
+            chosen = self.analysed(self.model(kept, noise), x)
+        chosen = self.simplest(chosen, noise)
+        kept = chosen.model.extras
+        if (better := self.voted(chosen)) != kept:
+            x = chosen.x[chosen.model.places_of(better)]
+            kept, chosen = better, self.analysed(self.model(better, noise), x)
+        refuse_nonsense(self.base, self.data, chosen.model.names, kept, chosen.x)
+        effects = effects_of(whole, kept) | effects_of(chosen, kept)
+        return tuple(self._result(axis, chosen, effects) for axis in self.axes)
+
+    def simplest(self, analysis: ResidualAnalysis, noise: Array) -> ResidualAnalysis:
+        """Without extras that together tell too little, by the Bayesian criterion.
+
+        Load, current and what differs by direction stand in for each other, so each may pass alone and yet all of them
+        tell nothing: motion one way is the same with more current, more load and less linear drag.
+        """
+        kept = analysis.model.extras
+        currents = [e for e in kept if e.kind == "current"]
+        if not currents:
+            return analysis
+        vague = [*currents, *(e for e in kept if e.kind == "load" or e.pairs())]
+        for dropped in (vague, [e for e in vague if e not in currents], currents):
+            if len(dropped) > 1:
+                without = tuple(e for e in kept if e not in dropped)
+                other = self.analysed(self.model(without, noise), analysis.x[analysis.model.places_of(without)])
+                if analysis.gain(other) < len(dropped) * np.log(max(analysis.degrees_of_freedom, 8.0)):
+                    return other
+        return analysis
+
+    def voted(self, analysis: ResidualAnalysis) -> tuple[Extra, ...]:
+        """The extras without those that differ by direction and do not help to predict a recording by the others."""
+        kept = analysis.model.extras
+        spread = np.sqrt(np.diag(analysis.covariance()))[len(analysis.model.names) :]
+        values = analysis.model.extra_values(analysis.x).items()
+        beyond = [abs(v - e.neutral) > _BEYOND_DOUBT * error for (e, v), error in zip(values, spread, strict=False)]
+        for extra in (e for e, is_sure in zip(kept, beyond, strict=True) if e.pairs() and not is_sure):
+            without = tuple(e for e in kept if e != extra)
+            errors = [
+                sum(p.error for axis in self.axes for p in self.held_out(axis, analysis, some).predictions)
+                for some in (kept, without)
+            ]
+            kept = kept if errors[0] < errors[1] else without
+        return kept
+
+    def held_out(self, axis: Axis, analysis: ResidualAnalysis, extras: Collection[Extra]) -> HeldOut:
+        """Each recording of an axis by the others, the thrust curve as all of them have it."""
+        rov, values = analysis.model.rov(analysis.x), analysis.model.extra_values(analysis.x)
+        data = tuple(_in_flow(d, values) for d in self.data if d.axis is axis)
+        alone = replace(self, data=data, base=self.base.replaced(_common(rov, self.base)), thrust=None)
+        curves = {curve.name for curve in curves_of(self.base.layout, axis)}
+        own = tuple(
+            e for e in extras
+            if e.kind not in (NORTH, EAST)
+            and (e.of in (axis.name, *curves) or any(e.concerns(d.recording) for d in data))
+        )  # fmt: skip
+        noise = analysis.model.sigma[[d.axis is axis for d in self.data]]
+        model = alone.model(own, noise)
+        x = model.start(dict(rov.coefficients), values)
+        initial = [analysis.x[place] for d, _, place, _ in analysis.model.places if d.axis is axis]
+        return hold_out(model, np.concatenate([x[: model.shared], *initial]))
+
+    def near(self, axis: Axis, extras: Sequence[Extra], noise: Array) -> tuple[dict[str, float], dict[Extra, float]]:
+        """Coefficients of one axis and its extras, thrust as it is, from many starts."""
+        concerned = tuple(
+            e for e in extras if e.kind in ("lag", "dead band") or any(e.concerns(d.recording) for d in self.data)
+        )
+        if axis is YAW:  # what flows is felt along the surface
+            concerned = tuple(e for e in concerned if not e.is_current)
+        model = self.model(concerned, noise, said=True)
+        delay = Extra("delay", axis.name)
+        begin = {e: _begin(e) for e in concerned}
+        starts = [model.start(self.guess(axis, beta), {**begin, delay: late}) for beta in _BETAS for late in _DELAYS]
+        costs = sorted(((_cost(model, x), n) for n, x in enumerate(starts)))
+        near = [starts[n] for cost, n in costs[:_STARTS] if np.isfinite(cost)]
+        if not near:
+            raise MotionError(f"the motion in {axis.name} cannot be computed with any coefficients")
+        x = near[0]
+        for start in near:
+            try:
+                x = min(x, solve(model, start, "linear", 1e-4).x, key=lambda x: _cost(model, x))
+            except MotionError:  # a start too far off; the others are not
+                continue
+            if _cost(model, x) < _GOOD * len(model.residuals(x)):
+                break
+        return external(model.names, x), model.extra_values(x)
+
+    def guess(self, axis: Axis, beta: float) -> dict[str, float]:
+        """Drag half linear, half quadratic, such that the strongest force gives about the highest speed."""
+        data = [d for d in self.data if d.axis is axis]
+        fastest = max(data, key=lambda d: d.speed)
+        force = self.base.strongest(axis)
+        if fastest.recording.command is not None:
+            force = max(abs(self.base.force(axis, c)) for c in _ends(fastest.recording.command)) or force
+        drag = self.base[axis.coefficient("alpha")] * force / fastest.speed
+        kinds = {"a_d": 0.5 * drag / fastest.speed, "b_d": 0.5 * drag, "beta": beta}
+        return {name: kinds[next(key for key in kinds if name.startswith(key))]
+                for name in drag_and_beta(self.base, axis, self.known)}  # fmt: skip
+
+    def first_in(self, recording: Recording) -> Axis | None:
+        """The axis that tells of the current in a file."""
+        file = recording.file
+        return next((d.axis for d in self.data if d.recording.file == file and is_in_flow(d.recording)), None)
+
+    def model(self, extras: tuple[Extra, ...], noise: Array, *, said: bool = False) -> Simulator:
+        """With these extras; `said` whether they are likely to be none."""
+        far = likely(extras, self.data, self.base) if said else None
+        return Simulator(self.data, self.base, self.names, extras, noise, self.thrust, far)
+
+    def analysed(self, model: Simulator, start: Array, tolerance: float = 1e-8) -> ResidualAnalysis:
+        """The best fit."""
+        return ResidualAnalysis(model, solve(model, start, self.loss, tolerance), robust=self.loss == "huber")
+
+    def noise(self, extras: tuple[Extra, ...], x: Array) -> Array:
+        """Standard deviation of each recording's residuals, robust."""
+        plain = self.model(extras, np.ones(len(self.data)))
+        residuals = plain.residuals(x)
+        return np.array([_at_least(robust_deviation(residuals[rows]), d) for d, rows, *_ in plain.places])
+
+    def _result(self, axis: Axis, analysis: ResidualAnalysis, effects: dict[Extra, Effect]) -> RecordingsFit:
+        curves = {curve.name for curve in curves_of(self.base.layout, axis)}
+        own = [d.recording for d in self.data if d.axis is axis]
+        flows = {e.of for e in effects if e.kind in (NORTH, EAST)} - {r.file for r in own if self.first_in(r) is axis}
+        of_axis = {
+            e: effect for e, effect in effects.items()
+            if e.of in curves or (any(map(e.concerns, own)) and not (e.kind in (NORTH, EAST) and e.of in flows))
+        }  # fmt: skip
+        return RecordingsFit(
+            axis,
+            analysis.model.rov(analysis.x),
+            estimate_of(analysis, axis),
+            tuple(s for s in analysis.simulations if s.recording.axis is axis),
+            tuple(of_axis.values()),
+            partial(self.held_out, axis, analysis, analysis.model.extras),
+        )
+
+
+def _cost(model: Simulator, x: Array) -> float:
+    """Of a robust fit; infinite where the motion cannot be computed."""
+    cost = float(np.sum(np.sqrt(1.0 + model.residuals(x) ** 2)))
+    return cost if np.isfinite(cost) else float("inf")
+
+
+def _ends(command: Array) -> tuple[float, float]:
+    return float(command.min()), float(command.max())
+
+
+def _in_flow(data: PreparedRecording, values: Mapping[Extra, float]) -> PreparedRecording:
+    """With the current of its file, which is found by several axes and tells nothing of the vehicle."""
+    of: dict[str, float] = {e.kind: value for e, value in values.items() if e.concerns(data.recording)}
+    return replace(data, current=(of.get(NORTH, 0.0), of.get(EAST, 0.0)))
+
+
+def _glimpse(data: PreparedRecording) -> PreparedRecording:
+    """A little of a recording, to begin with."""
+    return data.liveliest(_LONG).thinned(_FEW)
+
+
+def _begin(extra: Extra) -> float:
+    """Where the search for an extra starts."""
+    return {"lag": 0.1, "dead band": 0.02}.get(extra.kind, extra.neutral)
 
 
 def _at_least(noise: float, data: PreparedRecording) -> float:
     return max(noise, 1e-6 * float(np.ptp(data.values)), 1e-12)
 
 
-def _solve(model: Simulator, start: Array, loss: Literal["soft_l1", "huber", "linear"]) -> Solution:
-    limits = bounds(model.names, len(start) - len(model.names))
-    threshold = _HUBER if loss == "huber" else 1.0
-    return minimize(model.residuals, start, limits, jacobian=model.jacobian, loss=loss, threshold=threshold)
-
-
-class _ResidualAnalysis:
-    """Noise, correlation and outliers of a solution's residuals, and the uncertainty that follows from them."""
-
-    def __init__(self, model: Simulator, solution: Solution, loss: Loss) -> None:
-        self.x, self._jacobian, self._model = solution.x, solution.jacobian, model
-        r = solution.residuals
-        self._inside = np.abs(r) <= _HUBER if loss == "huber" else np.ones(len(r), bool)
-        self._psi = np.clip(r, -_HUBER, _HUBER) if loss == "huber" else r
-        self._variance = np.ones(len(r))  # of each psi, correlation counted; of the thrust curve it is 1
-        self.simulations: list[Simulation] = []
-        self.degrees_of_freedom = 2.0 * bool(model.thrust) - len(self.x)
-        excess = len(r) / (len(r) - len(self.x))
-        for d, rows, initial, sigma in model.places:
-            correlation = correlation_time(self._psi[rows])
-            self._variance[rows] = correlation * excess * np.mean(self._psi[rows] ** 2)
-            self.degrees_of_freedom += len(d.time) / correlation
-            run, noise = model.run(d, self.x, self.x[initial]), sigma * robust_deviation(r[rows])
-            outliers = int((np.abs(r[rows]) > _HUBER).sum())
-            self.simulations.append(Simulation(d.recording, d.time, d.values, *run, noise, correlation, outliers))
-
-    def covariance(self, jacobian: Array | None = None) -> Array:
-        """Of the parameters of a robust fit; correlated residuals count as so many fewer."""
-        J = self._jacobian if jacobian is None else jacobian
-        return covariance(*((J * weights[:, None]).T @ J for weights in (self._inside, self._variance)))
-
-    def by_delay(self, axis: Axis) -> Array:
-        """Derivative of the residuals by a delay on an axis."""
-        column = np.zeros(len(self._psi))
-        for s, (d, rows, _, sigma) in zip(self.simulations, self._model.places, strict=True):
-            if d.axis is axis:
-                column[rows] = -(s.velocity if d.recording.is_position else s.acceleration) / sigma
-        return column
-
-    def unmodelled_effect(self, column: Array) -> UnmodelledEffect:
-        """One Gauss-Newton step with one more parameter, from the solution."""
-        J = np.column_stack([self._jacobian, column])
-        gram = (J * self._inside[:, None]).T @ J
-        value = -float(np.linalg.lstsq(gram, J.T @ self._psi, rcond=None)[0][-1])
-        reach = quantile(max(self.degrees_of_freedom, 1.0)) * float(np.sqrt(self.covariance(J)[-1, -1]))
-        return UnmodelledEffect(value, (value - reach, value + reach))
+def _common(rov: Rov, base: Rov) -> dict[str, float]:
+    """The numbers of a vehicle that another one has too."""
+    return {name: rov[name] for name in base.coefficients}

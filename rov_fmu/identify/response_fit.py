@@ -1,11 +1,14 @@
 """Drag and β of one axis from measured V_ss and Tau: least squares of their relative errors, in closed form (17)."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite
 
 import numpy as np
 
+from rov_fmu.identify.choice import MARGIN, Choice, aicc
+from rov_fmu.identify.drag_forms import LEFT_OUT, DragForm, Point, candidate_forms, level
 from rov_fmu.identify.least_squares import (
     Array,
     Estimate,
@@ -17,24 +20,11 @@ from rov_fmu.identify.least_squares import (
     leave_one_out,
     rms,
 )
-from rov_fmu.identify.tank_tests import thrust_names
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
 
-
-@dataclass(frozen=True)
-class Point:
-    """One measured V_ss (m/s, rad/s) or Tau (s) of an axis at a held command, signs as in the test."""
-
-    quantity: str
-    """V_ss or Tau."""
-    command: float
-    value: float
-    weight: float
-    source: str
-    """File and line, or file and time."""
-    error: float | None = None
-    """Standard error, of a point from a recording."""
+_DIGITS = 1e-5
+"""Of a relative error: nothing is measured to more digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +41,8 @@ class ResponseFit:
     """Coefficients that are not identifiable from the points, and what is assumed instead."""
     leave_one_out: Array
     """n: prediction of every point by a fit without the points of its thrust; NaN where too few are left."""
+    choices: tuple[Choice, ...] = ()
+    """What else the drag could be, beside linear and quadratic and the same both ways; whether it is."""
 
     @property
     def model(self) -> Array:
@@ -67,42 +59,97 @@ class ResponseFit:
 
 
 def fit_response(
-    axis: Axis,
-    points: Sequence[Point],
-    base: Rov,
-    known: Collection[str] = (),
-    thrust_covariance: Array | None = None,
+    axis: Axis, points: Sequence[Point], base: Rov, known: Collection[str] = (), thrust: Estimate | None = None
 ) -> ResponseFit:
     """Fit what is not known of a_d, b_d and β of the axis; `base` holds the rest, α included.
 
-    The thrust coefficients' covariance (2 x 2, a_t and b_t), where they were fitted, widens the intervals.
+    Drag is linear and quadratic, the same both ways. It is less, or by direction, where both the information criterion
+    and leave-one-thrust-out say so, and clearly more so than of any form with some of its coefficients. What is left
+    out keeps its share in the intervals, which are those of the fit with it.
+    `thrust` is the estimate of coefficients of thrust curves, where they were measured; it widens the intervals.
     """
-    used = [p for p in points if p.weight > 0.0]
-    names, assumed = free_coefficients(axis, used, known)
-    base = base.replaced({name: value for name, (value, _) in assumed.items()})
-    solution = _solve(axis, used, base, names)
-    thrust = None
-    if thrust_covariance is not None and names:
-        steps = {name: 1e-5 * max(abs(base[name]), 0.1) for name in thrust_names(axis)}
-        by_thrust = _slopes(lambda k: _residuals(axis, used, k, external(names, solution.x)), base, steps)
-        thrust = by_thrust, thrust_covariance
-
-    def without(out: Flags) -> Array | None:
-        rest = [p for p, is_out in zip(points, out, strict=True) if not is_out and p.weight > 0.0]
-        if not set(free_coefficients(axis, rest, known)[0]) >= set(names) or len(rest) < len(names):
-            return None
-        other = base.replaced(external(names, _solve(axis, rest, base, names).x))
-        return predict(axis, other, [p for p, is_out in zip(points, out, strict=True) if is_out])
-
+    data = tuple(points)
+    plain, *others = (_Candidate(axis, data, form) for form in candidate_forms(axis, data, base, known))
+    better = [c for c in others if c.beats(plain) and all(c.beats(part) for part in others if part.is_part_of(c))]
+    chosen = min(better, key=lambda c: c.aicc, default=plain)
+    whole = next(c for c in (plain, *others) if c.form.keys == chosen.form.keys and not c.form.zero)
+    at = chosen.rov
+    reasons = dict.fromkeys(chosen.form.zero, LEFT_OUT)
     return ResponseFit(
         axis,
-        tuple(points),
-        base.replaced(external(names, solution.x)),
-        estimate_alike(names, solution, len(used), thrust),
-        estimate_alike(names, solution, len(used)),
-        {name: reason for name, (_, reason) in assumed.items()},
-        leave_one_out(np.array([round(abs(p.command), 6) for p in points]), without),
+        data,
+        at,
+        whole.estimate(at, thrust),
+        whole.estimate(at),
+        {**chosen.form.assumed, **reasons},
+        chosen.leave_one_out,
+        tuple(other.choice(plain, other is chosen) for other in others if other.form.is_open and isfinite(other.aicc)),
     )
+
+
+class _Candidate:
+    """One form of the drag, fitted."""
+
+    def __init__(self, axis: Axis, points: tuple[Point, ...], form: DragForm) -> None:
+        self.axis, self.points, self.form = axis, points, form
+        self.used = [p for p in points if p.weight > 0.0]
+        self._solution = _solve(axis, self.used, form.base, _start(axis, self.used, form.base, form.names))
+        self.rov = form.base.replaced(external(form.names, self._solution.x))
+
+    @cached_property
+    def aicc(self) -> float:
+        """Of the points that count."""
+        r = self._solution.residuals
+        return aicc(float(r @ r), len(self.used), len(self.form.names), _DIGITS)
+
+    def estimate(self, at: Rov, thrust: Estimate | None = None) -> Estimate:
+        """Its uncertainty, around other values."""
+        names, by_thrust = self.form.names, None
+        if thrust is not None and names:
+            steps = {name: 1e-5 * max(abs(at[name]), 0.1) for name in thrust.names}
+            values = external(names, self._solution.x)
+            slopes = _slopes(lambda k: _residuals(self.axis, self.used, k, values), self.form.base, steps)
+            by_thrust = slopes, thrust.covariance
+        found = estimate_alike(names, self._solution, len(self.used), by_thrust)
+        return replace(found, values=np.array([at[name] for name in names]))
+
+    @cached_property
+    def leave_one_out(self) -> Array:
+        """Of every point."""
+        return leave_one_out(np.array([level(p) for p in self.points]), self._without)
+
+    def _without(self, out: Flags) -> Array | None:
+        rest = [p for p, is_out in zip(self.points, out, strict=True) if not is_out and p.weight > 0.0]
+        names = self.form.names
+        if not self.form.is_told_by(rest) or len(rest) < len(names):
+            return None
+        start = external(names, self._solution.x)
+        other = self.form.base.replaced(external(names, _solve(self.axis, rest, self.form.base, start).x))
+        return predict(self.axis, other, [p for p, is_out in zip(self.points, out, strict=True) if is_out])
+
+    def is_part_of(self, other: "_Candidate") -> bool:
+        """Whether the other form has all of its coefficients, and more."""
+        return set(self.form.names) < set(other.form.names)
+
+    def beats(self, other: "_Candidate") -> bool:
+        """Whether neither criterion misses the other form; more coefficients must explain clearly more."""
+        margin = MARGIN if len(self.form.names) > len(other.form.names) else 0.0
+        if not self.aicc + margin < other.aicc:
+            return False
+        theirs, own = self._errors(other)
+        return own <= theirs
+
+    def _errors(self, other: "_Candidate") -> tuple[float, float]:
+        """Leave-one-thrust-out errors of the other form and of this one, of the points that both predict."""
+        both = [n for n, p in enumerate(self.points)
+                if p.weight > 0.0 and isfinite(other.leave_one_out[n] + self.leave_one_out[n])]  # fmt: skip
+        value = np.array([self.points[n].value for n in both])
+        theirs, own = (rms(c.leave_one_out[both] / value - 1.0) for c in (other, self))
+        return theirs, own
+
+    def choice(self, plain: "_Candidate", kept: bool) -> Choice:
+        """What it would change, and whether it does."""
+        return Choice(self.form.what, kept, plain.aicc - self.aicc, self._errors(plain))
 
 
 def responses(axis: Axis, rov: Rov, commands: Array) -> Array:
@@ -110,10 +157,11 @@ def responses(axis: Axis, rov: Rov, commands: Array) -> Array:
     return np.array([rov.response(axis, c) for c in commands.tolist()])
 
 
-def predict(axis: Axis, rov: Rov, points: Iterable[Point]) -> Array:
-    """V_ss or Tau of the model at every point."""
-    responses = (rov.response(axis, p.command)[p.quantity == "Tau"] for p in points)
-    return np.fromiter(responses, float)
+def predict(axis: Axis, rov: Rov, points: Sequence[Point], thrust: Sequence[float] | None = None) -> Array:
+    """V_ss or Tau of the model at every point; the thrust before α at each may be given."""
+    form, thrust = rov.layout.kinds[axis.name], thrust or [rov.force(axis, p.command) for p in points]
+    motions = zip(points, (rov.acceleration_of(form, F) for F in thrust), strict=True)
+    return np.fromiter((m.time_constant() if p.quantity == "Tau" else m.steady_velocity() for p, m in motions), float)
 
 
 def holding_force(rov: Rov, axis: Axis, V: float) -> float:
@@ -140,53 +188,42 @@ def response_band(axis: Axis, rov: Rov, found: Estimate, commands: Array) -> tup
 
 
 def _slopes(numbers: Callable[[Rov], Array], rov: Rov, steps: Mapping[str, float]) -> Array:
-    """... x p: derivative of numbers (...) by p of the coefficients, by central differences of the given steps."""
+    """... x p: derivative of numbers (...) by p of the coefficients, by differences of the given steps: central ones.
+
+    At 0, where drag has its bound, they go upward.
+    """
     columns = []
     for name, h in steps.items():
-        up, down = (numbers(rov.replaced({name: rov[name] + step})) for step in (h, -h))
-        columns.append((up - down) / (2.0 * h))
+        back = h if rov[name] else 0.0
+        up, down = (numbers(rov.replaced({name: rov[name] + step})) for step in (h, -back))
+        columns.append((up - down) / (h + back))
     return np.stack(columns, axis=-1)
 
 
-def drag_and_beta(axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:
-    """Names of a_d, b_d and β of an axis, as far as they are not known."""
-    return tuple(name for kind in ("a_d", "b_d", "beta") if (name := axis.coefficient(kind)) not in known)
+def _solve(axis: Axis, used: Sequence[Point], base: Rov, start: Mapping[str, float]) -> Solution:
+    thrust = [base.force(axis, p.command) for p in used]
+    return fit_named(lambda values: _residuals(axis, used, base, values, thrust), start)
 
 
-def free_coefficients(
-    axis: Axis, used: Sequence[Point], known: Collection[str]
-) -> tuple[tuple[str, ...], dict[str, tuple[float, str]]]:
-    """Coefficients to fit, and those that are not identifiable: the value assumed, and the reason."""
-    a_d, b_d, beta = drag_and_beta(axis)
-    assumed: dict[str, tuple[float, str]] = {}
-    if b_d not in known and a_d not in known and len({round(abs(p.command), 6) for p in used}) < 2:
-        assumed[b_d] = (0.0, "Linear and quadratic drag are not identifiable apart from one thrust; assumed 0")
-    if beta not in known and not any(p.quantity == "Tau" for p in used):
-        assumed[beta] = (1.0, f"{axis.inertia}/{beta} is not identifiable from V_ss alone; assumed 1")
-    return drag_and_beta(axis, {*known, *assumed}), assumed
-
-
-def _solve(axis: Axis, used: Sequence[Point], base: Rov, names: tuple[str, ...]) -> Solution:
-    return fit_named(lambda values: _residuals(axis, used, base, values), _start(axis, used, base, names))
-
-
-def _residuals(axis: Axis, used: Sequence[Point], base: Rov, values: Mapping[str, float]) -> Array:
-    model = predict(axis, base.replaced(values), used)
+def _residuals(
+    axis: Axis, used: Sequence[Point], base: Rov, values: Mapping[str, float], thrust: Sequence[float] | None = None
+) -> Array:
+    model = predict(axis, base.replaced(values), used, thrust)
     measured, weights = np.array([p.value for p in used]), np.array([p.weight for p in used])
     return np.asarray(np.sqrt(weights) * (model / measured - 1.0))
 
 
 def _start(axis: Axis, used: Sequence[Point], base: Rov, names: tuple[str, ...]) -> dict[str, float]:
     """Where to begin: half of the drag linear, half quadratic, at the mean V_ss; then β by the mean Tau."""
-    a_d, b_d, beta = drag_and_beta(axis)
-    alpha = base[axis.coefficient("alpha")]
+    beta, alpha = axis.coefficient("beta"), base[axis.coefficient("alpha")]
     steady = [p for p in used if p.quantity == "V_ss"]
     drag = [d for p in steady if (d := alpha * base.force(axis, p.command) / p.value) > 0.0]
     speed = float(np.mean([abs(p.value) for p in steady])) if steady else 1.0
     mean = float(np.mean(drag)) if drag else 1.0
-    start = {a_d: 0.5 * mean / speed, b_d: 0.5 * mean, beta: 1.0}
-    rov = base.replaced({name: start[name] for name in names})
+    share = {"a_d": 0.5 * mean / speed, "b_d": 0.5 * mean, "beta": 1.0}
+    start = {name: share[next(key for key in share if name.startswith(key))] for name in names}
+    rov = base.replaced(start)
     ratios = [rov.response(axis, p.command)[1] / p.value for p in used if p.quantity == "Tau"]
-    if ratios:
+    if ratios and beta in names:
         start[beta] = float(np.median(ratios)) * rov[beta]
-    return {name: start[name] for name in names}
+    return start

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.files.csv_table import read_columns
+from rov_fmu.identify.columns import HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
+from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.least_squares import Array, Estimate, estimate_alike, fit_named, kind_of
-from rov_fmu.identify.response_fit import Point, holding_force, predict
-from rov_fmu.identify.tank_tests import HELD_COMMAND, time_constant_column, velocity_column
+from rov_fmu.identify.response_fit import holding_force, predict
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
 
@@ -98,6 +99,7 @@ def read_points(path: Path, rov: Rov, axis: Axis) -> tuple[Point, ...]:
         "time constant": time_constant_column(optional=True),
     }
     table = read_columns(path, columns)
+    refuse_slips(table, ["command"])
     points = []
     for quantity, column in (("V_ss", "velocity"), ("Tau", "time constant")):
         for n, value in enumerate(table.values.get(column, ())):

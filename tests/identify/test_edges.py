@@ -1,5 +1,6 @@
 """Where the rules of reading and of looking at recordings begin and end."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -34,6 +35,8 @@ def test_twenty_samples_are_enough(samples: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize("force", [0.049, 0.051])
 def test_a_force_against_the_command_is_noise_up_to_a_twentieth_of_the_largest(force: float, tmp_path: Path) -> None:
     shutil.copytree(TESTS, tmp_path / "tests")
+    rov = tmp_path / "tests" / "rov.toml"
+    rov.write_text(re.sub(r"^[ab]_t_rear .*$", "", rov.read_text(encoding="utf-8"), flags=re.M), encoding="utf-8")
     path = tmp_path / "tests" / "thrust_rear_more.csv"
     path.write_text(f"command [%],force [N]\n80,10\n-1,{10.0 * force:g}\n", encoding="utf-8")
     if force > 0.05:
@@ -78,12 +81,13 @@ _DEPTH, _SPEED = ("log_heave", "time [s],command [%],depth [m]"), ("log_surge", 
     ],
 )
 def test_bounds_of_every_column(table: tuple[str, str], within: str, beyond: str, tmp_path: Path) -> None:
-    shutil.copy(TESTS / "rov.toml", tmp_path)
+    head = (TESTS / "rov.toml").read_text(encoding="utf-8").split("[known]")[0]
+    (tmp_path / "rov.toml").write_text(f'base = "videoray"\n{head}', encoding="utf-8")
     name, header = table
-    rest = [f"{n},0,0" for n in range(1, 21)] if name.startswith("log") else []
+    rest = [f"{n},50,0" for n in range(1, 21)] if name.startswith("log") else ["60,1"] if name == "thrust_rear" else []
     path = tmp_path / f"{name}.csv"
     path.write_text("\n".join((header, within, *rest)), encoding="utf-8")
-    assert set(load_tank_tests(tmp_path).inputs) == {"rov.toml", path.name}
+    assert set(load_tank_tests(tmp_path).inputs) == {"rov.toml", "videoray", path.name}
     path.write_text("\n".join((header, beyond, *rest)), encoding="utf-8")
     with pytest.raises(DataFileError, match="line 2, column"):
         load_tank_tests(tmp_path)

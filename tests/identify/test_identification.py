@@ -11,18 +11,21 @@ import pytest
 from scipy.stats import linregress
 
 from rov_fmu.cli import main
+from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.identification import AxisResult, Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Array, Estimate
 from rov_fmu.identify.quadratic_fit import fit_quadratic
-from rov_fmu.identify.response_fit import Point, fit_response
+from rov_fmu.identify.response_fit import fit_response
 from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.pages.report import report_page
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS
 from tests.recordings import AXES, PLANS, clean, write_log
 
@@ -172,11 +175,27 @@ def test_points_without_weight_do_not_count(k: Rov) -> None:
 
 def test_thrust_that_is_uncertain_makes_drag_uncertain(k: Rov) -> None:
     thrust = np.array([k["a_t_top"], k["b_t_top"]])
-    fit = fit_response(
-        HEAVE, points_of(HEAVE, k, (0.2, 0.5, 0.7)), k, thrust_covariance=0.01 * np.outer(thrust, thrust)
-    )
+    uncertain = Estimate(("a_t_top", "b_t_top"), thrust, 0.01 * np.outer(thrust, thrust), 6.0, 1.0)
+    fit = fit_response(HEAVE, points_of(HEAVE, k, (0.2, 0.5, 0.7)), k, thrust=uncertain)
     assert fit.estimate.errors["a_d_w"] == pytest.approx(0.1 * k["a_d_w"], rel=0.01)
     assert fit.estimate.errors["beta_w"] == pytest.approx(0.1, rel=0.01)
+
+
+def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
+    """Three days, three payloads: drag, which the fit takes as one, is not; its interval says so, and a warning does."""
+    write_rov(tmp_path)
+    k, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(1)
+    rows = [(c, k.force(HEAVE, c)) for c in (0.1, 0.3, 0.5, 0.7)]
+    write_csv(tmp_path / "thrust_top.csv", "command [1],force [N]", rows)
+    for n, factor in enumerate((0.8, 1.0, 1.2)):
+        other = k.replaced({"alpha_w": 1.0, "a_d_w": factor * k["a_d_w"]})
+        write_log(tmp_path, str(n), clean(other, HEAVE, PLANS["heave"][n], 25.0).noisy(random))
+    found = identify(load_tank_tests(tmp_path))
+    (fit,) = (result.recordings for result in found.axes if result.recordings)
+    assert fit.disagreement["a_d_w"] > 3.0
+    assert any("heave: the recordings disagree on a_d_w" in warning for warning in found.warnings), found.warnings
+    low, high = found.vehicle.intervals["a_d_w"]
+    assert low < k["a_d_w"] < high
 
 
 # ---- A folder --------------------------------------------------------------------------------------------------------
@@ -340,6 +359,47 @@ def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
     assert both.thrust["rear"].leave_one_out_error > 1.0
     assert forward.vehicle.sources["a_t_rear"] == "(7) over 4 forces"
     assert both.vehicle.sources["a_t_rear"] == "(6) over 5 forces"
+
+
+@pytest.fixture(scope="module")
+def by_direction(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+    """Reverse thrust of 60 % on both thrusters; up twice the drag, which slows more than the thrust alone."""
+    k = untuned(load_vehicle(VIDEORAY).rov)
+    ahead, back = (0.1, 0.2, 0.4, 0.6, 0.8), dict[str, float]()
+    tables = {}
+    for name, m in (("rear", SURGE), ("top", HEAVE)):
+        forces = [(c, k.force(m, c)) for c in ahead]
+        tables[f"thrust_{name}"] = [*forces, *((-c, -0.6 * F) for c, F in forces)]
+        back |= {f"{key}_{name}": 0.6 * k[f"{key}_{name}"] for key in ("a_t", "b_t")}
+    up = k.replaced({**back, "a_d_w": 2.0 * k["a_d_w"], "b_d_w": 2.0 * k["b_d_w"]})
+    tables["steady_heave"] = [(c, k.response(HEAVE, c)[0]) for c in ahead]
+    tables["steady_heave"] += [(-c, -up.response(HEAVE, c)[0]) for c in ahead]
+    tables["time_constant_heave"] = [(c, k.response(HEAVE, c)[1]) for c in ahead]
+    return folder_with(tmp_path_factory.mktemp("by_direction"), tables)
+
+
+def test_thrust_and_drag_by_direction_reach_the_vehicle_file(
+    by_direction: Identification, tmp_path: Path, k: Rov
+) -> None:
+    found = by_direction
+    assert not any("thrust: " in warning or "heave: V_ss differs" in warning for warning in found.warnings)
+    write_vehicle(found.vehicle, tmp_path / "made.toml")
+    read = load_vehicle(tmp_path / "made.toml").rov
+    for name in ("a_t_rear", "b_t_rear", "a_t_top", "b_t_top"):
+        assert read[name] == pytest.approx(k[name], rel=1e-3)
+        assert read[f"{name}_reverse"] == pytest.approx(0.6 * k[name], rel=1e-3)
+    for name in ("a_d_w", "b_d_w"):
+        assert [read[name], read[f"{name}_reverse"]] == pytest.approx([k[name], 2.0 * k[name]], rel=0.01)
+    assert found.vehicle.sources["a_t_top_reverse"] == "(6) over 10 forces"
+    assert found.vehicle.sources["b_d_w_reverse"] == "Least squares of the relative errors of 10 V_ss and 5 Tau"
+
+
+@pytest.mark.long
+def test_report_says_what_is_by_direction(by_direction: Identification) -> None:
+    page = report_page(by_direction)
+    assert page.count("<td>a curve of its own in reverse</td><td>taken</td>") == 2
+    assert page.count("<td>drag by direction</td><td>taken</td>") == 1
+    assert "a_d_w_reverse" in page
 
 
 def test_drag_as_in_the_paper_stands_beside(tmp_path: Path, k: Rov) -> None:

@@ -9,6 +9,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.response_fit import fit_response
 from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables
@@ -20,8 +21,8 @@ RMS = {
     ("surge", "V_ss"): (0.0531, 0.0974, 0.1658),
     ("heave", "V_ss"): (0.0822, 0.1080, 0.0989),
     ("heave", "Tau"): (0.1221, 0.1701, 0.1215),
-    ("yaw", "V_ss"): (0.1062, 0.1926, 0.1197),
-    ("yaw", "Tau"): (0.0601, 0.1473, 0.1128),
+    ("yaw", "V_ss"): (0.1061, 0.1269, 0.1197),
+    ("yaw", "Tau"): (0.0617, 0.0937, 0.1128),
 }
 
 
@@ -88,7 +89,7 @@ def test_on_the_commands_of_table_7_alone_yaw_is_better_too(
     errors = [
         sum((values[n] / c.points[n].value - 1.0) ** 2 for n in of_rows) ** 0.5 / 2.0 for values in c.columns[::2]
     ]
-    assert errors == pytest.approx([0.0987, 0.1268], abs=1e-4)
+    assert errors == pytest.approx([0.0965, 0.1268], abs=1e-4)
 
 
 def test_every_measured_number_is_compared(vehicle: Vehicle, comparisons: dict[tuple[str, str], Comparison]) -> None:
@@ -119,6 +120,29 @@ def test_drag_is_physical_and_what_is_not_identifiable_is_said(refit: Identifica
         "yaw: quadratic and linear drag are hardly identifiable",
     ):
         assert any(words in warning for warning in refit.warnings)
+
+
+def test_of_the_drag_only_what_earns_its_place(refit: Identification) -> None:
+    """Linear drag in yaw; in heave AICc alone would leave it out, and Tau be fitted by 13.5 % for 12.2 %."""
+    choices = {result.axis.name: result.response.choices for result in refit.axes if result.response}
+    kept = {axis: [choice.what for choice in found if choice.kept] for axis, found in choices.items()}
+    assert kept == {"surge": [], "heave": [], "yaw": ["quadratic drag alone"]}
+    assert refit.vehicle.rov["b_d_r"] == 0.0
+    assert refit.vehicle.sources["b_d_r"].startswith("Left at 0")
+    assert refit.vehicle.intervals["b_d_r"] == pytest.approx((0.0, 0.166), abs=0.001)
+    gains = {axis: found[0].gain for axis, found in choices.items()}
+    assert gains == pytest.approx({"surge": -0.85, "heave": 9.18, "yaw": 7.15}, abs=0.01)
+
+
+def test_the_choice_for_yaw_hangs_on_its_weakest_thrust(refit: Identification) -> None:
+    """Chosen anew without each thrust, linear drag is left out but for 20 %, which is then missed as before."""
+    result = next(result for result in refit.axes if result.axis.name == "yaw")
+    linear = []
+    for command in sorted({p.command for p in result.points}):
+        rest = [p for p in result.points if p.command != command]
+        fit = fit_response(result.axis, rest, refit.vehicle.rov, refit.tests.given.known)
+        linear.append(fit.rov["b_d_r"] > 0.0)
+    assert linear == [True, False, False, False, False, False]
 
 
 def test_command_prints_the_two_side_by_side(refit: Identification, capsys: pytest.CaptureFixture[str]) -> None:

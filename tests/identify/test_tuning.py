@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rov_fmu.cli import main
-from rov_fmu.identify.response_fit import Point
+from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.tuning import TuningError, tune, tune_over
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.motion.rov import Rov

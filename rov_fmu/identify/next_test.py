@@ -1,0 +1,103 @@
+"""What to measure next: the recording that would narrow the widest interval most, by what it would tell (Fisher)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from rov_fmu.identify.least_squares import Array, Estimate, is_factor
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.runs import prepare
+from rov_fmu.identify.simulator import Simulator
+from rov_fmu.identify.trajectory import MotionError
+from rov_fmu.motion.layout import Axis
+from rov_fmu.motion.rov import Rov
+
+_COMMANDS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
+_RATE = 10.0  # Hz
+_HOLDS = 5.0, 60.0  # s: the shortest and the longest
+_VAGUE = 1e3  # times its value: the standard error of what is not identifiable yet
+NOISE = {"distance": 0.02, "depth": 0.01, "heading": 0.01, "velocity": 0.02}
+"""Of a plain sensor, m, rad and m/s: where no recording tells it."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What a test would be recorded by."""
+
+    quantity: str
+    noise: float
+    """Standard deviation of a sample, correlation counted, at 10 Hz."""
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """An experiment, and what it would do to the widest interval of an axis."""
+
+    axis: Axis
+    coefficient: str
+    interval: tuple[float, float] | None
+    """Now; None where the coefficient is not identifiable yet."""
+    width: float
+    """Half of it, relative to the value; infinite where there is none."""
+    narrowed: float
+    """The width of the interval after the test by that of now."""
+    words: str
+
+
+def next_test(axis: Axis, rov: Rov, found: Estimate, sensor: Sensor) -> NextTest | None:
+    """The best of many; None where nothing is sought, or nothing moves."""
+    if not found.names:
+        return None
+    error = np.sqrt(np.diag(found.covariance))
+    size = np.maximum(np.abs(found.values), 1e-9)
+    relative = np.where(np.isfinite(error), error / size, inf)
+    widest = int(np.argmax(relative))
+    error = np.maximum(np.where(np.isfinite(error), error, _VAGUE * size), 1e-12 * size)
+    prior = np.where(np.isfinite(found.covariance), found.covariance, 0.0) / np.outer(error, error)
+    prior[np.diag_indices(len(size))] = 1.0  # in standard errors of now
+    before = np.linalg.pinv(prior, hermitian=True)
+    internal = error * [1.0 / v if is_factor(n) else 1.0 for n, v in zip(found.names, found.values, strict=True)]
+    best: tuple[float, str] = (inf, "")
+    for words, command in _tests(axis, rov):
+        told = _information(axis, rov, found.names, sensor, command) * np.outer(internal, internal)
+        if np.isfinite(told).all():
+            after = np.linalg.pinv(before + told, hermitian=True)
+            best = min(best, (float(np.sqrt(np.clip(after[widest, widest], 0.0, 1.0))), words))
+    if not best[1]:
+        return None
+    return NextTest(axis, found.names[widest], found.interval(found.names[widest]), float(relative[widest]), *best)
+
+
+def _tests(axis: Axis, rov: Rov) -> Iterator[tuple[str, Array]]:
+    """Steps from rest and back to rest, one way or both: in words, and the command at each sample."""
+    for level in _COMMANDS:
+        if not rov.force(axis, level) or not rov.force(axis, -level):
+            continue
+        Taus = [rov.response(axis, c)[1] for c in (level, -level)]
+        hold = float(np.clip(round(4.0 * max(Taus)), *_HOLDS)) if np.isfinite(Taus).all() else _HOLDS[1]
+        for ways in ((level,), (level, -level)):
+            levels = [0.0, *(c for way in ways for c in (way, 0.0))]
+            command = np.repeat(levels, round(hold * _RATE))
+            both = " and ".join(f"{c:.0%}" for c in ways)
+            step = "steps" if len(ways) > 1 else "a step"
+            yield (
+                f"a recording of {step} from rest at {both}, {hold:g} s each, with {hold:g} s of rest after each",
+                command,
+            )
+
+
+def _information(axis: Axis, rov: Rov, names: tuple[str, ...], sensor: Sensor, command: Array) -> Array:
+    """What a recording tells of the coefficients (internal), its first velocity and position not known; or NaN."""
+    time, values = np.arange(len(command)) / _RATE, np.zeros(len(command))
+    recording = Recording("", axis, sensor.quantity, time, command, values)
+    model = Simulator((prepare(recording, rov),), rov, names, (), np.array([sensor.noise]))
+    x = model.start(dict(rov.coefficients), {})
+    try:
+        J = model.jacobian(x)
+    except MotionError:
+        return np.full((len(names), len(names)), np.nan)
+    p, gram = len(names), J.T @ J
+    cross = gram[:p, p:]
+    return np.asarray(gram[:p, :p] - cross @ np.linalg.pinv(gram[p:, p:]) @ cross.T)

@@ -1,0 +1,74 @@
+"""Noise, correlation and outliers of a solution's residuals, and the uncertainty of the parameters that follows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rov_fmu.identify.least_squares import Array, Solution, covariance
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.simulator import HUBER, Simulator
+from rov_fmu.identify.step_responses import correlation_time, robust_deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A recording beside the fitted model; arrays over the measured samples, SI units."""
+
+    recording: Recording
+    time: Array
+    measured: Array
+    modelled: Array
+    velocity: Array
+    """Of the model, through the water."""
+    noise: float
+    """Standard deviation of the residuals, robust."""
+    correlation_time: float
+    """Of the residuals, in samples; 1 where they are white."""
+    outliers: int
+    """Samples farther off than 2.5 standard deviations, which count less than their square."""
+
+    @property
+    def residuals(self) -> Array:
+        """Measured less modelled."""
+        return self.measured - self.modelled
+
+
+class ResidualAnalysis:
+    """Of a solution of a simulator's recordings."""
+
+    def __init__(self, model: Simulator, solution: Solution, *, robust: bool) -> None:
+        self.x, self.model = solution.x, model
+        r, J = solution.residuals, solution.jacobian
+        inside = np.abs(r) <= HUBER if robust else np.ones(len(r), bool)
+        psi = np.clip(r, -HUBER, HUBER) if robust else r
+        variance = np.ones(len(r))  # of each psi, correlation counted; of the thrust curve it is 1
+        self.simulations: list[Simulation] = []
+        self.degrees_of_freedom = float(len(model.thrust.names) if model.thrust else 0) - len(self.x)
+        excess = len(r) / (len(r) - len(self.x))
+        size = np.abs(r)
+        losses = np.where(inside, r * r, (2.0 * size - HUBER) * HUBER)
+        cost: list[float] = []
+        for output, (d, rows, _, sigma) in zip(model.run(self.x), model.places, strict=True):
+            correlation = correlation_time(psi[rows])
+            cost.append(float(losses[rows].sum()))
+            variance[rows] = correlation * excess * np.mean(psi[rows] ** 2)
+            self.degrees_of_freedom += len(d.time) / correlation
+            outliers, noise = int((np.abs(r[rows]) > HUBER).sum()), sigma * robust_deviation(r[rows])
+            self.simulations.append(
+                Simulation(d.recording, d.time, d.values, output.values, output.velocity, noise, correlation, outliers)
+            )
+        self.cost = np.array(cost)
+        """Of each recording: the sum of what is minimized."""
+        self.gram, self.meat = ((J * weights[:, None]).T @ J for weights in (inside, variance))
+
+    def gain(self, other: "ResidualAnalysis") -> float:
+        """By how much the cost is lower than another model's, correlated residuals counting as so many fewer.
+
+        How far they are correlated is told by this model, the larger one: misfit makes another's more so.
+        """
+        correlation = np.array([s.correlation_time for s in self.simulations])
+        return float(np.sum((other.cost - self.cost) / correlation))
+
+    def covariance(self) -> Array:
+        """Of the parameters of a robust fit; correlated residuals count as so many fewer."""
+        return covariance(self.gram, self.meat)

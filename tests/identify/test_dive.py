@@ -1,0 +1,124 @@
+"""A dive: several axes move at once, the heading turns and the water moves. Truth by an independent integrator."""
+
+from dataclasses import replace
+from functools import cache
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from rov_fmu.identify.coupling import EAST, NORTH
+from rov_fmu.identify.extras import Extra, Kind
+from rov_fmu.identify.limits import NoFitError, limits, refuse_nonsense
+from rov_fmu.identify.output_error import fit_recordings
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
+from rov_fmu.identify.runs import prepare
+from rov_fmu.identify.simulator import Simulator, solve
+from rov_fmu.motion.layout import AXES, HEAVE
+from rov_fmu.motion.rov import Rov
+from rov_fmu.pages.findings import acting
+from tests.dives import CURRENT, LAG, TRUTH, Dive, dive
+
+FILE = "dive.tlog"
+FLOW = {Extra(kind, FILE): value for kind, value in zip((NORTH, EAST), CURRENT, strict=True)}  # type: ignore[arg-type]
+NAMES = tuple(f"{key}_{v}" for v in "uvr" for key in ("a_d", "b_d", "beta"))
+
+
+@cache
+def dived(seconds: float, seed: int = 0) -> Dive:
+    return dive(seconds, seed)
+
+
+def simulator(recordings: tuple[Recording, ...]) -> tuple[Simulator, np.ndarray]:
+    """Surge, sway and yaw with the current, at the truth."""
+    data = tuple(prepare(r, TRUTH) for r in recordings if r.axis is not HEAVE)
+    model = Simulator(data, TRUTH, NAMES, tuple(FLOW), np.array([0.01, 0.01, 0.005]))
+    return model, model.start(dict(TRUTH.coefficients), FLOW)
+
+
+@pytest.mark.parametrize("quantity", ["velocity", "distance"])
+def test_derivatives_are_those_of_differences(quantity: str) -> None:
+    model, x = simulator(dived(20.0).recorded(0.0, quantity=quantity))
+    x = x + 0.03 * np.random.default_rng(0).standard_normal(len(x))
+    J = model.jacobian(x)
+    for n in range(model.shared):
+        h = 1e-4 * max(abs(x[n]), 0.1)
+        up, down = (model.residuals(x + sign * h * (np.arange(len(x)) == n)) for sign in (1.0, -1.0))
+        errors = np.abs((up - down) / (2.0 * h) - J[:, n])
+        assert np.abs(J[:, n]).max() > 0.0
+        assert np.quantile(errors, 0.99) < 2e-4 * np.abs(J[:, n]).max(), n  # at a reversal the drag has a kink
+
+
+def test_what_a_pool_does_is_what_the_simulator_does() -> None:
+    """But for the smoothing of what is beside; without the coupling, or the current, it is something else."""
+    model, x = simulator(dived(40.0).recorded(0.0))
+    off = float(np.sqrt(np.mean(model.residuals(x) ** 2)))
+    alone = tuple(replace(d, recording=replace(d.recording, beside={})) for d in model.data)
+    still = x.copy()
+    still[len(NAMES) : model.shared] = 0.0
+    for other, at in ((replace(model, data=alone), x), (model, still)):
+        assert float(np.sqrt(np.mean(other.residuals(at) ** 2))) > 5.0 * off
+
+
+def test_a_short_dive_is_solved_from_afar() -> None:
+    model, _ = simulator(dived(60.0).recorded())
+    thin = replace(model, data=tuple(d.thinned(300) for d in model.data))
+    coefficients = {name: (0.5 if name.startswith("beta") else 2.0) * TRUTH[name] for name in NAMES}
+    found = solve(thin, thin.start(coefficients, {}), "linear", 1e-6).x
+    rov, flow = thin.rov(found), thin.extra_values(found)
+    assert [rov[f"beta_{v}"] for v in "uv"] == pytest.approx([1.0, 1.0], rel=0.03)
+    for v in "uvr":  # drag at a usual velocity: a_d and b_d are hardly told apart in a minute
+        assert rov[f"a_d_{v}"] * 0.5 + rov[f"b_d_{v}"] == pytest.approx(
+            TRUTH[f"a_d_{v}"] * 0.5 + TRUTH[f"b_d_{v}"], 0.05
+        )
+    assert list(flow.values()) == pytest.approx(CURRENT, abs=0.01)
+
+
+def test_what_only_nonsense_fits_is_one_line() -> None:
+    """A load that no thrust of the vehicle could hold."""
+    model, _ = simulator(dived(20.0).recorded())
+    extras = (Extra("load", "surge"),)
+    x = replace(model, extras=extras).start(dict(TRUTH.coefficients), {})
+    refuse_nonsense(TRUTH, model.data, NAMES, extras, x)
+    _, high = limits(TRUTH, model.data, NAMES, extras, len(x))
+    x[len(NAMES)] = high[len(NAMES)]
+    with pytest.raises(NoFitError, match=r"^dive\.tlog: no surge of a vehicle .* a load of [0-9.]+ N would do it best"):
+        refuse_nonsense(TRUTH, model.data, NAMES, extras, x)
+
+
+@pytest.mark.parametrize("kind", get_args(Kind))
+def test_every_effect_has_words(kind: Kind) -> None:
+    assert acting(Effect(kind, FILE, "m/s", 0.1, None, kept=True))
+
+
+def unknown() -> Rov:
+    """Of the vehicle what a folder with `base = "bluerov2"` leaves."""
+    layout = TRUTH.layout
+    axes = tuple(replace(f, keys=tuple(k for k in f.keys if k != "F_0")) for f in layout.axes)
+    curves = tuple(replace(c, keys=tuple(k for k in c.keys if k != "T")) for c in layout.curves)
+    drag = {f"{key}_{v}": 1.0 for v in "uvwr" for key in ("a_d", "b_d", "beta")}
+    return Rov(replace(layout, axes=axes, curves=curves), {**TRUTH.coefficients, **drag})
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_dive_is_identified(seed: int) -> None:
+    fits = fit_recordings(dived(240.0, seed).recorded(seed=seed), unknown(), lag=("t200",))
+    assert [fit.axis.name for fit in fits] == list(AXES)
+    for fit in fits:
+        of = fit.axis.velocity
+        assert fit.rov[f"a_d_{of}"] == pytest.approx(TRUTH[f"a_d_{of}"], rel=0.07)
+        assert fit.rov[f"beta_{of}"] == pytest.approx(1.0, rel=0.05)
+        for effect in (e for e in fit.effects if e.kind == "reverse drag" and e.kept):
+            assert effect.value == pytest.approx(1.0, abs=0.02), "drag is that of both directions"
+        assert fit.held_out.by_halves
+        assert fit.held_out.fit >= 85.0
+    assert fits[2].rov["F_0_w"] == pytest.approx(TRUTH["F_0_w"], rel=0.05)
+    assert fits[0].rov["T_t200"] == pytest.approx(LAG, abs=0.02)
+    assert currents(fits[0]) == pytest.approx(CURRENT, abs=0.005)
+    assert not any(currents(fit) for fit in fits[1:]), "it is told once"
+
+
+def currents(fit: RecordingsFit) -> list[float]:
+    return [effect.value for effect in fit.effects if effect.kind in (NORTH, EAST)]

@@ -1,0 +1,170 @@
+"""Drag and β from points: in the form that the points ask for, of any vehicle, by direction."""
+
+from dataclasses import replace
+from math import atanh, exp, inf, sqrt
+
+import numpy as np
+import pytest
+
+from rov_fmu.identify.drag_forms import LEFT_OUT, Point
+from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.response_fit import ResponseFit, fit_response, response_band
+from rov_fmu.motion.layout import HEAVE, SWAY, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+
+BOTH_WAYS = (0.2, 0.35, 0.5, 0.7, -0.2, -0.35, -0.5, -0.7)
+RISE = 1.0 - exp(-1.0)
+
+
+def points_of(
+    drag: tuple[float, float], reverse: tuple[float, float], scatter: float = 0.0, seed: int = 0,
+    commands: tuple[float, ...] = BOTH_WAYS, mass: float = 10.0, beta: float = 0.8,
+) -> list[Point]:  # fmt: skip
+    """V_ss and Tau of one thruster of 20 c^2 + 5 c N that moves 10 kg, written out; with relative errors."""
+    random, found = np.random.default_rng(seed), []
+    for c in commands:
+        (a, b), F = drag if c > 0.0 else reverse, 20.0 * c * c + 5.0 * abs(c)
+        V = (sqrt(b * b + 4.0 * a * F) - b) / (2.0 * a) if a else F / b
+        # From rest v = F tanh(w t)/(root + b/2 tanh(w t)), w = beta/m root.
+        root = sqrt(a * F + b * b / 4.0)
+        Tau = mass / beta / root * atanh(RISE * V * root / (F - RISE * V * b / 2.0))
+        values = np.array([V if c > 0.0 else -V, Tau]) * (1.0 + scatter * random.standard_normal(2))
+        found += [Point(q, c, v, 1.0, "") for q, v in zip(("V_ss", "Tau"), values.tolist(), strict=True)]
+    return found
+
+
+@pytest.fixture
+def sway() -> Rov:
+    """A vehicle of one axis that is no vehicle of the paper."""
+    layout = Layout((VehicleAxis(SWAY),), (Curve("t"),), (Thruster("s", "t", (0.0, 1.0, 0.0)),))
+    numbers = dict.fromkeys(layout.coefficients, 1.0) | {"m_rov": 10.0, "a_t_t": 20.0, "b_t_t": 5.0}
+    return Rov(layout, numbers)
+
+
+def kept(fit: ResponseFit) -> list[str]:
+    return [choice.what for choice in fit.choices if choice.kept]
+
+
+def test_any_vehicle_and_axis(sway: Rov) -> None:
+    fit = fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0)), sway)
+    assert fit.estimate.named == pytest.approx({"a_d_v": 15.0, "b_d_v": 4.0, "beta_v": 0.8}, rel=1e-5)
+    assert kept(fit) == []
+
+
+def test_thrusters_of_a_bluerov2_with_their_curve_by_direction() -> None:
+    """In sway four thrusters push, two of them in reverse."""
+    k = load_vehicle(SHIPPED["bluerov2"]).rov
+    points = [Point(q, c, k.response(SWAY, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in (0.2, 0.5, 0.8)]
+    fit = fit_response(SWAY, points, k.replaced({"a_d_v": 1.0, "b_d_v": 1.0, "beta_v": 1.0}))
+    assert [fit.rov[name] for name in ("a_d_v", "b_d_v", "beta_v")] == pytest.approx(
+        [k[name] for name in ("a_d_v", "b_d_v", "beta_v")], rel=1e-4
+    )
+
+
+def test_drag_by_direction_where_the_points_tell_it(sway: Rov) -> None:
+    fit = fit_response(SWAY, points_of((15.0, 4.0), (30.0, 6.0), 0.01), sway)
+    assert kept(fit) == ["drag by direction"]
+    assert fit.rov.layout.kinds["sway"].keys == ("a_d", "b_d", "a_d_reverse", "b_d_reverse")
+    true = {"a_d_v": 15.0, "b_d_v": 4.0, "beta_v": 0.8, "a_d_v_reverse": 30.0, "b_d_v_reverse": 6.0}
+    assert set(fit.estimate.names) == set(true)
+    for name, (low, high) in fit.estimate.intervals.items():
+        assert low < true[name] < high
+    assert fit.rms("V_ss") < 0.02
+
+
+@pytest.mark.parametrize("seeds", [range(1, 5), pytest.param(range(100), marks=pytest.mark.long)], ids=len)
+def test_drag_alike_both_ways_stays_so(seeds: range, sway: Rov) -> None:
+    """3 % scatter: drag by direction in one of ten at most."""
+    fits = [fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0), 0.03, seed), sway) for seed in seeds]
+    assert sum("a_d_v_reverse" in fit.estimate.names for fit in fits) <= 0.1 * len(seeds)
+
+
+def test_one_command_in_reverse_tells_no_direction(sway: Rov) -> None:
+    fit = fit_response(SWAY, points_of((15.0, 4.0), (30.0, 6.0), commands=(0.2, 0.4, 0.5, 0.7, -0.5)), sway)
+    assert not any("direction" in choice.what for choice in fit.choices)
+
+
+def test_drag_that_has_no_linear_part_is_fitted_without(sway: Rov) -> None:
+    points = points_of((15.0, 0.0), (15.0, 0.0), 0.05, 1, commands=(0.2, 0.3, 0.5, 0.7))
+    fit = fit_response(SWAY, points, sway)
+    assert kept(fit) == ["quadratic drag alone"]
+    assert fit.rov["b_d_v"] == 0.0
+    assert fit.assumed == {"b_d_v": LEFT_OUT}
+    alone = fit_response(SWAY, points, sway.replaced({"b_d_v": 0.0}), known=["b_d_v"])
+    assert fit.rov["a_d_v"] == pytest.approx(alone.rov["a_d_v"], rel=1e-6)
+    assert fit.leave_one_out == pytest.approx(alone.leave_one_out, rel=1e-6)
+    for name in ("a_d_v", "beta_v"):
+        low, high = fit.estimate.intervals[name]
+        least, most = alone.estimate.intervals[name]
+        assert high - low > most - least, "what is left out keeps its share in the intervals"
+    assert fit.estimate.intervals["b_d_v"][1] > 0.0
+
+
+@pytest.mark.parametrize("drag", [(0.0, 9.0), (15.0, 0.0), (15.0, 9.0)])
+def test_points_without_errors_have_both_parts_found(sway: Rov, drag: tuple[float, float]) -> None:
+    fit = fit_response(SWAY, points_of(drag, drag), sway)
+    assert [fit.rov["a_d_v"], fit.rov["b_d_v"]] == pytest.approx(drag, rel=1e-4, abs=1e-4)
+
+
+def test_known_drag_leaves_nothing_to_choose(sway: Rov) -> None:
+    fit = fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0)), sway.replaced({"a_d_v": 15.0}), known=["a_d_v"])
+    assert fit.choices == ()
+    assert fit.estimate.names == ("b_d_v", "beta_v")
+
+
+def test_known_reverse_drag_stays(sway: Rov) -> None:
+    form = VehicleAxis(SWAY, ("a_d", "b_d", "a_d_reverse", "b_d_reverse"))
+    known = {"a_d_v_reverse": 30.0, "b_d_v_reverse": 6.0}
+    base = Rov(replace(sway.layout, axes=(form,)), {**sway.coefficients, **known})
+    fit = fit_response(SWAY, points_of((15.0, 4.0), (30.0, 6.0)), base, known=known)
+    assert fit.rov.layout.kinds["sway"] == form
+    assert fit.estimate.named == pytest.approx({"a_d_v": 15.0, "b_d_v": 4.0, "beta_v": 0.8}, rel=1e-5)
+
+
+def test_uncertain_thrust_of_one_direction_makes_its_drag_uncertain(sway: Rov) -> None:
+    """A force in proportion has the drag of its direction in proportion."""
+    layout = replace(sway.layout, curves=(Curve("t", ("a_t", "b_t", "a_t_reverse", "b_t_reverse")),))
+    base = Rov(layout, {**sway.coefficients, "a_t_t_reverse": 20.0, "b_t_t_reverse": 5.0})
+    spread = np.outer([20.0, 5.0], [20.0, 5.0]) * 0.1**2
+    thrust = Estimate(("a_t_t_reverse", "b_t_t_reverse"), np.array([20.0, 5.0]), spread, 6.0, 1.0)
+    steady = [p for p in points_of((15.0, 4.0), (30.0, 6.0)) if p.quantity == "V_ss"]
+    fit = fit_response(SWAY, steady, base, thrust=thrust)
+    assert fit.estimate.errors["a_d_v_reverse"] / 30.0 == pytest.approx(0.1, rel=0.01)
+    assert fit.estimate.errors["b_d_v_reverse"] / 6.0 == pytest.approx(0.1, rel=0.01)
+    assert fit.estimate.errors["a_d_v"] / 15.0 < 0.001
+
+
+def test_upward_points_of_the_paper_ask_for_no_direction(vehicle: Vehicle) -> None:
+    """Table 3: 0.13, 0.17, 0.28, 0.38 down, 0.13, 0.17, 0.25, 0.37 up."""
+    down, up = (0.13, 0.17, 0.28, 0.38), (0.13, 0.17, 0.25, 0.37)
+    points = [Point("V_ss", c, v, 1.0, "") for c, v in zip((0.2, 0.3, 0.5, 0.7), down, strict=True)]
+    points += [Point("V_ss", -c, -v, 1.0, "") for c, v in zip((0.2, 0.3, 0.5, 0.7), up, strict=True)]
+    fit = fit_response(HEAVE, points, vehicle.rov.replaced({"alpha_w": 1.0, "beta_w": 1.0}))
+    assert "a_d_w_reverse" not in fit.estimate.names
+    assert next(choice for choice in fit.choices if choice.what == "drag by direction").gain < 0.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("drag", [(15.0, 4.0), (15.0, 0.5), (15.0, 0.0)])
+@pytest.mark.parametrize("reverse", [1.0, 1.5])
+def test_intervals_cover_the_truth(sway: Rov, drag: tuple[float, float], reverse: float) -> None:
+    """200 seeds of 3 % scatter, whether or not linear drag is left out: 88 % at least."""
+    back = drag[0] * reverse, drag[1] * reverse
+    hits: dict[str, list[bool]] = {}
+    for seed in range(200):
+        fit = fit_response(SWAY, points_of(drag, back, 0.03, seed), sway)
+        true = {"a_d_v": drag[0], "b_d_v": drag[1], "beta_v": 0.8, "a_d_v_reverse": back[0], "b_d_v_reverse": back[1]}
+        for name, (low, high) in fit.estimate.intervals.items():
+            hits.setdefault(name, []).append(low <= true[name] <= high)
+    assert all(np.mean(found) >= 0.88 for found in hits.values() if len(found) > 100), hits
+
+
+def test_the_band_of_drag_at_its_bound(sway: Rov) -> None:
+    """Without quadratic drag V = F/b_d, and dV/da_d = -F^2/b_d^3."""
+    rov = sway.replaced({"a_d_v": 0.0, "b_d_v": 20.0})
+    found = Estimate(("a_d_v",), np.array([0.0]), np.array([[1.0]]), inf, 1.0)
+    low, high, *_ = response_band(SWAY, rov, found, np.array([0.5]))
+    F = 20.0 * 0.5**2 + 5.0 * 0.5
+    assert high - low == pytest.approx([2.0 * 1.96 * F**2 / 20.0**3], rel=1e-3)

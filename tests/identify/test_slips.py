@@ -1,0 +1,239 @@
+"""Slips of a hand or a script: a wrong unit, a wrong scale, a turned sign. Each is named or refused, with its file."""
+
+import re
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.slips import Tables, beta_out_of_range, slips
+from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+from tests.pool import Run, run
+from tests.recordings import AXES, PLANS
+from tests.vehicles import VIDEORAY
+
+_COLUMN = {"distance": "distance [m]", "depth": "depth [m]", "heading": "heading [deg]", "velocity": "velocity [m/s]"}
+SENSOR = {"surge": "distance", "heave": "depth", "yaw": "heading"}
+K = VIDEORAY.replaced({"beta_u": 0.8})
+KNOWN = ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top", "alpha_u", "alpha_w", "alpha_r")
+
+
+@dataclass(frozen=True)
+class Slip:
+    """What the file says, as a multiple of what was measured, and how that may be put into words."""
+
+    axis: Axis
+    value: float = 1.0
+    command: float = 1.0
+    words: str = ""
+
+
+_SCALE, _TURNED = r"\bunit|\bscale|\bcm\b|\b100?\b", r"\bsign|direction|against the command"
+SLIPS = {
+    "distances a tenth": Slip(SURGE, value=0.1, words=_SCALE),
+    "distances a hundredfold": Slip(SURGE, value=100.0, words=_SCALE),
+    "depths a tenth": Slip(HEAVE, value=0.1, words=_SCALE),
+    "depths a hundredfold": Slip(HEAVE, value=100.0, words=_SCALE),
+    "radians under degrees": Slip(YAW, value=np.pi / 180.0, words=r"\brad|\bunit"),
+    "degrees under radians": Slip(YAW, value=180.0 / np.pi, words=r"\bdeg|\brad|\bunit"),
+    "fractions under percent": Slip(HEAVE, command=0.01, words=r"fraction|percent|%|\[1\]"),
+    "heave up": Slip(HEAVE, value=-1.0, words=_TURNED),
+    "yaw to port": Slip(YAW, value=-1.0, words=_TURNED),
+    "surge astern": Slip(SURGE, value=-1.0, words=_TURNED),
+}
+
+
+@cache
+def runs(axis: Axis) -> tuple[Run, ...]:
+    return tuple(run(K, axis, plan, 20.0) for plan in PLANS[axis.name])
+
+
+def recordings(axis: Axis, seed: int = 0) -> list[Recording]:
+    random = np.random.default_rng(seed)
+    return [clean.recorded(random, SENSOR[axis.name], f"log_{axis.name}_{n}.csv") for n, clean in enumerate(runs(axis))]
+
+
+def slipped(recording: Recording, slip: Slip) -> Recording:
+    assert recording.command is not None
+    return replace(recording, values=slip.value * recording.values, command=slip.command * recording.command)
+
+
+def write_folder(folder: Path, written: Sequence[Recording]) -> Path:
+    """A folder of tank tests: logs of the VideoRay; its mass, geometry and thrust are known, and its other axes."""
+    metas, others = K.layout.coefficients, {axis.name for axis in AXES} - {r.axis.name for r in written}
+    drag = [axis.coefficient(kind) for axis in AXES if axis.name in others for kind in ("a_d", "b_d", "beta")]
+    known = [f'{n} = {{ value = {K[n]!r}, unit = "{metas[n].unit}", source = "A pool" }}' for n in (*KNOWN, *drag)]
+    head = ['name = "An ROV"', 'identifier = "an_rov"', 'version = "1"', 'description = "An ROV"', 'source = "A pool"']
+    text = "\n".join(["[vehicle]", *head, "[known]", *known]) + "\n"
+    (folder / "rov.toml").write_text(text, encoding="utf-8")
+    for recording in written:
+        assert recording.command is not None
+        values = np.degrees(recording.values) if recording.quantity == "heading" else recording.values
+        table = np.column_stack([recording.time, 100.0 * recording.command, values])
+        header = f"time [s],command [%],{_COLUMN[recording.quantity]}"
+        np.savetxt(folder / recording.file, table, "%.6g", ",", header=header, comments="")
+    return folder
+
+
+def told(folder: Path) -> list[str]:
+    """What an identification warns of, or why it refuses; a sentence each."""
+    try:
+        return list(identify(load_tank_tests(folder)).warnings)
+    except (DataFileError, VehicleFileError) as refusal:
+        return str(refusal).splitlines()
+
+
+def names(sentences: Sequence[str], file: str, words: str) -> bool:
+    """Whether a sentence names the file and the likely cause."""
+    about = (sentence for sentence in sentences if file in sentence)
+    return any(re.search(words, sentence.replace(file, ""), re.IGNORECASE) for sentence in about)
+
+
+@pytest.mark.parametrize("kind", SLIPS)
+@pytest.mark.parametrize("how_many", ["one of three", "all"])
+def test_a_slip_is_named_or_refused(kind: str, how_many: str, tmp_path: Path) -> None:
+    slip = SLIPS[kind]
+    logs = recordings(slip.axis)
+    wrong = logs[1:2] if how_many == "one of three" else logs
+    sentences = told(write_folder(tmp_path, [slipped(r, slip) if r in wrong else r for r in logs]))
+    assert any(names(sentences, r.file, slip.words) for r in wrong), sentences
+    assert how_many == "all" or not any(names(sentences, r.file, "likely") for r in logs if r not in wrong), sentences
+
+
+@pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
+def test_nothing_is_said_of_logs_without_slip(axis: Axis, tmp_path: Path) -> None:
+    assert not told(write_folder(tmp_path, recordings(axis)))
+
+
+# ---- Other vehicles, other logs --------------------------------------------------------------------------------------
+
+VEHICLES = {name: load_vehicle(SHIPPED[name]).rov for name in ("bluerov2", "bluerov2_heavy")}
+CASES = [(name, form.axis) for name, k in VEHICLES.items() for form in k.layout.axes]
+# What of a factor is told by plausibility alone, in one file: all but ten times too little, of which drag tells less.
+FACTORS = {"m": (-1.0, 0.01, 0.1, 100.0), "rad": (-1.0, np.pi / 180.0, 180.0 / np.pi)}
+
+
+@cache
+def swims(name: str, axis: Axis) -> tuple[Run, ...]:
+    """The plan of surge serves for sway. Every thruster stands at what the commands of the axis make of it."""
+    k, plans = VEHICLES[name], PLANS.get(axis.name, PLANS["surge"])
+    signs, gains = k.layout.signs(axis), k.layout.gains
+    reaching = {t: sum(gain * signs.get(u, 0.0) for u, gain in gains[t].items()) for t in gains}
+    return tuple(run(k, axis, plan, 20.0, pattern={t: c for t, c in reaching.items() if c}) for plan in plans)
+
+
+def sensed(name: str, axis: Axis, seed: int = 0) -> list[Recording]:
+    random = np.random.default_rng(seed)
+    return [clean.recorded(random, axis.position, f"{n}.csv") for n, clean in enumerate(swims(name, axis))]
+
+
+@pytest.mark.parametrize(
+    ("name", "axis"),
+    [pytest.param(*case, marks=[] if case[0] == "bluerov2" else [pytest.mark.long]) for case in CASES],
+    ids=lambda part: getattr(part, "name", part),
+)
+def test_slips_of_other_vehicles_are_told_from_none(name: str, axis: Axis) -> None:
+    k, logs = VEHICLES[name], sensed(name, axis)
+    assert not slips({axis.name: logs}, k)
+    assert not slips({axis.name: logs[:1]}, k)
+    for factor in FACTORS[axis.position_unit]:
+        wrong = [replace(log, values=factor * log.values) for log in logs]
+        assert [f.file for f in slips({axis.name: [logs[0], wrong[1], logs[2]]}, k) if f.certain] == ["1.csv"]
+        assert [f.file for f in slips({axis.name: wrong[2:]}, k)] == ["2.csv"]
+
+
+@pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
+def test_nothing_is_said_of_a_sensor_that_tells_of_no_motion(axis: Axis) -> None:
+    log = recordings(axis)[0]
+    for seed in range(3):
+        noise = 0.01 * np.random.default_rng(seed).standard_normal(len(log.time))
+        assert not slips({axis.name: [replace(log, values=noise)]}, K)
+
+
+# ---- Tables ----------------------------------------------------------------------------------------------------------
+
+
+def tables(axis: Axis, velocity: float = 1.0, time_constant: float = 1.0) -> tuple[dict[str, Tables], ...]:
+    """Both tables of an axis, each times a factor."""
+    found = [(c, K.response(axis, c)) for c in (0.2, 0.3, 0.5, 0.7, -0.5)]
+    steady = {"steady.csv": [(c, velocity * V_ss) for c, (V_ss, _) in found]}
+    return {axis.name: steady}, {axis.name: {"tau.csv": [(c, time_constant * Tau) for c, (_, Tau) in found]}}
+
+
+@pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
+def test_slips_in_tables(axis: Axis) -> None:
+    assert not slips({}, K, (), *tables(axis))
+    for factor in (1000.0, 0.001):
+        (found,) = slips({}, K, (), *tables(axis, time_constant=factor))
+        assert found.certain
+        assert "ms" in found.sentence.removeprefix("tau.csv")
+    for factor in FACTORS[axis.position_unit][1:]:
+        if factor != 0.1:
+            (found,) = slips({}, K, (), *tables(axis, factor))
+            assert found.file == "steady.csv"
+
+
+def test_a_table_that_contradicts_recordings_is_refused() -> None:
+    logs = recordings(HEAVE)
+    assert not slips({"heave": logs}, K, (), *tables(HEAVE))
+    (found,) = slips({"heave": logs}, K, (), *tables(HEAVE, 0.1))
+    assert (found.file, found.certain) == ("steady.csv", True)
+
+
+# ---- β of the final fit ----------------------------------------------------------------------------------------------
+
+
+def test_a_beta_that_no_vehicle_has_is_told() -> None:
+    assert beta_out_of_range(K, HEAVE) is None
+    for beta in (0.04, 1.3):
+        assert f"beta_w = {beta:g}" in str(beta_out_of_range(K.replaced({"beta_w": beta}), HEAVE))
+    heavy = VEHICLES["bluerov2_heavy"]
+    assert beta_out_of_range(heavy.replaced({"beta_w": 2.0}), HEAVE) is None
+    assert "and the added one" in str(beta_out_of_range(heavy.replaced({"beta_w": 0.2}), HEAVE))
+
+
+# ---- Time ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.long
+def test_nine_recordings_of_6000_rows_take_20_seconds(tmp_path: Path) -> None:
+    """60 s at 100 Hz each; as a whole command, without the report."""
+    random = np.random.default_rng(0)
+    logs = [
+        run(K, axis, plan, 100.0).recorded(random, SENSOR[axis.name], f"log_{axis.name}_{n}.csv")
+        for axis in AXES
+        for n, plan in enumerate(PLANS[axis.name])
+    ]
+    assert all(len(log.time) == 6000 for log in logs)
+    folder = write_folder(tmp_path, logs)
+    began = time.monotonic()
+    assert main(["identify", str(folder)]) == 0
+    assert time.monotonic() - began <= 20.0
+
+
+@pytest.mark.long
+def test_five_recordings_whose_command_never_rests_take_10_seconds(tmp_path: Path) -> None:
+    """A joystick, 3,000 rows each, another command at every row."""
+    rate, at = 50.0, np.arange(3000) / 50.0
+    random = np.random.default_rng(0)
+    logs = []
+    for n in range(5):
+        low, high = random.uniform(0.2, 0.6), random.uniform(0.8, 2.0)
+        commands = 0.45 * np.sin(low * at) + 0.25 * np.sin(high * at)
+        stick = run(K, HEAVE, [(c, 1.0 / rate) for c in commands.tolist()], rate)
+        logs.append(stick.recorded(random, "depth", f"log_heave_{n}.csv"))
+    folder = write_folder(tmp_path, logs)
+    began = time.monotonic()
+    assert main(["identify", str(folder)]) == 0
+    assert time.monotonic() - began <= 10.0
