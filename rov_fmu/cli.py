@@ -20,6 +20,8 @@ from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
 
 if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
+
     from rov_fmu.build import Built
 
 _EXIT_CODES = {FileError: 2, OSError: 2, click.ClickException: 2, BuildError: 1}
@@ -93,18 +95,43 @@ def _build(vehicle: Path, output: Path | None, backend: str, platforms: tuple[st
 @contextmanager
 def _progress(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
     """A line a platform that is being compiled, on a terminal only; yields what to call when one is done."""
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    with _shown(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()) as progress:
+        if progress is None:
+            yield lambda _: None
+        else:
+            tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
+            yield lambda name: progress.update(tasks[name], completed=1)
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[str, float], None]]:
+    """One bar, on a terminal only; yields what to call with what comes next, and the share that is done (0 ... 1)."""
+    from rich.progress import BarColumn, SpinnerColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    columns = SpinnerColumn(), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
+    with _shown(*columns) as progress:
+        if progress is None:
+            yield lambda *_: None
+        else:
+            task = progress.add_task("reading", total=1.0)
+            yield lambda words, share: progress.update(task, description=words, completed=share)
+
+
+@contextmanager
+def _shown(*columns: "ProgressColumn") -> "Iterator[Progress | None]":
+    """Progress on a terminal, gone when it ends, however that is; None where there is none."""
+    from rich.progress import Progress
 
     from rov_fmu.pages.console import console
 
     out = console()
     if not out.is_terminal:
-        yield lambda _: None
+        yield None
         return
-    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
     with Progress(*columns, console=out, transient=True) as progress:
-        tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
-        yield lambda name: progress.update(tasks[name], completed=1)
+        yield progress
 
 
 def _print_built(built: "Built", seconds: float) -> None:
@@ -135,14 +162,19 @@ def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
     from rov_fmu.pages.console_results import print_identification
     from rov_fmu.vehicle.writer import vehicle_output
 
-    tests = load_tank_tests(folder)
-    check_targets(filter(None, (output, report)), tests.files)
-    identification = identify(tests)
-    identified, outputs = identification.vehicle, []
-    if report:
-        from rov_fmu.pages.report import report_output
+    with _bar() as done:
+        tests = load_tank_tests(folder)
+        check_targets(filter(None, (output, report)), tests.files)
+        identification = identify(tests, done)
+        done("each recording predicted by the others", 0.97)
+        _ = [result.held_out for result in identification.axes]  # now, and not when it is printed
+        identified, outputs = identification.vehicle, []
+        if report:
+            from rov_fmu.pages.report import report_output
 
-        outputs.append(report_output(identification, report))
+            done("drawing the report", 1.0)
+            outputs.append(report_output(identification, report))
+    if report:
         assert identified.provenance
         identified = replace(identified, provenance=replace(identified.provenance, report=report))
     if output:

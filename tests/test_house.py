@@ -15,7 +15,7 @@ PARTS = ("cli", "build", "pages", "export", "identify", "vehicle", "process", "f
 AROUND = {
     "rov_fmu": {"rov_fmu"},
     "checks": {"checks", "rov_fmu"},
-    "examples": {"examples", "rov_fmu"},
+    "examples": {"examples", "checks", "rov_fmu"},
     "benchmarks": {"benchmarks", "checks", "rov_fmu"},
     "fuzz": {"fuzz", "checks", "rov_fmu"},
     "interop": {"interop", "checks", "examples", "rov_fmu"},

@@ -5,19 +5,36 @@ from collections.abc import Iterable, Sequence
 from rich.table import Table
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
+from rov_fmu.identify.recordings_fit import Effect
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.pages.console import DEVIATION, console, table, text
+from rov_fmu.pages.findings import Unseen, acting, effects, unseen
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _OUT = "leave-\none-out"
+_MOST_STEPS = 20
 
 
 def print_identification(identification: Identification) -> None:
-    """Coefficients, recordings, points beside the model, and the warnings."""
+    """How well it predicts, coefficients, what else acts, what to measure next; then steps, points and warnings."""
     out, vehicle = console(), identification.vehicle
     out.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
     comparisons, other = compare(identification), [identification.against.name] if identification.against else []
-    tables = [_coefficients(vehicle), *(_steps(result) for result in identification.axes if result.steps)]
+    if predicted := [*unseen(identification, comparisons)]:
+        out.print()
+        out.print(_predicted(predicted))
+    acts = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
+    for found in [_coefficients(vehicle), *([_effects(acts)] if acts else [])]:
+        out.print()
+        out.print(found)
+    if identification.next_tests:
+        out.print("\nTo measure next:")
+    for test in identification.next_tests:
+        now = f"now {test.interval[0]:.3g} ... {test.interval[1]:.3g}" if test.interval else "not identifiable yet"
+        narrowed = f"; then {1.0 - test.narrowed:.0%} narrower" if test.interval else ""
+        words = f"- {test.axis.name}: {test.words} ({test.coefficient}, {now}{narrowed})"
+        out.print(words, soft_wrap=True)
+    tables = [_steps(result) for result in identification.axes if result.steps]
     tables += [_points(comparison, other) for comparison in comparisons]
     for found in [*tables, *([_summary(comparisons, other)] if comparisons else [])]:
         out.print()
@@ -32,6 +49,24 @@ def print_identification(identification: Identification) -> None:
         out.print(f"- {warning}", soft_wrap=True)
 
 
+def _predicted(found: Iterable[Unseen]) -> Table:
+    result = table("Prediction of what a fit has not seen", "axis", ("fit", "RMS error"), ("of",))
+    for row in found:
+        fit = "" if row.fit is None else text(row.fit / 100.0, ".1%")
+        error = "" if row.error is None else text(row.error, ".1%")
+        result.add_row(row.axis.name, fit, error, f"{row.what}, {row.by}")
+    return result
+
+
+def _effects(kept: Iterable[Effect]) -> Table:
+    found = table("What else acts", "of", ("value", "95 % from", "to", "unit"), ("",))
+    for effect in kept:
+        low, high = (f"{end:.4g}" for end in effect.interval) if effect.interval else ("", "")
+        unit = "" if effect.unit == "1" else effect.unit
+        found.add_row(effect.of, f"{effect.value:.4g}", low, high, unit, acting(effect))
+    return found
+
+
 def _coefficients(vehicle: Vehicle) -> Table:
     result = table("Coefficients", "name", ("value", "95 % from", "to", "unit"), ("source",))
     for name, meta in vehicle.layout.coefficients.items():
@@ -43,11 +78,13 @@ def _coefficients(vehicle: Vehicle) -> Table:
 def _steps(result: AxisResult) -> Table:
     headers = ("from s", "to s", "command", f"V_ss [{result.axis.unit}]", "+-", "Tau [s]", "+-")
     found = table(f"{result.axis.name.capitalize()}: held commands of the recordings", "file", headers, ("",))
-    for s in result.steps:
+    for s in result.steps[:_MOST_STEPS]:
         responses = [text(n, form) for n, form in (
             (s.V_ss, ".4f"), (s.V_ss_error, ".1g"), (s.Tau, ".4f"), (s.Tau_error, ".1g"),
         )]  # fmt: skip
         found.add_row(s.file, f"{s.start:.1f}", f"{s.end:.1f}", f"{s.command:.0%}", *responses, s.note)
+    if (more := len(result.steps) - _MOST_STEPS) > 0:
+        found.add_row(f"and {more} more: --report lists them all")
     return found
 
 

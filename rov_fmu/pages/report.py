@@ -1,7 +1,7 @@
 """The identification report: one HTML file with the data, the fits, their residuals, and the warnings."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -10,13 +10,19 @@ from typing import Any
 from markupsafe import Markup
 
 from rov_fmu.files.output import Output
-from rov_fmu.identify.identification import Comparison, Identification, compare, count
-from rov_fmu.identify.tank_tests import ROV_FILE, THRUSTERS, TankTests
-from rov_fmu.pages.report_plots import plot_drag, plot_recording, plot_response, plot_steps, plot_thrust
+from rov_fmu.identify.given import ROV_FILE
+from rov_fmu.identify.identification import Comparison, Identification, compare
+from rov_fmu.identify.recordings_fit import count
+from rov_fmu.identify.residual_analysis import Simulation
+from rov_fmu.identify.tank_tests import TankTests
+from rov_fmu.pages.findings import Known, acting, effects, known, unseen, verdict
+from rov_fmu.pages.report_plots import plot_drag, plot_known, plot_response, plot_steps, plot_thrust
+from rov_fmu.pages.report_recordings import CommandStep, clearest_step, plot_recording, plot_step
 from rov_fmu.pages.svg import Draw, inline_svg
-from rov_fmu.pages.templates import page
+from rov_fmu.pages.templates import number, page
 
-_PLOT, _WIDE = (3.7, 3.5), (5.6, 3.1)  # inches
+_PLOT, _WIDE = (3.7, 3.5), (4.7, 3.0)  # inches
+_WHITE = 1.5  # samples: residuals that are correlated over less are as good as white
 
 
 def report_output(results: Identification, path: Path) -> Output:
@@ -26,24 +32,47 @@ def report_output(results: Identification, path: Path) -> Output:
 
 def report_page(results: Identification) -> str:
     """The report as HTML, the same for the same input."""
-    comparisons = compare(results)
+    comparisons, found = compare(results), known(results)
+    predicted = tuple(unseen(results, comparisons))
+    fits = [result.recordings for result in results.axes if result.recordings]
+    closeups = {fit.axis.name: step for fit in fits if (step := clearest_step(fit))}
     return page(
         "report.html.j2",
         vehicle=results.vehicle,
         results=results,
         comparisons=comparisons,
-        thrusters=THRUSTERS,
-        plots=dict(_plots(results, comparisons)),
+        curves=results.vehicle.layout.curves,
+        unseen=predicted,
+        unseen_fit=dict(part for row in predicted for part in row.parts),
+        known=found,
+        closeups=closeups,
+        plots=dict(_plots(results, comparisons, found, closeups)),
         holds=_holds(results.tests),
+        effects=effects,
+        acting=acting,
+        verdict=verdict,
+        scatter=scatter,
     )
 
 
-def _plots(results: Identification, comparisons: tuple[Comparison, ...]) -> Iterator[tuple[str, Markup]]:
+def _plots(
+    results: Identification,
+    comparisons: tuple[Comparison, ...],
+    found: tuple[Known, ...],
+    closeups: Mapping[str, CommandStep],
+) -> Iterator[tuple[str, Markup]]:
     """Every plot by its label."""
     draw: dict[str, Draw] = {
         f"Thrust: {name}": partial(plot_thrust, results=results, fit=fit) for name, fit in results.thrust.items()
     }
+    if found:
+        yield (
+            "What is known",
+            inline_svg("What is known", partial(plot_known, found=found), (4.6, 0.7 + 0.23 * len(found))),
+        )
     for result in results.axes:
+        if not (result.points or result.recordings):
+            continue
         of_axis: dict[str, Any] = {"results": results, "result": result}
         for quantity in ("V_ss", "Tau"):
             comparison = next((c for c in comparisons if c.result is result and c.quantity == quantity), None)
@@ -56,13 +85,16 @@ def _plots(results: Identification, comparisons: tuple[Comparison, ...]) -> Iter
             draw[f"Step responses: {result.axis.name}"] = partial(plot_steps, **of_axis)
         for s in result.recordings.simulations if result.recordings else ():
             draw[f"Recording: {s.recording.file}"] = partial(plot_recording, result=result, simulation=s)
+        if step := closeups.get(result.axis.name):
+            draw[f"Step in {step.simulation.recording.file}"] = partial(plot_step, result=result, step=step)
     for label, plot in draw.items():
-        yield label, inline_svg(label, plot, _WIDE if label.startswith("Recording") else _PLOT)
+        yield label, inline_svg(label, plot, _WIDE if label.startswith(("Recording", "Step in")) else _PLOT)
 
 
 def _holds(tests: TankTests) -> dict[str, str]:
     """What every input file holds, in words."""
-    holds = {ROV_FILE: "what is given beforehand: mass, geometry"}
+    holds = dict.fromkeys(tests.inputs, "not used") | {ROV_FILE: "what is given beforehand: mass, geometry"}
+    holds |= {tests.given.base_name: "the vehicle to begin from"} if tests.given.base else {}
     tables = {"force": tests.thrust, "steady velocity": tests.steady, "time constant": tests.time_constants}
     for what, rows in tables.items():
         files = Counter(row.file for row in chain(*rows.values()))
@@ -70,3 +102,11 @@ def _holds(tests: TankTests) -> dict[str, str]:
     for r in chain(*tests.recordings.values()):
         holds[r.file] = f"{len(r.time)} samples of command and {r.quantity} in {r.time[-1]:.4g} s"
     return holds
+
+
+def scatter(simulation: Simulation) -> str:
+    """What measured less modelled is, in words: noise only where it is white."""
+    size, unit = number(simulation.noise, 2), simulation.recording.unit
+    if simulation.correlation_time < _WHITE:
+        return f"residuals of {size} {unit}, white: the sensor’s noise"
+    return f"residuals of {size} {unit}, correlated over {simulation.correlation_time:.0f} samples: more than noise"

@@ -1,29 +1,37 @@
 """The plots of the identification report: every fit with its 95 % band, and its residuals below."""
 
+from collections.abc import Iterator, Sequence
+from math import log
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification
 from rov_fmu.identify.least_squares import Array, Flags
-from rov_fmu.identify.output_error import Simulation
-from rov_fmu.identify.quadratic_fit import QuadraticFit, quadratic
+from rov_fmu.identify.quadratic_fit import QuadraticFit
 from rov_fmu.identify.response_fit import holding_force, responses
-from rov_fmu.identify.step_responses import velocity, without_spikes
+from rov_fmu.identify.thrust_fit import ThrustFit, forces
+from rov_fmu.pages.findings import Known
 from rov_fmu.pages.plots import Step, draw_steps, evenly
 from rov_fmu.pages.svg import LIGHT
-from rov_fmu.pages.templates import pretty_unit
+from rov_fmu.pages.templates import pretty_unit, text
 
-_BINS = 300  # of a recording: as many as one can see
+_WIDEST = 5.0  # end of an interval by the value, or its inverse: beyond it there is an arrow
+_TICKS = (
+    0.001, 0.002, 0.003, 0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0, 2.0, 3.0, 4.0,
+)  # fmt: skip
+_REACH = 1.96  # standard errors of a 95 % interval
 
 
-def plot_thrust(figure: Figure, results: Identification, fit: QuadraticFit) -> None:
+def plot_thrust(figure: Figure, results: Identification, fit: ThrustFit) -> None:
     """Force over command, and the curve of the vehicle where recordings have moved it away from the fit."""
-    curve = [results.vehicle.rov[name] for name in fit.estimate.names]
-    moved = not np.allclose(curve, (fit.a, fit.b), rtol=1e-9)
-    above, below, x = _quadratic(figure, fit, 100.0, "grey" if moved else "blue", "fit to the forces")
+    rov = results.vehicle.rov
+    curve = next(curve for curve in rov.layout.curves if curve.name == fit.curve.name)
+    moved = curve != fit.curve or not all(np.isclose(rov[name], value, rtol=1e-9) for name, value in fit.values.items())
+    above, below, x = _fitted(figure, fit, 100.0, "grey" if moved else "blue", "fit to the forces")
     if moved:
-        above.plot(100.0 * x, quadratic(x) @ curve, color=LIGHT["blue"], label="with the recordings")
+        above.plot(100.0 * x, forces(curve, rov.coefficients, x), color=LIGHT["blue"], label="with the recordings")
     _finish(above, below, "Force (N)", "command (%)", "residual (N)")
 
 
@@ -31,9 +39,9 @@ def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> No
     """Thrust at measured V_ss: the drag that the vehicle takes, and the fit to these forces alone as in (11)-(16)."""
     assert result.drag
     axis, load, rov = result.axis, pretty_unit(result.axis.load), results.vehicle.rov
-    above, below, v = _quadratic(figure, result.drag, 1.0, "grey", "fit to these forces")
-    a, b, alpha = (rov[axis.coefficient(key)] for key in ("a_d", "b_d", "alpha"))
-    above.plot(v, quadratic(v) @ (a, b), color=LIGHT["blue"], label="model")
+    above, below, v = _fitted(figure, result.drag, 1.0, "grey", "fit to these forces")
+    alpha = rov[axis.coefficient("alpha")]
+    above.plot(v, [holding_force(rov, axis, x) for x in v.tolist()], color=LIGHT["blue"], label="model")
     other = results.against.rov if results.against and results.against.layout.has(axis) else None
     if other and (scale := other[axis.coefficient("alpha")]):
         scaled = [holding_force(other, axis, x) * alpha / scale for x in v.tolist()]
@@ -42,7 +50,9 @@ def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> No
     _finish(above, below, title, f"velocity ({axis.unit})", f"residual ({load})")
 
 
-def _quadratic(figure: Figure, fit: QuadraticFit, scale: float, color: str, label: str) -> tuple[Axes, Axes, Array]:
+def _fitted(
+    figure: Figure, fit: ThrustFit | QuadraticFit, scale: float, color: str, label: str
+) -> tuple[Axes, Axes, Array]:
     """Both parts of the plot of a fit, and over which numbers it is drawn."""
     above, below = _two(figure)
     x = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
@@ -68,6 +78,9 @@ def plot_response(
         low, high = fit.band(c)[2 * which :][:2]
         _band(above, 100.0 * c, np.maximum(low, 0.0), high, "blue")
     above.plot(100.0 * c, curve, color=LIGHT["blue"], label="model")
+    reverse = responses(axis, results.vehicle.rov, -c)[:, which] * (1.0 if which else -1.0)
+    if any(p.command < 0.0 for p in points) and not np.allclose(reverse, curve, rtol=0.01):
+        above.plot(100.0 * c, reverse, "-.", color=LIGHT["blue"], linewidth=1.0, label="model, negative commands")
     if results.against and results.against.layout.has(axis):
         other = responses(axis, results.against.rov, c)[:, which]
         above.plot(100.0 * c, other, "--", color=LIGHT["grey"], label="compared")
@@ -76,8 +89,12 @@ def plot_response(
     if comparison and below:
         x, y = 100.0 * np.array(at), np.array([abs(p.value) for p in points])
         counts = np.array([p.weight > 0.0 for p in points])
+        errors = _REACH * np.array([p.error or 0.0 for p in points])
+        _bars(above, x, y, errors)
         _dots(above, x, y, counts, label="measured")
-        _dots(below, x, 100.0 * (np.abs(comparison.model) / y - 1.0), counts)
+        off = np.abs(comparison.model) / y
+        _bars(below, x, 100.0 * (off - 1.0), 100.0 * off * errors / y)
+        _dots(below, x, 100.0 * (off - 1.0), counts)
         _diamonds(below, x, 100.0 * (np.abs(comparison.leave_one_out) / y - 1.0))
     title = "$Tau$ (s)" if quantity == "Tau" else rf"$V_{{ss}}$ ({axis.unit})"
     _finish(above, below, title, "command (%)", "error (%)")
@@ -96,28 +113,38 @@ def plot_steps(figure: Figure, results: Identification, result: AxisResult) -> N
     ax.set_title(f"Steps: ${result.axis.velocity}$ ({result.axis.unit})", loc="left")
 
 
-def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -> None:
-    """Velocity of a recording and of the model, and below the residuals of the measured samples."""
-    recording, axis = simulation.recording, result.axis
-    above, below = _two(figure, (2.2, 1.0))
-    for hold in (step for step in result.steps if step.file == recording.file):
-        above.axvspan(hold.start, hold.end, facecolor=LIGHT["band"], edgecolor=LIGHT["page"], zorder=0)
-        above.text(
-            0.5 * (hold.start + hold.end), 1.0, f"{100.0 * hold.command:g} %".replace("-", "−"), fontsize=8.5,
-            transform=above.get_xaxis_transform(), ha="center", va="top", color=LIGHT["muted"],
-        )  # fmt: skip
-    time, v = velocity(simulation.time, without_spikes(simulation.measured), is_position=recording.is_position)
-    thin = slice(None, None, max(1, len(time) // (2 * _BINS)))
-    above.plot(time[thin], v[thin], color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label="measured")
-    thin = slice(None, None, max(1, len(simulation.time) // (2 * _BINS)))
-    above.plot(simulation.time[thin], simulation.velocity[thin], color=LIGHT["blue"], linewidth=1.2, label="model")
-    above.margins(y=0.18)
-    parts = np.array_split(np.arange(len(simulation.time)), min(_BINS, len(simulation.time)))
-    low, high = ([pick(simulation.residuals[part]) for part in parts] for pick in (np.min, np.max))
-    t = [simulation.time[part[0]] for part in parts]
-    below.fill_between(t, low, high, color=LIGHT["orange"], linewidth=0.6)
-    _finish(above, below, f"${axis.velocity}$ ({axis.unit})", "time (s)", f"residual ({recording.unit})")
-    above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
+def plot_known(figure: Figure, found: Sequence[Known]) -> None:
+    """The intervals of coefficients by their values, side by side; an arrow where one goes beyond the plot."""
+    ax: Axes = figure.subplots()
+    ends = [abs(log(max(end, 1.0 / _WIDEST))) for k in found for end in k.relative or ()]
+    reach = min(max([1.15 * end for end in ends], default=0.0), log(_WIDEST)) or log(_WIDEST)
+    for row, k in enumerate(found):
+        low, high = (log(max(end, 1e-9)) for end in k.relative or (0.0, 1e9))
+        color = LIGHT["blue"] if max(-low, high) <= reach else LIGHT["orange"]
+        dashes = (0, (1.0, 1.0)) if k.relative is None else "-"
+        ax.plot([max(low, -reach), min(high, reach)], [row, row], color=color, linewidth=6.0, alpha=0.4,
+                linestyle=dashes, solid_capstyle="butt", dash_capstyle="butt")  # fmt: skip
+        for is_beyond, at, arrow in ((-low > reach, -reach, "<"), (high > reach, reach, ">")):
+            if is_beyond:
+                ax.plot([at], [row], arrow, color=color, markersize=6.0, clip_on=False)
+        if k.relative:
+            ax.plot([0.0], [row], "o", color=color, markersize=4.5)
+    ax.axvline(0.0, color=LIGHT["muted"], linewidth=0.8, zorder=0)
+    ticks = [0.0, *_ticks(_TICKS, reach), *_ticks([-t for t in _TICKS if t < 1.0], reach)]
+    ax.set_xticks([log(1.0 + t) for t in ticks], [text(100.0 * t, "+g") + " %" if t else "value" for t in ticks])
+    ax.set_yticks(range(len(found)), [k.name for k in found])
+    ax.set(xlim=(-reach, reach), ylim=(len(found) - 0.4, -0.6))
+    ax.tick_params(axis="y", labelcolor=LIGHT["ink"])
+
+
+def _ticks(sizes: Sequence[float], reach: float) -> Iterator[float]:
+    """The outermost within reach, and one nearer to the middle."""
+    places = {size: abs(log(1.0 + size)) for size in sizes}
+    inside = [size for size in sizes if places[size] <= reach]
+    yield from inside[-1:]
+    yield from [size for size in inside if places[size] <= 0.55 * places[inside[-1]] and places[size] > 0.25 * reach][
+        -1:
+    ]
 
 
 def _band(ax: Axes, x: Array, low: Array, high: Array, color: str) -> None:
@@ -149,6 +176,12 @@ def _dots(ax: Axes, x: Array, y: Array, counts: Flags, label: str = "") -> None:
         if which.any():
             ax.plot(x[which], y[which], "o", color=LIGHT["orange"], markerfacecolor=face, markersize=4.5, zorder=5,
                     label=name or None)  # fmt: skip
+
+
+def _bars(ax: Axes, x: Array, y: Array, errors: Array) -> None:
+    """Intervals of points, where they are known."""
+    if (there := errors > 0.0).any():
+        ax.errorbar(x[there], y[there], errors[there], fmt="none", ecolor=LIGHT["orange"], elinewidth=1.1, capsize=2.0)
 
 
 def _diamonds(ax: Axes, x: Array, y: Array) -> None:

@@ -36,7 +36,7 @@ PAGES = [
     *sorted((ROOT / "examples").rglob("README.md")),
 ]
 PROGRAMS = ("rov-fmu ", "python build_fmu.py", "python -m ")
-HOLDS_COMMANDS = re.compile(r"(?:rov-fmu|fmpy|cat) ")
+HOLDS_COMMANDS = re.compile(r"(?:rov-fmu|fmpy|cat|mkdir|python -m examples\.(?:tank_tests|dive_log)) ")
 HERE_DOCUMENT = re.compile(r"(?<=<<END\n).*?^END$", re.MULTILINE | re.DOTALL)
 
 
@@ -161,7 +161,8 @@ def test_commands_run(page: Path, workplace: Path) -> None:
 
 
 def test_the_pages_with_commands_are_found() -> None:
-    wanted = {"README.md", *(f"docs/{page}.md" for page in ("identify", "importers", "model", "platforms"))}
+    pages = ("identify", "importers", "model", "platforms", "tutorial-dive-log", "tutorial-tank-tests")
+    wanted = {"README.md", *(f"docs/{page}.md" for page in pages)}
     assert wanted <= {name(page) for page in SHELL_PAGES}
 
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -127,6 +128,36 @@ def test_an_interrupted_command_says_so_and_leaves_nothing(
     assert process.returncode == 130
     assert said == "rov-fmu: interrupted, no file is half-written\n"
     assert not any(output.parent.iterdir())
+
+
+@pytest.mark.parametrize(
+    "moment", [b"heave", pytest.param(b"reading", marks=pytest.mark.long), pytest.param(b"dra", marks=pytest.mark.long)]
+)
+def test_an_identification_that_is_cancelled_as_it_works_loses_nothing(moment: bytes, tmp_path: Path) -> None:
+    target, report = tmp_path / "out" / "rov.toml", tmp_path / "out" / "report.html"
+    target.parent.mkdir()
+    target.write_bytes(OLD)
+    ours, theirs = os.openpty()
+    process = start(
+        ["identify", str(TESTS), "-o", str(target), "--report", str(report)],
+        environment={"TERM": "xterm", "NO_COLOR": "1"},
+        stdout=theirs,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    os.close(theirs)
+    told = b""
+    while moment not in told:
+        told += os.read(ours, 4096)  # of a terminal that is closed this fails
+    process.send_signal(signal.SIGINT)
+    with suppress(OSError):  # so Linux ends a terminal
+        while part := os.read(ours, 4096):
+            told += part
+    os.close(ours)
+    assert process.communicate(timeout=30)[1] == "rov-fmu: interrupted, no file is half-written\n"
+    assert process.returncode == 130
+    assert b"Coefficients" not in told
+    assert [path.name for path in target.parent.iterdir()] == [target.name]
+    assert target.read_bytes() == OLD
 
 
 @pytest.mark.parametrize("name", ["the vehicle", "the report", "the tuned vehicle", "the figures"])

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -117,9 +118,25 @@ _BUILD = ["build", str(BARE), "--platform=host", "-o"]
 
 @_posix
 def test_a_build_tells_its_progress_on_a_terminal(tmp_path: Path) -> None:
+    said = _on_a_terminal([*_BUILD, str(tmp_path / "x.fmu")])
+    assert b"compiling " in said
+    assert said.index(b"compiling ") < said.index(b"built in")
+    assert b"\x1b[2K" in said, "the lines of the progress are taken back"
+
+
+@_posix
+def test_an_identification_tells_its_progress_on_a_terminal() -> None:
+    said = _on_a_terminal(["identify", str(TESTS)])
+    before = said[: said.index(b"Coefficients")]
+    assert b"%" in before
+    assert b"heave" in before
+    assert b"\x1b[2K" in said, "the bar is taken back"
+
+
+def _on_a_terminal(arguments: Sequence[str]) -> bytes:
+    """What a command that succeeds prints there."""
     ours, theirs = os.openpty()
-    plain = {"TERM": "xterm", "NO_COLOR": "1"}
-    process = start([*_BUILD, str(tmp_path / "x.fmu")], environment=plain, stdout=theirs)
+    process = start(arguments, environment={"TERM": "xterm", "NO_COLOR": "1"}, stdout=theirs)
     os.close(theirs)
     said = b""
     while part := _read(ours):
@@ -127,9 +144,7 @@ def test_a_build_tells_its_progress_on_a_terminal(tmp_path: Path) -> None:
     os.close(ours)
     assert process.communicate(timeout=60)[1] == ""
     assert process.returncode == 0
-    assert b"compiling " in said
-    assert said.index(b"compiling ") < said.index(b"built in")
-    assert b"\x1b[2K" in said, "the lines of the progress are taken back"
+    return said
 
 
 def _read(terminal: int) -> bytes:

@@ -19,9 +19,11 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from rov_fmu.cli import main
 from rov_fmu.export.interface import UNITS, Variable, variables
 from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import TESTS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -126,6 +128,43 @@ def _row(v: Variable) -> list[str]:
     unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
     limits = ["" if value is None else number(value) for value in (v.start, v.minimum, v.maximum)]
     return [v.name, v.description, v.causality, v.variability, unit, *limits]
+
+
+# ---- The report of an identification ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    assert main(["identify", str(TESTS), "--report", str(path)]) == 0
+    return path
+
+
+@pytest.mark.parametrize("width", [375, 1280])
+def test_the_report_asks_for_nothing_and_fits(
+    report: Path, visit: Callable[..., Visit], tmp_path: Path, width: int
+) -> None:
+    seen = visit(width=width)
+    seen.page.goto(report.as_uri())
+    seen.page.screenshot(path=tmp_path / f"report-{width}.png", full_page=True)
+    assert seen.said == []
+    assert seen.asked == [report.as_uri()]
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+    tables = seen.page.evaluate("Array.from(document.querySelectorAll('#predicts ~ .wide'), t => t.scrollWidth)")
+    assert tables[0] <= width, "the first answer is not cut off"
+
+
+def test_folded_tables_of_the_report_are_open_on_paper(report: Path, visit: Callable[..., Visit]) -> None:
+    page = visit().page
+    page.goto(report.as_uri())
+    page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', "
+                  "'<details id=fold><summary>many</summary><p>rows</p></details>')")  # fmt: skip
+    rows = page.locator("#fold p")
+    assert not rows.is_visible()
+    page.emulate_media(media="print")
+    box = rows.bounding_box()
+    assert box is not None
+    assert box["height"] > 5
 
 
 # ---- FMPy's web app --------------------------------------------------------------------------------------------------

@@ -15,14 +15,19 @@ from rov_fmu.cli import main
 from rov_fmu.files.output import write_whole
 from rov_fmu.identify.identification import Identification, compare
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.next_test import NextTest
+from rov_fmu.identify.recordings_fit import Effect
 from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW
 from rov_fmu.motion.rov import Rov
+from rov_fmu.pages.console_results import print_identification
 from rov_fmu.pages.report import report_output, report_page
+from rov_fmu.pages.templates import number
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT, TESTS
+from tests.folders import DOWN, SPEED, pulled, read
 from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
 from tests.pages.test_fmu_page import check_refers_to_itself_alone
 from tests.recordings import PLANS, clean, write_log
@@ -64,6 +69,12 @@ def pages(of_tables: Identification, of_recordings: Identification) -> Mapping[i
 @pytest.fixture
 def page(results: Identification, pages: Mapping[int, str]) -> str:
     return pages[id(results)]
+
+
+@pytest.fixture
+def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing takes most of the time, and words do not need it."""
+    monkeypatch.setattr("rov_fmu.pages.report.inline_svg", lambda *_: "")
 
 
 def text_of(page: str) -> str:
@@ -154,6 +165,131 @@ def test_recordings_are_drawn_and_their_holds_listed(of_recordings: Identificati
     assert ["80 %", "weight 0"] in [[row[0], row[-1]] for row in rows(page) if len(row) == 6]
 
 
+# ---- Three questions first ------------------------------------------------------------------------------------------
+
+
+def sections(page: str) -> list[str]:
+    return [h2.get("id") for h2 in html.fromstring(page).iter("h2")]
+
+
+def test_three_questions_come_first(page: str) -> None:
+    assert sections(page)[:4] == ["predicts", "known", "next", "warnings"]
+
+
+def test_recordings_are_predicted_in_percent_of_the_velocity_over_time(
+    of_recordings: Identification, pages: Mapping[int, str]
+) -> None:
+    table = rows(pages[id(of_recordings)])
+    for result in of_recordings.axes:
+        assert result.held_out
+        p = np.concatenate([[p.measured, p.predicted] for p in result.held_out.predictions], axis=1)
+        fit = 1.0 - np.sqrt(np.mean((p[0] - p[1]) ** 2)) / np.std(p[0])
+        assert 0.5 < fit < 1.0
+        name, halves = result.axis.name.capitalize(), f"halves of log_{result.axis.name}_a&b $1.csv, each by a fit to"
+        assert [row[2] for row in table if row[0] == name and row[1].startswith(halves)] == [f"{100.0 * fit:.1f} %"]
+
+
+def test_points_are_predicted_by_fits_without_their_thrust(of_tables: Identification, pages: Mapping[int, str]) -> None:
+    table = rows(pages[id(of_tables)])
+    for words, error in (("Vss of 6 points", "9.7 %"), ("Tau of 4 points", "17.0 %")):
+        assert [row for row in table if row[1:2] == [f"{words}, each by a fit without its thrust"] and row[-1] == error]
+
+
+def test_what_was_sought_is_known_in_a_plot_and_a_table(results: Identification, page: str) -> None:
+    table = {row[0]: row for row in reversed(rows(page)) if len(row) in (4, 5)}
+    for name in (name for result in results.axes if result.estimate for name in result.estimate.names):
+        low, high = results.vehicle.intervals[name]
+        numbers = number(results.vehicle.rov[name], 4), number(low, 3), number(high, 3)
+        assert tuple(table[name][1:4]) == numbers
+    (plot,) = [svg for svg in html.fromstring(page).iter("svg") if svg.get("aria-label") == "What is known"]
+    labels = {text.text_content() for text in plot.iter("text")}
+    assert {"a_d_u", "b_d_w", "beta_r"} <= labels
+    assert not [label for label in labels if label.startswith(("alpha", "m_rov"))], "what is given, or by convention"
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_the_next_test_is_told_the_worst_axis_first(of_tables: Identification) -> None:
+    def test_of(n: int, interval: tuple[float, float] | None, width: float) -> NextTest:
+        return NextTest(
+            of_tables.axes[n].axis, PAPER.axes[n].axis.coefficient("a_d"), interval, width, 0.4, f"do {n} < 3"
+        )
+
+    tests = [test_of(0, (0.9, 1.1), 0.1), test_of(1, None, np.inf), test_of(2, (0.1, 0.3), 0.5)]
+    axes = tuple(replace(result, next_test=test) for result, test in zip(of_tables.axes, tests, strict=True))
+    (listed,) = html.fromstring(report_page(replace(of_tables, axes=axes))).iter("ol")
+    items = [" ".join(item.text_content().split()) for item in listed.iter("li")]
+    assert [item.split(":")[0] for item in items] == ["Heave", "Yaw", "Surge"]
+    assert items[0] == "Heave: do 1 < 3. It makes a_d_w identifiable, which the data do not tell yet."
+    assert items[1].endswith("would have an interval of 40 % of that width.")
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_what_else_acts_is_told_kept_or_not(of_recordings: Identification) -> None:
+    heave = of_recordings.axes[1]
+    assert heave.recordings
+    file = heave.recordings.simulations[0].recording.file
+    acts = (
+        Effect("load", "heave", "N", -0.25, (-0.3, -0.2), kept=True),
+        Effect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),
+        Effect("delay", file, "s", 0.001, None, kept=False),
+    )
+    axes = (of_recordings.axes[0], replace(heave, recordings=replace(heave.recordings, effects=acts)))
+    page = report_page(replace(of_recordings, axes=axes))
+    assert ["Constant load", "heave", "−0.25", "−0.3", "−0.2", "N", "kept"] in rows(page)
+    assert ["Delay from the commands to the motion", file, "0.001", "–", "–", "s", "left at 0"] in rows(page)
+    assert "The fitted delay of 0.21 s is shaded." in text_of(page)
+    folded = [fold.text_content() for fold in html.fromstring(page).iter("details")]
+    assert any("Sought in single recordings too, and left at zero: 1" in fold and file in fold for fold in folded)
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_long_tables_are_folded_without_a_script(of_recordings: Identification) -> None:
+    surge = of_recordings.axes[0]
+    many = replace(of_recordings, axes=(replace(surge, steps=surge.steps[:1] * 201),))
+    root = html.fromstring(report_page(many))
+    (fold,) = [fold for fold in root.iter("details") if fold.find("summary").text == "Held commands: 201 rows"]
+    assert len(list(fold.iter("tr"))) == 202
+    assert not [fold for fold in root.iter("details") if fold.get("open") is not None]
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_the_report_of_another_vehicle_speaks_of_it_alone(tmp_path: Path) -> None:
+    tables = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
+    results = identify(read(tmp_path / "mine", DOWN, tables))
+    page = report_page(results)
+    assert sections(page)[-3:] == ["thrust", "heave", "inputs"]
+    assert not re.search(r"videoray|rear|top thruster|surge|yaw", text_of(page), re.IGNORECASE)
+
+
+# ---- The same in the terminal ----------------------------------------------------------------------------------------
+
+
+def test_the_printout_is_short_and_says_the_same(
+    of_recordings: Identification, capsys: pytest.CaptureFixture[str]
+) -> None:
+    surge, heave, yaw = of_recordings.axes
+    assert heave.recordings
+    acts = (Effect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),)
+    heave = replace(
+        heave,
+        recordings=replace(heave.recordings, effects=acts),
+        next_test=NextTest(HEAVE, "a_d_w", (10.0, 20.0), 0.5, 0.25, "a dive"),
+        steps=heave.steps[:1] * 30,
+    )
+    print_identification(replace(of_recordings, axes=(surge, heave, yaw)))
+    out = capsys.readouterr().out
+    words = [" ".join(line.split()) for line in out.splitlines()]
+    assert heave.held_out
+    assert f"heave {heave.held_out.fit:.1f}% halves of log_heave_a&b $1.csv, each by a fit to the other" in words
+    assert "heave 0.21 0.2 0.22 s delay from the commands to the motion" in words
+    assert "- heave: a dive (a_d_w, now 10 ... 20; then 75% narrower)" in words
+    assert "and 10 more: --report lists them all" in words
+    order = [out.index(part) for part in ("Prediction of", "Coefficients", "What else acts", "To measure next", "held")]
+    assert order == sorted(order)
+
+
+# ---- Any data -------------------------------------------------------------------------------------------------------
+
 CASES: Mapping[str, Tables] = {
     "no more than a fit needs": {"steady_yaw": [(0.3, 1.5), (0.6, 3.1)], "thrust_top": TOP[1:3]},
     "one thrust": {"steady_heave": [(0.3, 0.163)]},
@@ -173,6 +309,7 @@ def test_any_data(case: str, tmp_path: Path) -> None:
     assert "inf" not in re.findall(r"[a-z]+", text)
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_text_of_the_files_is_escaped(of_tables: Identification) -> None:
     odd = replace(of_tables, vehicle=replace(of_tables.vehicle, name='<script>$1</script> & "Söhne"'))
     root = html.fromstring(report_page(odd))
@@ -183,6 +320,7 @@ def test_text_of_the_files_is_escaped(of_tables: Identification) -> None:
 # ---- The file, and the FMU -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_nothing_is_left_half_written(
     of_tables: Identification, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -272,7 +410,7 @@ def test_figures_of_the_paper_are_those_that_ship(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == [made.name, "videoray.svg"]
     text = made.read_text(encoding="utf-8")
     shown = re.findall(r"<text[^>]*>([^<]*)</text>", text)
-    for number in ("5", "6", "7", "8", "9", "11a", "11b"):
-        assert any(words.startswith(f"Figure {number}: ") for words in shown), number
+    for figure in ("5", "6", "7", "8", "9", "11a", "11b"):
+        assert any(words.startswith(f"Figure {figure}: ") for words in shown), figure
     shipped = (ROOT / "docs" / made.name).read_text(encoding="utf-8")
     assert re.findall(r"<text[^>]*>([^<]*)</text>", shipped) == shown
