@@ -11,6 +11,7 @@ from rov_fmu.identify.least_squares import Array, Estimate
 from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.identify.thrust_fit import ThrustFit
+from rov_fmu.identify.usable import is_pushed
 from rov_fmu.motion.layout import REVERSE
 from rov_fmu.motion.rov import Rov
 
@@ -39,6 +40,11 @@ def on_axis(result: AxisResult, base: Rov, thrust: Mapping[str, ThrustFit]) -> I
         )
     if result.estimate:
         yield from _on_drag(result, result.estimate)
+    if still := sorted({p.command for p in result.points if not is_pushed(axis, base, p.command)}):
+        yield (
+            f"what moves at {listed(f'{c:.0%}' for c in still)} is left out: the thrust curve gives no push there "
+            f"(its dead band, or a slip in one of the tables)"
+        )
     steady = [p for p in result.points if p.quantity == "V_ss"]
     x, y = np.array([p.command for p in steady]), np.array([p.value for p in steady])
     fitted = result.recordings or result.response

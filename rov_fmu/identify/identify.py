@@ -31,7 +31,7 @@ from rov_fmu.identify.step_responses import StepResponse, steps
 from rov_fmu.identify.tank_tests import TankTests
 from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, measured
 from rov_fmu.identify.trajectory import MotionError
-from rov_fmu.identify.usable import check_push, check_recording, check_slips
+from rov_fmu.identify.usable import check_push, check_recording, check_slips, is_pushed
 from rov_fmu.motion.layout import Axis, Curve
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.schema import NOT_GIVEN
@@ -202,8 +202,9 @@ def _axis(
     found = tuple(step for recording in tests.recordings.get(axis.name, ()) for step in steps(recording))
     points = _points(tests, axis, [_in_time(step, fitted) for step in found])
     driving = {curve.name: thrust[curve.name] for curve in curves_of(base.layout, axis) if curve.name in thrust}
+    check_push(tests.folder, axis, base, [p.command for p in points if p.weight > 0.0])
+    points = tuple(p if is_pushed(axis, base, p.command) else replace(p, weight=0.0) for p in points)
     used = [p for p in points if p.weight > 0.0]
-    check_push(tests.folder, axis, base, [p.command for p in used])
     response = _response(axis, points, base, known, _thrust_of(fitted, driving))
     wanted = set(drag_and_beta(axis, known))
     if not fitted and not response and (missing := sorted(wanted - {axis.coefficient("beta")})):

@@ -34,7 +34,7 @@ from rov_fmu.motion.rov import Rov
 _BETAS = (0.03, 0.1, 0.3, 1.0, 3.0)  # to begin with
 _DELAYS = (0.0, 0.3)
 _STARTS = 3
-_BEYOND_DOUBT = 10.0  # standard errors: no recording has to be left out to see it
+_BEYOND_DOUBT = 100.0  # of Wald's statistic, each: nothing has to be left out to see it
 _GOOD = 1.5  # cost of a sample: white noise has 1.36, so there is nothing better to find
 _FEW = 200  # samples of a recording, to begin with
 _LONG = 100.0  # s of a recording, to begin with
@@ -94,11 +94,7 @@ class _Fit:
         noise = np.array([_at_least(white_noise(d.values), d) for d in self.data])
         for axis in self.axes:
             alone = replace(self, data=tuple(_glimpse(d) for d in self.data if d.axis is axis), thrust=None)
-            near, found = alone.near(
-                axis,
-                [e for e in extras if e.of == axis.name or e.is_current or e.kind in ("lag", "dead band")],
-                noise[[d.axis is axis for d in self.data]],
-            )
+            near, found = alone.near(axis, extras, noise[[d.axis is axis for d in self.data]])
             coefficients |= near
             values |= found
         model = replace(self, data=tuple(d.thinned() for d in self.data)).model(extras, noise, said=True)
@@ -127,25 +123,21 @@ class _Fit:
         tell nothing: motion one way is the same with more current, more load and less linear drag.
         """
         kept = analysis.model.extras
-        currents = [e for e in kept if e.kind == "current"]
-        if not currents:
-            return analysis
-        vague = [*currents, *(e for e in kept if e.kind == "load" or e.pairs())]
-        for dropped in (vague, [e for e in vague if e not in currents], currents):
-            if len(dropped) > 1:
+        currents = {e for e in kept if e.kind == "current"}
+        others = {e for e in kept if e.kind == "load" or e.pairs()} if currents else set()
+        each = np.log(max(analysis.degrees_of_freedom, 8.0))
+        for dropped in dict.fromkeys(map(frozenset, (currents | others, others, currents))):
+            if len(dropped) > 1 and analysis.significance(dropped) < _BEYOND_DOUBT * len(dropped):
                 without = tuple(e for e in kept if e not in dropped)
                 other = self.analysed(self.model(without, noise), analysis.x[analysis.model.places_of(without)])
-                if analysis.gain(other) < len(dropped) * np.log(max(analysis.degrees_of_freedom, 8.0)):
+                if analysis.gain(other) < each * len(dropped):
                     return other
         return analysis
 
     def voted(self, analysis: ResidualAnalysis) -> tuple[Extra, ...]:
         """The extras without those that differ by direction and do not help to predict a recording by the others."""
         kept = analysis.model.extras
-        spread = np.sqrt(np.diag(analysis.covariance()))[len(analysis.model.names) :]
-        values = analysis.model.extra_values(analysis.x).items()
-        beyond = [abs(v - e.neutral) > _BEYOND_DOUBT * error for (e, v), error in zip(values, spread, strict=False)]
-        for extra in (e for e, is_sure in zip(kept, beyond, strict=True) if e.pairs() and not is_sure):
+        for extra in (e for e in kept if e.pairs() and analysis.significance({e}) < _BEYOND_DOUBT):
             without = tuple(e for e in kept if e != extra)
             errors = [
                 sum(p.error for axis in self.axes for p in self.held_out(axis, analysis, some).predictions)
@@ -172,12 +164,14 @@ class _Fit:
         return hold_out(model, np.concatenate([x[: model.shared], *initial]))
 
     def near(self, axis: Axis, extras: Sequence[Extra], noise: Array) -> tuple[dict[str, float], dict[Extra, float]]:
-        """Coefficients of one axis and its extras, thrust as it is, from many starts."""
+        """Coefficients of one axis and the extras that act on it, thrust as it is, from many starts."""
+        own = {axis.name, *(curve.name for curve in curves_of(self.base.layout, axis))}
         concerned = tuple(
-            e for e in extras if e.kind in ("lag", "dead band") or any(e.concerns(d.recording) for d in self.data)
-        )
-        if axis is YAW:  # what flows is felt along the surface
-            concerned = tuple(e for e in concerned if not e.is_current)
+            e for e in extras
+            if e.of in own
+            # what flows is felt along the surface
+            or (e.is_current and axis is not YAW and any(e.concerns(d.recording) for d in self.data))
+        )  # fmt: skip
         model = self.model(concerned, noise, said=True)
         delay = Extra("delay", axis.name)
         begin = {e: _begin(e) for e in concerned}

@@ -21,12 +21,17 @@ _LEAST_PUSH = 1e-6
 """N or N m, less than moves any vehicle: what is fitted to it would overflow."""
 
 
+def is_pushed(axis: Axis, base: Rov, command: float) -> bool:
+    """Whether the thrusters push the vehicle where the command tells it to go."""
+    return float(np.sign(command)) * base.force(axis, command) >= _LEAST_PUSH
+
+
 def check_push(folder: Path, axis: Axis, base: Rov, commands: Sequence[float]) -> None:
     """Where the vehicle moves, its thrusters must push it there, at one command at least. Raises DataFileError."""
-    forces, names = [base.force(axis, c) for c in commands], listed(c.name for c in curves_of(base.layout, axis))
-    if commands and all(np.sign(c) * force < _LEAST_PUSH for force, c in zip(forces, commands, strict=True)):
+    if commands and not any(is_pushed(axis, base, c) for c in commands):
+        names = listed(c.name for c in curves_of(base.layout, axis))
         raise DataFileError(
-            f"{folder}: the thrust curve of {names} gives {forces[0]:.3g} {axis.load} at a command "
+            f"{folder}: the thrust curve of {names} gives {base.force(axis, commands[0]):.3g} {axis.load} at a command "
             f"of {commands[0]:.0%}, where {axis.name} needs a push that way"
         )
 

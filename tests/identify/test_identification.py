@@ -182,7 +182,7 @@ def test_thrust_that_is_uncertain_makes_drag_uncertain(k: Rov) -> None:
 
 
 def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
-    """Three days, three payloads: drag, which the fit takes as one, is not; its interval says so, and a warning does."""
+    """Three days, three payloads: drag, which the fit takes as one, is not; its interval and a warning say so."""
     write_rov(tmp_path)
     k, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(1)
     rows = [(c, k.force(HEAVE, c)) for c in (0.1, 0.3, 0.5, 0.7)]
@@ -329,6 +329,13 @@ WORDS: dict[str, tuple[Tables, str]] = {
     "weak reverse thrust": ({"thrust_rear": [*FORCES, (-0.5, -8.0)]}, "rear thrust: force differs by -34%"),
     "slow upward": ({"steady_heave": [*STEADY["heave"], (-0.5, -0.25)]}, "heave: V_ss differs by -11%"),
     "thrust not tested": ({"thrust_top": TOP[:3]}, "but top thrust was tested from 10% to 50% only"),
+    "motion in the dead band": (
+        {
+            "thrust_top": [(0.1, 0.0), (0.2, 0.0), (0.3, 0.42), (0.4, 0.98), (0.5, 1.62), (0.6, 2.37), (0.7, 3.2)],
+            "steady_heave": [(0.1, 0.08), *STEADY["heave"]],
+        },
+        "heave: what moves at 10% is left out",
+    ),
     "two thrusts": ({"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]}, "2 points for two"),
 }
 

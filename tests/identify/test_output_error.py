@@ -151,6 +151,15 @@ def test_gaps_an_uneven_clock_and_a_start_in_motion(k: Rov) -> None:
     assert len(fit.simulations[0].time) == 3000 - np.isnan(values).sum()
 
 
+def test_a_first_stamp_long_before_the_others(k: Rov) -> None:
+    """Halves to predict from one another have as many samples, whatever their time."""
+    recording = clean(k, HEAVE, PLANS["heave"][0], 10.0).noisy(np.random.default_rng(2))
+    early = np.concatenate([[-900.0], recording.time[1:]])
+    fit = only([replace(recording, time=early)], unknowing(k, HEAVE))
+    assert fit.held_out.by_halves
+    assert [len(p.time) > 100 for p in fit.held_out.predictions] == [True, True]
+
+
 def test_command_that_never_rests(k: Rov) -> None:
     """A joystick: another command at every sample."""
     rate, time = 50.0, np.arange(2000) / 50.0

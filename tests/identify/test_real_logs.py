@@ -173,6 +173,16 @@ def test_intervals_cover_the_truth_along_the_other_axes(name: str) -> None:
     assert (np.abs(found.off.mean(axis=0)) < SCENARIOS[name].bias).all(), str(found)
 
 
+@pytest.mark.parametrize("name", ["one current", "another current each time"])
+def test_the_current_is_found(name: str) -> None:
+    """In each recording by itself; it is told from loads and from what differs by direction."""
+    (fit,) = fitted(name, 0)
+    found = {effect.of: effect for effect in fit.effects if effect.kept}
+    assert {effect.kind for effect in found.values()} == {"current"}
+    for n, current in enumerate(SCENARIOS[name].currents):
+        assert found[f"log_{n}.csv"].value == pytest.approx(current, abs=0.002)
+
+
 # ---- Prediction ------------------------------------------------------------------------------------------------------
 
 PULSES: Plan = ((0.0, 2.0), (0.55, 2.5), (0.0, 2.5), (-0.35, 3.0), (0.45, 2.0), (-0.65, 1.5), (0.25, 4.0), (0.0, 4.0))
