@@ -6,16 +6,17 @@ import platform
 import signal
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Lock, current_thread, main_thread
+from threading import Lock
 
 from fat_macho import FatWriter
 
+from rov_fmu.files.interrupts import held_interrupts
 from rov_fmu.files.places import FMU_SRC
 
 C_SOURCES = FMU_SRC / "c"
@@ -101,7 +102,7 @@ def compile_all(
     ended: SimpleQueue[Future[bytes] | None] = SimpleQueue()
     try:
         with (
-            _interrupts_to(lambda: ended.put(None)),
+            held_interrupts(lambda: ended.put(None)),
             ThreadPoolExecutor(os.cpu_count()) as pool,
             _Compilers() as compilers,
         ):
@@ -116,28 +117,6 @@ def compile_all(
             return {name: job.result() for job, name in jobs.items()}
     except OSError as error:
         raise BuildError(f"cannot compile: {error.strerror or error}") from error
-
-
-@contextmanager
-def _interrupts_to(tell: Callable[[], None]) -> Iterator[None]:
-    """Tell of interrupts, and raise at the end: raised at any moment, one could leave a lock of the threads locked."""
-    came: list[int] = []
-
-    def interrupted(number: int, _: object) -> None:
-        came.append(number)
-        tell()
-
-    here = current_thread() is main_thread()
-    taken = [s for s in (signal.SIGINT, signal.SIGTERM) if here and signal.getsignal(s) is signal.default_int_handler]
-    try:
-        for number in taken:
-            signal.signal(number, interrupted)
-        yield
-    finally:
-        for number in taken:
-            signal.signal(number, signal.default_int_handler)
-        if came:
-            raise KeyboardInterrupt
 
 
 class _Compilers:

@@ -8,6 +8,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from rov_fmu.files.interrupts import held_interrupts
+
 
 class WriteError(OSError):
     """A path that cannot be written."""
@@ -52,9 +54,10 @@ def write_whole(*outputs: Output) -> None:
     check_targets(output.path for output in outputs)
     with ExitStack() as drafts:
         ready = [(output.path, _draft(output, drafts)) for output in outputs]
-        for path, draft in ready:
-            with _errors_about(path):
-                draft.replace(path)
+        with held_interrupts():
+            for path, draft in ready:
+                with _errors_about(path):
+                    draft.replace(path)
 
 
 def _draft(output: Output, drafts: ExitStack) -> Path:

@@ -9,13 +9,17 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.export.archive import native_content
+from rov_fmu.files.output import Output, write_whole
+from rov_fmu.motion.layout import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE, BARE, COMMANDS, TESTS, start
+from tests.recordings import PLANS, clean, write_log
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
 OLD = b"the old one"
@@ -137,9 +141,13 @@ def test_an_identification_that_is_cancelled_as_it_works_loses_nothing(moment: b
     target, report = tmp_path / "out" / "rov.toml", tmp_path / "out" / "report.html"
     target.parent.mkdir()
     target.write_bytes(OLD)
+    folder = Path(shutil.copytree(TESTS, tmp_path / "tests"))
+    rov, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(0)
+    for n, plan in enumerate(PLANS["heave"]):  # so that it works for long enough
+        write_log(folder, str(n), clean(rov, HEAVE, plan).noisy(random))
     ours, theirs = os.openpty()
     process = start(
-        ["identify", str(TESTS), "-o", str(target), "--report", str(report)],
+        ["identify", str(folder), "-o", str(target), "--report", str(report)],
         environment={"TERM": "xterm", "NO_COLOR": "1"},
         stdout=theirs,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
@@ -172,6 +180,19 @@ def test_an_interrupt_before_the_last_move_leaves_nothing(
     assert command.run(tmp_path / command.name) == 130
     assert capsys.readouterr() == ("", "rov-fmu: interrupted, no file is half-written\n")
     assert not any(tmp_path.iterdir())
+
+
+def test_an_interrupt_between_two_moves_waits_for_the_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(self: Path, target: Path) -> Path:
+        os.kill(os.getpid(), signal.SIGINT)
+        self.rename(target)
+        return target
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    outputs = [Output(tmp_path / name, b"new") for name in ("rov.toml", "report.html")]
+    with pytest.raises(KeyboardInterrupt):
+        write_whole(*outputs)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "rov.toml"]
 
 
 def test_a_vehicle_out_of_a_pipe_is_refused_where_it_must_be_read_twice(
