@@ -158,8 +158,8 @@ def _print_built(built: "Built", seconds: float) -> None:
 def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
     """Identify a vehicle from FOLDER of tank tests: rov.toml and thrust_, steady_, ... .csv."""
     from rov_fmu.identify.identify import identify
-    from rov_fmu.identify.tank_tests import load_tank_tests
     from rov_fmu.pages.console_results import print_identification
+    from rov_fmu.tank.tank_tests import load_tank_tests
     from rov_fmu.vehicle.writer import vehicle_output
 
     with _bar() as done:

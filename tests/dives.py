@@ -6,10 +6,10 @@ from math import radians
 import numpy as np
 
 from checks.pool import Array, swim
-from rov_fmu.identify.recording import Recording
-from rov_fmu.identify.signals import Commands, Signal, recordings_of
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.signals import Commands, Signal, recordings_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from rov_fmu.identify.given import ROV_FILE
-from rov_fmu.identify.tank_tests import TankTests, load_tank_tests
 from rov_fmu.motion.layout import YAW, Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.given import ROV_FILE
+from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 
 HEAD = """
 [vehicle]

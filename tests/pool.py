@@ -8,9 +8,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from checks.pool import Array, swim
-from rov_fmu.identify.recording import Recording
 from rov_fmu.motion.layout import AXIS, CURVE, Axis, coefficient_name
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.recording import Recording
 
 Plan = Sequence[tuple[float, float]]
 """Commands and how long each is held, s."""

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.recording import Recording
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
 
 NOISE = {"heave": 0.005, "yaw": radians(0.5), "surge": 0.02}
 """Depth in m, heading in rad, velocity (a camera's) in m/s."""

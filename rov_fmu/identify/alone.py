@@ -13,10 +13,10 @@ from math import inf, sqrt
 import numpy as np
 from scipy.signal import lfilter
 
-from rov_fmu.identify.least_squares import Array
 from rov_fmu.identify.runs import PreparedRecording, push
 from rov_fmu.identify.step_responses import correlation_time
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
 
 _DELAYS = (0.0, 0.1, 0.2, 0.4, 0.8)  # s, from the commands to the motion
 _RATES = np.geomspace(0.03, 20.0, 27)  # 1/s

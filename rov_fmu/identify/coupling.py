@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.recording import Recording
 from rov_fmu.motion.layout import SURGE, SWAY, YAW, Axis, Layout
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
 
 Current = tuple[float, float]
 """Of the water, north and east, m/s."""

@@ -7,13 +7,14 @@ import numpy as np
 from rov_fmu.files.toml_file import listed
 from rov_fmu.identify.coupling import is_coupled, is_told
 from rov_fmu.identify.identification import AxisResult
-from rov_fmu.identify.least_squares import Array, Estimate
+from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.identify.thrust_fit import ThrustFit
 from rov_fmu.identify.usable import is_pushed
 from rov_fmu.motion.layout import REVERSE
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
 
 
 def on_thrust(thruster: str, fit: ThrustFit) -> Iterator[str]:

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.runs import PreparedRecording
 from rov_fmu.identify.simulator import Simulator, solve
-from rov_fmu.identify.step_responses import velocity, without_spikes
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.smoothing import velocity, without_spikes
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,17 +23,17 @@ from rov_fmu.identify.limits import NoFitError
 from rov_fmu.identify.next_test import NOISE, NextTest, Sensor, next_test
 from rov_fmu.identify.output_error import fit_recordings
 from rov_fmu.identify.quadratic_fit import fit_quadratic
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.recordings_fit import RecordingsFit, count
 from rov_fmu.identify.response_fit import ResponseFit, fit_response
 from rov_fmu.identify.slips import beta_out_of_range
 from rov_fmu.identify.step_responses import StepResponse, steps
-from rov_fmu.identify.tank_tests import TankTests
 from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, measured
 from rov_fmu.identify.trajectory import MotionError
 from rov_fmu.identify.usable import check_push, check_recording, check_slips, is_pushed
 from rov_fmu.motion.layout import Axis, Curve
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.tank_tests import TankTests
 from rov_fmu.vehicle.schema import NOT_GIVEN
 from rov_fmu.vehicle.sense import no_thrust
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle

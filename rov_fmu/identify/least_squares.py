@@ -9,14 +9,12 @@ from math import exp, isfinite, log, nan, sqrt
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from rov_fmu.motion.layout import AXIS, CURVE, TUNING, Kind
+from rov_fmu.tank.arrays import Array, Flags
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Loss = Literal["huber", "linear"]
 LEVEL = 0.95
 _RANK = 1e-6  # singular values below this fraction of the largest belong to what is not identifiable

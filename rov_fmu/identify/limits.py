@@ -6,11 +6,12 @@ from math import exp, log
 import numpy as np
 
 from rov_fmu.identify.extras import Extra
-from rov_fmu.identify.least_squares import Array, bounds
-from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.least_squares import bounds
 from rov_fmu.identify.runs import PreparedRecording, axes_of
 from rov_fmu.motion.layout import REVERSE, Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
 
 _LEAST_BETA = 1e-3
 _LOAD = 1.5  # of the strongest thrust: against more no vehicle is driven

@@ -18,18 +18,19 @@ from rov_fmu.identify.coupling import EAST, NORTH, is_in_flow
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.extras import Extra
 from rov_fmu.identify.held_out import HeldOut, hold_out
-from rov_fmu.identify.least_squares import Array, Estimate, Loss, external
+from rov_fmu.identify.least_squares import Estimate, Loss, external
 from rov_fmu.identify.limits import refuse_nonsense
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.recordings_fit import Effect, RecordingsFit, effects_of, estimate_of
 from rov_fmu.identify.residual_analysis import ResidualAnalysis
 from rov_fmu.identify.runs import PreparedRecording, axes_of, prepare
 from rov_fmu.identify.selection import candidates, earn_their_place, likely
 from rov_fmu.identify.simulator import Simulator, solve
-from rov_fmu.identify.step_responses import robust_deviation, white_noise
 from rov_fmu.identify.trajectory import MotionError
 from rov_fmu.motion.layout import YAW, Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.smoothing import robust_deviation, white_noise
 
 _BETAS = (0.03, 0.1, 0.3, 1.0, 3.0)  # to begin with
 _DELAYS = (0.0, 0.3)

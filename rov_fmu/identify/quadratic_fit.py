@@ -6,7 +6,8 @@ from math import nan
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from rov_fmu.identify.least_squares import Array, Estimate, Flags, Solution, bounds, estimate_alike, leave_one_out, rms
+from rov_fmu.identify.least_squares import Estimate, Solution, bounds, estimate_alike, leave_one_out, rms
+from rov_fmu.tank.arrays import Array, Flags
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,12 @@ import numpy as np
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.extras import Extra, Kind
 from rov_fmu.identify.held_out import HeldOut
-from rov_fmu.identify.least_squares import Array, Estimate, is_factor, quantile
+from rov_fmu.identify.least_squares import Estimate, is_factor, quantile
 from rov_fmu.identify.residual_analysis import ResidualAnalysis, Simulation
 from rov_fmu.identify.response_fit import response_band
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
 
 _DISAGREEMENT = 3.0
 """Times a standard error: three recordings of what the model has differ by more once in 10,000 cases."""

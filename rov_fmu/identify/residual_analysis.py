@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rov_fmu.identify.extras import Extra
-from rov_fmu.identify.least_squares import Array, Solution, covariance
-from rov_fmu.identify.recording import Recording
+from rov_fmu.identify.least_squares import Solution, covariance
 from rov_fmu.identify.simulator import HUBER, Simulator
-from rov_fmu.identify.step_responses import correlation_time, robust_deviation
+from rov_fmu.identify.step_responses import correlation_time
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.smoothing import robust_deviation
 
 
 @dataclass(frozen=True, eq=False)

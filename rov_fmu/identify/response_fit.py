@@ -9,19 +9,10 @@ import numpy as np
 
 from rov_fmu.identify.choice import MARGIN, Choice, aicc
 from rov_fmu.identify.drag_forms import LEFT_OUT, DragForm, Point, candidate_forms, level
-from rov_fmu.identify.least_squares import (
-    Array,
-    Estimate,
-    Flags,
-    Solution,
-    estimate_alike,
-    external,
-    fit_named,
-    leave_one_out,
-    rms,
-)
+from rov_fmu.identify.least_squares import Estimate, Solution, estimate_alike, external, fit_named, leave_one_out, rms
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array, Flags
 
 _DIGITS = 1e-5
 """Of a relative error: nothing is measured to more digits."""

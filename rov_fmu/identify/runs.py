@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from rov_fmu.identify.coupling import Coupling, Current, carried, coupling
 from rov_fmu.identify.driving import curves_of
-from rov_fmu.identify.least_squares import Array, Flags
-from rov_fmu.identify.recording import Recording
-from rov_fmu.identify.step_responses import velocity, without_spikes
 from rov_fmu.identify.trajectory import REACH, ROUGH, Steps, recursion
 from rov_fmu.motion.layout import REVERSE, Axis, Curve, VehicleAxis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.smoothing import velocity, without_spikes
 
 _MOST_PARTS = 64  # of an interval between two samples
 _FEW = 500  # samples of a recording that is thinned

@@ -8,11 +8,12 @@ import numpy as np
 from rov_fmu.identify.coupling import EAST, NORTH, is_in_flow
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.extras import Extra, Kind
-from rov_fmu.identify.least_squares import Array, covariance
+from rov_fmu.identify.least_squares import covariance
 from rov_fmu.identify.residual_analysis import ResidualAnalysis
 from rov_fmu.identify.runs import PreparedRecording, axes_of
 from rov_fmu.motion.layout import AXES, REVERSE, SURGE, SWAY, Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
 
 _SIGNIFICANT = 6.63
 """What a load, a delay, a current or a lag must lower the sum of squares by, in variances: chance does in 1 % of cases.

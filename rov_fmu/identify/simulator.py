@@ -9,13 +9,14 @@ import numpy as np
 
 from rov_fmu.identify.coupling import EAST, NORTH, Current
 from rov_fmu.identify.extras import Extra, with_extras
-from rov_fmu.identify.least_squares import Array, Estimate, Loss, Solution, external, internal, minimize
+from rov_fmu.identify.least_squares import Estimate, Loss, Solution, external, internal, minimize
 from rov_fmu.identify.limits import limits
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.runs import ForcedRun, PreparedRecording, at_samples, forced_run, joined, steps_of
 from rov_fmu.identify.sensitivity import Sensitivity
 from rov_fmu.identify.trajectory import REACH, Motion, MotionError, motion
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
 
 HUBER = 2.5
 """Residuals beyond so many standard deviations count by their size, not its square."""

@@ -13,10 +13,10 @@ from scipy.optimize import nnls
 
 from rov_fmu.identify.alone import Alone, alone
 from rov_fmu.identify.explanation import CERTAIN, FASTEST, LIKELY, Evidence, Explanation, Files, contradict
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.runs import prepare
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.recording import Recording
 
 Tables = Mapping[str, Sequence[tuple[float, float]]]
 """Rows by file: command and a number."""

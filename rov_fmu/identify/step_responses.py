@@ -1,33 +1,27 @@
 """From recordings to V_ss and Tau, sections 4.1-4.3: smooth, differentiate, find the steady state, apply (17).
 
-Velocity comes from SciPy's filters: a local cubic (Savitzky-Golay) or the paper's moving average. V_ss itself is read
-off the raw samples, as the slope of the position over the steady part of a hold, or the mean of the velocity: there no
-filter has correlated the sensor's noise yet, and what correlation is left (turbulence) is measured and counted.
+V_ss is read off the raw samples, as the slope of the position over the steady part of a hold, or the mean of the
+velocity: there no filter has correlated the sensor's noise yet, and what correlation is left (turbulence) is measured
+and counted.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot, isnan, nan, sqrt
-from typing import Literal
 
 import numpy as np
-from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.signal import correlate, savgol_coeffs, savgol_filter
+from scipy.signal import correlate
 
-from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.recording import Recording
 from rov_fmu.motion.riccati import RISE
-
-Method = Literal["savitzky-golay", "moving average"]
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.smoothing import WINDOW, kernel, robust_deviation, velocity, without_spikes
 
 AGAINST = "moves against the command: no V_ss"
 _SAME_COMMAND = 0.005  # fraction of full thrust
 _LEAST = 20  # samples of a hold, and of its steady part
-_WINDOW = 0.5  # s, before the time constant is known
 _BIAS = 0.002  # of Tau: what the filter bends off at most
-_MOST = 1_000_000  # samples, evenly spaced
-_ORDER = 3  # of the local polynomials: a quadratic would cut the bend at Tau
 
 
 @dataclass(frozen=True)
@@ -76,36 +70,6 @@ def steps(recording: Recording) -> tuple[StepResponse, ...]:
             step = _rising(step, *samples) if rests else replace(step, note="not from rest: no Tau")
         found.append(step)
     return tuple(found)
-
-
-def velocity(
-    time: Array, values: Array, *, is_position: bool, window: float = _WINDOW, method: Method = "savitzky-golay"
-) -> tuple[Array, Array]:
-    """Smoothed velocity on evenly spaced times (s), from position or velocity at any times; the window is in s."""
-    step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST)  # in spite of a gap of days
-    even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
-    samples = np.interp(even, time, values)
-    n = _odd(window / step, len(samples))
-    if method == "moving average":
-        smooth = uniform_filter1d(samples, n, mode="nearest")
-        return even, np.gradient(smooth, step) if is_position else smooth
-    return even, savgol_filter(samples, n, min(_ORDER, n - 1), deriv=int(is_position), delta=step, mode="interp")
-
-
-def without_spikes(values: Array) -> Array:
-    """The values, those far off their neighbours replaced by the median of five."""
-    median = median_filter(values, 5, mode="nearest")
-    return np.asarray(np.where(np.abs(values - median) > 8.0 * white_noise(values), median, values))
-
-
-def white_noise(values: Array) -> float:
-    """About the standard deviation of the sensor's noise, from second differences: motion is smooth beside it."""
-    return robust_deviation(np.diff(values, 2)) / sqrt(6.0)
-
-
-def robust_deviation(values: Array) -> float:
-    """Standard deviation, robust."""
-    return float(1.4826 * np.median(np.abs(values - np.median(values))))
 
 
 def correlation_time(residuals: Array) -> float:
@@ -185,22 +149,21 @@ def _rising(step: StepResponse, time: Array, values: Array, is_position: bool) -
     """The time at which the smoothed velocity reaches (1 - 1/e) V_ss, (17); the window follows the time constant."""
     assert step.V_ss is not None
     assert step.V_ss_error is not None
-    window, Tau = max(_WINDOW, 0.1 * (step.end - step.start)), nan
+    window, Tau = max(WINDOW, 0.1 * (step.end - step.start)), nan
     for _ in range(4):
         even, v = velocity(time, values, is_position=is_position, window=window)
         Tau = _crossing(even - step.start, v / step.V_ss)
         if isnan(Tau):
             return replace(step, note="no clear rise to V_ss: no Tau")
         window = min(Tau, 0.5 * (step.end - step.start))
-    interval = float(even[1] - even[0])
-    n = _odd(window / interval, len(even))
-    kernel = savgol_coeffs(n, min(_ORDER, n - 1), deriv=int(is_position), delta=interval)
+    weights = kernel(even, window, is_position=is_position)
     _, fitted = velocity(time, values, is_position=False, window=window)
     noise = robust_deviation(np.interp(even, time, values) - fitted)
     at = int(np.searchsorted(even - step.start, Tau))
-    near = slice(max(at - n // 4 - 1, 0), at + n // 4 + 2)
+    beside = len(weights) // 4 + 1
+    near = slice(max(at - beside, 0), at + beside + 1)
     rise = float(np.polyfit(even[near], v[near], 1)[0])
-    error = hypot(noise * float(np.linalg.norm(kernel)), RISE * step.V_ss_error) / abs(rise) if rise else np.inf
+    error = hypot(noise * float(np.linalg.norm(weights)), RISE * step.V_ss_error) / abs(rise) if rise else np.inf
     return replace(step, Tau=Tau, Tau_error=hypot(error, _BIAS * Tau))
 
 
@@ -213,9 +176,3 @@ def _crossing(time: Array, rise: Array) -> float:
     if rise[0] > RISE or up[-1] < RISE:
         return nan
     return 0.5 * float(np.interp(RISE, up, time[:top]) + np.interp(RISE, down, time[:top]))
-
-
-def _odd(samples: float, most: int) -> int:
-    """An odd number of samples, five at least where there are so many."""
-    n = min(max(round(samples), 5), most)
-    return n if n % 2 else n - 1

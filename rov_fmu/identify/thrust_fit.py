@@ -12,9 +12,7 @@ from scipy.linalg import block_diag
 from rov_fmu.identify.choice import MARGIN, Choice, aicc
 from rov_fmu.identify.forms import with_keys
 from rov_fmu.identify.least_squares import (
-    Array,
     Estimate,
-    Flags,
     Solution,
     bounds,
     estimate_alike,
@@ -24,6 +22,7 @@ from rov_fmu.identify.least_squares import (
     rms,
 )
 from rov_fmu.motion.layout import REVERSE, Curve
+from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.sense import no_thrust
 
 _DIGITS = 1e-5  # of the strongest force: no scale resolves less

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dtbtrs
 
-from rov_fmu.identify.least_squares import Array, Flags
+from rov_fmu.tank.arrays import Array, Flags
 
 ORDER = 8
 REACH = 0.25

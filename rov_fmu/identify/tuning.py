@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.files.csv_table import read_columns
-from rov_fmu.identify.columns import HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
 from rov_fmu.identify.drag_forms import Point
-from rov_fmu.identify.least_squares import Array, Estimate, estimate_alike, fit_named, kind_of
+from rov_fmu.identify.least_squares import Estimate, estimate_alike, fit_named, kind_of
 from rov_fmu.identify.response_fit import holding_force, predict
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.columns import HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
 
 
 class TuningError(ValueError):

@@ -7,15 +7,15 @@ import numpy as np
 
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.files.toml_file import listed
-from rov_fmu.identify.columns import VELOCITIES
 from rov_fmu.identify.driving import curves_of
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.runs import prepare
 from rov_fmu.identify.slips import slips
-from rov_fmu.identify.tables import Row
-from rov_fmu.identify.tank_tests import TankTests
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.columns import VELOCITIES
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.tables import Row
+from rov_fmu.tank.tank_tests import TankTests
 
 _LEAST_PUSH = 1e-6
 """N or N m, less than moves any vehicle: what is fitted to it would overflow."""

@@ -10,16 +10,16 @@ from typing import Any
 from markupsafe import Markup
 
 from rov_fmu.files.output import Output
-from rov_fmu.identify.given import ROV_FILE
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.recordings_fit import count
 from rov_fmu.identify.residual_analysis import Simulation
-from rov_fmu.identify.tank_tests import TankTests
 from rov_fmu.pages.findings import Known, acting, effects, known, unseen, verdict
 from rov_fmu.pages.report_plots import plot_drag, plot_known, plot_response, plot_steps, plot_thrust
 from rov_fmu.pages.report_recordings import CommandStep, clearest_step, plot_recording, plot_step
 from rov_fmu.pages.svg import Draw, inline_svg
 from rov_fmu.pages.templates import number, page
+from rov_fmu.tank.given import ROV_FILE
+from rov_fmu.tank.tank_tests import TankTests
 
 _PLOT, _WIDE = (3.7, 3.5), (4.7, 3.0)  # inches
 _WHITE = 1.5  # samples: residuals that are correlated over less are as good as white

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification
-from rov_fmu.identify.least_squares import Array, Flags
 from rov_fmu.identify.quadratic_fit import QuadraticFit
 from rov_fmu.identify.response_fit import holding_force, responses
 from rov_fmu.identify.thrust_fit import ThrustFit, forces
@@ -16,6 +15,7 @@ from rov_fmu.pages.findings import Known
 from rov_fmu.pages.plots import Step, draw_steps, evenly
 from rov_fmu.pages.svg import LIGHT
 from rov_fmu.pages.templates import pretty_unit, text
+from rov_fmu.tank.arrays import Array, Flags
 
 _WIDEST = 5.0  # end of an interval by the value, or its inverse: beyond it there is an arrow
 _TICKS = (

@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 from scipy.signal import savgol_coeffs
 
 from rov_fmu.identify.identification import AxisResult
-from rov_fmu.identify.least_squares import Array
 from rov_fmu.identify.recordings_fit import RecordingsFit
 from rov_fmu.identify.residual_analysis import Simulation
 from rov_fmu.identify.runs import prepare, push
-from rov_fmu.identify.step_responses import velocity, without_spikes
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.svg import LIGHT
 from rov_fmu.pages.templates import text
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.smoothing import velocity, without_spikes
 
 _BINS = 300  # of a recording: as many as one can see
 _BEFORE = 1.0  # s, of a step

@@ -15,9 +15,9 @@ from examples.tank_tests import DELAY, OTTER, write_tests
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.recordings_fit import Effect
-from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.tank_tests import load_tank_tests
 from tests.commands import ROOT
 from tests.vehicles import at_rest, still
 

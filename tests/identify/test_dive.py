@@ -11,13 +11,13 @@ from rov_fmu.identify.coupling import EAST, NORTH
 from rov_fmu.identify.extras import Extra, Kind
 from rov_fmu.identify.limits import NoFitError, limits, refuse_nonsense
 from rov_fmu.identify.output_error import fit_recordings
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.runs import prepare
 from rov_fmu.identify.simulator import Simulator, solve
 from rov_fmu.motion.layout import AXES, HEAVE
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.findings import acting
+from rov_fmu.tank.recording import Recording
 from tests.dives import CURRENT, LAG, TRUTH, Dive, dive
 
 FILE = "dive.tlog"

@@ -14,13 +14,14 @@ from rov_fmu.cli import main
 from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.identification import AxisResult, Identification, compare
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.least_squares import Array, Estimate
+from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.quadratic_fit import fit_quadratic
 from rov_fmu.identify.response_fit import fit_response
-from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.report import report_page
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import VIDEORAY
@@ -446,3 +447,14 @@ def test_estimate_without_freedom_has_no_interval() -> None:
     low, high = estimate.interval("beta_u") or (0.0, 0.0)
     assert low * high == pytest.approx(4.0), "a factor's interval is symmetric in its logarithm"
     assert np.isnan(estimate.correlation[0, 0])
+
+
+def test_tests_at_one_command_hold_a_twentieth_around_it(tmp_path: Path) -> None:
+    shutil.copytree(TESTS, tmp_path / "tests")
+    for path in (tmp_path / "tests").glob("*.csv"):
+        head, *rows = path.read_text(encoding="utf-8").splitlines()
+        path.write_text("\n".join([head, *(row for row in rows if row.startswith("30,"))]) + "\n", encoding="utf-8")
+        if path.name == "steady_heave_up.csv":
+            path.unlink()
+    low, high = identify(load_tank_tests(tmp_path / "tests")).vehicle.command_range
+    assert (low, high) == pytest.approx((0.25, 0.35))

@@ -13,10 +13,10 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.slips import Tables, beta_out_of_range, slips
-from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from tests.pool import Run, run

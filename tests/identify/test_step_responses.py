@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rov_fmu.identify.recording import Recording
-from rov_fmu.identify.step_responses import Method, StepResponse, correlation_time, steps, velocity, without_spikes
+from rov_fmu.identify.step_responses import StepResponse, correlation_time, steps
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import AXES, PLANS, clean
 
@@ -70,6 +70,14 @@ def test_coloured_noise_widens_the_standard_error(vehicle: Vehicle) -> None:
     assert 3.0 < turbulent.V_ss_error / plain.V_ss_error < 12.0
 
 
+def test_what_is_steady_is_so_to_the_last_sample(vehicle: Vehicle) -> None:
+    recording = record(vehicle, HEAVE, (0.0, 3.0), (0.3, 30.0))
+    (step,) = steps(recording)
+    assert step.steady is not None
+    assert step.steady[1] == recording.time[-1]
+    assert 3.0 < step.steady[0] < 25.0
+
+
 def test_hold_too_short_for_a_steady_state_has_none(vehicle: Vehicle) -> None:
     (step,) = steps(record(vehicle, HEAVE, (0.0, 3.0), (0.3, 3.0)))
     assert (step.V_ss, step.Tau) == (None, None)
@@ -106,28 +114,12 @@ def test_any_rate(rate: float, vehicle: Vehicle) -> None:
     assert step.Tau == pytest.approx(Tau, rel=0.05)
 
 
-@pytest.mark.parametrize("method", ["savitzky-golay", "moving average"])
-def test_velocity_of_a_ramp(method: Method) -> None:
-    time = np.sort(np.random.default_rng(3).uniform(0.0, 10.0, 1000))  # a logger without a steady clock
-    even, v = velocity(time, 0.3 * time, is_position=True, method=method)
-    assert np.ptp(np.diff(even)) < 1e-9
-    inner = slice(80, -80)  # the moving average has spikes at its ends, as the paper says of Figure 11
-    assert v[inner] == pytest.approx(0.3, abs=1e-9)
-    _, same = velocity(time, np.full_like(time, 0.3), is_position=False, method=method)
-    assert same == pytest.approx(0.3, abs=1e-12)
-
-
-def test_without_spikes_leaves_the_rest_alone() -> None:
-    values = np.sin(np.arange(500) / 30.0) + 0.01 * np.random.default_rng(0).standard_normal(500)
-    spiked = values.copy()
-    spiked[[50, 51, 200]] += 2.0
-    found = without_spikes(spiked)
-    assert found[[50, 51, 200]] == pytest.approx(values[[50, 51, 200]], abs=0.1)
-    assert np.mean(found != spiked) < 0.02
-    assert without_spikes(np.zeros(30)).tolist() == [0.0] * 30
-
-
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
 def test_correlation_time_of_first_order_noise(rho: float) -> None:
     noise = lfilter([1.0], [1.0, -rho], np.random.default_rng(2).standard_normal(50_000))
     assert correlation_time(noise) == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.12)
+
+
+@pytest.mark.parametrize("residuals", [[0.0] * 50, [0.5] * 50, [1.0, -1.0], [2.0]])
+def test_residuals_that_tell_no_correlation_count_as_white(residuals: list[float]) -> None:
+    assert correlation_time(np.array(residuals)) == 1.0

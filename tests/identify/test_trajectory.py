@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rov_fmu.identify.least_squares import Array
 from rov_fmu.identify.trajectory import MotionError, Slopes, Steps, motion
+from rov_fmu.tank.arrays import Array
 
 LENGTHS = (1e-4, 0.005, 0.02)
 

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from rov_fmu.identify.held_out import HeldOut
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.recording import Recording
 from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.residual_analysis import Simulation
 from rov_fmu.motion.layout import HEAVE
@@ -18,6 +17,7 @@ from rov_fmu.pages.findings import Known, acting, effects, verdict
 from rov_fmu.pages.report import scatter
 from rov_fmu.pages.report_plots import plot_known
 from rov_fmu.pages.report_recordings import clearest_step, modelled, plot_recording, plot_step
+from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 

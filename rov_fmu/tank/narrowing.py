@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rov_fmu.files.toml_file import line, listed
-from rov_fmu.identify.given import Said
 from rov_fmu.motion.layout import (
     ARM,
     AXES,
@@ -21,6 +20,7 @@ from rov_fmu.motion.layout import (
     coefficient_name,
 )
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.given import Said
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.geometry import impossible, places
 from rov_fmu.vehicle.quantity import Quantity

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.identify.given import ROV_FILE
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.tank_tests import load_tank_tests
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.motion.rov import Rov
+from rov_fmu.tank.given import ROV_FILE
+from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle

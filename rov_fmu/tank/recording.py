@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rov_fmu.identify.least_squares import Array
 from rov_fmu.motion.layout import Axis, Layout
+from rov_fmu.tank.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,14 +22,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.files.reading import read_bytes
-from rov_fmu.identify.columns import NO_OUTPUT, pulses
-from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.signals import LEAST_SAMPLES, Commands, Signal
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Layout
+from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.tank.columns import NO_OUTPUT, pulses
+from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal
 
 SUFFIXES = (".bin", ".tlog")
 _DATAFLASH = b"\xa3\x95\x80"
@@ -261,11 +260,11 @@ def _signals(layout: Layout, found: _Found) -> Iterator[Signal]:
         yield Signal(YAW, YAW.position, heading[1], heading[2][:, 0])
 
 
-def _is_known(found: _Found, time: Array) -> NDArray[np.bool_]:
+def _is_known(found: _Found, time: Array) -> Flags:
     """Whether the filter knew the horizontal velocity; where the log does not tell, it did."""
     series = found.series(_STATUS, varies=False)
     if not series:
         return np.ones(len(time), bool)
     flags = series[2][np.maximum(np.searchsorted(series[1], time, side="right") - 1, 0), 0].astype(int)
-    known: NDArray[np.bool_] = (flags & _VELOCITY_KNOWN > 0) & (flags & _STANDS_STILL == 0)
+    known: Flags = (flags & _VELOCITY_KNOWN > 0) & (flags & _STANDS_STILL == 0)
     return known

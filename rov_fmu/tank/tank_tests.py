@@ -20,12 +20,12 @@ from pathlib import Path
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.reading import read_bytes
-from rov_fmu.identify.given import ROV_FILE, Said, read_said
-from rov_fmu.identify.logs import read_log
-from rov_fmu.identify.narrowing import Given, Tested, narrowed
-from rov_fmu.identify.recording import Recording
-from rov_fmu.identify.tables import Row, read_rows
 from rov_fmu.motion.layout import AXES, Axis, Layout
+from rov_fmu.tank.given import ROV_FILE, Said, read_said
+from rov_fmu.tank.logs import read_log
+from rov_fmu.tank.narrowing import Given, Tested, narrowed
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.tables import Row, read_rows
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
 _LOGS = (".bin", ".tlog")

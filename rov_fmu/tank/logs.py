@@ -12,7 +12,9 @@ import numpy as np
 
 from rov_fmu.files.csv_table import Column, Columns, DataFileError, read_columns
 from rov_fmu.files.messages import shown
-from rov_fmu.identify.columns import (
+from rov_fmu.motion.layout import HEAVE, YAW, Axis, Layout
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.columns import (
     LOGGED_COMMAND,
     NO_OUTPUT,
     PULSES,
@@ -21,11 +23,9 @@ from rov_fmu.identify.columns import (
     refuse_slips,
     velocity_column,
 )
-from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.mavlink import SUFFIXES, read_mavlink
-from rov_fmu.identify.recording import Recording
-from rov_fmu.identify.signals import LEAST_SAMPLES, Commands, Signal, recordings_of, unwrapped
-from rov_fmu.motion.layout import HEAVE, YAW, Axis, Layout
+from rov_fmu.tank.mavlink import SUFFIXES, read_mavlink
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, recordings_of, unwrapped
 
 _MOST_BACK = 0.2  # of the rows: with more of them out of order the time begins anew
 _COMMAND = "command"

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import strategies as st
 
 from rov_fmu.files.messages import FileError
-from rov_fmu.identify.given import ROV_FILE
-from rov_fmu.identify.tank_tests import load_tank_tests
+from rov_fmu.tank.given import ROV_FILE
+from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.geometry import impossible
 from tests.damage import changed_toml, fuzz
 from tests.folders import (

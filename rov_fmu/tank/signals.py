@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rov_fmu.identify.least_squares import Array
-from rov_fmu.identify.recording import Recording
-from rov_fmu.identify.step_responses import velocity, without_spikes
 from rov_fmu.motion.layout import SURGE, SWAY, YAW, Axis, Layout
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.smoothing import velocity, without_spikes
 
 LEAST_SAMPLES = 20
 _SAME = 0.005  # of full thrust: two steps of a pulse of 1 µs

@@ -1,20 +1,14 @@
-"""Where the rules of reading and of looking at recordings begin and end."""
+"""Where the rules of reading begin and end."""
 
 import re
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.identify.identify import identify
-from rov_fmu.identify.step_responses import correlation_time, steps, velocity
-from rov_fmu.identify.tank_tests import load_tank_tests
-from rov_fmu.motion.layout import HEAVE
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.tank.tank_tests import load_tank_tests
 from tests.commands import TESTS
-from tests.recordings import clean
 
 
 @pytest.mark.parametrize("samples", [19, 20])
@@ -44,19 +38,6 @@ def test_a_force_against_the_command_is_noise_up_to_a_twentieth_of_the_largest(f
             load_tank_tests(path.parent)
     else:
         assert load_tank_tests(path.parent).thrust["rear"][-1].value == 10.0 * force
-
-
-@pytest.mark.parametrize("residuals", [[0.0] * 50, [0.5] * 50, [1.0, -1.0], [2.0]])
-def test_residuals_that_tell_no_correlation_count_as_white(residuals: list[float]) -> None:
-    assert correlation_time(np.array(residuals)) == 1.0
-
-
-def test_what_is_steady_is_so_to_the_last_sample(vehicle: Vehicle) -> None:
-    recording = clean(vehicle.rov, HEAVE, [(0.0, 3.0), (0.3, 30.0)]).noisy(np.random.default_rng(0))
-    (step,) = steps(recording)
-    assert step.steady is not None
-    assert step.steady[1] == recording.time[-1]
-    assert 3.0 < step.steady[0] < 25.0
 
 
 _THRUST, _HEAVE = ("thrust_rear", "command [%],force [N]"), ("steady_heave", "command [%],velocity [m/s]")
@@ -91,21 +72,3 @@ def test_bounds_of_every_column(table: tuple[str, str], within: str, beyond: str
     path.write_text("\n".join((header, beyond, *rest)), encoding="utf-8")
     with pytest.raises(DataFileError, match="line 2, column"):
         load_tank_tests(tmp_path)
-
-
-def test_velocity_is_smoothed_over_half_a_second() -> None:
-    time = np.arange(300) / 100.0
-    values = np.random.default_rng(0).standard_normal(300)
-    half, default = velocity(time, values, is_position=False, window=0.5), velocity(time, values, is_position=False)
-    assert (half[1] == default[1]).all()
-
-
-def test_tests_at_one_command_hold_a_twentieth_around_it(tmp_path: Path) -> None:
-    shutil.copytree(TESTS, tmp_path / "tests")
-    for path in (tmp_path / "tests").glob("*.csv"):
-        head, *rows = path.read_text(encoding="utf-8").splitlines()
-        path.write_text("\n".join([head, *(row for row in rows if row.startswith("30,"))]) + "\n", encoding="utf-8")
-        if path.name == "steady_heave_up.csv":
-            path.unlink()
-    low, high = identify(load_tank_tests(tmp_path / "tests")).vehicle.command_range
-    assert (low, high) == pytest.approx((0.25, 0.35))

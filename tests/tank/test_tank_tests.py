@@ -12,8 +12,8 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.identify.tables import Row
-from rov_fmu.identify.tank_tests import TankTests, load_tank_tests
+from rov_fmu.tank.tables import Row
+from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle

@@ -1,0 +1,63 @@
+"""Smoothed velocity from what a sensor measured, and how much noise is in it, section 4.1.
+
+The filters are SciPy's: a local cubic (Savitzky-Golay) or the paper's moving average.
+"""
+
+from math import sqrt
+from typing import Literal
+
+import numpy as np
+from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from rov_fmu.tank.arrays import Array
+
+Method = Literal["savitzky-golay", "moving average"]
+
+WINDOW = 0.5
+"""s, as long as no time constant is known."""
+_MOST = 1_000_000  # samples, evenly spaced
+_ORDER = 3  # of the local polynomials: a quadratic would cut the bend at Tau
+
+
+def velocity(
+    time: Array, values: Array, *, is_position: bool, window: float = WINDOW, method: Method = "savitzky-golay"
+) -> tuple[Array, Array]:
+    """Smoothed velocity on evenly spaced times (s), from position or velocity at any times; the window is in s."""
+    step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST)  # in spite of a gap of days
+    even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
+    samples = np.interp(even, time, values)
+    n = _odd(window / step, len(samples))
+    if method == "moving average":
+        smooth = uniform_filter1d(samples, n, mode="nearest")
+        return even, np.gradient(smooth, step) if is_position else smooth
+    return even, savgol_filter(samples, n, min(_ORDER, n - 1), deriv=int(is_position), delta=step, mode="interp")
+
+
+def kernel(even: Array, window: float, *, is_position: bool) -> Array:
+    """The weights of the local cubic on these evenly spaced times (s)."""
+    interval = float(even[1] - even[0])
+    n = _odd(window / interval, len(even))
+    return np.asarray(savgol_coeffs(n, min(_ORDER, n - 1), deriv=int(is_position), delta=interval))
+
+
+def without_spikes(values: Array) -> Array:
+    """The values, those far off their neighbours replaced by the median of five."""
+    median = median_filter(values, 5, mode="nearest")
+    return np.asarray(np.where(np.abs(values - median) > 8.0 * white_noise(values), median, values))
+
+
+def white_noise(values: Array) -> float:
+    """About the standard deviation of the sensor's noise, from second differences: motion is smooth beside it."""
+    return robust_deviation(np.diff(values, 2)) / sqrt(6.0)
+
+
+def robust_deviation(values: Array) -> float:
+    """Standard deviation, robust."""
+    return float(1.4826 * np.median(np.abs(values - np.median(values))))
+
+
+def _odd(samples: float, most: int) -> int:
+    """An odd number of samples, five at least where there are so many."""
+    n = min(max(round(samples), 5), most)
+    return n if n % 2 else n - 1
