@@ -7,11 +7,14 @@ import numpy as np
 
 from rov_fmu.identify.extras import Extra
 from rov_fmu.identify.least_squares import Solution, covariance
+from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
 from rov_fmu.identify.simulator import HUBER, Simulator
 from rov_fmu.identify.step_responses import correlation_time
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation
+
+_COLOURED = 2.0  # samples of correlation; below, a fit takes nothing to speak of from the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +30,7 @@ class Simulation:
     noise: float
     """Standard deviation of the residuals, robust."""
     correlation_time: float
-    """Of the residuals, in samples; 1 where they are white."""
+    """Of the noise, in samples; 1 where it is white."""
     outliers: int
     """Samples farther off than 2.5 standard deviations, which count less than their square."""
 
@@ -45,17 +48,24 @@ class ResidualAnalysis:
         r, J = solution.residuals, solution.jacobian
         inside = np.abs(r) <= HUBER if robust else np.ones(len(r), bool)
         psi = np.clip(r, -HUBER, HUBER) if robust else r
-        variance = np.ones(len(r))  # of each psi, correlation counted; of the thrust curve it is 1
         self.simulations: list[Simulation] = []
         self.degrees_of_freedom = float(len(model.thrust.names) if model.thrust else 0) - len(self.x)
         excess = len(r) / (len(r) - len(self.x))
+        rest = slice(sum(len(d.time) for d in model.data), None)  # the thrust curve and what extras are likely to be
+        self.gram, self.meat = (J * inside[:, None]).T @ J, J[rest].T @ J[rest]
         size = np.abs(r)
         losses = np.where(inside, r * r, (2.0 * size - HUBER) * HUBER)
         cost: list[float] = []
         for output, (d, rows, _, sigma) in zip(model.run(self.x), model.places, strict=True):
+            variance = excess * float(np.mean(psi[rows] ** 2))
             correlation = correlation_time(psi[rows])
+            part, weights = J[rows], np.full(len(d.time), correlation * variance)
+            if correlation > _COLOURED:
+                spectrum = noise_spectrum(psi[rows], part * inside[rows, None])
+                if spectrum is not None:
+                    part, weights, correlation = cosines(part), spectrum, max(float(spectrum[0]) / variance, 1.0)
+            self.meat += part.T @ (part * weights[:, None])
             cost.append(float(losses[rows].sum()))
-            variance[rows] = correlation * excess * np.mean(psi[rows] ** 2)
             self.degrees_of_freedom += len(d.time) / correlation
             outliers, noise = int((np.abs(r[rows]) > HUBER).sum()), sigma * robust_deviation(r[rows])
             self.simulations.append(
@@ -63,7 +73,6 @@ class ResidualAnalysis:
             )
         self.cost = np.array(cost)
         """Of each recording: the sum of what is minimized."""
-        self.gram, self.meat = ((J * weights[:, None]).T @ J for weights in (inside, variance))
 
     def gain(self, other: "ResidualAnalysis") -> float:
         """By how much the cost is lower than another model's, correlated residuals counting as so many fewer.

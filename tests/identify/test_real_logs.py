@@ -42,6 +42,8 @@ class Scenario:
     lag: tuple[str, ...] = ()
     """Curves whose lag is to be fitted."""
     jitter: float = 0.0
+    slow: float = 0.0
+    """Time constant of the sensor's noise, s; 0 where it is white."""
     sensor: str = ""
     """Other than the usual one."""
     bias: float = 0.02
@@ -75,6 +77,8 @@ SCENARIOS: dict[str, Scenario] = {
     "more drag up than down": Scenario((HEAVE,), {key: 1.3 * K[key.removesuffix("_reverse")] for key in _UP}),
     "dead band of the top thruster": Scenario((HEAVE,), {"c_0_top": 0.05}),
     **{f"jitter in {axis.name}": Scenario((axis,), jitter=0.01) for axis in AXES},
+    **{f"noise of {slow} s in heave": Scenario((HEAVE,), slow=slow) for slow in (0.2, 1.0, 3.0)},
+    "noise of 1 s, load and delay in heave": Scenario((HEAVE,), {"F_0_w": 0.1}, 0.2, slow=1.0),
 }
 MAIN = (
     *(f"load of {load} N in heave" for load in (0.02, 0.1, 0.3)),
@@ -101,8 +105,9 @@ def runs(name: str) -> tuple[Run, ...]:
 def fitted(name: str, seed: int) -> tuple[RecordingsFit, ...]:
     """The fit of a scenario, which is told nothing of what is not ideal but the curves that lag."""
     scenario, random = SCENARIOS[name], np.random.default_rng(seed)
+    noise = {"colour": np.exp(-1.0 / (RATE * scenario.slow)) if scenario.slow else 0.0, "jitter": scenario.jitter}
     recordings = [
-        clean.recorded(random, scenario.sensor or SENSOR[clean.axis.name], f"log_{n}.csv", jitter=scenario.jitter)
+        clean.recorded(random, scenario.sensor or SENSOR[clean.axis.name], f"log_{n}.csv", **noise)
         for n, clean in enumerate(runs(name))
     ]
     unknown = {axis.coefficient(kind): 1.0 for axis in scenario.axes for kind in KINDS}
@@ -171,6 +176,24 @@ def test_intervals_cover_the_truth_along_the_other_axes(name: str) -> None:
     found = shares(name, seeds)
     assert (found.covered.sum(axis=0) >= binom.ppf(1e-3, len(seeds), 0.95)).all(), str(found)
     assert (np.abs(found.off.mean(axis=0)) < SCENARIOS[name].bias).all(), str(found)
+
+
+@pytest.mark.parametrize("name", ["noise of 1.0 s in heave"])
+def test_slow_noise_is_nothing_that_acts(name: str) -> None:
+    """It looks like a load, a delay or another drag up than down; one seed in five had one where it counted as less."""
+    assert sum(effect.kept for seed in range(8) for (fit,) in [fitted(name, seed)] for effect in fit.effects) <= 1
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["noise of 0.2 s in heave", "noise of 1.0 s in heave"])
+def test_intervals_cover_the_truth_under_slow_noise(name: str) -> None:
+    """Of 40 seeds no more have extras than 5 % of all have, but for one case in 1,000; as few miss the truth."""
+    fits = [fit for seed in range(40) for fit in fitted(name, seed)]
+    assert sum(any(effect.kept for effect in fit.effects) for fit in fits) <= binom.ppf(0.999, len(fits), 0.05)
+    for coefficient in (HEAVE.coefficient(kind) for kind in KINDS):
+        intervals = [fit.estimate.interval(coefficient) for fit in fits]
+        covered = sum(i is not None and i[0] <= K[coefficient] <= i[1] for i in intervals)
+        assert covered >= binom.ppf(1e-3, len(fits), 0.95), f"{coefficient}: {covered} of {len(fits)}"
 
 
 @pytest.mark.parametrize("name", ["one current", "another current each time"])
