@@ -35,7 +35,7 @@ from rov_fmu.tank.smoothing import robust_deviation, white_noise
 _BETAS = (0.03, 0.1, 0.3, 1.0, 3.0)  # to begin with
 _DELAYS = (0.0, 0.3)
 _STARTS = 3
-_BEYOND_DOUBT = 100.0  # of Wald's statistic, each: nothing has to be left out to see it
+_BEYOND_DOUBT = 100.0  # of Wald's statistic: no recording has to be left out to see it
 _GOOD = 1.5  # cost of a sample: white noise has 1.36, so there is nothing better to find
 _FEW = 200  # samples of a recording, to begin with
 _LONG = 100.0  # s of a recording, to begin with
@@ -128,17 +128,18 @@ class _Fit:
         others = {e for e in kept if e.kind == "load" or e.pairs()} if currents else set()
         each = np.log(max(analysis.degrees_of_freedom, 8.0))
         for dropped in dict.fromkeys(map(frozenset, (currents | others, others, currents))):
-            if len(dropped) > 1 and analysis.significance(dropped) < _BEYOND_DOUBT * len(dropped):
+            if len(dropped) > 1:  # Wald's statistic will not do: what stands in for each other is far from linear
                 without = tuple(e for e in kept if e not in dropped)
-                other = self.analysed(self.model(without, noise), analysis.x[analysis.model.places_of(without)])
+                start = analysis.x[analysis.model.places_of(without)]
+                other = self.analysed(self.model(without, noise), start, 1e-4)
                 if analysis.gain(other) < each * len(dropped):
-                    return other
+                    return self.analysed(other.model, other.x)
         return analysis
 
     def voted(self, analysis: ResidualAnalysis) -> tuple[Extra, ...]:
         """The extras without those that differ by direction and do not help to predict a recording by the others."""
         kept = analysis.model.extras
-        for extra in (e for e in kept if e.pairs() and analysis.significance({e}) < _BEYOND_DOUBT):
+        for extra in (e for e in kept if e.pairs() and analysis.significance(e) < _BEYOND_DOUBT):
             without = tuple(e for e in kept if e != extra)
             errors = [
                 sum(p.error for axis in self.axes for p in self.held_out(axis, analysis, some).predictions)

@@ -1,6 +1,5 @@
 """Noise, correlation and outliers of a solution's residuals, and the uncertainty of the parameters that follows."""
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,13 +81,10 @@ class ResidualAnalysis:
         correlation = np.array([s.correlation_time for s in self.simulations])
         return float(np.sum((other.cost - self.cost) / correlation))
 
-    def significance(self, extras: Collection[Extra]) -> float:
-        """Wald's statistic of some extras together: about what the cost would rise by without them."""
-        model = self.model
-        which = [n for n, extra in enumerate(model.extras, len(model.names)) if extra in extras]
-        off = self.x[which] - np.array([extra.neutral for extra in model.extras if extra in extras])
-        found = self.covariance()[np.ix_(which, which)]
-        return float(off @ np.linalg.solve(found, off)) if np.isfinite(found).all() else 0.0
+    def significance(self, extra: Extra) -> float:
+        """Wald's statistic: about what the cost would rise by without it."""
+        n = len(self.model.names) + self.model.extras.index(extra)
+        return float((self.x[n] - extra.neutral) ** 2 / self.covariance()[n, n])
 
     def covariance(self) -> Array:
         """Of the parameters of a robust fit; correlated residuals count as so many fewer."""

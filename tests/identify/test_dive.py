@@ -14,7 +14,7 @@ from rov_fmu.identify.output_error import fit_recordings
 from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.runs import prepare
 from rov_fmu.identify.simulator import Simulator, solve
-from rov_fmu.motion.layout import AXES, HEAVE
+from rov_fmu.motion.layout import AXES, HEAVE, YAW
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.findings import acting
 from rov_fmu.tank.recording import Recording
@@ -109,7 +109,8 @@ def test_a_dive_is_identified(seed: int) -> None:
     for fit in fits:
         of = fit.axis.velocity
         assert fit.rov[f"a_d_{of}"] == pytest.approx(TRUTH[f"a_d_{of}"], rel=0.07)
-        assert fit.rov[f"beta_{of}"] == pytest.approx(1.0, rel=0.05)
+        # by hand one turns fast or not at all, which tells little of how long it takes
+        assert fit.rov[f"beta_{of}"] == pytest.approx(1.0, rel=0.1 if fit.axis is YAW else 0.05)
         for effect in (e for e in fit.effects if e.kind == "reverse drag" and e.kept):
             assert effect.value == pytest.approx(1.0, abs=0.02), "drag is that of both directions"
         assert fit.held_out.by_halves

@@ -86,6 +86,8 @@ MAIN = (
     "jitter in yaw",
 )
 """Each kind along one axis."""
+SLOW = tuple(f"noise of {slow} s in heave" for slow in (0.2, 1.0, 3.0))
+"""Noise as slow as the vehicle, or slower."""
 BY_DEFAULT = ("load of 0.1 N in heave", "delay in surge", "lag and delay in heave", "weak reverse thrust in heave")
 """Those that are quick; the long tests try all."""
 # In yaw one thruster of the pair is in reverse whichever way it turns, so yaw alone never tells its strength.
@@ -169,7 +171,7 @@ def test_intervals_cover_the_truth_in_90_to_99_percent(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [name for name in SCENARIOS if name not in MAIN])
+@pytest.mark.parametrize("name", [name for name in SCENARIOS if name not in (*MAIN, *SLOW)])
 def test_intervals_cover_the_truth_along_the_other_axes(name: str) -> None:
     """As by default."""
     seeds = range(20)
@@ -185,14 +187,17 @@ def test_slow_noise_is_nothing_that_acts(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["noise of 0.2 s in heave", "noise of 1.0 s in heave"])
+@pytest.mark.parametrize("name", SLOW)
 def test_intervals_cover_the_truth_under_slow_noise(name: str) -> None:
-    """Of 40 seeds no more have extras than 5 % of all have, but for one case in 1,000; as few miss the truth."""
+    """Of 40 seeds no more have extras than 5 % of all have, but for one case in 1,000; as few miss the truth.
+
+    Where noise of 3 s leaves too little to tell there is no interval.
+    """
     fits = [fit for seed in range(40) for fit in fitted(name, seed)]
     assert sum(any(effect.kept for effect in fit.effects) for fit in fits) <= binom.ppf(0.999, len(fits), 0.05)
     for coefficient in (HEAVE.coefficient(kind) for kind in KINDS):
         intervals = [fit.estimate.interval(coefficient) for fit in fits]
-        covered = sum(i is not None and i[0] <= K[coefficient] <= i[1] for i in intervals)
+        covered = sum(i[0] <= K[coefficient] <= i[1] if i else name == SLOW[-1] for i in intervals)
         assert covered >= binom.ppf(1e-3, len(fits), 0.95), f"{coefficient}: {covered} of {len(fits)}"
 
 
