@@ -13,18 +13,6 @@ Kind = Literal[
     "load", "delay", "current", "current north", "current east", "lag", "dead band", "reverse thrust", "reverse drag"
 ]
 
-_BOUNDS: dict[Kind, tuple[float, float]] = {
-    "load": (-1e6, 1e6),
-    "delay": (-2.0, 5.0),
-    "current": (-3.0, 3.0),
-    "current north": (-3.0, 3.0),
-    "current east": (-3.0, 3.0),
-    "lag": (0.05, 10.0),
-    "dead band": (-0.2, 0.3),  # below 0 is none: a search that ends at a bound is slow
-    "reverse thrust": (0.05, 20.0),
-    "reverse drag": (0.05, 20.0),
-}
-
 
 @dataclass(frozen=True)
 class Extra:
@@ -42,11 +30,6 @@ class Extra:
     def neutral(self) -> float:
         """As if it were not there."""
         return 1.0 if self.kind.startswith("reverse") else 0.0
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Within which it is sought."""
-        return _BOUNDS[self.kind]
 
     @property
     def is_of_file(self) -> bool:

@@ -5,7 +5,7 @@ from math import exp, log
 
 import numpy as np
 
-from rov_fmu.identify.extras import Extra
+from rov_fmu.identify.extras import Extra, Kind
 from rov_fmu.identify.least_squares import bounds
 from rov_fmu.identify.runs import PreparedRecording, axes_of
 from rov_fmu.motion.layout import REVERSE, Axis
@@ -16,6 +16,17 @@ from rov_fmu.tank.recording import Recording
 _LEAST_BETA = 1e-3
 _LOAD = 1.5  # of the strongest thrust: against more no vehicle is driven
 _DRAG = 20.0  # of what would hold the strongest thrust at the highest velocity seen
+
+_EXTRAS: dict[Kind, tuple[float, float]] = {
+    "delay": (-2.0, 5.0),
+    "current": (-3.0, 3.0),
+    "current north": (-3.0, 3.0),
+    "current east": (-3.0, 3.0),
+    "lag": (0.05, 10.0),
+    "dead band": (-0.2, 0.3),  # below 0 is none: a search that ends at a bound is slow
+    "reverse thrust": (0.05, 20.0),
+    "reverse drag": (0.05, 20.0),
+}
 
 
 class NoFitError(ValueError):
@@ -40,10 +51,11 @@ def limits(
             for name in {curve.coefficient("b_t"), curve.coefficient("b_t" + REVERSE)} & {*names}:
                 low[names.index(name)] = 0.0
     for n, extra in enumerate(extras, len(names)):
-        low[n], high[n] = extra.bounds
         if extra.kind == "load":
             load = _LOAD * max(_strongest(base, d.axis) for d in data if extra.concerns(d.recording))
             low[n], high[n] = -load, load
+        else:
+            low[n], high[n] = _EXTRAS[extra.kind]
     return low, high
 
 

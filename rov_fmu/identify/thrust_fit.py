@@ -4,12 +4,13 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import inf, nan
+from math import inf
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from rov_fmu.identify.choice import MARGIN, Choice, aicc
+from rov_fmu.identify.curve_fit import CurveFit
 from rov_fmu.identify.forms import with_keys
 from rov_fmu.identify.least_squares import (
     Estimate,
@@ -19,7 +20,6 @@ from rov_fmu.identify.least_squares import (
     leave_one_out,
     minimize,
     quantile,
-    rms,
 )
 from rov_fmu.motion.layout import REVERSE, Curve
 from rov_fmu.tank.arrays import Array, Flags
@@ -30,61 +30,23 @@ _GRID = {1: 24, 2: 8}  # dead bands to begin with, by how many are fitted
 
 
 @dataclass(frozen=True, eq=False)
-class ThrustFit:
-    """Force (N) of all `together` thrusters of a curve over command, fitted to n measured ones."""
+class ThrustFit(CurveFit):
+    """Force (N) of all `together` thrusters of a curve over command; the estimate is of those that were fitted."""
 
     curve: Curve
     """With the keys that the forces ask for, and the known ones."""
     values: Mapping[str, float]
     """Every coefficient of the curve but the lag, by name."""
-    estimate: Estimate
-    """Those that were fitted."""
-    x: Array
-    y: Array
-    weights: Array
-    """W_k of (7)."""
-    leave_one_out: Array
-    """Leave-one-thrust-out: a fit of the same form without the points of its thrust; NaN where too few are left."""
     choices: tuple[Choice, ...] = ()
     """What else the curve could have, and whether it has."""
-
-    @property
-    def counts(self) -> Flags:
-        """Whether a point has weight."""
-        return self.weights > 0.0
 
     def value(self, x: Array) -> Array:
         """The curve."""
         return forces(self.curve, self.values, x)
 
-    def band(self, x: Array) -> tuple[Array, Array]:
-        """95 % confidence band of the curve; infinite where there are too few points."""
-        reach = self.estimate.half_band(_slopes(self.curve, self.values, x, self.estimate.names))
-        return self.value(x) - reach, self.value(x) + reach
-
-    @cached_property
-    def residuals(self) -> Array:
-        """Measured less fitted."""
-        return self.y - self.value(self.x)
-
-    @property
-    def residual_rms(self) -> float:
-        """Over the points that count."""
-        return rms(self.residuals[self.counts])
-
-    @property
-    def r_squared(self) -> float:
-        """Share of the weighted variance about the mean that the curve explains."""
-        if not self.weights.any():
-            return nan
-        total = float(self.weights @ (self.y - np.average(self.y, weights=self.weights)) ** 2)
-        return 1.0 - float(self.weights @ self.residuals**2) / total if total > 0.0 else nan
-
-    @property
-    def leave_one_out_error(self) -> float:
-        """Leave-one-thrust-out: RMS of measured less predicted, over the points that count and have a prediction."""
-        errors = (self.y - self.leave_one_out)[self.counts]
-        return rms(errors[np.isfinite(errors)])
+    def slopes(self, x: Array) -> Array:
+        """n x p: of the curve by what was fitted."""
+        return _slopes(self.curve, self.values, x, self.estimate.names)
 
 
 def fit_thrust(
@@ -228,7 +190,7 @@ class _Candidate:
         data = self.data
         groups: Array = np.abs(data.x).round(6)
         out = leave_one_out(groups, self._without)
-        return ThrustFit(self.curve, self.values, self._estimate, data.x, data.y, data.weights, out)
+        return ThrustFit(data.x, data.y, data.weights, self._estimate, out, self.curve, self.values)
 
     def _without(self, out: Flags) -> Array | None:
         """Prediction of some points by the fit to the others."""

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.identify.curve_fit import CurveFit
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification
-from rov_fmu.identify.quadratic_fit import QuadraticFit
 from rov_fmu.identify.response_fit import holding_force, responses
 from rov_fmu.identify.thrust_fit import ThrustFit, forces
 from rov_fmu.pages.findings import Known
@@ -50,9 +50,7 @@ def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> No
     _finish(above, below, title, f"velocity ({axis.unit})", f"residual ({load})")
 
 
-def _fitted(
-    figure: Figure, fit: ThrustFit | QuadraticFit, scale: float, color: str, label: str
-) -> tuple[Axes, Axes, Array]:
+def _fitted(figure: Figure, fit: CurveFit, scale: float, color: str, label: str) -> tuple[Axes, Axes, Array]:
     """Both parts of the plot of a fit, and over which numbers it is drawn."""
     above, below = _two(figure)
     x = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
