@@ -6,7 +6,8 @@ from math import atan2, cos, degrees, hypot, sin
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.patches import Arc, Circle, Wedge
+from matplotlib.patches import Arc, Circle, PathPatch, Wedge
+from matplotlib.path import Path
 
 from rov_fmu.motion.layout import AXES, HEAVE, SURGE, SWAY, YAW, Axis, Thruster
 from rov_fmu.motion.rov import Rov
@@ -174,6 +175,27 @@ def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
         _draw_scale(ax, size)
     ax.set(xticks=[], yticks=[])
     ax.set_title(scene.view.capitalize(), loc="left")
+
+
+def draw_icon(ax: Axes, rov: Rov) -> None:
+    """The vehicle from above without words: its thrusters, on a body as wide as they are apart, round at the bow."""
+    size, marks = _size(rov), list(_marks(rov, *VIEWS["from above"]))
+    x, y = 1.2 * size, max([0.5 * size, *(abs(mark.at[1]) for mark in marks)])
+    ax.add_patch(PathPatch(_body(x, y), facecolor=LIGHT["band"], edgecolor=LIGHT["metal"], linewidth=2.0))
+    for mark in marks:
+        _draw_mark(ax, mark, 1.6 * size)
+    reach = 1.1 * max(x, *(abs(part) for mark in marks for part in mark.tip(1.6 * size)))
+    ax.set(aspect="equal", xlim=(-reach, reach), ylim=(reach, -reach))
+    ax.set_axis_off()
+
+
+def _body(x: float, y: float) -> Path:
+    """An outline from -x to x and from -y to y."""
+    starboard = [(-x, 0.0), (-x, 0.8 * y), (-x, y), (-x + 0.2 * y, y), (0.4 * x, y), (x, y), (x, 0.0)]
+    port = [(along, -across) for along, across in reversed(starboard)]
+    ways = [Path.LINETO, Path.CURVE3, Path.CURVE3, Path.LINETO, Path.CURVE3, Path.CURVE3]
+    back = [Path.CURVE3, Path.CURVE3, Path.LINETO, Path.CURVE3, Path.CURVE3, Path.LINETO]
+    return Path(starboard + port[1:], [Path.MOVETO, *ways, *back])
 
 
 def _arrow(ax: Axes, start: tuple[float, float], end: tuple[float, float], color: str, **how: Any) -> None:

@@ -94,13 +94,21 @@ def svg_file(
     draw: Draw, size: tuple[float, float], *, salt: str, background: str = "white", margin: float = 0.1
 ) -> str:
     """A figure (size in inches) as SVG, whatever the user's Matplotlib is set to."""
+    svg = saved(draw, size, background=background, margin=margin, salt=salt, format="svg", metadata={"Date": None})
+    return _without_ballast(svg).replace("'DejaVu Sans'", _FONTS)
+
+
+def saved(
+    draw: Draw, size: tuple[float, float], *, background: str, margin: float, salt: str = "", **how: Any
+) -> bytes:
+    """A figure (size in inches) as Matplotlib saves it, in the one style; `how` tells it the format."""
     file = BytesIO()
     margins = {f"figure.constrained_layout.{side}_pad": margin for side in "wh"}
     with style.context(["default", _STYLE, {"svg.hashsalt": salt, **margins}]):
         figure = Figure(figsize=size, layout="constrained", facecolor=background)
         draw(figure)
-        figure.savefig(file, format="svg", metadata={"Date": None})
-    return _without_ballast(file.getvalue()).replace("'DejaVu Sans'", _FONTS)
+        figure.savefig(file, **how)
+    return file.getvalue()
 
 
 def _without_ballast(svg: bytes) -> str:
