@@ -1,0 +1,262 @@
+"""rov-fmu prove: an FMU comes to the results that it carries, or not; ours, and any other."""
+
+import shutil
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+from pythonfmu import FmuBuilder
+
+from rov_fmu.cli import main
+from rov_fmu.export.proof import prove
+from rov_fmu.export.reference_results import FOLDER, MANIFEST, reference_results
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import ALONE
+
+Capsys = pytest.CaptureFixture[str]
+Files = Mapping[str, str | None]
+"""By their name in the FMU, or beside the manifest; None where one is to be left out."""
+
+
+def _with(fmu: Path, files: Files, path: Path) -> Path:
+    """Another FMU with these files."""
+    changed = {name if "/" in name else f"{FOLDER}/{name}": text for name, text in files.items()}
+    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
+        for member in set(old.namelist()) - changed.keys():
+            new.writestr(member, old.read(member))
+        for name, text in changed.items():
+            if text is not None:
+                new.writestr(name, text)
+    return path
+
+
+# ---- Ours ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("interface", [None, "co-simulation", "model-exchange"])
+def test_the_videoray_proves_itself(interface: str | None, videoray_fmu: Path, capsys: Capsys) -> None:
+    chosen = ["--interface", interface] if interface else []
+    assert main(["prove", str(videoray_fmu), *chosen]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "FAIL" not in out
+    assert out.count(" pass") == 28 * 2 + 7
+    found = prove(videoray_fmu, interface)
+    assert max(f.deviation for f in found) < (1e-9 if interface == "model-exchange" else 1e-10)
+    assert {f.tolerance for f in found} == {1e-9}
+
+
+def test_a_vehicle_with_lag_and_coupling_proves_itself(heavy_dir: Path, tmp_path: Path, capsys: Capsys) -> None:
+    bare = Path(shutil.make_archive(str(tmp_path / "heavy"), "zip", heavy_dir))
+    files = reference_results(load_vehicle(SHIPPED["bluerov2_heavy"]))
+    fmu = _with(bare, {name: content.decode() for name, content in files.items()}, tmp_path / "heavy.fmu")
+    assert main(["prove", str(fmu)]) == 0
+    assert "manoeuvre" in capsys.readouterr().out
+
+
+def test_a_binary_that_goes_another_way_is_found(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+    """The results of the VideoRay in the FMU of one that is heavier by a millionth."""
+    vehicle = tmp_path / "heavier.toml"
+    vehicle.write_text(ALONE.replace("6.57", "6.57000657"), encoding="utf-8")
+    assert main(["build", str(vehicle), "--platform", "host", "-o", str(tmp_path / "heavier.fmu")]) == 0
+    own = main(["prove", str(tmp_path / "heavier.fmu")])
+    with zipfile.ZipFile(videoray_fmu) as archive:
+        files = {n: archive.read(n).decode() for n in archive.namelist() if n.startswith(FOLDER)}
+    other = _with(tmp_path / "heavier.fmu", files, tmp_path / "other.fmu")
+    capsys.readouterr()
+    assert (own, main(["prove", str(other)])) == (0, 1)
+    out, err = capsys.readouterr()
+    failed = [line.split() for line in out.splitlines() if "FAIL" in line]
+    assert err == f"rov-fmu: {other}: {len(failed)} of 63 results are not as expected\n"
+    assert {line[1] for line in failed} == {"u", "w", "x", "y", "z"}, "its mass has no part in yaw"
+    assert main(["prove", str(other), "--tolerance", "1e-5"]) == 0
+
+
+# ---- Any other -------------------------------------------------------------------------------------------------------
+
+_SLAVE = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, Boolean
+
+class Counter(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.k, self.u, self.y, self.n, self.on = 2.0, 0.0, 0.0, 0, False
+        self.register_variable(Real("k", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+        self.register_variable(Integer("n", causality=Fmi2Causality.output))
+        self.register_variable(Boolean("on", causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        self.y += self.k * self.u * step_size
+        self.n += 1
+        self.on = self.y > 1.0
+        if self.u > 9.0:
+            raise ValueError("too fast")
+        return True
+"""
+_FOREIGN: Files = {
+    MANIFEST: """<fmiReferences xmlns:l="http://fmi-standard.org/fmi-ls-manifest" l:fmi-ls-version="1.0.0-alpha.1"
+        l:fmi-ls-name="org.fmi-standard.fmi-ls-ref" l:fmi-ls-description="Layered Standard">
+      <Related type="application/x-ma-ls-experiments" source="my%20tests/all.exp" role="experiment/smoke-test"/>
+      <Related source="not-there.txt" role="document"/>
+    </fmiReferences>""",
+    f"{FOLDER}/my tests/all.exp": """<Experiments name="All">
+      <Experiment name="step" startTime="0" stopTime="2" stepSize="0.5" tolerance="1e-6">
+        <Parameters source="../k.ssv"/><Stimuli source="u.csv"/><References source="y.csv"/>
+      </Experiment>
+      <Experiment name="draft" tolerance="1e-6">
+        <TransientSimulation startTime="0" stopTime="1" stepSize="0.25"/>
+        <Stimuli source="u.csv"/><References source="%79.csv#x"/>
+      </Experiment>
+      <Experiment name="runs" stopTime="1"><Stimuli source="u.csv"/></Experiment>
+    </Experiments>""",
+    f"{FOLDER}/k.ssv": """<ssv:ParameterSet version="1.0" name="k"
+        xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">
+      <ssv:Parameters><ssv:Parameter name="k"><ssv:Real value="2"/></ssv:Parameter></ssv:Parameters>
+    </ssv:ParameterSet>""",
+    f"{FOLDER}/my tests/u.csv": '"time","u"\r\n0,1\r\n1,1\r\n1,-1\r\n2,-1\r\n',
+    f"{FOLDER}/my tests/y.csv": "time,y,on\n0,0,false\n0.5,1,false\n1,2,true\n",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An FMU of another exporter, Co-Simulation alone, with experiments that we did not write."""
+    folder = tmp_path_factory.mktemp("foreign")
+    (folder / "counter.py").write_text(_SLAVE, encoding="utf-8")
+    return _with(Path(FmuBuilder.build_FMU(folder / "counter.py", dest=folder)), _FOREIGN, folder / "foreign.fmu")
+
+
+def test_an_fmu_of_another_exporter_is_proved(foreign: Path, capsys: Capsys) -> None:
+    assert main(["prove", str(foreign)]) == 0
+    found = [(f.experiment, f.variable, f.passed) for f in prove(foreign)]
+    assert found == [(x, v, True) for x in ("step", "draft") for v in ("y", "on")] + [("runs", "-", True)]
+    assert "missing" not in capsys.readouterr().out, "what FMPy and the FMU say stays out of the table"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line"),
+    [
+        ("my tests/y.csv", "time,y\n0,0\n1,2.00001\n", "step y 5.0e-06 1.0e-06 FAIL"),
+        ("my tests/y.csv", "time,y\n0,0\n3,2\n", "step y inf 1.0e-06 FAIL"),
+        ("k.ssv", _FOREIGN[f"{FOLDER}/k.ssv"].replace('"2"', '"2.1"'), "step y 5.0e-02 1.0e-06 FAIL"),  # type: ignore[union-attr]
+        ("my tests/u.csv", "time,u\n0,10\n", "step - inf 1.0e-06 FAIL fmi2DoStep failed with status"),
+    ],
+)  # fmt: skip
+def test_what_deviates_or_fails_is_told(
+    name: str, text: str, line: str, foreign: Path, tmp_path: Path, capsys: Capsys
+) -> None:
+    fmu = _with(foreign, {f"{FOLDER}/{name}": text}, tmp_path / "other.fmu")
+    assert main(["prove", str(fmu)]) == 1
+    out, err = capsys.readouterr()
+    assert line in [" ".join(told.split())[: len(line)] for told in out.splitlines()]
+    assert err.startswith(f"rov-fmu: {fmu}: ")
+    assert err.endswith(" results are not as expected\n")
+
+
+# ---- Bad input -------------------------------------------------------------------------------------------------------
+
+_EXP = f"{FOLDER}/my tests/all.exp"
+_Y = f"{FOLDER}/my tests/y.csv"
+_U = f"{FOLDER}/my tests/u.csv"
+
+
+def _exp(inner: str) -> str:
+    return f'<Experiments name="x"><Experiment name="a" {inner}</Experiment></Experiments>'
+
+
+BAD: dict[str, tuple[Files, str]] = {
+    "no manifest": ({MANIFEST: None}, f"{MANIFEST}: there is no such file: the FMU carries no reference results"),
+    "another manifest": ({MANIFEST: "<a/>"}, f"{MANIFEST}: must begin with <fmiReferences>, and not with <a>"),
+    "no XML": ({MANIFEST: "<fmiReferences>"}, f"{MANIFEST}: not XML: "),
+    "an empty manifest": ({MANIFEST: "<fmiReferences/>"}, f"{MANIFEST}: names no experiment with expected results"),
+    "no experiments": ({_EXP: None}, f"{_EXP}: there is no such file in the FMU"),
+    "a source elsewhere": (
+        {MANIFEST: '<fmiReferences><Related role="experiment" source="http://a/b.exp"/></fmiReferences>'},
+        f"{MANIFEST}: source = 'http://a/b.exp' does not lead to a file in the FMU",
+    ),
+    "a source outside": (
+        {MANIFEST: '<fmiReferences><Related role="experiment" source="../../../../etc/passwd"/></fmiReferences>'},
+        "../../etc/passwd: there is no such file in the FMU",
+    ),
+    "no source": (
+        {MANIFEST: '<fmiReferences><Related role="experiment"/></fmiReferences>'},
+        f"{MANIFEST}: source = None does not lead to a file in the FMU",
+    ),
+    "no expected results": ({_Y: None}, f"{_Y}: there is no such file in the FMU"),
+    "an unknown variable": ({_Y: "time,q\n0,1\n"}, f"{_Y}: the FMU has no variable 'q'"),
+    "an unknown input": ({_U: "time,q\n0,1\n"}, f"{_U}: the FMU has no variable 'q'"),
+    "no number": ({_Y: "time,y\n0,a\n"}, f"{_Y}: row 1, column 'y' = 'a': must be a number"),
+    "NaN": ({_Y: "time,y\n0,nan\n"}, f"{_Y}: row 1, column 'y' = 'nan': must be a number"),
+    "a torn row": ({_Y: "time,y\n0\n"}, f"{_Y}: row 1: 1 cells below 2 columns"),
+    "time that goes back": ({_Y: "time,y\n1,0\n0,0\n"}, f"{_Y}: row 2: the time goes back"),
+    "a column twice": ({_Y: "time,y,y\n0,0,0\n"}, f"{_Y}: column 'y': there is such a column before"),
+    "no rows": ({_Y: "time,y\n"}, f"{_Y}: has no rows below a header"),
+    "an open quote": ({_Y: 'time,"y\n0,1\n'}, f"{_Y}: not CSV: "),
+    "another kind": ({_EXP: _exp("><SteadyState/>")}, f"{_EXP}: experiment 'a': SteadyState cannot be run"),
+    "no time": ({_EXP: _exp('stopTime="0">')}, f"{_EXP}: experiment 'a': must go on from its start"),
+    "a word for a time": ({_EXP: _exp('stopTime="soon">')}, f"{_EXP}: experiment 'a': stopTime = 'soon': must be a"),
+    "an unknown parameter": (
+        {"k.ssv": '<ParameterSet><Parameter name="q"><Real value="1"/></Parameter></ParameterSet>'},
+        f"{FOLDER}/k.ssv: the FMU has no variable 'q'",
+    ),
+    "a parameter without value": (
+        {"k.ssv": '<ParameterSet><Parameter name="k"/></ParameterSet>'}, f"{FOLDER}/k.ssv: parameter 'k': has no value",
+    ),
+    "a parameter in another unit": (
+        {"k.ssv": '<ParameterSet><Parameter name="k"><Real value="1" unit="N"/></Parameter></ParameterSet>'},
+        f"{FOLDER}/k.ssv: parameter 'k': is in N, and not in None",
+    ),
+    "no description": ({"modelDescription.xml/": "", "modelDescription.xml": None}, "is no FMU that FMPy reads: "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line_that_names_the_file(case: str, foreign: Path, tmp_path: Path, capsys: Capsys) -> None:
+    files, reason = BAD[case]
+    fmu = _with(foreign, files, tmp_path / "bad.fmu")
+    assert main(["prove", str(fmu)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"rov-fmu: {fmu}: {reason}")
+    assert err.count("\n") == 1
+
+
+def _cut(fmu: Path, path: Path) -> None:
+    path.write_bytes(fmu.read_bytes()[:-100])
+
+
+def _flipped(fmu: Path, path: Path) -> None:
+    """Damage in the manifest's bytes, which its checksum tells."""
+    content = fmu.read_bytes()
+    path.write_bytes(content.replace(b"my%20tests", b"mx%20tests"))
+
+
+DAMAGE: dict[str, tuple[Callable[[Path, Path], None], str]] = {
+    "cut off": (_cut, "is no FMU, or a damaged one: "),
+    "a byte changed": (_flipped, f"is no FMU that FMPy reads: Bad CRC-32 for file '{MANIFEST}'"),
+    "not there": (lambda _, __: None, "No such file or directory"),
+    "a folder": (lambda _, path: path.mkdir(), "Is a directory"),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGE)
+def test_a_damaged_archive_is_one_line(case: str, foreign: Path, tmp_path: Path, capsys: Capsys) -> None:
+    damage, reason = DAMAGE[case]
+    damage(foreign, tmp_path / "bad.fmu")
+    assert main(["prove", str(tmp_path / "bad.fmu")]) == 2
+    assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'bad.fmu'}: {reason}")
+
+
+def test_what_an_fmu_does_not_have_is_told(foreign: Path, videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+    assert main(["prove", str(foreign), "--interface", "model-exchange"]) == 2
+    assert capsys.readouterr().err == f"rov-fmu: {foreign}: has no model-exchange, only co-simulation\n"
+    with zipfile.ZipFile(videoray_fmu) as archive:
+        binaries = dict.fromkeys(n for n in archive.namelist() if n.startswith("binaries/"))
+    bare = _with(videoray_fmu, binaries, tmp_path / "bare.fmu")
+    assert main(["prove", str(bare)]) == 2
+    assert "has no binary for this machine" in capsys.readouterr().err
+    assert main(["prove", str(foreign), "--tolerance", "0"]) == 2
