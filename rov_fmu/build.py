@@ -7,8 +7,9 @@ from pathlib import Path
 from time import perf_counter
 
 from rov_fmu.export.archive import archive, native_content, python_content
-from rov_fmu.export.compile import PLATFORMS, BuildError, compile_all, host_platform
+from rov_fmu.export.compile import PLATFORMS, BuildError, OptionError, compile_all, host_platform
 from rov_fmu.export.osp import osp_model_description, osp_path
+from rov_fmu.export.reference_results import reference_results
 from rov_fmu.files.output import Output, check_targets, write_whole
 from rov_fmu.pages.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -38,29 +39,36 @@ def build(
     *,
     platforms: Sequence[str] | None = None,
     backend: str = "native",
+    fmi: int = 2,
     osp: bool = False,
     inputs: Sequence[Path] = (),
     on_compiled: Callable[[str], None] = lambda _: None,
 ) -> Built:
     """Build the FMU of a vehicle, validate it and run it; it is written whole or not at all.
 
-    `output` is <identifier>.fmu in this folder by default, `platforms` all of PLATFORMS; `host` is this machine's. The
-    backend `pythonfmu` makes the flavour in pure Python, for all platforms at once. `osp` also writes
-    <identifier>_OspModelDescription.xml beside it. `inputs` are files that it must not overwrite, besides those
-    that the vehicle names. `on_compiled` is told of every platform that is done.
+    `output` is <identifier>.fmu in this folder by default, of FMI 3.0 (`fmi` = 3) <identifier>.fmi3.fmu; `platforms`
+    all of PLATFORMS; `host` is this machine's. The backend `pythonfmu` makes the flavour in pure Python, for all
+    platforms at once. `osp` also writes <identifier>_OspModelDescription.xml beside it. Both are of FMI 2.0 alone.
+    `inputs` are files that it must not overwrite, besides those that the vehicle names. `on_compiled` is told of every
+    platform that is done.
 
     Raises BuildError; VehicleFileError where a file of the vehicle cannot be read; OSError about a path that cannot be
     written.
     """
     native = backend == "native"
-    output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}.fmu")
+    if fmi == 3 and not native:
+        raise OptionError("--fmi 3: PythonFMU makes FMI 2.0 alone")
+    if fmi == 3 and osp:
+        raise OptionError("--fmi 3: libcosim and the OSP tools, which --osp is for, read FMI 2.0 alone")
+    output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{'.fmi3' if fmi == 3 else ''}.fmu")
     beside = []
     if osp:
         description = osp_model_description(vehicle.layout)
         beside = [Output(osp_path(output, vehicle.identifier), description)]
     check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
     chosen = chosen_platforms(platforms) if native else []
-    content = (native_content if native else python_content)(vehicle, documentation(vehicle, native=native))
+    pages = {**documentation(vehicle, native=native, fmi=fmi), **reference_results(vehicle)}
+    content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
     start = perf_counter()
     seconds: dict[str, float] = {}
 
@@ -69,7 +77,10 @@ def build(
         on_compiled(name)
 
     binaries = compile_all(chosen, content.sources, content.identifier, done)
-    libraries = {f"binaries/{name}/{content.identifier}{PLATFORMS[name].suffix}": b for name, b in binaries.items()}
+    folders = {name: name if fmi == 2 else PLATFORMS[name].folder for name in binaries}
+    libraries = {
+        f"binaries/{folders[name]}/{content.identifier}{PLATFORMS[name].suffix}": b for name, b in binaries.items()
+    }
     packed = archive({**content.files, **libraries})
     notes: list[str] = []
     draft = Output(output, packed, lambda path: notes.append(_check(path, vehicle, chosen if native else None)))

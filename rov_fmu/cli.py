@@ -1,4 +1,4 @@
-"""The command rov-fmu: build | identify | tune | convert | schema | tables | figures."""
+"""The command rov-fmu: build | prove | identify | tune | convert | schema | tables | figures."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,8 +12,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
-from rov_fmu.export.compile import PLATFORMS, BuildError
-from rov_fmu.files.messages import FileError
+from rov_fmu.export.compile import PLATFORMS, BuildError, OptionError
+from rov_fmu.files.messages import FileError, ProofError
 from rov_fmu.files.output import check_targets, write_whole
 from rov_fmu.motion.layout import AXES
 from rov_fmu.process import exit_code
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
     from rov_fmu.build import Built
 
-_EXIT_CODES = {FileError: 2, OSError: 2, click.ClickException: 2, BuildError: 1}
+_EXIT_CODES = {FileError: 2, OSError: 2, click.ClickException: 2, OptionError: 2, BuildError: 1, ProofError: 1}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code: 0 done, 1 a build failed, 2 bad input, 130 interrupted."""
+    """Run the command line; the exit code: 0 done, 1 a build or a proof failed, 2 bad input, 130 interrupted."""
 
     def action() -> None:
         chosen = _commands.main(arguments, "rov-fmu", standalone_mode=False)
@@ -71,13 +71,24 @@ _commands.command_class = _Parsed
 
 @_commands.command("build")
 @_vehicle(default=str(VIDEORAY))
-@click.option("-o", "--output", type=_FILE, metavar="FILE.fmu", help="Where to write it; <identifier>.fmu by default.")
+@click.option(
+    "-o",
+    "--output",
+    type=_FILE,
+    metavar="FILE.fmu",
+    help="Where to write it; <identifier>.fmu by default, of FMI 3.0 <identifier>.fmi3.fmu.",
+)
 @click.option("--backend", type=click.Choice(["native", "pythonfmu"]), default="native", show_default=True,
-              help="Compiled C, or pure Python with PythonFMU.")  # fmt: skip
+              help="Compiled C, or pure Python with PythonFMU (FMI 2.0 alone).")  # fmt: skip
+@click.option("--fmi", type=click.Choice([2, 3]), default=2, show_default=True, help="Version of FMI: 2.0 or 3.0.")
 @click.option("--platform", "platforms", multiple=True, type=click.Choice(["host", *PLATFORMS]), metavar="NAME",
               help=f"host, {', '.join(PLATFORMS)}; may be repeated (default: all).")  # fmt: skip
-@click.option("--osp", is_flag=True, help="Also write <identifier>_OspModelDescription.xml beside it (OSP-IS 1.0.1).")
-def _build(vehicle: Path, output: Path | None, backend: str, platforms: tuple[str, ...], osp: bool) -> None:
+@click.option(
+    "--osp",
+    is_flag=True,
+    help="Also write <identifier>_OspModelDescription.xml beside it (OSP-IS 1.0.1; FMI 2.0 alone).",
+)
+def _build(vehicle: Path, output: Path | None, backend: str, fmi: int, platforms: tuple[str, ...], osp: bool) -> None:
     """Build the FMU of a vehicle: the VideoRay Pro 4 by default."""
     if backend == "pythonfmu" and platforms:
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
@@ -88,7 +99,9 @@ def _build(vehicle: Path, output: Path | None, backend: str, platforms: tuple[st
     loaded = load_vehicle(vehicle)
     chosen = chosen_platforms(platforms) if backend == "native" else []
     with _progress(chosen) as done:
-        built = build(loaded, output, platforms=chosen, backend=backend, osp=osp, inputs=[vehicle], on_compiled=done)
+        built = build(
+            loaded, output, platforms=chosen, backend=backend, fmi=fmi, osp=osp, inputs=[vehicle], on_compiled=done
+        )
     _print_built(built, perf_counter() - started)
 
 
@@ -148,6 +161,23 @@ def _print_built(built: "Built", seconds: float) -> None:
     for path in built.beside:
         out.print(Text(str(path), "bold"), soft_wrap=True)
     out.print(f"  built in {seconds:.1f} s")
+
+
+@_commands.command("prove")
+@click.argument("fmu", type=_FILE)
+@click.option("--interface", type=click.Choice(["co-simulation", "model-exchange"]),
+              help="The first of these that it has, by default.")  # fmt: skip
+@click.option("--tolerance", type=click.FloatRange(min=0.0, min_open=True), help="In place of the experiments' own.")
+def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
+    """Run the experiments that an FMU carries (FMI-LS-REF): any FMU that carries some."""
+    from rov_fmu.export.proof import prove
+    from rov_fmu.pages.console import print_proof
+
+    with _bar() as done:
+        findings = prove(fmu, interface, tolerance, done)
+    print_proof(findings)
+    if wrong := sum(not finding.passed for finding in findings):
+        raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
 
 
 @_commands.command("identify")

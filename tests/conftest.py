@@ -48,11 +48,26 @@ def videoray_dir(videoray_fmu: Path) -> Path:
     return folder
 
 
-def unzipped(vehicle: Path, folder: Path) -> Path:
-    """The folder of the FMU of another vehicle, without its page."""
-    content = native_content(load_vehicle(vehicle))
+@pytest.fixture(scope="session")
+def videoray3_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("FMU für FMI 3") / "videoray.fmi3.fmu"
+    assert main(["build", "--fmi", "3", "--platform", "host", "-o", str(path)]) == 0
+    return path
+
+
+@pytest.fixture(scope="session")
+def videoray3_dir(videoray3_fmu: Path) -> Path:
+    folder = videoray3_fmu.with_suffix("")
+    fmpy.extract(str(videoray3_fmu), unzipdir=str(folder))
+    return folder
+
+
+def unzipped(vehicle: Path, folder: Path, fmi: int = 2) -> Path:
+    """The folder of the FMU of a vehicle, without its page."""
+    content = native_content(load_vehicle(vehicle), fmi=fmi)
     (library,) = compile_all(chosen_platforms(["host"]), content.sources, content.identifier).values()
-    binary = f"binaries/{fmpy.platform}/{content.identifier}{fmpy.sharedLibraryExtension}"
+    host = fmpy.platform if fmi == 2 else fmpy.platform_tuple
+    binary = f"binaries/{host}/{content.identifier}{fmpy.sharedLibraryExtension}"
     for name, data in {**content.files, binary: library}.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)
@@ -69,6 +84,12 @@ def heavy_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def everything_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The FMU of a vehicle that has all that one can have."""
     return unzipped(EVERYTHING, tmp_path_factory.mktemp("everything"))
+
+
+@pytest.fixture(scope="session")
+def heavy3_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The FMU of FMI 3.0 of the BlueROV2 Heavy."""
+    return unzipped(SHIPPED["bluerov2_heavy"], tmp_path_factory.mktemp("heavy3"), fmi=3)
 
 
 @pytest.fixture(scope="module")

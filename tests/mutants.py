@@ -34,10 +34,12 @@ PLACES = ("rov_fmu", "fmu_src/c")
 
 # By file, the first pattern that fits: the default tests that hold it, quick ones first.
 _TESTS = {
+    "fmu_src/c/saved.c": "fmu/test_state fmu/test_state_bytes around/test_fuzz",
     "fmu_src/c/[rst]*.c": "motion/test_c_step motion/test_exactness fmu/test_values fmu/test_derivatives "
     "motion/test_time_to_rest motion/test_extremes motion/test_rov around/test_fuzz",
-    "fmu_src/c/*": "fmu/test_values fmu/test_lifecycle fmu/test_arguments fmu/test_state fmu/test_state_bytes "
-    "fmu/test_model_exchange fmu/test_derivatives around/test_fuzz",
+    "fmu_src/c/*": "fmu/test_values fmu/test_lifecycle fmu/test_arguments fmu/test_instantiation fmu/test_state "
+    "fmu/test_state_bytes fmu/test_model_exchange fmu/test_event_mode fmu/test_intermediate_update "
+    "fmu/test_derivatives around/test_fuzz",
     "rov_fmu/motion/riccati.py": "motion/test_time_to_rest motion/test_riccati motion/test_properties",
     "rov_fmu/motion/series.py": "motion/test_series motion/test_symmetries motion/test_exactness",
     "rov_fmu/motion/*": "motion/test_rov export/test_declared_numbers motion/test_symmetries motion/test_exactness",

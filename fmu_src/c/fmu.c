@@ -11,20 +11,11 @@
 
 #include "interface.h"
 
-/* The functions are named <modelIdentifier>_fmi2..., so that several FMUs can be linked into one program; plainly, as in
- * a shared library, where FMI2_OVERRIDE_FUNCTION_PREFIX is defined. The headers before FMI 2.0.4 do not know it: with
- * them names are plain unless FMI2_FUNCTION_PREFIX is defined for the compiler. */
-#if !defined FMI2_FUNCTION_PREFIX && !defined FMI2_OVERRIDE_FUNCTION_PREFIX
-#define FMI2_FUNCTION_PREFIX MODEL_PREFIX
-#include "fmi2Functions.h"
-#ifndef FMI2_ACTUAL_FUNCTION_PREFIX /* which those of 2.0.4 define; the older ones are included again without prefix */
-#undef FMI2_FUNCTION_PREFIX
-#undef FMI2_Export
-#undef fmi2FullName
-#undef fmi2Functions_h
+#if FMI_VERSION == 3
+#include "fmi3_host.h"
+#else
+#include "fmi2_host.h"
 #endif
-#endif
-#include "fmi2Functions.h"
 
 #include "riccati.c"
 #include "rov.c"
@@ -32,7 +23,16 @@
 #include "series.c"
 #include "rov_step.c"
 
+#include "instance.h"
+#include "instance.c"
+#include "saved.c"
+
+#if FMI_VERSION == 3
+#include "fmi3_common.c"
+#include "fmi3_model_exchange.c"
+#include "fmi3_co_simulation.c"
+#else
 #include "fmi2_common.c"
-#include "fmi2_state.c"
 #include "fmi2_model_exchange.c"
 #include "fmi2_co_simulation.c"
+#endif

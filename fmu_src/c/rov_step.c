@@ -120,26 +120,35 @@ static inline bool is_in_reach(const rov_gains *gains, const double C[WIDTH], co
     return longest >= 0.0;
 }
 
+/* What moves and drives the vehicle while the inputs are held. */
+static inline void flow_begin(const double at[], const rov_gains *gains, rov_held *held, flow *f, double v[WIDTH])
+{
+    memset(f, 0, sizeof *f);
+    memset(v, 0, sizeof(double[WIDTH]));
+    f->gains = gains;
+    rov_hold(at, gains, held);
+    rov_push(at, gains, held->steady, f->then);
+    for (int a = 0; a < N_AXES; a++) {
+        v[a] = at[FIRST_STATE + a];
+        f->C[a] = held->C[a];
+        for (int t = 0; t < N_THRUSTERS; t++) {
+            if (rov_lags(t)) {
+                f->late[THRUSTERS[t].curve][a] += gains->push[t][a] * (at[THRUSTERS[t].force] - held->steady[t]);
+            }
+        }
+    }
+}
+
 /* The states after h > 0 seconds with the inputs held; not finite only where a result overflows. False where the step takes
  * more than MOST_PIECES pieces. */
 static bool rov_step(const double at[], const rov_gains *gains, double h, double next[N_STATES])
 {
     const double *const state = at + FIRST_STATE;
-    double v[WIDTH] = {0.0}, way[WIDTH] = {0.0}, change[N_STATES] = {0.0};
+    double v[WIDTH], way[WIDTH] = {0.0}, change[N_STATES] = {0.0};
     planar sum = {0.0, 0.0};
     rov_held held;
-    flow f = {gains, {0.0}, {0.0}, {{0.0}}};
-    rov_hold(at, gains, &held);
-    rov_push(at, gains, held.steady, f.then);
-    for (int a = 0; a < N_AXES; a++) {
-        v[a] = state[a];
-        f.C[a] = held.C[a];
-        for (int t = 0; t < N_THRUSTERS; t++) {
-            if (rov_lags(t)) {
-                f.late[THRUSTERS[t].curve][a] += gains->push[t][a] * (at[THRUSTERS[t].force] - held.steady[t]);
-            }
-        }
-    }
+    flow f;
+    flow_begin(at, gains, &held, &f, v);
     const double lengths = v[R] == 0.0 && held.C[R] == 0.0 ? 3.0 : 1.0; /* straight, the closed form costs less so soon */
     bool done = (!IS_FREE || is_in_reach(gains, held.C, v, lengths * h)) && series_step(&f, v, h, way, &sum);
     if (IS_FREE && !done) {
@@ -171,4 +180,63 @@ static bool rov_step(const double at[], const rov_gains *gains, double h, double
         next[s] = state[s] + change[s];
     }
     return done;
+}
+
+/* Terms of the pose by those of the velocities and the heading: of x and y as products with its sine and cosine. */
+static void rov_pose_terms(const series *s, double psi, int n, double north, double east, double term[N_STATES])
+{
+    double sine[ORDER + 1] = {sin(psi)}, cosine[ORDER + 1] = {cos(psi)}, ahead = 0.0, aside = 0.0;
+    for (int k = 1; k < n; k++) { /* sin' = r cos, cos' = -r sin */
+        for (int j = 0; j < k; j++) {
+            sine[k] += s->c[j][R] * cosine[k - 1 - j] * INVERSE[k];
+            cosine[k] -= s->c[j][R] * sine[k - 1 - j] * INVERSE[k];
+        }
+    }
+    for (int j = 0; j < n; j++) {
+        ahead += s->c[j][U] * cosine[n - 1 - j] - s->c[j][V] * sine[n - 1 - j];
+        aside += s->c[j][U] * sine[n - 1 - j] + s->c[j][V] * cosine[n - 1 - j];
+    }
+    double v[WIDTH];
+    memcpy(v, s->c[n - 1], sizeof v);
+    v[U] = ahead;
+    v[V] = aside;
+    rov_pose(0.0, v, n == 1 ? north : 0.0, n == 1 ? east : 0.0, term);
+    for (int p = N_AXES; p < N_STATES; p++) {
+        term[p] *= INVERSE[n];
+    }
+}
+
+/* Time derivatives of order 1 <= n <= ORDER of the states and of the thrust, while the inputs are held; d by value
+ * reference, 0 elsewhere. */
+static void rov_rates_of_order(const double at[], const rov_gains *gains, int n, double d[N_VARIABLES])
+{
+    double v[WIDTH], *const rate = d + FIRST_STATE, factorial = 1.0;
+    rov_held held;
+    flow f;
+    series s;
+    memset(d, 0, sizeof(double[N_VARIABLES]));
+    flow_begin(at, gains, &held, &f, v);
+    series_begin(&f, v, 1.0, &s);
+    for (int k = 1; k < n; k++) {
+        series_next(&f, &s, k);
+        factorial *= k + 1;
+    }
+    rov_pose_terms(&s, rov_value(at, POSE_psi == NONE ? NONE : FIRST_STATE + POSE_psi), n, held.north, held.east, rate);
+    memcpy(rate, s.c[n], sizeof(double[N_AXES]));
+    for (int i = 0; i < N_STATES; i++) {
+        rate[i] *= factorial;
+    }
+    for (int t = 0; t < N_THRUSTERS; t++) {
+        if (rov_lags(t)) { /* F' = (F(c) - F)/T */
+            const double lag = gains->rate[THRUSTERS[t].curve];
+            d[THRUSTERS[t].force] = (held.steady[t] - held.F[t]) * lag * pow(-lag, n - 1);
+        }
+    }
+    for (int c = 0; c < N_CURVES; c++) {
+        for (int t = 0; t < N_THRUSTERS; t++) {
+            if (THRUSTERS[t].curve == c && CURVES[c].torque != NONE) {
+                d[CURVES[c].torque] += gains->torque[t] * d[THRUSTERS[t].force];
+            }
+        }
+    }
 }

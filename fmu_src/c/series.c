@@ -151,9 +151,8 @@ static void series_next(const flow *f, series *s, int n)
     series_term(f, s, n);
 }
 
-/* Polynomials from v on over tau seconds, of so many terms that the next ones would be rounding; false where ORDER does not
- * do. */
-static inline bool series_grow(const flow *f, const double v[WIDTH], double tau, series *s)
+/* The first two terms of polynomials from v on over tau seconds. */
+static inline void series_begin(const flow *f, const double v[WIDTH], double tau, series *s)
 {
     double couple[WIDTH] = {0.0};
     s->tau = tau;
@@ -171,6 +170,13 @@ static inline bool series_grow(const flow *f, const double v[WIDTH], double tau,
         s->D[a] = tau * f->gains->axis[a].B[back] + 2.0 * s->A[a] * v[a];
     }
     s->decided = false;
+}
+
+/* Polynomials from v on over tau seconds, of so many terms that the next ones would be rounding; false where ORDER does not
+ * do. */
+static inline bool series_grow(const flow *f, const double v[WIDTH], double tau, series *s)
+{
+    series_begin(f, v, tau, s);
     series_term(f, s, 1); /* by hand, for what is not a loop takes a third less time */
     series_term(f, s, 2);
     series_term(f, s, 3);

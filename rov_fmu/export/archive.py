@@ -11,8 +11,9 @@ from uuid import UUID
 
 from rov_fmu.export.compile import C_SOURCES, UNITY_FILE, fmi_headers
 from rov_fmu.export.interface import interface_header, model_header, variables
-from rov_fmu.export.model_description import NATIVE, PYTHON, model_description
+from rov_fmu.export.model_description import NATIVE, PYTHON, build_description, model_description
 from rov_fmu.export.python_flavour import python_files, python_sources
+from rov_fmu.export.terminals import FOLDER, ICON, terminals_and_icons
 from rov_fmu.files.places import LICENSE
 from rov_fmu.files.reading import read_bytes
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
@@ -20,6 +21,12 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 REPORT = "identification.html"
 """The report in documentation/, where the vehicle file names one."""
+_NEEDED = """What the binaries need of the system, and nothing else:
+
+Linux    GLIBC 2.17 or newer (libc.so.6, libm.so.6)
+Windows  the Universal C Runtime, which is part of Windows since 10
+macOS    11 or newer
+"""
 
 
 @dataclass(frozen=True)
@@ -34,17 +41,23 @@ class Content:
     """The C files to compile; none in pure Python."""
 
 
-def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
-    """The FMU in C, for Co-Simulation and Model Exchange; `pages` go into it by their path."""
+def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2) -> Content:
+    """The FMU in C, for Co-Simulation and Model Exchange, of FMI 2.0 or 3.0; `pages` go into it by their path."""
     declared = variables(vehicle.rov)
-    sources = {path.name: path.read_text(encoding="utf-8") for path in sorted(C_SOURCES.iterdir())}
+    others = f"fmi{5 - fmi}_"
+    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(others)]
+    sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
     sources["model.h"] = model_header(vehicle.rov)
-    describe = partial(model_description, vehicle, declared, interfaces=NATIVE, source_files=(UNITY_FILE,))
+    named = (UNITY_FILE,) if fmi == 2 else ()
+    describe = partial(model_description, vehicle, declared, interfaces=NATIVE[fmi], source_files=named, fmi=fmi)
     guid = _guid(describe(guid=""), sources)
-    sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid)
-    files = {"documentation/licenses/fmi-headers.txt": _fmi_license()}
+    sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid, fmi)
+    files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
-    return Content(vehicle.identifier, guid, {**_common_files(vehicle, describe(guid=guid)), **pages, **files}, sources)
+    if fmi == 3:
+        files["sources/buildDescription.xml"] = build_description(vehicle.identifier)
+        files["documentation/externalDependencies.txt"] = _NEEDED.encode()
+    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, sources)
 
 
 def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
@@ -54,7 +67,7 @@ def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     describe = partial(model_description, vehicle, declared, interfaces=PYTHON)
     guid = _guid(describe(guid=""), sources)
     files = python_files(vehicle, sources)
-    return Content(vehicle.identifier, guid, {**_common_files(vehicle, describe(guid=guid)), **pages, **files}, {})
+    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})
 
 
 def _guid(description: bytes, sources: Mapping[str, str]) -> str:
@@ -65,18 +78,23 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
     return f"{{{UUID(digest.hexdigest()[:32])}}}"
 
 
-def _common_files(vehicle: Vehicle, description: bytes) -> dict[str, bytes]:
+def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, bytes]) -> dict[str, bytes]:
     report = vehicle.provenance.report if vehicle.provenance else None
-    files = {"model.png": vehicle.picture("model.png"), "documentation/licenses/license.txt": LICENSE}
-    if report:
-        files[f"documentation/{REPORT}"] = report
-    read = {name: read_bytes(path, VehicleFileError) for name, path in files.items()}
-    return {"modelDescription.xml": description, **read}
+    files = {
+        "model.png": vehicle.picture("model.png"),
+        "documentation/licenses/license.txt": LICENSE,
+        f"documentation/{REPORT}": report,
+    }
+    read = {name: read_bytes(path, VehicleFileError) for name, path in files.items() if path}
+    if ICON in pages:
+        read.setdefault("model.png", pages[ICON])
+    terminals = {f"{FOLDER}/terminalsAndIcons.xml": terminals_and_icons(vehicle.layout)}
+    return {"modelDescription.xml": description, **terminals, **read, **pages}
 
 
-def _fmi_license() -> bytes:
+def _fmi_license(fmi: int) -> bytes:
     """The licence in the comment of the FMI headers that the binaries are compiled with."""
-    text = (fmi_headers() / "fmi2Functions.h").read_text(encoding="utf-8")
+    text = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
     start = text.index("Copyright (C)")
     lines = text[start : text.index("*/", start)].splitlines()
     return ("\n".join(line.strip() for line in lines).strip() + "\n").encode()

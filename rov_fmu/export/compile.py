@@ -30,13 +30,19 @@ class BuildError(Exception):
     """A build that cannot go on: one line, and the compiler's own output below it where it has one."""
 
 
+class OptionError(BuildError):
+    """Options that do not go together: there is nothing to build."""
+
+
 @dataclass(frozen=True)
 class Platform:
-    """A folder of binaries/ (FMI 2.0, section 2.3) and what the compiler is asked for.
+    """A folder of binaries/ and what the compiler is asked for.
 
     Several targets are joined into one universal file.
     """
 
+    folder: str
+    """In FMI 3.0 (section 2.5.1.4.1); in FMI 2.0 (section 2.3) it is the platform's name."""
     suffix: str
     targets: tuple[str, ...]
     flags: tuple[str, ...] = ()
@@ -48,13 +54,13 @@ _LINUX = ("-lm", "-Wl,-z,max-page-size=4096", "-Wl,-z,common-page-size=4096")
 # FMPy and FMILibrary load darwin64 on Apple Silicon too, hence both processors in one file; the standard has a folder
 # of its own for it (2.3). No importer known looks for x86_64-linux, -windows or -darwin in an FMI 2.0 archive.
 PLATFORMS: dict[str, Platform] = {
-    "linux64": Platform(".so", ("x86_64-linux-gnu.2.17",), _LINUX),
-    "linux32": Platform(".so", ("x86-linux-gnu.2.17",), _LINUX),
-    "aarch64-linux": Platform(".so", ("aarch64-linux-gnu.2.17",), _LINUX),
-    "win64": Platform(".dll", ("x86_64-windows-gnu",)),
-    "win32": Platform(".dll", ("x86-windows-gnu",)),
-    "darwin64": Platform(".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0")),
-    "aarch64-darwin": Platform(".dylib", ("aarch64-macos.11.0",)),
+    "linux64": Platform("x86_64-linux", ".so", ("x86_64-linux-gnu.2.17",), _LINUX),
+    "linux32": Platform("x86-linux", ".so", ("x86-linux-gnu.2.17",), _LINUX),
+    "aarch64-linux": Platform("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",), _LINUX),
+    "win64": Platform("x86_64-windows", ".dll", ("x86_64-windows-gnu",)),
+    "win32": Platform("x86-windows", ".dll", ("x86-windows-gnu",)),
+    "darwin64": Platform("x86_64-darwin", ".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0")),
+    "aarch64-darwin": Platform("aarch64-darwin", ".dylib", ("aarch64-macos.11.0",)),
 }
 
 
@@ -173,8 +179,8 @@ def _compile(compilers: _Compilers, name: str, sources: Mapping[str, str], ident
                 *C_FLAGS,
                 *("-g0", "-s", "-shared", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables"),
                 *WARNINGS,
-                "-DFMI2_OVERRIDE_FUNCTION_PREFIX",
-                f"-I{fmi_headers()}",
+                *(f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3)),
+                *("-isystem", str(fmi_headers())),  # their own warnings are not ours
                 UNITY_FILE,
                 *target_platform.flags,
                 *install_name,

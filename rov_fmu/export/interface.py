@@ -49,7 +49,7 @@ UNITS: dict[str, Unit] = {
 
 @dataclass(frozen=True)
 class Variable:
-    """One scalar variable as FMI 2.0 describes it. Every one is a Real.
+    """One scalar variable as FMI describes it. Every one is a Real, a Float64 in FMI 3.0.
 
     `dependencies` maps each known that the variable depends on to its dependenciesKind, for outputs and derivatives.
     """
@@ -218,7 +218,7 @@ ENDS = ("", REVERSE)
 LOG_CATEGORIES = {
     "logEvents": "Changes of mode: initialization, event mode, reset, termination",
     "logStatusWarning": "A command beyond ±1 that saturates, a call or a time that the standard does not foresee; once",
-    "logStatusDiscard": "A value refused by fmi2SetReal or by a solver's state: not finite, or outside min ... max",
+    "logStatusDiscard": "A refused value, of a variable or of a solver's state: not finite, or outside min ... max",
     "logStatusError": "Illegal calls and arguments, steps past stopTime, results that overflow",
 }
 
@@ -287,13 +287,14 @@ def model_header(rov: Rov) -> str:
     )  # fmt: skip
 
 
-def interface_header(rov: Rov, identifier: str, guid: str) -> str:
+def interface_header(rov: Rov, identifier: str, token: str, fmi: int = 2) -> str:
     """interface.h: what the FMI layer knows of the variables, and the names of the functions in a static library."""
     return render(
         "interface.h.j2",
         variables=variables(rov),
         identifier=identifier,
-        guid=guid,
+        token=token,
+        fmi=fmi,
         log_categories=LOG_CATEGORIES,
         c_double=lambda value, otherwise: otherwise if value is None else repr(value),
     )

@@ -1,12 +1,16 @@
-"""modelDescription.xml from the variables (FMI 2.0, section 2.2)."""
+"""modelDescription.xml from the variables (FMI 2.0, section 2.2; FMI 3.0, section 2.4)."""
 
 from collections.abc import Mapping
 
 from rov_fmu import __version__
+from rov_fmu.export.compile import UNITY_FILE
 from rov_fmu.export.interface import LOG_CATEGORIES, UNITS, Variable, parameters_of
 from rov_fmu.files.templates import render
 from rov_fmu.motion.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
+
+OUTPUT_ORDER = 19
+"""Time derivatives of the outputs that are given: ORDER of series.c."""
 
 # What is false is written out too, for FMI++ ends where it is absent.
 _COMMON = {
@@ -21,12 +25,38 @@ _CO_SIMULATION = {
     "canRunAsynchronuously": "false",
     **_COMMON,
 }
+_COMMON_3 = {
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "providesDirectionalDerivatives": "true",
+    "providesAdjointDerivatives": "true",
+}
 
 # The interfaces of each flavour and what they can do, as it really is.
 NATIVE = {
-    "ModelExchange": {**_COMMON, "providesDirectionalDerivative": "true"},
-    "CoSimulation": {**_CO_SIMULATION, "maxOutputDerivativeOrder": "1", "providesDirectionalDerivative": "true"},
+    2: {
+        "ModelExchange": {**_COMMON, "providesDirectionalDerivative": "true"},
+        "CoSimulation": {
+            **_CO_SIMULATION,
+            "maxOutputDerivativeOrder": "1",  # OUTPUT_ORDER are given, but fmu-runner takes this for a Boolean
+            "providesDirectionalDerivative": "true",
+        },
+    },
+    3: {
+        "ModelExchange": {**_COMMON_3, "needsCompletedIntegratorStep": "false"},
+        "CoSimulation": {
+            **_COMMON_3,
+            "canHandleVariableCommunicationStepSize": "true",
+            "maxOutputDerivativeOrder": str(OUTPUT_ORDER),
+            "providesIntermediateUpdate": "true",
+            "mightReturnEarlyFromDoStep": "true",
+            "canReturnEarlyAfterIntermediateUpdate": "true",
+            "hasEventMode": "true",
+        },
+    },
 }
+"""By version of FMI."""
 PYTHON = {"CoSimulation": {"needsExecutionTool": "true", **_CO_SIMULATION}}
 
 _EXPERIMENT = {"startTime": 0.0, "stopTime": 10.0, "tolerance": 1e-6, "stepSize": 0.01}
@@ -39,51 +69,84 @@ def model_description(
     guid: str,
     interfaces: Mapping[str, Mapping[str, str]],
     source_files: tuple[str, ...] = (),
+    fmi: int = 2,
 ) -> bytes:
-    """The XML document, UTF-8, indented, the same bytes for the same arguments."""
+    """The XML document of a version of FMI, UTF-8, indented, the same bytes for the same arguments."""
     head = {
-        "fmiVersion": "2.0",
+        "fmiVersion": f"{fmi}.0",
         "modelName": vehicle.identifier,
-        "guid": guid,
+        "guid" if fmi == 2 else "instantiationToken": guid,
         "description": vehicle.description,
         "author": vehicle.source,
         "version": vehicle.version,
         "license": "MIT, see documentation/licenses/license.txt",
         "generationTool": f"rov-fmu {__version__}",
         "variableNamingConvention": "structured",
-        "numberOfEventIndicators": "0",
+        "numberOfEventIndicators": "0" if fmi == 2 else None,
     }
+    if fmi == 3:
+        variables = (*variables, Variable("time", len(variables), "Time", "s", "independent", "continuous"))
+    number = {v.name: v.index if fmi == 2 else v.value_reference for v in variables}
     return render(
         "modelDescription.xml.j2",
         head=head,
         interfaces={name: {"modelIdentifier": vehicle.identifier, **can} for name, can in interfaces.items()},
         source_files=source_files,
         units={name: UNITS[name] for name in dict.fromkeys(v.unit for v in variables)},
+        types={_type_name(v): _type(v) for v in variables} if fmi == 3 else {},
+        type_name=_type_name,
         log_categories=LOG_CATEGORIES,
         experiment=_EXPERIMENT,
         variables=variables,
-        index={v.name: v.index for v in variables},
-        structure=_structure(variables, vehicle.layout),
+        number=number,
+        numbers=lambda names: " ".join(str(number[name]) for name in names),
+        structure=_structure(variables, vehicle.layout, _LISTS[fmi]),
     ).encode()
 
 
-def _structure(variables: tuple[Variable, ...], layout: Layout) -> dict[str, dict[int, dict[int, str]]]:
-    """The lists of <ModelStructure>: by index of an unknown, the kinds of the knowns it depends on, by index."""
-    index, parameters = {v.name: v.index for v in variables}, parameters_of(layout)
-    lists: dict[str, dict[int, dict[int, str]]] = {"Outputs": {}, "Derivatives": {}, "InitialUnknowns": {}}
+def build_description(identifier: str) -> bytes:
+    """sources/buildDescription.xml (FMI 3.0, section 2.5.1.3.1): how the sources become the library."""
+    return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
 
-    def add(to: str, variable: Variable, known: Mapping[str, str]) -> None:
-        lists[to][variable.index] = dict(sorted((index[name], kind) for name, kind in known.items()))
+
+# In FMI 3.0 unit and size stand with a type, for some importers do not know them of a variable.
+
+
+def _type(variable: Variable) -> dict[str, str | float | None]:
+    return {"unit": variable.unit, "displayUnit": variable.display_unit, "nominal": variable.nominal}
+
+
+def _type_name(variable: Variable) -> str:
+    shown = f", shown in {variable.display_unit}" if variable.display_unit else ""
+    return f"{variable.unit}{shown}{'' if variable.nominal is None else f', about {variable.nominal:g}'}"
+
+
+_LISTS = {
+    2: ("Outputs", "Derivatives", "InitialUnknowns"),
+    3: ("Output", "ContinuousStateDerivative", "InitialUnknown"),
+}
+
+
+def _structure(
+    variables: tuple[Variable, ...], layout: Layout, names: tuple[str, str, str]
+) -> dict[str, dict[str, dict[str, str]]]:
+    """The lists of <ModelStructure>: by name of an unknown, the kinds of the knowns it depends on, by name."""
+    parameters, order = parameters_of(layout), {v.name: v.index for v in variables}
+    lists: dict[str, dict[str, dict[str, str]]] = {name: {} for name in names}
+    outputs, derivatives, initial = lists.values()
+
+    def add(to: dict[str, dict[str, str]], variable: Variable, known: Mapping[str, str]) -> None:
+        to[variable.name] = dict(sorted(known.items(), key=lambda item: order[item[0]]))
 
     for v in variables:
         if v.dependencies is None:
             continue
         if v.causality == "output":
-            add("Outputs", v, v.dependencies)
+            add(outputs, v, v.dependencies)
         if v.derivative_of:
-            add("Derivatives", v, v.dependencies)
+            add(derivatives, v, v.dependencies)
         if v.initial == "calculated":
             # Initialization knows no parameters that are fixed: a factor is constant or not (2.2.8).
             at_start = {n: "constant" if kind == "constant" else "dependent" for n, kind in v.dependencies.items()}
-            add("InitialUnknowns", v, at_start | dict.fromkeys(parameters.get(v.name, ()), "dependent"))
+            add(initial, v, at_start | dict.fromkeys(parameters.get(v.name, ()), "dependent"))
     return lists

@@ -32,7 +32,7 @@ def layout_of(given: Any) -> layout.Layout:
 
 
 def _time_tolerance(t: float, h: float) -> float:
-    """Rounding of communication points, as in fmi2_co_simulation.c."""
+    """Rounding of communication points, as in instance.c."""
     return min(1e-9 * (abs(t) + h), 0.5 * h)
 
 

@@ -10,6 +10,10 @@ class FileError(ValueError):
         super().__init__("\n".join(map(one_line, reasons)))
 
 
+class ProofError(Exception):
+    """An FMU that does not come to the results that it carries."""
+
+
 def one_line(text: str) -> str:
     """Line breaks, other control characters and undecodable bytes of a file's name as Python writes them."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 from decimal import Decimal
 from math import isnan
+from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
@@ -10,6 +11,9 @@ from rich.table import Table
 
 from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from rov_fmu.export.proof import Finding
 
 DEVIATION = "+.1%"
 _MIN_WIDTH = 110  # rich takes 80 columns in a pipe, and cuts digits off to fit a table into them
@@ -34,6 +38,21 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
         "dev.: the computed value against the printed one; under test, the scaled model against the test.\n"
         "*: the printed value is not the computed one rounded to its digits. -: not printed, not measured."
     )
+
+
+def print_proof(findings: "Iterable[Finding]") -> None:
+    """How far each variable of an experiment is from its expected values."""
+    found = table("", "experiment", (), ("variable",))
+    for header in ("deviation", "tolerance"):
+        found.add_column(header, justify="right", no_wrap=True)
+    found.add_column("")
+    for f in findings:
+        found.add_row(
+            f.experiment, f.variable, text(f.deviation, ".1e"), text(f.tolerance, ".1e"),
+            "pass" if f.passed else f"FAIL {f.error}",
+        )  # fmt: skip
+    console().print(found)
+    console().print("\nDeviation: relative to the largest expected value of the variable.")
 
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:

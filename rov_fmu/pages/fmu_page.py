@@ -14,10 +14,13 @@ from matplotlib.figure import Figure
 
 from rov_fmu.export.archive import REPORT
 from rov_fmu.export.interface import variables
+from rov_fmu.export.model_description import OUTPUT_ORDER
+from rov_fmu.export.reference_results import TOLERANCE
 from rov_fmu.motion.layout import ARM, Axis, Layout
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages import equations
 from rov_fmu.pages.drawing import draw_thrusters, scenes
+from rov_fmu.pages.pictures import pictures
 from rov_fmu.pages.plots import Step, draw_curve, draw_steps, evenly, finish, measured_step
 from rov_fmu.pages.svg import LIGHT, inline_file, inline_svg, svg_file
 from rov_fmu.pages.templates import page
@@ -34,13 +37,14 @@ _FRAMES = {
 # ---- The page ------------------------------------------------------------------------------------------------------
 
 
-def documentation(vehicle: Vehicle, *, native: bool) -> dict[str, bytes]:
-    """The page by its path in the FMU. Raises FileError."""
-    return {"documentation/index.html": documentation_page(vehicle, native=native).encode()}
+def documentation(vehicle: Vehicle, *, native: bool, fmi: int = 2) -> dict[str, bytes]:
+    """The page and the pictures by their path in the FMU. Raises FileError."""
+    text = documentation_page(vehicle, native=native, fmi=fmi)
+    return {"documentation/index.html": text.encode(), **pictures(vehicle.rov)}
 
 
-def documentation_page(vehicle: Vehicle, *, native: bool = True) -> str:
-    """The page of a vehicle as HTML, of the native FMU or the one in pure Python.
+def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2) -> str:
+    """The page of a vehicle as HTML, of the native FMU in a version of FMI or the one in pure Python.
 
     Without a data folder it goes without tables and measurements.
     """
@@ -51,9 +55,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True) -> str:
     first = axes[0]
     start = {name: 0.3 * sign for name, sign in layout.signs(first).items()}
     rest = dict.fromkeys([*layout.inputs, *layout.state], 0.0)
-    own = [
-        (label, path) for name, label in _FRAMES.items() if (path := vehicle.picture(name)).parent == vehicle.pictures
-    ]
+    own = [(label, path) for name, label in _FRAMES.items() if (path := vehicle.picture(name))]
     return page(
         "index.html.j2",
         vehicle=vehicle,
@@ -61,6 +63,8 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True) -> str:
         is_free=not layout.coupled and not layout.lagging,
         is_tuned=_is_tuned(rov),
         native=native,
+        fmi=fmi,
+        output_order=OUTPUT_ORDER,
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
         groups=[
             list(group) for _, group in groupby(variables(rov), lambda v: (v.causality, v.variability, v.initial))
@@ -73,6 +77,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True) -> str:
         arm=[rov[name] for name in ARM] if layout.has_arm else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
+        tolerance=f"{TOLERANCE:g}",
         first=first,
         moved=rov.step(rest | start, rest, 10.0)[first.velocity],
         moves_at_rest=any(rov.derivatives(rest, rest).values()),

@@ -50,8 +50,8 @@ class FileHead(Head):
     """A folder beside the file with the published tables, as `rov-fmu tables` prints them; its files are named and
     headed as those of `models/videoray/tables`."""
     pictures: _Folder | None = None
-    """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`; a neutral
-    `model.png` where there is none; the thrusters are drawn from their geometry in any case."""
+    """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`; the
+    icon and the thrusters are drawn from their geometry in any case."""
 
 
 _Command = Annotated[float, Field(ge=0.0, le=1.0)]

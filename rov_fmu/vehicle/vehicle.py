@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rov_fmu.files.messages import FileError
-from rov_fmu.files.places import FMU_SRC
 from rov_fmu.files.toml_file import Toml, check, read_toml, told
 from rov_fmu.motion.layout import Layout
 from rov_fmu.motion.rov import Rov
@@ -99,10 +98,10 @@ class Vehicle:
         pictures = [self.pictures / name for name in PICTURES] if self.pictures else []
         return [path for path in (*tables, *pictures, report) if path and path.is_file()]
 
-    def picture(self, name: str) -> Path:
-        """The vehicle's own picture of this name, or the neutral one."""
+    def picture(self, name: str) -> Path | None:
+        """The vehicle's own picture of this name, if it has one."""
         own = self.pictures / name if self.pictures else None
-        return own if own and own.is_file() else FMU_SRC / "pictures" / name
+        return own if own and own.is_file() else None
 
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from checks.c_programs import clang
-from checks.legal import MODES, legal_modes
+from checks.legal import legal_modes
 from fuzz import __main__ as command
 from fuzz.campaign import FindingError, build_target, fuzz, replay, unpack_corpus
 from rov_fmu.export.archive import native_content
@@ -23,82 +23,109 @@ def corpus(tmp_path: Path) -> Path:
     return tmp_path / "corpus"
 
 
+NEVER = {2: {"fmi2GetStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus"}, 3: set[str]()}
+"""Legal and refused all the same: no step is ever pending."""
+MISSING = {
+    2: {"fmi2CancelStep"},
+    3: {
+        "fmi3EnterConfigurationMode",
+        "fmi3ExitConfigurationMode",
+        "fmi3ActivateModelPartition",
+        "fmi3GetNumberOfVariableDependencies",
+        "fmi3GetVariableDependencies",
+    },
+}
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize(
     "name", [n if n == "videoray" else pytest.param(n, marks=pytest.mark.long) for n in command.VEHICLES]
 )
-def test_the_corpus_reaches_every_function_and_finds_nothing(corpus: Path, tmp_path: Path, name: str) -> None:
-    build_target(native_content(load_vehicle(command.VEHICLES[name])).sources, tmp_path / "target")
+def test_the_corpus_reaches_every_function_and_finds_nothing(corpus: Path, tmp_path: Path, name: str, fmi: int) -> None:
+    build_target(native_content(load_vehicle(command.VEHICLES[name]), fmi=fmi).sources, tmp_path / "target", fmi)
     counts = replay(tmp_path / "target", [corpus], tmp_path)
-    legal = {name for kind in MODES for name in legal_modes(kind)}
-    never = {"fmi2GetStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus"}  # no step is ever pending
-    assert {name for name, accepted in +counts if accepted} == legal - never
-    assert {name for name, accepted in +counts if not accepted} == legal | {"fmi2CancelStep"}
+    # FMI 3.0 has one kind of instances more
+    legal = {name for kind in range(fmi) for name in legal_modes(kind, fmi)}
+    assert {name for name, accepted in +counts if accepted} == legal - NEVER[fmi]
+    assert {name for name, accepted in +counts if not accepted} == legal | MISSING[fmi]
 
 
 # A line of C, what it is made into, and how the fuzzer tells.
 PLANTED = {
     "a bound is not looked at": (
-        "fmi2_common.c",
-        "if (value[i] < info->minimum || value[i] > info->maximum) {",
-        "if (value[i] < info->minimum) {",
-        "fmi2SetReal: illegal",
+        "instance.c",
+        "if (value[i] < info->minimum || value[i] > info->maximum) {\n                DISCARD",
+        "if (value[i] < info->minimum) {\n                DISCARD",
+        "SetReal: illegal",
     ),
     "a refused value stays": (
-        "fmi2_common.c",
+        "instance.c",
         "        if (!isfinite(value[i])) {",
         "        f->now.values[vr[i]] = isfinite(value[i]) ? value[i] : old;\n        if (!isfinite(value[i])) {",
-        "fmi2SetReal changes instance",
+        "SetReal changes instance",
     ),
     "a value reference is not looked at": (
-        "fmi2_common.c",
-        'REQUIRE("fmi2GetReal", vr[i] < N_VARIABLES,',
-        'REQUIRE("fmi2GetReal", vr[i] < N_VARIABLES + 2,',
-        "runtime error: index 4[67] out of bounds",
+        "instance.c",
+        "return reference < N_VARIABLES ? &f->now.values[reference]",
+        "return reference < N_VARIABLES + 2 ? &f->now.values[reference]",
+        "runtime error: index 4[67] out of bounds|GetReal: illegal",
     ),
     "a call is legal in a mode too many": (
-        "fmi2_model_exchange.c",
-        'OPEN("fmi2SetContinuousStates", CONTINUOUS);',
-        'OPEN("fmi2SetContinuousStates", CONTINUOUS | EVENT);',
-        "fmi2SetContinuousStates: illegal in Event Mode",
+        "instance.h",
+        "MAY_INTEGRATE = CONTINUOUS,",
+        "MAY_INTEGRATE = CONTINUOUS | EVENT,",
+        "(SetContinuousStates|CompletedIntegratorStep): illegal in Event Mode",
     ),
     "a message may introduce a value reference": (
-        "fmi2_instance.h",
-        "if (*c == '%' || *c == '#') {",
-        "if (*c == '%') {",
+        "instance.h",
+        "if (*c == '#' || (LOG_IS_FORMAT && *c == '%')) {",
+        "if (LOG_IS_FORMAT && *c == '%') {",
         "a message with a single #",
     ),
     "what is warned of once is in the state": (
-        "fmi2_common.c",
+        "instance.c",
         "    if (f->now.mode == INSTANTIATED) {\n        WARN",
         "    if (f->now.mode == INSTANTIATED) {\n        f->now.time = 1.0;\n        WARN",
         "to read changes the instance",
     ),
     "the last byte of a state is not there": (
-        "fmi2_state.c",
+        "saved.c",
         "size >= SERIALIZED_SIZE,",
         "size >= SERIALIZED_SIZE - 1,",
         "AddressSanitizer: heap-buffer-overflow",
     ),
     "the time is not in the bytes": (
-        "fmi2_state.c",
+        "saved.c",
         "put_double(&to, s->time);",
         "put_double(&to, 0.0);",
         "a state restored from bytes goes another way",
     ),
     "damaged bytes are taken": (
-        "fmi2_state.c",
+        "saved.c",
         "get_word(&from) == checksum(bytes, SERIALIZED_SIZE - 8),",
         "get_word(&from) + 1 > 0,",
         "fmi2DeSerializeFMUstate: illegal",
     ),
     "a restored state steps with the coefficients from before": (
-        "fmi2_state.c",
+        "saved.c",
         "    rov_prepare(f->now.values, &f->gains);\n",
         "",
         "the gains are those of other coefficients|goes another way",
     ),
-    "a state is not freed": ("fmi2_state.c", "    free(saved);\n", "", "LeakSanitizer: detected memory leaks"),
-    "overflow is not looked at": ("fmi2_co_simulation.c", "if (sum != 0.0) {", "if (sum > 0.0) {", "broken property"),
+    "a state is not freed": ("saved.c", "    free(saved);\n", "", "LeakSanitizer: detected memory leaks"),
+    "overflow is not looked at": ("instance.c", "if (sum != 0.0) {", "if (sum > 0.0) {", "broken property"),
+    "a failed step moves the time": (
+        "instance.c",
+        "    TRY(is_step(f, t, h));\n    TRY(advance",
+        "    TRY(is_step(f, t, h));\n    f->now.time = t;\n    TRY(advance",
+        "fmi2DoStep changes instance",
+    ),
+    "a high derivative is not that of the motion": (
+        "series.c",
+        "rest[a] = -s->A[a] * (2.0 * square[a] + middle * middle);",
+        "rest[a] = -s->A[a] * (2.0 * square[a] + 1.001 * middle * middle);",
+        "a series of derivatives|a step and its parts",
+    ),
     "fast motion is pushed by its drag": (
         "riccati.c",
         "const double change = (c - (b + drag) * v0) * N / growth;",
@@ -131,14 +158,77 @@ PLANTED_IN_HEAVY = {
         "rov.c",
         "rate[V] -= gains->c_v * v[U] * v[R];",
         "rate[V] += 100.0 * gains->c_v * v[U] * v[R];",
-        "at most",
+        "at most|a step and its parts",
     ),
     "a lag overshoots": (
         "rov_step.c",
         "(held.F[t] - held.steady[t]) * expm1(",
         "1.01 * (held.F[t] - held.steady[t]) * expm1(",
-        "F of thruster",
+        "F of thruster|a step and its parts",
     ),
+}
+
+
+PLANTED_IN_FMI3 = {
+    "the adjoint takes another row": (
+        "fmi3_common.c",
+        "sum += seed[i] * d[unknowns[i]];",
+        "sum += seed[i] * d[unknowns[n_unknowns - 1]];",
+        "adjoint .*, directional",
+    ),
+    "the number of values is not looked at": (
+        "fmi3_common.c",
+        "REQUIRE(references == values,",
+        "REQUIRE(references <= values + 1,",
+        "illegal|heap-buffer-overflow",
+    ),
+    "an update may save the state": (
+        "instance.h",
+        "MAY_SAVE = BETWEEN,",
+        "MAY_SAVE = BETWEEN | INTERMEDIATE,",
+        "illegal in Intermediate Update Mode",
+    ),
+    "an update may tune": (
+        "instance.c",
+        "case INTERMEDIATE: return kind == INPUT;",
+        "case INTERMEDIATE: return kind == INPUT || kind == TUNABLE;",
+        "fmi3SetFloat64: illegal in Intermediate Update Mode",
+    ),
+    "pieces are counted from the time": (
+        "fmi3_co_simulation.c",
+        "TRY(advance(f, t + from, gone - from));",
+        "TRY(advance(f, t + from, t + gone - (t + from)));",
+        "a step and its parts|broken property",
+    ),
+    "an early return goes on": (
+        "fmi3_co_simulation.c",
+        "*length = fmax(wanted - t, gone);",
+        "*length = fmax(wanted - t, gone) + 1e-4;",
+        "an early return|what an update may|update .* instead of|a step from",
+    ),
+    "inputs are taken at the end of a piece": (
+        "fmi3_co_simulation.c",
+        "        TRY(advance(f, t + from, gone - from));\n",
+        "        TRY(advance(f, t + from, 1.001 * (gone - from)));\n",
+        "broken property",
+    ),
+    "Event Mode without its being asked for": (
+        "fmi3_common.c",
+        "if (f->now.mode == STEP && !f->host.uses_events) {",
+        "if (f->now.mode == STEP && f->host.uses_events && !f->host.uses_events) {",
+        "fmi3EnterEventMode: illegal in Step Mode",
+    ),
+    "a state in Event Mode is put where there is none": (
+        "saved.c",
+        "(has_event_mode(of) ? EVENT : 0)",
+        "(of != NULL ? EVENT : 0)",
+        "(fmi3SetFMUState|fmi3DeserializeFMUState): illegal|in Event Mode instead",
+    ),
+}
+EVERY_PLANTED = {
+    **{name: ("videoray", 2, *planted) for name, planted in PLANTED.items()},
+    **{name: ("bluerov2_heavy", 2, *planted) for name, planted in PLANTED_IN_HEAVY.items()},
+    **{name: ("videoray", 3, *planted) for name, planted in PLANTED_IN_FMI3.items()},
 }
 
 
@@ -150,30 +240,30 @@ def test_a_finding_can_be_made_again(
     file, line, planted, told = PLANTED["the time is not in the bytes"]
     content = native_content(vehicle)
     content = replace(content, sources={**content.sources, file: content.sources[file].replace(line, planted)})
-    monkeypatch.setattr(command, "native_content", lambda _vehicle: content)
+    monkeypatch.setattr(command, "native_content", lambda *_, **__: content)
     monkeypatch.chdir(tmp_path)
-    assert command.main(["--vehicle", "videoray", str(corpus)]) == 1
+    assert command.main(["--vehicle", "videoray", "--fmi", "2", str(corpus)]) == 1
     assert told in (words := capsys.readouterr().err)
     (kept,) = tmp_path.glob("finding-*")
-    assert f"again with: python -m fuzz --vehicle videoray ./{kept.name}, in base64:\n" in words
+    assert f"again with: python -m fuzz --vehicle videoray --fmi 2 ./{kept.name}, in base64:\n" in words
     assert b64decode(words.split()[-1]) == kept.read_bytes()
-    assert command.main(["--vehicle", "videoray", kept.name]) == 1
+    assert command.main(["--vehicle", "videoray", "--fmi", "2", kept.name]) == 1
     assert told in capsys.readouterr().err
 
 
 def test_every_defect_has_a_place_to_be_planted(vehicle: Vehicle) -> None:
-    sources, planted = native_content(vehicle).sources, PLANTED | PLANTED_IN_HEAVY
-    assert [name for name, (file, line, *_) in planted.items() if sources[file].count(line) != 1] == []
+    sources = {fmi: native_content(vehicle, fmi=fmi).sources for fmi in (2, 3)}
+    every = EVERY_PLANTED.items()
+    assert [name for name, (_, fmi, file, line, *_) in every if sources[fmi][file].count(line) != 1] == []
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [*PLANTED, *PLANTED_IN_HEAVY])
+@pytest.mark.parametrize("name", list(EVERY_PLANTED))
 def test_a_planted_defect_is_found_within_a_minute(corpus: Path, tmp_path: Path, name: str) -> None:
-    file, line, planted, told = (PLANTED | PLANTED_IN_HEAVY)[name]
-    vehicle = load_vehicle(command.VEHICLES["videoray" if name in PLANTED else "bluerov2_heavy"])
-    sources = dict(native_content(vehicle).sources)
+    vehicle, fmi, file, line, planted, told = EVERY_PLANTED[name]
+    sources = dict(native_content(load_vehicle(command.VEHICLES[vehicle]), fmi=fmi).sources)
     sources[file] = sources[file].replace(line, planted)
-    build_target(sources, tmp_path / "target")
+    build_target(sources, tmp_path / "target", fmi)
     with pytest.raises(FindingError) as found:
         fuzz(tmp_path / "target", corpus, tmp_path, seconds=60, jobs=2)
     assert re.search(told, str(found.value))

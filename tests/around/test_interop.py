@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, partial
 from itertools import pairwise
 from math import nan
 from pathlib import Path
@@ -16,8 +17,7 @@ from interop.__main__ import main
 from interop.importers import EXACT, HERE, IMPORTERS, KITS, RUNNERS, Importer, pinned
 from interop.install import install
 from interop.manoeuvre import DETOUR, MANOEUVRES, TIMES, Manoeuvre, ResultError
-from interop.run import Verdict, run, without_places
-from rov_fmu import cli
+from interop.run import Verdict, build_fmu, run, without_places
 
 TOOLS = HERE / ".tools"
 SIMPLE = MANOEUVRES["videoray"]
@@ -180,7 +180,8 @@ def test_verdict(
     outcome = run(importer, fmu, tools, SIMPLE)
     assert outcome.verdict is verdict
     monkeypatch.setattr("interop.importers.IMPORTERS", (importer,))
-    assert main(["--vehicle", "videoray", "--fmu", str(fmu), "--tools", str(tools)]) == (0 if verdict.is_good else 1)
+    arguments = ["--vehicle", "videoray", "--fmi", "2", "--fmu", str(fmu), "--tools", str(tools)]
+    assert main(arguments) == (0 if verdict.is_good else 1)
 
 
 @pytest.mark.parametrize("manoeuvre", MANOEUVRES.values(), ids=lambda manoeuvre: manoeuvre.vehicle)
@@ -200,17 +201,49 @@ def test_importer_that_is_not_installed(
     fmu = tmp_path / "any.fmu"
     fmu.touch()
     monkeypatch.setattr("interop.importers.IMPORTERS", (PRETEND,))
-    arguments = ["--vehicle", "videoray", "--fmu", str(fmu), "--tools", str(tmp_path)]
+    arguments = ["--vehicle", "videoray", "--fmi", "2", "--fmu", str(fmu), "--tools", str(tmp_path)]
     assert main(arguments) == 0
     assert "python -m interop --install python" in capsys.readouterr().out
     assert main([*arguments, "pretend"]) == 1, "what is asked for by name must run"
     assert main([*arguments, "python"]) == 1
 
 
-@pytest.mark.parametrize("arguments", [["nothing"], ["--vehicle", "videoray", "--fmu", "nothing.fmu"]])
-def test_bad_arguments(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(arguments) == 2
-    assert capsys.readouterr().err.startswith("interop: nothing")
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("nothing", "nothing: no such importer"),
+        ("--vehicle videoray --fmi 3 --fmu nothing.fmu", "nothing.fmu"),
+        ("--vehicle videoray --fmu nothing.fmu", "--fmu goes with --vehicle and --fmi"),
+        ("--fmi 3 --fmu nothing.fmu", "--fmu goes with --vehicle and --fmi"),
+        ("--fmi 3 fmpy-cs fmpy-cs-fmi3", "fmpy-cs: not with this version of FMI"),
+        ("--fmi 3 java", "java: not with this version of FMI"),
+    ],
+)
+def test_bad_arguments(arguments: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments.split()) == 2
+    assert capsys.readouterr().err.startswith(f"interop: {message}")
+
+
+def test_each_importer_gets_the_version_that_it_takes(
+    tools: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    built = []
+
+    def build(vehicle: str, fmi: int, folder: Path) -> Path:
+        built.append((vehicle, fmi))
+        (folder / f"{vehicle}{fmi}").write_text(str(fmi))
+        return folder / f"{vehicle}{fmi}"
+
+    program = "import sys; from pathlib import Path; sys.exit(Path('rov.fmu').read_text() != sys.argv[1])"
+    importers = [
+        replace(PRETEND, name=f"{n}", command=("{python}", "-c", program, f"{fmi}"), tolerance=None, fmi=fmi)
+        for n, fmi in enumerate((2, 3, 3, 2))
+    ]
+    monkeypatch.setattr("interop.importers.IMPORTERS", tuple(importers))
+    monkeypatch.setattr("interop.__main__.build_fmu", build)
+    assert main(["--tools", str(tools)]) == 0
+    assert sorted(built) == [(vehicle, fmi) for vehicle in sorted(MANOEUVRES) for fmi in (2, 3)], "each is built once"
+    assert [fmi for fmi in capsys.readouterr().out.split() if fmi in {"2.0", "3.0"}] == ["2.0", "3.0", "3.0", "2.0"]
 
 
 def test_log_names_no_folder_and_no_host(tmp_path: Path) -> None:
@@ -287,16 +320,14 @@ def test_no_registry_is_named() -> None:
 
 
 @pytest.fixture(scope="session")
-def fmu(manoeuvre: Manoeuvre, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("FMU für Tests") / "any.fmu"
-    assert cli.main(["build", manoeuvre.vehicle, "--platform", "host", "-o", str(path)]) == 0
-    return path
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
+    return cache(partial(build_fmu, folder=tmp_path_factory.mktemp("FMU für Tests")))
 
 
 @pytest.mark.interop
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
-def test_importer(importer: Importer, fmu: Path, manoeuvre: Manoeuvre) -> None:
-    outcome = run(importer, fmu, TOOLS, manoeuvre)
+def test_importer(importer: Importer, fmu: Callable[[str, int], Path], manoeuvre: Manoeuvre) -> None:
+    outcome = run(importer, fmu(manoeuvre.vehicle, importer.fmi), TOOLS, manoeuvre)
     if outcome.verdict is Verdict.NOT_RUN:
         pytest.skip(outcome.reason)
     assert outcome.verdict.is_good, f"{outcome.reason} {outcome.difference} {outcome.log[-2000:]}"

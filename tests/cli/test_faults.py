@@ -280,6 +280,7 @@ def test_a_terminal_that_knows_ascii_alone_gets_every_line(name: str, tmp_path: 
         [],
         ["build", "--platform", "amiga"],
         ["build", "--backend", ""],
+        ["build", "--fmi", "1"],
         ["build", "a", "b"],
     ],
 )
@@ -305,4 +306,20 @@ def test_empty_and_clashing_options_of_the_build_are_one_line(
     assert out == ""
     assert said.startswith("rov-fmu: ")
     assert said.count("\n") == 1
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("option", "reason"),
+    [
+        ("--backend=pythonfmu", "PythonFMU makes FMI 2.0 alone"),
+        ("--osp", "libcosim and the OSP tools, which --osp is for, read FMI 2.0 alone"),
+    ],
+)
+def test_what_is_of_fmi_2_alone_is_refused_with_fmi_3(
+    option: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["build", "--fmi", "3", option]) == 2
+    assert capsys.readouterr() == ("", f"rov-fmu: --fmi 3: {reason}\n")
     assert not any(tmp_path.iterdir())

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from fmpy import read_model_description
 
 from rov_fmu.build import build
 from rov_fmu.cli import main
@@ -34,6 +35,17 @@ def test_a_vehicle_that_ships_is_built_by_its_name(
     assert main(["build", name, "--backend", "pythonfmu"]) == 0
     assert capsys.readouterr().out.startswith(f"{name}-python.fmu  ")
     assert [path.name for path in tmp_path.iterdir()] == [f"{name}-python.fmu"]
+
+
+def test_an_fmu_of_fmi_3_bears_it_in_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["build", str(BARE), "--fmi", "3", "--platform", "host"]) == 0
+    assert capsys.readouterr().out.startswith("bare.fmi3.fmu  ")
+    (path,) = tmp_path.iterdir()
+    assert path.name == "bare.fmi3.fmu"
+    assert read_model_description(str(path)).fmiVersion == "3.0"
 
 
 @pytest.mark.parametrize("command", [["build"], ["tables"], ["tune", "--axis=yaw"]])
@@ -91,13 +103,14 @@ def _completed(*words: str, shell: str = "bash") -> list[str]:
 
 
 def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
-    commands = ("build", "convert", "figures", "identify", "schema", "tables", "tune")
+    commands = ("build", "convert", "figures", "identify", "prove", "schema", "tables", "tune")
     assert _completed("") == [f"plain,{name}" for name in commands]
     assert _completed("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
     assert _completed("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
     assert _completed("tune", "./my") == ["file,./my"]
     assert _completed("build", "--platform", "") == [f"plain,{name}" for name in ("host", *PLATFORMS)]
     assert _completed("build", "--backend", "p") == ["plain,pythonfmu"]
+    assert _completed("build", "--fmi", "") == ["plain,2", "plain,3"]
     assert _completed("tune", "videoray", "--axis", "") == [f"plain,{name}" for name in AXES]
 
 

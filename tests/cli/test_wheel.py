@@ -124,6 +124,7 @@ def test_the_installed_command_does_everything_outside_the_checkout(wheel: Path,
     assert "built in" in told
     made.run("fmpy", "simulate", "videoray.fmu", "--start-values", "u_l", "0.3", "u_r", "0.3", where=here)
     made.run("rov-fmu", "build", "videoray_refit", "--platform", "host", where=here)
+    made.run("rov-fmu", "build", "--fmi", "3", where=here)
     made.run("rov-fmu", "build", "--backend", "pythonfmu", "--osp", where=here)
     assert "Table 8." in made.run("rov-fmu", "tables", "videoray", where=here)
     assert "alpha_u" in made.run("rov-fmu", "tune", "videoray", "--axis=surge", "--command=0.3", "--v-ss=1", where=here)
@@ -135,10 +136,11 @@ def test_the_installed_command_does_everything_outside_the_checkout(wheel: Path,
     same = tmp_path / "same"
     same.mkdir()
     made.run("python", ROOT / "build_fmu.py", where=same)
+    made.run("python", ROOT / "build_fmu.py", "--fmi", "3", where=same)
     made.run("python", ROOT / "build_fmu.py", "--backend", "pythonfmu", "--osp", where=same)
     for path in same.iterdir():
         assert path.read_bytes() == (here / path.name).read_bytes(), path.name
-    assert len(list(same.iterdir())) == 3
+    assert len(list(same.iterdir())) == 4
 
 
 @pytest.mark.long

@@ -24,11 +24,11 @@ static void write_double(double value, char end)
 
 int main(int argc, char *argv[])
 {
-    static const fmi2CallbackFunctions callbacks;
+    static const fmu_host callbacks;
     CHECK(argc == 2);
     load_fmu(argv[1]);
-    fmi2Component c = new_instance("rov", &callbacks);
-    fmi2ValueReference inputs[N_INPUTS], outputs[N_OUTPUTS];
+    fmu_instance c = new_instance("rov", &callbacks);
+    unsigned inputs[N_INPUTS], outputs[N_OUTPUTS];
     for (unsigned i = 0; i < N_INPUTS; i++) {
         inputs[i] = i;
     }
@@ -40,15 +40,13 @@ int main(int argc, char *argv[])
         for (int i = 0; i < N_INPUTS; i++) {
             CHECK(read_double(&values[i]));
         }
-        CHECK(fmi2.SetReal(c, inputs, N_INPUTS, values) == fmi2OK);
-        CHECK(fmi2.DoStep(c, t, h, fmi2True) == fmi2OK);
-        CHECK(fmi2.GetReal(c, outputs, N_OUTPUTS, values) == fmi2OK);
+        CHECK(set_values(c, inputs, N_INPUTS, values) && do_step(c, t, h) && get_values(c, outputs, N_OUTPUTS, values));
         for (int i = 0; i < N_OUTPUTS; i++) {
             write_double(values[i], i + 1 < N_OUTPUTS ? ' ' : '\n');
         }
         t += h;
     }
-    CHECK(fmi2.Terminate(c) == fmi2OK);
-    fmi2.FreeInstance(c);
+    CHECK(API.Terminate(c) == 0);
+    API.FreeInstance(c);
     return 0;
 }

@@ -1,4 +1,7 @@
-"""Each binary of the archive for all platforms: what it needs, what it exports, and that it runs as the others do."""
+"""Each binary of the archive for all platforms: what it needs, what it exports, and that it runs as the others do.
+
+Of FMI 2.0, and in the long tests of FMI 3.0.
+"""
 
 import os
 import random
@@ -18,70 +21,118 @@ import pytest
 
 from checks.c_programs import compile_c, run_program
 from rov_fmu.cli import main
-from rov_fmu.export.compile import PLATFORMS, fmi_headers
+from rov_fmu.export.compile import PLATFORMS, fmi_headers, host_platform
 from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.shipped import SHIPPED
 
 lief.logging.disable()
 
-_HEADER = (fmi_headers() / "fmi2Functions.h").read_text(encoding="utf-8")
-FMI_FUNCTIONS = set(re.findall(r"#define (fmi2\w+)\s+fmi2FullName\(\1\)", _HEADER))
 LINUX = ["linux64", "linux32", "aarch64-linux"]
 WINDOWS = ["win64", "win32"]
 DARWIN = ["darwin64", "aarch64-darwin"]
+TUPLES = {
+    "linux64": "x86_64-linux",
+    "linux32": "x86-linux",
+    "aarch64-linux": "aarch64-linux",
+    "win64": "x86_64-windows",
+    "win32": "x86-windows",
+    "darwin64": "x86_64-darwin",
+    "aarch64-darwin": "aarch64-darwin",
+}
+"""Folders in FMI 3.0 by those in FMI 2.0."""
+LARGEST = 450_000
 
 
-@pytest.fixture(scope="session")
-def binaries(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder binaries/ of the FMU that a build writes by default."""
+def functions(fmi: int) -> set[str]:
+    """All of a version, as its header names them."""
+    header = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
+    return set(re.findall(rf"#define (fmi{fmi}\w+)\s+fmi{fmi}FullName\(\1\)", header))
+
+
+@dataclass(frozen=True)
+class Binaries:
+    """An unzipped FMU for all platforms, of a version of FMI."""
+
+    archive: Path
+    folder: Path
+    fmi: int
+
+    def of(self, name: str) -> Path:
+        folder = TUPLES[name] if self.fmi == 3 else name
+        return self.folder / "binaries" / folder / f"videoray{PLATFORMS[name].suffix}"
+
+
+@pytest.fixture(scope="session", params=[2, pytest.param(3, marks=pytest.mark.long)], ids=["FMI 2.0", "FMI 3.0"])
+def binaries(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Binaries:
+    """The FMU that a build writes by default."""
     folder = tmp_path_factory.mktemp("all platforms")
-    assert main(["build", "-o", str(folder / "videoray.fmu")]) == 0
-    fmpy.extract(str(folder / "videoray.fmu"), unzipdir=str(folder / "fmu"))
-    return folder / "fmu" / "binaries"
+    found = Binaries(folder / "videoray.fmu", folder / "fmu", request.param)
+    assert main(["build", "--fmi", str(found.fmi), "-o", str(found.archive)]) == 0
+    fmpy.extract(str(found.archive), unzipdir=str(found.folder))
+    return found
 
 
-def _binary(binaries: Path, name: str) -> Path:
-    return binaries / name / f"videoray{PLATFORMS[name].suffix}"
-
-
-def test_one_archive_holds_all_platforms_in_400_kb(binaries: Path) -> None:
-    archive = binaries.parent.parent / "videoray.fmu"
-    assert archive.stat().st_size <= 400_000
-    with zipfile.ZipFile(archive) as content:
+def test_one_archive_holds_all_platforms(binaries: Binaries) -> None:
+    assert binaries.archive.stat().st_size <= LARGEST
+    with zipfile.ZipFile(binaries.archive) as content:
         names = {n for n in content.namelist() if n.startswith("binaries/")}
-    assert names == {f"binaries/{name}/videoray{p.suffix}" for name, p in PLATFORMS.items()}
+    assert names == {binaries.of(name).relative_to(binaries.folder).as_posix() for name in PLATFORMS}
     assert set(PLATFORMS) == {*LINUX, *WINDOWS, *DARWIN}
 
 
-def test_there_are_44_fmi_functions() -> None:
-    assert len(FMI_FUNCTIONS) == 44
+@pytest.mark.long
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("vehicle", SHIPPED)
+def test_every_vehicle_that_ships_is_built_for_all_platforms(
+    vehicle: str, fmi: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["build", vehicle, "--fmi", str(fmi)]) == 0
+    (archive,) = tmp_path.iterdir()
+    assert archive.name == f"{vehicle}{'.fmi3' if fmi == 3 else ''}.fmu"
+    assert archive.stat().st_size <= LARGEST
+    assert capsys.readouterr().out.startswith(f"{archive.name}  ")
+
+
+@pytest.mark.parametrize(("fmi", "number"), [(2, 44), (3, 75)])
+def test_there_are_so_many_functions(fmi: int, number: int) -> None:
+    assert len(functions(fmi)) == number
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the others are looked at in the archive for all platforms")
+def test_the_library_of_this_machine_has_all_functions(either_dir: Path, fmi: int) -> None:
+    (path,) = (either_dir / "binaries").glob("*/*.so")
+    library = lief.ELF.parse(path)
+    assert library is not None
+    assert {s.name for s in library.exported_symbols} == functions(fmi)
 
 
 @pytest.mark.parametrize("name", LINUX)
-def test_linux_needs_libc_and_libm_of_2012_alone(binaries: Path, name: str) -> None:
-    library = lief.ELF.parse(_binary(binaries, name))
+def test_linux_needs_libc_and_libm_of_2012_alone(binaries: Binaries, name: str) -> None:
+    library = lief.ELF.parse(binaries.of(name))
     assert library is not None
     assert set(library.libraries) <= {"libc.so.6", "libm.so.6"}
     versions = re.findall(r"GLIBC_([\d.]+)", " ".join(str(s.symbol_version) for s in library.imported_symbols))
     assert versions
     assert max(tuple(map(int, v.split("."))) for v in versions) <= (2, 17)
-    assert {s.name for s in library.exported_symbols} == FMI_FUNCTIONS
+    assert {s.name for s in library.exported_symbols} == functions(binaries.fmi)
 
 
 @pytest.mark.parametrize("name", WINDOWS)
-def test_windows_needs_the_system_and_its_c_run_time_alone(binaries: Path, name: str) -> None:
-    library = lief.PE.parse(_binary(binaries, name))
+def test_windows_needs_the_system_and_its_c_run_time_alone(binaries: Binaries, name: str) -> None:
+    library = lief.PE.parse(binaries.of(name))
     assert library is not None
     needed = {str(i.name) for i in library.imports}
     assert "KERNEL32.dll" in needed
     assert [n for n in needed if n != "KERNEL32.dll" and not n.startswith("api-ms-win-crt-")] == []
     exports = library.get_export()
     assert exports is not None
-    assert {e.name for e in exports.entries} == FMI_FUNCTIONS
+    assert {e.name for e in exports.entries} == functions(binaries.fmi)
 
 
 @pytest.mark.parametrize("name", DARWIN)
-def test_darwin_has_both_processors_and_needs_the_system_alone(binaries: Path, name: str) -> None:
-    universal = lief.MachO.parse(_binary(binaries, name))
+def test_darwin_has_both_processors_and_needs_the_system_alone(binaries: Binaries, name: str) -> None:
+    universal = lief.MachO.parse(binaries.of(name))
     assert universal is not None
     slices = {str(part.header.cpu_type).rsplit(".", 1)[-1]: part for part in universal}
     assert set(slices) == ({"X86_64", "ARM64"} if name == "darwin64" else {"ARM64"})
@@ -90,7 +141,7 @@ def test_darwin_has_both_processors_and_needs_the_system_alone(binaries: Path, n
         assert part.dyld_info is not None
         exported = {str(e.symbol.name) for e in part.dyld_info.exports if e.symbol is not None}
         # the linker adds two symbols of its own
-        assert exported - {"__mh_dylib_header", "___dso_handle"} == {f"_{function}" for function in FMI_FUNCTIONS}
+        assert exported - {"__mh_dylib_header", "___dso_handle"} == {f"_{f}" for f in functions(binaries.fmi)}
     assert slices["ARM64"].has_code_signature  # Apple Silicon loads nothing unsigned; ad hoc is enough
 
 
@@ -150,14 +201,14 @@ def _recorded_steps() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _run(binaries: Path, name: str, folder: Path) -> np.ndarray:
+def _run(binaries: Binaries, name: str, folder: Path) -> np.ndarray:
     machine = MACHINES[name]
     if reason := machine.missing():
         pytest.skip(f"{name}: {reason}")
-    program = folder / f"host-{name}{machine.suffix}"
+    program = folder / f"host-{name}-{binaries.fmi}{machine.suffix}"
     flags = ("-target", machine.target, *(() if machine.suffix else ("-ldl",)))
-    compile_c(Path(__file__).with_name("host.c"), program, binaries.parent / "sources", *flags)
-    library = shutil.copy(_binary(binaries, name), folder / f"{name}{PLATFORMS[name].suffix}")
+    compile_c(Path(__file__).with_name("host.c"), program, binaries.folder / "sources", *flags)
+    library = shutil.copy(binaries.of(name), folder / f"{name}-{binaries.fmi}{PLATFORMS[name].suffix}")
     environment = os.environ | {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
     command: list[str | Path] = [*machine.command, program, f"./{Path(library).name}"]
     run = run_program(*command, input=_recorded_steps(), cwd=folder, env=environment)
@@ -171,10 +222,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def trajectory(binaries: Path, folder: Path) -> np.ndarray:
+def trajectory(binaries: Binaries, folder: Path) -> np.ndarray:
     if sys.platform != "linux":
         pytest.skip("the programs are run on Linux")
     return _run(binaries, "linux64", folder)
+
+
+@pytest.mark.skipif(host_platform() != "linux64", reason="the programs are run on Linux on x86-64")
+def test_both_versions_of_fmi_fly_the_same_to_the_last_bit(
+    videoray_fmu: Path, videoray_dir: Path, videoray3_fmu: Path, videoray3_dir: Path, folder: Path
+) -> None:
+    two = _run(Binaries(videoray_fmu, videoray_dir, 2), "linux64", folder)
+    three = _run(Binaries(videoray3_fmu, videoray3_dir, 3), "linux64", folder)
+    assert two.shape == (400, 11)
+    assert two.tobytes() == three.tobytes()
 
 
 # The compiler makes Windows' start-up code for a program anew, which takes a minute.
@@ -182,7 +243,9 @@ def trajectory(binaries: Path, folder: Path) -> np.ndarray:
     "name",
     [*LINUX[1:], *(pytest.param(name, marks=pytest.mark.long) for name in WINDOWS)],
 )
-def test_every_platform_runs_as_linux64_does(binaries: Path, folder: Path, trajectory: np.ndarray, name: str) -> None:
+def test_every_platform_runs_as_linux64_does(
+    binaries: Binaries, folder: Path, trajectory: np.ndarray, name: str
+) -> None:
     other = _run(binaries, name, folder)
     assert trajectory.shape == (400, 11)
     assert np.isfinite(trajectory).all()

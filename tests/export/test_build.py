@@ -1,5 +1,6 @@
 """The archive that a build writes."""
 
+import re
 import zipfile
 from pathlib import Path
 
@@ -15,19 +16,23 @@ from rov_fmu.export.interface import UNITS, variables
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ALONE
 
+_LAYERS = {2: {"fmi2_host.h"}, 3: {"fmi3_host.h", "buildDescription.xml"}}
+"""What is a version's own beside its C files."""
+
 
 def _build(output: Path, *arguments: str) -> int:
     return main(["build", "--platform", "host", "-o", str(output), *arguments])
 
 
-def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(videoray_fmu: Path) -> None:
-    assert validate_fmu(str(videoray_fmu)) == []
-    result = fmpy.simulate_fmu(str(videoray_fmu), start_values={"u_l": 0.3, "u_r": 0.3})
-    assert round(float(result["u"][-1]), 4) == 0.4729
+def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(either_fmu: Path) -> None:
+    assert validate_fmu(str(either_fmu)) == []
+    for interface in ("CoSimulation", "ModelExchange"):
+        result = fmpy.simulate_fmu(str(either_fmu), fmi_type=interface, start_values={"u_l": 0.3, "u_r": 0.3})
+        assert round(float(result["u"][-1]), 4) == 0.4729
 
 
-def test_the_archive_is_one_that_every_importer_unpacks(videoray_fmu: Path) -> None:
-    with zipfile.ZipFile(videoray_fmu) as archive:
+def test_the_archive_is_one_that_every_importer_unpacks(either_fmu: Path) -> None:
+    with zipfile.ZipFile(either_fmu) as archive:
         assert archive.testzip() is None
         members = archive.infolist()
     names = [m.filename for m in members]
@@ -35,11 +40,15 @@ def test_the_archive_is_one_that_every_importer_unpacks(videoray_fmu: Path) -> N
     assert {
         "model.png",
         "documentation/index.html",
+        "documentation/diagram.png",
         "documentation/licenses/license.txt",
         "sources/fmu.c",
         "sources/interface.h",
+        "terminalsAndIcons/terminalsAndIcons.xml",
     } <= set(names)
-    assert not [n for n in names if Path(n).name in {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"}]
+    headers = {path.name for path in fmu_compile.fmi_headers().glob("*.h")}
+    assert len(headers) > 6
+    assert not [n for n in names if Path(n).name in headers], "they are the importer's"
     for m in members:
         assert m.compress_type == zipfile.ZIP_DEFLATED
         assert m.extract_version <= 20
@@ -47,6 +56,25 @@ def test_the_archive_is_one_that_every_importer_unpacks(videoray_fmu: Path) -> N
         assert "\\" not in m.filename
         assert m.external_attr >> 16 == 0o644  # a file, not a link
         assert not m.flag_bits & 0x1
+
+
+def test_the_archive_has_what_is_of_its_version_alone(either_dir: Path, fmi: int) -> None:
+    here = {path.name for path in (either_dir / "sources").iterdir()}
+    layers = {path.name for path in fmu_compile.C_SOURCES.glob(f"fmi{fmi}_*")} | _LAYERS[fmi]
+    shared = {path.name for path in fmu_compile.C_SOURCES.iterdir() if not path.name.startswith("fmi")}
+    assert here == layers | shared | {"interface.h", "model.h"}
+    (binaries,) = (either_dir / "binaries").iterdir()
+    assert binaries.name == {2: fmpy.platform, 3: fmpy.platform_tuple}[fmi]
+    page = (either_dir / "documentation" / "index.html").read_text(encoding="utf-8")
+    for claim in (f"FMI {fmi}.0 ", f"fmi{fmi}Discard", f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"):
+        assert claim in page
+    assert not re.findall(f"FMI {5 - fmi}|fmi{5 - fmi}", page)
+    license_ = (either_dir / "documentation" / "licenses" / "fmi-headers.txt").read_text(encoding="utf-8")
+    header = (fmu_compile.fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
+    assert license_.startswith("Copyright (C) 2008-2011 MODELISAR")
+    assert license_.split() == header[header.index("Copyright (C)") :].partition("*/")[0].split()
+    needed = either_dir / "documentation" / "externalDependencies.txt"
+    assert needed.exists() == (fmi == 3)
 
 
 def test_the_description_says_what_the_interface_declares(videoray_dir: Path, vehicle: Vehicle) -> None:
@@ -84,11 +112,11 @@ def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> Non
         assert [element.get(flag) for flag in flags] == ["false"] * len(flags)
 
 
-def test_the_same_inputs_give_the_same_bytes(videoray_fmu: Path, tmp_path: Path) -> None:
+def test_the_same_inputs_give_the_same_bytes(either_fmu: Path, fmi: int, tmp_path: Path) -> None:
     again = tmp_path / "elsewhere" / "other name.fmu"
     again.parent.mkdir()
-    assert _build(again) == 0
-    assert again.read_bytes() == videoray_fmu.read_bytes()
+    assert _build(again, "--fmi", str(fmi)) == 0
+    assert again.read_bytes() == either_fmu.read_bytes()
 
 
 def test_another_coefficient_is_another_guid(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def vary(values: Sequence[float]) -> bool:
 def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
     """One list of <ModelStructure>."""
     of_rov = variables(rov)
-    root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=NATIVE))
+    root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=NATIVE[2]))
     name: Mapping[str, Variable] = {str(v.index): v for v in of_rov}
     found: dict[tuple[str, str], str] = {}
     for unknown in root.find(f"ModelStructure/{of}"):

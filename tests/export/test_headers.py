@@ -3,7 +3,7 @@
 FMPy's package brings headers whose names never bear a prefix. The others are made of them, by what the standard's own
 differ in: FMI 2.0.0 (as in FMI Library, FMI4cpp, MasterSim or PythonFMU 0.6.3) has const members in
 fmi2CallbackFunctions and pastes the prefix; 2.0.1 to 2.0.3 (and Reference-FMUs) paste it; 2.0.4 and 2.0.5 do, unless
-FMI2_OVERRIDE_FUNCTION_PREFIX is defined.
+FMI2_OVERRIDE_FUNCTION_PREFIX is defined. FMPy's headers of FMI 3.0 are the standard's: as those of 2.0.4.
 """
 
 import platform
@@ -21,7 +21,8 @@ import pytest
 from rov_fmu.export.archive import native_content
 from rov_fmu.export.compile import compiler, fmi_headers
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.fmi2 import OK, Fmu, reals
+from tests import fmi2, fmi3
+from tests.fmi import OK, Fmu, reals
 
 _EXPORT = "#if defined _WIN32"  # begins the definition of FMI2_Export in FMPy's header
 _NAME = "#define fmi2FullName(name) name"
@@ -33,6 +34,8 @@ _KNOWS_OVERRIDE = (
 
 def _write_headers(folder: Path, release: str) -> Path:
     shutil.copytree(fmi_headers(), folder)
+    if release == "3.0":
+        return folder
     functions, types = folder / "fmi2Functions.h", folder / "fmi2FunctionTypes.h"
     prefix = "FMI2_ACTUAL_FUNCTION_PREFIX" if release == "2.0.4" else "FMI2_FUNCTION_PREFIX"
     if release != "FMPy":
@@ -59,7 +62,18 @@ def _write_headers(folder: Path, release: str) -> Path:
     return folder
 
 
-RELEASES = ("2.0.0", "2.0.1", "2.0.4", "FMPy")
+_OF_FMI2 = ("2.0.0", "2.0.1", "2.0.4", "FMPy")
+RELEASES = (*_OF_FMI2, "3.0")
+
+
+def _version(release: str) -> int:
+    return 3 if release == "3.0" else 2
+
+
+@pytest.fixture(scope="module")
+def fmus(fmu: fmi2.Fmu, videoray3_dir: Path) -> dict[int, Fmu]:
+    """By version of FMI."""
+    return {2: fmu, 3: fmi3.Fmu(videoray3_dir)}
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +83,7 @@ def headers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 _STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
-_PLAIN = {"2.0.4": ("-DFMI2_OVERRIDE_FUNCTION_PREFIX",)}
+_PLAIN = {"2.0.4": ("-DFMI2_OVERRIDE_FUNCTION_PREFIX",), "3.0": ("-DFMI3_OVERRIDE_FUNCTION_PREFIX",)}
 """What these headers are told for a shared library; the others need nothing."""
 COMPILERS = {"zig": compiler()} | {name: [name] for name in ("gcc", "clang") if shutil.which(name)}
 _HAS_FMA = "fma" in Path("/proc/cpuinfo").read_text(encoding="utf-8") if Path("/proc/cpuinfo").exists() else False
@@ -78,7 +92,8 @@ _HAS_FMA = "fma" in Path("/proc/cpuinfo").read_text(encoding="utf-8") if Path("/
 def _compile(fmu: Fmu, headers: Path, command: Sequence[str], library: Path, warnings: Sequence[str] = _STRICT) -> Path:
     """The FMU's sources as a shared library."""
     sources = fmu.folder / "sources"
-    shared = ("-shared", "-fPIC", "-I", str(headers), "fmu.c", "-lm", "-o", str(library))
+    include = "-isystem" if headers.name == "3.0" else "-I"  # where the standard itself declares f() without arguments
+    shared = ("-shared", "-fPIC", include, str(headers), "fmu.c", "-lm", "-o", str(library))
     built = subprocess.run([*command, *warnings, *shared], cwd=sources, capture_output=True, text=True, check=False)
     assert (built.returncode, built.stderr) == (0, "")
     return library
@@ -98,23 +113,24 @@ def _flight(fmu: Fmu, steps: int = 400) -> bytes:
             h = 10.0 ** drawn.uniform(-4.0, 1.5)
             assert rov.step(t, h) == OK
             t += h
-            result += bytes(reals(*rov.get(list(fmu.variables))))
+            result += bytes(reals(*rov.get([name for name in fmu.variables if name != "time"])))
     return result
 
 
 @pytest.fixture(scope="module")
-def shipped(fmu: Fmu) -> bytes:
+def shipped(fmu: fmi2.Fmu) -> bytes:
+    """That of FMI 2.0 is that of all."""
     return _flight(fmu)
 
 
 def _flies_the_same(fmu: Fmu, library: Path, shipped: bytes) -> None:
-    assert _flight(Fmu(fmu.folder, library)) == shipped
+    assert _flight(type(fmu)(fmu.folder, library)) == shipped
 
 
 def _exports(library: Path) -> set[str]:
     binary = lief.parse(str(library))
     assert isinstance(binary, lief.ELF.Binary | lief.PE.Binary | lief.MachO.Binary)
-    return {name for function in binary.exported_functions if "fmi2" in (name := str(function.name))}
+    return {name for function in binary.exported_functions if re.search("fmi[23]", name := str(function.name))}
 
 
 # Every header once, every compiler once, both standards; all of them in the long tests.
@@ -130,69 +146,98 @@ _MATRIX = [
 
 @pytest.mark.parametrize(("release", "name", "standard"), _MATRIX)
 def test_a_shared_library_has_plain_names_and_flies_the_same(
-    fmu: Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path, release: str, name: str, standard: str
+    fmus: dict[int, Fmu],
+    headers: dict[str, Path],
+    shipped: bytes,
+    tmp_path: Path,
+    release: str,
+    name: str,
+    standard: str,
 ) -> None:
+    fmu = fmus[_version(release)]
     command = [*COMPILERS[name], f"-std={standard}", "-O2", *_PLAIN.get(release, ())]
     library = _compile(fmu, headers[release], command, tmp_path / "videoray.so")
     assert _exports(library) == _exports(fmu.library)
     _flies_the_same(fmu, library, shipped)
 
 
-def test_as_cpp_they_fly_the_same(fmu: Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path) -> None:
+@pytest.mark.parametrize("release", ["2.0.0", "3.0"])
+def test_as_cpp_they_fly_the_same(
+    fmus: dict[int, Fmu], headers: dict[str, Path], shipped: bytes, tmp_path: Path, release: str
+) -> None:
     """Not pedantically so: compound literals are an extension there, of GCC and Clang."""
-    command = [*compiler(), "-x", "c++", "-std=c++17", "-O2"]
-    library = _compile(fmu, headers["2.0.0"], command, tmp_path / "videoray.so", ("-Wall", "-Wextra", "-Werror"))
+    fmu = fmus[_version(release)]
+    command = [*compiler(), "-x", "c++", "-std=c++17", "-O2", *_PLAIN.get(release, ())]
+    library = _compile(fmu, headers[release], command, tmp_path / "videoray.so", ("-Wall", "-Wextra", "-Werror"))
     assert _exports(library) == _exports(fmu.library)
     _flies_the_same(fmu, library, shipped)
 
 
-@pytest.mark.parametrize("release", ["2.0.0", "2.0.1", "2.0.4"])
+@pytest.mark.parametrize("release", ["2.0.0", "2.0.1", "2.0.4", "3.0"])
 @pytest.mark.parametrize("override", [False, True])
 def test_the_prefix_reaches_the_exports_only_where_it_is_meant_to(
-    fmu: Fmu, headers: dict[str, Path], tmp_path: Path, release: str, override: bool
+    fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, override: bool
 ) -> None:
+    fmu = fmus[_version(release)]
     plain = _exports(fmu.library)
     prefixed = {f"videoray_{name}" for name in plain}
-    command = [*compiler(), "-O0", *_PLAIN["2.0.4"] * override]
+    command = [*compiler(), "-O0", *_PLAIN.get(release, _PLAIN["2.0.4"]) * override]
     library = _compile(fmu, headers[release], command, tmp_path / "a.so")
-    assert _exports(library) == (prefixed if release == "2.0.4" and not override else plain)
+    assert _exports(library) == (prefixed if release in _PLAIN and not override else plain)
     if not override:  # asked for, for a static library
-        command = [*compiler(), "-O0", "-DFMI2_FUNCTION_PREFIX=videoray_"]
+        command = [*compiler(), "-O0", f"-DFMI{_version(release)}_FUNCTION_PREFIX=videoray_"]
         assert _exports(_compile(fmu, headers[release], command, tmp_path / "b.so")) == prefixed
 
 
-@pytest.mark.parametrize("release", ["2.0.0", "2.0.4"])
+_MAIN = r"""
+#include "fmi2FunctionTypes.h"
+#include "fmi3FunctionTypes.h"
+#include <stdio.h>
+static const fmi2CallbackFunctions callbacks;
+%s
+int main(void)
+{
+    printf("%%p %%p\n", %s);
+    return 0;
+}
+"""
+_INSTANTIATE = {
+    2: '{0}_fmi2Instantiate("rov", fmi2CoSimulation, "{1}", NULL, &callbacks, fmi2False, fmi2False)',
+    3: '{0}_fmi3InstantiateModelExchange("rov", "{1}", NULL, false, false, NULL, NULL)',
+}
+_DECLARE = {
+    2: "fmi2InstantiateTYPE {0}_fmi2Instantiate;",
+    3: "fmi3InstantiateModelExchangeTYPE {0}_fmi3InstantiateModelExchange;",
+}
+
+
+@pytest.mark.parametrize(
+    ("releases", "sister"),
+    [(("2.0.0",) * 2, "sister"), (("2.0.4",) * 2, "sister"), (("3.0",) * 2, "sister"), (("2.0.4", "3.0"), "videoray")],
+    ids=["2.0.0", "2.0.4", "3.0", "one model in both versions"],
+)
 def test_two_models_link_into_one_program_under_their_prefixes(
-    vehicle: Vehicle, headers: dict[str, Path], tmp_path: Path, release: str
+    vehicle: Vehicle, headers: dict[str, Path], tmp_path: Path, releases: tuple[str, str], sister: str
 ) -> None:
-    calls, include = [], ("-isystem", str(headers[release]))
-    for identifier in ("videoray", "sister"):
-        content = native_content(replace(vehicle, identifier=identifier))
-        (tmp_path / identifier).mkdir()
+    declared, calls, objects = [], [], []
+    for release, identifier in zip(releases, ("videoray", sister), strict=True):
+        fmi = _version(release)
+        content = native_content(replace(vehicle, identifier=identifier), fmi=fmi)
+        folder = tmp_path / f"{identifier}{fmi}"
+        folder.mkdir()
         for name, text in content.sources.items():
-            (tmp_path / identifier / name).write_text(text, encoding="utf-8")
-        prefix = () if release == "2.0.4" else (f"-DFMI2_FUNCTION_PREFIX={identifier}_",)
-        subprocess.run(
-            [*compiler(), "-std=c11", *prefix, *include, "-c", "fmu.c", "-o", f"../{identifier}.o"],
-            cwd=tmp_path / identifier,
-            check=True,
-        )
-        calls.append(f'    printf("%p\\n", instantiate({identifier}_fmi2Instantiate, "{content.guid}"));')
+            (folder / name).write_text(text, encoding="utf-8")
+        prefix = () if release in _PLAIN else (f"-DFMI2_FUNCTION_PREFIX={identifier}_",)
+        include = ("-isystem", str(headers[release]))
+        command = [*compiler(), "-std=c11", *prefix, *include, "-c", "fmu.c", "-o", f"{folder}.o"]
+        subprocess.run(command, cwd=folder, check=True)
+        declared.append(_DECLARE[fmi].format(identifier))
+        calls.append(_INSTANTIATE[fmi].format(identifier, content.guid))
+        objects.append(f"{folder}.o")
     main = tmp_path / "main.c"
-    main.write_text(
-        '#include "fmi2FunctionTypes.h"\n#include <stdio.h>\n'
-        "fmi2InstantiateTYPE videoray_fmi2Instantiate, sister_fmi2Instantiate;\n"
-        "static void *instantiate(fmi2InstantiateTYPE *f, const char *guid)\n{\n"
-        "    static const fmi2CallbackFunctions callbacks;\n"
-        '    return f("rov", fmi2CoSimulation, guid, NULL, &callbacks, fmi2False, fmi2False);\n}\n'
-        "int main(void)\n{\n" + "\n".join(calls) + "\n    return 0;\n}\n",
-        encoding="utf-8",
-    )
-    subprocess.run(
-        [*compiler(), *include, "main.c", "videoray.o", "sister.o", "-lm", "-o", "main"],
-        cwd=tmp_path,
-        check=True,
-    )
+    main.write_text(_MAIN % ("\n".join(declared), ", ".join(calls)), encoding="utf-8")
+    command = [*compiler(), "-isystem", str(fmi_headers()), "main.c", *objects, "-lm", "-o", "main"]
+    subprocess.run(command, cwd=tmp_path, check=True)
     pointers = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.split()
     assert len(pointers) == len(set(pointers)) == 2
     assert "(nil)" not in pointers
@@ -208,13 +253,13 @@ def test_two_models_link_into_one_program_under_their_prefixes(
     ],
 )
 def test_fused_multiplication_does_not_change_a_bit(
-    fmu: Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path, name: str, flags: tuple[str, ...]
+    fmu: fmi2.Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path, name: str, flags: tuple[str, ...]
 ) -> None:
     library = _compile(fmu, headers["2.0.0"], [*COMPILERS[name], *flags], tmp_path / "videoray.so")
     _flies_the_same(fmu, library, shipped)
 
 
-_OF_ONE = ("fabs", "sqrt", "sin", "cos", "exp", "log", "log1p", "expm1", "atan", "atanh")
+_OF_ONE = ("fabs", "ceil", "sqrt", "sin", "cos", "exp", "log", "log1p", "expm1", "atan", "atanh")
 _OF_TWO = ("fmin", "fmax", "copysign", "hypot", "pow", "remainder")
 # What the sources use of the C library, as Microsoft's headers declare it; those cannot be had from a package.
 _MICROSOFT = {
@@ -226,14 +271,15 @@ _MICROSOFT = {
     "string.h": "#include <stddef.h>\nvoid *memset(void *, int, size_t);\nvoid *memcpy(void *, const void *, size_t);\n"
     "int memcmp(const void *, const void *, size_t);\nint strcmp(const char *, const char *);\n"
     "size_t strlen(const char *);\nchar *strcpy(char *, const char *);\nsize_t strspn(const char *, const char *);\n",
-    "stdio.h": "#include <stdarg.h>\n#include <stddef.h>\nint vsnprintf(char *, size_t, const char *, va_list);\n",
+    "stdio.h": "#include <stdarg.h>\n#include <stddef.h>\nint vsnprintf(char *, size_t, const char *, va_list);\n"
+    "int snprintf(char *, size_t, const char *, ...);\n",
 }
 
 
 @pytest.mark.parametrize("release", RELEASES)
 @pytest.mark.parametrize("standard", _STANDARDS)
 def test_microsofts_compiler_would_take_them(
-    fmu: Fmu, headers: dict[str, Path], tmp_path: Path, release: str, standard: str
+    fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, standard: str
 ) -> None:
     """By clang, which takes its place: its target, its language, no __GNUC__."""
     for name, text in _MICROSOFT.items():
@@ -246,7 +292,7 @@ def test_microsofts_compiler_would_take_them(
             *(*_STRICT, "-isystem", tmp_path, "-isystem", zig.parent / "lib" / "include"),
             *("-isystem", headers[release], "fmu.c"),
         ],
-        cwd=fmu.folder / "sources",
+        cwd=fmus[_version(release)].folder / "sources",
         capture_output=True,
         text=True,
         check=False,
@@ -269,6 +315,6 @@ def test_the_headers_are_what_their_releases_are(headers: dict[str, Path], tmp_p
         return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
     override = "-DFMI2_OVERRIDE_FUNCTION_PREFIX"
-    assert [takes(r) for r in RELEASES] == [True, True, True, False]
-    assert [takes(r, override) for r in RELEASES] == [True, True, False, False]
-    assert [takes(r, "-DASSIGN") for r in RELEASES] == [False, True, True, False]
+    assert [takes(r) for r in _OF_FMI2] == [True, True, True, False]
+    assert [takes(r, override) for r in _OF_FMI2] == [True, True, False, False]
+    assert [takes(r, "-DASSIGN") for r in _OF_FMI2] == [False, True, True, False]

@@ -14,7 +14,8 @@ from checks.fmpy_slave import fmpy_slave, keep_loaded
 from rov_fmu.cli import main
 from rov_fmu.export.interface import Variable, variables
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.fmi2 import WARNING, Message, recording_callbacks
+from tests.fmi import WARNING, Message
+from tests.fmi2 import recording_callbacks
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,8 @@ import pytest
 from tests.cli.test_wheel import CONSTRAINTS, built, environment, interpreter
 from tests.commands import ROOT
 
-_BUILDS = {"native": ("--platform", "linux64", "--platform", "win64"), "pythonfmu": ("--backend", "pythonfmu")}
+_SOME = ("--platform", "linux64", "--platform", "win64")
+_BUILDS = {"native": _SOME, "fmi3": ("--fmi", "3", *_SOME), "pythonfmu": ("--backend", "pythonfmu")}
 _OLDEST, _NEWEST = 10, 14  # Python 3, as pyproject.toml has it
 
 
@@ -29,7 +30,9 @@ def _built(folder: Path, *command: str, flavours: Sequence[str] = tuple(_BUILDS)
 _CHECKOUT = str(ROOT / "build_fmu.py")
 
 
-@pytest.mark.parametrize("flavour", ["native", pytest.param("pythonfmu", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "flavour", ["native", *(pytest.param(name, marks=pytest.mark.long) for name in ("fmi3", "pythonfmu"))]
+)
 def test_built_in_another_folder(flavour: str, tmp_path: Path) -> None:
     one, other = tmp_path / "here", tmp_path / "deep" / "er and other"
     for folder in (one, other):

@@ -27,22 +27,22 @@ def zig_as_cc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("zig_as_cc")
-def test_fmpy_compiles_and_runs_them(videoray_dir: Path, tmp_path: Path) -> None:
+def test_fmpy_compiles_and_runs_them(either_dir: Path, tmp_path: Path) -> None:
     folder = tmp_path / "source fmu"
-    shutil.copytree(videoray_dir, folder)
+    shutil.copytree(either_dir, folder)
     shutil.rmtree(folder / "binaries")
     (tmp_path / "build").mkdir()
     build_platform_binary(folder, tmp_path / "build")
     built = fmpy.simulate_fmu(str(folder), start_values={"u_l": 0.3, "u_r": 0.1})
-    shipped = fmpy.simulate_fmu(str(videoray_dir), start_values={"u_l": 0.3, "u_r": 0.1})
+    shipped = fmpy.simulate_fmu(str(either_dir), start_values={"u_l": 0.3, "u_r": 0.1})
     for name in built.dtype.names:
         assert built[name] == pytest.approx(shipped[name], rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize("optimization", ["-O0", "-O3"])
-def test_no_warning_under_the_strictest_flags(videoray_dir: Path, tmp_path: Path, optimization: str) -> None:
+def test_no_warning_under_the_strictest_flags(either_dir: Path, tmp_path: Path, optimization: str) -> None:
     more = ["-Wshadow", "-Wundef", "-Wstrict-prototypes", "-Wcast-qual", "-Wvla"]
     flags = ["-std=c11", *WARNINGS, *more, optimization, "-isystem", str(fmi_headers())]
     command = [*compiler(), *flags, "-c", "fmu.c", "-o", str(tmp_path / "fmu.o")]
-    result = subprocess.run(command, cwd=videoray_dir / "sources", capture_output=True, text=True, check=False)
+    result = subprocess.run(command, cwd=either_dir / "sources", capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (0, "")

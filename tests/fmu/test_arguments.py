@@ -6,52 +6,95 @@ from math import inf, nan
 from typing import Any
 
 import pytest
-from fmpy.fmi2 import fmi2CallbackFunctions
 
 from rov_fmu.export.interface import variables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.fmi2 import (
+from tests import fmi2, fmi3
+from tests.fmi import (
     CO_SIMULATION,
     CONTINUOUS,
     DISCARD,
     ERROR,
     EVENT,
+    INITIALIZATION,
     INSTANTIATED,
     MODEL_EXCHANGE,
     OK,
-    SIGNATURES,
     STEP,
     WARNING,
+    WITH_EVENTS,
     Fmu,
-    Message,
+    contents,
     integers,
     reals,
-    recording_callbacks,
     references,
+    room,
     strings,
 )
+from tests.fmi3 import CLOCKS, TYPES, flags
 
 CS, ME = CO_SIMULATION, MODEL_EXCHANGE
+WRAPPERS: tuple[type[Fmu], ...] = (fmi2.Fmu, fmi3.Fmu)
 _VR = {v.name: v.value_reference for v in variables(load_vehicle(VIDEORAY).rov)}
 U_L, U, DER_U, F_L, BETA_U = (references(_VR[name]) for name in ("u_l", "u", "der(u)", "F_l", "beta_u"))
-NOTHING, U_AND_NOTHING, U_L_AND_NOTHING = (
-    references(len(_VR)),
-    references(U[0], 2**32 - 1),
-    references(U_L[0], 2**32 - 1),
-)
+TIME, NOTHING = references(len(_VR)), references(len(_VR) + 1)
+U_AND_NOTHING, U_L_AND_NOTHING = references(U[0], 2**32 - 1), references(U_L[0], 2**32 - 1)
 FOREIGN = ctypes.create_string_buffer(4096)
 
+Case = tuple[int, str, str, tuple[Any, ...]]
+"""Kind of instance, mode, function, arguments."""
 
-def room(n: int = 1) -> Any:
-    return reals(*[-7.0] * n)
+
+def counted(*of: Any) -> tuple[Any, ...]:
+    """Arrays, each with its length."""
+    return tuple(argument for array in of for argument in (array, len(array)))
 
 
-# interface, mode, function, bad arguments
-BAD_CALLS: list[tuple[int, str, str, tuple[Any, ...]]] = [
-    (CS, STEP, "fmi2SetDebugLogging", (1, 1, None)),
-    (CS, STEP, "fmi2SetDebugLogging", (1, 1, strings(None))),
-    (CS, STEP, "fmi2SetDebugLogging", (0, 2, strings(b"logEvents", b"logAll"))),
+# Of both versions, by their common names.
+_BAD: list[Case] = [
+    (CS, STEP, "SetDebugLogging", (1, 1, None)),
+    (CS, STEP, "SetDebugLogging", (1, 1, strings(None))),
+    (CS, STEP, "SetDebugLogging", (0, 2, strings(b"logEvents", b"logAll"))),
+    (CS, STEP, "GetFMUState", (None,)),
+    (CS, STEP, "GetFMUState", (ctypes.pointer(ctypes.cast(FOREIGN, c_void_p)),)),
+    (CS, STEP, "SetFMUState", (None,)),
+    (CS, STEP, "SetFMUState", (FOREIGN,)),
+    (CS, STEP, "FreeFMUState", (ctypes.pointer(ctypes.cast(FOREIGN, c_void_p)),)),
+    (CS, STEP, "SerializedFMUStateSize", (None, ctypes.pointer(c_size_t(7)))),
+    (CS, STEP, "SerializedFMUStateSize", (FOREIGN, ctypes.pointer(c_size_t(7)))),
+    (CS, STEP, "SerializeFMUState", (None, ctypes.create_string_buffer(1000), 1000)),
+    (CS, STEP, "SerializeFMUState", (FOREIGN, ctypes.create_string_buffer(1000), 1000)),
+    (CS, STEP, "DeserializeFMUState", (None, 1000, ctypes.pointer(c_void_p()))),
+    (CS, STEP, "DeserializeFMUState", (FOREIGN, 0, ctypes.pointer(c_void_p()))),
+    (CS, STEP, "DeserializeFMUState", (FOREIGN, 1000, None)),
+    *((ME, CONTINUOUS, "SetTime", (t,)) for t in (nan, inf, -inf)),
+    *((ME, CONTINUOUS, "SetContinuousStates", a) for a in [(None, 7), (room(7), 6), (room(8), 8), (room(), 0)]),
+    *(
+        (ME, CONTINUOUS, function, a)
+        for function in ("GetContinuousStateDerivatives", "GetContinuousStates", "GetNominalsOfContinuousStates")
+        for a in [(None, 7), (room(7), 6), (room(8), 8), (room(), 0)]
+    ),
+    (ME, CONTINUOUS, "GetEventIndicators", (room(), 1)),
+]
+_UNKNOWNS_AND_KNOWNS = [
+    (NOTHING, U),
+    (U, NOTHING),
+    (U_L, U),  # an input is no unknown
+    (U, F_L),  # a calculated output is no known
+    (U, BETA_U),  # a parameter is one in Initialization Mode alone
+]
+_OUTPUTS_AND_ORDERS = [
+    (NOTHING, 1),
+    (U_L, 1),
+    (DER_U, 1),  # der(u) is no output
+    (BETA_U, 1),
+    *((U, order) for order in (-1, 0, 20)),
+]
+_TIMES = [(0.0, h) for h in (0.0, -0.0, -0.1, nan, inf, -inf)] + [(t, 0.1) for t in (nan, inf, -inf)] + [(1e308, 1e308)]
+BAD_CALLS: list[Case] = [
+    *((kind, mode, of.name(name), a) for of in WRAPPERS for kind, mode, name, a in _BAD),
+    # ---- FMI 2.0 ----
     *((CS, INSTANTIATED, "fmi2SetupExperiment", (0, 0.0, start, 0, 0.0)) for start in (nan, inf, -inf)),
     *((CS, INSTANTIATED, "fmi2SetupExperiment", (0, 0.0, 1.0, 1, stop)) for stop in (nan, -inf, 0.999)),
     *((CS, STEP, "fmi2GetReal", a) for a in [(None, 1, room()), (U, 1, None), (NOTHING, 1, room())]),
@@ -60,18 +103,6 @@ BAD_CALLS: list[tuple[int, str, str, tuple[Any, ...]]] = [
     (CS, STEP, "fmi2SetReal", (U_L_AND_NOTHING, 2, room(2))),
     *((CS, STEP, f"fmi2{f}{t}", (U, 1, integers(-7))) for f in ("Get", "Set") for t in ("Integer", "Boolean")),
     *((CS, STEP, f"fmi2{f}String", (U, 1, strings(b"x"))) for f in ("Get", "Set")),
-    (CS, STEP, "fmi2GetFMUstate", (None,)),
-    (CS, STEP, "fmi2GetFMUstate", (ctypes.pointer(ctypes.cast(FOREIGN, c_void_p)),)),
-    (CS, STEP, "fmi2SetFMUstate", (None,)),
-    (CS, STEP, "fmi2SetFMUstate", (FOREIGN,)),
-    (CS, STEP, "fmi2FreeFMUstate", (ctypes.pointer(ctypes.cast(FOREIGN, c_void_p)),)),
-    (CS, STEP, "fmi2SerializedFMUstateSize", (None, ctypes.pointer(c_size_t(7)))),
-    (CS, STEP, "fmi2SerializedFMUstateSize", (FOREIGN, ctypes.pointer(c_size_t(7)))),
-    (CS, STEP, "fmi2SerializeFMUstate", (None, ctypes.create_string_buffer(1000), 1000)),
-    (CS, STEP, "fmi2SerializeFMUstate", (FOREIGN, ctypes.create_string_buffer(1000), 1000)),
-    (CS, STEP, "fmi2DeSerializeFMUstate", (None, 1000, ctypes.pointer(c_void_p()))),
-    (CS, STEP, "fmi2DeSerializeFMUstate", (FOREIGN, 0, ctypes.pointer(c_void_p()))),
-    (CS, STEP, "fmi2DeSerializeFMUstate", (FOREIGN, 1000, None)),
     *(
         (CS, STEP, "fmi2GetDirectionalDerivative", a)
         for a in [
@@ -79,24 +110,12 @@ BAD_CALLS: list[tuple[int, str, str, tuple[Any, ...]]] = [
             (U, 1, None, 1, reals(1.0), room()),
             (U, 1, U, 1, None, room()),
             (U, 1, U, 1, reals(1.0), None),
-            (NOTHING, 1, U, 1, reals(1.0), room()),
-            (U, 1, NOTHING, 1, reals(1.0), room()),
-            (U_L, 1, U, 1, reals(1.0), room()),  # an input is no unknown
-            (U, 1, F_L, 1, reals(1.0), room()),  # a calculated output is no known
-            (U, 1, BETA_U, 1, reals(1.0), room()),  # a parameter is one in Initialization Mode alone
+            *((unknown, 1, known, 1, reals(1.0), room()) for unknown, known in _UNKNOWNS_AND_KNOWNS),
         ]
     ),
     (ME, EVENT, "fmi2NewDiscreteStates", (None,)),
     (ME, CONTINUOUS, "fmi2CompletedIntegratorStep", (1, None, integers(-7))),
     (ME, CONTINUOUS, "fmi2CompletedIntegratorStep", (1, integers(-7), None)),
-    *((ME, CONTINUOUS, "fmi2SetTime", (t,)) for t in (nan, inf, -inf)),
-    *((ME, CONTINUOUS, "fmi2SetContinuousStates", a) for a in [(None, 7), (room(7), 6), (room(8), 8), (room(), 0)]),
-    *(
-        (ME, CONTINUOUS, function, a)
-        for function in ("fmi2GetDerivatives", "fmi2GetContinuousStates", "fmi2GetNominalsOfContinuousStates")
-        for a in [(None, 7), (room(7), 6), (room(8), 8), (room(), 0)]
-    ),
-    (ME, CONTINUOUS, "fmi2GetEventIndicators", (room(), 1)),
     (CS, STEP, "fmi2SetRealInputDerivatives", (U_L, 1, integers(1), reals(0.0))),
     *(
         (CS, STEP, "fmi2GetRealOutputDerivatives", a)
@@ -104,27 +123,78 @@ BAD_CALLS: list[tuple[int, str, str, tuple[Any, ...]]] = [
             (None, 1, integers(1), room()),
             (U, 1, None, room()),
             (U, 1, integers(1), None),
-            (NOTHING, 1, integers(1), room()),
-            (U_L, 1, integers(1), room()),
-            (DER_U, 1, integers(1), room()),  # der(u) is no output
-            (BETA_U, 1, integers(1), room()),
-            *((U, 1, integers(order), room()) for order in (-1, 0, 2)),
+            *((vr, 1, integers(order), room()) for vr, order in _OUTPUTS_AND_ORDERS),
         ]
     ),
-    *((CS, STEP, "fmi2DoStep", (0.0, h, 1)) for h in (0.0, -0.0, -0.1, nan, inf, -inf)),
-    *((CS, STEP, "fmi2DoStep", (t, 0.1, 1)) for t in (nan, inf, -inf)),
-    (CS, STEP, "fmi2DoStep", (1e308, 1e308, 1)),
+    *((CS, STEP, "fmi2DoStep", (*times, 1)) for times in _TIMES),
     (CS, STEP, "fmi2CancelStep", ()),
     *((CS, STEP, f"fmi2Get{t}Status", (2, None)) for t in ("", "Real", "Integer", "Boolean", "String")),
+    # ---- FMI 3.0 ----
+    *((CS, INSTANTIATED, "fmi3EnterInitializationMode", (0, 0.0, start, 0, 0.0)) for start in (nan, inf, -inf)),
+    *((CS, INSTANTIATED, "fmi3EnterInitializationMode", (0, 0.0, 1.0, 1, stop)) for stop in (nan, -inf, 0.999)),
+    *(
+        (CS, STEP, f"fmi3{do}Float64", a)
+        for do, of in [("Get", U), ("Set", U_L)]
+        for a in [
+            (None, 1, room(), 1),
+            (of, 1, None, 1),
+            (NOTHING, 1, room(), 1),
+            (references(of[0], 2**32 - 1), 2, room(2), 2),
+            *((of, 1, room(2), n) for n in (0, 2)),  # a value too few or too many
+            (None, 0, None, 1),
+        ]
+    ),
+    (CS, STEP, "fmi3SetFloat64", (TIME, 1, room(), 1)),
+    *(
+        (WITH_EVENTS, INITIALIZATION, name, tuple(1 if t is c_size_t else None for t in of))
+        for name, of in {**TYPES, **CLOCKS}.items()
+    ),
+    *(
+        (CS, STEP, function, a)
+        for function in ("fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative")
+        for a in [
+            (None, 1, *counted(U, reals(1.0), room())),
+            (*counted(U), None, 1, *counted(reals(1.0), room())),
+            (*counted(U, U), None, 1, *counted(room())),
+            (*counted(U, U, reals(1.0)), None, 1),
+            (*counted(U, U), reals(1.0), 0, *counted(room())),
+            (*counted(U, U, reals(1.0)), room(), 0),
+            *(counted(unknown, known, reals(1.0), room()) for unknown, known in _UNKNOWNS_AND_KNOWNS),
+        ]
+    ),
+    *(
+        (ME, EVENT, "fmi3UpdateDiscreteStates", (*(None if i == n else flags(True) for i in range(5)), room()))
+        for n in range(5)
+    ),
+    (ME, EVENT, "fmi3UpdateDiscreteStates", (*(flags(True) for _ in range(5)), None)),
+    (ME, CONTINUOUS, "fmi3CompletedIntegratorStep", (True, None, flags(True))),
+    (ME, CONTINUOUS, "fmi3CompletedIntegratorStep", (True, flags(True), None)),
+    *((ME, EVENT, f"fmi3GetNumberOf{what}", (None,)) for what in ("EventIndicators", "ContinuousStates")),
+    *(
+        (CS, STEP, "fmi3GetOutputDerivatives", a)
+        for a in [
+            (None, 1, integers(1), room(), 1),
+            (U, 1, None, room(), 1),
+            (U, 1, integers(1), None, 1),
+            *((U, 1, integers(1), room(2), n) for n in (0, 2)),
+            *((vr, 1, integers(order), room(), 1) for vr, order in _OUTPUTS_AND_ORDERS),
+        ]
+    ),
+    *((CS, STEP, "fmi3DoStep", (*times, True, *(flags(True) for _ in range(3)), room())) for times in _TIMES),
+    *(
+        (CS, STEP, "fmi3DoStep", (0.0, 0.1, True, *(None if i == n else flags(True) for i in range(3)), room()))
+        for n in range(3)
+    ),
+    (CS, STEP, "fmi3DoStep", (0.0, 0.1, True, *(flags(True) for _ in range(3)), None)),
 ]
 
 
 @pytest.mark.parametrize(("kind", "mode", "function", "arguments"), BAD_CALLS)
 def test_a_bad_argument_is_an_error_with_one_log_line_and_no_effect(
-    fmu: Fmu, kind: int, mode: str, function: str, arguments: tuple[Any, ...]
+    fmus: dict[int, Fmu], kind: int, mode: str, function: str, arguments: tuple[Any, ...]
 ) -> None:
-    given = [bytes(a) for a in arguments if isinstance(a, ctypes.Array)]
-    with fmu.instance(kind) as rov:
+    given = contents(arguments)
+    with fmus[int(function[3])].instance(kind) as rov:
         rov.reach(mode)
         before = rov.save()
         assert rov.call(function, *arguments) == ERROR
@@ -132,23 +202,30 @@ def test_a_bad_argument_is_an_error_with_one_log_line_and_no_effect(
         assert (message.status, message.category) == (ERROR, "logStatusError")
         assert message.text.startswith(f"{function}: ")
         assert rov.save() == before
-    assert [bytes(a) for a in arguments if isinstance(a, ctypes.Array)] == given
+    results = slice(None) if "DoStep" not in function else slice(0, 0)  # of a step, they tell where it ended
+    assert contents(arguments)[results] == given[results]
 
 
-@pytest.mark.parametrize("function", SIGNATURES)
-def test_no_instance_is_an_error(fmu: Fmu, function: str) -> None:
-    zero = {ctypes.c_int: 0, ctypes.c_double: 0.0, ctypes.c_size_t: 0}
-    assert fmu.call(function, None, *(zero.get(t) for t in SIGNATURES[function])) == ERROR
+_EVERY_FUNCTION = [(of, function) for of in WRAPPERS for function in of.SIGNATURES]
+
+
+@pytest.mark.parametrize(("of", "function"), _EVERY_FUNCTION)
+def test_no_instance_is_an_error(fmus: dict[int, Fmu], of: type[Fmu], function: str) -> None:
+    zero = dict.fromkeys((ctypes.c_int, ctypes.c_uint, ctypes.c_size_t, ctypes.c_bool), 0) | {ctypes.c_double: 0.0}
+    assert fmus[of.VERSION].call(function, None, *(zero.get(t) for t in of.SIGNATURES[function])) == ERROR
 
 
 def test_nothing_can_be_freed(fmu: Fmu) -> None:
-    fmu.dll.fmi2FreeInstance(None)
+    getattr(fmu.dll, fmu.name("FreeInstance"))(None)
     with fmu.instance() as rov:
-        rov.expect("fmi2FreeFMUstate", None)
-        rov.expect("fmi2FreeFMUstate", ctypes.byref(c_void_p()))
+        rov.expect("FreeFMUState", None)
+        rov.expect("FreeFMUState", ctypes.byref(c_void_p()))
 
 
-ODD_CALLS: list[tuple[int, str, str, tuple[Any, ...]]] = [
+ODD_CALLS: list[Case] = [
+    *((ME, CONTINUOUS, of.name("GetEventIndicators"), (None, 0)) for of in WRAPPERS),
+    *((CS, STEP, of.name("SetDebugLogging"), (-1, 0, None)) for of in WRAPPERS),
+    # ---- FMI 2.0 ----
     (CS, INSTANTIATED, "fmi2SetupExperiment", (-1, nan, 0.0, -1, 10.0)),
     (CS, INSTANTIATED, "fmi2SetupExperiment", (0, 0.0, 0.0, 0, nan)),
     (CS, INSTANTIATED, "fmi2SetupExperiment", (0, 0.0, -5.0, 2, inf)),
@@ -158,17 +235,24 @@ ODD_CALLS: list[tuple[int, str, str, tuple[Any, ...]]] = [
     (CS, STEP, "fmi2GetRealOutputDerivatives", (None, 0, None, None)),
     (CS, STEP, "fmi2SetRealInputDerivatives", (None, 0, None, None)),
     *((CS, STEP, "fmi2DoStep", (t, 0.09999999999999998, -1)) for t in (-1.4e-17, -1.0, 0.1, 1e6)),
-    (ME, CONTINUOUS, "fmi2GetEventIndicators", (None, 0)),
     (ME, CONTINUOUS, "fmi2CompletedIntegratorStep", (-1, integers(1), integers(1))),
-    (CS, STEP, "fmi2SetDebugLogging", (-1, 0, None)),
+    # ---- FMI 3.0 ----
+    (CS, INSTANTIATED, "fmi3EnterInitializationMode", (True, nan, 0.0, True, 10.0)),
+    (CS, INSTANTIATED, "fmi3EnterInitializationMode", (False, 0.0, 0.0, False, nan)),
+    (CS, INSTANTIATED, "fmi3EnterInitializationMode", (False, 0.0, -5.0, True, inf)),
+    *((CS, STEP, f"fmi3{f}Float64", (None, 0, None, 0)) for f in ("Get", "Set")),
+    *((CS, STEP, f"fmi3Get{f}Derivative", (None, 0) * 4) for f in ("Directional", "Adjoint")),
+    (CS, STEP, "fmi3GetDirectionalDerivative", (U, 1, None, 0, None, 0, room(), 1)),
+    (CS, STEP, "fmi3GetAdjointDerivative", (None, 0, U, 1, None, 0, room(), 1)),
+    (CS, STEP, "fmi3GetOutputDerivatives", (None, 0, None, None, 0)),
 ]
 
 
 @pytest.mark.parametrize(("kind", "mode", "function", "arguments"), ODD_CALLS)
 def test_what_importers_really_pass_works(
-    fmu: Fmu, kind: int, mode: str, function: str, arguments: tuple[Any, ...]
+    fmus: dict[int, Fmu], kind: int, mode: str, function: str, arguments: tuple[Any, ...]
 ) -> None:
-    with fmu.instance(kind) as rov:
+    with fmus[int(function[3])].instance(kind) as rov:
         rov.reach(mode)
         rov.expect(function, *arguments)
 
@@ -205,9 +289,7 @@ def test_a_step_past_the_stop_time_is_refused_up_to_rounding(
     fmu: Fmu, start: float, stop: float | None, t: float, h: float, status: int
 ) -> None:
     with fmu.instance() as rov:
-        assert rov.setup(start, stop) == OK
-        rov.expect("fmi2EnterInitializationMode")
-        rov.expect("fmi2ExitInitializationMode")
+        rov.start(stop=stop, at=start)
         before = rov.save()
         assert rov.step(t, h) == status
         assert (rov.save() == before) == (status == ERROR)
@@ -236,10 +318,7 @@ def test_a_repeated_or_skipped_communication_point_is_warned_of_once(
 ) -> None:
     with fmu.instance() as rov, fmu.instance() as regular:
         for either in (rov, regular):
-            assert either.setup(start) == OK
-            assert either.set({"u_l": 0.5, "r": 1.0}) == OK
-            either.expect("fmi2EnterInitializationMode")
-            either.expect("fmi2ExitInitializationMode")
+            either.start({"u_l": 0.5, "r": 1.0}, at=start)
         at = start
         for t, h, warned in steps:
             assert rov.step(t, h) == regular.step(at, h) == OK
@@ -271,9 +350,9 @@ def test_a_thousand_steps_added_up_reach_the_stop_time(fmu: Fmu) -> None:
         assert rov.step(t, 0.01) == ERROR
 
 
-def test_status_after_a_step(fmu: Fmu) -> None:
+def test_status_after_a_step(fmu2: fmi2.Fmu) -> None:
     time, flag = room(), integers(-7)
-    with fmu.instance() as rov:
+    with fmu2.instance() as rov:
         rov.start()
         assert rov.step(0.0, 0.25) == OK
         rov.expect("fmi2GetRealStatus", 2, time)
@@ -283,73 +362,3 @@ def test_status_after_a_step(fmu: Fmu) -> None:
             assert rov.call(function, kind, time if "Real" in function else flag) == DISCARD
         assert (time[0], flag[0]) == (0.25, 0)
         assert {m.category for m in rov.log} == {"logStatusDiscard"}
-
-
-GUID = object()  # the FMU's own
-
-
-@pytest.mark.parametrize(
-    ("name", "kind", "guid", "said"),
-    [
-        (None, CS, GUID, "name"),
-        (b"", CS, GUID, "name"),
-        (b" \t\r\n", ME, GUID, "name"),
-        (b"rov", 2, GUID, "fmuType = 2"),
-        (b"rov", -1, GUID, "fmuType = -1"),
-        (b"rov", CS, None, "NULL"),
-        (b"rov", CS, b"", "GUID"),
-        (b"rov", ME, b"{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}", "{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}"),
-        (b"rov", CS, b"%n" * 300, "GUID"),
-    ],
-)
-def test_a_bad_instantiation_gives_no_instance_and_one_log_line(
-    fmu: Fmu, name: bytes | None, kind: int, guid: Any, said: str
-) -> None:
-    log: list[Message] = []
-    callbacks = recording_callbacks(log)
-    own = fmu.description.guid.encode()
-    component = fmu.dll.fmi2Instantiate(name, kind, own if guid is GUID else guid, None, ctypes.byref(callbacks), 0, 0)
-    assert component is None
-    (message,) = log
-    assert (message.status, message.category) == (ERROR, "logStatusError")
-    assert message.text.startswith("fmi2Instantiate: ")
-    assert said in message.text
-    silent = fmi2CallbackFunctions()  # no logger
-    assert fmu.dll.fmi2Instantiate(name, kind, own if guid is GUID else guid, None, ctypes.byref(silent), 0, 0) is None
-
-
-def test_no_callbacks_give_no_instance(fmu: Fmu) -> None:
-    assert fmu.dll.fmi2Instantiate(b"rov", CS, fmu.description.guid.encode(), None, None, 0, 0) is None
-
-
-@pytest.mark.parametrize(
-    "uri",
-    [
-        None,
-        b"",
-        b"file:/x",
-        b"file:///x",
-        b"file:////x/",
-        b"file:///no such%20folder",
-        b"\xff%n%s",
-        b"C:\\x",
-        b"x" * 9999,
-    ],
-)
-def test_any_resource_location_will_do(fmu: Fmu, uri: bytes | None) -> None:
-    callbacks = fmi2CallbackFunctions()  # NULL, all of them
-    component = fmu.dll.fmi2Instantiate(b"rov", CS, fmu.description.guid.encode(), uri, ctypes.byref(callbacks), -1, -1)
-    assert fmu.call("fmi2SetupExperiment", component, 0, 0.0, 0.0, 0, 0.0) == OK
-    assert fmu.call("fmi2DoStep", component, 0.0, 0.1, 1) == ERROR  # without a logger, too
-    fmu.dll.fmi2FreeInstance(component)
-
-
-def test_the_callbacks_are_copied(fmu: Fmu) -> None:
-    log: list[Message] = []
-    callbacks = recording_callbacks(log)
-    given = fmi2CallbackFunctions.from_buffer_copy(callbacks)
-    component = fmu.dll.fmi2Instantiate(b"rov", CS, fmu.description.guid.encode(), None, ctypes.byref(given), 0, 0)
-    ctypes.memset(ctypes.byref(given), 0xAA, ctypes.sizeof(given))
-    assert fmu.call("fmi2DoStep", component, 0.0, 0.1, 1) == ERROR
-    fmu.dll.fmi2FreeInstance(component)
-    assert len(log) == 1

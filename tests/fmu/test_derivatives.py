@@ -9,11 +9,15 @@ import pytest
 from mpmath import mp
 
 from checks.equations import effect, equations, steady_forces
+from checks.time_derivatives import time_derivatives
+from rov_fmu.export.model_description import OUTPUT_ORDER
 from rov_fmu.motion.layout import YAW
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.fmi2 import (
+from tests import fmi3
+from tests.fmi import (
     CO_SIMULATION,
+    ERROR,
     EVERY_MODE,
     INITIALIZATION,
     INSTANTIATED,
@@ -21,26 +25,42 @@ from tests.fmi2 import (
     MODES,
     OK,
     STEP,
+    AnyInstance,
     Fmu,
-    Instance,
     integers,
     reals,
-    references,
+    room,
 )
-from tests.vehicles import EVERYTHING, HEAVY, VIDEORAY, State, Values
+from tests.fmu.conftest import WRAPPERS
+from tests.vehicles import EVERYTHING, HEAVY, VIDEORAY, State, Values, at_rest
 
-ROVS = {"videoray_dir": VIDEORAY, "heavy_dir": HEAVY, "everything_dir": load_vehicle(EVERYTHING).rov}
+ROVS = {
+    "videoray_dir": VIDEORAY,
+    "videoray3_dir": VIDEORAY,
+    "heavy_dir": HEAVY,
+    "heavy3_dir": HEAVY,
+    "everything_dir": load_vehicle(EVERYTHING).rov,
+}
 
 
 @pytest.fixture(scope="module", params=ROVS)
 def fmu(request: pytest.FixtureRequest) -> Fmu:
     """Of a vehicle of the paper, of one with sway, lag, coupling and dead band, and of one that has everything."""
-    return Fmu(request.getfixturevalue(request.param))
+    return WRAPPERS[3 if "3" in request.param else 2](request.getfixturevalue(request.param))
+
+
+@pytest.fixture(scope="module", params=["videoray3_dir", "heavy3_dir"])
+def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
+    return fmi3.Fmu(request.getfixturevalue(request.param))
 
 
 @pytest.fixture
 def rov(fmu: Fmu) -> Rov:
     """The same vehicle."""
+    return rov_of(fmu)
+
+
+def rov_of(fmu: Fmu) -> Rov:
     return next(rov for rov in ROVS.values() if set(rov.layout.inputs) == set(fmu.inputs))
 
 
@@ -71,10 +91,14 @@ def points(fmu: Fmu, n: int, seed: int) -> list[dict[str, float]]:
     return [motion | random_parameters(fmu, rng) for motion in motions]
 
 
-def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> Instance:
-    rov = fmu.instance(kind)
+def bring(rov: AnyInstance, mode: str, point: dict[str, float]) -> None:
     assert rov.set(point) == OK
     rov.reach(mode)
+
+
+def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> AnyInstance:
+    rov = fmu.instance(kind)
+    bring(rov, mode, point)
     return rov
 
 
@@ -93,15 +117,22 @@ def exact(rov: Rov, point: Values) -> dict[str, Any]:
     return found | {f"der({name})": rate for name, rate in rates.items()}
 
 
+_SLOPES: dict[tuple[Any, ...], dict[str, float]] = {}
+"""By vehicle, point, known and side: both versions and interfaces are held to the same ones."""
+
+
 def slopes(rov: Rov, point: Values, known: str, side: int = 1) -> dict[str, float]:
     """Of every output and derivative by one known, from one side: in 50 digits all that a double has."""
-    with mp.workdps(50):
-        h = side * mp.mpf(10) ** -18
-        here, near, far = (exact(rov, {**point, known: mp.mpf(point[known]) + n * h}) for n in range(3))
-        return {name: float((4 * near[name] - far[name] - 3 * here[name]) / (2 * h)) for name in here}
+    key = (id(rov), *point.items(), known, side)
+    if key not in _SLOPES:
+        with mp.workdps(50):
+            h = side * mp.mpf(10) ** -18
+            here, near, far = (exact(rov, {**point, known: mp.mpf(point[known]) + n * h}) for n in range(3))
+            _SLOPES[key] = {name: float((4 * near[name] - far[name] - 3 * here[name]) / (2 * h)) for name in here}
+    return _SLOPES[key]
 
 
-def check_slopes(rov: Rov, instance: Instance, point: Values, known: str, side: int = 1) -> None:
+def check_slopes(rov: Rov, instance: AnyInstance, point: Values, known: str, side: int = 1) -> None:
     unknowns = instance.fmu.outputs + instance.fmu.derivatives
     found, expected = instance.derivatives(unknowns, known), slopes(rov, point, known, side)
     size = max(1.0, *map(abs, expected.values()))  # what a sum of large terms leaves
@@ -109,11 +140,11 @@ def check_slopes(rov: Rov, instance: Instance, point: Values, known: str, side: 
         assert d == pytest.approx(expected[name], rel=1e-12, abs=1e-14 * size), (name, known, side, point)
 
 
-@pytest.mark.parametrize("number", [3, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [2, pytest.param(60, marks=pytest.mark.long)])
 def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
-    """By every input, state and coefficient, of all that is calculated."""
-    for point in points(fmu, number, seed=1):
-        with at_point(fmu, CO_SIMULATION, INITIALIZATION, point) as instance:
+    """By every input, state and coefficient, of all that is calculated, in both interfaces."""
+    for point, kind in product(points(fmu, number, seed=1), MODES):
+        with at_point(fmu, kind, INITIALIZATION, point) as instance:
             for known in point:
                 check_slopes(rov, instance, point, known)
 
@@ -159,18 +190,60 @@ def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
     with at_point(fmu, MODEL_EXCHANGE, INITIALIZATION, point) as rov:
         seeds = {known: rng.uniform(-1.0, 1.0) for known in point}
         columns = [[seed * d for d in rov.derivatives(unknowns, known)] for known, seed in seeds.items()]
-        result = reals(*[0.0] * len(unknowns))
-        rov.expect(
-            "fmi2GetDirectionalDerivative",
-            references(*(fmu.vr[name] for name in unknowns)),
-            len(unknowns),
-            references(*(fmu.vr[name] for name in seeds)),
-            len(seeds),
-            reals(*seeds.values()),
-            result,
-        )
+        result = rov.derivatives(unknowns, seeds)
         for i, column in enumerate(zip(*columns, strict=True)):
             assert result[i] == pytest.approx(sum(column), rel=1e-12, abs=1e-12 * max(map(abs, column)))
+
+
+# ---- Adjoint derivatives ----
+
+
+@pytest.mark.parametrize("number", [2, pytest.param(40, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kind", MODES)
+def test_adjoint_derivatives_are_the_slopes_of_the_equations(fmu3: fmi3.Fmu, kind: int, number: int) -> None:
+    """Of every output and derivative, by every input, state and coefficient."""
+    unknowns = fmu3.outputs + fmu3.derivatives
+    for point in points(fmu3, number, seed=1):
+        columns = [slopes(rov_of(fmu3), point, known) for known in point]
+        size = [max(1.0, *map(abs, column.values())) for column in columns]
+        with fmu3.instance(kind) as instance:
+            bring(instance, INITIALIZATION, point)
+            for name in unknowns:
+                row = instance.adjoint([name], list(point), [1.0])
+                for known, d, column, scale in zip(point, row, columns, size, strict=True):
+                    assert d == pytest.approx(column[name], rel=1e-12, abs=1e-14 * scale), (name, known, point)
+
+
+@pytest.mark.parametrize(("kind", "mode"), [c for c in fmi3.EVERY_MODE if c[1] != INSTANTIATED], ids=str)
+def test_adjoint_derivatives_are_those_of_the_directional_ones(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
+    """(v J) u = v (J u), by the knowns of the mode."""
+    rng = random.Random(4)
+    unknowns = fmu3.outputs + fmu3.derivatives
+    for point in points(fmu3, 5, seed=2):
+        known = list(point) if mode == INITIALIZATION else fmu3.inputs + fmu3.states
+        u, v = ({name: rng.uniform(-1.0, 1.0) for name in names} for names in (known, unknowns))
+        with fmu3.instance(kind) as rov:
+            bring(rov, mode, point)
+            change, row = rov.derivatives(unknowns, u), rov.adjoint(unknowns, known, list(v.values()))
+            terms = [a * b for a, b in zip(v.values(), change, strict=True)]
+            combined = sum(a * b for a, b in zip(row, u.values(), strict=True))
+            assert combined == pytest.approx(sum(terms), rel=1e-11, abs=1e-13 * sum(map(abs, terms)))
+
+
+@pytest.mark.parametrize("function", ["fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"])
+def test_as_many_seeds_and_sensitivities_are_wanted_as_there_are_variables(fmu3: fmi3.Fmu, function: str) -> None:
+    of, n_seed = fmu3.references, 2 if "Directional" in function else 3
+    arguments = (of(["u", "der(u)", "der(psi)"]), 3, of(["r", "u"]), 2)
+    with fmu3.instance() as rov:
+        rov.start({"u": 0.5, "r": 0.2})
+        for seeds, sensitivities in [(n_seed - 1, 5 - n_seed), (n_seed, 4 - n_seed), (0, 0)]:
+            found = room(5 - n_seed)
+            assert rov.call(function, *arguments, reals(1.0, 2.0, 3.0), seeds, found, sensitivities) == ERROR
+            assert list(found) == list(room(5 - n_seed))
+            assert f"it takes {n_seed} and {5 - n_seed}" in rov.log[-1].text
+        rov.expect(function, *arguments, reals(1.0, 2.0, 3.0), n_seed, found, 5 - n_seed)
+        d = rov.derivatives(["der(u)"], "u")[0]
+        assert list(found) == ([2.0, 2.0 * d, 1.0] if n_seed == 2 else [3.0, 1.0 + 2.0 * d])
 
 
 # ---- The model structure ----
@@ -178,7 +251,7 @@ def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
 Jacobian = dict[tuple[str, str], float]
 
 
-def jacobian(rov: Instance, unknowns: Sequence[str], knowns: Sequence[str]) -> Jacobian:
+def jacobian(rov: AnyInstance, unknowns: Sequence[str], knowns: Sequence[str]) -> Jacobian:
     columns = {known: rov.derivatives(unknowns, known) for known in knowns}
     return {(name, known): d for known, column in columns.items() for name, d in zip(unknowns, column, strict=True)}
 
@@ -241,26 +314,41 @@ def test_the_structure_lists_every_output_state_and_calculated_variable(fmu: Fmu
 # ---- Derivatives by time ----
 
 
-def output_derivatives(rov: Instance) -> list[float]:
-    names = rov.fmu.outputs
-    values = reals(*[0.0] * len(names))
-    vr = references(*(rov.fmu.vr[name] for name in names))
-    rov.expect("fmi2GetRealOutputDerivatives", vr, len(names), integers(*[1] * len(names)), values)
-    return list(values)
+def check_rates(rov: Rov, instance: AnyInstance, point: Values) -> None:
+    """The derivatives of all orders, against those of the equations."""
+    names = instance.fmu.outputs
+    k = Rov(rov.layout, {name: point[name] for name in rov.coefficients})
+    for order, exact_rates in enumerate(time_derivatives(k, point, point, OUTPUT_ORDER), 1):
+        expected = {name: float(exact_rates[name]) for name in names}
+        size = max(map(abs, expected.values()))
+        for name, rate in zip(names, instance.rates(names, order), strict=True):
+            assert rate == pytest.approx(expected[name], rel=1e-11, abs=1e-13 * size), (name, order, point)
 
 
-def test_output_derivatives_are_the_slopes_of_the_outputs_over_small_steps(fmu: Fmu) -> None:
-    h = 2e-5
-    for point in points(fmu, 12, seed=7):
-        with at_point(fmu, CO_SIMULATION, STEP, point) as rov:
-            before = rov.get(fmu.outputs)
-            assert rov.step(0.0, h) == OK
-            slopes = output_derivatives(rov)
-            assert rov.step(h, h) == OK
-            for name, slope, a, b in zip(fmu.outputs, slopes, before, rov.get(fmu.outputs), strict=True):
-                assert slope == pytest.approx((b - a) / (2.0 * h), rel=1e-5, abs=1e-5), (name, point)
-            rov.expect("fmi2Terminate")
-            assert output_derivatives(rov)[0] == rov.get(["der(u)"])[0]
+@pytest.mark.parametrize("number", [8, pytest.param(300, marks=pytest.mark.long)])
+def test_output_derivatives_of_every_order_are_those_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
+    """From any motion, and from rest."""
+    for n, point in enumerate(points(fmu, number, seed=7)):
+        motion = point | (at_rest(rov) if n % 4 == 0 else {})
+        with at_point(fmu, CO_SIMULATION, STEP, motion) as instance:
+            check_rates(rov, instance, motion)
+            instance.expect("Terminate")
+            assert instance.rates(["u"]) == pytest.approx(instance.get(["der(u)"]), rel=1e-13)
+
+
+def test_output_derivatives_are_given_up_to_order_19(fmu: Fmu) -> None:
+    highest = 19
+    declared = fmu.description.coSimulation.maxOutputDerivativeOrder
+    assert highest == OUTPUT_ORDER
+    assert declared == highest or (fmu.VERSION == 2 and declared == 1)
+    vr, values = fmu.references(["u", "u"]), room(2)
+    with fmu.instance() as rov:
+        rov.start({"u": 0.5})
+        assert rov.rates_by(vr, integers(1, highest + 1), values) == ERROR
+        assert list(values) == list(room(2))
+        assert f"order {highest + 1} of u" in rov.log[-1].text
+        assert rov.rates_by(vr, integers(highest, 1), values) == OK
+        assert list(values) == [*rov.rates(["u"], highest), *rov.rates(["u"], 1)]
 
 
 @pytest.mark.parametrize("mode", MODES[MODEL_EXCHANGE][1:])
@@ -268,9 +356,9 @@ def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu:
     n = len(fmu.states)
     for point in points(fmu, 5, seed=8):
         with at_point(fmu, MODEL_EXCHANGE, mode, point) as rov:
-            derivatives, states = reals(*[0.0] * n), reals(*[0.0] * n)
-            rov.expect("fmi2GetDerivatives", derivatives, n)
-            rov.expect("fmi2GetContinuousStates", states, n)
+            derivatives, states = room(n), room(n)
+            rov.expect("GetContinuousStateDerivatives", derivatives, n)
+            rov.expect("GetContinuousStates", states, n)
             assert bytes(derivatives) == bytes(reals(*rov.get(fmu.derivatives)))
             assert bytes(states) == bytes(reals(*(point[name] for name in fmu.states)))
             assert len({*derivatives}) > 3

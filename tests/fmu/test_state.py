@@ -9,18 +9,20 @@ from pathlib import Path
 
 import pytest
 
-from tests.fmi2 import (
+from tests import fmi3
+from tests.fmi import (
     CO_SIMULATION,
     CONTINUOUS,
     ERROR,
+    EVENT,
     EVERY_MODE,
-    LAST_SUCCESSFUL_TIME,
     MODEL_EXCHANGE,
     MODES,
     OK,
     STEP,
+    WITH_EVENTS,
+    AnyInstance,
     Fmu,
-    Instance,
     reals,
 )
 
@@ -41,7 +43,7 @@ def commands(i: int) -> dict[str, float]:
     }
 
 
-def run(rov: Instance, first: int, last: int) -> bytes:
+def run(rov: AnyInstance, first: int, last: int) -> bytes:
     """All outputs after each step from the first to before the last."""
     result = b""
     for i in range(first, last):
@@ -82,11 +84,11 @@ def test_a_state_restored_in_its_own_run_repeats_it(fmu: Fmu, whole: bytes) -> N
     with fmu.instance() as rov:
         rov.start(DISTURBED, stop=1.0)
         run(rov, 0, 10)
-        rov.expect("fmi2GetFMUstate", ctypes.byref(state))
+        rov.expect("GetFMUState", ctypes.byref(state))
         for _ in range(3):
             assert run(rov, 10, 20) == half(whole)
-            rov.expect("fmi2SetFMUstate", state)
-        rov.expect("fmi2FreeFMUstate", ctypes.byref(state))
+            rov.expect("SetFMUState", state)
+        rov.expect("FreeFMUState", ctypes.byref(state))
         assert state.value is None
 
 
@@ -101,13 +103,14 @@ def test_a_state_goes_on_in_another_process(fmu: Fmu, whole: bytes, midway: byte
     saved = tmp_path / "state"
     saved.write_bytes(midway)
     script = (
-        "import sys; from pathlib import Path; from tests.fmi2 import Fmu; from tests.fmu.test_state import run\n"
-        "with Fmu(Path(sys.argv[1])).instance(name='elsewhere') as rov:\n"
+        "import sys; from pathlib import Path; from tests.fmu.conftest import WRAPPERS\n"
+        "from tests.fmu.test_state import run\n"
+        "with WRAPPERS[int(sys.argv[3])](Path(sys.argv[1])).instance(name='elsewhere') as rov:\n"
         "    assert rov.load(Path(sys.argv[2]).read_bytes()) == 0, rov.log\n"
         "    sys.stdout.write(run(rov, 10, 20).hex())\n"
     )
     result = subprocess.run(
-        [sys.executable, "-c", script, str(fmu.folder), str(saved)],
+        [sys.executable, "-c", script, str(fmu.folder), str(saved), str(fmu.VERSION)],
         cwd=Path(__file__).parent.parent.parent,
         capture_output=True,
         text=True,
@@ -120,7 +123,7 @@ def test_reset_and_run_again_gives_the_same_bits(fmu: Fmu, whole: bytes) -> None
     with fmu.instance() as rov:
         rov.start({"u": 2.0, "alpha_u": 0.5, "R": 0.3})
         run(rov, 0, 7)
-        rov.expect("fmi2Reset")
+        rov.expect("Reset")
         rov.start(DISTURBED, stop=1.0)
         assert run(rov, 0, 20) == whole
 
@@ -136,7 +139,7 @@ def test_the_library_unloaded_and_loaded_again_gives_the_same_bits(fmu: Fmu, who
     copy = tmp_path / fmu.library.name
     shutil.copyfile(fmu.library, copy)
     for _ in range(2):
-        loaded = Fmu(fmu.folder, copy)
+        loaded = type(fmu)(fmu.folder, copy)
         rov = loaded.instance()
         rov.start(DISTURBED, stop=1.0)
         assert run(rov, 0, 20) == whole
@@ -157,6 +160,60 @@ def test_two_instances_in_turns_give_the_bits_of_each_alone(fmu: Fmu, whole: byt
     assert b"".join(row[2] for row in together) == other
 
 
+# ---- Event Mode of Co-Simulation ----
+
+
+@pytest.mark.parametrize("mode", fmi3.MODES[WITH_EVENTS])
+def test_with_event_mode_a_state_holds_the_mode(fmu3: fmi3.Fmu, mode: str) -> None:
+    with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance(WITH_EVENTS) as another:
+        rov.reach(mode)
+        assert another.load(rov.save()) == OK
+        assert another.mode() == mode
+        assert another.save() == rov.save()
+
+
+def test_a_state_in_event_mode_is_refused_where_that_is_not_used(fmu3: fmi3.Fmu) -> None:
+    state, restored = c_void_p(), c_void_p()
+    with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance() as other:
+        rov.reach(EVENT)
+        rov.expect("GetFMUState", ctypes.byref(state))
+        before = other.save()
+        assert other.call("SetFMUState", state) == ERROR
+        assert "Event Mode" in other.log[-1].text
+        assert other.deserialize(rov.save(), restored) == ERROR
+        assert restored.value is None
+        assert other.save() == before
+        rov.expect("FreeFMUState", ctypes.byref(state))
+
+
+def test_a_state_between_steps_goes_on_with_event_mode_and_without(fmu3: fmi3.Fmu) -> None:
+    with fmu3.instance() as plain, fmu3.instance(WITH_EVENTS) as events:
+        plain.start(DISTURBED)
+        events.reach(STEP)
+        commanded = {name: value for name, value in commands(0).items() if name in fmu3.inputs}
+        assert plain.set(commanded) == OK
+        assert events.load(plain.save()) == OK
+        assert events.mode() == STEP
+        for rov in (plain, events):
+            assert rov.step(0.0, 0.3) == OK
+        assert events.get(fmu3.states) == plain.get(fmu3.states)
+        assert plain.load(events.save()) == OK
+
+
+def test_a_state_of_the_other_version_is_refused(fmus: dict[int, Fmu]) -> None:
+    """The bytes begin with whose they are; in memory a state tells whose it is."""
+    for version, fmu in fmus.items():
+        state, restored = c_void_p(), c_void_p()
+        with fmu.instance() as rov, fmus[5 - version].instance() as other:
+            before = other.save()
+            rov.expect("GetFMUState", ctypes.byref(state))
+            assert other.call("SetFMUState", state) == ERROR
+            assert other.deserialize(rov.save(), restored) == ERROR
+            assert "not a state of this FMU" in other.log[-1].text
+            assert other.save() == before
+            rov.expect("FreeFMUState", ctypes.byref(state))
+
+
 # ---- What a state holds ----
 
 
@@ -166,25 +223,23 @@ def test_a_state_holds_the_mode(fmu: Fmu, kind: int, mode: str) -> None:
         rov.reach(mode)
         assert another.load(rov.save()) == OK
         assert another.mode() == mode
-        another.expect("fmi2Reset")
+        another.expect("Reset")
         another.reach(MODES[kind][2])
         assert another.load(rov.save()) == OK
         assert another.mode() == mode
 
 
 def test_a_state_holds_every_value_and_the_time(fmu: Fmu, midway: bytes) -> None:
-    time = reals(0.0)
     with fmu.instance() as rov:
         rov.start(DISTURBED, stop=1.0)
         run(rov, 0, 10)
         before = rov.get(list(fmu.variables))
-        rov.expect("fmi2Reset")
-        rov.start({"u_l": 0.1, "b_t_top": 3.0, "y": -4.0}, stop=50.0)
+        rov.expect("Reset")
+        rov.start({"u_l": 0.1, "b_t_top": 3.0, "y": -4.0}, stop=50.0, at=40.0)
         assert rov.step(40.0, 1.0) == OK
         assert rov.load(midway) == OK
         assert rov.get(list(fmu.variables)) == before
-        rov.expect("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME, time)
-        assert time[0] == pytest.approx(0.5, abs=1e-15)
+        assert rov.time() == pytest.approx(0.5, abs=1e-15)
         assert rov.step(0.5, 0.6) == ERROR  # past its stop time
 
 
@@ -192,25 +247,25 @@ def test_a_state_is_a_copy_that_later_calls_leave_alone(fmu: Fmu, midway: bytes)
     state = c_void_p()
     with fmu.instance() as rov, fmu.instance() as another:
         assert rov.load(midway) == OK
-        rov.expect("fmi2GetFMUstate", ctypes.byref(state))
+        rov.expect("GetFMUState", ctypes.byref(state))
         run(rov, 10, 15)
-        rov.expect("fmi2Reset")
+        rov.expect("Reset")
         assert rov.save(state) == midway
         assert another.save(state) == midway  # any instance can read it
-        another.expect("fmi2FreeFMUstate", ctypes.byref(state))
+        another.expect("FreeFMUState", ctypes.byref(state))
 
 
 def test_a_state_given_again_is_overwritten_in_place(fmu: Fmu, midway: bytes) -> None:
     state = c_void_p()
     with fmu.instance() as rov:
-        rov.expect("fmi2GetFMUstate", ctypes.byref(state))
+        rov.expect("GetFMUState", ctypes.byref(state))
         first, new = state.value, rov.save(state)
         assert rov.load(midway) == OK
-        rov.expect("fmi2GetFMUstate", ctypes.byref(state))
+        rov.expect("GetFMUState", ctypes.byref(state))
         assert (state.value, rov.save(state)) == (first, midway)
         assert rov.deserialize(new, state) == OK
         assert (state.value, rov.save(state)) == (first, new)
-        rov.expect("fmi2FreeFMUstate", ctypes.byref(state))
+        rov.expect("FreeFMUState", ctypes.byref(state))
 
 
 @pytest.mark.parametrize(("kind", "mode"), [(CO_SIMULATION, STEP), (MODEL_EXCHANGE, CONTINUOUS)])
@@ -218,10 +273,10 @@ def test_a_state_of_the_other_interface_is_refused(fmu: Fmu, kind: int, mode: st
     state = c_void_p()
     with fmu.instance(kind) as rov, fmu.instance(1 - kind) as other:
         rov.reach(mode)
-        rov.expect("fmi2GetFMUstate", ctypes.byref(state))
+        rov.expect("GetFMUState", ctypes.byref(state))
         before = other.save()
-        for status in (other.call("fmi2SetFMUstate", state), other.load(rov.save())):
+        for status in (other.call("SetFMUState", state), other.load(rov.save())):
             assert status == ERROR
             assert "interface" in other.log[-1].text
             assert other.save() == before
-        rov.expect("fmi2FreeFMUstate", ctypes.byref(state))
+        rov.expect("FreeFMUState", ctypes.byref(state))

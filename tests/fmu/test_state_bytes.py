@@ -7,7 +7,7 @@ from math import inf, nan
 
 import pytest
 
-from tests.fmi2 import CO_SIMULATION, ERROR, INSTANTIATED, OK, Fmu, Instance
+from tests.fmi import CO_SIMULATION, ERROR, INITIALIZATION, OK, AnyInstance, Fmu
 
 
 @pytest.fixture(scope="module")
@@ -27,19 +27,19 @@ def checksum(content: bytes) -> bytes:
     return struct.pack("<Q", value)
 
 
-def assert_refused(rov: Instance, content: bytes) -> None:
+def assert_refused(rov: AnyInstance, content: bytes) -> None:
     """The bytes are an error, no instance changes, and neither does *FMUstate, NULL or a state."""
     nothing, state = c_void_p(), c_void_p()
-    rov.expect("fmi2GetFMUstate", ctypes.byref(state))
+    rov.expect("GetFMUState", ctypes.byref(state))
     before, address = rov.save(), state.value
     rov.log.clear()
     assert rov.deserialize(content, nothing) == ERROR
     assert nothing.value is None
     assert rov.deserialize(content, state) == ERROR
     assert [m.category for m in rov.log] == ["logStatusError"] * 2
-    assert all(m.text.startswith("fmi2DeSerializeFMUstate: ") for m in rov.log)
+    assert all(m.text.startswith(f"{rov.fmu.name('DeserializeFMUState')}: ") for m in rov.log)
     assert (state.value, rov.save(state), rov.save()) == (address, before, before)
-    rov.expect("fmi2FreeFMUstate", ctypes.byref(state))
+    rov.expect("FreeFMUState", ctypes.byref(state))
 
 
 def test_no_byte_of_a_state_can_be_damaged(fmu: Fmu, serialized: bytes) -> None:
@@ -59,7 +59,7 @@ def test_a_state_cut_short_extended_or_foreign_is_refused(fmu: Fmu, serialized: 
         for foreign in (bytes(n), b"\xff" * n, serialized[::-1], serialized[8:] + serialized[:8]):
             assert_refused(rov, foreign)
             assert_refused(rov, foreign[:-8] + checksum(foreign[:-8]))
-        guid = fmu.description.guid.encode()
+        guid = fmu.token
         another = serialized.replace(guid, guid[:-2] + bytes([guid[-2] ^ 1]) + guid[-1:])
         assert_refused(rov, another[:-8] + checksum(another[:-8]))
 
@@ -67,7 +67,7 @@ def test_a_state_cut_short_extended_or_foreign_is_refused(fmu: Fmu, serialized: 
 def test_values_that_no_run_can_reach_are_refused_even_with_the_right_checksum(fmu: Fmu) -> None:
     marks = {name: 0.5 + i / 1024 for i, name in enumerate(fmu.inputs + fmu.states + fmu.parameters)}
     with fmu.instance() as rov:
-        assert rov.setup(start=0.4375) == OK
+        assert rov.initialize(start=0.4375) == OK
         assert rov.set(marks) == OK
         good = rov.save()
         places = {name: good.index(struct.pack("<d", value)) for name, value in {**marks, "time": 0.4375}.items()}
@@ -79,7 +79,7 @@ def test_values_that_no_run_can_reach_are_refused_even_with_the_right_checksum(f
 
         assert with_value("u", marks["u"]) == good
         assert rov.load(with_value("u", -8.5)) == OK
-        assert rov.mode() == INSTANTIATED
+        assert rov.mode() == INITIALIZATION
         for name in places:
             for value in (nan, inf, -inf):
                 assert_refused(rov, with_value(name, value))
@@ -97,7 +97,7 @@ def test_values_that_no_run_can_reach_are_refused_even_with_the_right_checksum(f
     ],
 )
 def test_a_mode_that_no_run_can_be_in_is_refused(fmu: Fmu, serialized: bytes, word: int, value: int) -> None:
-    start = len(b"ROVSTATE") + len(fmu.description.guid)
+    start = len(b"ROVSTATE") + len(fmu.token)
     content = bytearray(serialized[:-8])
     interface, mode, flags = struct.unpack_from("<3Q", content, start)
     assert (interface, mode, flags) == (CO_SIMULATION, 16, 3)

@@ -24,22 +24,25 @@ _PLAIN_ADDRESSES = (
 )
 
 
-@pytest.fixture(scope="module")
-def sources(vehicle: Vehicle) -> Mapping[str, str]:
-    return native_content(vehicle).sources
-
-
 def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls: int) -> Ended:
     program = compile_c(PROGRAM, folder / "threads", sources, "-pthread", sanitizers=sanitizers)
     return run_program(sys.executable, "-c", _PLAIN_ADDRESSES, program, str(calls))
 
 
 @pytest.mark.parametrize("calls", [20_000, pytest.param(2_000_000, marks=pytest.mark.long)])
-@pytest.mark.parametrize("sanitizers", ["thread", "address,undefined"])
+@pytest.mark.parametrize(
+    ("fmi", "sanitizers"),
+    [
+        (2, "thread"),
+        (2, "address,undefined"),
+        (3, "thread"),
+        pytest.param(3, "address,undefined", marks=pytest.mark.long),  # as the fuzzer's corpus has it
+    ],
+)
 def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
-    sources: Mapping[str, str], tmp_path: Path, sanitizers: str, calls: int
+    vehicle: Vehicle, tmp_path: Path, fmi: int, sanitizers: str, calls: int
 ) -> None:
-    run = run_threads(sources, tmp_path, sanitizers, calls)
+    run = run_threads(native_content(vehicle, fmi=fmi).sources, tmp_path, sanitizers, calls)
     assert run.code == 0, run.errors
     assert run.errors == ""
     counts = {name: int(count) for name, count in run.lines}
@@ -51,16 +54,23 @@ def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
 @pytest.mark.parametrize(
     ("sanitizers", "file", "line", "fault", "report"),
     [
-        ("thread", "rov_step.c", "    rov_held held;\n", "static rov_held held;", "data race"),
-        ("address", "fmi2_common.c", "    free(c);\n", "(void)c;", "detected memory leaks"),
+        (
+            "thread",
+            "rov_step.c",
+            "    rov_held held;\n    flow f;\n    flow_begin",
+            "static rov_held held; flow f; flow_begin",
+            "data race",
+        ),
+        ("address", "fmi2_common.c", "    free(c);\n", "(void)c;\n", "detected memory leaks"),
     ],
     ids=["shared variable", "lost instance"],
 )
 def test_a_shared_variable_or_a_lost_instance_would_be_reported(
-    sources: Mapping[str, str], tmp_path: Path, sanitizers: str, file: str, line: str, fault: str, report: str
+    vehicle: Vehicle, tmp_path: Path, sanitizers: str, file: str, line: str, fault: str, report: str
 ) -> None:
+    sources = native_content(vehicle).sources
     assert sources[file].count(line) == 1
-    faulty = {**sources, file: sources[file].replace(line, fault + "\n")}
+    faulty = {**sources, file: sources[file].replace(line, fault)}
     run = run_threads(faulty, tmp_path, sanitizers, 8_000)
     assert run.code != 0
     assert report in run.errors

@@ -4,7 +4,8 @@ from math import inf, nan, nextafter
 
 import pytest
 
-from tests.fmi2 import (
+from tests import fmi3
+from tests.fmi import (
     CO_SIMULATION,
     CONTINUOUS,
     DISCARD,
@@ -15,25 +16,20 @@ from tests.fmi2 import (
     OK,
     STEP,
     WARNING,
+    WITH_EVENTS,
+    AnyInstance,
     Fmu,
-    Instance,
     integers,
     reals,
     references,
+    room,
     strings,
 )
 
 COMMANDS = ("u_l", "u_r", "u_t")
 
 
-def settable(fmu: Fmu, mode: str) -> list[str]:
-    if mode == INITIALIZATION:
-        return fmu.inputs + fmu.states + fmu.parameters
-    tunable = [name for name in fmu.parameters if fmu.variables[name].variability == "tunable"]
-    return fmu.inputs + tunable + (fmu.states if mode == CONTINUOUS else [])
-
-
-def assert_discarded(rov: Instance, name: str, value: float) -> None:
+def assert_discarded(rov: AnyInstance, name: str, value: float) -> None:
     """Setting a value together with a good one sets neither, and one log line names the variable."""
     companion = "u_l" if name != "u_l" else "u_r"
     before = rov.save()
@@ -42,7 +38,7 @@ def assert_discarded(rov: Instance, name: str, value: float) -> None:
     assert rov.set({companion: 0.875, name: value}) == DISCARD, (name, value)
     (message,) = rov.log
     assert (message.status, message.category) == (DISCARD, "logStatusDiscard")
-    assert message.text.startswith(f"fmi2SetReal: {name} = ")
+    assert message.text.startswith(f"{rov.fmu.name('SetFloat64')}: {name} = ")
     assert message.text.endswith(f"; it stays {kept:.15g}.")
     assert rov.save() == before
 
@@ -60,7 +56,7 @@ def assert_discarded(rov: Instance, name: str, value: float) -> None:
 def test_no_variable_takes_a_value_that_is_not_finite(fmu: Fmu, kind: int, mode: str) -> None:
     with fmu.instance(kind) as rov:
         rov.reach(mode)
-        for name in settable(fmu, mode):
+        for name in fmu.settable(kind, mode):
             for value in (nan, inf, -inf):
                 assert_discarded(rov, name, value)
 
@@ -89,20 +85,20 @@ def test_values_that_overflow_are_told_and_not_given(fmu: Fmu) -> None:
     for kind, status in [(CO_SIMULATION, ERROR), (MODEL_EXCHANGE, DISCARD)]:
         with fmu.instance(kind) as rov:
             rov.start({"w": 1e200})
-            value = reals(-7.0)
-            assert rov.call("fmi2GetReal", references(fmu.vr["der(w)"]), 1, value) == status
+            value = room()
+            assert rov.get_by(references(fmu.vr["der(w)"]), value) == status
             assert list(value) == [-7.0]
-            function = "fmi2GetDerivatives" if kind == MODEL_EXCHANGE else "fmi2GetRealOutputDerivatives"
-            values = reals(*[-7.0] * n)
-            w = references(fmu.vr["w"])
-            arguments = (values, n) if kind == MODEL_EXCHANGE else (w, 1, integers(1), values)
-            assert rov.call(function, *arguments) == status
-            assert list(values) == [-7.0] * n
+            values = room(n if kind == MODEL_EXCHANGE else 1)
+            if kind == MODEL_EXCHANGE:
+                assert rov.call("GetContinuousStateDerivatives", values, n) == status
+            else:
+                assert rov.rates_by(references(fmu.vr["w"]), integers(1), values) == status
+            assert set(values) == {-7.0}
             assert len(rov.log) == 2
             assert all("der(w) overflows" in m.text or "derivative of w overflows" in m.text for m in rov.log)
 
 
-def trajectory(rov: Instance, steps: int = 5) -> bytes:
+def trajectory(rov: AnyInstance, steps: int = 5) -> bytes:
     result = b""
     for i in range(steps):
         assert rov.step(0.1 * i, 0.1) == OK
@@ -126,7 +122,9 @@ def test_a_command_beyond_full_saturates_and_is_logged_once(fmu: Fmu, command: s
             assert rov.set({command: value}) == OK
         (message,) = rov.log
     assert (message.status, message.category) == (WARNING, "logStatusWarning")
-    assert message.text.startswith(f"fmi2SetReal: {command} = {value:.15g} saturates at {1 if value > 0.0 else -1}")
+    assert message.text.startswith(
+        f"{fmu.name('SetFloat64')}: {command} = {value:.15g} saturates at {1 if value > 0.0 else -1}"
+    )
 
 
 def test_every_command_that_saturates_has_its_line_and_has_it_again_after_reset(fmu: Fmu) -> None:
@@ -134,23 +132,38 @@ def test_every_command_that_saturates_has_its_line_and_has_it_again_after_reset(
         for _ in range(2):
             assert rov.set(dict.fromkeys(COMMANDS, 1.25)) == OK
             assert rov.set(dict.fromkeys(COMMANDS, -1.25)) == OK
-            rov.expect("fmi2Reset")
+            rov.expect("Reset")
         assert [m.text.split()[1] for m in rov.log] == [*COMMANDS, *COMMANDS]
 
 
-def test_a_message_is_a_printf_format_that_gives_the_text_as_it_is(fmu: Fmu) -> None:
-    with fmu.instance(name="100 %s%n") as rov:
-        assert rov.call("fmi2SetDebugLogging", 1, 1, strings(b"#50 %d%%n%##")) == ERROR
+def test_in_fmi_3_a_message_is_the_text_with_its_signs_of_references_doubled(fmu3: fmi3.Fmu) -> None:
+    with fmu3.instance() as rov:
+        assert rov.call("SetDebugLogging", 1, 1, strings(b"#50 %d%%n%##")) == ERROR
+        (message,) = rov.log
+    assert message.text == "fmi3SetDebugLogging: there is no log category ##50 %d%%n%####."
+
+
+def test_with_event_mode_values_are_discarded_there_too(fmu3: fmi3.Fmu) -> None:
+    with fmu3.instance(WITH_EVENTS) as rov:
+        rov.reach(EVENT)
+        for name in fmu3.settable(WITH_EVENTS, EVENT):
+            assert_discarded(rov, name, nan)
+        assert_discarded(rov, "beta_u", -0.001)
+
+
+def test_a_message_is_a_printf_format_that_gives_the_text_as_it_is(fmu2: Fmu) -> None:
+    with fmu2.instance(name="100 %s%n") as rov:
+        assert rov.call("SetDebugLogging", 1, 1, strings(b"#50 %d%%n%##")) == ERROR
         (message,) = rov.log
     assert message.instance == "100 %s%n"
     assert "##50 %d%%n%####" in message.text % ()  # a single # would begin a value reference (2.1.5)
 
 
-def refused(rov: Instance) -> list[str]:
+def refused(rov: AnyInstance) -> list[str]:
     """The categories that speak on a restored state, an illegal call and a value that is not finite."""
     rov.log.clear()
     assert rov.load(rov.save()) == OK
-    assert rov.call("fmi2CancelStep") == ERROR
+    assert rov.call("ExitInitializationMode") == ERROR
     assert rov.set({"u": nan}) == DISCARD
     return [m.category for m in rov.log]
 
@@ -158,21 +171,21 @@ def refused(rov: Instance) -> list[str]:
 def test_log_categories_are_switched_on_and_off(fmu: Fmu) -> None:
     with fmu.instance() as rov:
         assert refused(rov) == ["logStatusError", "logStatusDiscard"]
-        rov.expect("fmi2SetDebugLogging", 0, 1, strings(b"logStatusError"))
+        rov.expect("SetDebugLogging", 0, 1, strings(b"logStatusError"))
         assert refused(rov) == ["logStatusDiscard"]
-        rov.expect("fmi2SetDebugLogging", 0, 0, None)
+        rov.expect("SetDebugLogging", 0, 0, None)
         assert refused(rov) == []
-        rov.expect("fmi2SetDebugLogging", -1, 2, strings(b"logStatusError", b"logEvents"))
+        rov.expect("SetDebugLogging", -1, 2, strings(b"logStatusError", b"logEvents"))
         assert refused(rov) == ["logEvents", "logStatusError"]
-        assert rov.call("fmi2SetDebugLogging", 0, 2, strings(b"logStatusError", b"logNoSuch")) == ERROR
+        assert rov.call("SetDebugLogging", 0, 2, strings(b"logStatusError", b"logNoSuch")) == ERROR
         assert refused(rov) == ["logEvents", "logStatusError"]
-        rov.expect("fmi2SetDebugLogging", 1, 1, strings(b"logStatusDiscard"))
+        rov.expect("SetDebugLogging", 1, 1, strings(b"logStatusDiscard"))
         assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
-        rov.expect("fmi2SetDebugLogging", 0, 1, strings(b"logEvents"))
+        rov.expect("SetDebugLogging", 0, 1, strings(b"logEvents"))
         assert refused(rov) == ["logStatusError", "logStatusDiscard"]
-        rov.expect("fmi2SetDebugLogging", 1, 0, None)
+        rov.expect("SetDebugLogging", 1, 0, None)
         assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
-        rov.expect("fmi2SetDebugLogging", 0, 1, strings(b"logStatusError"))
-        rov.expect("fmi2Reset")  # what fmi2Instantiate was given holds again
+        rov.expect("SetDebugLogging", 0, 1, strings(b"logStatusError"))
+        rov.expect("Reset")  # what instantiation was given holds again
         assert refused(rov) == ["logStatusError", "logStatusDiscard"]
         assert {c.name for c in fmu.description.logCategories} >= {"logStatusError", "logStatusDiscard", "logEvents"}

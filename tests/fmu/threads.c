@@ -4,9 +4,11 @@
  * not. It is driven in two halves by different threads, so instances and saved states end in another thread than they
  * began in. Prints how many calls were made, accepted and logged; the exit code is 1 where a session differs. */
 #define _POSIX_C_SOURCE 200809L
+#define FMI3_OVERRIDE_FUNCTION_PREFIX
 #include "fmu.c"
 
 #include "check.h"
+#include "versions.h"
 
 #include <pthread.h>
 
@@ -17,10 +19,9 @@ typedef struct {
     uint64_t *trace;       /* the hash after each call */
     size_t calls, accepted, messages;
     struct {
-        fmi2Component instance;
-        fmi2FMUstate saved;
-        double time;
-    } of[N_KINDS]; /* by fmi2Type */
+        void *instance, *saved;
+        double time, longest; /* of a step */
+    } of[N_KINDS]; /* by interface_type */
 } session;
 
 static size_t calls_of_a_half;
@@ -53,147 +54,219 @@ static double draw_between(session *s, double low, double high)
     return low + (high - low) * draw(s, 1u << 20) / (1u << 20);
 }
 
-static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
-                   fmi2String message, ...)
+static void log_line(session *s, result status, const char *category, const char *text)
 {
-    session *const s = environment;
-    see(s, name, strlen(name));
     see(s, &status, sizeof status);
     see(s, category, strlen(category));
-    see(s, message, strlen(message));
+    see(s, text, strlen(text));
     s->messages++;
 }
 
 /* ---- The calls ---- */
 
-static void instantiate(session *s, fmi2Type kind)
+static result set_inputs(session *s, void *c)
 {
-    const fmi2CallbackFunctions callbacks = {logger, NULL, NULL, NULL, s};
-    char name[64];
-    memset(name, 'n', sizeof name);
-    name[1 + draw(s, sizeof name - 1)] = '\0';
-    s->of[kind].instance = fmi2Instantiate(name, kind, MODEL_GUID, NULL, &callbacks, fmi2False, draw(s, 2) == 0);
+    unsigned vr[FIRST_STATE];
+    double values[FIRST_STATE];
+    for (unsigned i = 0; i < FIRST_STATE; i++) {
+        vr[i] = i;
+        values[i] = draw_between(s, -1.1, 1.1);
+    }
+    return FMI(SetReal)(c, vr, FIRST_STATE, values AND(FIRST_STATE));
 }
 
-static fmi2Status begin(session *s, fmi2Type kind)
+#if FMI_VERSION == 3
+static void logger(fmi3InstanceEnvironment environment, result status, fmi3String category, fmi3String text)
 {
-    fmi2Component const c = s->of[kind].instance;
+    log_line(environment, status, category, text);
+}
+
+/* Sets inputs inside a step, and ends it early, now and then. */
+static void update_step(fmi3InstanceEnvironment environment, double time, bool may_set, bool may_get, bool finished,
+                   bool may_return, fmi3Boolean *early, double *end)
+{
+    session *const s = environment;
+    see(s, &time, sizeof time);
+    *early = may_return && draw(s, 20) == 0;
+    *end = time;
+    if (may_set && may_get && finished && draw(s, 4) == 0) {
+        set_inputs(s, s->of[CO_SIMULATION].instance);
+    }
+}
+
+static void instantiate_of(session *s, int kind, const char *name)
+{
+    const bool tells = draw(s, 2) == 0, updates = draw(s, 2) == 0;
+    s->of[kind].longest = kind == CO_SIMULATION && updates ? 2e-3 : 2.0;
+    s->of[kind].instance = kind == MODEL_EXCHANGE
+                               ? fmi3InstantiateModelExchange(name, MODEL_TOKEN, NULL, false, tells, s, logger)
+                               : fmi3InstantiateCoSimulation(name, MODEL_TOKEN, NULL, false, tells, draw(s, 2) == 0, updates,
+                                                             NULL, 0, s, logger, update_step);
+}
+
+static result begin_at(session *s, int kind, double time)
+{
+    void *const c = s->of[kind].instance;
+    fmi3Boolean flags[5];
+    double next;
+    result worst = fmi3EnterInitializationMode(c, false, 0.0, time, false, 0.0);
+    worst |= fmi3ExitInitializationMode(c);
+    if (((fmu *)c)->now.mode == EVENT) {
+        worst |= fmi3UpdateDiscreteStates(c, &flags[0], &flags[1], &flags[2], &flags[3], &flags[4], &next);
+        worst |= (kind == MODEL_EXCHANGE ? fmi3EnterContinuousTimeMode(c) : fmi3EnterStepMode(c));
+    }
+    return worst;
+}
+
+static result do_step(session *s, int kind, double h)
+{
+    fmi3Boolean event, stop, early;
+    double last = s->of[kind].time;
+    const result status = fmi3DoStep(s->of[kind].instance, last, h, true, &event, &stop, &early, &last);
+    s->of[kind].time = last;
+    return status;
+}
+#else
+static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
+                   fmi2String message, ...)
+{
+    see(environment, name, strlen(name));
+    log_line(environment, status, category, message);
+}
+
+static void instantiate_of(session *s, int kind, const char *name)
+{
+    const fmi2CallbackFunctions callbacks = {logger, NULL, NULL, NULL, s};
+    s->of[kind].longest = 2.0;
+    s->of[kind].instance = fmi2Instantiate(name, kind, MODEL_TOKEN, NULL, &callbacks, fmi2False, draw(s, 2) == 0);
+}
+
+static result begin_at(session *s, int kind, double time)
+{
+    void *const c = s->of[kind].instance;
     fmi2EventInfo info;
-    s->of[kind].time = draw_between(s, 0.0, 10.0);
-    fmi2Status worst = fmi2SetupExperiment(c, fmi2False, 0.0, s->of[kind].time, fmi2False, 0.0);
+    result worst = fmi2SetupExperiment(c, fmi2False, 0.0, time, fmi2False, 0.0);
     worst |= fmi2EnterInitializationMode(c);
     worst |= fmi2ExitInitializationMode(c);
-    if (kind == fmi2ModelExchange) {
+    if (kind == MODEL_EXCHANGE) {
         worst |= fmi2NewDiscreteStates(c, &info);
         worst |= fmi2EnterContinuousTimeMode(c);
     }
     return worst;
 }
 
-static fmi2Status set_any(session *s, fmi2Component c)
+static result do_step(session *s, int kind, double h)
 {
-    static const double strange[] = {0.0, -0.0, NAN, INFINITY, 1e308, 5e-324};
-    const fmi2ValueReference vr = draw(s, N_VARIABLES + 1);
-    const bool plain = draw(s, 4) != 0;
-    const double value = plain ? draw_between(s, -2.0, 2.0) : strange[draw(s, sizeof strange / sizeof strange[0])];
-    return fmi2SetReal(c, &vr, 1, &value);
-}
-
-static fmi2Status set_inputs(session *s, fmi2Component c)
-{
-    fmi2ValueReference vr[FIRST_STATE];
-    double values[FIRST_STATE];
-    for (unsigned i = 0; i < FIRST_STATE; i++) {
-        vr[i] = i;
-        values[i] = draw_between(s, -1.1, 1.1);
-    }
-    return fmi2SetReal(c, vr, FIRST_STATE, values);
-}
-
-static fmi2Status step(session *s, fmi2Type kind)
-{
-    fmi2Component const c = s->of[kind].instance;
-    const double h = draw_between(s, 1e-3, 2.0);
-    fmi2Status status;
-    if (kind == fmi2CoSimulation || draw(s, 20) == 0) {
-        status = fmi2DoStep(c, s->of[kind].time, h, fmi2True);
-    } else { /* explicit Euler */
-        double x[N_STATES], rate[N_STATES];
-        status = fmi2GetContinuousStates(c, x, N_STATES);
-        status |= fmi2GetDerivatives(c, rate, N_STATES);
-        for (int i = 0; i < N_STATES && status == fmi2OK; i++) {
-            x[i] += 1e-3 * h * rate[i];
-        }
-        status |= status == fmi2OK ? fmi2SetContinuousStates(c, x, N_STATES) : fmi2OK;
-        status |= fmi2SetTime(c, s->of[kind].time + h);
-    }
+    const result status = fmi2DoStep(s->of[kind].instance, s->of[kind].time, h, fmi2True);
     s->of[kind].time += h;
     return status;
 }
+#endif
 
-static fmi2Status serialize(session *s, fmi2Type kind)
+static void make(session *s, int kind)
 {
-    fmi2Component const c = s->of[kind].instance;
-    fmi2Byte bytes[2 * SERIALIZED_SIZE];
+    char name[64];
+    memset(name, 'n', sizeof name);
+    name[1 + draw(s, sizeof name - 1)] = '\0';
+    instantiate_of(s, kind, name);
+}
+
+static result begin(session *s, int kind)
+{
+    s->of[kind].time = draw_between(s, 0.0, 10.0);
+    return begin_at(s, kind, s->of[kind].time);
+}
+
+static result set_any(session *s, void *c)
+{
+    static const double strange[] = {0.0, -0.0, NAN, INFINITY, 1e308, 5e-324};
+    const unsigned vr = draw(s, N_VARIABLES + 1);
+    const bool plain = draw(s, 4) != 0;
+    const double value = plain ? draw_between(s, -2.0, 2.0) : strange[draw(s, sizeof strange / sizeof strange[0])];
+    return FMI(SetReal)(c, &vr, 1, &value AND(1));
+}
+
+static result take_step(session *s, int kind)
+{
+    void *const c = s->of[kind].instance;
+    const double h = draw_between(s, 1e-3, s->of[kind].longest);
+    if (kind == CO_SIMULATION || draw(s, 20) == 0) {
+        return do_step(s, kind, h);
+    }
+    double x[N_STATES], rate[N_STATES]; /* explicit Euler */
+    result status = FMI(GetContinuousStates)(c, x, N_STATES);
+    status |= FMI(GetDerivatives)(c, rate, N_STATES);
+    for (int i = 0; i < N_STATES && status == FMI(OK); i++) {
+        x[i] += 1e-3 * h * rate[i];
+    }
+    status |= status == FMI(OK) ? FMI(SetContinuousStates)(c, x, N_STATES) : FMI(OK);
+    s->of[kind].time += h;
+    return status | FMI(SetTime)(c, s->of[kind].time);
+}
+
+static result serialize_again(session *s, int kind)
+{
+    void *const c = s->of[kind].instance;
+    octet bytes[2 * SERIALIZED_SIZE];
     size_t size = 0;
-    fmi2Status status = fmi2SerializedFMUstateSize(c, s->of[kind].saved, &size);
-    status |= fmi2SerializeFMUstate(c, s->of[kind].saved, bytes, size);
-    if (status == fmi2OK) {
+    result status = FMI(SerializedFMUstateSize)(c, s->of[kind].saved, &size);
+    status |= FMI(SerializeFMUstate)(c, s->of[kind].saved, bytes, size);
+    if (status == FMI(OK)) {
         see(s, bytes, size);
         bytes[draw(s, SERIALIZED_SIZE)] ^= draw(s, 4) == 0; /* damaged, now and then */
-        status = fmi2DeSerializeFMUstate(c, bytes, size, &s->of[kind].saved);
+        status = FMI(DeSerializeFMUstate)(c, bytes, size, &s->of[kind].saved);
     }
     return status;
 }
 
-static fmi2Status differentiate(session *s, fmi2Component c)
+static result get_partial(session *s, void *c)
 {
-    const fmi2ValueReference known = draw(s, FIRST_CALCULATED + 1);
-    fmi2ValueReference unknown[N_STATES];
+    const unsigned known = draw(s, FIRST_CALCULATED + 1);
+    unsigned unknown[N_STATES];
     double seed = 1.0, change[N_STATES] = {0.0};
     for (unsigned i = 0; i < N_STATES; i++) {
         unknown[i] = FIRST_CALCULATED + i;
     }
-    const fmi2Status status = fmi2GetDirectionalDerivative(c, unknown, N_STATES, &known, 1, &seed, change);
+    const result status = FMI(GetDirectionalDerivative)(c, unknown, N_STATES, &known, 1, &seed AND(1), change AND(N_STATES));
     see(s, change, sizeof change);
     return status;
 }
 
-static fmi2Status reset(session *s, fmi2Type kind)
+static result start_again(session *s, int kind)
 {
-    fmi2Component const c = s->of[kind].instance;
-    fmi2Status status = draw(s, 2) == 0 ? fmi2Terminate(c) : fmi2OK;
-    status |= fmi2Reset(c);
+    void *const c = s->of[kind].instance;
+    result status = draw(s, 2) == 0 ? FMI(Terminate)(c) : FMI(OK);
+    status |= FMI(Reset)(c);
     for (unsigned i = draw(s, 4); i > 0; i--) {
         set_any(s, c);
     }
     return status | begin(s, kind);
 }
 
-static fmi2Status replace(session *s, fmi2Type kind)
+static result replace(session *s, int kind)
 {
-    fmi2FreeInstance(s->of[kind].instance);
-    instantiate(s, kind);
+    FMI(FreeInstance)(s->of[kind].instance);
+    make(s, kind);
     return begin(s, kind);
 }
 
-static fmi2Status any_call(session *s, fmi2Type kind)
+static result any_call(session *s, int kind)
 {
-    fmi2Component const c = s->of[kind].instance;
-    fmi2FMUstate *const saved = &s->of[kind].saved;
-    const fmi2String category = LOG_CATEGORIES[draw(s, N_LOG_CATEGORIES)];
+    void *const c = s->of[kind].instance;
+    void **const saved = &s->of[kind].saved;
+    const char *const category = LOG_CATEGORIES[draw(s, N_LOG_CATEGORIES)];
     switch (draw(s, 16)) {
     case 0: return set_any(s, c);
     case 1: return set_inputs(s, c);
-    case 2: return fmi2GetFMUstate(c, saved);
-    case 3: return fmi2SetFMUstate(c, *saved);
-    case 4: return serialize(s, kind);
-    case 5: return draw(s, 4) == 0 ? fmi2FreeFMUstate(c, saved) : fmi2OK;
-    case 6: return differentiate(s, c);
-    case 7: return fmi2SetDebugLogging(c, draw(s, 4) != 0, 1, &category);
-    case 8: return reset(s, kind);
-    case 9: return draw(s, 4) == 0 ? replace(s, kind) : fmi2OK;
-    default: return step(s, kind);
+    case 2: return FMI(GetFMUstate)(c, saved);
+    case 3: return FMI(SetFMUstate)(c, *saved);
+    case 4: return serialize_again(s, kind);
+    case 5: return draw(s, 4) == 0 ? FMI(FreeFMUstate)(c, saved) : FMI(OK);
+    case 6: return get_partial(s, c);
+    case 7: return FMI(SetDebugLogging)(c, draw(s, 4) != 0, 1, &category);
+    case 8: return start_again(s, kind);
+    case 9: return draw(s, 4) == 0 ? replace(s, kind) : FMI(OK);
+    default: return take_step(s, kind);
     }
 }
 
@@ -202,17 +275,17 @@ static fmi2Status any_call(session *s, fmi2Type kind)
 static void drive(session *s)
 {
     for (size_t i = 0; i < calls_of_a_half; i++) {
-        const fmi2Type kind = draw(s, N_KINDS);
-        const fmi2Status status = any_call(s, kind);
+        const int kind = (int)draw(s, N_KINDS);
+        const result status = any_call(s, kind);
         double values[N_VARIABLES] = {0.0};
-        fmi2ValueReference all[N_VARIABLES];
+        unsigned all[N_VARIABLES];
         for (unsigned j = 0; j < N_VARIABLES; j++) {
             all[j] = j;
         }
-        fmi2GetReal(s->of[kind].instance, all, N_VARIABLES, values);
+        FMI(GetReal)(s->of[kind].instance, all, N_VARIABLES, values AND(N_VARIABLES));
         see(s, &status, sizeof status);
         see(s, values, sizeof values);
-        s->accepted += status == fmi2OK;
+        s->accepted += status == FMI(OK);
         s->trace[s->calls++] = s->seen;
     }
 }
@@ -222,8 +295,8 @@ static void *first_half(void *argument)
     session *const s = argument;
     pthread_barrier_wait(&together);
     for (int kind = 0; kind < N_KINDS; kind++) {
-        instantiate(s, (fmi2Type)kind);
-        begin(s, (fmi2Type)kind);
+        make(s, kind);
+        begin(s, kind);
     }
     drive(s);
     return NULL;
@@ -235,14 +308,14 @@ static void *second_half(void *argument)
     pthread_barrier_wait(&together);
     drive(s);
     for (int kind = 0; kind < N_KINDS; kind++) {
-        fmi2FreeFMUstate(s->of[kind].instance, &s->of[kind].saved);
-        fmi2FreeInstance(s->of[kind].instance);
+        FMI(FreeFMUstate)(s->of[kind].instance, &s->of[kind].saved);
+        FMI(FreeInstance)(s->of[kind].instance);
     }
     return NULL;
 }
 
 /* All sessions, as many at a time as there are threads. */
-static void run(session sessions[N_SESSIONS], unsigned threads)
+static void drive_all(session sessions[N_SESSIONS], unsigned threads)
 {
     void *(*const halves[N_HALVES])(void *) = {first_half, second_half};
     pthread_t thread[N_SESSIONS];
@@ -272,8 +345,8 @@ int main(int argc, char *argv[])
         at_once[i].trace = calloc(size, sizeof *at_once[i].trace);
         CHECK(alone[i].trace != NULL && at_once[i].trace != NULL);
     }
-    run(alone, 1);
-    run(at_once, N_SESSIONS);
+    drive_all(alone, 1);
+    drive_all(at_once, N_SESSIONS);
     int differing = 0;
     size_t calls = 0, accepted = 0, messages = 0;
     for (unsigned i = 0; i < N_SESSIONS; i++) {

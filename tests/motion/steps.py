@@ -5,7 +5,8 @@ from typing import Any
 
 from checks import reference
 from rov_fmu.motion.rov import Rov
-from tests.fmi2 import OK, Fmu
+from tests.fmi import OK
+from tests.fmi2 import Fmu
 from tests.vehicles import State, Values
 
 Step = Callable[[Rov, Values, Values, float], State]

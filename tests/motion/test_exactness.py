@@ -16,7 +16,8 @@ from scipy.integrate import solve_ivp
 from checks import reference
 from rov_fmu.motion.riccati import Riccati
 from rov_fmu.motion.rov import Rov
-from tests.fmi2 import ERROR, Fmu
+from tests.fmi import ERROR
+from tests.fmi2 import Fmu
 from tests.motion.steps import Step, errors, in_fmu, in_python, worst
 from tests.motions import path_of
 from tests.vehicles import (

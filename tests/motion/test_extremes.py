@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.fmi2 import ERROR, OK, Fmu
+from tests.fmi import ERROR, OK
+from tests.fmi2 import Fmu
 
 _DRAG = [("a_d_u", "b_d_u"), ("a_d_r", "b_d_r")]
 

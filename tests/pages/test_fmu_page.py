@@ -1,7 +1,6 @@
 """documentation/index.html and model.png: complete, self-contained, the same bytes every time."""
 
 import re
-import struct
 from collections.abc import Callable
 from dataclasses import replace
 from math import atan2, hypot, sin
@@ -17,6 +16,7 @@ from rov_fmu.export.interface import variables
 from rov_fmu.pages.drawing import VIEWS, draw_thrusters, place, scenes
 from rov_fmu.pages.fmu_page import documentation, documentation_page
 from rov_fmu.pages.paper_figures import write_figures
+from rov_fmu.pages.pictures import pictures
 from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -185,15 +185,16 @@ def test_number(value: float | None, text: str) -> None:
     assert number(value) == text
 
 
-@pytest.mark.parametrize("own", [True, False])
-def test_icon_is_a_small_png(vehicle: Vehicle, own: bool) -> None:
-    picture = replace(vehicle, pictures=vehicle.pictures if own else None).picture("model.png")
-    icon = picture.read_bytes()
-    assert icon[:8] == b"\x89PNG\r\n\x1a\n"
-    assert struct.unpack(">II", icon[16:24]) == (400, 300)
-    assert len(icon) < 20_000
-    assert b"tEXt" not in icon
-    assert b"tIME" not in icon
+@pytest.mark.parametrize("content_of", [native_content, python_content])
+def test_model_png_is_the_own_picture_or_else_the_icon(vehicle: Vehicle, content_of: Callable[..., Content]) -> None:
+    drawn = pictures(vehicle.rov)
+    assert vehicle.pictures
+    own = (vehicle.pictures / "model.png").read_bytes()
+    assert len(own) < 20_000
+    assert b"tEXt" not in own
+    assert content_of(vehicle, drawn).files["model.png"] == own
+    bare = replace(vehicle, pictures=None)
+    assert content_of(bare, drawn).files["model.png"] == drawn["terminalsAndIcons/icon.png"]
 
 
 def test_picture_of_the_readme(tmp_path: Path) -> None:
@@ -207,9 +208,27 @@ def test_picture_of_the_readme(tmp_path: Path) -> None:
 
 def test_the_page_of_the_python_flavour_claims_no_more_than_it_does(vehicle: Vehicle) -> None:
     native, python = (documentation_page(vehicle, native=native) for native in (True, False))
-    for claim in ("Model Exchange", "fmi2Discard", "Directional derivatives", "First derivatives"):
+    for claim in ("Model Exchange", "fmi2Discard", "Directional derivatives", "Time derivatives"):
         assert claim in native
         assert claim not in python
+
+
+def test_the_page_tells_of_the_version_of_fmi_that_it_is_in(vehicle: Vehicle) -> None:
+    two, three = (documentation_page(vehicle, fmi=fmi) for fmi in (2, 3))
+    assert " ".join(two.split()).count("up to order 19") == 1
+    for claim in (
+        "FMI 3.0",
+        "fmi3Discard",
+        "adjoint",
+        "intermediate update",
+        "Event Mode between",
+        "videoray.fmi3.fmu",
+    ):
+        assert claim in three
+        assert claim not in two
+    for claim in ("FMI 2.0", "fmi2Discard", "simulate videoray.fmu"):
+        assert claim in two
+        assert claim not in three
 
 
 @pytest.mark.parametrize("content_of", [native_content, python_content])

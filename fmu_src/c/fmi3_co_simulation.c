@@ -1,0 +1,94 @@
+/* Co-Simulation (FMI 3.0, section 4), and what of Scheduled Execution must be there. */
+
+FMI3_Export fmi3Status fmi3EnterStepMode(fmi3Instance instance)
+{
+    OPEN_FOR(CO_SIMULATION, fmi3EnterStepMode, MAY_UPDATE);
+    return (fmi3Status)enter(f, STEP);
+}
+
+static outcome get_counted_output_rates(fmu *f, const unsigned vr[], size_t n, const int order[], double value[],
+                                        size_t n_values)
+{
+    TRY(is_counted(f, n, n_values));
+    return get_output_rates(f, vr, n, order, value);
+}
+
+FMI3_Export fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                                size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
+                                                size_t nValues)
+{
+    OPEN_FOR(CO_SIMULATION, fmi3GetOutputDerivatives, MAY_ASK_OUTPUTS);
+    return (fmi3Status)get_counted_output_rates(f, valueReferences, nValueReferences, orders, values, nValues);
+}
+
+/* Between two intermediate updates the inputs are held. */
+static const double PIECE = 1e-4; /* s, or as long as MOST_PIECES to a step are */
+
+/* The callback of intermediate update where the state now is, `gone` seconds from t: it may read, and set inputs. Where the
+ * step shall end early, *length becomes shorter. */
+static void update(fmu *f, double t, double gone, double *length, bool is_inside)
+{
+    const char *const function = f->function;
+    const bool may_return = is_inside && f->host.may_return_early;
+    fmi3Boolean early = false;
+    const double end = t + *length;
+    fmi3Float64 wanted = end;
+    f->now.mode = INTERMEDIATE;
+    f->host.update(f->host.environment, f->now.time, true, true, true, may_return, &early, &wanted);
+    f->now.mode = STEP;
+    f->function = function;
+    if (early && may_return && wanted < end) {
+        *length = fmax(wanted - t, gone);
+    }
+}
+
+/* A step in pieces, each with the inputs of the update at its beginning. *last is where it ends. */
+static outcome step_in_pieces(fmu *f, double t, double h, double *last)
+{
+    const double pieces = fmin(fmax(1.0, ceil(h / PIECE * (1.0 - 1e-9))), MOST_PIECES);
+    double length = h, gone = 0.0; /* counted from t: beside a late t a piece may be less than a digit */
+    TRY(is_step(f, t, h));
+    warn_of_jump(f, f->now.time, t, h);
+    f->now.time = t;
+    update(f, t, gone, &length, false);
+    for (double n = 1.0; gone < length; n++) {
+        const double from = gone;
+        gone = n < pieces ? fmin(length, h * (n / pieces)) : length;
+        TRY(advance(f, t + from, gone - from));
+        f->now.time = *last = t + gone; /* to the digit */
+        update(f, t, gone, &length, gone < length);
+    }
+    return DONE;
+}
+
+FMI3_Export fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
+                                  fmi3Float64 communicationStepSize, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                  fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+                                  fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
+{
+    OPEN(fmi3DoStep, MAY_STEP);
+    (void)noSetFMUStatePriorToCurrentPoint;
+    GIVEN(eventHandlingNeeded != NULL && terminateSimulation != NULL && earlyReturn != NULL && lastSuccessfulTime != NULL,
+          "one of the results");
+    const double t = currentCommunicationPoint, end = t + communicationStepSize;
+    outcome done;
+    *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
+    *lastSuccessfulTime = t;
+    if (f->host.update == NULL) {
+        done = step(f, t, communicationStepSize);
+        *lastSuccessfulTime = done == DONE ? end : t;
+    } else {
+        done = step_in_pieces(f, t, communicationStepSize, lastSuccessfulTime);
+    }
+    *earlyReturn = done == DONE && *lastSuccessfulTime < end;
+    return (fmi3Status)done;
+}
+
+FMI3_Export fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
+                                                  fmi3Float64 activationTime)
+{
+    OPEN(fmi3ActivateModelPartition, MAY_LOG);
+    (void)clockReference;
+    (void)activationTime;
+    return (fmi3Status)lacks(f, "Scheduled Execution");
+}

@@ -1,0 +1,428 @@
+/* What an instance does, whichever version of FMI asks for it. References are checked here, pointers to arrays too. */
+
+/* ---- Life ---- */
+
+static outcome enter(fmu *f, lifecycle mode)
+{
+    f->now.mode = mode;
+    REPORT(f, "Entered %s at t = %g s.", mode_name(mode), f->now.time);
+    return DONE;
+}
+
+/* Whether all that a function writes to is there. */
+static outcome given(fmu *f, bool there, const char *names)
+{
+    REQUIRE(there, "%s is NULL.", names);
+    return DONE;
+}
+
+static void start(fmu *f)
+{
+    const interface_type type = f->now.type;
+    memset(&f->now, 0, sizeof f->now);
+    f->now.type = type;
+    f->now.mode = INSTANTIATED;
+    for (size_t i = 0; i < N_VARIABLES; i++) {
+        f->now.values[i] = VARIABLES[i].start;
+    }
+    memset(f->warned, 0, sizeof f->warned);
+    for (int i = 0; i < N_LOG_CATEGORIES; i++) {
+        f->log_enabled[i] = i != logEvents || f->logging_on;
+    }
+    rov_prepare(f->now.values, &f->gains);
+}
+
+#define REJECT(...)                                                                  \
+    do {                                                                             \
+        emit(of, shown, function, REFUSED, logStatusError, __VA_ARGS__);             \
+        return NULL;                                                                 \
+    } while (0)
+
+/* A new instance; NULL, and a line that says why, where it is refused. The token is that of modelDescription.xml. */
+static fmu *instantiate(const char *function, const host *of, const char *name, const char *token, interface_type type,
+                        bool logging_on)
+{
+    const char *const shown = name == NULL ? "" : name;
+    if (shown[strspn(shown, " \t\r\n\f\v")] == '\0') {
+        REJECT("the instance name is missing or blank.");
+    }
+    if (token == NULL || strcmp(token, MODEL_TOKEN) != 0) {
+        REJECT("the " TOKEN_NAME " %s is not that of this binary, %s.", token == NULL ? "NULL" : token, MODEL_TOKEN);
+    }
+    fmu *const f = (fmu *)calloc(1, sizeof *f + strlen(shown) + 1);
+    if (f == NULL) {
+        REJECT("out of memory.");
+    }
+    strcpy(f->name, shown);
+    memcpy(&f->host, of, sizeof f->host); /* its members are const in the headers of FMI 2.0.0 */
+    f->logging_on = logging_on;
+    f->now.type = type;
+    start(f);
+    return f;
+}
+
+static outcome choose_logs(fmu *f, bool logging_on, size_t n, const char *const categories[])
+{
+    REQUIRE(n == 0 || categories != NULL, "categories is NULL.");
+    bool chosen[N_LOG_CATEGORIES] = {false};
+    for (size_t i = 0; i < n; i++) {
+        bool known = false;
+        for (int j = 0; j < N_LOG_CATEGORIES && categories[i] != NULL; j++) {
+            if (strcmp(categories[i], LOG_CATEGORIES[j]) == 0) {
+                chosen[j] = known = true;
+            }
+        }
+        REQUIRE(known, "there is no log category %s.", categories[i] == NULL ? "NULL" : categories[i]);
+    }
+    for (int j = 0; j < N_LOG_CATEGORIES; j++) {
+        if (n == 0 || chosen[j]) {
+            f->log_enabled[j] = logging_on;
+        }
+    }
+    return DONE;
+}
+
+static outcome set_up(fmu *f, double start_time, bool stop_defined, double stop)
+{
+    REQUIRE(isfinite(start_time), "startTime = %g is not a finite number.", start_time);
+    REQUIRE(!stop_defined || stop >= start_time, "stopTime = %g s lies before startTime = %g s.", stop, start_time);
+    f->now.experiment_defined = true;
+    f->now.time = start_time;
+    f->now.stop_defined = stop_defined;
+    f->now.stop = stop_defined ? stop : 0.0;
+    return DONE;
+}
+
+static outcome initialize(fmu *f)
+{
+    REQUIRE(f->now.experiment_defined, "fmi2SetupExperiment comes first.");
+    return enter(f, INITIALIZATION);
+}
+
+static outcome run(fmu *f)
+{
+    return enter(f, f->now.type == MODEL_EXCHANGE || has_event_mode(&f->host) ? EVENT : STEP);
+}
+
+static outcome terminate(fmu *f)
+{
+    if (f->now.mode == INITIALIZATION) {
+        WARN_ONCE(f, ENDED_EARLY, "done, though the standard has no such call in Initialization Mode.");
+    }
+    return enter(f, TERMINATED);
+}
+
+static outcome reset(fmu *f)
+{
+    start(f);
+    REPORT(f, "Reset.");
+    return DONE;
+}
+
+/* ---- Values ---- */
+
+/* Thrust and derivatives follow from the rest; only who reads them needs them. */
+static void calculate(fmu *f)
+{
+    rov_thrust_of(f->now.values, &f->gains);
+    rov_derivatives(f->now.values, &f->gains);
+}
+
+/* A variable by its reference, time among them where it is one; NULL where there is none. */
+static const double *variable(const fmu *f, unsigned reference)
+{
+    return reference < N_VARIABLES ? &f->now.values[reference] : HAS_TIME && reference == TIME ? &f->now.time : NULL;
+}
+
+static outcome get_values(fmu *f, const unsigned vr[], size_t n, double value[])
+{
+    REQUIRE(n == 0 || (vr != NULL && value != NULL), "vr or value is NULL.");
+    bool calculated = false;
+    for (size_t i = 0; i < n; i++) {
+        REQUIRE(variable(f, vr[i]) != NULL, "there is no " REAL " with value reference %u.", vr[i]);
+        calculated = calculated || (vr[i] < N_VARIABLES && VARIABLES[vr[i]].kind == CALCULATED);
+    }
+    if (calculated) {
+        calculate(f);
+        for (size_t i = 0; i < n; i++) {
+            if (!isfinite(*variable(f, vr[i]))) {
+                const bool exchange = f->now.type == MODEL_EXCHANGE;
+                REFUSE(f, exchange ? DISCARDED : REFUSED, exchange ? logStatusDiscard : logStatusError, "%s overflows.",
+                       VARIABLES[vr[i]].name);
+            }
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        value[i] = *variable(f, vr[i]);
+    }
+    if (f->now.mode == INSTANTIATED) {
+        WARN_ONCE(f, READ_EARLY, "done, though the standard has no such call before initialization; said once.");
+    }
+    return DONE;
+}
+
+/* FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4, FMI 3.0, section 2.4.7.4, and what importers do: inputs before initialization,
+ * and parameters between the integrator's steps. */
+static bool may_set(const fmu *f, variable_kind kind)
+{
+    switch (f->now.mode) {
+    case INSTANTIATED:
+    case INITIALIZATION: return kind != CALCULATED;
+    case EVENT: return kind == INPUT || kind == TUNABLE || (kind == STATE && EVENTS_SET_STATES);
+    case STEP: return kind == INPUT || (kind == TUNABLE && !has_event_mode(&f->host));
+    case CONTINUOUS: return kind == INPUT || kind == STATE || kind == TUNABLE;
+    case INTERMEDIATE: return kind == INPUT;
+    case TERMINATED:
+    case FAILED: break;
+    }
+    return false;
+}
+
+static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double value[])
+{
+    REQUIRE(n == 0 || (vr != NULL && value != NULL), "vr or value is NULL.");
+    bool coefficient = false;
+    for (size_t i = 0; i < n; i++) { /* all are checked before any is set */
+        REQUIRE(vr[i] < N_VARIABLES, "there is no " REAL " with value reference %u%s.", vr[i],
+                HAS_TIME && vr[i] == TIME ? " to be set" : "");
+        const variable_info *const info = &VARIABLES[vr[i]];
+        const double old = f->now.values[vr[i]];
+        REQUIRE(may_set(f, info->kind), "%s must not be set in %s.", info->name, mode_name(f->now.mode));
+        if (!isfinite(value[i])) {
+            DISCARD(f, "%s = %g is not a finite number; it stays %.15g.", info->name, value[i], old);
+        }
+        if (info->kind == FIXED || info->kind == TUNABLE) {
+            coefficient = true;
+            if (value[i] < info->minimum || value[i] > info->maximum) {
+                DISCARD(f, "%s = %.15g is not within %g ... %g; it stays %.15g.", info->name, value[i], info->minimum,
+                        info->maximum, old);
+            }
+        }
+    }
+    for (size_t i = 0; i < n; i++) {
+        const variable_info *const info = &VARIABLES[vr[i]];
+        f->now.values[vr[i]] = value[i];
+        if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
+            WARN_ONCE(f, vr[i], "%s = %.15g saturates at %g; said once.", info->name, value[i],
+                      value[i] < 0.0 ? info->minimum : info->maximum);
+        } else if (info->kind == TUNABLE && f->now.mode == CONTINUOUS) {
+            WARN_ONCE(f, TUNED_LATE, "%s is set, though the standard wants Event Mode for it; said once.", info->name);
+        }
+    }
+    if (coefficient) {
+        rov_prepare(f->now.values, &f->gains);
+    }
+    return DONE;
+}
+
+/* There are no variables of the other types: reading or writing none of them is all that can be asked for. */
+static outcome has_none(fmu *f, size_t n, const char *type)
+{
+    REQUIRE(n == 0, "this FMU has no %s variables.", type);
+    return DONE;
+}
+
+/* ---- States ---- */
+
+static outcome set_states(fmu *f, const double x[], size_t n)
+{
+    REQUIRE(n == N_STATES && x != NULL, "%zu states given, or NULL; it takes %d.", n, N_STATES);
+    for (size_t i = 0; i < N_STATES; i++) {
+        if (!isfinite(x[i])) {
+            DISCARD(f, "%s = %g is not a finite number; it stays %.15g.", VARIABLES[FIRST_STATE + i].name, x[i],
+                    f->now.values[FIRST_STATE + i]);
+        }
+    }
+    memcpy(&f->now.values[FIRST_STATE], x, N_STATES * sizeof x[0]);
+    return DONE;
+}
+
+static outcome is_for_states(fmu *f, const double to[], size_t n)
+{
+    REQUIRE(n == N_STATES && to != NULL, "%zu states asked for, or NULL; it has %d.", n, N_STATES);
+    return DONE;
+}
+
+static outcome get_states(fmu *f, double x[], size_t n)
+{
+    TRY(is_for_states(f, x, n));
+    memcpy(x, &f->now.values[FIRST_STATE], N_STATES * sizeof x[0]);
+    return DONE;
+}
+
+static outcome get_rates(fmu *f, double rates[], size_t n)
+{
+    TRY(is_for_states(f, rates, n));
+    calculate(f);
+    for (size_t i = 0; i < N_STATES; i++) {
+        if (!isfinite(f->now.values[FIRST_CALCULATED + i])) {
+            DISCARD(f, "%s overflows.", VARIABLES[FIRST_CALCULATED + i].name);
+        }
+    }
+    memcpy(rates, &f->now.values[FIRST_CALCULATED], N_STATES * sizeof rates[0]);
+    return DONE;
+}
+
+static outcome get_nominals(fmu *f, double nominals[], size_t n)
+{
+    TRY(is_for_states(f, nominals, n));
+    for (size_t i = 0; i < N_STATES; i++) {
+        nominals[i] = VARIABLES[FIRST_STATE + i].nominal;
+    }
+    return DONE;
+}
+
+static outcome get_indicators(fmu *f, size_t n)
+{
+    REQUIRE(n == 0, "%zu event indicators asked for; it has none.", n);
+    return DONE;
+}
+
+/* A time beyond stopTime is taken: solvers look past the end before they interpolate back to it, CasADi tells stopTime 1
+ * whatever it integrates over, and the model, which does not depend on time, is as valid there. */
+static outcome set_time(fmu *f, double time)
+{
+    REQUIRE(isfinite(time), "time = %g is not a finite number.", time);
+    f->now.time = time;
+    return DONE;
+}
+
+/* ---- Partial derivatives ---- */
+
+static const char *name_of(unsigned reference)
+{
+    return reference < N_VARIABLES ? VARIABLES[reference].name : "an unknown value reference";
+}
+
+/* Parameters are knowns of the initialization (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.12). */
+static bool is_known(const fmu *f, unsigned reference)
+{
+    const variable_kind kind = reference < N_VARIABLES ? VARIABLES[reference].kind : CALCULATED;
+    return kind == INPUT || kind == STATE || (kind != CALCULATED && f->now.mode == INITIALIZATION);
+}
+
+static bool is_unknown(unsigned reference)
+{
+    return reference < N_VARIABLES && (VARIABLES[reference].kind == STATE || VARIABLES[reference].kind == CALCULATED);
+}
+
+static outcome are_partial(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[], size_t n_knowns,
+                           const double seed[], size_t n_seed, double sensitivity[], size_t n_sensitivity, bool adjoint)
+{
+    const size_t from = adjoint ? n_unknowns : n_knowns, to = adjoint ? n_knowns : n_unknowns;
+    REQUIRE((n_unknowns == 0 || unknowns != NULL) && (n_knowns == 0 || knowns != NULL) && (from == 0 || seed != NULL)
+                && (to == 0 || sensitivity != NULL),
+            "an argument is NULL.");
+    REQUIRE(n_seed >= from && n_sensitivity >= to, "%zu seeds and %zu sensitivities, it takes %zu and %zu.", n_seed,
+            n_sensitivity, from, to);
+    for (size_t i = 0; i < n_knowns; i++) {
+        REQUIRE(is_known(f, knowns[i]), "%s is no known variable in %s.", name_of(knowns[i]), mode_name(f->now.mode));
+    }
+    for (size_t i = 0; i < n_unknowns; i++) {
+        REQUIRE(is_unknown(unknowns[i]), "%s is neither an output nor a derivative.", name_of(unknowns[i]));
+    }
+    return DONE;
+}
+
+/* sensitivity = J seed. */
+static outcome differentiate(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
+                             size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],
+                             size_t n_sensitivity)
+{
+    TRY(are_partial(f, unknowns, n_unknowns, knowns, n_knowns, seed, n_seed, sensitivity, n_sensitivity, false));
+    double d[N_VARIABLES] = {0.0};
+    for (size_t i = 0; i < n_knowns; i++) {
+        d[knowns[i]] += seed[i];
+    }
+    rov_tangent(f->now.values, d);
+    for (size_t i = 0; i < n_unknowns; i++) {
+        REQUIRE(isfinite(d[unknowns[i]]), "that of %s is not a finite number.", name_of(unknowns[i]));
+    }
+    for (size_t i = 0; i < n_unknowns; i++) {
+        sensitivity[i] = d[unknowns[i]];
+    }
+    return DONE;
+}
+
+static bool is_output(unsigned reference)
+{
+    const bool rate = reference >= FIRST_CALCULATED && reference < FIRST_CALCULATED + N_STATES;
+    return is_unknown(reference) && !rate;
+}
+
+/* Time derivatives of outputs, while the inputs are held: as high as the series goes. */
+static outcome get_output_rates(fmu *f, const unsigned vr[], size_t n, const int order[], double value[])
+{
+    REQUIRE(n == 0 || (vr != NULL && order != NULL && value != NULL), "vr, order or value is NULL.");
+    for (size_t i = 0; i < n; i++) {
+        REQUIRE(is_output(vr[i]), "value reference %u is no output.", vr[i]);
+        REQUIRE(order[i] >= 1 && order[i] <= ORDER, "order %d of %s is not available, only 1 to %d.", order[i],
+                VARIABLES[vr[i]].name, ORDER);
+    }
+    for (int pass = 0; pass < 2; pass++) { /* nothing is written unless all are finite */
+        for (size_t i = 0; i < n; i++) {
+            double rates[N_VARIABLES];
+            rov_rates_of_order(f->now.values, &f->gains, order[i], rates);
+            REQUIRE(isfinite(rates[vr[i]]), "the derivative of %s overflows.", VARIABLES[vr[i]].name);
+            if (pass == 1) {
+                value[i] = rates[vr[i]];
+            }
+        }
+    }
+    return DONE;
+}
+
+/* ---- Steps ---- */
+
+/* Rounding of communication points, relative to their size, but never more than half a step. */
+static double time_tolerance(double t, double h)
+{
+    return fmin(1e-9 * (fabs(t) + h), 0.5 * h);
+}
+
+/* Whether a step from t over h seconds may be asked for. */
+static outcome is_step(fmu *f, double t, double h)
+{
+    REQUIRE(h > 0.0 && isfinite(t + h), "communicationStepSize = %g at t = %g is not a step forward.", h, t);
+    REQUIRE(!f->now.stop_defined || t + h <= f->now.stop + time_tolerance(f->now.stop, h),
+            "a step of %g s from t = %.15g passes stopTime = %.15g.", h, t, f->now.stop);
+    return DONE;
+}
+
+static void warn_of_jump(fmu *f, double time, double t, double h)
+{
+    if (fabs(t - time) > time_tolerance(time, h)) {
+        WARN_ONCE(f, TIME_JUMPED, "the step from t = %.15g does not begin at t = %.15g, where the FMU is; done from its "
+                  "state, and said once.", t, time);
+    }
+}
+
+/* h seconds pass from t with the inputs held. */
+static outcome advance(fmu *f, double t, double h)
+{
+    double next[N_STATES], sum = 0.0; /* not finite if one is not: zero times it is NaN */
+    if (!rov_step(f->now.values, &f->gains, h, next)) {
+        f->now.mode = FAILED;
+        FAIL(f, "the motion over %g s from t = %g takes more than MOST_PIECES = %d pieces; the state from before is kept.",
+             h, t, (int)MOST_PIECES);
+    }
+    for (size_t i = 0; i < N_STATES; i++) {
+        sum += 0.0 * next[i];
+    }
+    if (sum != 0.0) {
+        f->now.mode = FAILED;
+        FAIL(f, "the motion over %g s from t = %g overflows; the state from before is kept.", h, t);
+    }
+    memcpy(&f->now.values[FIRST_STATE], next, sizeof next);
+    f->now.time = t + h; /* the model is autonomous: whatever t says, h seconds have passed */
+    return DONE;
+}
+
+static outcome step(fmu *f, double t, double h)
+{
+    const double time = f->now.time;
+    TRY(is_step(f, t, h));
+    TRY(advance(f, t, h));
+    warn_of_jump(f, time, t, h);
+    return DONE;
+}

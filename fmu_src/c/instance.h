@@ -1,0 +1,172 @@
+/* An instance of the FMU, and what every FMI function begins with, in every version of FMI.
+ *
+ * A call that is refused (illegal in the mode, bad argument, value out of bounds) changes nothing. Only a step whose
+ * result overflows puts the instance into error mode, with the state from before the step. */
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+typedef enum {
+    INSTANTIATED = 1,
+    INITIALIZATION = 2,
+    EVENT = 4,
+    CONTINUOUS = 8, /* Model Exchange */
+    STEP = 16,      /* Co-Simulation, between steps */
+    TERMINATED = 32,
+    FAILED = 64,
+    INTERMEDIATE = 128 /* Co-Simulation, inside a step: intermediate update of FMI 3.0 */
+} lifecycle;
+
+enum { TIME = N_VARIABLES }; /* the reference of the independent variable, where it is a variable */
+
+/* What is legal when: the tables of FMI 2.0, sections 3.2.3 and 4.2.4, and of FMI 3.0, 2.3.1 and 4.2. */
+enum {
+    RUNNING = EVENT | CONTINUOUS | STEP,
+    BETWEEN = INSTANTIATED | INITIALIZATION | RUNNING | TERMINATED | FAILED, /* everywhere but inside a step */
+    MAY_LOG = BETWEEN | INTERMEDIATE,
+    MAY_RESET = BETWEEN,
+    MAY_SAVE = BETWEEN,
+    MAY_SET_UP = INSTANTIATED,
+    MAY_BEGIN = INITIALIZATION,
+    MAY_END = INITIALIZATION | RUNNING,
+    MAY_COUNT = INSTANTIATED | EVENT | CONTINUOUS,
+    MAY_READ = BETWEEN | INTERMEDIATE,
+    MAY_READ_LATER = MAY_READ & ~INSTANTIATED,
+    MAY_WRITE = INSTANTIATED | INITIALIZATION | RUNNING | INTERMEDIATE,
+    MAY_WRITE_DISCRETE = MAY_WRITE & ~(CONTINUOUS | INTERMEDIATE),
+    MAY_DIFFERENTIATE = BETWEEN & ~INSTANTIATED,
+    MAY_MEET_EVENTS = EVENT | CONTINUOUS | STEP,
+    MAY_UPDATE = EVENT,
+    MAY_MOVE_TIME = EVENT | CONTINUOUS,
+    MAY_INTEGRATE = CONTINUOUS,
+    MAY_STEP = STEP,
+    MAY_ASK_OUTPUTS = STEP | INTERMEDIATE | TERMINATED | FAILED,
+    MAY_ASK_STATUS = STEP | TERMINATED
+};
+
+/* As fmi2Type numbers them. */
+typedef enum { MODEL_EXCHANGE, CO_SIMULATION } interface_type;
+
+/* As fmi2Status and fmi3Status number them. */
+typedef enum { DONE, WARNED, DISCARDED, REFUSED } outcome;
+
+/* What an FMU state saves: all that a run depends on. Calculated variables are not kept, they follow. */
+typedef struct {
+    interface_type type;
+    lifecycle mode;
+    bool experiment_defined, stop_defined;
+    double time, stop;
+    double values[N_VARIABLES]; /* by value reference */
+} fmu_state;
+
+/* What is warned of once: a command that saturates, by value reference, and what importers do against the standard. */
+enum { READ_EARLY = FIRST_STATE, TUNED_LATE, ENDED_EARLY, TIME_JUMPED, N_WARNINGS };
+
+typedef struct {
+    host host;            /* who made it: the callbacks of a version of FMI */
+    const char *function; /* the FMI function that works on it */
+    bool logging_on;      /* as given at instantiation */
+    bool log_enabled[N_LOG_CATEGORIES];
+    bool warned[N_WARNINGS];
+    rov_gains gains; /* follows the coefficients */
+    fmu_state now;
+    char name[]; /* as given at instantiation */
+} fmu;
+
+/* ---- Logging ---- */
+
+/* One line, which begins with the function where there is one. */
+#if defined __GNUC__
+__attribute__((format(printf, 6, 7)))
+#endif
+static void emit(const host *to, const char *name, const char *function, outcome status, log_category category,
+                 const char *format, ...)
+{
+    char text[320], message[2 * sizeof text];
+    size_t doubled = 0;
+    va_list arguments;
+    size_t begin = function == NULL ? 0 : (size_t)snprintf(text, sizeof text, "%s: ", function);
+    va_start(arguments, format);
+    size_t length = begin + (size_t)vsnprintf(text + begin, sizeof text - begin, format, arguments);
+    va_end(arguments);
+    if (length >= sizeof text) { /* cut before a character of UTF-8, not inside it */
+        for (length = sizeof text - 1; length > 0 && (text[length - 1] & 0x80) != 0; length--) {
+        }
+        text[length] = '\0';
+    }
+    for (const char *c = text; *c != '\0'; c++) { /* # begins a value reference, % a format */
+        message[doubled++] = *c;
+        if (*c == '#' || (LOG_IS_FORMAT && *c == '%')) {
+            message[doubled++] = *c;
+        }
+    }
+    message[doubled] = '\0';
+    tell(to, name, (int)status, LOG_CATEGORIES[category], message);
+}
+
+/* One line in a category, if enabled; of the function that is called, or of an event. */
+#define SAY(f, function, status, category, ...)                                          \
+    do {                                                                                 \
+        if ((f)->log_enabled[category]) {                                                \
+            emit(&(f)->host, (f)->name, function, status, category, __VA_ARGS__);        \
+        }                                                                                \
+    } while (0)
+#define REPORT(f, ...) SAY(f, NULL, DONE, logEvents, __VA_ARGS__)
+#define WARN_ONCE(f, what, ...)                                                          \
+    do {                                                                                 \
+        if (!(f)->warned[what]) {                                                        \
+            (f)->warned[what] = (f)->log_enabled[logStatusWarning];                      \
+            SAY(f, (f)->function, WARNED, logStatusWarning, __VA_ARGS__);                \
+        }                                                                                \
+    } while (0)
+#define REFUSE(f, status, category, ...)                                                 \
+    do {                                                                                 \
+        SAY(f, (f)->function, status, category, __VA_ARGS__);                            \
+        return status;                                                                   \
+    } while (0)
+#define FAIL(f, ...) REFUSE(f, REFUSED, logStatusError, __VA_ARGS__)
+#define DISCARD(f, ...) REFUSE(f, DISCARDED, logStatusDiscard, __VA_ARGS__)
+#define REQUIRE(condition, ...)                                                          \
+    do {                                                                                 \
+        if (!(condition)) {                                                              \
+            FAIL(f, __VA_ARGS__);                                                        \
+        }                                                                                \
+    } while (0)
+/* Ends where a part of the work was refused. */
+#define TRY(work)                                                                        \
+    do {                                                                                 \
+        const outcome tried = (work);                                                    \
+        if (tried != DONE) {                                                             \
+            return tried;                                                                \
+        }                                                                                \
+    } while (0)
+
+static const char *mode_name(lifecycle mode)
+{
+    switch (mode) {
+    case INSTANTIATED: return "Instantiated";
+    case INITIALIZATION: return "Initialization Mode";
+    case EVENT: return "Event Mode";
+    case CONTINUOUS: return "Continuous-Time Mode";
+    case STEP: return "Step Mode";
+    case TERMINATED: return "Terminated";
+    case FAILED: return "Error";
+    case INTERMEDIATE: return "Intermediate Update Mode";
+    }
+    return "an unknown mode";
+}
+
+/* ---- What every function begins with ---- */
+
+/* An instance for one interface alone, where `wanted` is one; legal in some modes. */
+enum { ANY_INTERFACE = -1 };
+
+static outcome open_instance(fmu *f, const char *function, int modes, int wanted)
+{
+    f->function = function;
+    REQUIRE(((int)f->now.mode & modes) != 0, "not allowed in %s.", mode_name(f->now.mode));
+    REQUIRE(wanted == ANY_INTERFACE || (int)f->now.type == wanted, "only an instance for %s has this function.",
+            wanted == MODEL_EXCHANGE ? "Model Exchange" : "Co-Simulation");
+    return DONE;
+}

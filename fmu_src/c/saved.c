@@ -1,0 +1,190 @@
+/* The complete state: get, set, serialize (FMI 2.0, section 2.1.8; FMI 3.0, section 2.2.7.4). */
+
+/* Bytes, least significant first: magic, token, type, mode, flags, time, stop, settable values, checksum. */
+enum {
+    MAGIC_SIZE = 8,
+    TOKEN_SIZE = sizeof MODEL_TOKEN - 1,
+    N_HEADER_WORDS = 5,
+    SERIALIZED_SIZE = MAGIC_SIZE + TOKEN_SIZE + 8 * (N_HEADER_WORDS + N_VARIABLES + 1)
+};
+
+static const char MAGIC[MAGIC_SIZE + 1] = "ROVSTATE";
+
+static void put_word(unsigned char **to, uint64_t word)
+{
+    for (int i = 0; i < 8; i++) {
+        *(*to)++ = (unsigned char)(word >> (8 * i) & 0xff);
+    }
+}
+
+static uint64_t get_word(const unsigned char **from)
+{
+    uint64_t word = 0;
+    for (int i = 0; i < 8; i++) {
+        word |= (uint64_t) * (*from)++ << (8 * i);
+    }
+    return word;
+}
+
+static void put_double(unsigned char **to, double value)
+{
+    uint64_t word;
+    memcpy(&word, &value, sizeof word);
+    put_word(to, word);
+}
+
+static double get_double(const unsigned char **from)
+{
+    const uint64_t word = get_word(from);
+    double value;
+    memcpy(&value, &word, sizeof value);
+    return value;
+}
+
+static uint64_t checksum(const unsigned char *bytes, size_t size) /* FNV-1a */
+{
+    uint64_t hash = 14695981039346656037u;
+    for (size_t i = 0; i < size; i++) {
+        hash = (hash ^ bytes[i]) * 1099511628211u;
+    }
+    return hash;
+}
+
+/* Whether an instance can be in a mode, with Event Mode in Co-Simulation or without. */
+static bool is_mode_of(const fmu_state *s, const host *of)
+{
+    const int stepping = STEP | FAILED | (has_event_mode(of) ? EVENT : 0), mode = (int)s->mode;
+    const int modes = s->type == MODEL_EXCHANGE ? EVENT | CONTINUOUS : stepping;
+    return (mode & (modes | INSTANTIATED | INITIALIZATION | TERMINATED)) != 0 && (mode & (mode - 1)) == 0;
+}
+
+/* Whether a state read from bytes could have been reached by calls. */
+static bool is_valid(const fmu_state *s, const host *of)
+{
+    bool valid = is_mode_of(s, of) && isfinite(s->time) && !isnan(s->stop)
+                 && (s->experiment_defined || s->mode == INSTANTIATED);
+    for (size_t i = 0; i < N_VARIABLES; i++) {
+        const double value = s->values[i];
+        const bool bounded = VARIABLES[i].kind == FIXED || VARIABLES[i].kind == TUNABLE;
+        valid = valid && isfinite(value)
+                && (!bounded || (value >= VARIABLES[i].minimum && value <= VARIABLES[i].maximum));
+    }
+    return valid;
+}
+
+/* What an FMU state points to. */
+typedef struct {
+    const void *owner; /* tells a state of this FMU from other memory */
+    fmu_state state;
+} saved_state;
+
+static saved_state *as_saved(void *state)
+{
+    saved_state *const saved = (saved_state *)state;
+    return saved != NULL && saved->owner == VARIABLES ? saved : NULL;
+}
+
+/* Memory for a state: the one given, or new where none is. */
+static saved_state *state_memory(void **state)
+{
+    if (*state == NULL) {
+        saved_state *const saved = (saved_state *)calloc(1, sizeof *saved);
+        if (saved != NULL) {
+            saved->owner = VARIABLES;
+            *state = saved;
+        }
+        return saved;
+    }
+    return as_saved(*state);
+}
+
+static outcome save(fmu *f, void **state)
+{
+    REQUIRE(state != NULL, "the state is NULL.");
+    saved_state *const saved = state_memory(state);
+    REQUIRE(saved != NULL, "out of memory, or *state is no state of this FMU.");
+    saved->state = f->now;
+    return DONE;
+}
+
+static outcome restore(fmu *f, void *state)
+{
+    const saved_state *const saved = as_saved(state);
+    REQUIRE(saved != NULL, "the state is NULL or no state of this FMU.");
+    REQUIRE(saved->state.type == f->now.type, "the state is of the other interface type.");
+    REQUIRE(is_mode_of(&saved->state, &f->host), "the state is in Event Mode, which this instance does not use.");
+    f->now = saved->state;
+    rov_prepare(f->now.values, &f->gains);
+    REPORT(f, "Restored %s at t = %g s.", mode_name(f->now.mode), f->now.time);
+    return DONE;
+}
+
+static outcome free_saved(fmu *f, void **state)
+{
+    if (state == NULL || *state == NULL) {
+        return DONE;
+    }
+    saved_state *const saved = as_saved(*state);
+    REQUIRE(saved != NULL, "*state is no state of this FMU.");
+    saved->owner = NULL;
+    free(saved);
+    *state = NULL;
+    return DONE;
+}
+
+static outcome serialized_size(fmu *f, void *state, size_t *size)
+{
+    REQUIRE(as_saved(state) != NULL && size != NULL, "the state is NULL or no state of this FMU, or size is NULL.");
+    *size = SERIALIZED_SIZE;
+    return DONE;
+}
+
+static outcome serialize(fmu *f, void *state, unsigned char bytes[], size_t size)
+{
+    const saved_state *const saved = as_saved(state);
+    REQUIRE(saved != NULL && bytes != NULL, "the state is NULL or no state of this FMU, or bytes is NULL.");
+    REQUIRE(size >= SERIALIZED_SIZE, "%zu bytes are too few, it takes %d.", size, (int)SERIALIZED_SIZE);
+    const fmu_state *const s = &saved->state;
+    unsigned char *to = bytes + MAGIC_SIZE + TOKEN_SIZE;
+    memcpy(bytes, MAGIC, MAGIC_SIZE);
+    memcpy(bytes + MAGIC_SIZE, MODEL_TOKEN, TOKEN_SIZE);
+    put_word(&to, (uint64_t)s->type);
+    put_word(&to, (uint64_t)s->mode);
+    put_word(&to, (s->experiment_defined ? 1u : 0u) | (s->stop_defined ? 2u : 0u));
+    put_double(&to, s->time);
+    put_double(&to, s->stop);
+    for (size_t i = 0; i < N_VARIABLES; i++) {
+        put_double(&to, VARIABLES[i].kind == CALCULATED ? 0.0 : s->values[i]);
+    }
+    put_word(&to, checksum(bytes, SERIALIZED_SIZE - 8));
+    return DONE;
+}
+
+static outcome deserialize(fmu *f, const unsigned char bytes[], size_t size, void **state)
+{
+    REQUIRE(bytes != NULL && state != NULL, "bytes or the state is NULL.");
+    REQUIRE(size == SERIALIZED_SIZE, "%zu bytes are no state of this FMU, it has %d.", size, (int)SERIALIZED_SIZE);
+    const unsigned char *from = bytes + SERIALIZED_SIZE - 8;
+    REQUIRE(memcmp(bytes, MAGIC, MAGIC_SIZE) == 0 && memcmp(bytes + MAGIC_SIZE, MODEL_TOKEN, TOKEN_SIZE) == 0,
+            "the bytes are not a state of this FMU.");
+    REQUIRE(get_word(&from) == checksum(bytes, SERIALIZED_SIZE - 8), "the bytes are damaged.");
+    from = bytes + MAGIC_SIZE + TOKEN_SIZE;
+    const uint64_t type = get_word(&from), mode = get_word(&from), flags = get_word(&from);
+    REQUIRE(type <= 1 && mode <= FAILED && flags <= 3, "the bytes are damaged.");
+    fmu_state s;
+    memset(&s, 0, sizeof s);
+    s.type = (interface_type)type;
+    s.mode = (lifecycle)mode;
+    s.experiment_defined = (flags & 1u) != 0;
+    s.stop_defined = (flags & 2u) != 0;
+    s.time = get_double(&from);
+    s.stop = get_double(&from);
+    for (size_t i = 0; i < N_VARIABLES; i++) {
+        s.values[i] = get_double(&from);
+    }
+    REQUIRE(is_valid(&s, &f->host), "the bytes hold values that no run can reach.");
+    saved_state *const saved = state_memory(state);
+    REQUIRE(saved != NULL, "out of memory, or *state is no state of this FMU.");
+    saved->state = s;
+    return DONE;
+}

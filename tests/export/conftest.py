@@ -1,0 +1,23 @@
+"""The FMU of either version of FMI: what is said of one is said of both."""
+
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session", params=[2, 3], ids=["FMI 2.0", "FMI 3.0"])
+def fmi(request: pytest.FixtureRequest) -> int:
+    version: int = request.param
+    return version
+
+
+@pytest.fixture(scope="session")
+def either_fmu(fmi: int, request: pytest.FixtureRequest) -> Path:
+    path: Path = request.getfixturevalue({2: "videoray_fmu", 3: "videoray3_fmu"}[fmi])
+    return path
+
+
+@pytest.fixture(scope="session")
+def either_dir(fmi: int, request: pytest.FixtureRequest) -> Path:
+    folder: Path = request.getfixturevalue({2: "videoray_dir", 3: "videoray3_dir"}[fmi])
+    return folder

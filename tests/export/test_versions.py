@@ -1,0 +1,135 @@
+"""One declaration, two versions of FMI: both descriptions are valid, and say the same of the same vehicle."""
+
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+from lxml import etree
+
+from rov_fmu.export.interface import variables
+from rov_fmu.export.model_description import NATIVE, OUTPUT_ORDER, build_description, model_description
+from rov_fmu.motion.rov import Rov
+from tests.vehicles import VEHICLES, a_vehicle
+
+SCHEMAS = Path(fmpy.__file__).with_name("schema")
+ORDER = Path(__file__).parents[2] / "fmu_src" / "c" / "series.c"
+TIME = {
+    "name": "time", "description": "Time", "causality": "independent", "variability": "continuous", "unit": "s",
+}  # fmt: skip
+_OF_A_VARIABLE = ("name", "valueReference", "description", "causality", "variability", "initial")
+_OF_A_NUMBER = ("unit", "displayUnit", "min", "max", "nominal", "start")
+_LISTS = {
+    "Outputs": "Output",
+    "Derivatives": "ContinuousStateDerivative",
+    "InitialUnknowns": "InitialUnknown",
+}
+
+
+def described(rov: Rov, fmi: int) -> etree._Element:
+    description = model_description(a_vehicle(rov), variables(rov), guid="{1}", interfaces=NATIVE[fmi], fmi=fmi)
+    return etree.fromstring(description)
+
+
+def check_schema(document: etree._Element, name: str) -> None:
+    etree.XMLSchema(file=str(SCHEMAS / name)).assertValid(document)
+
+
+def declared(root: etree._Element) -> dict[str, dict[str, Any]]:
+    """Every variable by name, with what FMI 2.0 says in a child and FMI 3.0 in a type; references by name."""
+    types = {of.get("name"): of for of in root.iter("Float64Type")}
+    found = {}
+    numbers = list(root.find("ModelVariables"))
+    by_reference = {v.get("valueReference"): v.get("name") for v in numbers}
+    for v in numbers:
+        attributes = {key: v.get(key) for key in _OF_A_VARIABLE}
+        parts = [v, types[v.get("declaredType")]] if types else list(v)
+        attributes |= {key: x for key in _OF_A_NUMBER for of in parts if (x := of.get(key)) is not None}
+        if (of := parts[0].get("derivative")) is not None:
+            attributes["derivative"] = by_reference[of] if types else numbers[int(of) - 1].get("name")
+        found[v.get("name")] = {key: x for key, x in attributes.items() if x is not None}
+    return found
+
+
+def structure(root: etree._Element, fmi: int) -> dict[str, list[tuple[str, list[str], str]]]:
+    """The lists of <ModelStructure>, in order: the unknown, what it depends on and how, by name."""
+    numbers = list(root.find("ModelVariables"))
+    name = {str(n): v.get("name") for n, v in enumerate(numbers, 1)}
+    if fmi == 3:
+        name = {v.get("valueReference"): v.get("name") for v in numbers}
+    found = {}
+    for of_2, of_3 in _LISTS.items():
+        unknowns = root.findall(f"ModelStructure/{of_3}" if fmi == 3 else f"ModelStructure/{of_2}/Unknown")
+        found[of_2] = [
+            (
+                name[u.get("valueReference" if fmi == 3 else "index")],
+                [name[known] for known in u.get("dependencies").split()],
+                u.get("dependenciesKind"),
+            )
+            for u in unknowns
+        ]
+    return found
+
+
+def units(root: etree._Element) -> dict[str, bytes]:
+    return {unit.get("name"): etree.tostring(unit, method="c14n").strip() for unit in root.iter("Unit")}
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_both_versions_declare_the_same(kind: str) -> None:
+    two, three = (described(VEHICLES[kind], fmi) for fmi in (2, 3))
+    variables_2, variables_3 = declared(two), declared(three)
+    number = str(len(variables_2))
+    assert variables_3.pop("time") == TIME | {"valueReference": number}
+    assert list(variables_3) == list(variables_2)
+    assert variables_3 == variables_2
+    assert structure(three, 3) == structure(two, 2)
+    units_3 = units(three)
+    assert b'<BaseUnit s="1">' in units_3["s"]  # that of the time
+    assert units_3 == units(two) | {"s": units_3["s"]}
+    same = ("Category", "DefaultExperiment")
+    assert [dict(e.attrib) for e in three.iter(*same)] == [dict(e.attrib) for e in two.iter(*same)]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_the_description_follows_its_schema(kind: str, fmi: int) -> None:
+    check_schema(described(VEHICLES[kind], fmi), f"fmi{fmi}/fmi{fmi}ModelDescription.xsd")
+
+
+def test_the_build_description_follows_its_schema_and_names_the_file_to_compile() -> None:
+    document = etree.fromstring(build_description("a_rov"))
+    check_schema(document, "fmi3/fmi3BuildDescription.xsd")
+    (configuration,) = document
+    assert configuration.get("modelIdentifier") == "a_rov"
+    assert [file.get("name") for file in document.iter("SourceFile")] == ["fmu.c"]
+
+
+def test_fmi_3_says_what_it_can_do() -> None:
+    """And nothing else: what is absent is false."""
+    root = described(VEHICLES["VideoRay"], 3)
+    assert root.get("fmiVersion") == "3.0"
+    assert root.get("instantiationToken") == "{1}"
+    both = {
+        "modelIdentifier": "an_rov", "canGetAndSetFMUState": "true", "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true", "providesAdjointDerivatives": "true",
+    }  # fmt: skip
+    stepped = {
+        "canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeOrder": str(OUTPUT_ORDER),
+        "providesIntermediateUpdate": "true", "mightReturnEarlyFromDoStep": "true",
+        "canReturnEarlyAfterIntermediateUpdate": "true", "hasEventMode": "true",
+    }  # fmt: skip
+    for interface, can in {"ModelExchange": both, "CoSimulation": both | stepped}.items():
+        said = {key: x for key, x in root.find(interface).attrib.items() if x != "false"}
+        assert said == can
+    assert root.find("ScheduledExecution") is None
+
+
+def test_the_order_of_output_derivatives_is_that_of_the_series() -> None:
+    assert f"ORDER = {OUTPUT_ORDER}" in ORDER.read_text(encoding="utf-8")
+
+
+def test_inputs_and_outputs_alone_are_of_intermediate_update() -> None:
+    root = described(VEHICLES["Heavy"], 3)
+    updated = {v.get("name") for v in root.iter("Float64") if v.get("intermediateUpdate") == "true"}
+    assert updated == {v.name for v in variables(VEHICLES["Heavy"]) if v.causality in ("input", "output")}

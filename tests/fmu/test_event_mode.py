@@ -1,0 +1,84 @@
+"""Event Mode of FMI 3.0, in both interfaces: the model has no events of its own, the importer tunes and jumps there."""
+
+import pytest
+
+from tests.fmi import CO_SIMULATION, EVENT, MODEL_EXCHANGE, OK, STEP, WITH_EVENTS, reals, room
+from tests.fmi3 import Fmu, Instance, Stepped, flags
+
+MOVING = {"u_l": 0.6, "u_r": 0.2, "u_t": -0.4, "u": 0.3, "r": -0.5, "V_E": 0.1}
+CHANGES = {"beta_u": 0.7, "alpha_w": 1.3, "u_l": -0.5, "u": -0.2, "psi": 1.0, "N_ext": 0.05}
+"""Of tunable parameters, inputs and states."""
+
+
+def run(rov: Instance, first: int) -> bytes:
+    """Ten steps."""
+    result = b""
+    for i in range(first, first + 10):
+        assert rov.step(0.1 * i, 0.1) == OK
+        result += bytes(reals(*rov.get(rov.fmu.outputs)))
+    return result
+
+
+@pytest.mark.parametrize("kind", [MODEL_EXCHANGE, WITH_EVENTS])
+def test_there_are_no_events(fmu3: Fmu, kind: int) -> None:
+    with fmu3.instance(kind) as rov:
+        rov.reach(EVENT)
+        before = rov.save()
+        for _ in range(2):
+            told, next_time = [flags(True) for _ in range(5)], room()
+            rov.expect("fmi3UpdateDiscreteStates", *told, next_time)
+            assert [bool(flag[0]) for flag in told] == [False] * 5
+            assert next_time[0] == 0.0
+            rov.expect("fmi3EvaluateDiscreteStates")
+        assert rov.save() == before
+        if kind == MODEL_EXCHANGE:
+            rov.expect("fmi3EnterContinuousTimeMode")
+            enter, terminate = flags(True), flags(True)
+            rov.expect("fmi3CompletedIntegratorStep", True, enter, terminate)
+            assert (enter[0], terminate[0]) == (False, False)
+
+
+@pytest.mark.parametrize("kind", [CO_SIMULATION, WITH_EVENTS])
+def test_a_step_tells_of_no_event_and_where_it_ends(fmu3: Fmu, kind: int) -> None:
+    with fmu3.instance(kind) as rov:
+        assert rov.set(MOVING) == OK
+        rov.reach(STEP)
+        assert rov.step(0.0, 0.1) == OK
+        assert rov.stepped == Stepped(False, False, False, 0.1)
+        assert rov.step(0.1, 0.2) == OK
+        assert rov.stepped == Stepped(False, False, False, 0.1 + 0.2)
+        assert rov.time() == 0.1 + 0.2
+
+
+def test_what_is_set_in_event_mode_holds_from_then_on(fmu3: Fmu) -> None:
+    """As if a run began with it; steps between events are those of an instance without Event Mode."""
+    with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance() as plain, fmu3.instance() as changed:
+        assert rov.set(MOVING) == OK
+        rov.reach(STEP)
+        plain.start(MOVING)
+        assert run(rov, 0) == run(plain, 0)
+        end = dict(zip(fmu3.states, rov.get(fmu3.states), strict=True))
+        rov.expect("EnterEventMode")
+        assert rov.set(CHANGES) == OK
+        rov.update()
+        rov.expect("EnterStepMode")
+        changed.start({**MOVING, **end, **CHANGES}, at=rov.time())
+        assert run(rov, 10) == run(changed, 10) != run(plain, 10)
+        assert rov.log == plain.log == []
+
+
+@pytest.mark.parametrize("kind", [MODEL_EXCHANGE, CO_SIMULATION, WITH_EVENTS])
+def test_the_time_is_a_variable(fmu3: Fmu, kind: int) -> None:
+    assert fmu3.variables["time"].causality == "independent"
+    with fmu3.instance(kind) as rov:
+        assert rov.time() == 0.0
+        assert rov.initialize(start=2.5) == OK
+        assert rov.time() == 2.5
+        rov.expect("ExitInitializationMode")
+        assert rov.get(["u", "time", "der(u)"]) == [0.0, 2.5, 0.0]
+        if kind == MODEL_EXCHANGE:
+            rov.expect("SetTime", 3.25)
+            assert rov.time() == 3.25
+        elif kind == CO_SIMULATION:
+            assert rov.step(2.5, 0.25) == OK
+            assert rov.time() == 2.75
