@@ -29,9 +29,9 @@ Counts = Counter[tuple[str, bool]]
 """Calls by function and whether they were accepted."""
 
 
-def build_target(sources: Mapping[str, str], output: Path) -> None:
+def build_target(sources: Mapping[str, str], output: Path, fmi: int = 2) -> None:
     """Compile the fuzzer for the sources of an FMU, with AddressSanitizer and UndefinedBehaviorSanitizer."""
-    compile_c(TARGET_SOURCE, output, {**sources, "legal.h": legal_header()}, sanitizers="fuzzer,address,undefined")
+    compile_c(TARGET_SOURCE, output, {**sources, "legal.h": legal_header(fmi)}, sanitizers="fuzzer,address,undefined")
 
 
 def unpack_corpus(folder: Path) -> None:

@@ -1,4 +1,4 @@
-/* The functions of section 2.1, with any arguments. */
+/* The functions that both interfaces have, with any arguments. */
 #pragma once
 
 #include "world.h"
@@ -15,31 +15,24 @@ static int category_of(const char *name)
     return i;
 }
 
-static void check_message(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
-                          fmi2String message, ...)
+/* What both versions promise of a message. */
+static void check_message(const slot *s, int status, const char *category, const char *text)
 {
-    const slot *const s = environment;
-    char text[2048];
-    va_list none;
-    va_start(none, message);
-    const int length = vsnprintf(text, sizeof text, message, none); /* as importers do: no percent sign is left in it */
-    va_end(none);
-    PROPERTY(length > 0 && length < 640, "a message of %d characters", length);
+    PROPERTY(text[0] != '\0' && strlen(text) < 640, "a message of %zu characters", strlen(text));
     for (const char *c = text; (c = strchr(c, '#')) != NULL; c += 2) { /* a single one would begin a value reference */
         PROPERTY(c[1] == '#', "a message with a single #: %s", text);
     }
-    PROPERTY(status != fmi2Pending && status != fmi2Fatal, "a message of status %d", (int)status);
+    PROPERTY(status >= DONE && status <= REFUSED, "a message of status %d", status);
     const int known = category_of(category);
     PROPERTY(known < N_LOG_CATEGORIES, "a message of the category %s", category);
     PROPERTY(s->f == NULL || s->f->log_enabled[known], "a message of %s, which is switched off", category);
-    PROPERTY(s->f == NULL || strcmp(name, s->f->name) == 0, "a message of the instance %s", name);
     messages++;
 }
 
 static const char *take_name(void)
 {
     static const char *const names[] = {NULL, "", " \t\n", "rov", "rov 2", "#%s%n%d#", "\xc3\xa9\xff", "logEvents",
-                                        "logStatusError", "logStatusWarning", "logStatusDiscard", MODEL_GUID};
+                                        "logStatusError", "logStatusWarning", "logStatusDiscard", MODEL_TOKEN};
     static char longest[1000];
     memset(longest, '%', sizeof longest - 1);
     const unsigned n = take_byte() % (sizeof names / sizeof names[0] + 1);
@@ -48,80 +41,60 @@ static const char *take_name(void)
 
 static void free_instance(slot *s)
 {
-    fmi2FreeInstance(s->f);
+    FMI(FreeInstance)(s->f);
     s->f = NULL;
 }
 
-/* A new instance in place of what is there; NULL where an argument is wrong. */
-static void instantiate(slot *s, const char *name, int type, const char *guid, bool logs, bool functions, bool events)
+/* What replaces the instance of a slot; `good`: the arguments that it was made with. */
+static void put_instance(slot *s, fmu *made, bool good, int type, manner of)
 {
-    free_instance(s);
-    const fmi2CallbackFunctions given = {logs ? check_message : NULL, NULL, NULL, NULL, s};
-    LENT fmi2CallbackFunctions *const callbacks = copy_of(&given, 1, sizeof given);
-    before_call();
-    s->f = fmi2Instantiate(name, (fmi2Type)type, guid, NULL, functions ? callbacks : NULL, fmi2False, events);
-    const bool good = name != NULL && name[strspn(name, " \t\n")] != '\0' && guid != NULL && strcmp(guid, MODEL_GUID) == 0
-                      && type >= 0 && type <= 1 && functions && !memory_is_full;
-    PROPERTY((s->f != NULL) == good, "fmi2Instantiate of type %d", type);
-    if (good) {
-        s->logs = logs;
-        s->at = (expected){.type = (fmi2Type)type, .mode = INSTANTIATED};
-    }
+    s->f = made;
+    PROPERTY((made != NULL) == (good && !memory_is_full), "an instance of type %d", type);
+    s->of = of;
+    s->at = (expected){.type = (interface_type)type, .mode = INSTANTIATED};
 }
 
-static void call_fmi2Instantiate(slot *s)
+static bool is_name(const char *name)
 {
-    const bool proper = take_byte() < 200;
-    const char *const name = proper ? "rov" : take_name();
-    const char *const guid = proper || take_bool() ? MODEL_GUID : take_name();
-    const int type = proper ? take_bool() : (int)take_word(4);
-    memory_is_full = take_byte() >= 250;
-    instantiate(s, name, type, guid, take_byte() < 200, take_byte() < 240, take_bool());
-    memory_is_full = false;
+    return name != NULL && name[strspn(name, " \t\n")] != '\0';
 }
 
-static void call_fmi2SetDebugLogging(slot *s)
+static bool is_token(const char *token)
+{
+    return token != NULL && strcmp(token, MODEL_TOKEN) == 0;
+}
+
+static void PLAY(SetDebugLogging)(slot *s)
 {
     const size_t n = take_count();
-    LENT fmi2String *const categories = take_byte() < 250 ? exactly(n, sizeof *categories) : NULL;
+    LENT const char **const categories = take_byte() < 250 ? exactly(n, sizeof *categories) : NULL;
     bool good = n == 0 || categories != NULL;
     for (size_t i = 0; i < n && categories != NULL; i++) {
         categories[i] = take_byte() < 200 ? LOG_CATEGORIES[take_byte() % N_LOG_CATEGORIES] : take_name();
         good = good && categories[i] != NULL && category_of(categories[i]) < N_LOG_CATEGORIES;
     }
-    CALL(s, good, true, fmi2SetDebugLogging, s->f, take_bool(), n, categories);
-}
-
-static void call_fmi2SetupExperiment(slot *s)
-{
-    const bool simple = take_bool(), stops = !simple && take_bool();
-    const double start = simple ? 0.0 : take_real(), stop = stops ? take_real() : 0.0;
-    const bool good = isfinite(start) && (!stops || stop >= start);
-    if (CALL(s, good, true, fmi2SetupExperiment, s->f, take_bool(), take_real(), start, stops, stop)) {
-        s->at = (expected){.type = s->at.type, .mode = s->at.mode, .experiment_defined = true, .time = start,
-                           .stop_defined = stops, .stop = stop};
-    }
+    CALL(s, good, true, SetDebugLogging, s->f, take_bool(), n, categories);
 }
 
 /* Functions without arguments that lead to a mode. */
-#define CALL_THAT_LEADS(function, good, to)            \
-    static void call_##function(slot *s)               \
+#define CALL_THAT_LEADS(name, good, to)                \
+    static void PLAY(name)(slot *s)                    \
     {                                                  \
-        if (CALL(s, good, true, function, s->f)) {     \
+        if (CALL(s, good, true, name, s->f)) {         \
             s->at.mode = to;                           \
         }                                              \
     }
 
-CALL_THAT_LEADS(fmi2EnterInitializationMode, s->at.experiment_defined, INITIALIZATION)
-CALL_THAT_LEADS(fmi2ExitInitializationMode, true, s->at.type == fmi2ModelExchange ? EVENT : STEP)
-CALL_THAT_LEADS(fmi2Terminate, true, TERMINATED)
-CALL_THAT_LEADS(fmi2EnterEventMode, true, EVENT)
-CALL_THAT_LEADS(fmi2EnterContinuousTimeMode, true, CONTINUOUS)
+CALL_THAT_LEADS(ExitInitializationMode, true, s->at.type == MODEL_EXCHANGE || s->of.events ? EVENT : STEP)
+CALL_THAT_LEADS(Terminate, true, TERMINATED)
+CALL_THAT_LEADS(EnterEventMode, true, EVENT)
+CALL_THAT_LEADS(EnterContinuousTimeMode, true, CONTINUOUS)
 
-static void call_fmi2Reset(slot *s)
+static void PLAY(Reset)(slot *s)
 {
-    CALL(s, true, true, fmi2Reset, s->f);
-    s->at = (expected){.type = s->at.type, .mode = INSTANTIATED};
+    if (CALL(s, true, true, Reset, s->f)) {
+        s->at = (expected){.type = s->at.type, .mode = INSTANTIATED};
+    }
 }
 
 /* ---- Values ---- */
@@ -143,7 +116,7 @@ static void *take_room(size_t n, size_t size)
         return list;                                             \
     }
 
-TAKE_LIST(take_references, fmi2ValueReference, take_reference)
+TAKE_LIST(take_references, unsigned, take_reference)
 TAKE_LIST(take_reals, double, take_real)
 
 /* Where a function gives back n doubles: they are all finite, or it was refused and left them alone. */
@@ -159,47 +132,57 @@ static void check_results(const char *function, bool accepted, const double *val
     }
 }
 
-static void call_fmi2GetReal(slot *s)
+/* How many values there are for n references: FMI 3.0 asks for their number, which may be wrong. */
+static size_t take_size(size_t n)
 {
-    const size_t n = take_count();
-    LENT fmi2ValueReference *const vr = take_references(n);
-    LENT double *const values = take_room(n, sizeof *values);
-    bool good = n == 0 || (vr != NULL && values != NULL), derived = false;
-    for (size_t i = 0; i < n && vr != NULL; i++) {
-        good = good && vr[i] < N_VARIABLES;
-        derived = derived || (vr[i] >= FIRST_CALCULATED && vr[i] < (N_LAGGING > 0 ? FIRST_COEFFICIENT : FIRST_THRUST));
-    }
-    verdict wanted = legal(s, CALL_fmi2GetReal, good);
-    if (wanted == ACCEPTED && derived && !is_moderate(s->f)) {
-        wanted = EITHER; /* a derivative may overflow, and what follows from forces that are states */
-    }
-    check_results("fmi2GetReal", CALL_AS(s, wanted, false, fmi2GetReal, s->f, vr, n, values), values, n);
+    const unsigned any = FMI_VERSION == 3 ? take_byte() : 0;
+    return any < 245 ? n : any < 250 ? n + 1 : n / 2;
 }
 
-/* Sections 2.2.7, 3.2.3 and 4.2.4. */
-static bool settable(const slot *s, fmi2ValueReference vr)
+static void PLAY(GetReal)(slot *s)
+{
+    const size_t n = take_count(), m = take_size(n);
+    LENT unsigned *const vr = take_references(n);
+    LENT double *const values = take_room(m, sizeof *values);
+    bool good = m == n && (n == 0 || (vr != NULL && values != NULL)), derived = false;
+    for (size_t i = 0; i < n && vr != NULL; i++) {
+        good = good && vr[i] < N_VARIABLES + (FMI_VERSION == 3); /* the time */
+        derived = derived || (vr[i] >= FIRST_CALCULATED && vr[i] < (N_LAGGING > 0 ? FIRST_COEFFICIENT : FIRST_THRUST));
+    }
+    verdict wanted = legal(s, WHICH(GetReal), good);
+    if (wanted == ALLOWED && derived && !is_moderate(s->f)) {
+        wanted = EITHER; /* a derivative may overflow, and what follows from forces that are states */
+    }
+    check_results("GetReal", CALL_AS(s, wanted, false, GetReal, s->f, vr, n, values AND(m)), values, m);
+}
+
+/* FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and 4.2. */
+static bool settable(const slot *s, unsigned vr)
 {
     const variable_kind kind = VARIABLES[vr].kind;
     switch ((int)s->at.mode) {
     case INSTANTIATED:
     case INITIALIZATION: return kind != CALCULATED;
     case CONTINUOUS: return kind == INPUT || kind == STATE || kind == TUNABLE;
+    case EVENT: return kind == INPUT || kind == TUNABLE || (FMI_VERSION == 3 && kind == STATE);
+    case STEP: return kind == INPUT || (kind == TUNABLE && !s->of.events);
+    case INTERMEDIATE: return kind == INPUT;
     default: return kind == INPUT || kind == TUNABLE;
     }
 }
 
-static void call_fmi2SetReal(slot *s)
+static void PLAY(SetReal)(slot *s)
 {
-    const size_t n = take_count();
-    LENT fmi2ValueReference *const vr = take_references(n);
-    LENT double *const values = take_reals(n);
-    bool good = n == 0 || (vr != NULL && values != NULL);
+    const size_t n = take_count(), m = take_size(n);
+    LENT unsigned *const vr = take_references(n);
+    LENT double *const values = take_reals(m);
+    bool good = m == n && (n == 0 || (vr != NULL && values != NULL));
     for (size_t i = 0; i < n && good; i++) {
         good = vr[i] < N_VARIABLES && settable(s, vr[i]) && isfinite(values[i])
                && (VARIABLES[vr[i]].kind == INPUT
                    || (values[i] >= VARIABLES[vr[i]].minimum && values[i] <= VARIABLES[vr[i]].maximum));
     }
-    if (CALL(s, good, true, fmi2SetReal, s->f, vr, n, values)) {
+    if (CALL(s, good, true, SetReal, s->f, vr, n, values AND(m))) {
         for (size_t i = n; i-- > 0;) { /* the last one counts */
             bool later = false;
             for (size_t j = i + 1; j < n; j++) {
@@ -210,42 +193,94 @@ static void call_fmi2SetReal(slot *s)
     }
 }
 
-/* No variables of another type: nothing to get or set. */
-#define CALL_OF_OTHER_TYPE(function, type)                          \
-    static void call_##function(slot *s)                            \
-    {                                                               \
-        const size_t n = take_count();                              \
-        LENT fmi2ValueReference *const vr = take_references(n);     \
-        LENT type *const values = exactly(n, sizeof(type));         \
-        CALL(s, n == 0, false, function, s->f, vr, n, values);      \
+/* Nothing to get or set: variables of another type, clocks. */
+#define CALL_OF_NONE(name, ...)                                           \
+    static void PLAY(name)(slot *s)                                       \
+    {                                                                     \
+        const size_t n = take_count();                                    \
+        LENT unsigned *const vr = take_references(n);                     \
+        LENT void *const room = exactly(n, 16);                           \
+        CALL(s, n == 0, false, name, s->f, vr, n, __VA_ARGS__);           \
     }
 
-CALL_OF_OTHER_TYPE(fmi2GetInteger, fmi2Integer)
-CALL_OF_OTHER_TYPE(fmi2GetBoolean, fmi2Boolean)
-CALL_OF_OTHER_TYPE(fmi2GetString, fmi2String)
-CALL_OF_OTHER_TYPE(fmi2SetInteger, fmi2Integer)
-CALL_OF_OTHER_TYPE(fmi2SetBoolean, fmi2Boolean)
-CALL_OF_OTHER_TYPE(fmi2SetString, fmi2String)
+/* ---- Partial derivatives ---- */
 
-static void call_fmi2GetDirectionalDerivative(slot *s)
+/* J seed, or seed J of the adjoint ones. */
+typedef struct {
+    size_t n_unknown, n_known, n_seed, n_result;
+    unsigned *unknown, *known;
+    double *seed, *result;
+} partial;
+
+/* Mostly one of the variables from `first` on, before `end`. */
+static unsigned take_reference_among(unsigned first, unsigned end)
 {
-    const size_t n_unknown = take_count(), n_known = take_count();
-    LENT fmi2ValueReference *const unknown = take_references(n_unknown);
-    LENT fmi2ValueReference *const known = take_references(n_known);
-    LENT double *const change = take_reals(n_known);
-    LENT double *const result = exactly(n_unknown, sizeof *result);
-    bool good = (n_unknown == 0 || unknown != NULL) && (n_known == 0 || (known != NULL && change != NULL));
-    for (size_t i = 0; i < n_known && good; i++) {
-        const variable_kind kind = known[i] < N_VARIABLES ? VARIABLES[known[i]].kind : CALCULATED;
+    const unsigned n = take_byte();
+    return n < 230 ? first + n % (end - first) : take_reference();
+}
+
+static unsigned take_known(void)
+{
+    return take_reference_among(0, FIRST_CALCULATED);
+}
+
+static unsigned take_unknown(void)
+{
+    return take_reference_among(FIRST_STATE, FIRST_COEFFICIENT);
+}
+
+TAKE_LIST(take_knowns, unsigned, take_known)
+TAKE_LIST(take_unknowns, unsigned, take_unknown)
+
+static partial take_partial(bool adjoint)
+{
+    partial p;
+    p.n_unknown = take_count();
+    p.n_known = take_count();
+    const size_t from = adjoint ? p.n_unknown : p.n_known, to = adjoint ? p.n_known : p.n_unknown;
+    p.n_seed = take_size(from);
+    p.n_result = take_size(to);
+    p.unknown = take_unknowns(p.n_unknown);
+    p.known = take_knowns(p.n_known);
+    p.seed = take_reals(p.n_seed);
+    p.result = exactly(p.n_result, sizeof *p.result);
+    return p;
+}
+
+static void free_partial(const partial *p)
+{
+    free(p->unknown);
+    free(p->known);
+    free(p->seed);
+    free(p->result);
+}
+
+static verdict may_differentiate(const slot *s, call which, const partial *p, bool adjoint)
+{
+    const size_t from = adjoint ? p->n_unknown : p->n_known, to = adjoint ? p->n_known : p->n_unknown;
+    bool good = (p->n_unknown == 0 || p->unknown != NULL) && (p->n_known == 0 || p->known != NULL)
+                && (from == 0 || p->seed != NULL) && p->n_seed >= from && p->n_result >= to;
+    for (size_t i = 0; i < p->n_known && good; i++) {
+        const variable_kind kind = p->known[i] < N_VARIABLES ? VARIABLES[p->known[i]].kind : CALCULATED;
         good = kind == INPUT || kind == STATE || (kind != CALCULATED && s->at.mode == INITIALIZATION);
     }
-    for (size_t i = 0; i < n_unknown && good; i++) {
-        good = unknown[i] < N_VARIABLES && (VARIABLES[unknown[i]].kind == STATE || VARIABLES[unknown[i]].kind == CALCULATED);
+    for (size_t i = 0; i < p->n_unknown && good; i++) {
+        const variable_kind kind = p->unknown[i] < N_VARIABLES ? VARIABLES[p->unknown[i]].kind : INPUT;
+        good = kind == STATE || kind == CALCULATED;
     }
-    verdict wanted = legal(s, CALL_fmi2GetDirectionalDerivative, good);
-    for (size_t i = 0; i < n_known && wanted == ACCEPTED; i++) {
-        wanted = fabs(change[i]) <= 1e30 && is_moderate(s->f) ? wanted : EITHER;
+    verdict wanted = legal(s, which, good);
+    for (size_t i = 0; i < from && wanted == ALLOWED; i++) {
+        wanted = fabs(p->seed[i]) <= 1e30 ? wanted : EITHER;
     }
-    check_results("fmi2GetDirectionalDerivative", CALL_AS(s, wanted, false, fmi2GetDirectionalDerivative, s->f, unknown,
-                  n_unknown, known, n_known, change, result), result, n_unknown);
+    return wanted == ALLOWED && !is_moderate(s->f) ? EITHER : wanted; /* an entry may overflow, even times a seed of 0 */
+}
+
+static void PLAY(GetDirectionalDerivative)(slot *s)
+{
+    const partial p = take_partial(false);
+    const verdict wanted = may_differentiate(s, WHICH(GetDirectionalDerivative), &p, false);
+    const bool accepted = CALL_AS(s, wanted, false, GetDirectionalDerivative, s->f, p.unknown, p.n_unknown, p.known, p.n_known,
+                                  p.seed AND(p.n_seed), p.result AND(p.n_result));
+    check_results("GetDirectionalDerivative", accepted, p.result, accepted ? p.n_unknown : p.n_result);
+    free_partial(&p);
 }

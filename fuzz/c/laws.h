@@ -1,4 +1,4 @@
-/* What holds whatever was called: finite outputs, and motion that obeys its equation. */
+/* What holds whatever was called: finite outputs, motion that obeys its equation, derivatives that are the motion's. */
 #pragma once
 
 #include "world.h"
@@ -33,20 +33,38 @@ static void fastest(const fmu *f, double h, double v[N_AXES])
     }
 }
 
-/* Whether a step takes few enough pieces in any case: its rates come to no more than 1,000 over it. */
-static bool is_calm(const fmu *f, double h)
+/* The rates, together, at which drag and coupling change velocities up to v. */
+static double rates_up_to(const fmu *f, const double v[N_AXES])
 {
-    double v[N_AXES], rates;
-    fastest(f, h, v);
-    rates = rov_value(v, YAW);
-    for (int a = 0; a < N_AXES && !IS_FREE; a++) {
-        const double coupling = fabs(f->gains.c_u) + fabs(f->gains.c_v) + fabs(f->gains.c_r);
+    const double coupling = fabs(f->gains.c_u) + fabs(f->gains.c_v) + fabs(f->gains.c_r);
+    double rates = 0.0;
+    for (int a = 0; a < N_AXES; a++) {
         for (int back = 0; back < 2; back++) {
             rates += f->gains.axis[a].B[back] + f->gains.axis[a].A[back] * v[a];
         }
         rates += coupling * v[a];
     }
-    return h <= 1e30 && rates * h <= 1e3;
+    return rates;
+}
+
+/* Whether a step takes few enough pieces in any case: its rates come to no more than 1,000 over it. */
+static bool is_calm(const fmu *f, double h)
+{
+    double v[N_AXES];
+    fastest(f, h, v);
+    return h <= 1e30 && (rov_value(v, YAW) + (IS_FREE ? 0.0 : rates_up_to(f, v))) * h <= 1e3;
+}
+
+/* How far anything changes within h, together. */
+static double changes_of(const fmu *f, double h)
+{
+    double v[N_AXES], rates;
+    fastest(f, h, v);
+    rates = rov_value(v, YAW) + rates_up_to(f, v);
+    for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
+        rates += f->gains.rate[c];
+    }
+    return rates * h;
 }
 
 /* ---- Axes alone ---- */
@@ -145,10 +163,103 @@ static void check_step(const fmu *start, const fmu *end, double h)
     }
 }
 
+/* ---- One motion, asked for in several ways ---- */
+
+/* How large the terms are that make up each state within h. */
+static void sizes_of(const fmu *f, double h, double size[N_STATES])
+{
+    const double *const state = f->now.values + FIRST_STATE;
+    const double turned = POSE_psi == NONE ? 0.0 : fabs(rov_value(state, POSE_psi));
+    double most[N_AXES], way = h * (fabs(rov_value(f->now.values, MAYBE_V_N)) + fabs(rov_value(f->now.values, MAYBE_V_E)));
+    rov_held held;
+    rov_hold(f->now.values, &f->gains, &held);
+    fastest(f, h, most);
+    for (int a = 0; a < N_AXES; a++) {
+        size[a] = most[a];
+        way += h * most[a];
+    }
+    for (int i = N_AXES; i < N_STATES; i++) {
+        size[i] = fabs(state[i]) + way * (1.0 + turned); /* a large heading has fewer digits for its sine */
+    }
+    for (int t = 0; t < N_THRUSTERS; t++) {
+        if (rov_lags(t)) {
+            size[THRUSTERS[t].force - FIRST_STATE] = fabs(held.F[t]) + fabs(held.steady[t]);
+        }
+    }
+}
+
+static void check_same(const char *what, const fmu *start, double h, const double one[], const double other[], double rounding)
+{
+    double size[N_STATES];
+    sizes_of(start, h, size);
+    for (int i = 0; i < N_STATES; i++) {
+        PROPERTY(!(fabs(one[i] - other[i]) > rounding * size[i] + DBL_MIN * (1.0 + h)), "%s of %a s: %s = %a and %a", what, h,
+                 VARIABLES[FIRST_STATE + i].name, one[i], other[i]);
+    }
+}
+
+/* A step leads where so many parts of it lead. */
+static void check_parts(const fmu *start, const fmu *end, double h, int parts)
+{
+    double values[N_VARIABLES];
+    memcpy(values, start->now.values, sizeof values);
+    if (!(changes_of(start, h) <= 1.0)) { /* rounding may grow */
+        return;
+    }
+    for (int i = 0; i < parts; i++) {
+        double next[N_STATES];
+        PROPERTY(rov_step(values, &start->gains, h / parts, next), "a part of a step takes too many pieces");
+        memcpy(values + FIRST_STATE, next, sizeof next);
+    }
+    check_same("a step and its parts", start, h, end->now.values + FIRST_STATE, values + FIRST_STATE, 1e-9);
+}
+
+/* A step with the inputs held, from t. */
+static void check_whole_step(const fmu *start, const fmu *end, double t, double h)
+{
+    check_step(start, end, h);
+    check_parts(start, end, h, 3);
+    PROPERTY(end->now.time == t + h, "a step to t = %a ends at %a", t + h, end->now.time);
+}
+
+/* The derivatives of all orders are those of the motion: their series leads where a short step leads. */
+static void check_taylor(const fmu *f)
+{
+    const double *const from = f->now.values + FIRST_STATE, h = 0.005 / (1.0 + changes_of(f, 1.0));
+    double d[N_VARIABLES], sum[N_STATES], next[N_STATES], factor = 1.0;
+    bool plain = changes_of(f, h) <= 0.01 && rov_step(f->now.values, &f->gains, h, next);
+    memcpy(sum, from, sizeof sum);
+    for (int n = 1; n <= ORDER && plain; n++) {
+        rov_rates_of_order(f->now.values, &f->gains, n, d);
+        factor *= h / n;
+        for (int i = 0; i < N_STATES; i++) {
+            sum[i] += factor * d[FIRST_STATE + i];
+            plain = plain && isfinite(sum[i]);
+        }
+    }
+    for (int a = 0; a < N_AXES; a++) { /* beyond a reversal there is another series */
+        plain = plain && (from[a] == 0.0 || next[a] / from[a] > 0.5);
+    }
+    if (plain) {
+        check_same("a series of derivatives", f, h, next, sum, 1e-11);
+    }
+}
+
+/* The first time derivative of a state is what the model says that it is. */
+static void check_first_derivative(fmu *f, unsigned state, double derivative)
+{
+    const unsigned vr = FIRST_CALCULATED + state;
+    double rate, size[N_STATES];
+    PROPERTY(FMI(GetReal)(f, &vr, 1, &rate AND(1)) == 0, "a derivative cannot be read");
+    sizes_of(f, 1.0, size);
+    PROPERTY(!(fabs(derivative - rate) > 1e-12 * (1.0 + changes_of(f, 1.0)) * size[state]), "der(%s) = %a and %a",
+             VARIABLES[FIRST_STATE + state].name, derivative, rate);
+}
+
 /* The gains and the mode are the expected ones; states and thrust can be read and are finite. */
 static void check_instance(const slot *s)
 {
-    fmi2ValueReference vr[N_STATES + N_THRUST];
+    unsigned vr[N_STATES + N_THRUST];
     double values[N_STATES + N_THRUST];
     for (unsigned i = 0; i < N_STATES + N_THRUST; i++) {
         vr[i] = FIRST_STATE + i + (i < N_STATES ? 0 : N_STATES);
@@ -163,7 +274,7 @@ static void check_instance(const slot *s)
              mode_name(s->f->now.mode), mode_name(s->at.mode));
     const unsigned n = N_LAGGING > 0 && !is_moderate(s->f) ? N_STATES : N_STATES + N_THRUST; /* a torque may overflow */
     before_call();
-    PROPERTY(fmi2GetReal(s->f, vr, n, values) == fmi2OK, "the outputs cannot be read");
+    PROPERTY(FMI(GetReal)(s->f, vr, n, values AND(n)) == 0, "the outputs cannot be read");
     PROPERTY(is_same(s, true), "to read changes the instance");
     for (unsigned i = 0; i < n; i++) {
         PROPERTY(isfinite(values[i]), "%s = %g", VARIABLES[vr[i]].name, values[i]);

@@ -1,4 +1,4 @@
-/* The functions of section 2.1.8, with states and bytes of any origin. */
+/* The functions of states, with states and bytes of any origin. */
 #pragma once
 
 #include "world.h"
@@ -10,66 +10,73 @@ static saved_slot *take_saved(void)
     return &saves[take_byte() % N_SAVED];
 }
 
-static void call_fmi2GetFMUstate(slot *s)
+static void PLAY(GetFMUstate)(slot *s)
 {
     saved_slot *const to = take_saved();
     const unsigned n = take_byte();
-    fmi2FMUstate other = foreign;
-    fmi2FMUstate *const at = n < 240 ? &to->state : n < 248 ? &other : NULL;
+    void *other = foreign;
+    void **const at = n < 240 ? &to->state : n < 248 ? &other : NULL;
     memory_is_full = n >= 230 && n < 240;
     const bool good = n < 240 && !(memory_is_full && to->state == NULL);
-    if (CALL(s, good, false, fmi2GetFMUstate, s->f, at)) {
+    if (CALL(s, good, false, GetFMUstate, s->f, at)) {
         to->at = s->at;
     }
     memory_is_full = false;
     PROPERTY(other == foreign, "memory that is no state is taken");
 }
 
-static void call_fmi2SetFMUstate(slot *s)
+/* In which an instance of an interface can be saved, were it made as this one was. */
+static int modes_of(const slot *s, interface_type type)
+{
+    return BETWEEN & ~(type == MODEL_EXCHANGE ? STEP | FAILED : s->of.events ? CONTINUOUS : EVENT | CONTINUOUS);
+}
+
+static void PLAY(SetFMUstate)(slot *s)
 {
     saved_slot *const from = take_saved();
     const bool own = take_byte() < 240;
-    const bool good = own && from->state != NULL && from->at.type == s->at.type;
-    if (CALL(s, good, true, fmi2SetFMUstate, s->f, own ? from->state : foreign)) {
+    const bool good = own && from->state != NULL && from->at.type == s->at.type
+                      && ((int)from->at.mode & modes_of(s, s->at.type)) != 0;
+    if (CALL(s, good, true, SetFMUstate, s->f, own ? from->state : foreign)) {
         s->at = from->at;
     }
 }
 
-static void call_fmi2FreeFMUstate(slot *s)
+static void PLAY(FreeFMUstate)(slot *s)
 {
     saved_slot *const from = take_saved();
     const unsigned n = take_byte();
-    fmi2FMUstate other = foreign;
-    fmi2FMUstate *const freed = n < 240 ? &from->state : n < 248 ? &other : NULL;
-    const bool accepted = CALL(s, n < 240 || n >= 248, false, fmi2FreeFMUstate, s->f, freed);
+    void *other = foreign;
+    void **const freed = n < 240 ? &from->state : n < 248 ? &other : NULL;
+    const bool accepted = CALL(s, n < 240 || n >= 248, false, FreeFMUstate, s->f, freed);
     PROPERTY(!accepted || n >= 240 || from->state == NULL, "a freed state is still there");
 }
 
-static void call_fmi2SerializedFMUstateSize(slot *s)
+static void PLAY(SerializedFMUstateSize)(slot *s)
 {
     const saved_slot *const from = take_saved();
     const unsigned n = take_byte();
     size_t size = 12345;
     const bool good = from->state != NULL && n < 240;
-    const bool accepted = CALL(s, good, false, fmi2SerializedFMUstateSize, s->f, from->state, n < 240 ? &size : NULL);
+    const bool accepted = CALL(s, good, false, SerializedFMUstateSize, s->f, from->state, n < 240 ? &size : NULL);
     PROPERTY(size == (accepted ? SERIALIZED_SIZE : 12345), "%zu bytes", size);
 }
 
-static void call_fmi2SerializeFMUstate(slot *s)
+static void PLAY(SerializeFMUstate)(slot *s)
 {
     const saved_slot *const from = take_saved();
     buffer *const to = &buffers[take_byte() % N_BUFFERS];
     const unsigned n = take_byte();
     const size_t size = n < 200 ? SERIALIZED_SIZE : n < 250 ? SERIALIZED_SIZE - 2 + n % 5 : take_word(1);
-    fmi2Byte *const bytes = exactly(size, 1);
+    unsigned char *const bytes = exactly(size, 1);
     const bool good = from->state != NULL && size >= SERIALIZED_SIZE;
-    if (CALL(s, good, false, fmi2SerializeFMUstate, s->f, from->state, bytes, size)) {
+    if (CALL(s, good, false, SerializeFMUstate, s->f, from->state, (octet *)bytes, size)) {
         free(to->bytes);
-        *to = (buffer){bytes, size, checksum((unsigned char *)bytes, size), false, from->at};
+        *to = (buffer){bytes, size, checksum(bytes, size), false, from->at};
         return;
     }
     for (size_t i = 0; i < size; i++) {
-        PROPERTY((unsigned char)bytes[i] == 0xa5, "a refused call writes bytes");
+        PROPERTY(bytes[i] == 0xa5, "a refused call writes bytes");
     }
     free(bytes);
 }
@@ -81,12 +88,12 @@ static void damage(void)
     if (b->bytes == NULL || b->size != SERIALIZED_SIZE) {
         return;
     }
-    unsigned char *const bytes = (unsigned char *)b->bytes;
+    unsigned char *const bytes = b->bytes;
     const bool forge = take_bool();
     const size_t at = (size_t)take_word(2) % SERIALIZED_SIZE, word = at % (N_HEADER_WORDS + N_VARIABLES);
     if (forge) {
         const double value = take_real();
-        unsigned char *to = bytes + MAGIC_SIZE + GUID_SIZE + 8 * word;
+        unsigned char *to = bytes + MAGIC_SIZE + TOKEN_SIZE + 8 * word;
         if (word < 3) {
             put_word(&to, take_byte());
         } else {
@@ -101,24 +108,24 @@ static void damage(void)
     }
 }
 
-static void call_fmi2DeSerializeFMUstate(slot *s)
+static void PLAY(DeSerializeFMUstate)(slot *s)
 {
     const buffer *const from = &buffers[take_byte() % N_BUFFERS];
     saved_slot *const to = take_saved();
     const bool whole = from->bytes != NULL && from->size == SERIALIZED_SIZE
-                       && checksum((unsigned char *)from->bytes, from->size) == from->sum;
+                       && checksum(from->bytes, from->size) == from->sum;
     memory_is_full = take_byte() >= 250;
-    verdict wanted = legal(s, CALL_fmi2DeSerializeFMUstate, whole && !(memory_is_full && to->state == NULL));
-    wanted = wanted == ACCEPTED && from->forged ? EITHER : wanted;
-    const bool accepted = CALL_AS(s, wanted, false, fmi2DeSerializeFMUstate, s->f, from->bytes, from->size, &to->state);
+    const bool fits = from->forged || ((int)from->at.mode & modes_of(s, from->at.type)) != 0;
+    verdict wanted = legal(s, WHICH(DeSerializeFMUstate), whole && fits && !(memory_is_full && to->state == NULL));
+    wanted = wanted == ALLOWED && from->forged ? EITHER : wanted;
+    const bool accepted = CALL_AS(s, wanted, false, DeSerializeFMUstate, s->f, (octet *)from->bytes, from->size, &to->state);
     memory_is_full = false;
     if (!accepted) {
         return;
     }
     const fmu_state *const state = &((saved_state *)to->state)->state;
     to->at = from->forged ? *state : from->at;
-    const int modes = state->type == fmi2ModelExchange ? EVERYWHERE & ~(STEP | FAILED) : EVERYWHERE & ~(EVENT | CONTINUOUS);
-    const int mode = (int)state->mode;
+    const int modes = modes_of(s, state->type), mode = (int)state->mode;
     PROPERTY((modes & mode) != 0 && (mode & (mode - 1)) == 0, "a state in mode %d", mode);
     for (int i = 0; i < N_VARIABLES; i++) {
         PROPERTY(isfinite(state->values[i]), "a state with %s = %g", VARIABLES[i].name, state->values[i]);

@@ -6,45 +6,71 @@
 #define OPERATION(function) call_##function,
 static void (*const OPERATIONS[N_CALLS])(slot *) = {EACH_CALL(OPERATION)};
 
+static void any_call(slot *s, unsigned which)
+{
+    OPERATIONS[which % N_CALLS](s);
+}
+
+/* From Event Mode to where time passes. */
+static void leave_event_mode(slot *s)
+{
+    if (s->at.type == MODEL_EXCHANGE) {
+        PLAY(EnterContinuousTimeMode)(s);
+    }
+#if FMI_VERSION == 3
+    if (s->of.events) {
+        call_fmi3EnterStepMode(s);
+    }
+#endif
+}
+
 /* An instance of each interface in two slots each, running: few bytes lead far. */
 static void set_out(void)
 {
+    manner of = take_manner();
     for (int i = 0; i < N_SLOTS; i++) {
         slot *const s = &slots[i];
-        instantiate(s, "rov", i % 2, MODEL_GUID, true, true, i < 2);
-        fmi2SetupExperiment(s->f, fmi2False, 0.0, 0.0, fmi2False, 0.0);
-        s->at.experiment_defined = true;
-        call_fmi2EnterInitializationMode(s);
-        call_fmi2ExitInitializationMode(s);
-        if (s->at.type == fmi2ModelExchange) {
-            call_fmi2EnterContinuousTimeMode(s);
-        }
+        of.is_told = i < 2;
+        make(s, (interface_type)(i % 2), of);
+        begin(s);
+        PLAY(ExitInitializationMode)(s);
+        leave_event_mode(s);
     }
+}
+
+/* Any calls in Event Mode. */
+static void meet_events(slot *s)
+{
+    PLAY(EnterEventMode)(s);
+    for (unsigned n = take_byte() % 4; n > 0; n--) {
+        any_call(s, take_byte());
+    }
+    leave_event_mode(s);
 }
 
 /* A run from its start, with any start values and end. */
 static void start_again(slot *s)
 {
-    call_fmi2Reset(s);
+    PLAY(Reset)(s);
+#if FMI_VERSION == 2
     call_fmi2SetupExperiment(s);
-    call_fmi2SetReal(s);
-    call_fmi2EnterInitializationMode(s);
-    call_fmi2SetReal(s);
-    call_fmi2ExitInitializationMode(s);
-    if (s->at.type == fmi2ModelExchange) {
-        call_fmi2EnterContinuousTimeMode(s);
-    }
+#endif
+    PLAY(SetReal)(s);
+    PLAY(EnterInitializationMode)(s);
+    PLAY(SetReal)(s);
+    PLAY(ExitInitializationMode)(s);
+    leave_event_mode(s);
 }
 
 /* Sets and steps, as a run has them. */
-static void run(slot *s, unsigned length)
+static void fly(slot *s, unsigned length)
 {
     for (unsigned i = 0; i < length; i++) {
-        call_fmi2SetReal(s);
-        call_fmi2DoStep(s);
-        call_fmi2SetContinuousStates(s);
-        call_fmi2GetDerivatives(s);
-        call_fmi2GetReal(s);
+        PLAY(SetReal)(s);
+        PLAY(DoStep)(s);
+        PLAY(SetContinuousStates)(s);
+        PLAY(GetDerivatives)(s);
+        PLAY(GetReal)(s);
     }
 }
 
@@ -52,12 +78,17 @@ static void run(slot *s, unsigned length)
 static void coast(slot *s)
 {
     static const double nothing[FIRST_STATE];
-    fmi2ValueReference vr[FIRST_STATE];
+    unsigned vr[FIRST_STATE];
     for (unsigned i = 0; i < FIRST_STATE; i++) {
         vr[i] = i;
     }
-    CALL(s, true, true, fmi2SetReal, s->f, vr, FIRST_STATE, nothing);
-    call_fmi2DoStep(s);
+    CALL(s, true, true, SetReal, s->f, vr, FIRST_STATE, nothing AND(FIRST_STATE));
+    PLAY(DoStep)(s);
+}
+
+static bool is_alike(const manner *a, const manner *b)
+{
+    return a->events == b->events && a->updates == b->updates && a->returns_early == b->returns_early;
 }
 
 /* The same bytes from the same state give the same calls and the same results: in the instance that was saved, and in
@@ -67,53 +98,53 @@ static void replay(slot *s)
     slot *const other = &slots[take_byte() % N_SLOTS];
     const unsigned length = take_byte() % 4;
     const size_t start = position;
-    if (s->f == NULL || other->f == NULL || s->at.type != other->at.type) {
+    if (s->f == NULL || other->f == NULL || s->at.type != other->at.type || !is_alike(&s->of, &other->of)) {
         return;
     }
     const expected at = s->at;
-    fmi2FMUstate state = NULL, copy = NULL;
+    void *state = NULL, *copy = NULL;
     unsigned char bytes[SERIALIZED_SIZE];
-    PROPERTY(fmi2GetFMUstate(s->f, &state) == fmi2OK, "not saved");
-    PROPERTY(fmi2SerializeFMUstate(s->f, state, (fmi2Byte *)bytes, sizeof bytes) == fmi2OK, "not serialized");
-    PROPERTY(fmi2DeSerializeFMUstate(other->f, (fmi2Byte *)bytes, sizeof bytes, &copy) == fmi2OK, "not deserialized");
+    PROPERTY(FMI(GetFMUstate)(s->f, &state) == DONE, "not saved");
+    PROPERTY(FMI(SerializeFMUstate)(s->f, state, (octet *)bytes, sizeof bytes) == DONE, "not serialized");
+    PROPERTY(FMI(DeSerializeFMUstate)(other->f, (octet *)bytes, sizeof bytes, &copy) == DONE, "not deserialized");
     uint64_t traces[3];
     for (int i = 0; i < 3; i++) {
         slot *const runner = i < 2 ? s : other;
-        PROPERTY(i == 0 || fmi2SetFMUstate(runner->f, i == 1 ? state : copy) == fmi2OK, "not restored");
+        PROPERTY(i == 0 || FMI(SetFMUstate)(runner->f, i == 1 ? state : copy) == DONE, "not restored");
         runner->at = at;
         position = start;
         trace = 0;
-        run(runner, length);
+        fly(runner, length);
         note(runner->f->now.values, FIRST_CALCULATED * sizeof(double));
         note(&runner->f->now.time, sizeof(double));
         traces[i] = trace;
     }
     PROPERTY(traces[0] == traces[1], "a restored state goes another way");
     PROPERTY(traces[0] == traces[2], "a state restored from bytes goes another way in another instance");
-    PROPERTY(fmi2FreeFMUstate(s->f, &state) == fmi2OK && fmi2FreeFMUstate(s->f, &copy) == fmi2OK, "not freed");
+    PROPERTY(FMI(FreeFMUstate)(s->f, &state) == DONE && FMI(FreeFMUstate)(s->f, &copy) == DONE, "not freed");
 }
 
 /* A state by way of bytes that may be damaged on the way, into any instance. */
 static void carry(slot *s)
 {
     const size_t start = position;
-    call_fmi2GetFMUstate(s);
+    PLAY(GetFMUstate)(s);
     position = start; /* the same place again */
-    call_fmi2SerializeFMUstate(s);
+    PLAY(SerializeFMUstate)(s);
     if (take_bool()) {
         damage();
     }
-    call_fmi2DeSerializeFMUstate(s);
-    call_fmi2SetFMUstate(&slots[take_byte() % N_SLOTS]);
+    PLAY(DeSerializeFMUstate)(s);
+    PLAY(SetFMUstate)(&slots[take_byte() % N_SLOTS]);
 }
 
 static void clear_world(void)
 {
     if (slots[0].f == NULL) { /* states are freed by an instance */
-        instantiate(&slots[0], "rov", fmi2CoSimulation, MODEL_GUID, false, true, false);
+        make(&slots[0], CO_SIMULATION, (manner){.logs = false});
     }
     for (int i = 0; i < N_SAVED; i++) {
-        PROPERTY(fmi2FreeFMUstate(slots[0].f, &saves[i].state) == fmi2OK, "not freed");
+        PROPERTY(FMI(FreeFMUstate)(slots[0].f, &saves[i].state) == DONE, "not freed");
     }
     for (int i = 0; i < N_SLOTS; i++) {
         free_instance(&slots[i]);
@@ -138,24 +169,24 @@ __attribute__((destructor)) static void write_counts(void)
     }
 }
 
-enum { MOST_WILD = 50 }; /* of 10,000 pieces each, which take a tenth of a second under the sanitizers */
+enum { MOST_SPENT = 50 * MOST_PIECES }; /* 10,000 pieces take a tenth of a second under the sanitizers */
 
 int LLVMFuzzerTestOneInput(const unsigned char *data, size_t size)
 {
     input = data;
     input_size = size;
     position = 0;
-    wild = 0;
+    spent = 0;
     set_out();
-    while (position < input_size && wild < MOST_WILD) {
+    while (position < input_size && spent < MOST_SPENT) {
         const unsigned what = take_byte();
         slot *const s = &slots[take_byte() % N_SLOTS];
         if (what < 200) {
-            OPERATIONS[what % N_CALLS](s);
+            any_call(s, what);
         } else if (what < 208) {
             start_again(s);
         } else if (what < 216) {
-            run(s, take_byte() % 8);
+            fly(s, take_byte() % 8);
         } else if (what < 225) {
             coast(s);
         } else if (what < 235) {
@@ -164,8 +195,10 @@ int LLVMFuzzerTestOneInput(const unsigned char *data, size_t size)
             carry(s);
         } else if (what < 248) {
             damage();
+        } else if (what < 250) {
+            meet_events(s);
         } else if (what < 254) {
-            call_fmi2Instantiate(s);
+            PLAY(Instantiate)(s);
         } else {
             free_instance(s);
         }

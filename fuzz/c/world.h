@@ -12,31 +12,42 @@ static void *calloc_or_not(size_t count, size_t size)
     return memory_is_full ? NULL : calloc(count, size);
 }
 
+#define FMI3_OVERRIDE_FUNCTION_PREFIX
 #define calloc calloc_or_not
 #include "fmu.c"
 #undef calloc
 #include "check.h"
 #include "legal.h"
+#include "versions.h"
+
+#define WHICH(name) PASTE(CALL_, FMI(name))
+#define PLAY(name) PASTE(call_, FMI(name))
 
 enum { N_SLOTS = 4, N_SAVED = 3, N_BUFFERS = 3 };
 
 /* What an instance is in after the calls so far, by the standard; its values are not followed. */
 typedef fmu_state expected;
 
+/* How an instance was made: with a logger; of FMI 3.0 in Co-Simulation, what its host uses. */
+typedef struct {
+    bool logs, is_told, events, updates, returns_early; /* is_told: loggingOn */
+} manner;
+
 typedef struct {
     fmu *f;
-    bool logs; /* has a logger */
+    manner of;
     expected at;
+    struct updates *inside; /* a step */
 } slot;
 
 typedef struct {
-    fmi2FMUstate state;
+    void *state;
     expected at;
 } saved_slot;
 
 /* Serialized bytes, and the sum of them that tells whether they are as they were. */
 typedef struct {
-    fmi2Byte *bytes;
+    unsigned char *bytes;
     size_t size;
     uint64_t sum;
     bool forged; /* what is in it is not known */
@@ -46,6 +57,9 @@ typedef struct {
 static slot slots[N_SLOTS];
 static saved_slot saves[N_SAVED];
 static buffer buffers[N_BUFFERS];
+static unsigned spent; /* pieces that the steps of an input may have taken */
+
+static void any_call(slot *s, unsigned which);
 
 /* ---- Values from the fuzzer's bytes; zeros where they end ---- */
 
@@ -111,20 +125,13 @@ static void *exactly(size_t count, size_t size)
     return memory;
 }
 
-static void *copy_of(const void *from, size_t count, size_t size)
-{
-    void *const memory = exactly(count, size);
-    memcpy(memory, from, count * size);
-    return memory;
-}
-
 static size_t take_count(void)
 {
     const unsigned n = take_byte();
     return n < 240 ? n % 4 : n % (N_VARIABLES + 3);
 }
 
-static fmi2ValueReference take_reference(void)
+static unsigned take_reference(void)
 {
     const unsigned n = take_byte();
     if (n < 100) {
@@ -136,12 +143,12 @@ static fmi2ValueReference take_reference(void)
     if (n < 245) {
         return n % N_VARIABLES;
     }
-    return n < 253 ? N_VARIABLES + n % 4 : (fmi2ValueReference)take_word(4);
+    return n < 253 ? N_VARIABLES + n % 4 : (unsigned)take_word(4);
 }
 
 /* ---- One call: was it right to accept or refuse it, and did it leave alone what it must ---- */
 
-typedef enum { REFUSED, ACCEPTED, EITHER } verdict;
+typedef enum { FORBIDDEN, ALLOWED, EITHER } verdict;
 
 static unsigned long long counts[N_CALLS][2]; /* refused, accepted */
 static uint64_t trace;                        /* of all that was returned; two runs of the same bytes give the same */
@@ -156,10 +163,11 @@ static void note(const void *bytes, size_t size)
     }
 }
 
-/* The bytes of an instance but for the calculated variables, which follow from the rest. */
+/* The bytes of an instance but for the calculated variables, which follow from the rest, and who called last. */
 static void copy_instance(unsigned char *to, const fmu *from)
 {
     memcpy(to, from, sizeof *from);
+    ((fmu *)(void *)to)->function = NULL;
     memset(&((fmu *)(void *)to)->now.values[FIRST_CALCULATED], 0,
            (N_STATES + N_THRUST) * sizeof(double));
 }
@@ -198,19 +206,21 @@ static void before_call(void)
     }
 }
 
+enum { WITH_EVENTS = 2 }; /* the row of LEGAL beyond those of the interface types */
+
 static verdict legal(const slot *s, call which, bool arguments)
 {
-    return s->f != NULL && arguments && (LEGAL[s->at.type][which] & (int)s->at.mode) != 0 ? ACCEPTED : REFUSED;
+    return s->f != NULL && arguments && (LEGAL[s->of.events ? WITH_EVENTS : (int)s->at.type][which] & (int)s->at.mode) != 0 ? ALLOWED : FORBIDDEN;
 }
 
 /* Whether the call was accepted. `changes`: it may change its instance, if accepted. */
-static bool after_call(const slot *s, call which, verdict wanted, fmi2Status status, bool changes)
+static bool after_call(const slot *s, call which, verdict wanted, int status, bool changes)
 {
     const char *const name = CALL_NAMES[which];
-    const bool accepted = status == fmi2OK;
-    PROPERTY(accepted || status == fmi2Error || status == fmi2Discard, "%s returns %d", name, (int)status);
-    PROPERTY(wanted == EITHER || accepted == (wanted == ACCEPTED), "%s: %s in %s returns %d", name,
-             wanted == ACCEPTED ? "legal" : "illegal", s->f == NULL ? "no instance" : mode_name(s->at.mode), (int)status);
+    const bool accepted = status == DONE;
+    PROPERTY(accepted || status == REFUSED || status == DISCARDED, "%s returns %d", name, status);
+    PROPERTY(wanted == EITHER || accepted == (wanted == ALLOWED), "%s: %s in %s returns %d", name,
+             wanted == ALLOWED ? "legal" : "illegal", s->f == NULL ? "no instance" : mode_name(s->at.mode), status);
     for (int i = 0; i < N_SLOTS; i++) {
         const bool own = s == &slots[i] && accepted;
         PROPERTY((own && changes) || is_same(&slots[i], own), "%s changes instance %d", name, i);
@@ -220,8 +230,8 @@ static bool after_call(const slot *s, call which, verdict wanted, fmi2Status sta
                      || memcmp(&saves_before[i], saves[i].state, sizeof saves_before[i]) == 0,
                  "%s is refused and changes a saved state", name);
     }
-    if (!accepted && s->f != NULL && s->logs) {
-        const bool enabled = s->f->log_enabled[status == fmi2Discard ? logStatusDiscard : logStatusError];
+    if (!accepted && s->f != NULL && s->of.logs) {
+        const bool enabled = s->f->log_enabled[status == DISCARDED ? logStatusDiscard : logStatusError];
         PROPERTY(messages == (enabled ? 1u : 0u), "%s is refused with %u messages", name, messages);
     }
     note(&status, sizeof status);
@@ -230,10 +240,9 @@ static bool after_call(const slot *s, call which, verdict wanted, fmi2Status sta
 }
 
 /* Calls a function of the FMU, and after_call with what it returned. `good`: its arguments are. */
-#define CALL_AS(s, wanted, changes, function, ...) \
-    (before_call(), after_call(s, CALL_##function, wanted, function(__VA_ARGS__), changes))
-#define CALL(s, good, changes, function, ...) \
-    CALL_AS(s, legal(s, CALL_##function, good), changes, function, __VA_ARGS__)
+#define CALL_AS(s, wanted, changes, name, ...) \
+    (before_call(), after_call(s, WHICH(name), wanted, (int)FMI(name)(__VA_ARGS__), changes))
+#define CALL(s, good, changes, name, ...) CALL_AS(s, legal(s, WHICH(name), good), changes, name, __VA_ARGS__)
 
 /* Far from where a result can overflow. */
 static bool is_moderate(const fmu *f)
