@@ -4,19 +4,17 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
-from contextlib import redirect_stdout
-from io import StringIO
+from functools import cache, partial
+from itertools import product
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Column, Table
 
-from rov_fmu import cli
-
-from .importers import HERE, KITS, Importer, chosen
+from .importers import HERE, KITS, VERSIONS, Importer, chosen
 from .install import InstallError, install
 from .manoeuvre import MANOEUVRES
-from .run import Outcome, Verdict, run
+from .run import Outcome, Verdict, build_fmu, run
 
 STYLES = {Verdict.DIFFERS: "red", Verdict.FAILED: "red", Verdict.NOT_RUN: "yellow"}
 
@@ -28,16 +26,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("names", nargs="*", metavar="NAME", help=f"importer (see --list) or kit: {', '.join(KITS)}; what is named must "
         "run (default: all that are installed)")  # fmt: skip
     add("--vehicle", choices=MANOEUVRES, metavar="NAME", help=f"{' or '.join(MANOEUVRES)} (default: both)")
-    add("--fmu", type=Path, metavar="FILE", help="FMU of that vehicle (default: built for this)")
+    add("--fmi", type=int, choices=VERSIONS, help="version of FMI (default: both)")
+    add("--fmu", type=Path, metavar="FILE", help="FMU of that vehicle and version (default: built for this)")
     add("--install", action="store_true", help="install the kits instead of running (Linux)")
     add("--list", action="store_true", help="list the importers instead of running them")
     add("--tools", type=Path, default=HERE / ".tools", metavar="FOLDER", help="where the importers are installed "
         "(default: interop/.tools)")  # fmt: skip
     options = parser.parse_args(arguments)
     try:
-        importers = chosen(options.names)
-        if options.fmu and not options.vehicle:
-            raise LookupError("--fmu goes with --vehicle")
+        versions = [options.fmi] if options.fmi else VERSIONS
+        importers = chosen(options.names, versions)
+        if options.fmu and not (options.vehicle and options.fmi):
+            raise LookupError("--fmu goes with --vehicle and --fmi")
         if options.fmu and not options.fmu.is_file():
             raise LookupError(f"{options.fmu}: there is no such file")
     except LookupError as error:
@@ -46,18 +46,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     tools, console = options.tools.resolve(), Console(highlight=False)
     if options.list:
         for importer in importers:
-            print(f"{importer.name:<14}{importer.kit:<8}{importer.title} {importer.version}, {importer.interface}")
+            row = f"{importer.name:<18}{importer.kit:<8}FMI {importer.fmi}.0  {importer.title} {importer.version}"
+            print(f"{row}, {importer.interface}")
         return 0
     if options.install:
         # All kits, whether or not one fails.
         return max([_install(kit, tools, console) for kit in dict.fromkeys(importer.kit for importer in importers)])
     outcomes = []
     with tempfile.TemporaryDirectory() as folder:
-        for vehicle in [options.vehicle] if options.vehicle else MANOEUVRES:
-            fmu = options.fmu or _built(vehicle, Path(folder))
-            for importer in importers:
-                with console.status(f"{importer.title}, {importer.interface}: {vehicle}"):
-                    outcomes.append(run(importer, fmu, tools, MANOEUVRES[vehicle]))
+        vehicles = [options.vehicle] if options.vehicle else MANOEUVRES
+        built = cache(partial(build_fmu, folder=Path(folder)))
+        for vehicle, importer in product(vehicles, importers):
+            fmu = options.fmu or built(vehicle, importer.fmi)
+            with console.status(f"{importer.title}, FMI {importer.fmi}.0, {importer.interface}: {vehicle}"):
+                outcomes.append(run(importer, fmu, tools, MANOEUVRES[vehicle]))
     _show(outcomes, console)
     # What was asked for by name must run.
     bad = {Verdict.DIFFERS, Verdict.FAILED, *([Verdict.NOT_RUN] if options.names else [])}
@@ -74,19 +76,10 @@ def _install(kit: str, tools: Path, console: Console) -> int:
     return 0
 
 
-def _built(vehicle: str, folder: Path) -> Path:
-    fmu = folder / f"{vehicle}.fmu"
-    with redirect_stdout(StringIO()):
-        code = cli.main(["build", vehicle, "--platform", "host", "-o", str(fmu)])
-    if code:
-        raise SystemExit(code)
-    return fmu
-
-
 def _show(outcomes: Sequence[Outcome], console: Console) -> None:
     """A row for each importer, a column for each vehicle; then what is to be said of one."""
     vehicles = dict.fromkeys(outcome.vehicle for outcome in outcomes)
-    table = Table("importer", "version", "FMI interface", *(Column(name, justify="right") for name in vehicles),
+    table = Table("importer", "version", "FMI", "interface", *(Column(name, justify="right") for name in vehicles),
                   title="The largest difference, 30 s, SI units", title_justify="left")  # fmt: skip
     rows: dict[Importer, list[str]] = {}
     for outcome in outcomes:
@@ -96,7 +89,7 @@ def _show(outcomes: Sequence[Outcome], console: Console) -> None:
         style = STYLES.get(outcome.verdict, "default")
         rows.setdefault(outcome.importer, []).append(f"[{style}]{shown}[/]")
     for importer, cells in rows.items():
-        table.add_row(importer.title, importer.version, importer.interface, *cells)
+        table.add_row(importer.title, importer.version, f"{importer.fmi}.0", importer.interface, *cells)
     console.print(table)
     for outcome in outcomes:
         if outcome.reason:

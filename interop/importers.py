@@ -2,9 +2,12 @@
 
 import re
 import sys
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+VERSIONS = (2, 3)
+"""Of FMI."""
 HERE = Path(__file__).parent
 RUNNERS = HERE / "runners"
 
@@ -43,6 +46,8 @@ class Importer:
     """The same of a vehicle whose thrust lags behind the commands, where it is more."""
     programs: tuple[str, ...] = ()
     """From the system, beside what its kit takes."""
+    fmi: int = 2
+    """The version of the FMU that it loads."""
 
     @property
     def version(self) -> str:
@@ -90,8 +95,22 @@ def _java(name: str, title: str, interface: str, package: str, proof: str, comma
     return Importer(name, title, interface, "java", pin, f"java/{name}/{proof}", command, tolerance)
 
 
+def _both(*importers: Importer) -> Iterator[Importer]:
+    """Each with an FMU of FMI 2.0 and of FMI 3.0."""
+    for importer in importers:
+        yield from (importer, replace(importer, name=f"{importer.name}-fmi3", fmi=3))
+
+
 def _source(name: str, *options: str) -> tuple[str, ...]:
     return ("java", *options, "-cp", f"{{tools}}/java/{name}/*", f"{{runners}}/{name}/Fly.java")
+
+
+def _rust(name: str, package: str, interface: str, tolerance: float = EXACT, late: float | None = None,
+          fmi: int = 2) -> Importer:  # fmt: skip
+    pin = f"runners/{package.replace('-', '_')}/Cargo.toml", package
+    proof = f"rust/{package}-{{version}}/debug/fly"
+    command = f"{{tools}}/{proof}", *name.removeprefix(package).split("-")[1:]
+    return Importer(name, package, interface, "rust", pin, proof, command, tolerance, late, fmi=fmi)
 
 
 _CARGO = "runners/fmu_runner/Cargo.toml"
@@ -101,23 +120,25 @@ _FMI_SIM = "rust/fmi-sim-{version}/bin/fmi-sim"
 # compile with SUNDIALS 3 only; OMSimulator's package fetches its binaries from another host as it is installed.
 # Jaxonomy's Model Exchange agrees to 4e-6, but takes minutes.
 IMPORTERS = (
-    _python("fmpy-cs", "FMPy", "CS, state restored", "fmpy"),
-    _python("fmpy-me", "FMPy", "ME, CVode", "fmpy", SOLVER),
-    _python("fmpy-compile", "FMPy", "CS, built by fmpy compile", "fmpy", programs=("cc", "c++", "make")),
+    *_both(_python("fmpy-cs", "FMPy", "CS, state restored", "fmpy"),
+           _python("fmpy-me", "FMPy", "ME, CVode", "fmpy", SOLVER),
+           _python("fmpy-compile", "FMPy", "CS, built by fmpy compile", "fmpy", programs=("cc", "c++", "make"))),
+    replace(_python("fmpy-events", "FMPy", "CS, Event Mode, steps end early", "fmpy"), fmi=3),
     _python("libcosim-cs", "libcosim", "CS", "libcosimpy"),
     _python("libcosim-ssp", "libcosim", "CS, SSP", "libcosimpy"),
     _python("libcosim-osp", "libcosim", "CS, OSP", "libcosimpy"),
-    _python("ecos-cs", "Ecos", "CS", "ecospy"),
+    *_both(_python("ecos-cs", "Ecos", "CS", "ecospy")),
     _python("ecos-ssp", "Ecos", "CS, SSP", "ecospy"),
-    _python("casadi-me", "CasADi", "ME, DaeBuilder, CVODES", "casadi", SOLVER),
-    _python("pathsim-cs", "PathSim", "CS", "pathsim-fmi"),
-    _python("pathsim-me", "PathSim", "ME, RKDP87", "pathsim-fmi", SOLVER),
+    *_both(_python("casadi-me", "CasADi", "ME, DaeBuilder, CVODES", "casadi", SOLVER),
+           _python("pathsim-cs", "PathSim", "CS", "pathsim-fmi"),
+           _python("pathsim-me", "PathSim", "ME, RKDP87", "pathsim-fmi", SOLVER)),
     _python("jaxonomy", "Jaxonomy", "CS", "jaxonomy"),
     _python("cofmupy", "CoFmuPy", "CS", "cofmupy", requirements="requirements-cofmupy.txt"),
     _python("fmugym", "FMUGym", "CS, single precision", "fmugym", SINGLE),
-    _python("fmucontainer", "fmutool", "CS, container of two ROVs", "fmu-manipulation-toolbox"),
-    replace(_python("fmutool", "fmutool", "-check: schema, rules", "fmu-manipulation-toolbox", None),
-            command=("{tools}/python/bin/fmutool", "-input", "rov.fmu", "-check")),
+    *_both(_python("fmucontainer", "fmutool", "CS, container of two ROVs", "fmu-manipulation-toolbox"),
+           replace(_python("fmutool", "fmutool", "-check: schema, rules", "fmu-manipulation-toolbox", None),
+                   command=("{tools}/python/bin/fmutool", "-input", "rov.fmu", "-check")),
+           _python("schemas", "lxml", "XML schemas", "lxml", None)),
     _java("fmi4j", "FMI4j", "CS", "fmi-import", "fmi-import-{version}.jar", _source("fmi4j")),
     _java("javafmi", "JavaFMI", "CS, state restored", "fmu-wrapper", "fmu-wrapper-{version}.jar",
           _source("javafmi", "--add-opens", "java.prefs/java.util.prefs=ALL-UNNAMED")),
@@ -126,20 +147,24 @@ IMPORTERS = (
            "{tools}/java/maestro/maestro-{version}-jar-with-dependencies.jar")),
     _java("vdmcheck", "VDMCheck", "static rules", "vdmcheck2", "vdmcheck-{version}/VDMCheck2.sh",
           ("sh", "{runners}/vdmcheck/check.sh", "{tools}/java/vdmcheck/vdmcheck-{version}"), None),
-    Importer("fmi-sim-cs", "fmi-sim", "CS", "rust", (_CARGO, "fmi-sim"), _FMI_SIM,
-             ("sh", "{runners}/fmi_sim.sh", "cs")),
-    Importer("fmi-sim-me", "fmi-sim", "ME, forward Euler", "rust", (_CARGO, "fmi-sim"), _FMI_SIM,
-             ("sh", "{runners}/fmi_sim.sh", "me"), EULER, EULER_LATE),
-    Importer("fmu-runner", "fmu-runner", "CS, state restored", "rust", (_CARGO, "fmu-runner"),
-             "rust/fmu-runner-{version}/debug/fly", ("{tools}/rust/fmu-runner-{version}/debug/fly",)),
+    *_both(Importer("fmi-sim-cs", "fmi-sim", "CS", "rust", (_CARGO, "fmi-sim"), _FMI_SIM,
+                    ("sh", "{runners}/fmi_sim.sh", "cs")),
+           Importer("fmi-sim-me", "fmi-sim", "ME, forward Euler", "rust", (_CARGO, "fmi-sim"), _FMI_SIM,
+                    ("sh", "{runners}/fmi_sim.sh", "me"), EULER, EULER_LATE)),
+    _rust("fmi-rs-cs", "fmi-rs", "CS, Event Mode", fmi=3),
+    _rust("fmi-rs-me", "fmi-rs", "ME, forward Euler", EULER, EULER_LATE, fmi=3),
+    _rust("fmu-runner", "fmu-runner", "CS, state restored"),
 )  # fmt: skip
 
 KITS = tuple(dict.fromkeys(importer.kit for importer in IMPORTERS))
 
 
-def chosen(names: list[str]) -> list[Importer]:
-    """The importers of these names or kits; all without names. Raises LookupError."""
+def chosen(names: list[str], versions: Collection[int] = VERSIONS) -> list[Importer]:
+    """The importers of these names or kits, all without names, with these versions of FMI. Raises LookupError."""
     known = {*KITS, *(importer.name for importer in IMPORTERS)}
     if unknown := [name for name in names if name not in known]:
         raise LookupError(f"{unknown[0]}: no such importer; there are {', '.join(sorted(known))}")
-    return [i for i in IMPORTERS if not names or i.name in names or i.kit in names]
+    named = [i for i in IMPORTERS if not names or i.name in names or i.kit in names]
+    if idle := set(names) - {name for i in named if i.fmi in versions for name in (i.name, i.kit)}:
+        raise LookupError(f"{min(idle)}: not with this version of FMI")
+    return [i for i in named if i.fmi in versions]

@@ -15,7 +15,7 @@ from .run import without_places
 PROGRAMS: dict[str, tuple[tuple[str, ...], str]] = {
     "python": ((), "python3-venv"),
     "java": (("java", "javac", "mvn"), "openjdk-17-jdk-headless maven"),
-    "rust": (("cargo",), "cargo libclang-dev"),
+    "rust": (("cargo",), "cargo libclang-dev; fmi-rs takes Rust 1.88"),
 }
 MAVEN = "org.apache.maven.plugins:maven-dependency-plugin:3.8.1"
 ATTEMPTS = 3
@@ -77,7 +77,7 @@ def _install_rust(importer: Importer, tools: Path) -> None:
         _call(["cargo", "install", *options, "--debug", "--locked", program, "--root", str(folder)], tools)
         return
     with tempfile.TemporaryDirectory() as name:  # Cargo.lock names the registry: it stays out of the sources
-        project = shutil.copytree(RUNNERS / "fmu_runner", Path(name) / "fmu_runner") / "Cargo.toml"
+        project = shutil.copytree((HERE / importer.pin[0]).parent, Path(name) / "fly") / "Cargo.toml"
         _call(["cargo", "build", *options, "--manifest-path", str(project), "--target-dir", str(folder)], tools)
 
 

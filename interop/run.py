@@ -11,6 +11,10 @@ from enum import Enum
 from functools import partial
 from pathlib import Path
 
+from rov_fmu.build import build
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+
 from .importers import HERE, Importer
 from .manoeuvre import Manoeuvre, ResultError
 
@@ -44,6 +48,11 @@ class Outcome:
     difference: float | None = None
     reason: str = ""
     log: str = ""
+
+
+def build_fmu(vehicle: str, fmi: int, folder: Path) -> Path:
+    """Build the FMU of a vehicle that ships, for this machine. Raises BuildError."""
+    return build(load_vehicle(SHIPPED[vehicle]), folder / f"{vehicle}{fmi}.fmu", platforms=["host"], fmi=fmi).path
 
 
 def run(importer: Importer, fmu: Path, tools: Path, manoeuvre: Manoeuvre) -> Outcome:

@@ -6,6 +6,8 @@ import sys
 from functools import partial
 from pathlib import Path
 
+from fmpy import read_model_description
+
 from interop.runners.flight import FMU, OUTPUTS, Step, fly, parameters, steps
 from interop.runners.fmpy import Slave
 
@@ -25,7 +27,9 @@ def build() -> str:
     }
     Path("pair.json").write_text(json.dumps(container, indent=2))
     tool = Path(sys.executable).with_name("fmucontainer")
-    subprocess.run([tool, "-container", "pair.json", "-no-auto-link", "-no-auto-input", "-no-auto-output"], check=True)
+    version = read_model_description(FMU).fmiVersion.partition(".")[0]
+    subprocess.run([tool, "-container", "pair.json", "-fmi", version, "-no-auto-link", "-no-auto-input",
+                    "-no-auto-output"], check=True)  # fmt: skip
     return "pair.fmu"
 
 
