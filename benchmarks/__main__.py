@@ -40,7 +40,8 @@ class Effort:
 
 _HOW = """Medians of repetitions in turn: processor time on one core, of builds and loading the time on the clock.
 A cell's second number is the error at the end of a held command against 50 digits, in SI units. Commands are held
-for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal.
+for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal, and fmi3DoStep
+fmi3SetFloat64.
 """
 _QUICK = Effort(3, 1024, 8, 1, 1000, 100, 3, all_platforms=False)
 

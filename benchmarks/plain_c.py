@@ -17,9 +17,10 @@ from rov_fmu.export.compile import PLATFORMS, compile_all, host_platform
 from rov_fmu.vehicle.vehicle import Vehicle
 
 PLATFORM = "linux64"
-# as steps.py names them: the FMU, the same with its commands set before every step, the formulas without FMI, the
-# explicit methods, CVODE's
-FMU, FMU_SET, CLOSED, EULER, RK4 = "fmu", "fmu-set", "closed", "euler", "rk4"
+# as steps.py names them: the FMU, the same with its commands set before every step, both of FMI 3.0 too, the formulas
+# without FMI, the explicit methods, CVODE's
+FMU, FMU_SET, FMU_3, FMU_3_SET = FMUS = ("fmu", "fmu-set", "fmu-3", "fmu-3-set")
+CLOSED, EULER, RK4 = "closed", "euler", "rk4"
 BDF, ADAMS, FIXED_POINT = CVODE = ("bdf", "adams", "adams-fixed")
 _SOURCES = Path(__file__).with_name("c")
 # a library needs but a part of the FMU's sources; what replaces mallinfo came after the GLIBC that is linked here
@@ -39,25 +40,30 @@ def measurable() -> bool:
 
 
 class PlainC:
-    """The FMU's shared library, and beside it the methods and what times them all, in a folder of their own."""
+    """The FMU's shared library in both versions of FMI, and beside it the methods and what times them all, in a folder
+    of their own."""
 
     def __init__(self, vehicle: Vehicle, folder: Path) -> None:
-        content = native_content(vehicle)
+        content = {fmi: native_content(vehicle, fmi=fmi) for fmi in (2, 3)}
         self._states = len(vehicle.layout.state)
-        fmu = folder / f"{content.identifier}{PLATFORMS[PLATFORM].suffix}"
-        fmu.write_bytes(compile_all([PLATFORM], content.sources, content.identifier)[PLATFORM])
 
-        def load(name: str, *flags: str) -> Any:
-            output = folder / f"{name}.so"
-            return ctypes.CDLL(str(compile_c(_SOURCES / f"{name}.c", output, content.sources, *_FLAGS, *flags)))
+        def load(name: str, fmi: int, *flags: str) -> Any:
+            output, sources = folder / f"{name}-{fmi}.so", content[fmi].sources
+            return ctypes.CDLL(str(compile_c(_SOURCES / f"{name}.c", output, sources, *_FLAGS, *flags)))
 
-        self._explicit, self._measure = load("explicit", *_FASTEST), load("measure", "-ldl", *_SUNDIALS)
-        m = self._measure
-        m.hold.argtypes = (c_void_p, c_void_p, c_void_p, c_int, c_double, c_long, c_long, c_long, _REALS, _REALS)
-        m.step_in_turn.argtypes = (c_size_t, c_size_t, POINTER(c_double))
-        m.run_each.argtypes = (c_size_t, _REFERENCES, c_size_t, _REALS, _REALS, _REALS)
-        m.hold.restype = m.step_in_turn.restype = m.run_each.restype = c_double
-        m.begin(str(fmu).encode())
+        def measure(fmi: int) -> Any:
+            fmu = folder / f"{vehicle.identifier}-{fmi}{PLATFORMS[PLATFORM].suffix}"
+            fmu.write_bytes(compile_all([PLATFORM], content[fmi].sources, vehicle.identifier)[PLATFORM])
+            m = load("measure", fmi, "-ldl", *_SUNDIALS)
+            m.hold.argtypes = (c_void_p, c_void_p, c_void_p, c_int, c_double, c_long, c_long, c_long, _REALS, _REALS)
+            m.step_in_turn.argtypes = (c_size_t, c_size_t, POINTER(c_double))
+            m.run_each.argtypes = (c_size_t, _REFERENCES, c_size_t, _REALS, _REALS, _REALS)
+            m.hold.restype = m.step_in_turn.restype = m.run_each.restype = c_double
+            m.begin(str(fmu).encode())
+            return m
+
+        self._explicit = load("explicit", 2, *_FASTEST)
+        self._measure, self._measure_3 = measure(2), measure(3)
         self._solver = cache(self._new_solver)
 
     def _new_solver(self, states: int, method: str, tolerance: float) -> tuple[Any, Any]:
@@ -96,11 +102,12 @@ class PlainC:
         function, solver, end = None, (None, None), start.copy()
         if method in CVODE:
             solver = self._solver(states, method, setting)
-        elif method not in (FMU, FMU_SET):
+        elif method not in FMUS:
             library = self._measure if method == CLOSED else self._explicit
             function = ctypes.cast(getattr(library, f"{method}_{self._which(states)}"), c_void_p)
-        substeps = 0 if method == FMU_SET else 1 if method in CVODE else round(setting)
-        each = self._measure.hold(function, *solver, states, h, substeps, steps, len(commands), commands, end)
+        substeps = 0 if method in (FMU_SET, FMU_3_SET) else 1 if method in CVODE else round(setting)
+        measure = self._measure_3 if method in (FMU_3, FMU_3_SET) else self._measure
+        each = measure.hold(function, *solver, states, h, substeps, steps, len(commands), commands, end)
         return 1e-9 * each, end
 
     def step_in_turn(self, instances: int, steps: int) -> tuple[float, float]:

@@ -7,14 +7,18 @@ import numpy as np
 from .fleet import INSTANCES, Runs
 from .importer import INTERVAL, NATIVE, STOP
 from .page import Section, digits, duration, error
-from .plain_c import BDF, CLOSED, CVODE, EULER, FMU, FMU_SET, RK4, Reals
+from .plain_c import BDF, CLOSED, CVODE, EULER, FMU, FMU_3, FMU_3_SET, FMU_SET, RK4, Reals
 from .steps import KINDS, NAMES, SUBSTEP, TARGET, H, HeavyPlan, Job, Measured, Plan, compared, methods
 
 _STEPS = [f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H]
 _OURS = {FMU: "ours, fmi2DoStep", CLOSED: "ours, without FMI"}
-_SET = {FMU_SET: "ours, fmi2SetReal and fmi2DoStep"}
+_MORE = {
+    FMU_SET: "ours, fmi2SetReal and fmi2DoStep",
+    FMU_3: "ours, fmi3DoStep",
+    FMU_3_SET: "ours, fmi3SetFloat64 and fmi3DoStep",
+}
 _SUBSTEPS = f"sub-steps ≤ {1000 * SUBSTEP:g} ms"
-_NAMES = {**_SET, **_OURS, RK4: f"RK4, {_SUBSTEPS}", EULER: f"forward Euler, {_SUBSTEPS}"}
+_NAMES = {**_MORE, **_OURS, RK4: f"RK4, {_SUBSTEPS}", EULER: f"forward Euler, {_SUBSTEPS}"}
 
 
 def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
@@ -122,6 +126,7 @@ def promises(plan: Plan, measured: Measured, heavier: HeavyPlan, measured_heavy:
     turning_back = _spread(measured, [plan.job(CLOSED, 7, h, straight=True) for h in H])
     fmu, bare = (measured.seconds[plan.job(method, 7, SUBSTEP, straight=True)] for method in (FMU, CLOSED))
     layer = max(0.0, float(np.median(fmu - bare)))
+    versions = {h: _ratio(measured, plan.job(FMU_3_SET, 7, h), plan.job(FMU_SET, 7, h)) for h in H}
     per = f"at {error(TARGET)} a command of 1 s"
     steps = [(f"{'straight' if straight else 'turning'} step of all states to one of RK4, {1000 * h:g} ms", found)
              for (h, straight), found in to_rk4.items()]  # fmt: skip
@@ -138,6 +143,10 @@ def promises(plan: Plan, measured: Measured, heavier: HeavyPlan, measured_heavy:
         ("dearest to cheapest step, 1 ms to 100 s, ahead", digits(spread), "≤ 1.5", spread <= 1.5),
         ("the same, straight but turning back", digits(turning_back), "≤ 1.5", turning_back <= 1.5),
         ("what FMI adds to a step of 10 ms", duration(layer), "≤ 20 ns", layer <= 20e-9),
+        *(
+            (f"turning, set and step, FMI 3.0 to FMI 2.0, {step}", digits(found), "≤ 1.05", found <= 1.05)
+            for step, found in zip(_STEPS, versions.values(), strict=True)
+        ),
     ]
     rows = [(what, found, promised, "kept" if kept else "NOT KEPT") for what, found, promised, kept in made]
     return [("Promised", "measured", "promised", ""), *rows]

@@ -9,7 +9,7 @@ import numpy as np
 
 from rov_fmu.motion.rov import Rov
 
-from .plain_c import ADAMS, BDF, CLOSED, CVODE, EULER, FIXED_POINT, FMU, FMU_SET, RK4, PlainC, Reals
+from .plain_c import ADAMS, BDF, CLOSED, CVODE, EULER, FIXED_POINT, FMU, FMUS, RK4, PlainC, Reals
 from .work import Work
 
 TARGET = 1e-9
@@ -21,7 +21,7 @@ TOLERANCES = (1e-6, 1e-9)
 KINDS = ((3, False), (7, False), (7, True))
 """States, and whether straight, of the table."""
 NAMES = {RK4: "RK4", BDF: "CVODE BDF", ADAMS: "CVODE Adams, Newton", FIXED_POINT: "CVODE Adams"}
-_METHODS = [*((method, 0.0) for method in (FMU_SET, FMU, CLOSED, RK4, EULER)),
+_METHODS = [*((method, 0.0) for method in (*FMUS, CLOSED, RK4, EULER)),
             *((method, tolerance) for method in (BDF, FIXED_POINT) for tolerance in TOLERANCES)]  # fmt: skip
 _SWEEP = {
     EULER: [10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5],
@@ -35,7 +35,7 @@ _PASS = 4e-3
 
 def methods(states: int) -> list[tuple[str, float]]:
     """Of the table, with the solvers' tolerances. The FMU steps all states."""
-    return _METHODS[2 * (states == 3) :]
+    return _METHODS[len(FMUS) * (states == 3) :]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu.export.interface import LOG_CATEGORIES
+from rov_fmu.export.terminals import terminals
 from rov_fmu.motion.layout import AXES
 from rov_fmu.pages.templates import number
 from rov_fmu.vehicle.json_schema import json_schema
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 Table = list[tuple[str, ...]]
 PAGES = [Path(__file__).with_name(name) for name in ("vehicle-file.md", "variables.md")]
@@ -24,7 +27,7 @@ def tables() -> dict[str, Table]:
     named = {"vehicle": "FileHead", "provenance": "Made"} | {f"axis_{name}": f"_{name.capitalize()}" for name in AXES}
     named |= {name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster")}
     categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
-    found: dict[str, Table] = {"log_categories": categories, "file": _table(schema, schema)}
+    found = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
     return found | {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
 
 
@@ -41,6 +44,21 @@ def filled(page: str) -> str:
         return f"{match[1]}\n\n{markdown(found[match[2]])}\n\n"
 
     return re.sub(r"(<!-- table: (\w+) -->)\n.*?(?=<!-- end -->)", text, page, flags=re.DOTALL)
+
+
+def _terminals() -> Table:
+    """A row a terminal of the VideoRay, which has them all."""
+    rows = [
+        (
+            f"`{terminal.name}`",
+            terminal.causality,
+            terminal.rule,
+            terminal.description,
+            ", ".join(f"`{name}`" for name in terminal.members),
+        )
+        for terminal in terminals(load_vehicle(VIDEORAY).layout)
+    ]
+    return [("terminal", "of", "matching", "what", "members in the VideoRay"), ("---",) * 5, *rows]
 
 
 def _table(table: dict[str, Any], schema: dict[str, Any]) -> Table:

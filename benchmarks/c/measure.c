@@ -10,11 +10,11 @@
 enum { HELD = 10 };
 
 /* All value references; the commands come first. */
-static fmi2ValueReference reference[N_VARIABLES];
-static const fmi2ValueReference *const COMMANDS = reference, *const STATES = reference + FIRST_STATE;
+static unsigned reference[N_VARIABLES];
+static const unsigned *const COMMANDS = reference, *const STATES = reference + FIRST_STATE;
 static motion m;
-static fmi2Component rov;
-static const fmi2CallbackFunctions CALLBACKS;
+static fmu_instance rov;
+static const fmu_host CALLBACKS;
 
 static double nanoseconds(void)
 {
@@ -24,9 +24,9 @@ static double nanoseconds(void)
 }
 
 /* From the beginning, with n values set. */
-static void start_instance(fmi2Component c, const fmi2ValueReference vr[], size_t n, const double values[])
+static void start_instance(fmu_instance c, const unsigned vr[], size_t n, const double values[])
 {
-    CHECK(fmi2.Reset(c) == fmi2OK && fmi2.SetReal(c, vr, n, values) == fmi2OK);
+    CHECK(API.Reset(c) == 0 && set_values(c, vr, n, values));
     initialize(c);
 }
 
@@ -35,7 +35,7 @@ void begin(const char *path)
 {
     for (int i = 0; i < N_VARIABLES; i++) {
         m.at[i] = VARIABLES[i].start;
-        reference[i] = (fmi2ValueReference)i;
+        reference[i] = (unsigned)i;
     }
     rov_prepare(m.at, &m.gains);
     load_fmu(path);
@@ -125,14 +125,14 @@ double hold(advance *method, handle solver, handle y, int states, double h, long
         } else {
             double t = 0.0;
             for (long step = 0; step < steps; step++, t += h) {
-                CHECK((step > 0 && substeps > 0) || fmi2.SetReal(rov, COMMANDS, N_COMMANDS, command[i]) == fmi2OK);
-                CHECK(fmi2.DoStep(rov, t, h, fmi2True) == fmi2OK);
+                CHECK((step > 0 && substeps > 0) || set_values(rov, COMMANDS, N_COMMANDS, command[i]));
+                CHECK(do_step(rov, t, h));
             }
         }
     }
     const double each = (nanoseconds() - start) / (double)(n * steps);
     if (in_fmu) {
-        CHECK(fmi2.GetReal(rov, STATES, N_STATES, s) == fmi2OK);
+        CHECK(get_values(rov, STATES, N_STATES, s));
     }
     free(held);
     return each;
@@ -148,7 +148,7 @@ double step_in_turn(size_t n, size_t rounds, double *bytes)
     for (int i = 0; i < N_COMMANDS; i++) {
         commands[i] = 0.5;
     }
-    fmi2Component *const c = malloc(n * sizeof *c);
+    fmu_instance *const c = malloc(n * sizeof *c);
     CHECK(c != NULL);
     const int before = mallinfo().uordblks; /* in use on the heap */
     for (size_t i = 0; i < n; i++) {
@@ -162,29 +162,28 @@ double step_in_turn(size_t n, size_t rounds, double *bytes)
     const double start = nanoseconds();
     for (size_t round = 0; round < rounds; round++, t += h) {
         for (size_t i = 0; i < n; i++) {
-            CHECK(fmi2.DoStep(c[i], t, h, fmi2True) == fmi2OK);
+            CHECK(do_step(c[i], t, h));
         }
     }
     const double each = (nanoseconds() - start) / (double)(rounds * n);
     for (size_t i = 0; i < n; i++) {
-        fmi2.FreeInstance(c[i]);
+        API.FreeInstance(c[i]);
     }
     free(c);
     return each;
 }
 
 /* Runs of ten commands of 10 s, each with n values set at its start: nanoseconds, and where each ends. */
-double run_each(size_t runs, const fmi2ValueReference vr[], size_t n, const double *values,
+double run_each(size_t runs, const unsigned vr[], size_t n, const double *values,
                 const double command[HELD][N_COMMANDS], double end[][N_STATES])
 {
     const double start = nanoseconds();
     for (size_t i = 0; i < runs; i++) {
         start_instance(rov, vr, n, values + i * n);
         for (int k = 0; k < HELD; k++) {
-            CHECK(fmi2.SetReal(rov, COMMANDS, N_COMMANDS, command[k]) == fmi2OK
-                  && fmi2.DoStep(rov, 10.0 * k, 10.0, fmi2True) == fmi2OK);
+            CHECK(set_values(rov, COMMANDS, N_COMMANDS, command[k]) && do_step(rov, 10.0 * k, 10.0));
         }
-        CHECK(fmi2.GetReal(rov, STATES, N_STATES, end[i]) == fmi2OK);
+        CHECK(get_values(rov, STATES, N_STATES, end[i]));
     }
     return nanoseconds() - start;
 }
