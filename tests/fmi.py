@@ -164,8 +164,8 @@ class Fmu(ABC):
         return token.encode()
 
     @abstractmethod
-    def instance(self, kind: int = CO_SIMULATION, name: str = "rov", logging: bool = False) -> "AnyInstance":
-        """A new instance with a recorded log."""
+    def instance(self, kind: int = CO_SIMULATION, name: str = "rov", logging: bool | None = None) -> "AnyInstance":
+        """A new instance with a recorded log; without `logging` of what is no mere event."""
 
     def unload(self) -> None:
         fmpy.freeLibrary(self.dll._handle)

@@ -67,7 +67,7 @@ class Fmu(fmi.Fmu):
         self.dll.fmi2FreeInstance.restype = None
         self.dll.fmi2GetVersion.restype = self.dll.fmi2GetTypesPlatform.restype = c_char_p
 
-    def instance(self, kind: int = CO_SIMULATION, name: str = "rov", logging: bool = False) -> "Instance":
+    def instance(self, kind: int = CO_SIMULATION, name: str = "rov", logging: bool | None = None) -> "Instance":
         return Instance(self, kind, name, logging)
 
 
@@ -83,11 +83,11 @@ def recording_callbacks(log: list[Message]) -> Any:
 
 
 class Instance(fmi.Instance[Fmu]):
-    def __init__(self, fmu: Fmu, kind: int, name: str, logging: bool) -> None:
+    def __init__(self, fmu: Fmu, kind: int, name: str, logging: bool | None) -> None:
         super().__init__(fmu, kind)
         self._callbacks = recording_callbacks(self.log)
         self.component = fmu.dll.fmi2Instantiate(
-            name.encode(), kind, fmu.token, None, ctypes.byref(self._callbacks), 0, logging
+            name.encode(), kind, fmu.token, None, ctypes.byref(self._callbacks), 0, bool(logging)
         )
         assert self.component, self.log
 

@@ -46,6 +46,7 @@ from tests.fmi import (
     Signatures,
     reals,
     room,
+    strings,
 )
 
 MODES = {**fmi.MODES, WITH_EVENTS: (INSTANTIATED, INITIALIZATION, EVENT, STEP, TERMINATED, FAILED)}
@@ -167,7 +168,7 @@ class Fmu(fmi.Fmu):
         self,
         kind: int = CO_SIMULATION,
         name: str = "rov",
-        logging: bool = False,
+        logging: bool | None = None,
         on_update: OnUpdate | None = None,
         intermediate: Sequence[str] = (),
         early: bool = False,
@@ -188,8 +189,8 @@ class Instance(fmi.Instance[Fmu]):
     """`on_update` is called in intermediate update, where variables are registered for it or a step may end early."""
 
     def __init__(
-        self, fmu: Fmu, kind: int, name: str, logging: bool, on_update: OnUpdate | None, intermediate: Sequence[str],
-        early: bool
+        self, fmu: Fmu, kind: int, name: str, logging: bool | None, on_update: OnUpdate | None,
+        intermediate: Sequence[str], early: bool
     ) -> None:  # fmt: skip
         super().__init__(fmu, kind)
         self.stepped: Stepped | None = None
@@ -197,7 +198,7 @@ class Instance(fmi.Instance[Fmu]):
         self._raised: BaseException | None = None
         self._log = recorder(self.log)
         self._update = fmi3IntermediateUpdateCallback(self._inside)
-        arguments: tuple[Any, ...] = (name.encode(), fmu.token, None, False, logging)
+        arguments: tuple[Any, ...] = (name.encode(), fmu.token, None, False, logging is not False)
         if kind == MODEL_EXCHANGE:
             self.component = fmu.dll.fmi3InstantiateModelExchange(*arguments, None, self._log)
         else:
@@ -205,6 +206,8 @@ class Instance(fmi.Instance[Fmu]):
             arguments = (*arguments, kind == WITH_EVENTS, early, vr, len(vr), None, self._log, self._update)
             self.component = fmu.dll.fmi3InstantiateCoSimulation(*arguments)
         assert self.component, self.log
+        if logging is None:
+            self.expect("SetDebugLogging", False, 1, strings(b"logEvents"))
 
     def _inside(self, _: int, time: float, *told: Any) -> None:
         *booleans, early, wanted = told

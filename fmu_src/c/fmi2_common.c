@@ -20,9 +20,8 @@ FMI2_Export fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuT
         return NULL;
     }
     if (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation) {
-        emit(functions, instanceName == NULL ? "" : instanceName, "fmi2Instantiate", REFUSED, logStatusError,
-             "fmuType = %d is neither fmi2ModelExchange nor fmi2CoSimulation.", (int)fmuType);
-        return NULL;
+        REJECT(functions, instanceName == NULL ? "" : instanceName, "fmi2Instantiate", loggingOn,
+               "fmuType = %d is neither fmi2ModelExchange nor fmi2CoSimulation.", (int)fmuType);
     }
     return instantiate("fmi2Instantiate", functions, instanceName, fmuGUID, (interface_type)fmuType,
                        loggingOn != fmi2False);

@@ -17,7 +17,12 @@
 
 #define TOKEN_NAME "GUID"
 #define REAL "Real"
-enum { HAS_TIME = 0, EVENTS_SET_STATES = 0, LOG_IS_FORMAT = 1 };
+enum {
+    HAS_TIME = 0,
+    EVENTS_SET_STATES = 0,
+    LOG_IS_FORMAT = 1,
+    TROUBLE_IS_TOLD = 1 /* whatever loggingOn says: it is of debug logging (section 2.1.5) */
+};
 
 typedef fmi2CallbackFunctions host;
 

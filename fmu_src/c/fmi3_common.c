@@ -39,9 +39,8 @@ FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fm
     (void)visible;
     for (size_t i = 0; i < nRequiredIntermediateVariables; i++) {
         if (requiredIntermediateVariables == NULL || requiredIntermediateVariables[i] > TIME) {
-            emit(&of, instanceName, function, REFUSED, logStatusError,
-                 "requiredIntermediateVariables is NULL or has a value reference of no variable.");
-            return NULL;
+            REJECT(&of, instanceName, function, loggingOn,
+                   "requiredIntermediateVariables is NULL or has a value reference of no variable.");
         }
     }
     return instantiate(function, &of, instanceName, instantiationToken, CO_SIMULATION, loggingOn);
@@ -60,13 +59,10 @@ FMI3_Export fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceNa
     (void)instantiationToken;
     (void)resourcePath;
     (void)visible;
-    (void)loggingOn;
     (void)clockUpdate;
     (void)lockPreemption;
     (void)unlockPreemption;
-    emit(&of, instanceName, "fmi3InstantiateScheduledExecution", REFUSED, logStatusError,
-         "this FMU has no Scheduled Execution.");
-    return NULL;
+    REJECT(&of, instanceName, "fmi3InstantiateScheduledExecution", loggingOn, "this FMU has no Scheduled Execution.");
 }
 
 FMI3_Export void fmi3FreeInstance(fmi3Instance instance)

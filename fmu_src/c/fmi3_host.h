@@ -9,7 +9,12 @@
 
 #define TOKEN_NAME "instantiation token"
 #define REAL "Float64"
-enum { HAS_TIME = 1, EVENTS_SET_STATES = 1 /* (section 2.3.5) */, LOG_IS_FORMAT = 0 };
+enum {
+    HAS_TIME = 1,
+    EVENTS_SET_STATES = 1, /* (section 2.3.5) */
+    LOG_IS_FORMAT = 0,
+    TROUBLE_IS_TOLD = 0 /* without loggingOn nothing is (section 2.3.1) */
+};
 
 typedef struct {
     fmi3InstanceEnvironment environment;

@@ -27,14 +27,17 @@ static void start(fmu *f)
     }
     memset(f->warned, 0, sizeof f->warned);
     for (int i = 0; i < N_LOG_CATEGORIES; i++) {
-        f->log_enabled[i] = i != logEvents || f->logging_on;
+        f->log_enabled[i] = f->logging_on || (TROUBLE_IS_TOLD && i != logEvents);
     }
     rov_prepare(f->now.values, &f->gains);
 }
 
-#define REJECT(...)                                                                  \
+/* Makes no instance, and says why. */
+#define REJECT(of, name, function, logging_on, ...)                                  \
     do {                                                                             \
-        emit(of, shown, function, REFUSED, logStatusError, __VA_ARGS__);             \
+        if (TROUBLE_IS_TOLD || (logging_on)) {                                       \
+            emit(of, name, function, REFUSED, logStatusError, __VA_ARGS__);          \
+        }                                                                            \
         return NULL;                                                                 \
     } while (0)
 
@@ -44,14 +47,15 @@ static fmu *instantiate(const char *function, const host *of, const char *name, 
 {
     const char *const shown = name == NULL ? "" : name;
     if (shown[strspn(shown, " \t\r\n\f\v")] == '\0') {
-        REJECT("the instance name is missing or blank.");
+        REJECT(of, shown, function, logging_on, "the instance name is missing or blank.");
     }
     if (token == NULL || strcmp(token, MODEL_TOKEN) != 0) {
-        REJECT("the " TOKEN_NAME " %s is not that of this binary, %s.", token == NULL ? "NULL" : token, MODEL_TOKEN);
+        REJECT(of, shown, function, logging_on, "the " TOKEN_NAME " %s is not that of this binary, %s.",
+               token == NULL ? "NULL" : token, MODEL_TOKEN);
     }
     fmu *const f = (fmu *)calloc(1, sizeof *f + strlen(shown) + 1);
     if (f == NULL) {
-        REJECT("out of memory.");
+        REJECT(of, shown, function, logging_on, "out of memory.");
     }
     strcpy(f->name, shown);
     memcpy(&f->host, of, sizeof f->host); /* its members are const in the headers of FMI 2.0.0 */

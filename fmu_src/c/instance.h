@@ -1,7 +1,8 @@
 /* An instance of the FMU, and what every FMI function begins with, in every version of FMI.
  *
  * A call that is refused (illegal in the mode, bad argument, value out of bounds) changes nothing. Only a step whose
- * result overflows puts the instance into error mode, with the state from before the step. */
+ * result overflows puts the instance into error mode: with the state from before it, or, of a step in pieces, from the
+ * end of the last piece. */
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>

@@ -87,10 +87,11 @@ NO_LOGGER, NO_UPDATE = fmi3LogMessageCallback(), fmi3IntermediateUpdateCallback(
 
 
 def instantiate(
-    fmu3: fmi3.Fmu, name: bytes | None, token: bytes | None, logger: Any, references: Any = None, n: int = 0
-) -> Any:
+    fmu3: fmi3.Fmu, name: bytes | None, token: bytes | None, logger: Any, references: Any = None, n: int = 0,
+    logging: bool = True
+) -> Any:  # fmt: skip
     """Of Co-Simulation, without intermediate update."""
-    arguments = (name, token, None, False, False, False, False, references, n, None, logger, NO_UPDATE)
+    arguments = (name, token, None, False, logging, False, False, references, n, None, logger, NO_UPDATE)
     return fmu3.dll.fmi3InstantiateCoSimulation(*arguments)
 
 
@@ -113,10 +114,11 @@ def test_of_fmi_3_a_bad_instantiation_gives_no_instance(
         logger = fmi3.recorder(log)
         if function == "fmi3InstantiateCoSimulation":
             assert instantiate(fmu3, name, given, logger) is None
+            assert instantiate(fmu3, name, given, logger, logging=False) is None
             assert instantiate(fmu3, name, given, NO_LOGGER) is None
         else:
-            assert fmu3.dll.fmi3InstantiateModelExchange(name, given, None, False, False, None, logger) is None
-            assert fmu3.dll.fmi3InstantiateModelExchange(name, given, None, False, False, None, NO_LOGGER) is None
+            for logging, to in [(True, logger), (False, logger), (True, NO_LOGGER)]:
+                assert fmu3.dll.fmi3InstantiateModelExchange(name, given, None, False, logging, None, to) is None
         (message,) = log
         assert (message.status, message.category) == (ERROR, "logStatusError")
         assert message.text.startswith(f"{function}: ")
@@ -129,6 +131,7 @@ def test_variables_of_intermediate_update_are_those_of_the_fmu(fmu3: fmi3.Fmu) -
     for vr, size in [(references(0, n), 2), (None, 1)]:
         log: list[Message] = []
         assert instantiate(fmu3, b"rov", fmu3.token, fmi3.recorder(log), vr, size) is None
+        assert instantiate(fmu3, b"rov", fmu3.token, fmi3.recorder(log), vr, size, logging=False) is None
         (message,) = log
         assert "requiredIntermediateVariables" in message.text
 
@@ -148,8 +151,9 @@ def test_intermediate_variables_without_a_callback_are_those_of_some_importers(f
 def test_there_is_no_scheduled_execution(fmu3: fmi3.Fmu) -> None:
     log: list[Message] = []
     logger = fmi3.recorder(log)
-    arguments = (b"rov", fmu3.token, None, False, False, None, logger, None, None, None)
-    assert fmu3.dll.fmi3InstantiateScheduledExecution(*arguments) is None
+    for logging in (False, True):
+        arguments = (b"rov", fmu3.token, None, False, logging, None, logger, None, None, None)
+        assert fmu3.dll.fmi3InstantiateScheduledExecution(*arguments) is None
     (message,) = log
     assert (message.status, message.text) == (
         ERROR,
