@@ -5,6 +5,7 @@ import tempfile
 import time
 from base64 import b64encode
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from itertools import product
 from os import cpu_count
@@ -69,8 +70,11 @@ def _command(
         corpus = Path(name) / "corpus"
         pairs = product([chosen] if chosen else VEHICLES, [int(fmi)] if fmi else (2, 3))
         targets = {(vehicle, version): Path(name) / f"{vehicle}{version}" for vehicle, version in pairs}
-        for (vehicle, version), target in targets.items():
-            build_target(native_content(load_vehicle(VEHICLES[vehicle]), fmi=version).sources, target, version)
+        sources = {
+            (vehicle, fmi): native_content(load_vehicle(VEHICLES[vehicle]), fmi=fmi).sources for vehicle, fmi in targets
+        }
+        with ThreadPoolExecutor(jobs) as pool:  # each waits for a compiler
+            list(pool.map(build_target, sources.values(), targets.values(), [version for _, version in targets]))
         unpack_corpus(corpus)
         limit, share = seconds or (None if calls else _ROUND), len(targets)
         for (vehicle, version), target in targets.items():
