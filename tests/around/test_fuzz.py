@@ -68,7 +68,7 @@ PLANTED = {
         "instance.c",
         "return reference < N_VARIABLES ? &f->now.values[reference]",
         "return reference < N_VARIABLES + 2 ? &f->now.values[reference]",
-        "runtime error: index 4[67] out of bounds|GetReal: illegal",
+        "heap-buffer-overflow|GetReal: illegal",
     ),
     "a call is legal in a mode too many": (
         "instance.h",
