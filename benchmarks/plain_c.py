@@ -24,7 +24,7 @@ CLOSED, EULER, RK4 = "closed", "euler", "rk4"
 BDF, ADAMS, FIXED_POINT = CVODE = ("bdf", "adams", "adams-fixed")
 _SOURCES = Path(__file__).with_name("c")
 # a library needs but a part of the FMU's sources; what replaces mallinfo came after the GLIBC that is linked here
-_FLAGS = ("-target", *PLATFORMS[PLATFORM].targets, "-shared", "-g0", "-fno-asynchronous-unwind-tables", "-Wshadow",
+_FLAGS = ("-target", PLATFORMS[PLATFORM].target, "-shared", "-g0", "-fno-asynchronous-unwind-tables", "-Wshadow",
           "-Wno-unused-function", "-Wno-deprecated-declarations")  # fmt: skip
 # The explicit methods with what is best for them: packed into pairs, RK4 of three axes takes a third longer.
 _FASTEST = ("-O3", "-fno-slp-vectorize")

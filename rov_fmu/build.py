@@ -66,7 +66,7 @@ def build(
         description = osp_model_description(vehicle.layout)
         beside = [Output(osp_path(output, vehicle.identifier), description)]
     check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
-    chosen = chosen_platforms(platforms) if native else []
+    chosen = chosen_platforms(platforms, fmi) if native else []
     pages = {**documentation(vehicle, native=native, fmi=fmi), **reference_results(vehicle)}
     content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
     start = perf_counter()
@@ -76,40 +76,47 @@ def build(
         seconds[name] = perf_counter() - start
         on_compiled(name)
 
-    binaries = compile_all(chosen, content.sources, content.identifier, done)
-    folders = {name: name if fmi == 2 else PLATFORMS[name].folder for name in binaries}
+    binaries = compile_all(chosen, content.sources, content.identifier, done, fmi)
     libraries = {
-        f"binaries/{folders[name]}/{content.identifier}{PLATFORMS[name].suffix}": b for name, b in binaries.items()
+        f"binaries/{_folder(name, fmi)}/{content.identifier}{PLATFORMS[name].suffix}": library
+        for name, library in binaries.items()
     }
     packed = archive({**content.files, **libraries})
     notes: list[str] = []
-    draft = Output(output, packed, lambda path: notes.append(_check(path, vehicle, chosen if native else None)))
+    draft = Output(output, packed, lambda path: notes.append(_check(path, vehicle, chosen if native else None, fmi)))
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
     return Built(output, len(packed), content.guid, sizes, seconds, notes[0], [other.path for other in beside])
 
 
-def chosen_platforms(names: Sequence[str] | None) -> list[str]:
-    """Platforms by name, `host` resolved; all where none is named. Raises BuildError."""
+def chosen_platforms(names: Sequence[str] | None, fmi: int = 2) -> list[str]:
+    """Platforms by name, `host` resolved for this version of FMI; all where none is named. Raises BuildError."""
     if not names:
         return list(PLATFORMS)
     if unknown := set(names) - {"host", *PLATFORMS}:
         raise BuildError(f"there is no platform {', '.join(sorted(unknown))}, only host, {', '.join(PLATFORMS)}")
-    host = host_platform()
+    host = host_platform(fmi)
     if "host" in names and host is None:
         raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")
     return list(dict.fromkeys(host if name == "host" and host else name for name in names))
 
 
-def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None) -> str:
+def _folder(name: str, fmi: int) -> str:
+    """Of binaries/."""
+    return name if fmi == 2 else PLATFORMS[name].folder
+
+
+def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: int) -> str:
     """Validate and run an FMU; what to tell. Raises BuildError."""
     import fmpy
     from fmpy.validation import validate_fmu
 
     if problems := validate_fmu(str(path)):
         raise BuildError(f"the FMU is not valid: {problems[0]}")
-    host = host_platform()
-    if platforms is not None and (host not in platforms or host != fmpy.platform):
+    loaded = fmpy.platform if fmi == 2 else fmpy.platform_tuple
+    # FMPy runs nothing without a binary for a platform that it knows, even where it loads another one
+    known = fmpy.platform in fmpy.supported_platforms(str(path))
+    if platforms is not None and not (known and loaded in [_folder(name, fmi) for name in platforms]):
         return "valid; not run, for it has no binary that FMPy loads on this machine"
     with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
         fmpy.extract(str(path), unzipdir=folder)

@@ -97,7 +97,7 @@ def _build(vehicle: Path, output: Path | None, backend: str, fmi: int, platforms
 
     started = perf_counter()
     loaded = load_vehicle(vehicle)
-    chosen = chosen_platforms(platforms) if backend == "native" else []
+    chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
     with _progress(chosen) as done:
         built = build(
             loaded, output, platforms=chosen, backend=backend, fmi=fmi, osp=osp, inputs=[vehicle], on_compiled=done

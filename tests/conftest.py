@@ -65,7 +65,7 @@ def videoray3_dir(videoray3_fmu: Path) -> Path:
 def unzipped(vehicle: Path, folder: Path, fmi: int = 2) -> Path:
     """The folder of the FMU of a vehicle, without its page."""
     content = native_content(load_vehicle(vehicle), fmi=fmi)
-    (library,) = compile_all(chosen_platforms(["host"]), content.sources, content.identifier).values()
+    (library,) = compile_all(chosen_platforms(["host"], fmi), content.sources, content.identifier, fmi=fmi).values()
     host = fmpy.platform if fmi == 2 else fmpy.platform_tuple
     binary = f"binaries/{host}/{content.identifier}{fmpy.sharedLibraryExtension}"
     for name, data in {**content.files, binary: library}.items():

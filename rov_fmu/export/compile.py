@@ -36,43 +36,48 @@ class OptionError(BuildError):
 
 @dataclass(frozen=True)
 class Platform:
-    """A folder of binaries/ and what the compiler is asked for.
-
-    Several targets are joined into one universal file.
-    """
+    """A folder of binaries/ and what the compiler is asked for."""
 
     folder: str
-    """In FMI 3.0 (section 2.5.1.4.1); in FMI 2.0 (section 2.3) it is the platform's name."""
+    """Its folder in FMI 3.0 (section 2.5.1.4.1); in FMI 2.0 (section 2.3) that is the platform's name."""
     suffix: str
-    targets: tuple[str, ...]
-    flags: tuple[str, ...] = ()
+    target: str
+    flags: Sequence[str] = ()
+    also: str | None = None
+    """A target that is joined to it in FMI 2.0, to one universal file."""
+
+    def targets(self, fmi: int) -> list[str]:
+        """What the file in an archive of this version is made of."""
+        return [self.target, *([self.also] if self.also and fmi == 2 else [])]
 
 
 # GLIBC 2.17 is that of CentOS 7 (2012); 4 KiB pages in the file keep it small.
 _LINUX = ("-lm", "-Wl,-z,max-page-size=4096", "-Wl,-z,common-page-size=4096")
+_APPLE_SILICON = "aarch64-macos.11.0"
 
-# FMPy and FMILibrary load darwin64 on Apple Silicon too, hence both processors in one file; the standard has a folder
-# of its own for it (2.3). No importer known looks for x86_64-linux, -windows or -darwin in an FMI 2.0 archive.
+# In FMI 2.0, FMPy and FMILibrary load darwin64 on Apple Silicon too, hence both processors in one file; the standard
+# has a folder of its own for it (2.3). No importer known looks for x86_64-linux, -windows or -darwin there. In FMI 3.0
+# FMPy, FMILibrary since 3.0.2, CasADi and the Rust crates load aarch64-darwin there.
 PLATFORMS: dict[str, Platform] = {
-    "linux64": Platform("x86_64-linux", ".so", ("x86_64-linux-gnu.2.17",), _LINUX),
-    "linux32": Platform("x86-linux", ".so", ("x86-linux-gnu.2.17",), _LINUX),
-    "aarch64-linux": Platform("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",), _LINUX),
-    "win64": Platform("x86_64-windows", ".dll", ("x86_64-windows-gnu",)),
-    "win32": Platform("x86-windows", ".dll", ("x86-windows-gnu",)),
-    "darwin64": Platform("x86_64-darwin", ".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0")),
-    "aarch64-darwin": Platform("aarch64-darwin", ".dylib", ("aarch64-macos.11.0",)),
+    "linux64": Platform("x86_64-linux", ".so", "x86_64-linux-gnu.2.17", _LINUX),
+    "linux32": Platform("x86-linux", ".so", "x86-linux-gnu.2.17", _LINUX),
+    "aarch64-linux": Platform("aarch64-linux", ".so", "aarch64-linux-gnu.2.17", _LINUX),
+    "win64": Platform("x86_64-windows", ".dll", "x86_64-windows-gnu"),
+    "win32": Platform("x86-windows", ".dll", "x86-windows-gnu"),
+    "darwin64": Platform("x86_64-darwin", ".dylib", "x86_64-macos.11.0", also=_APPLE_SILICON),
+    "aarch64-darwin": Platform("aarch64-darwin", ".dylib", _APPLE_SILICON),
 }
 
 
-def host_platform() -> str | None:
-    """The platform of this machine; None where there is no binary for it."""
+def host_platform(fmi: int = 2) -> str | None:
+    """The platform that importers of this version look for on this machine; None where there is no binary for it."""
     processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     return {
         ("Linux", "x86_64"): "linux64",
         ("Linux", "aarch64"): "aarch64-linux",
         ("Windows", "x86_64"): "win64",
         ("Darwin", "x86_64"): "darwin64",
-        ("Darwin", "aarch64"): "darwin64",
+        ("Darwin", "aarch64"): "darwin64" if fmi == 2 else "aarch64-darwin",
     }.get((platform.system(), processor))
 
 
@@ -100,8 +105,9 @@ def compile_all(
     sources: Mapping[str, str],
     identifier: str,
     on_done: Callable[[str], None] = lambda _: None,
+    fmi: int = 2,
 ) -> dict[str, bytes]:
-    """Compile sources (file name to text) for all platforms side by side; the shared libraries' bytes.
+    """Compile sources (file name to text) for all platforms side by side; the bytes of the libraries for this version.
 
     Raises BuildError. Interrupted or failed, it leaves no process and no file behind.
     """
@@ -112,7 +118,7 @@ def compile_all(
             ThreadPoolExecutor(os.cpu_count()) as pool,
             _Compilers() as compilers,
         ):
-            jobs = {pool.submit(_compile, compilers, name, sources, identifier): name for name in platforms}
+            jobs = {pool.submit(_compile, compilers, name, sources, identifier, fmi): name for name in platforms}
             for job in jobs:
                 job.add_done_callback(ended.put)
             for _ in jobs:
@@ -165,7 +171,7 @@ class _Compilers:
         return process.returncode, output.decode(errors="replace").strip()
 
 
-def _compile(compilers: _Compilers, name: str, sources: Mapping[str, str], identifier: str) -> bytes:
+def _compile(compilers: _Compilers, name: str, sources: Mapping[str, str], identifier: str, fmi: int) -> bytes:
     target_platform = PLATFORMS[name]
     with tempfile.TemporaryDirectory(prefix="fmu-") as folder:
         for file, text in sources.items():
@@ -173,7 +179,7 @@ def _compile(compilers: _Compilers, name: str, sources: Mapping[str, str], ident
         library = Path(folder, f"{identifier}{target_platform.suffix}")
         install_name = (f"-Wl,-install_name,@rpath/{library.name}",) if library.suffix == ".dylib" else ()
         slices = []
-        for target in target_platform.targets:
+        for target in target_platform.targets(fmi):
             command = [
                 *(*compiler(), "-target", target),
                 *C_FLAGS,
