@@ -3,10 +3,12 @@
 import io
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, wait
 from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -83,14 +85,12 @@ def prove(
 
 def _findings(folder: str, description: Any, interface: str, experiment: Experiment) -> Iterator[Finding]:
     """A line a variable, or one where the experiment has no expected results or fails."""
-    import fmpy
-
     names = [*(experiment.references or ())][1:]
     kind = INTERFACES[interface]
     said = io.StringIO()
     try:
         with redirect_stdout(said):  # FMPy's warnings, and what the FMU logs
-            result = fmpy.simulate_fmu(
+            result = _simulated(
                 folder,
                 validate=False,
                 start_time=experiment.start,
@@ -116,6 +116,24 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
         scale = max(*map(abs, values), _OF_NOMINAL * abs(nominal[name]))
         off = _deviation(result["time"], result[name], times, values)
         yield Finding(experiment.name, name, off / scale, experiment.tolerance)
+
+
+def _simulated(*arguments: Any, **options: Any) -> Any:
+    """What FMPy's simulate_fmu gives, run in a thread of its own: an FMU that hangs keeps no interrupt from coming."""
+    import fmpy
+
+    future: Future[Any] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(fmpy.simulate_fmu(*arguments, **options))
+        except BaseException as error:
+            future.set_exception(error)
+
+    Thread(target=run, daemon=True).start()
+    while not wait([future], timeout=0.1).done:  # on Windows an interrupt comes between two waits
+        pass
+    return future.result()
 
 
 def _signals(stimuli: Series | None) -> Any:

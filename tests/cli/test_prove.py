@@ -1,6 +1,10 @@
 """rov-fmu prove: an FMU comes to the results that it carries, or not; ours, and any other."""
 
 import shutil
+import signal
+import subprocess
+import sys
+import time
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -8,12 +12,15 @@ from pathlib import Path
 import pytest
 from pythonfmu import FmuBuilder
 
+from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
+from rov_fmu.export.archive import native_content
+from rov_fmu.export.compile import compile_all
 from rov_fmu.export.proof import prove
 from rov_fmu.export.reference_results import FOLDER, MANIFEST, reference_results
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import ALONE
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import ALONE, start
 
 Capsys = pytest.CaptureFixture[str]
 Files = Mapping[str, str | None]
@@ -155,6 +162,56 @@ def test_what_deviates_or_fails_is_told(
     assert line in [" ".join(told.split())[: len(line)] for told in out.splitlines()]
     assert err.startswith(f"rov-fmu: {fmu}: ")
     assert err.endswith(" results are not as expected\n")
+
+
+_HANGS = """
+#include <stdio.h>
+#include <stdlib.h>
+
+static void hang(void)
+{
+    volatile int on = 1;
+    fclose(fopen(getenv("HANGS"), "w"));
+    while (on) {
+    }
+}
+
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals are POSIX, and the binary is of linux64")
+def test_an_fmu_that_hangs_is_ended_by_an_interrupt(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
+    """In compiled code, which Python does not get out of."""
+    content = native_content(vehicle)
+    name = "fmi2_co_simulation.c"
+    step = content.sources[name].replace("    OPEN(fmi2DoStep,", "    hang();\n    OPEN(fmi2DoStep,")
+    (library,) = compile_all(
+        chosen_platforms(["host"]), {**content.sources, name: _HANGS + step}, content.identifier
+    ).values()
+    fmu, folder, begun = tmp_path / "hangs.fmu", tmp_path / "tmp", tmp_path / "begun"
+    with zipfile.ZipFile(videoray_fmu) as old, zipfile.ZipFile(fmu, "w") as new:
+        for member in old.namelist():
+            new.writestr(member, library if member.startswith("binaries/") else old.read(member))
+    folder.mkdir()
+    process = start(
+        ["prove", str(fmu)],
+        stdout=subprocess.DEVNULL,
+        environment={"TMPDIR": str(folder), "HANGS": str(begun)},
+        # a shell starts what it runs in the background with interrupts ignored, and that is inherited
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    try:
+        deadline = time.monotonic() + 60.0
+        while not begun.exists():
+            assert time.monotonic() < deadline
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert (process.returncode, said) == (130, "rov-fmu: interrupted, no file is half-written\n")
+    assert list(folder.iterdir()) == []
 
 
 # ---- Bad input -------------------------------------------------------------------------------------------------------
