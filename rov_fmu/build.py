@@ -31,6 +31,8 @@ class Built:
     """What was found when the FMU was validated and run."""
     beside: Sequence[Path]
     """What was written beside it."""
+    left_out: Sequence[str] = ()
+    """Experiments that it has no expected results of, for their motion is too fast to be resolved."""
 
 
 def build(
@@ -67,7 +69,8 @@ def build(
         beside = [Output(osp_path(output, vehicle.identifier), description)]
     check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
     chosen = chosen_platforms(platforms, fmi) if native else []
-    pages = {**documentation(vehicle, native=native, fmi=fmi), **reference_results(vehicle)}
+    left_out: list[str] = []
+    pages = {**documentation(vehicle, native=native, fmi=fmi), **reference_results(vehicle, left_out.append)}
     content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
     start = perf_counter()
     seconds: dict[str, float] = {}
@@ -86,7 +89,8 @@ def build(
     draft = Output(output, packed, lambda path: notes.append(_check(path, vehicle, chosen if native else None, fmi)))
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
-    return Built(output, len(packed), content.guid, sizes, seconds, notes[0], [other.path for other in beside])
+    written = [other.path for other in beside]
+    return Built(output, len(packed), content.guid, sizes, seconds, notes[0], written, left_out)
 
 
 def chosen_platforms(names: Sequence[str] | None, fmi: int = 2) -> list[str]:

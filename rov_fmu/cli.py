@@ -158,6 +158,8 @@ def _print_built(built: "Built", seconds: float) -> None:
     for name, size in built.binaries.items():
         out.print(f"  {name:<14}{size / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
     out.print(f"  {built.note}")
+    if built.left_out:
+        out.print(f"  no expected results, for it moves too fast: {', '.join(built.left_out)}", soft_wrap=True)
     for path in built.beside:
         out.print(Text(str(path), "bold"), soft_wrap=True)
     out.print(f"  built in {seconds:.1f} s")

@@ -5,7 +5,7 @@ reverses, the drag has a kink, and the step is cut there. Arithmetic alone, so t
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from math import cos, sin
+from math import cos, isfinite, nan, sin
 
 from rov_fmu.motion.rov import Rov
 
@@ -16,6 +16,8 @@ _Rates = Callable[[Sequence[float]], _Numbers]
 _DIVISIONS = (2, 4, 6, 8, 10, 12, 14, 16)
 _TOLERANCE = 1e-11
 """Of what the last column of the extrapolation changes; the error is far below."""
+_ENOUGH = 1e-10
+"""The same, where the shortest step does no better; errors of many steps add up."""
 _FLOOR = 1e-4
 """m, rad, N, and per second: sizes that are not resolved further."""
 _STILL = 1e-12
@@ -26,13 +28,14 @@ _SHORTEST = 1e-6
 """What is left of them where that is not enough."""
 
 
+class TooFastError(Exception):
+    """A motion that the shortest step does not resolve."""
+
+
 def states(rov: Rov, inputs: Mapping[str, float], state: Mapping[str, float], times: Sequence[float]) -> list[State]:
-    """The states after so many seconds each, rising, with the inputs held."""
-    y, axes, equations = (
-        [*(state[name] for name in rov.layout.state), 0.0],
-        len(rov.layout.axes),
-        _equations(rov, inputs),
-    )
+    """The states after so many seconds each, rising, with the inputs held. Raises TooFastError."""
+    y, axes = [*(state[name] for name in rov.layout.state), 0.0], len(rov.layout.axes)
+    equations = _equations(rov, inputs)
     found, t, step = [], 0.0, times[0] / 4.0
     still = equations([0] * axes)
     for end in times:
@@ -53,6 +56,8 @@ def states(rov: Rov, inputs: Mapping[str, float], state: Mapping[str, float], ti
             if h > (_SHORTEST if both else 1.0) * least and (both or not error <= _TOLERANCE):
                 step = h / 2.0  # the error of a far too long step is no number
                 continue
+            if not error <= _ENOUGH:
+                raise TooFastError
             while turned:
                 h = _reversal(rates, y, turned[0], h, after[turned[0]])
                 after, _ = _leap(rates, y, h)
@@ -94,7 +99,8 @@ def _equations(rov: Rov, inputs: Mapping[str, float]) -> Callable[[Sequence[int]
                 found[at_v] -= coupling.c_v * u * r
                 found[at_r] -= coupling.c_r * u * v
             if planar:
-                c, s = cos(y[at_psi]), sin(y[at_psi])
+                psi = y[at_psi]
+                c, s = (cos(psi), sin(psi)) if isfinite(psi) else (nan, nan)
                 found += [u * c - v * s + V_N, u * s + v * c + V_E]
             if deep:
                 found.append(y[at_w])
@@ -135,7 +141,7 @@ def _leap(rates: _Rates, y: Sequence[float], h: float) -> tuple[_Numbers, float]
         before = row
     best, second = before[-2:][::-1]
     error = max(abs(a - b) / max(abs(a), abs(c), _FLOOR) for a, b, c in zip(best, second, y, strict=True))
-    return best, error
+    return best, error if all(map(isfinite, best)) else nan  # max() passes over a nan
 
 
 def _reversal(rates: _Rates, y: Sequence[float], n: int, h: float, after: float) -> float:

@@ -5,11 +5,11 @@ and without its tuning; and a manoeuvre of all axes. What they come to is found 
 that is to be proved.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, sqrt
 
-from rov_fmu.export.extrapolation import states
+from rov_fmu.export.extrapolation import TooFastError, states
 from rov_fmu.files.templates import render
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Axis, Meta
 from rov_fmu.motion.rov import Rov
@@ -57,13 +57,18 @@ class Experiment:
     references: str
 
 
-def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
-    """The files, by their path in the FMU. Raises DataFileError."""
+def reference_results(vehicle: Vehicle, on_left_out: Callable[[str], None] = lambda _: None) -> dict[str, bytes]:
+    """The files, by their path in the FMU. Raises DataFileError.
+
+    `on_left_out` is told the name of an experiment that is not among them, for its motion is too fast to be resolved.
+    """
     sets = {"tuned": vehicle.rov}
     if any(vehicle.rov[name] != 1.0 for name in _tunable(vehicle.rov)):
         sets["untuned"] = untuned(vehicle.rov)
     files: dict[str, str] = {}
-    experiments = [*_step_responses(vehicle, sets, files), _manoeuvre(vehicle, files)]
+    experiments = [*_step_responses(vehicle, sets, files, on_left_out), *_manoeuvre(vehicle, files, on_left_out)]
+    if not experiments:
+        return {}
     words = {"tuned": "alpha and beta as identified", "untuned": "alpha = beta = 1: without tuning"}
     related = []
     if len(sets) > 1:
@@ -101,7 +106,9 @@ def _tunable(rov: Rov) -> list[str]:
 # ---- Steps from rest -------------------------------------------------------------------------------------------------
 
 
-def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str]) -> Iterator[Experiment]:
+def _step_responses(
+    vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str], on_left_out: Callable[[str], None]
+) -> Iterator[Experiment]:
     """A step of each axis to some commands."""
     tables = {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
     for form in vehicle.layout.axes:
@@ -114,14 +121,19 @@ def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, 
             inputs = vehicle.rov.held_inputs(axis, percent / 100.0)
             units = {name: _unit(rov, axis, percent / 100.0, inputs) for name, rov in sets.items()}
             longest = max(units.values()) * _MULTIPLES[-1]
-            files[f"{stem}.csv"] = _csv([(t, _commanded(vehicle, inputs)) for t in (0.0, longest)])
             for name, rov in sets.items():
+                experiment = f"{stem}_{name}" if len(sets) > 1 else stem
                 references = f"{stem}_{name}.csv"
                 marks = [units[name] * n for n in _MULTIPLES]
-                trajectory = _trajectory(rov, [(inputs, marks)])
+                try:
+                    trajectory = _trajectory(rov, [(inputs, marks)])
+                except TooFastError:
+                    on_left_out(experiment)
+                    continue
+                files[f"{stem}.csv"] = _csv([(t, _commanded(vehicle, inputs)) for t in (0.0, longest)])
                 files[references] = _csv(_moving(trajectory, rov.layout.velocities | rov.layout.pose))
                 yield Experiment(
-                    f"{stem}_{name}" if len(sets) > 1 else stem,
+                    experiment,
                     _words(rov, axis, percent, name if len(sets) > 1 else "", table, row),
                     _text(marks[-1]),
                     _text(units[name] / _STEPS),
@@ -145,13 +157,16 @@ def _unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
 
 
 def _horizon(rov: Rov, inputs: Values) -> float:
-    """Some forty of the fastest time constants of the vehicle (s)."""
+    """Some forty of the fastest time constants of the vehicle, and not many more radians of a turn (s)."""
     rates = [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
     for form, motion in zip(rov.layout.axes, rov.axes(inputs, rov.commanded(inputs)), strict=True):
         A, B = motion.drag(motion.C)
         turning = sqrt(abs(motion.C)) if form.axis is YAW else 0.0
         rates.append(B + 2.0 * sqrt(A * abs(motion.C)) + turning)
-        if (k := rov.coupling) and isfinite(V := motion.steady_velocity()):
+        V = motion.steady_velocity()
+        if form.axis is YAW and isfinite(V):
+            rates.append(abs(V))
+        if (k := rov.coupling) and isfinite(V):
             rates.append(_OF_COUPLING * (abs(k.c_u) + abs(k.c_v) + abs(k.c_r)) * abs(V))
     return 40.0 / max(rates) if any(rates) else _LONGEST
 
@@ -187,7 +202,7 @@ _PHASES: tuple[tuple[Mapping[Axis, float], float], ...] = (
 )
 
 
-def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Experiment:
+def _manoeuvre(vehicle: Vehicle, files: dict[str, str], on_left_out: Callable[[str], None]) -> Iterator[Experiment]:
     """All axes at once, with loads, a current and reversals, and what is left when all is off; all outputs."""
     rov, layout = vehicle.rov, vehicle.layout
     phases = []
@@ -202,12 +217,15 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Experiment:
     length = float(f"{min(_PHASE, *(_horizon(rov, inputs) for inputs in phases)):.1g}")
     ends = [length * n for n in range(len(phases) + 1)]
     stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
+    held = [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
+    try:
+        trajectory = _trajectory(rov, held)
+    except TooFastError:
+        on_left_out("manoeuvre")
+        return
     files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
-    trajectory = _trajectory(
-        rov, [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
-    )
     files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.state))
-    return Experiment(
+    yield Experiment(
         "manoeuvre",
         "All axes at once, with loads, a current and reversals, then all off",
         _text(ends[-1]),
@@ -222,7 +240,7 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Experiment:
 
 
 def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
-    """The state from rest, at the times of each phase, in which the inputs are held."""
+    """The state from rest, at the times of each phase, in which the inputs are held. Raises TooFastError."""
     found: list[_Row] = [(0.0, dict.fromkeys(rov.layout.state, 0.0))]
     for inputs, times in phases:
         start, state = found[-1]

@@ -137,6 +137,17 @@ def test_the_command_line_says_what_it_built(tmp_path: Path, capsys: pytest.Capt
     assert "built in" in told
 
 
+def test_the_command_line_says_which_results_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("rov_fmu.export.extrapolation._ENOUGH", -1.0)  # no step is good enough
+    assert _build(tmp_path / "rov.fmu") == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if "no expected results, for it moves too fast: " in x]
+    assert line.endswith(", yaw_70_tuned, yaw_70_untuned, manoeuvre")
+    with zipfile.ZipFile(tmp_path / "rov.fmu") as archive:
+        assert not [name for name in archive.namelist() if name.startswith("extra/")]
+
+
 def test_a_program_is_told_of_a_platform_that_does_not_exist(vehicle: Vehicle, tmp_path: Path) -> None:
     with pytest.raises(fmu_compile.BuildError, match="there is no platform linux, only host, linux64"):
         build(vehicle, tmp_path / "rov.fmu", platforms=["linux"])

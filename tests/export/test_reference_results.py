@@ -4,7 +4,8 @@ import csv
 import io
 import random
 from collections.abc import Mapping
-from math import e
+from dataclasses import replace
+from math import e, inf
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from lxml import etree
 
 from checks import reference
 from rov_fmu.export.archive import archive
-from rov_fmu.export.extrapolation import states
+from rov_fmu.export.extrapolation import TooFastError, states
 from rov_fmu.export.reference_results import FOLDER, MANIFEST, TOLERANCE, reference_results
+from rov_fmu.motion.layout import AXES
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -166,3 +168,43 @@ def test_the_extrapolation_agrees_with_the_exact_step(name: str) -> None:
         found = states(rov, inputs, state, (0.2, 1.0))
         for h, after in zip((0.2, 1.0), found, strict=True):
             assert after == pytest.approx(rov.step(inputs, state, h), rel=1e-10, abs=1e-11)
+
+
+# ---- Fast motions ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def spinner() -> Vehicle:
+    """Its thrust turns it at thousands of radians per second: within the limits of a vehicle file."""
+    rov = VEHICLES["sway and yaw"]
+    coefficients = {name: rov[name] for name in rov.layout.coefficients} | {"a_d_r": 0.0, "b_d_r": 0.01}
+    vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
+    return replace(vehicle, data=None, rov=Rov(rov.layout, coefficients))
+
+
+def test_what_is_expected_of_a_vehicle_that_spins_fast_is_right(spinner: Vehicle) -> None:
+    left_out: list[str] = []
+    files = reference_results(spinner, left_out.append)
+    assert left_out == []
+    assert spinner.rov.response(AXES["yaw"], 1.0)[0] > 1000.0
+    for experiment in ("sway_100", "yaw_40", "yaw_100", "manoeuvre"):
+        _check(spinner.rov, files, experiment)
+
+
+def test_what_is_too_fast_is_left_out_and_told(spinner: Vehicle, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rov_fmu.export.reference_results._horizon", lambda *_: inf)
+    left_out: list[str] = []
+    files = reference_results(spinner, left_out.append)
+    assert left_out == ["yaw_40", "yaw_100", "yaw_minus_100"]
+    kept = _experiments(files)
+    assert [*kept] == ["sway_40", "sway_100", "sway_minus_100", "manoeuvre"]
+    sources = {part.get("source") for x in kept.values() for part in x}
+    assert {name.removeprefix(f"{FOLDER}/") for name in files} == {*sources, "experiments.exp", "fmi-ls-manifest.xml"}
+
+
+@pytest.mark.parametrize("torque", [1e5, 1e300])
+def test_a_motion_that_is_not_resolved_is_no_result(torque: float) -> None:
+    """A turn of 250 rad/s for a quarter of an hour, and one that overflows."""
+    rov = VEHICLES["neither lag nor coupling"]
+    with pytest.raises(TooFastError):
+        states(rov, still(rov) | {"N_ext": torque}, at_rest(rov), (1000.0,))
