@@ -8,6 +8,7 @@ from time import perf_counter
 
 from rov_fmu.export.archive import archive, native_content, python_content
 from rov_fmu.export.compile import PLATFORMS, BuildError, OptionError, compile_all, host_platform
+from rov_fmu.export.model_description import NATIVE
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.export.reference_results import reference_results
 from rov_fmu.files.output import Output, check_targets, write_whole
@@ -58,6 +59,8 @@ def build(
     written.
     """
     native = backend == "native"
+    if fmi not in NATIVE:
+        raise OptionError(f"there is no FMI version {fmi!r}, only {', '.join(map(str, NATIVE))}")
     if fmi == 3 and not native:
         raise OptionError("--fmi 3: PythonFMU makes FMI 2.0 alone")
     if fmi == 3 and osp:

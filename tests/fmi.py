@@ -147,13 +147,13 @@ class Fmu(ABC):
         variable = self.variables[name]
         return float(variable.nominal or variable.declaredType.nominal)
 
-    def settable(self, kind: int, mode: str) -> list[str]:
+    def settable(self, mode: str) -> list[str]:
         """What may be set when; beyond the standard, inputs of FMI 2.0 before initialization, and tuning between the
         integrator's steps."""
         chosen = [] if mode in (TERMINATED, FAILED) else [*self.inputs]
         if mode in (INSTANTIATED, INITIALIZATION):
             return chosen + self.states + self.parameters
-        if mode in (EVENT, CONTINUOUS) or (mode == STEP and kind != WITH_EVENTS):
+        if mode in (EVENT, CONTINUOUS, STEP):
             chosen += [name for name in self.parameters if self.variables[name].variability == "tunable"]
         return chosen + (self.states if mode == CONTINUOUS or (mode == EVENT and self.VERSION == 3) else [])
 

@@ -165,21 +165,27 @@ static outcome get_values(fmu *f, const unsigned vr[], size_t n, double value[])
     return DONE;
 }
 
-/* FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4, FMI 3.0, section 2.4.7.4, and what importers do: inputs before initialization,
- * and parameters between the integrator's steps. */
+/* FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4, FMI 3.0, sections 2.4.7.4 and 4.2.1, and what importers do: inputs before
+ * initialization, and parameters between the integrator's steps. */
 static bool may_set(const fmu *f, variable_kind kind)
 {
     switch (f->now.mode) {
     case INSTANTIATED:
     case INITIALIZATION: return kind != CALCULATED;
     case EVENT: return kind == INPUT || kind == TUNABLE || (kind == STATE && EVENTS_SET_STATES);
-    case STEP: return kind == INPUT || (kind == TUNABLE && !has_event_mode(&f->host));
+    case STEP: return kind == INPUT || kind == TUNABLE;
     case CONTINUOUS: return kind == INPUT || kind == STATE || kind == TUNABLE;
     case INTERMEDIATE: return kind == INPUT;
     case TERMINATED:
     case FAILED: break;
     }
     return false;
+}
+
+/* Where a parameter may change in Event Mode alone; of Step Mode FMI 3.0 says so in 2.4.7.4, and not in 4.2.1. */
+static bool is_for_event_mode(const fmu *f)
+{
+    return f->now.mode == CONTINUOUS || (f->now.mode == STEP && has_event_mode(&f->host));
 }
 
 static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double value[])
@@ -209,7 +215,7 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
         if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
             WARN_ONCE(f, vr[i], "%s = %.15g saturates at %g; said once.", info->name, value[i],
                       value[i] < 0.0 ? info->minimum : info->maximum);
-        } else if (info->kind == TUNABLE && f->now.mode == CONTINUOUS) {
+        } else if (info->kind == TUNABLE && is_for_event_mode(f)) {
             WARN_ONCE(f, TUNED_LATE, "%s is set, though the standard wants Event Mode for it; said once.", info->name);
         }
     }

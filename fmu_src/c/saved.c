@@ -50,18 +50,20 @@ static uint64_t checksum(const unsigned char *bytes, size_t size) /* FNV-1a */
     return hash;
 }
 
-/* Whether an instance can be in a mode, with Event Mode in Co-Simulation or without. */
-static bool is_mode_of(const fmu_state *s, const host *of)
+/* Whether an instance can be in the mode of a state, with Event Mode in Co-Simulation or without. */
+static outcome knows_mode_of(fmu *f, const fmu_state *s)
 {
-    const int stepping = STEP | FAILED | (has_event_mode(of) ? EVENT : 0), mode = (int)s->mode;
+    const int stepping = STEP | FAILED | (has_event_mode(&f->host) ? EVENT : 0), mode = (int)s->mode;
     const int modes = s->type == MODEL_EXCHANGE ? EVENT | CONTINUOUS : stepping;
-    return (mode & (modes | INSTANTIATED | INITIALIZATION | TERMINATED)) != 0 && (mode & (mode - 1)) == 0;
+    REQUIRE((mode & (modes | INSTANTIATED | INITIALIZATION | TERMINATED)) != 0 && (mode & (mode - 1)) == 0,
+            "the state is in %s, which this instance does not use.", mode_name(s->mode));
+    return DONE;
 }
 
 /* Whether a state read from bytes could have been reached by calls. */
-static bool is_valid(const fmu_state *s, const host *of)
+static bool is_valid(const fmu_state *s)
 {
-    bool valid = is_mode_of(s, of) && isfinite(s->time) && !isnan(s->stop)
+    bool valid = isfinite(s->time) && !isnan(s->stop)
                  && (s->experiment_defined || s->mode == INSTANTIATED);
     for (size_t i = 0; i < N_VARIABLES; i++) {
         const double value = s->values[i];
@@ -112,7 +114,7 @@ static outcome restore(fmu *f, void *state)
     const saved_state *const saved = as_saved(state);
     REQUIRE(saved != NULL, "the state is NULL or no state of this FMU.");
     REQUIRE(saved->state.type == f->now.type, "the state is of the other interface type.");
-    REQUIRE(is_mode_of(&saved->state, &f->host), "the state is in Event Mode, which this instance does not use.");
+    TRY(knows_mode_of(f, &saved->state));
     f->now = saved->state;
     rov_prepare(f->now.values, &f->gains);
     REPORT(f, "Restored %s at t = %g s.", mode_name(f->now.mode), f->now.time);
@@ -182,7 +184,8 @@ static outcome deserialize(fmu *f, const unsigned char bytes[], size_t size, voi
     for (size_t i = 0; i < N_VARIABLES; i++) {
         s.values[i] = get_double(&from);
     }
-    REQUIRE(is_valid(&s, &f->host), "the bytes hold values that no run can reach.");
+    TRY(knows_mode_of(f, &s));
+    REQUIRE(is_valid(&s), "the bytes hold values that no run can reach.");
     saved_state *const saved = state_memory(state);
     REQUIRE(saved != NULL, "out of memory, or *state is no state of this FMU.");
     saved->state = s;

@@ -165,7 +165,6 @@ static bool settable(const slot *s, unsigned vr)
     case INITIALIZATION: return kind != CALCULATED;
     case CONTINUOUS: return kind == INPUT || kind == STATE || kind == TUNABLE;
     case EVENT: return kind == INPUT || kind == TUNABLE || (FMI_VERSION == 3 && kind == STATE);
-    case STEP: return kind == INPUT || (kind == TUNABLE && !s->of.events);
     case INTERMEDIATE: return kind == INPUT;
     default: return kind == INPUT || kind == TUNABLE;
     }

@@ -124,9 +124,10 @@ def test_there_are_commands_to_look_at() -> None:
 
 
 @pytest.fixture
-def workplace(tmp_path: Path, videoray_fmu: Path) -> Path:
-    """What a reader has at hand: the FMU, a folder of tank tests, the command (it builds for this machine alone)."""
+def workplace(tmp_path: Path, videoray_fmu: Path, videoray3_fmu: Path) -> Path:
+    """What a reader has at hand: both FMUs, a folder of tank tests, the command (it builds for this machine alone)."""
     shutil.copy(videoray_fmu, tmp_path)
+    shutil.copy(videoray3_fmu, tmp_path)
     shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", tmp_path / "my_tests")
     program = tmp_path / "bin" / "rov-fmu"
     program.parent.mkdir()

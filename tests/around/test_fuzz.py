@@ -220,8 +220,8 @@ PLANTED_IN_FMI3 = {
     ),
     "a state in Event Mode is put where there is none": (
         "saved.c",
-        "(has_event_mode(of) ? EVENT : 0)",
-        "(of != NULL ? EVENT : 0)",
+        "(has_event_mode(&f->host) ? EVENT : 0)",
+        "(f != NULL ? EVENT : 0)",
         "(fmi3SetFMUState|fmi3DeserializeFMUState): illegal|in Event Mode instead",
     ),
 }

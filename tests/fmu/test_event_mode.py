@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.fmi import CO_SIMULATION, EVENT, MODEL_EXCHANGE, OK, STEP, WITH_EVENTS, reals, room
+from tests.fmi import CO_SIMULATION, EVENT, MODEL_EXCHANGE, OK, STEP, WARNING, WITH_EVENTS, reals, room
 from tests.fmi3 import Fmu, Instance, Stepped, flags
 
 MOVING = {"u_l": 0.6, "u_r": 0.2, "u_t": -0.4, "u": 0.3, "r": -0.5, "V_E": 0.1}
@@ -65,6 +65,20 @@ def test_what_is_set_in_event_mode_holds_from_then_on(fmu3: Fmu) -> None:
         changed.start({**MOVING, **end, **CHANGES}, at=rov.time())
         assert run(rov, 10) == run(changed, 10) != run(plain, 10)
         assert rov.log == plain.log == []
+
+
+@pytest.mark.parametrize("kind", [CO_SIMULATION, WITH_EVENTS])
+def test_between_steps_parameters_are_tuned_too_with_a_warning_where_there_is_event_mode(fmu3: Fmu, kind: int) -> None:
+    with fmu3.instance(kind) as rov, fmu3.instance() as changed:
+        assert rov.set(MOVING) == OK
+        rov.reach(STEP)
+        for value in (0.5, 0.7):
+            assert rov.set({"beta_u": value}) == OK
+        changed.start({**MOVING, "beta_u": 0.7})
+        assert run(rov, 0) == run(changed, 0)
+        assert [(m.status, m.text.split()[:2]) for m in rov.log] == [(WARNING, ["fmi3SetFloat64:", "beta_u"])] * (
+            kind == WITH_EVENTS
+        )
 
 
 @pytest.mark.parametrize("kind", [MODEL_EXCHANGE, CO_SIMULATION, WITH_EVENTS])

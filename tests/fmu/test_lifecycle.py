@@ -264,7 +264,7 @@ def test_a_variable_can_be_set_in_the_modes_of_its_causality_and_variability(
             def act(name: str = name, rov: AnyInstance = rov) -> None:
                 before = now(rov, mode)
                 rov.log.clear()
-                if name in fmus[version].settable(kind, mode):
+                if name in fmus[version].settable(mode):
                     assert rov.set({name: 0.75}) == OK, name
                     assert now(rov, mode) != before, name
                 else:

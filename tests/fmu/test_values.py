@@ -56,7 +56,7 @@ def assert_discarded(rov: AnyInstance, name: str, value: float) -> None:
 def test_no_variable_takes_a_value_that_is_not_finite(fmu: Fmu, kind: int, mode: str) -> None:
     with fmu.instance(kind) as rov:
         rov.reach(mode)
-        for name in fmu.settable(kind, mode):
+        for name in fmu.settable(mode):
             for value in (nan, inf, -inf):
                 assert_discarded(rov, name, value)
 
@@ -146,7 +146,7 @@ def test_in_fmi_3_a_message_is_the_text_with_its_signs_of_references_doubled(fmu
 def test_with_event_mode_values_are_discarded_there_too(fmu3: fmi3.Fmu) -> None:
     with fmu3.instance(WITH_EVENTS) as rov:
         rov.reach(EVENT)
-        for name in fmu3.settable(WITH_EVENTS, EVENT):
+        for name in fmu3.settable(EVENT):
             assert_discarded(rov, name, nan)
         assert_discarded(rov, "beta_u", -0.001)
 
