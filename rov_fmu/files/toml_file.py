@@ -3,12 +3,12 @@
 import json
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, create_model
 from pydantic_core import ErrorDetails
 
 from rov_fmu.files.messages import FileError, brief, shown
@@ -24,6 +24,18 @@ class Strict(BaseModel):
     """A table of a TOML file: no keys but these, no number in quotes. Docstrings are what an editor shows."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True)
+
+
+DOCUMENTED = ConfigDict(use_attribute_docstrings=True)
+
+
+def table_of(name: str, base: type[Strict], fields: Mapping[str, Any], words: str | None = None) -> Any:
+    """A table of fields that are computed: pydantic would look for their docstrings in every source above, at length.
+
+    A class on top of it that has some of its own says so: `model_config = DOCUMENTED`.
+    """
+    quick = {"use_attribute_docstrings": False}
+    return create_model(name, __base__=base, __doc__=words, __cls_kwargs__=quick, **fields)
 
 
 Checked = TypeVar("Checked", bound=Strict)

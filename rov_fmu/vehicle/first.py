@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from pydantic import Field, create_model
+from pydantic import Field
 
-from rov_fmu.files.toml_file import Strict
+from rov_fmu.files.toml_file import Strict, table_of
 from rov_fmu.vehicle.form import FileHead, Made, Validity
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.quantity import Quantity, Text, quantity
@@ -12,8 +12,8 @@ from rov_fmu.vehicle.quantity import Quantity, Text, quantity
 QUANTITIES = {name: quantity(name, meta) for name, meta in PAPER.coefficients.items()}
 _REQUIRED: dict[str, Any] = {name: (q, ...) for name, q in QUANTITIES.items()}
 _OPTIONAL: dict[str, Any] = {name: (q | None, None) for name, q in QUANTITIES.items()}
-_All = create_model("_All", __base__=Strict, **_REQUIRED)
-_Some = create_model("_Some", __base__=Strict, **_OPTIONAL)
+_All = table_of("_All", Strict, _REQUIRED)
+_Some = table_of("_Some", Strict, _OPTIONAL)
 
 
 def quantities(table: Strict) -> dict[str, Quantity]:

@@ -3,9 +3,9 @@
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, create_model
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
-from rov_fmu.files.toml_file import Strict, pair
+from rov_fmu.files.toml_file import Strict, pair, table_of
 from rov_fmu.motion.layout import Meta
 
 
@@ -69,4 +69,4 @@ def quantity(name: str, meta: Meta) -> Any:
         "value": (Annotated[Finite, AfterValidator(lambda value: within(value, meta)), WithJsonSchema(bounds)], ...),
         "unit": (Literal[meta.unit], ...),
     }
-    return create_model(name, __base__=Quantity, __doc__=meta.description, **fields)
+    return table_of(name, Quantity, fields, meta.description)

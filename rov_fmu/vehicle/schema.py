@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 from math import hypot
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, create_model
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from rov_fmu.files.toml_file import Strict, pair
+from rov_fmu.files.toml_file import DOCUMENTED, Strict, pair, table_of
 from rov_fmu.motion import layout
 from rov_fmu.motion.layout import ARM, AXES, AXIS, BODY, CURVE, TUNING, Axis, Kind, Layout, Meta, VehicleAxis
 from rov_fmu.vehicle.form import FileHead, Made, Validity
@@ -27,12 +27,12 @@ def _coefficients(
     """A table with a coefficient a key; those are needed that are needed by their kind, if these are given."""
     fields: dict[str, Any] = {}
     for key, meta in metas.items():
-        form = quantity(f"{name}_{key}", meta)
+        one = quantity(f"{name}_{key}", meta)
         if kinds and key in kinds and kinds[key].needed:
-            fields[key] = (form, Field(description=meta.description))
+            fields[key] = (one, Field(description=meta.description))
         else:
-            fields[key] = (form | None, Field(None, description=meta.description))
-    return create_model(f"_{name}", __base__=Strict, __doc__=words, **fields)
+            fields[key] = (one | None, Field(None, description=meta.description))
+    return table_of(f"_{name}", Strict, fields, words)
 
 
 def given(table: Strict, kinds: Mapping[str, Kind]) -> dict[str, Quantity]:
@@ -46,13 +46,13 @@ def keys(table: Strict, kinds: Mapping[str, Kind]) -> tuple[str, ...]:
     return tuple(key for key, kind in kinds.items() if key in has or kind.needed)
 
 
-def _opened(form: Any, kinds: Mapping[str, Kind]) -> Any:
+def _opened(table: Any, kinds: Mapping[str, Kind]) -> Any:
     """A table none of whose coefficients is needed."""
     fields: dict[str, Any] = {
         key: (field.annotation | None, Field(None, description=field.description))
-        for key, field in form.model_fields.items() if key in kinds and field.is_required()
+        for key, field in table.model_fields.items() if key in kinds and field.is_required()
     }  # fmt: skip
-    return create_model(f"_Open{form.__name__}", __base__=form, __doc__=form.__doc__, **fields)
+    return table_of(f"_Open{table.__name__}", table, fields, table.__doc__)
 
 
 # ---- Body, arm, curves, axes -----------------------------------------------------------------------------------------
@@ -60,6 +60,8 @@ def _opened(form: Any, kinds: Mapping[str, Kind]) -> Any:
 
 class Body(_coefficients("Body", {key: kind.meta() for key, kind in BODY.items()})):  # type: ignore[misc]
     """Mass, needed for surge, sway and heave, and moment of inertia, needed for yaw."""
+
+    model_config = DOCUMENTED
 
     coupling: bool = False
     """Whether surge, sway and yaw are coupled: Coriolis and Munk terms of a diagonal mass matrix."""
@@ -75,6 +77,8 @@ _CURVE = {key: kind.meta(curve="curve", equation="(2)") for key, kind in CURVE.i
 class Curve(_coefficients("Curve", _CURVE, CURVE)):  # type: ignore[misc]
     """A thrust curve: a_t m² + b_t m, m the command beyond the dead band. In reverse it is mirrored, unless it has
     coefficients of its own there."""
+
+    model_config = DOCUMENTED
 
     description: Name | None = None
     """Words for what has this curve: "rear pair"."""
@@ -93,12 +97,12 @@ _axes: dict[str, Any] = {name: (table | None, None) for name, table in _tables.i
 _open_axes: dict[str, Any] = {name: (_opened(table, AXIS) | None, None) for name, table in _tables.items()}
 
 
-class Axes(create_model("_Axes", __base__=Strict, **_axes)):  # type: ignore[misc]
+class Axes(table_of("_Axes", Strict, _axes)):  # type: ignore[misc]
     """The axes that the vehicle has."""
 
 
 OpenArm, OpenCurve = _opened(Arm, ARM), _opened(Curve, CURVE)
-OpenAxes = create_model("_OpenAxes", __base__=Strict, __doc__=Axes.__doc__, **_open_axes)
+OpenAxes = table_of("_OpenAxes", Strict, _open_axes, Axes.__doc__)
 
 
 # ---- Thrusters -------------------------------------------------------------------------------------------------------
