@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import inf, sqrt
 
 import numpy as np
-from scipy.signal import lfilter
 
 from rov_fmu.identify.runs import PreparedRecording, push
 from rov_fmu.identify.step_responses import correlation_time
@@ -98,6 +97,8 @@ def _fits(time: Array, v: Array, steady: Array, rate: float) -> tuple[Array, Arr
 
     The gains, the sums of squares that are left, and the residuals of the best.
     """
+    from scipy.signal import lfilter  # late: it takes long to import, and tables need none of it
+
     fall = np.exp(-rate * float(time[1] - time[0]))
     lagging = lfilter([1.0 - fall], [1.0, -fall], np.pad(steady[:, :-1], ((0, 0), (1, 0))), axis=1)
     left, lagging = v - v.mean(), lagging - lagging.mean(axis=1, keepdims=True)

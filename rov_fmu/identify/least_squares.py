@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from rov_fmu.motion.layout import AXIS, CURVE, TUNING, Kind
 from rov_fmu.tank.arrays import Array, Flags
@@ -229,7 +229,7 @@ def leave_one_out(groups: Array, predict: Callable[[Flags], Array | None]) -> Ar
 
 def quantile(degrees_of_freedom: float) -> float:
     """How many standard errors a 95 % interval reaches (Student)."""
-    return float(student.ppf(0.5 + 0.5 * LEVEL, degrees_of_freedom))
+    return float(stdtrit(degrees_of_freedom, 0.5 + 0.5 * LEVEL))
 
 
 def rms(errors: Array) -> float:

@@ -11,7 +11,6 @@ from itertools import pairwise
 from math import hypot, isnan, nan, sqrt
 
 import numpy as np
-from scipy.signal import correlate
 
 from rov_fmu.motion.riccati import RISE
 from rov_fmu.tank.arrays import Array
@@ -77,6 +76,8 @@ def correlation_time(residuals: Array) -> float:
 
     The sum ends where the autocorrelation falls into what white noise has by chance.
     """
+    from scipy.signal import correlate  # late: it takes long to import, and tables need none of it
+
     n = len(residuals)
     centred = residuals - residuals.mean()
     lags = correlate(centred, centred, mode="full", method="fft")[n - 1 :]

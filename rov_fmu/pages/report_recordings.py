@@ -6,7 +6,6 @@ from math import isfinite
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.signal import savgol_coeffs
 
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.recordings_fit import RecordingsFit
@@ -158,6 +157,8 @@ def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
 
 def _window(simulation: Simulation) -> float:
     """The shortest window (s) in which noise does not hide a step of the velocity."""
+    from scipy.signal import savgol_coeffs
+
     rate = (len(simulation.time) - 1) / float(simulation.time[-1] - simulation.time[0])
     visible = _STILL * float(np.ptp(simulation.velocity))
     for window in _WINDOWS[:-1]:

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from rov_fmu.tank.arrays import Array
 
@@ -24,6 +23,8 @@ def velocity(
     time: Array, values: Array, *, is_position: bool, window: float = WINDOW, method: Method = "savitzky-golay"
 ) -> tuple[Array, Array]:
     """Smoothed velocity on evenly spaced times (s), from position or velocity at any times; the window is in s."""
+    from scipy.signal import savgol_filter  # late: it takes long to import, and tables need none of it
+
     step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST)  # in spite of a gap of days
     even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
     samples = np.interp(even, time, values)
@@ -36,6 +37,8 @@ def velocity(
 
 def kernel(even: Array, window: float, *, is_position: bool) -> Array:
     """The weights of the local cubic on these evenly spaced times (s)."""
+    from scipy.signal import savgol_coeffs
+
     interval = float(even[1] - even[0])
     n = _odd(window / interval, len(even))
     return np.asarray(savgol_coeffs(n, min(_ORDER, n - 1), deriv=int(is_position), delta=interval))
