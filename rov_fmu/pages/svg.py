@@ -10,6 +10,7 @@ from typing import Any
 from lxml import etree
 from markupsafe import Markup
 from matplotlib import style
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from rov_fmu.files.messages import FileError
@@ -107,8 +108,20 @@ def saved(
     with style.context(["default", _STYLE, {"svg.hashsalt": salt, **margins}]):
         figure = Figure(figsize=size, layout="constrained", facecolor=background)
         draw(figure)
+        _arrange(figure, how["format"])
         figure.savefig(file, **how)
     return file.getvalue()
+
+
+def _arrange(figure: Figure, form: str) -> None:
+    """Lay it out as it is saved; where that is left to Matplotlib, it draws all of it once more."""
+    if form == "svg":
+        FigureCanvasSVG(figure)
+        figure.dpi = 72.0  # as SVG is drawn
+    engine = figure.get_layout_engine()
+    assert engine
+    engine.execute(figure)
+    figure.set_layout_engine(None)
 
 
 def _without_ballast(svg: bytes) -> str:
