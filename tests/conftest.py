@@ -1,9 +1,12 @@
-"""The FMU under test: built once a session by the exporter's own command line, for this machine."""
+"""The FMU under test: built once a run by the exporter's own command line, for this machine."""
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 
 from rov_fmu.build import chosen_platforms
@@ -33,33 +36,53 @@ def heavy() -> Vehicle:
     return load_vehicle(SHIPPED["bluerov2_heavy"])
 
 
+Made = Callable[[str, Callable[[Path], object]], Path]
+"""A folder of this name, and what fills it."""
+
+
 @pytest.fixture(scope="session")
-def videoray_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """A folder that is made once a run, by the worker that needs it first; tests only read it."""
+    own = tmp_path_factory.getbasetemp()
+    of_all = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+    def made(name: str, fill: Callable[[Path], object]) -> Path:
+        folder, draft = of_all / name, tmp_path_factory.mktemp("draft")
+        with FileLock(of_all / f"{name}.lock"):
+            if not folder.exists():
+                fill(draft)
+                draft.rename(folder)
+        return folder
+
+    return made
+
+
+def _videoray(folder: Path, fmi: int) -> None:
+    """The VideoRay's FMU, and what is in it."""
+    path = folder / f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"
+    assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(path)]) == 0
+    fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
+
+
+@pytest.fixture(scope="session")
+def videoray_fmu(made_once: Made) -> Path:
     # a path with a space and an umlaut, as users have them
-    path = tmp_path_factory.mktemp("FMU für Tests") / "videoray.fmu"
-    assert main(["build", "--platform", "host", "-o", str(path)]) == 0
-    return path
+    return made_once("FMU für Tests", lambda folder: _videoray(folder, 2)) / "videoray.fmu"
 
 
 @pytest.fixture(scope="session")
 def videoray_dir(videoray_fmu: Path) -> Path:
-    folder = videoray_fmu.with_suffix("")
-    fmpy.extract(str(videoray_fmu), unzipdir=str(folder))
-    return folder
+    return videoray_fmu.with_suffix("")
 
 
 @pytest.fixture(scope="session")
-def videoray3_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("FMU für FMI 3") / "videoray.fmi3.fmu"
-    assert main(["build", "--fmi", "3", "--platform", "host", "-o", str(path)]) == 0
-    return path
+def videoray3_fmu(made_once: Made) -> Path:
+    return made_once("FMU für FMI 3", lambda folder: _videoray(folder, 3)) / "videoray.fmi3.fmu"
 
 
 @pytest.fixture(scope="session")
 def videoray3_dir(videoray3_fmu: Path) -> Path:
-    folder = videoray3_fmu.with_suffix("")
-    fmpy.extract(str(videoray3_fmu), unzipdir=str(folder))
-    return folder
+    return videoray3_fmu.with_suffix("")
 
 
 def unzipped(vehicle: Path, folder: Path, fmi: int = 2) -> Path:
@@ -75,21 +98,21 @@ def unzipped(vehicle: Path, folder: Path, fmi: int = 2) -> Path:
 
 
 @pytest.fixture(scope="session")
-def heavy_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def heavy_dir(made_once: Made) -> Path:
     """The FMU of the BlueROV2 Heavy, which has sway, lag and coupling."""
-    return unzipped(SHIPPED["bluerov2_heavy"], tmp_path_factory.mktemp("heavy"))
+    return made_once("heavy", lambda folder: unzipped(SHIPPED["bluerov2_heavy"], folder))
 
 
 @pytest.fixture(scope="session")
-def everything_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def everything_dir(made_once: Made) -> Path:
     """The FMU of a vehicle that has all that one can have."""
-    return unzipped(EVERYTHING, tmp_path_factory.mktemp("everything"))
+    return made_once("everything", lambda folder: unzipped(EVERYTHING, folder))
 
 
 @pytest.fixture(scope="session")
-def heavy3_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def heavy3_dir(made_once: Made) -> Path:
     """The FMU of FMI 3.0 of the BlueROV2 Heavy."""
-    return unzipped(SHIPPED["bluerov2_heavy"], tmp_path_factory.mktemp("heavy3"), fmi=3)
+    return made_once("heavy3", lambda folder: unzipped(SHIPPED["bluerov2_heavy"], folder, fmi=3))
 
 
 @pytest.fixture(scope="module")

@@ -58,42 +58,45 @@ def _imports(module: str) -> set[str]:
     return found - {"", module}
 
 
-IMPORTS = {module: _imports(module) for module in FILES}
+@pytest.fixture(scope="module")
+def imports() -> dict[str, set[str]]:
+    """Of every module."""
+    return {module: _imports(module) for module in FILES}
 
 
 def _part(module: str) -> str:
     return [*module.split("."), ""][1]
 
 
-def test_the_imports_are_seen() -> None:
-    assert IMPORTS["rov_fmu.build"] >= {"rov_fmu.export.archive", "rov_fmu.pages.fmu_page"}
-    assert "rov_fmu.pages.report" in IMPORTS["rov_fmu.cli"], "inside a function"
-    assert "rov_fmu.motion.rov" in IMPORTS["rov_fmu.export.slave"], "from a package"
+def test_the_imports_are_seen(imports: dict[str, set[str]]) -> None:
+    assert imports["rov_fmu.build"] >= {"rov_fmu.export.archive", "rov_fmu.pages.fmu_page"}
+    assert "rov_fmu.pages.report" in imports["rov_fmu.cli"], "inside a function"
+    assert "rov_fmu.motion.rov" in imports["rov_fmu.export.slave"], "from a package"
     assert {_part(module) for module in FILES if module.startswith("rov_fmu.")} == {*PARTS, "motion", "__main__"}
 
 
-def test_nothing_imports_in_a_circle() -> None:
+def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
     try:
-        TopologicalSorter(IMPORTS).prepare()
+        TopologicalSorter(imports).prepare()
     except CycleError as circle:
         pytest.fail(" < ".join(circle.args[1]))
 
 
-def test_the_package_imports_downwards() -> None:
+def test_the_package_imports_downwards(imports: dict[str, set[str]]) -> None:
     below = {part: {part, *PARTS[n:], "motion", ""} for n, part in enumerate(PARTS)}
     below |= {"motion": {"motion", ""}, "__main__": {"cli", "process"}, "": set()}
     upward = {
         f"{module} imports {name}"
         for module in FILES
         if module.split(".")[0] == "rov_fmu"
-        for name in IMPORTS[module]
+        for name in imports[module]
         if name.startswith("rov_fmu") and _part(name) not in below[_part(module)]
     }
     assert not upward
 
 
-def test_the_files_of_the_package_know_nothing_of_the_model() -> None:
-    assert not [m for m in FILES if _part(m) in ("files", "process") and any(_part(n) == "motion" for n in IMPORTS[m])]
+def test_the_files_of_the_package_know_nothing_of_the_model(imports: dict[str, set[str]]) -> None:
+    assert not [m for m in FILES if _part(m) in ("files", "process") and any(_part(n) == "motion" for n in imports[m])]
 
 
 def test_the_motion_is_the_standard_library_alone() -> None:

@@ -20,8 +20,21 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import VEHICLES, VIDEORAY
 
-SHIPPED_PICTURES = {name: pictures(load_vehicle(path).rov) for name, path in SHIPPED.items()}
+Pictures = Mapping[str, bytes]
+"""By their path in the FMU."""
 SIZES = {"diagram": 8_500, "icon": 3_000, "signal": 500}
+
+
+@pytest.fixture(scope="module")
+def shipped() -> dict[str, Pictures]:
+    """Of every vehicle that ships."""
+    return {name: pictures(load_vehicle(path).rov) for name, path in SHIPPED.items()}
+
+
+@pytest.fixture(params=SHIPPED)
+def files(request: pytest.FixtureRequest, shipped: dict[str, Pictures]) -> Pictures:
+    """Of one of them."""
+    return shipped[request.param]
 
 
 def decoded(png: bytes) -> Any:
@@ -29,8 +42,7 @@ def decoded(png: bytes) -> Any:
     return imread(BytesIO(png), format="png")
 
 
-@pytest.mark.parametrize("files", SHIPPED_PICTURES.values(), ids=SHIPPED_PICTURES)
-def test_each_png_opens_and_is_small(files: Mapping[str, bytes]) -> None:
+def test_each_png_opens_and_is_small(files: Pictures) -> None:
     shapes = {}
     for path, content in files.items():
         if path.endswith(".png"):
@@ -43,15 +55,14 @@ def test_each_png_opens_and_is_small(files: Mapping[str, bytes]) -> None:
     assert shapes["diagram"][1] == 740
 
 
-def test_the_icon_is_transparent_and_the_diagram_is_not() -> None:
-    files = SHIPPED_PICTURES["videoray"]
+def test_the_icon_is_transparent_and_the_diagram_is_not(shipped: dict[str, Pictures]) -> None:
+    files = shipped["videoray"]
     icon = decoded(files["terminalsAndIcons/icon.png"])
     assert [float(icon[place][3]) for place in ((0, 0), (-1, -1), (100, 100))] == [0.0, 0.0, 1.0]
     assert (decoded(files["documentation/diagram.png"])[..., 3] == 1.0).all()
 
 
-@pytest.mark.parametrize("files", SHIPPED_PICTURES.values(), ids=SHIPPED_PICTURES)
-def test_the_svg_needs_nothing_and_runs_nothing(files: Mapping[str, bytes]) -> None:
+def test_the_svg_needs_nothing_and_runs_nothing(files: Pictures) -> None:
     svg = files["terminalsAndIcons/icon.svg"]
     root = etree.fromstring(svg)
     assert {etree.QName(element).localname for element in root.iter()} <= {
@@ -85,17 +96,17 @@ def test_every_thruster_is_within_the_icon(kind: str) -> None:
     assert len(arrows) == len(horizontal)
 
 
-def test_vehicles_have_pictures_of_their_own() -> None:
+def test_vehicles_have_pictures_of_their_own(shipped: dict[str, Pictures]) -> None:
     """And the refit of the VideoRay, which has the same thrusters, the same."""
-    assert SHIPPED_PICTURES["videoray"] == SHIPPED_PICTURES["videoray_refit"]
+    assert shipped["videoray"] == shipped["videoray_refit"]
     names = ("videoray", "bluerov2", "bluerov2_heavy")
     for path in ("terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg", "documentation/diagram.png"):
-        assert len({SHIPPED_PICTURES[name][path] for name in names}) == len(names)
+        assert len({shipped[name][path] for name in names}) == len(names)
 
 
-def test_the_same_bytes_whatever_matplotlib_is_set_to() -> None:
+def test_the_same_bytes_whatever_matplotlib_is_set_to(shipped: dict[str, Pictures]) -> None:
     with mpl.rc_context({"lines.linewidth": 5.0, "figure.dpi": 77, "savefig.dpi": 55, "font.size": 20.0}):
-        assert pictures(VIDEORAY) == SHIPPED_PICTURES["videoray"]
+        assert pictures(VIDEORAY) == shipped["videoray"]
 
 
 @pytest.mark.parametrize("size", [(0.29, 0.57), (1.14, 0.58)])
