@@ -247,12 +247,11 @@ _CELL = """
 import asyncio, sys
 from pathlib import Path
 from rov_fmu.build import build
-from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 async def cell():
     try:
-        build(load_vehicle(VIDEORAY), Path(sys.argv[1]), platforms=["host"])
+        build(load_vehicle(Path(sys.argv[2])), Path(sys.argv[1]), platforms=["host"])
     except KeyboardInterrupt:
         print("interrupted")
 
@@ -266,7 +265,7 @@ def test_an_interrupted_build_in_a_notebook_ends_at_once_and_leaves_nothing(tmp_
     # an empty cache makes the compiler work for seconds
     caches = dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(tmp_path / "cache"))
     process = subprocess.Popen(
-        [sys.executable, "-c", _CELL, str(tmp_path / "x.fmu")],
+        [sys.executable, "-c", _CELL, str(tmp_path / "x.fmu"), str(BARE)],
         env=os.environ | caches | {"TMPDIR": str(tmp_path / "tmp")}, cwd=ROOT, stdout=subprocess.PIPE, text=True,
         # a shell starts what it runs in the background with interrupts ignored, and that is inherited
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509

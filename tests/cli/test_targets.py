@@ -13,7 +13,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import COMMANDS, REFIT, ROOT, TESTS, Command, run_elsewhere
+from tests.commands import BARE, COMMANDS, REFIT, ROOT, TESTS, Command, run_elsewhere
 
 Capsys = pytest.CaptureFixture[str]
 OLD = b"the old one"
@@ -149,7 +149,7 @@ def test_a_limit_on_the_size_of_files_leaves_the_old_files(tmp_path: Path) -> No
 def test_two_files_are_written_both_or_neither(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
-    first, second = tmp_path / "rov", tmp_path / "videoray_OspModelDescription.xml"
+    first, second = tmp_path / "rov", tmp_path / "bare_OspModelDescription.xml"
     second.write_bytes(OLD)
     calls = 0
 
@@ -162,7 +162,7 @@ def test_two_files_are_written_both_or_neither(
     def run() -> int:
         if command == "identify":
             return main(["identify", str(TESTS), "-o", str(first), "--report", str(second)])
-        return main(["build", "--platform", "host", "-o", str(first), "--osp"])
+        return main(["build", str(BARE), "--platform", "host", "-o", str(first), "--osp"])
 
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full)
@@ -171,7 +171,7 @@ def test_two_files_are_written_both_or_neither(
     assert list(tmp_path.iterdir()) == [second]
     assert second.read_bytes() == OLD
     assert run() == 0
-    assert sorted(tmp_path.iterdir()) == [first, second]
+    assert sorted(tmp_path.iterdir()) == [second, first]
     if command == "identify":
         provenance = load_vehicle(first).provenance
         assert provenance

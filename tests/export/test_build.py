@@ -12,8 +12,9 @@ from lxml import etree
 from rov_fmu.build import build
 from rov_fmu.cli import main
 from rov_fmu.export import compile as fmu_compile
+from rov_fmu.export.archive import native_content
 from rov_fmu.export.interface import UNITS, variables
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE
 
 _LAYERS = {2: {"fmi2_host.h"}, 3: {"fmi3_host.h", "buildDescription.xml"}}
@@ -120,12 +121,12 @@ def test_the_same_inputs_give_the_same_bytes(either_fmu: Path, fmi: int, tmp_pat
 
 
 def test_another_coefficient_is_another_guid(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
-    text = ALONE
-    heavier = tmp_path / "heavier.toml"
-    heavier.write_text(text.replace("6.57", "6.58"), encoding="utf-8")
-    assert _build(tmp_path / "heavier.fmu", str(heavier)) == 0
-    guids = [fmpy.read_model_description(str(f)).guid for f in (videoray_fmu, tmp_path / "heavier.fmu")]
-    assert guids[0] != guids[1]
+    guids = [fmpy.read_model_description(str(videoray_fmu)).guid]
+    for mass in ("6.57", "6.58"):
+        path = tmp_path / f"{mass}.toml"
+        path.write_text(ALONE.replace("6.57", mass), encoding="utf-8")
+        guids.append(native_content(load_vehicle(path)).guid)
+    assert guids[0] == guids[1] != guids[2]
     assert vehicle.rov["m_rov"] == 6.57
 
 

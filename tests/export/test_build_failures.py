@@ -115,7 +115,7 @@ def _run(old: Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
     """The script as a process of its own, its temporary files in a folder that can be looked at."""
     (folder / "tmp").mkdir()
     return subprocess.Popen(
-        [sys.executable, _SCRIPT, "--platform", "host", "-o", str(old)],
+        [sys.executable, _SCRIPT, str(BARE), "--platform", "host", "-o", str(old)],
         env=os.environ | {"TMPDIR": str(folder / "tmp")} | environment,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -133,7 +133,7 @@ def test_no_room_for_temporary_files(old: Path, tmp_path: Path) -> None:
         "import matplotlib.font_manager, resource, runpy, signal, sys\n"  # which writes a cache of its own
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
-        f"sys.argv = ['build_fmu.py', '--platform', 'host', '-o', {str(old)!r}]\n"
+        f"sys.argv = ['build_fmu.py', {str(BARE)!r}, '--platform', 'host', '-o', {str(old)!r}]\n"
         f"runpy.run_path({_SCRIPT!r}, run_name='__main__')\n",
         encoding="utf-8",
     )

@@ -9,8 +9,8 @@ from rov_fmu.cli import main
 from rov_fmu.export.interface import UNITS, variables
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.motion.layout import Layout
-from rov_fmu.vehicle.vehicle import Vehicle
-from tests.commands import ALONE
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import ALONE, BARE
 from tests.vehicles import VEHICLES
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
@@ -109,13 +109,14 @@ def _build(path: Path, *arguments: str) -> int:
     return main(["build", "--platform", "host", "-o", str(path), *arguments])
 
 
-def test_the_option_writes_it_beside_the_fmu(tmp_path: Path, vehicle: Vehicle) -> None:
-    assert _build(tmp_path / "rov.fmu") == 0
+def test_the_option_writes_it_beside_the_fmu(tmp_path: Path) -> None:
+    vehicle = load_vehicle(BARE)
+    assert _build(tmp_path / "rov.fmu", str(BARE)) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["rov.fmu"]
-    assert _build(tmp_path / "rov.fmu", "--osp") == 0
+    assert _build(tmp_path / "rov.fmu", str(BARE), "--osp") == 0
     # named after the model, not after the archive: that is where libcosim looks for it
-    path = tmp_path / "videoray_OspModelDescription.xml"
-    assert sorted(tmp_path.iterdir()) == [tmp_path / "rov.fmu", path]
+    path = tmp_path / "bare_OspModelDescription.xml"
+    assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]
     assert osp_path(tmp_path / "rov.fmu", vehicle.identifier) == path
     assert path.read_bytes() == osp_model_description(vehicle.layout)
 
@@ -138,7 +139,7 @@ def test_a_folder_in_its_place_stops_the_build(tmp_path: Path, capsys: pytest.Ca
 def test_written_whole_or_not_at_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "videoray_OspModelDescription.xml"
+    path = tmp_path / "bare_OspModelDescription.xml"
     path.write_text("as it was")
     replace = Path.replace
 
@@ -148,7 +149,7 @@ def test_written_whole_or_not_at_all(
         return replace(self, target)
 
     monkeypatch.setattr(Path, "replace", full)
-    assert _build(tmp_path / "rov.fmu", "--osp") == 2
+    assert _build(tmp_path / "rov.fmu", str(BARE), "--osp") == 2
     assert f"{path}: cannot be written: No space left on device" in capsys.readouterr().err
     assert path.read_text() == "as it was"
-    assert sorted(tmp_path.iterdir()) == [tmp_path / "rov.fmu", path]
+    assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]
