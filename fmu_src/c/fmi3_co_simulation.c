@@ -70,17 +70,15 @@ FMI3_Export fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentComm
     (void)noSetFMUStatePriorToCurrentPoint;
     GIVEN(eventHandlingNeeded != NULL && terminateSimulation != NULL && earlyReturn != NULL && lastSuccessfulTime != NULL,
           "one of the results");
-    const double t = currentCommunicationPoint, end = t + communicationStepSize;
-    outcome done;
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
-    *lastSuccessfulTime = t;
     if (f->host.update == NULL) {
-        done = step(f, t, communicationStepSize);
-        *lastSuccessfulTime = done == DONE ? end : t;
-    } else {
-        done = step_in_pieces(f, t, communicationStepSize, lastSuccessfulTime);
+        const fmi3Status done = (fmi3Status)step(f, currentCommunicationPoint, communicationStepSize);
+        *lastSuccessfulTime = done == fmi3OK ? f->now.time : currentCommunicationPoint;
+        return done;
     }
-    *earlyReturn = done == DONE && *lastSuccessfulTime < end;
+    *lastSuccessfulTime = currentCommunicationPoint;
+    const outcome done = step_in_pieces(f, currentCommunicationPoint, communicationStepSize, lastSuccessfulTime);
+    *earlyReturn = done == DONE && *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;
     return (fmi3Status)done;
 }
 
