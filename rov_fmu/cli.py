@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -54,6 +55,14 @@ def _vehicles(_: click.Context, __: click.Parameter, incomplete: str) -> list[Co
 _vehicle = partial(
     click.argument, "vehicle", callback=lambda _, __, given: find_vehicle(given), shell_complete=_vehicles
 )
+
+
+def _finite(_: click.Context, __: click.Parameter, given: float | None) -> float | None:
+    if given is None or 0.0 < given < inf:  # click's range has room for NaN
+        return given
+    raise click.BadParameter(f"{given:g} is not a finite number above 0")
+
+
 _FILE = click.Path(path_type=Path, readable=False)  # what cannot be read is told where it is read
 
 
@@ -169,7 +178,7 @@ def _print_built(built: "Built", seconds: float) -> None:
 @click.argument("fmu", type=_FILE)
 @click.option("--interface", type=click.Choice(["co-simulation", "model-exchange"]),
               help="The first of these that it has, by default.")  # fmt: skip
-@click.option("--tolerance", type=click.FloatRange(min=0.0, min_open=True), help="In place of the experiments' own.")
+@click.option("--tolerance", type=float, callback=_finite, help="In place of the experiments' own.")
 def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     """Run the experiments that an FMU carries (FMI-LS-REF): any FMU that carries some."""
     from rov_fmu.export.proof import prove

@@ -13,9 +13,11 @@ from urllib.parse import unquote, urlsplit
 
 from lxml import etree
 
-from rov_fmu.export.reference_results import MANIFEST
 from rov_fmu.files.messages import FileError, shown
 
+NAME = "org.fmi-standard.fmi-ls-ref"
+FOLDER = f"extra/{NAME}"
+MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
 _LOOSE = 1e-3
 """The tolerance where neither experiment nor FMU has one."""
 _STEPS = 500

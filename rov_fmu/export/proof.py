@@ -1,20 +1,20 @@
 """An FMU proved by the experiments that it carries, run by FMPy."""
 
 import io
+import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, wait
-from contextlib import redirect_stdout
+from contextlib import closing, redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 import numpy as np
 
+from rov_fmu.export.apart import DiedError, apart
 from rov_fmu.export.experiments import Carried, Experiment, Series
-from rov_fmu.files.messages import FileError, brief
+from rov_fmu.files.messages import FileError, ProofError, brief, one_line
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
 """By the name that a person gives: FMPy's."""
@@ -25,6 +25,8 @@ _OF_NOMINAL = 0.01
 absolute tolerances (2.0, section 2.2.7)."""
 _OF_A_SOLVER = 1e-3
 """What the solver of Model Exchange may take of the tolerance at each step."""
+_WARNING = 1
+"""The status of a message, in every version of FMI; what is worse comes after it."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def prove(
     tolerance: float | None = None,
     on_experiment: Callable[[str, float], None] = lambda *_: None,
 ) -> list[Finding]:
-    """Run the experiments of an FMU and compare. Raises FileError.
+    """Run the experiments of an FMU and compare. Raises FileError, and ProofError where the FMU ends its process.
 
     `interface` is one of INTERFACES; the first that the FMU has by default. A tolerance stands in place of those of the
     experiments. `on_experiment` is told of the one that comes next, and of the share that is done.
@@ -75,22 +77,45 @@ def prove(
             raise FileError(
                 f"{fmu}: has no {interface or 'interface that can be run'}, only {', '.join(has) or 'none'}"
             )
+        chosen = [replace(x, tolerance=tolerance or x.tolerance) for x in experiments]
         found: list[Finding] = []
-        for n, experiment in enumerate(experiments):
-            on_experiment(experiment.name, n / len(experiments))
-            chosen = replace(experiment, tolerance=tolerance or experiment.tolerance)
-            found += _findings(folder, description, interface or has[0], chosen)
+        # A damaged library can end the process that loads it, and no interrupt ends a call that hangs.
+        with closing(apart(_all_findings, folder, interface or has[0], chosen)) as runs:
+            for n, experiment in enumerate(chosen):
+                on_experiment(experiment.name, n / len(chosen))
+                try:
+                    found += next(runs)
+                except DiedError as died:
+                    where = one_line(f"{fmu}: experiment {experiment.name!r}")
+                    raise ProofError(f"{where}: the FMU ended its process: {died}") from died
     return found
+
+
+def _all_findings(folder: str, interface: str, experiments: Sequence[Experiment]) -> Iterator[list[Finding]]:
+    import fmpy
+
+    description = fmpy.read_model_description(folder, validate=False)
+    for experiment in experiments:
+        yield list(_findings(folder, description, interface, experiment))
 
 
 def _findings(folder: str, description: Any, interface: str, experiment: Experiment) -> Iterator[Finding]:
     """A line a variable, or one where the experiment has no expected results or fails."""
+    import fmpy
+
     names = [*(experiment.references or ())][1:]
     kind = INTERFACES[interface]
-    said = io.StringIO()
+    reasons: list[bytes] = []
+
+    def keep(*told: Any) -> None:
+        """A message of the FMU: its last arguments are the same in every version of FMI."""
+        status, _, text = told[-3:]
+        if status >= _WARNING:
+            reasons[:] = [text or b""]
+
     try:
-        with redirect_stdout(said):  # FMPy's warnings, and what the FMU logs
-            result = _simulated(
+        with redirect_stdout(io.StringIO()):  # FMPy's warnings
+            result = fmpy.simulate_fmu(
                 folder,
                 validate=False,
                 start_time=experiment.start,
@@ -103,9 +128,13 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
                 output=names or None,
                 model_description=description,
                 remote_platform=None,
+                debug_logging=True,
+                logger=keep,
             )
     except Exception as error:  # FMPy raises that itself, and the FMU may fail in any way
-        yield Finding(experiment.name, "-", inf, experiment.tolerance, brief(str(error)))
+        told = "".join(f"; the FMU: {text.decode(errors='replace')}" for text in reasons)
+        what = str(error).replace(folder + os.sep, "").rstrip(".")  # the cause stands after the library's path
+        yield Finding(experiment.name, "-", inf, experiment.tolerance, brief(what + told, 240))
         return
     if not experiment.references:
         yield Finding(experiment.name, "-", 0.0, experiment.tolerance)
@@ -116,24 +145,6 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
         scale = max(*map(abs, values), _OF_NOMINAL * abs(nominal[name]))
         off = _deviation(result["time"], result[name], times, values)
         yield Finding(experiment.name, name, off / scale, experiment.tolerance)
-
-
-def _simulated(*arguments: Any, **options: Any) -> Any:
-    """What FMPy's simulate_fmu gives, run in a thread of its own: an FMU that hangs keeps no interrupt from coming."""
-    import fmpy
-
-    future: Future[Any] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(fmpy.simulate_fmu(*arguments, **options))
-        except BaseException as error:
-            future.set_exception(error)
-
-    Thread(target=run, daemon=True).start()
-    while not wait([future], timeout=0.1).done:  # on Windows an interrupt comes between two waits
-        pass
-    return future.result()
 
 
 def _signals(stimuli: Series | None) -> Any:

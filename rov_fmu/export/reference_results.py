@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, sqrt
 
+from rov_fmu.export.experiments import FOLDER, NAME
 from rov_fmu.export.extrapolation import TooFastError, states
 from rov_fmu.files.templates import render
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Axis, Meta
@@ -16,9 +17,6 @@ from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
-NAME = "org.fmi-standard.fmi-ls-ref"
-FOLDER = f"extra/{NAME}"
-MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 VERSION = "1.0.0-beta.1"
 EXPERIMENTS = "application/x-ma-hs-experiments"
@@ -123,7 +121,7 @@ def _step_responses(
             longest = max(units.values()) * _MULTIPLES[-1]
             for name, rov in sets.items():
                 experiment = f"{stem}_{name}" if len(sets) > 1 else stem
-                references = f"{stem}_{name}.csv"
+                references = f"{experiment}_expected.csv"
                 marks = [units[name] * n for n in _MULTIPLES]
                 try:
                     trajectory = _trajectory(rov, [(inputs, marks)])

@@ -19,10 +19,10 @@ def one_line(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
-def brief(text: str) -> str:
+def brief(text: str, most: int = 80) -> str:
     """On one line, and not endless."""
-    clean = one_line(text[:100])
-    return clean if len(clean) <= 80 else f"{clean[:77]}..."
+    clean = one_line(text[: most + 20])
+    return clean if len(clean) <= most else f"{clean[: most - 3]}..."
 
 
 class _Repr(reprlib.Repr):

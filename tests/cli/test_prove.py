@@ -1,9 +1,12 @@
 """rov-fmu prove: an FMU comes to the results that it carries, or not; ours, and any other."""
 
+import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import zipfile
 from collections.abc import Callable, Mapping
@@ -16,11 +19,12 @@ from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
 from rov_fmu.export.archive import native_content
 from rov_fmu.export.compile import compile_all
+from rov_fmu.export.experiments import FOLDER, MANIFEST
 from rov_fmu.export.proof import prove
-from rov_fmu.export.reference_results import FOLDER, MANIFEST, reference_results
+from rov_fmu.export.reference_results import reference_results
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import ALONE, start
+from tests.commands import ALONE, ROOT, start
 
 Capsys = pytest.CaptureFixture[str]
 Files = Mapping[str, str | None]
@@ -164,6 +168,66 @@ def test_what_deviates_or_fails_is_told(
     assert err.endswith(" results are not as expected\n")
 
 
+def _changed(fmu: Path, begin: str, change: Callable[[bytes], bytes], path: Path) -> Path:
+    """Another FMU, with other bytes where a member's name begins so."""
+    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
+        for member in old.namelist():
+            content = old.read(member)
+            new.writestr(member, change(content) if member.startswith(begin) else content)
+    return path
+
+
+WHY: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
+    "out of bounds": (
+        f"{FOLDER}/tuned.ssv", lambda old: re.sub(b'value="[^"]*"', b'value="-5"', old, count=1),
+        r"fmi\dSet\w+ failed with status 2 \(discard\); the FMU: fmi\dSet\w+: alpha_u = -5 is not within 0 ",
+    ),
+    "a wrong token": (
+        "modelDescription.xml", lambda old: re.sub(b'(guid|Token)="[^"]*"', b'\\1="wrong"', old),
+        r"Failed to instantiate \w+; the FMU: fmi\dInstantiate\w*: the (GUID|instantiation token) wrong is not that ",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("version", ["videoray_fmu", "videoray3_fmu"])
+@pytest.mark.parametrize("case", WHY)
+def test_an_fmu_tells_why_it_fails(case: str, version: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    begin, change, reason = WHY[case]
+    first = prove(_changed(request.getfixturevalue(version), begin, change, tmp_path / "other.fmu"))[0]
+    assert not first.passed
+    assert re.match(reason, first.error)
+
+
+def test_the_cause_is_seen_behind_the_path_of_a_library(videoray_fmu: Path, tmp_path: Path) -> None:
+    first = prove(_changed(videoray_fmu, "binaries/", lambda _: b"none", tmp_path / "none.fmu"))[0]
+    assert first.error.startswith("Failed to load shared library binaries")
+    assert str(Path(tempfile.gettempdir())) not in first.error
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a library that is cut off is not loaded")
+def test_an_fmu_that_ends_its_process_is_one_line(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+    fmu = _changed(videoray_fmu, "binaries/", lambda old: old[:20_000], tmp_path / "cut.fmu")
+    assert main(["prove", str(fmu)]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    where = f"rov-fmu: {fmu}: experiment 'surge_20_tuned': the FMU ended its process: signal "
+    assert err in {f"{where}7 (Bus error)\n", f"{where}11 (Segmentation fault)\n"}
+
+
+def test_a_script_without_a_guard_runs_once(foreign: Path, tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import sys\nfrom pathlib import Path\nfrom rov_fmu.export.proof import prove\n"
+        "print(len(prove(Path(sys.argv[1]))))\n",
+        encoding="utf-8",
+    )
+    ran = subprocess.run(
+        [sys.executable, script, foreign], env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    assert (ran.stdout, ran.stderr) == ("5\n", "")
+
+
 _HANGS = """
 #include <stdio.h>
 #include <stdlib.h>
@@ -189,9 +253,7 @@ def test_an_fmu_that_hangs_is_ended_by_an_interrupt(videoray_fmu: Path, vehicle:
         chosen_platforms(["host"]), {**content.sources, name: _HANGS + step}, content.identifier
     ).values()
     fmu, folder, begun = tmp_path / "hangs.fmu", tmp_path / "tmp", tmp_path / "begun"
-    with zipfile.ZipFile(videoray_fmu) as old, zipfile.ZipFile(fmu, "w") as new:
-        for member in old.namelist():
-            new.writestr(member, library if member.startswith("binaries/") else old.read(member))
+    _changed(videoray_fmu, "binaries/", lambda _: library, fmu)
     folder.mkdir()
     process = start(
         ["prove", str(fmu)],
@@ -316,4 +378,12 @@ def test_what_an_fmu_does_not_have_is_told(foreign: Path, videoray_fmu: Path, tm
     bare = _with(videoray_fmu, binaries, tmp_path / "bare.fmu")
     assert main(["prove", str(bare)]) == 2
     assert "has no binary for this machine" in capsys.readouterr().err
-    assert main(["prove", str(foreign), "--tolerance", "0"]) == 2
+
+
+@pytest.mark.parametrize("tolerance", ["0", "-1", "nan", "inf", "1e999"])
+def test_a_tolerance_is_finite_and_above_zero(tolerance: str, foreign: Path, capsys: Capsys) -> None:
+    assert main(["prove", str(foreign), "--tolerance", tolerance]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("rov-fmu: Invalid value for '--tolerance': ")
+    assert err.count("\n") == 1

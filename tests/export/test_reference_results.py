@@ -15,8 +15,9 @@ from lxml import etree
 
 from checks import reference
 from rov_fmu.export.archive import archive
+from rov_fmu.export.experiments import FOLDER, MANIFEST
 from rov_fmu.export.extrapolation import TooFastError, states
-from rov_fmu.export.reference_results import FOLDER, MANIFEST, TOLERANCE, reference_results
+from rov_fmu.export.reference_results import TOLERANCE, reference_results
 from rov_fmu.motion.layout import AXES
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.published import load_tables, untuned
@@ -75,6 +76,11 @@ def test_the_files_have_the_form_of_the_standards(shipped: tuple[Vehicle, Mappin
     for name, content in files.items():
         if name.endswith(".ssv"):
             schema.assertValid(etree.fromstring(content))
+
+
+def test_expected_results_are_named_after_their_experiment(shipped: tuple[Vehicle, Mapping[str, bytes]]) -> None:
+    for name, experiment in _experiments(shipped[1]).items():
+        assert experiment.find("References").get("source") == f"{name}_expected.csv"
 
 
 def test_they_are_small_and_the_same_each_time(shipped: tuple[Vehicle, Mapping[str, bytes]]) -> None:
