@@ -2,17 +2,19 @@
 
 import io
 import os
+import signal
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rov_fmu.export.apart import DiedError, apart
 from rov_fmu.export.experiments import Carried, Experiment, Series
 from rov_fmu.files.messages import FileError, ProofError, brief, one_line
 
@@ -54,6 +56,8 @@ def prove(
 ) -> list[Finding]:
     """Run the experiments of an FMU and compare. Raises FileError, and ProofError where the FMU ends its process.
 
+    That is another one than this, so a script that calls this has its `if __name__ == "__main__":`.
+
     `interface` is one of INTERFACES; the first that the FMU has by default. A tolerance stands in place of those of the
     experiments. `on_experiment` is told of the one that comes next, and of the share that is done.
     """
@@ -79,24 +83,55 @@ def prove(
             )
         chosen = [replace(x, tolerance=tolerance or x.tolerance) for x in experiments]
         found: list[Finding] = []
-        # A damaged library can end the process that loads it, and no interrupt ends a call that hangs.
-        with closing(apart(_all_findings, folder, interface or has[0], chosen)) as runs:
+        with closing(_apart(folder, interface or has[0], chosen)) as runs:
             for n, experiment in enumerate(chosen):
                 on_experiment(experiment.name, n / len(chosen))
                 try:
                     found += next(runs)
-                except DiedError as died:
+                except _DiedError as died:
                     where = one_line(f"{fmu}: experiment {experiment.name!r}")
                     raise ProofError(f"{where}: the FMU ended its process: {died}") from died
     return found
 
 
-def _all_findings(folder: str, interface: str, experiments: Sequence[Experiment]) -> Iterator[list[Finding]]:
+class _DiedError(Exception):
+    """The process that ran the FMU is no more."""
+
+
+def _apart(folder: str, interface: str, experiments: Sequence[Experiment]) -> Generator[list[Finding]]:
+    """The findings of each experiment, from a process of its own, which ends with the generator. Raises _DiedError.
+
+    A damaged library ends the process that loads it, and no interrupt ends a call that hangs.
+    """
+    spawn = get_context("spawn")
+    here, there = spawn.Pipe(duplex=False)
+    process = spawn.Process(target=_send_findings, args=(there, folder, interface, experiments), daemon=True)
+    process.start()
+    there.close()
+    try:
+        for _ in experiments:
+            while not here.poll(0.1):  # on Windows an interrupt comes between two waits
+                pass
+            yield here.recv()
+    except (EOFError, OSError) as error:  # at the end, or amid an answer
+        process.join()
+        code = process.exitcode or 0
+        raise _DiedError(f"signal {-code} ({signal.strsignal(-code)})" if code < 0 else f"exit code {code}") from error
+    finally:
+        process.kill()
+        process.join()
+        here.close()
+
+
+def _send_findings(to: Connection, folder: str, interface: str, experiments: Sequence[Experiment]) -> None:
+    """The other side: what the FMU prints goes nowhere, and an interrupt is for the process that this one answers."""
     import fmpy
 
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     description = fmpy.read_model_description(folder, validate=False)
     for experiment in experiments:
-        yield list(_findings(folder, description, interface, experiment))
+        to.send(list(_findings(folder, description, interface, experiment)))
 
 
 def _findings(folder: str, description: Any, interface: str, experiment: Experiment) -> Iterator[Finding]:

@@ -1,6 +1,5 @@
 """rov-fmu prove: an FMU comes to the results that it carries, or not; ours, and any other."""
 
-import os
 import re
 import shutil
 import signal
@@ -24,7 +23,7 @@ from rov_fmu.export.proof import prove
 from rov_fmu.export.reference_results import reference_results
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import ALONE, ROOT, start
+from tests.commands import ALONE, start
 
 Capsys = pytest.CaptureFixture[str]
 Files = Mapping[str, str | None]
@@ -212,20 +211,6 @@ def test_an_fmu_that_ends_its_process_is_one_line(videoray_fmu: Path, tmp_path: 
     assert out == ""
     where = f"rov-fmu: {fmu}: experiment 'surge_20_tuned': the FMU ended its process: signal "
     assert err in {f"{where}7 (Bus error)\n", f"{where}11 (Segmentation fault)\n"}
-
-
-def test_a_script_without_a_guard_runs_once(foreign: Path, tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text(
-        "import sys\nfrom pathlib import Path\nfrom rov_fmu.export.proof import prove\n"
-        "print(len(prove(Path(sys.argv[1]))))\n",
-        encoding="utf-8",
-    )
-    ran = subprocess.run(
-        [sys.executable, script, foreign], env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-        check=True,
-    )  # fmt: skip
-    assert (ran.stdout, ran.stderr) == ("5\n", "")
 
 
 _HANGS = """
