@@ -103,7 +103,8 @@ static double take_step(const slot *s)
 {
     static const double usual[] = {1e-3, 1e-2, 0.1, 1.0, 100.0, 1000.0}, fine[] = {1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 1e-2};
     const unsigned any = take_byte();
-    return any >= 160 ? take_real() : s->of.updates ? fine[any % 6] : usual[any % 6];
+    const unsigned rare = s->of.updates ? 240 : 160; /* thousands of updates take their time */
+    return any >= rare ? take_real() : s->of.updates ? fine[any % 6] : usual[any % 6];
 }
 
 static void PLAY(DoStep)(slot *s)

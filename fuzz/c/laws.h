@@ -203,7 +203,7 @@ static void check_parts(const fmu *start, const fmu *end, double h, int parts)
 {
     double values[N_VARIABLES];
     memcpy(values, start->now.values, sizeof values);
-    if (!(changes_of(start, h) <= 1.0)) { /* rounding may grow */
+    if (!(changes_of(start, h) <= 1.0) || h / parts < DBL_MIN) { /* rounding may grow; a subnormal has no third */
         return;
     }
     for (int i = 0; i < parts; i++) {
