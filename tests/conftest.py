@@ -1,6 +1,5 @@
 """The FMU under test: built once a run by the exporter's own command line, for this machine."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -41,10 +40,10 @@ Made = Callable[[str, Callable[[Path], object]], Path]
 
 
 @pytest.fixture(scope="session")
-def made_once(tmp_path_factory: pytest.TempPathFactory) -> Made:
+def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory) -> Made:
     """A folder that is made once a run, by the worker that needs it first; tests only read it."""
     own = tmp_path_factory.getbasetemp()
-    of_all = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    of_all = own.parent if hasattr(pytestconfig, "workerinput") else own  # a run inside a worker is a run of its own
 
     def made(name: str, fill: Callable[[Path], object]) -> Path:
         folder, draft = of_all / name, tmp_path_factory.mktemp("draft")
