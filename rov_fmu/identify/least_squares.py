@@ -149,8 +149,7 @@ def minimize(
     """
     low, high = limits
     start = np.clip(start, low, high)
-    residuals = _remembered(residuals)  # a search begins where the one before it ended
-    options: dict[str, Any] = {"jac": _remembered(jacobian) if jacobian else "3-point", "bounds": limits}
+    options: dict[str, Any] = {"jac": jacobian or "3-point", "bounds": limits}
     ends = {"xtol": tolerance, "ftol": 0.01 * tolerance, "gtol": 0.01 * tolerance}
     for method in ("trf", "dogbox") if far else ("dogbox",):
         result = least_squares(
@@ -167,19 +166,6 @@ def minimize(
         start = np.clip(result.x, low, high)
     plain = least_squares(residuals, start, method="dogbox", max_nfev=1, **options)
     return Solution(start, plain.fun, plain.jac)
-
-
-def _remembered(function: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """The same function, which keeps its last result; SciPy scales what it is given in place, so it gets a copy."""
-    last: tuple[Array, Array] | None = None
-
-    def of(x: Array) -> Array:
-        nonlocal last
-        if last is None or not np.array_equal(last[0], x):
-            last = x.copy(), function(x)
-        return last[1].copy()
-
-    return of
 
 
 def fit_named(residuals: Callable[[dict[str, float]], Array], start: Mapping[str, float]) -> Solution:

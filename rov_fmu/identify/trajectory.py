@@ -216,9 +216,9 @@ class _Piece:
         self.slopes = self._all(forward) if tangents else (self._by_start(), None)
 
     def _by_start(self) -> Slopes:
-        """By v alone: two motions near each other part as the integral of the drag's slope, -B - 2 A |v|, has it."""
-        none, (a, b) = np.zeros((0, len(self.end))), self._drag
-        return Slopes(np.exp(-b - 2.0 * a * (_MEANS @ self._c)), none, none, none, none, none)
+        none = np.zeros((0, len(self.end)))
+        by_v = self._tangent(None, np.ones((1, len(self.end)))).sum(axis=0)[0]
+        return Slopes(by_v, none, none, none, none, none)
 
     def _all(self, forward: Flags) -> tuple[Slopes, Slopes]:
         steps, c = self._steps, self._c
@@ -233,20 +233,24 @@ class _Piece:
             if n + 1 < ORDER:
                 terms[n + 1, 4 + K :] = -steps.D * h * h * falls
             falls = falls * (-steps.kappa * h) / (n + 1)
-        g = self._tangent(terms)
+        start = np.zeros((4 + 2 * K, N))
+        start[0] = 1.0
+        g = self._tangent(terms, start)
         both = np.vstack([forward, ~forward])
         found = []
         for rows in (g.sum(axis=0), h * np.einsum("k,kqn->qn", _MEANS, g)):
             found.append(Slopes(rows[0], both * rows[1], both * rows[2], rows[3], rows[4 : 4 + K], rows[4 + K :]))
         return found[0], found[1]
 
-    def _tangent(self, terms: Array) -> Array:
-        """The linear equation beside the series: ORDER + 1 x Q x N; the first begins with 1, the others with 0."""
+    def _tangent(self, terms: Array | None, start: Array) -> Array:
+        """The linear equation beside the series: ORDER + 1 x Q x N, from Q x N at the start."""
         c, (a, b) = self._c, self._drag
-        g = np.zeros((ORDER + 1, *terms.shape[1:]))
-        g[0, 0] = 1.0
+        g = np.zeros((ORDER + 1, *start.shape))
+        g[0] = start
         for n in range(ORDER):
-            g[n + 1] = -b * g[n] - 2.0 * a * np.einsum("kn,kqn->qn", c[: n + 1], g[n::-1]) + terms[n]
+            g[n + 1] = -b * g[n] - 2.0 * a * np.einsum("kn,kqn->qn", c[: n + 1], g[n::-1])
+            if terms is not None:
+                g[n + 1] += terms[n]
             g[n + 1] /= n + 1
         return g
 
