@@ -103,8 +103,11 @@ static double take_step(const slot *s)
 {
     static const double usual[] = {1e-3, 1e-2, 0.1, 1.0, 100.0, 1000.0}, fine[] = {1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 1e-2};
     const unsigned any = take_byte();
-    const unsigned rare = s->of.updates ? 240 : 160; /* thousands of updates take their time */
-    return any >= rare ? take_real() : s->of.updates ? fine[any % 6] : usual[any % 6];
+    const double real = any >= 160 ? take_real() : 0.0;
+    if (s->of.updates && any < 240) { /* thousands of updates take their time */
+        return fine[any % 6];
+    }
+    return any >= 160 ? real : usual[any % 6];
 }
 
 static void PLAY(DoStep)(slot *s)
