@@ -39,6 +39,6 @@ def test_a_mutant_is_one_change(file: str, before: str, after: set[str]) -> None
 
 @pytest.mark.long
 def test_most_of_a_sample_are_killed(capsys: pytest.CaptureFixture[str]) -> None:
-    """Every change of the code draws another sample, so the bound leaves room: of 21 not seen before, 18 died."""
-    arguments = ["--sample", "16", "--seed", "16", "--jobs", "2", "--least", "0.6"]
+    """Every change of the code draws another sample, and a small one, so the bound leaves room."""
+    arguments = ["--sample", "16", "--seed", "16", "--jobs", "2", "--least", "0.5"]
     assert mutants.main(arguments) == 0, capsys.readouterr().out
