@@ -107,9 +107,9 @@ def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> l
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names in a line, and not endlessly many."""
-    some = [*names]
-    return ", ".join(some[:_MOST]) + (", ..." if len(some) > _MOST else "")
+    """Names in a line, and neither endlessly many nor endless ones."""
+    some = [name or repr("") for name in names]
+    return brief(", ".join(some[:_MOST]) + (", ..." if len(some) > _MOST else ""), 200)
 
 
 def line(key: str, reason: str, *value: object) -> str:

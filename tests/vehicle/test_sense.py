@@ -117,6 +117,9 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "a curve with a dot": ({"curves": {"frame": _CURVE, "boo.st": _CURVE}, "alternatives": GONE}, [
         ("curves.boo.st = 'boo.st'", "letters, digits"), ("thruster.l.curve = 'boost'", "no such curve, only frame"),
         ("thruster.r.curve = 'boost'", "no such curve")]),
+    "a curve without a name and one with an endless one": ({**_ALONE, "curves": {"": _CURVE, "x" * 300: _CURVE}}, [
+        ("curves.'' = ''", "letters"), (f"curves.{'x' * 70}... = 'xxx", "letters"),
+        *[(f"thruster.{name}.curve", f"there is no such curve, only '', {'x' * 193}...") for name in "12345lr"]]),
     "an unknown curve": ({"thruster.5.curve": "T200"}, [
         ("thruster.5.curve = 'T200'", "no such curve, only frame, boost")]),
     "a curve of no thruster": ({"curves.spare": _CURVE}, [("curves.spare: no thruster has this curve",)]),
