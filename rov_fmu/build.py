@@ -73,7 +73,8 @@ def build(
     check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
     chosen = chosen_platforms(platforms, fmi) if native else []
     left_out: list[str] = []
-    pages = {**documentation(vehicle, native=native, fmi=fmi), **reference_results(vehicle, left_out.append)}
+    results = reference_results(vehicle, left_out.append)
+    pages = {**documentation(vehicle, native=native, fmi=fmi, proves=bool(results)), **results}
     content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
     start = perf_counter()
     seconds: dict[str, float] = {}

@@ -37,14 +37,16 @@ _FRAMES = {
 # ---- The page ------------------------------------------------------------------------------------------------------
 
 
-def documentation(vehicle: Vehicle, *, native: bool, fmi: int = 2) -> dict[str, bytes]:
+def documentation(vehicle: Vehicle, *, native: bool, fmi: int = 2, proves: bool = True) -> dict[str, bytes]:
     """The page and the pictures by their path in the FMU. Raises FileError."""
-    text = documentation_page(vehicle, native=native, fmi=fmi)
+    text = documentation_page(vehicle, native=native, fmi=fmi, proves=proves)
     return {"documentation/index.html": text.encode(), **pictures(vehicle.rov)}
 
 
-def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2) -> str:
+def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, proves: bool = True) -> str:
     """The page of a vehicle as HTML, of the native FMU in a version of FMI or the one in pure Python.
+
+    `proves`: the FMU carries reference results.
 
     Without a data folder it goes without tables and measurements.
     """
@@ -64,6 +66,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2) -
         is_tuned=_is_tuned(rov),
         native=native,
         fmi=fmi,
+        proves=proves,
         output_order=OUTPUT_ORDER,
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
         groups=[

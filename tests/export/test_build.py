@@ -147,6 +147,7 @@ def test_the_command_line_says_which_results_are_left_out(
     assert line.endswith(", yaw_70_tuned, yaw_70_untuned, manoeuvre")
     with zipfile.ZipFile(tmp_path / "rov.fmu") as archive:
         assert not [name for name in archive.namelist() if name.startswith("extra/")]
+        assert b"rov-fmu prove" not in archive.read("documentation/index.html")
 
 
 def test_a_program_is_told_of_a_platform_that_does_not_exist(vehicle: Vehicle, tmp_path: Path) -> None:

@@ -216,6 +216,8 @@ def test_the_page_of_the_python_flavour_claims_no_more_than_it_does(vehicle: Veh
 def test_the_page_tells_of_the_version_of_fmi_that_it_is_in(vehicle: Vehicle) -> None:
     two, three = (documentation_page(vehicle, fmi=fmi) for fmi in (2, 3))
     assert " ".join(two.split()).count("up to order 19") == 1
+    assert "rov-fmu prove videoray.fmu" in two
+    assert "rov-fmu prove videoray.fmi3.fmu" in three
     for claim in (
         "FMI 3.0",
         "fmi3Discard",
