@@ -1,4 +1,4 @@
-/* What is FMI 2.0's own of an instance: its callbacks, and how its functions begin. */
+/* What is FMI 2.0's own of an instance: its callbacks, and its words. */
 
 /* The functions are named <modelIdentifier>_fmi2..., so that several FMUs can be linked into one program; plainly, as in
  * a shared library, where FMI2_OVERRIDE_FUNCTION_PREFIX is defined. The headers before FMI 2.0.4 do not know it: with
@@ -15,6 +15,8 @@
 #endif
 #include "fmi2Functions.h"
 
+#define FMI_STATUS fmi2Status
+#define INSTANCE c /* as the functions call it */
 #define TOKEN_NAME "GUID"
 #define REAL "Real"
 enum {
@@ -38,16 +40,3 @@ static void tell(const host *to, const char *name, int status, const char *categ
         to->logger(to->componentEnvironment, name, (fmi2Status)status, category, text);
     }
 }
-
-/* Opens a function: the instance f, or an error where there is none or the call is illegal in its mode or interface. */
-#define OPEN_FOR(interface, function, modes)                                                    \
-    fmu *const f = (fmu *)c;                                                                    \
-    if (f == NULL || open_instance(f, #function, modes, interface) != DONE) {                   \
-        return fmi2Error;                                                                       \
-    }
-#define OPEN(function, modes) OPEN_FOR(ANY_INTERFACE, function, modes)
-/* Refuses a call without somewhere to write to. */
-#define GIVEN(there, names)                            \
-    if (given(f, there, names) != DONE) {              \
-        return fmi2Error;                              \
-    }

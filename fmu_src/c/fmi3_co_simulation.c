@@ -6,19 +6,13 @@ FMI3_Export fmi3Status fmi3EnterStepMode(fmi3Instance instance)
     return (fmi3Status)enter(f, STEP);
 }
 
-static outcome get_counted_output_rates(fmu *f, const unsigned vr[], size_t n, const int order[], double value[],
-                                        size_t n_values)
-{
-    TRY(is_counted(f, n, n_values));
-    return get_output_rates(f, vr, n, order, value);
-}
-
 FMI3_Export fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                                 size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
                                                 size_t nValues)
 {
     OPEN_FOR(CO_SIMULATION, fmi3GetOutputDerivatives, MAY_ASK_OUTPUTS);
-    return (fmi3Status)get_counted_output_rates(f, valueReferences, nValueReferences, orders, values, nValues);
+    const outcome counted = is_counted(f, nValueReferences, nValues);
+    return (fmi3Status)(counted == DONE ? get_output_rates(f, valueReferences, nValueReferences, orders, values) : counted);
 }
 
 /* Between two intermediate updates the inputs are held. */

@@ -1,4 +1,4 @@
-/* What is FMI 3.0's own of an instance: its callbacks, and how its functions begin. */
+/* What is FMI 3.0's own of an instance: its callbacks, and its words. */
 
 /* The functions are named <modelIdentifier>_fmi3..., so that several FMUs can be linked into one program; plainly, as in
  * a shared library, where FMI3_OVERRIDE_FUNCTION_PREFIX is defined. */
@@ -7,6 +7,8 @@
 #endif
 #include "fmi3Functions.h"
 
+#define FMI_STATUS fmi3Status
+#define INSTANCE instance /* as the functions call it */
 #define TOKEN_NAME "instantiation token"
 #define REAL "Float64"
 enum {
@@ -35,16 +37,3 @@ static void tell(const host *to, const char *name, int status, const char *categ
         to->log(to->environment, (fmi3Status)status, category, text);
     }
 }
-
-/* Opens a function: the instance f, or an error where there is none or the call is illegal in its mode or interface. */
-#define OPEN_FOR(interface, function, modes)                                                    \
-    fmu *const f = (fmu *)instance;                                                             \
-    if (f == NULL || open_instance(f, #function, modes, interface) != DONE) {                   \
-        return fmi3Error;                                                                       \
-    }
-#define OPEN(function, modes) OPEN_FOR(ANY_INTERFACE, function, modes)
-/* Refuses a call without somewhere to write to. */
-#define GIVEN(there, names)                            \
-    if (given(f, there, names) != DONE) {              \
-        return fmi3Error;                              \
-    }

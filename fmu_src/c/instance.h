@@ -171,3 +171,16 @@ static outcome open_instance(fmu *f, const char *function, int modes, int wanted
             wanted == MODEL_EXCHANGE ? "Model Exchange" : "Co-Simulation");
     return DONE;
 }
+
+/* Opens a function: the instance f, or an error where there is none or the call is illegal in its mode or interface. */
+#define OPEN_FOR(interface, function, modes)                                                    \
+    fmu *const f = (fmu *)INSTANCE;                                                             \
+    if (f == NULL || open_instance(f, #function, modes, interface) != DONE) {                   \
+        return (FMI_STATUS)REFUSED;                                                             \
+    }
+#define OPEN(function, modes) OPEN_FOR(ANY_INTERFACE, function, modes)
+/* Refuses a call without somewhere to write to. */
+#define GIVEN(there, names)                            \
+    if (given(f, there, names) != DONE) {              \
+        return (FMI_STATUS)REFUSED;                    \
+    }
