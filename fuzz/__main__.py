@@ -70,11 +70,8 @@ def _command(
         corpus = Path(name) / "corpus"
         pairs = product([chosen] if chosen else VEHICLES, [int(fmi)] if fmi else (2, 3))
         targets = {(vehicle, version): Path(name) / f"{vehicle}{version}" for vehicle, version in pairs}
-        sources = {
-            (vehicle, fmi): native_content(load_vehicle(VEHICLES[vehicle]), fmi=fmi).sources for vehicle, fmi in targets
-        }
         with ThreadPoolExecutor(jobs) as pool:  # each waits for a compiler
-            list(pool.map(build_target, sources.values(), targets.values(), [version for _, version in targets]))
+            list(pool.map(_build, targets, targets.values()))
         unpack_corpus(corpus)
         limit, share = seconds or (None if calls else _ROUND), len(targets)
         for (vehicle, version), target in targets.items():
@@ -90,6 +87,11 @@ def _command(
                 raise FindingError("\n".join([f"{what}: {finding}", *again])) from None
         if keep and not inputs:
             print(f"the corpus now has {pack_corpus(list(targets.values()), corpus)} inputs")
+
+
+def _build(pair: tuple[str, int], target: Path) -> None:
+    vehicle, version = pair
+    build_target(native_content(load_vehicle(VEHICLES[vehicle]), fmi=version).sources, target, version)
 
 
 def _keep(options: str, found: Path) -> str:
