@@ -60,7 +60,7 @@ void closed_all(motion *at, double state[N_STATES], double h, long steps)
     (void)steps;
     double next[N_STATES];
     memcpy(&at->at[FIRST_STATE], state, sizeof next);
-    CHECK(rov_step(at->at, &at->gains, h, next));
+    CHECK(rov_step(at->at, &at->gains, h, next) > 0);
     memcpy(state, next, sizeof next);
 }
 

@@ -40,6 +40,7 @@ static void update(fmu *f, double t, double gone, double *length, bool is_inside
 static outcome step_in_pieces(fmu *f, double t, double h, double *last)
 {
     const double pieces = fmin(fmax(1.0, ceil(h / PIECE * (1.0 - 1e-9))), MOST_PIECES);
+    int cuts = 0;
     double length = h, gone = 0.0; /* counted from t: beside a late t a piece may be less than a digit */
     TRY(is_step(f, t, h));
     warn_of_jump(f, f->now.time, t, h);
@@ -48,7 +49,7 @@ static outcome step_in_pieces(fmu *f, double t, double h, double *last)
     for (double n = 1.0; gone < length; n++) {
         const double from = gone;
         gone = n < pieces ? fmin(length, h * (n / pieces)) : length;
-        TRY(advance(f, t + from, gone - from));
+        TRY(advance(f, t + from, gone - from, &cuts));
         f->now.time = *last = t + gone; /* to the digit */
         update(f, t, gone, &length, gone < length);
     }

@@ -407,11 +407,13 @@ static void warn_of_jump(fmu *f, double time, double t, double h)
     }
 }
 
-/* h seconds pass from t with the inputs held. */
-static outcome advance(fmu *f, double t, double h)
+/* h seconds pass from t with the inputs held. *cuts: those of the step so far, each of which made a piece more. */
+static outcome advance(fmu *f, double t, double h, int *cuts)
 {
     double next[N_STATES], sum = 0.0; /* not finite if one is not: zero times it is NaN */
-    if (!rov_step(f->now.values, &f->gains, h, next)) {
+    const int pieces = rov_step(f->now.values, &f->gains, h, next);
+    *cuts += pieces - 1;
+    if (pieces == 0 || *cuts >= MOST_PIECES) {
         f->now.mode = FAILED;
         FAIL(f, "the motion over %g s from t = %g takes more than MOST_PIECES = %d pieces; the state from before is kept.",
              h, t, (int)MOST_PIECES);
@@ -431,8 +433,9 @@ static outcome advance(fmu *f, double t, double h)
 static outcome step(fmu *f, double t, double h)
 {
     const double time = f->now.time;
+    int cuts = 0;
     TRY(is_step(f, t, h));
-    TRY(advance(f, t, h));
+    TRY(advance(f, t, h, &cuts));
     warn_of_jump(f, time, t, h);
     return DONE;
 }

@@ -51,19 +51,19 @@ static void flow_pass(flow *f, double t)
     }
 }
 
-/* A step of h seconds: v moves to its end, the distances along the axes and the track go to *way and *sum. False where it
- * takes too many pieces; of a free motion also where the series does not reach the end at once. */
-static inline bool series_step(flow *f, double v[WIDTH], double h, double way[WIDTH], planar *sum)
+/* A step of h seconds: v moves to its end, the distances along the axes and the track go to *way and *sum. How many pieces it
+ * takes, or 0: too many; of a free motion also where the series does not reach the end at once. */
+static inline int series_step(flow *f, double v[WIDTH], double h, double way[WIDTH], planar *sum)
 {
     double tau = h, done = 0.0;
     series s;
-    for (int pieces = 0; pieces < MOST_PIECES; pieces++) {
+    for (int pieces = 1; pieces <= MOST_PIECES; pieces++) {
         const double rest = h - done;
         double change[WIDTH], gone[WIDTH], length = 1.0, reach = 1.0;
         int stops = NONE;
         if (!series_grow(f, v, fmin(rest, tau), &s)) {
             if (IS_FREE) {
-                return false;
+                return 0;
             }
             reach = series_reach(&s);
             if (reach == 0.0) { /* it overflows */
@@ -88,7 +88,7 @@ static inline bool series_step(flow *f, double v[WIDTH], double h, double way[WI
             v[stops] = 0.0;
         }
         if (length == 1.0 && s.tau >= rest) {
-            return true;
+            return pieces;
         }
         done += s.tau;
         if (N_LAGGING > 0) {
@@ -100,10 +100,10 @@ static inline bool series_step(flow *f, double v[WIDTH], double h, double way[WI
             for (int a = 0; a < N_AXES; a++) {
                 way[a] += v[a] * (h - done);
             }
-            return true;
+            return pieces;
         }
     }
-    return false;
+    return 0;
 }
 
 static const double SERIES_REACH = 0.3;
@@ -139,9 +139,9 @@ static inline void flow_begin(const double at[], const rov_gains *gains, rov_hel
     }
 }
 
-/* The states after h > 0 seconds with the inputs held; not finite only where a result overflows. False where the step takes
- * more than MOST_PIECES pieces. */
-static bool rov_step(const double at[], const rov_gains *gains, double h, double next[N_STATES])
+/* The states after h > 0 seconds with the inputs held; not finite only where a result overflows. How many pieces the step
+ * takes, or 0: more than MOST_PIECES. */
+static int rov_step(const double at[], const rov_gains *gains, double h, double next[N_STATES])
 {
     const double *const state = at + FIRST_STATE;
     double v[WIDTH], way[WIDTH] = {0.0}, change[N_STATES] = {0.0};
@@ -150,8 +150,8 @@ static bool rov_step(const double at[], const rov_gains *gains, double h, double
     flow f;
     flow_begin(at, gains, &held, &f, v);
     const double lengths = v[R] == 0.0 && held.C[R] == 0.0 ? 3.0 : 1.0; /* straight, the closed form costs less so soon */
-    bool done = (!IS_FREE || is_in_reach(gains, held.C, v, lengths * h)) && series_step(&f, v, h, way, &sum);
-    if (IS_FREE && !done) {
+    int pieces = IS_FREE && !is_in_reach(gains, held.C, v, lengths * h) ? 0 : series_step(&f, v, h, way, &sum);
+    if (IS_FREE && pieces == 0) {
         riccati axis[WIDTH];
         memcpy(axis, gains->axis, sizeof axis);
         sum.ahead = sum.aside = 0.0;
@@ -160,7 +160,7 @@ static bool rov_step(const double at[], const rov_gains *gains, double h, double
             v[a] = state[a];
             way[a] = 0.0;
         }
-        done = closed_step(axis, v, h, way, &sum);
+        pieces = closed_step(axis, v, h, way, &sum);
     }
     for (int a = 0; a < N_AXES; a++) {
         next[a] = v[a];
@@ -179,7 +179,7 @@ static bool rov_step(const double at[], const rov_gains *gains, double h, double
     for (int s = N_AXES; s < N_STATES; s++) {
         next[s] = state[s] + change[s];
     }
-    return done;
+    return pieces;
 }
 
 /* Terms of the pose by those of the velocities and the heading: of x and y as products with its sine and cosine. */

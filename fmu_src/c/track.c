@@ -171,9 +171,9 @@ static bool closed_leg(const riccati axis[WIDTH], double v[WIDTH], double rest, 
     return false;
 }
 
-/* A step of h seconds: v moves to its end, the distances along the axes and the track go to *way and *sum. False where it
- * takes too many pieces. */
-static bool closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, double way[WIDTH], planar *sum)
+/* A step of h seconds: v moves to its end, the distances along the axes and the track go to *way and *sum. How many pieces it
+ * takes, or 0: too many. */
+static int closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, double way[WIDTH], planar *sum)
 {
     double start = 0.0, from[WIDTH] = {0.0}, reversal[3];
     int pieces = 0;
@@ -189,7 +189,7 @@ static bool closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, do
     if (YAW == NONE || (from[R] == 0.0 && axis[R].C == 0.0)) {
         sum->ahead = way[U];
         sum->aside = way[V];
-        return true;
+        return 1;
     }
     for (int i = 0; i < 3; i++) {
         reversal[i] = riccati_reversal_time(&axis[PLANE[i]], from[PLANE[i]]);
@@ -204,9 +204,9 @@ static bool closed_step(const riccati axis[WIDTH], double v[WIDTH], double h, do
         }
         const double turned = start == 0.0 ? 0.0 : lane_distance(axis, from, R, start);
         if (!closed_leg(axis, at, end - start, turned, sum, &pieces)) {
-            return false;
+            return 0;
         }
         start = end;
     }
-    return true;
+    return pieces;
 }

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from math import inf, nan, sin
 from pathlib import Path
+from time import process_time
 
 import pytest
 
@@ -213,6 +214,24 @@ def test_a_step_that_fails_inside_tells_how_far_it_came(fmu3: fmi3.Fmu) -> None:
         assert rov.time() == 0.0025
         assert rov.mode() == FAILED
         assert [m.text.partition(":")[0] for m in rov.log] == ["fmi3SetFloat64", "fmi3DoStep"]
+
+
+def test_pieces_within_a_step_are_counted_over_all_its_updates(fmu3: fmi3.Fmu) -> None:
+    """Or a step of ten thousand updates might take ten thousand times what any other may."""
+    updates = []
+
+    def act(rov: Instance, update: Update) -> None:
+        updates.append(update.time)
+        _command(rov, {"N_ext": 1e9 * (-1.0) ** len(updates)})  # never settled, and turned many times at once
+
+    with moving(fmu3, swing(fmu3)) as rov:
+        rov.on_update = act
+        start = process_time()
+        assert rov.step(0.0, 5.0) == ERROR
+        assert process_time() - start < 5.0
+        assert 0.0 < updates[-1] == rov.time() == rov.stepped.last_successful_time < 2.5
+        assert rov.mode() == FAILED
+        assert "takes more than MOST_PIECES = 10000 pieces" in rov.log[-1].text
 
 
 # ---- A host in C ----

@@ -10,7 +10,7 @@ bool step(double at[N_VARIABLES], double h)
     rov_gains gains;
     double next[N_STATES];
     rov_prepare(at, &gains);
-    const bool done = rov_step(at, &gains, h, next);
+    const bool done = rov_step(at, &gains, h, next) > 0;
     memcpy(at + FIRST_STATE, next, sizeof next);
     return done;
 }
