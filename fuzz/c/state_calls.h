@@ -35,6 +35,9 @@ static void PLAY(SetFMUstate)(slot *s)
 {
     saved_slot *const from = take_saved();
     const bool own = take_byte() < 240;
+    if (s->f != NULL && own && from->state != NULL) {
+        restored[WHICH(SetFMUstate)][kind_of(s)][number(from->at.mode)] = 1;
+    }
     const bool good = own && from->state != NULL && from->at.type == s->at.type
                       && ((int)from->at.mode & modes_of(s, s->at.type)) != 0;
     if (CALL(s, good, true, SetFMUstate, s->f, own ? from->state : foreign)) {
@@ -115,6 +118,9 @@ static void PLAY(DeSerializeFMUstate)(slot *s)
     const bool whole = from->bytes != NULL && from->size == SERIALIZED_SIZE
                        && checksum(from->bytes, from->size) == from->sum;
     memory_is_full = take_byte() >= 250;
+    if (s->f != NULL && whole && !from->forged) {
+        restored[WHICH(DeSerializeFMUstate)][kind_of(s)][number(from->at.mode)] = 1;
+    }
     const bool fits = from->forged || ((int)from->at.mode & modes_of(s, from->at.type)) != 0;
     verdict wanted = legal(s, WHICH(DeSerializeFMUstate), whole && fits && !(memory_is_full && to->state == NULL));
     wanted = wanted == ALLOWED && from->forged ? EITHER : wanted;

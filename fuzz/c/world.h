@@ -153,6 +153,14 @@ typedef enum { FORBIDDEN, ALLOWED, EITHER } verdict;
 static unsigned long long counts[N_CALLS][2]; /* refused, accepted */
 static uint64_t trace;                        /* of all that was returned; two runs of the same bytes give the same */
 static unsigned messages;                     /* logged during the call */
+
+/* What libFuzzer takes for new beside new places in the code: any function in any mode, and a state that was saved in any
+ * mode, by kind of instance. Most calls that are illegal are refused in one place. */
+enum { WITH_EVENTS = 2, N_KINDS, N_MODES = 8 }; /* beyond the interface types */
+#define LEADS __attribute__((section("__libfuzzer_extra_counters")))
+static unsigned char called[N_CALLS][N_KINDS][N_MODES][2] LEADS;
+static unsigned char restored[N_CALLS][N_KINDS][N_MODES] LEADS;
+
 static _Alignas(fmu) unsigned char instances_before[N_SLOTS][sizeof(fmu)];
 static saved_state saves_before[N_SAVED];
 
@@ -206,11 +214,20 @@ static void before_call(void)
     }
 }
 
-enum { WITH_EVENTS = 2 }; /* the row of LEGAL beyond those of the interface types */
+/* The row of LEGAL. */
+static int kind_of(const slot *s)
+{
+    return s->of.events ? WITH_EVENTS : (int)s->at.type;
+}
+
+static int number(lifecycle mode)
+{
+    return __builtin_ctz((unsigned)mode);
+}
 
 static verdict legal(const slot *s, call which, bool arguments)
 {
-    return s->f != NULL && arguments && (LEGAL[s->of.events ? WITH_EVENTS : (int)s->at.type][which] & (int)s->at.mode) != 0 ? ALLOWED : FORBIDDEN;
+    return s->f != NULL && arguments && (LEGAL[kind_of(s)][which] & (int)s->at.mode) != 0 ? ALLOWED : FORBIDDEN;
 }
 
 /* Whether the call was accepted. `changes`: it may change its instance, if accepted. */
@@ -236,6 +253,9 @@ static bool after_call(const slot *s, call which, verdict wanted, int status, bo
     }
     note(&status, sizeof status);
     counts[which][accepted]++;
+    if (s->f != NULL) {
+        called[which][kind_of(s)][number(s->at.mode)][accepted] = 1;
+    }
     return accepted;
 }
 

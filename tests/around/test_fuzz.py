@@ -196,8 +196,8 @@ PLANTED_IN_FMI3 = {
     ),
     "pieces are counted from the time": (
         "fmi3_co_simulation.c",
-        "TRY(advance(f, t + from, gone - from));",
-        "TRY(advance(f, t + from, t + gone - (t + from)));",
+        "TRY(advance(f, t + from, gone - from, &cuts));",
+        "TRY(advance(f, t + from, t + gone - (t + from), &cuts));",
         "a step and its parts|broken property",
     ),
     "an early return goes on": (
@@ -208,8 +208,8 @@ PLANTED_IN_FMI3 = {
     ),
     "inputs are taken at the end of a piece": (
         "fmi3_co_simulation.c",
-        "        TRY(advance(f, t + from, gone - from));\n",
-        "        TRY(advance(f, t + from, 1.001 * (gone - from)));\n",
+        "        TRY(advance(f, t + from, gone - from, &cuts));\n",
+        "        TRY(advance(f, t + from, 1.001 * (gone - from), &cuts));\n",
         "broken property",
     ),
     "Event Mode without its being asked for": (
