@@ -37,7 +37,7 @@ MISSING = {
 }
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.long), 3])
 @pytest.mark.parametrize(
     "name", [n if n == "videoray" else pytest.param(n, marks=pytest.mark.long) for n in command.VEHICLES]
 )

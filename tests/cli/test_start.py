@@ -27,7 +27,7 @@ _posix = pytest.mark.skipif(os.name != "posix", reason="terminals and signals ar
 # ---- By name ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", [n if n == "videoray" else pytest.param(n, marks=pytest.mark.long) for n in SHIPPED])
 def test_a_vehicle_that_ships_is_built_by_its_name(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -30,9 +30,8 @@ def _built(folder: Path, *command: str, flavours: Sequence[str] = tuple(_BUILDS)
 _CHECKOUT = str(ROOT / "build_fmu.py")
 
 
-@pytest.mark.parametrize(
-    "flavour", ["native", *(pytest.param(name, marks=pytest.mark.long) for name in ("fmi3", "pythonfmu"))]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("flavour", ["native", "fmi3", "pythonfmu"])
 def test_built_in_another_folder(flavour: str, tmp_path: Path) -> None:
     one, other = tmp_path / "here", tmp_path / "deep" / "er and other"
     for folder in (one, other):

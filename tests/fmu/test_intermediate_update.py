@@ -229,6 +229,7 @@ def test_pieces_within_a_step_are_counted_over_all_its_updates(fmu3: fmi3.Fmu) -
         start = process_time()
         assert rov.step(0.0, 5.0) == ERROR
         assert process_time() - start < 5.0
+        assert rov.stepped is not None
         assert 0.0 < updates[-1] == rov.time() == rov.stepped.last_successful_time < 2.5
         assert rov.mode() == FAILED
         assert "takes more than MOST_PIECES = 10000 pieces" in rov.log[-1].text

@@ -141,6 +141,7 @@ def test_points_of_a_model_give_the_model(m: Axis, vehicle: Vehicle) -> None:
     assert fit.rms("Tau", leave_one_out=True) < 1e-6
 
 
+@pytest.mark.long
 def test_intervals_of_points_cover_the_truth(vehicle: Vehicle) -> None:
     """60 seeds of 1 % scatter: 90-99 % in the intervals, and drag never negative."""
     k, random = vehicle.rov, np.random.default_rng(2)
@@ -182,6 +183,7 @@ def test_thrust_that_is_uncertain_makes_drag_uncertain(k: Rov) -> None:
     assert fit.estimate.errors["beta_w"] == pytest.approx(0.1, rel=0.01)
 
 
+@pytest.mark.long
 def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
     """Three days, three payloads: drag, which the fit takes as one, is not; its interval and a warning say so."""
     write_rov(tmp_path)

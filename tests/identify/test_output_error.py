@@ -72,7 +72,7 @@ def round_trip(
     return {name: float(np.mean(hits)) for name, hits in covered.items()}
 
 
-@pytest.mark.parametrize("m", AXES, ids=lambda m: m.name)
+@pytest.mark.parametrize("m", AXES[:2], ids=lambda m: m.name)
 def test_intervals_cover_the_truth(m: Axis, k: Rov) -> None:
     """Of four seeds, which are fixed, a 95 % interval misses more than one in 1.4 % of all cases."""
     assert min(round_trip(k, m, range(4)).values()) >= 3 / 4
@@ -115,6 +115,7 @@ def test_outliers_hardly_move_a_robust_fit(k: Rov) -> None:
     assert all(s.outliers > 0.02 * len(s.time) for s in robust.simulations)
 
 
+@pytest.mark.long
 def test_coloured_noise_widens_the_intervals(k: Rov) -> None:
     random = np.random.default_rng(0)
     white = [clean(k, YAW, plan).noisy(random) for plan in PLANS["yaw"]]

@@ -88,8 +88,8 @@ MAIN = (
 """Each kind along one axis."""
 SLOW = tuple(f"noise of {slow} s in heave" for slow in (0.2, 1.0, 3.0))
 """Noise as slow as the vehicle, or slower."""
-BY_DEFAULT = ("load of 0.1 N in heave", "delay in surge", "lag and delay in heave", "weak reverse thrust in heave")
-"""Those that are quick; the long tests try all."""
+BY_DEFAULT = "load of 0.1 N in heave"
+"""One that is quick; the long tests try all."""
 # In yaw one thruster of the pair is in reverse whichever way it turns, so yaw alone never tells its strength.
 
 
@@ -152,7 +152,7 @@ def shares(name: str, seeds: Sequence[int]) -> Shares:
     return Shares(names, np.array(covered), np.array(off))
 
 
-@pytest.mark.parametrize("name", BY_DEFAULT)
+@pytest.mark.parametrize("name", [BY_DEFAULT])
 def test_intervals_cover_the_truth(name: str) -> None:
     """Of 20 seeds an interval that covers in 95 % of all cases covers in at least 15, but for one case in 1,000."""
     seeds = range(20)
@@ -180,6 +180,7 @@ def test_intervals_cover_the_truth_along_the_other_axes(name: str) -> None:
     assert (np.abs(found.off.mean(axis=0)) < SCENARIOS[name].bias).all(), str(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["noise of 1.0 s in heave"])
 def test_slow_noise_is_nothing_that_acts(name: str) -> None:
     """It looks like a load, a delay or another drag up than down; one seed in five had one where it counted as less."""

@@ -299,7 +299,7 @@ CASES: Mapping[str, Tables] = {
 }
 
 
-_SOME = ("one thrust", "backward too")
+_SOME = ("backward too",)
 
 
 @pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in CASES])
