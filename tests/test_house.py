@@ -11,7 +11,7 @@ import pytest
 from tests.commands import ROOT
 
 # From the top down. A part imports from itself and from parts below it; files/ and motion/ stand side by side.
-PARTS = ("cli", "build", "pages", "export", "identify", "tank", "vehicle", "process", "files")
+PARTS = ("cli", "studies", "build", "pages", "export", "identify", "tank", "vehicle", "process", "files")
 AROUND = {
     "rov_fmu": {"rov_fmu"},
     "checks": {"checks", "rov_fmu"},

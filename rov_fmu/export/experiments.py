@@ -1,12 +1,9 @@
 """The experiments that an FMU carries by the layered standard FMI-LS-REF, read from the archive; any FMU's."""
 
-import csv
-import io
 import posixpath
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -14,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 from lxml import etree
 
 from rov_fmu.files.messages import FileError, shown
+from rov_fmu.files.series import Series, number, series
 
 NAME = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{NAME}"
@@ -24,10 +22,6 @@ _STEPS = 500
 """Communication steps where nothing tells their length."""
 _NOT_READ = ("String", "Binary", "Clock")
 """Types of variables that no column of numbers holds."""
-_WORDS = {"true": 1.0, "false": 0.0}
-
-Series = Mapping[str, Sequence[float]]
-"""Columns of a CSV file by name; the first is the time."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +96,7 @@ class Carried:
 
             def setting(key: str, otherwise: Any, given: Mapping[str, str] = given, name: str = name) -> float:
                 if key in given:
-                    return _number(place, f"experiment {shown(name)}: {key}", given[key])
+                    return number(given[key], f"experiment {shown(name)}: {key}", place.error)
                 return otherwise if (value := getattr(default, key, None)) is None else float(value)
 
             start = setting("startTime", 0.0)
@@ -130,34 +124,18 @@ class Carried:
                 raise place.error(f"parameter {shown(name)}: is in {value.get('unit')}, and not in {variable.unit}")
             found[name] = value.get("value")
             if variable.type not in ("String", "Boolean"):
-                _number(place, f"parameter {shown(name)}", found[name])
+                number(found[name], f"parameter {shown(name)}", place.error)
         return found
 
     def _series(self, place: _Place, variables: Mapping[str, Any]) -> Series:
         """A CSV file: the time in the first column, a variable of the FMU in each other."""
-        try:
-            lines = list(csv.reader(io.StringIO(self._text(place), newline=""), strict=True))
-        except csv.Error as error:
-            raise place.error(f"not CSV: {error}") from error
-        lines = [line for line in lines if any(map(str.strip, line))]
-        if len(lines) < 2:
-            raise place.error("has no rows below a header")
-        header = [name.strip() for name in lines[0]]
-        if twice := next((name for name in header if header.count(name) > 1), None):
-            raise place.error(f"column {shown(twice)}: there is such a column before")
-        for name in header[1:]:
+
+        def check_column(name: str) -> None:
             variable = _variable(place, name, variables)
             if variable.type in _NOT_READ or getattr(variable, "dimensions", None):
                 raise place.error(f"column {shown(name)}: the variable is no single number")
-        rows: list[list[float]] = []
-        for n, line in enumerate(lines[1:], 1):
-            if len(line) != len(header):
-                raise place.error(f"row {n}: {len(line)} cells below {len(header)} columns")
-            rows.append([_number(place, f"row {n}, column {shown(name)}", cell)
-                         for name, cell in zip(header, line, strict=True)])  # fmt: skip
-            if n > 1 and rows[-1][0] < rows[-2][0]:
-                raise place.error(f"row {n}: the time goes back")
-        return dict(zip(header, zip(*rows, strict=True), strict=True))
+
+        return series(self._text(place), place.error, check_column)
 
     def _text(self, place: _Place) -> str:
         try:
@@ -188,13 +166,3 @@ def _variable(place: _Place, name: str, variables: Mapping[str, Any]) -> Any:
     if name not in variables:
         raise place.error(f"the FMU has no variable {shown(name)}")
     return variables[name]
-
-
-def _number(place: _Place, where: str, text: str) -> float:
-    try:
-        found = float(_WORDS.get(text.strip().lower(), text))
-    except ValueError:
-        found = nan
-    if not isfinite(found):
-        raise place.error(f"{where} = {shown(text)}: must be a number")
-    return found

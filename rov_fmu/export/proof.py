@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.export.experiments import Carried, Experiment, Series
+from rov_fmu.export.experiments import Carried, Experiment
 from rov_fmu.files.messages import FileError, ProofError, brief, one_line
+from rov_fmu.files.series import Series
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
 """By the name that a person gives: FMPy's."""

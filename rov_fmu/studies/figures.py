@@ -1,0 +1,165 @@
+"""The figures of a run: expressions over its outputs, and the functions that they may use."""
+
+import ast
+from collections.abc import Callable, Mapping
+from math import nan
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rov_fmu.files.messages import brief, shown
+from rov_fmu.motion.riccati import RISE
+
+Array = npt.NDArray[np.float64]
+_STEADY = 0.1
+"""The last part of a window, over which the mean is what is steady."""
+_NOT_FOR_FIGURES = ("open", "print", "dir", "type")
+_BAND = 0.05
+"""Of the way from the beginning: within it a response is settled."""
+
+
+class Responses:
+    """What an expression may call: functions of an output over the times of a run (s)."""
+
+    def __init__(self, times: Array) -> None:
+        self._times = times
+        self._windows: dict[tuple[float | None, float | None], tuple[slice, slice]] = {}
+        self.functions: Mapping[str, Callable[..., float]] = {
+            "V_ss": self.steady, "Tau": self.time_constant, "overshoot": self.overshoot,
+            "settling_time": self.settling_time, "at": self.at, "final": self.final,
+        }  # fmt: skip
+        """By the name in an expression."""
+
+    def at(self, y: Array, time: float) -> float:
+        """y at a time, straight between two points; NaN outside the run."""
+        return float(np.interp(time, self._times, y, nan, nan))
+
+    def final(self, y: Array) -> float:
+        """The last y."""
+        return float(y[-1])
+
+    def steady(self, y: Array, start: float | None = None, end: float | None = None) -> float:
+        """Steady y: its mean over the last tenth of the time from `start` to `end`."""
+        return float(y[self._window(start, end)[1]].mean())
+
+    def time_constant(self, y: Array, start: float | None = None, end: float | None = None) -> float:
+        """Time from `start` until y has gone 1 - 1/e of its way to the steady value; NaN where it goes nowhere."""
+        way, t = self._way(y, start, end)
+        n = int((way >= RISE).argmax())
+        if not way[n] >= RISE:
+            return nan
+        share = (RISE - way[n - 1]) / (way[n] - way[n - 1])  # n is not 0, where the way is 0
+        return float(t[n - 1] + share * (t[n] - t[n - 1]) - t[0])
+
+    def overshoot(self, y: Array, start: float | None = None, end: float | None = None) -> float:
+        """How far y goes beyond its steady value, by its way there: 0.1 is 10 %. NaN where it goes nowhere."""
+        way, _ = self._way(y, start, end)
+        return float(np.maximum(way.max() - 1.0, 0.0))
+
+    def settling_time(
+        self, y: Array, start: float | None = None, end: float | None = None, band: float = _BAND
+    ) -> float:
+        """Time from `start` until y stays within a band of its steady value; NaN where it never does.
+
+        A band of 0.05 is 5 % of its way there.
+        """
+        way, t = self._way(y, start, end)
+        n = len(way) - int((~(np.abs(way - 1.0) <= band))[::-1].argmax())  # of the first that is inside for good
+        return float(t[n] - t[0]) if n < len(way) else nan
+
+    def _window(self, start: float | None, end: float | None) -> tuple[slice, slice]:
+        """The points between two times, both included but for rounding, and those of their last tenth."""
+        if (start, end) not in self._windows:
+            t = self._times
+            slack = 1e-9 * max(1.0, abs(t[0]), abs(t[-1]))
+            first = int(np.searchsorted(t, (t[0] if start is None else start) - slack))
+            last = int(np.searchsorted(t, (t[-1] if end is None else end) + slack))
+            if first >= last:
+                raise ValueError(f"there is no time from {start} to {end}")
+            steady = t[last - 1] - _STEADY * (t[last - 1] - t[first]) - slack
+            self._windows[start, end] = slice(first, last), slice(int(np.searchsorted(t, steady)), last)
+        return self._windows[start, end]
+
+    def _way(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
+        """How far y has come, from 0 where it is first to 1 where it is steady; NaN where that is the same. The times."""
+        window, steady = self._window(start, end)
+        part = y[window]
+        whole = y[steady].mean() - part[0]
+        return (part - part[0]) / (whole or nan), self._times[window]
+
+
+TIME = "t"
+"""The times of the communication points, in an expression."""
+BY_NAME = "out"
+"""Variables whose name is none in Python, in an expression: out["der(u)"]."""
+
+
+def _interpreter() -> Any:
+    """Of expressions: NumPy's functions, no statements."""
+    from asteval import Interpreter
+
+    interpreter = Interpreter(minimal=True, with_ifexp=True, with_listcomp=True, use_numpy=True)
+    for name in _NOT_FOR_FIGURES:
+        interpreter.symtable.pop(name, None)
+    return interpreter
+
+
+def known_names() -> set[str]:
+    """What an expression may name besides variables."""
+    return {*_interpreter().symtable, *Responses(np.zeros(1)).functions, TIME, BY_NAME}
+
+
+def names_in(expression: str) -> set[str]:
+    """What an expression names, but for what it binds itself. Raises ValueError with the reason where it is none."""
+    try:
+        tree = ast.parse(expression.strip(), mode="eval")
+    except (SyntaxError, RecursionError, MemoryError) as error:
+        reason = getattr(error, "msg", "too long")
+        raise ValueError(f"is no expression: {reason}") from error
+    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    bound = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    quoted = {
+        n.slice.value
+        for n in ast.walk(tree)
+        if isinstance(n, ast.Subscript) and isinstance(n.value, ast.Name) and n.value.id == BY_NAME
+        and isinstance(n.slice, ast.Constant) and isinstance(n.slice.value, str)
+    }  # fmt: skip
+    return (names - bound) | quoted
+
+
+class Figures:
+    """The figures of a plan, for one thread at a time."""
+
+    def __init__(self, expressions: Mapping[str, str], times: Array) -> None:
+        self.names = tuple(expressions)
+        self._interpreter = _interpreter()
+        self._symbols = self._interpreter.symtable
+        self._symbols |= {TIME: times} | Responses(times).functions
+        self._parsed = {name: self._interpreter.parse(text.strip()) for name, text in expressions.items()}
+
+    def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
+        """In the order of their names, for a run's outputs and parameters; why one is NaN, or nothing."""
+        self._symbols.update(run)
+        self._symbols[BY_NAME] = run
+        found, reasons = [], []
+        with np.errstate(all="ignore"):
+            for name, parsed in self._parsed.items():
+                value, reason = self._value(parsed)
+                found.append(value)
+                reasons += [f"{name}: {reason}"] if reason else []
+        return found, "; ".join(reasons)
+
+    def _value(self, parsed: Any) -> tuple[float, str]:
+        interpreter = self._interpreter
+        interpreter.error = []
+        try:
+            value = interpreter.run(parsed, with_raise=False)
+        except Exception as error:  # whatever an expression can do
+            return nan, brief(f"{type(error).__name__}: {error}")
+        if interpreter.error:
+            _, words = interpreter.error[0].get_error()
+            return nan, brief(words.strip().splitlines()[-1].strip())
+        if np.ndim(value) != 0 or not isinstance(value, int | float | np.number | np.bool_):
+            return nan, f"must be one number, and not {shown(value)}"
+        return float(value), ""

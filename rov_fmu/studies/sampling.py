@@ -1,0 +1,152 @@
+"""The parameters of every run: they depend on the plan, its seed and the run's number alone."""
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from math import log, prod
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
+
+from rov_fmu.studies.model import Variable
+from rov_fmu.studies.plan import Plan, Varied
+
+Array = npt.NDArray[np.float64]
+_Draw = Callable[[int, int], Array]
+"""From the first run to the one after the last: numbers in 0 ... 1, a row a run."""
+
+
+class Design:
+    """What varies, and how."""
+
+    def __init__(self, plan: Plan, varied: Mapping[str, Varied], variables: Mapping[str, Variable]) -> None:
+        self.names = tuple(varied)
+        self._varied = list(varied.values())
+        self._variables = [variables[name] for name in varied]
+        self.runs = _runs(plan, self._varied)
+        """How many."""
+        width, seed = len(self.names), plan.seed
+        draws: dict[str, Callable[[], _Draw]] = {
+            "grid": lambda: _grid([len(way.choices or ()) for way in self._varied]),
+            "sobol": lambda: _sobol(width, seed),
+            "saltelli": lambda: _saltelli(width, seed),
+            "latin-hypercube": lambda: _latin_hypercube(width, seed, self.runs),
+            "random": lambda: _random(width, seed),
+        }
+        self._draw = draws[plan.sampler]()
+
+    def rows(self, first: int, end: int) -> Array:
+        """The values of what varies, a row a run, a column a variable, from the first run to the one before `end`."""
+        drawn = self._draw(first, end)
+        columns = [
+            _values(way, variable, drawn[:, n])
+            for n, (way, variable) in enumerate(zip(self._varied, self._variables, strict=True))
+        ]
+        return np.stack(columns, axis=1) if columns else np.zeros((end - first, 0))
+
+
+def _runs(plan: Plan, varied: Sequence[Varied]) -> int:
+    if plan.sampler == "grid":
+        return prod(len(way.choices or ()) for way in varied)
+    runs = plan.runs or 0
+    block = len(varied) + 2
+    return -(-runs // block) * block if plan.sampler == "saltelli" else runs
+
+
+# ---- From 0 ... 1 to values ------------------------------------------------------------------------------------------
+
+
+def _values(way: Varied, variable: Variable, drawn: Array) -> Array:
+    if (choices := way.choices) is not None:
+        picked: Array = np.array(choices)[np.minimum((drawn * len(choices)).astype(int), len(choices) - 1)]
+        return picked
+    if way.uniform:
+        low, high = way.uniform
+        if variable.is_whole:  # each whole number is as likely
+            return np.minimum(np.floor(low + drawn * (high - low + 1.0)), high)
+        return low + drawn * (high - low)
+    if way.normal:
+        middle, sd = way.normal.mean, way.normal.sd
+        found = _normal(middle, sd, variable.minimum, variable.maximum, drawn)
+    else:
+        assert way.lognormal
+        with np.errstate(divide="ignore"):
+            low, high = np.log(np.maximum((variable.minimum, variable.maximum), 0.0))
+        found = np.exp(_normal(log(way.lognormal.median), way.lognormal.sd, low, high, drawn))
+    found = np.clip(found, variable.minimum, variable.maximum)  # but for rounding it is within
+    return np.rint(found) if variable.is_whole else found
+
+
+def _normal(mean: float, sd: float, low: float, high: float, drawn: Array) -> Array:
+    """Normal between bounds. What is drawn is kept from 0 and 1 by less than can be told of a million million runs."""
+    below, above = ndtr((low - mean) / sd), ndtr((high - mean) / sd)
+    inside = np.clip(drawn, 1e-14, 1.0 - 1e-14)
+    return np.asarray(mean + sd * ndtri(below + inside * (above - below)))
+
+
+# ---- Numbers in 0 ... 1 ----------------------------------------------------------------------------------------------
+
+
+def _grid(counts: Sequence[int]) -> _Draw:
+    """Every combination; what is varied last changes first."""
+
+    def draw(first: int, end: int) -> Array:
+        left = np.arange(first, end)
+        drawn = np.empty((end - first, len(counts)))
+        for column in range(len(counts) - 1, -1, -1):
+            drawn[:, column] = (left % counts[column] + 0.5) / counts[column]
+            left = left // counts[column]
+        return drawn
+
+    return draw
+
+
+def _sobol(width: int, seed: int) -> _Draw:
+    """Scrambled (Owen). What was drawn last is the place from which the next ones are reached soonest."""
+    source = qmc.Sobol(width, seed=seed)
+
+    def draw(first: int, end: int) -> Array:
+        if first < source.num_generated:
+            source.reset()
+        source.fast_forward(first - source.num_generated)
+        with warnings.catch_warnings():  # that a sample is balanced where it is a power of two long
+            warnings.simplefilter("ignore", UserWarning)
+            return np.asarray(source.random(end - first))
+
+    return draw
+
+
+def _saltelli(width: int, seed: int) -> _Draw:
+    """Blocks of rows: one of a matrix A, for each column the same with that of another matrix B, and that of B.
+
+    Saltelli et al. (2010); the order is SALib's. A and B are the halves of a Sobol sequence.
+    """
+    block, pairs = width + 2, _sobol(2 * width, seed)
+
+    def draw(first: int, end: int) -> Array:
+        rows = np.arange(first, end)
+        start = first // block
+        both = pairs(start, (end - 1) // block + 1)[rows // block - start]
+        drawn = both[:, :width].copy()
+        places = rows % block
+        for column in range(width):
+            taken = (places == column + 1) | (places == block - 1)
+            drawn[taken, column] = both[taken, width + column]
+        return drawn
+
+    return draw
+
+
+def _latin_hypercube(width: int, seed: int, runs: int) -> _Draw:
+    all_of_it = qmc.LatinHypercube(width, seed=seed).random(runs)
+    return lambda first, end: all_of_it[first:end]
+
+
+def _random(width: int, seed: int) -> _Draw:
+    """A run has its own place in the sequence of a generator that can go to any place at once."""
+
+    def draw(first: int, end: int) -> Array:
+        return np.random.Generator(np.random.PCG64(seed).advance(first * width)).random((end - first, width))
+
+    return draw
