@@ -1,4 +1,4 @@
-"""The command rov-fmu: build | prove | identify | tune | convert | schema | tables | figures."""
+"""The command rov-fmu: build | prove | study | identify | tune | convert | schema | tables | figures."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
 from rov_fmu.export.compile import PLATFORMS, BuildError, OptionError
-from rov_fmu.files.messages import FileError, ProofError
+from rov_fmu.files.messages import FileError, ProofError, StudyError
 from rov_fmu.files.output import check_targets, write_whole
 from rov_fmu.motion.layout import AXES
 from rov_fmu.process import exit_code
@@ -24,12 +24,15 @@ if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
     from rov_fmu.build import Built
+    from rov_fmu.studies.engine import Progress as StudyProgress
 
-_EXIT_CODES = {FileError: 2, OSError: 2, click.ClickException: 2, OptionError: 2, BuildError: 1, ProofError: 1}
+_EXIT_CODES = {
+    FileError: 2, OSError: 2, click.ClickException: 2, OptionError: 2, BuildError: 1, ProofError: 1, StudyError: 1,
+}  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code: 0 done, 1 a build or a proof failed, 2 bad input, 130 interrupted."""
+    """Run the command line; the exit code: 0 done, 1 build, proof or study failed, 2 bad input, 130 interrupted."""
 
     def action() -> None:
         chosen = _commands.main(arguments, "rov-fmu", standalone_mode=False)
@@ -189,6 +192,65 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     print_proof(findings)
     if wrong := sum(not finding.passed for finding in findings):
         raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
+
+
+@_commands.command("study")
+@click.argument("plan", type=_FILE)
+@click.option("-o", "--output", type=_FILE, required=True, metavar="RESULTS", help="Folder of the results.")
+@click.option("--workers", type=click.IntRange(1, 1024), metavar="N",
+              help="Processes on this machine; as many as it has cores by default.")  # fmt: skip
+@click.option("--scheduler", metavar="ADDRESS", help="A scheduler of Dask instead, tcp://host:8786.")
+def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None) -> None:
+    """Do the runs of PLAN (TOML): a sweep, or what is uncertain, over any FMU for Co-Simulation.
+
+    What is done is kept: the same command goes on where an earlier one ended.
+    """
+    if workers and scheduler:
+        raise click.UsageError("study: --scheduler has the workers that it has: leave --workers out")
+    try:
+        from rov_fmu.studies.run import run_study
+        from rov_fmu.studies.summary import print_summary
+    except ModuleNotFoundError as error:
+        raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
+    try:
+        with _runs_bar() as tell:
+            spent, results = run_study(plan, output, workers, scheduler, tell)
+    except KeyboardInterrupt:
+        click.echo("rov-fmu: what is done is kept; the same command goes on from there", err=True)
+        raise
+    print_summary(results, spent)
+
+
+@contextmanager
+def _runs_bar() -> "Iterator[Callable[[StudyProgress], None]]":
+    """A bar of runs with their rate and the time left, on a terminal only; yields what to call with the progress."""
+    from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+    columns = (
+        SpinnerColumn(),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
+    with _shown(*columns) as progress:
+        if progress is None:
+            yield lambda _: None
+            return
+        task = progress.add_task("starting the workers", total=None)
+        began: list[tuple[float, int]] = []
+
+        def tell(now: "StudyProgress") -> None:
+            if not began:
+                began.append((perf_counter(), now.done))
+                if now.dashboard:
+                    progress.console.print(f"what the workers do: {now.dashboard}", soft_wrap=True)
+            start, before = began[0]
+            rate = (now.done - before) / max(perf_counter() - start, 1e-3)
+            words = f"{rate:.3g} runs/s{f', {now.failed} failed' if now.failed else ''}"
+            progress.update(task, total=now.total, completed=now.done, description=words)
+
+        yield tell
 
 
 @_commands.command("identify")

@@ -14,6 +14,10 @@ class ProofError(Exception):
     """An FMU that does not come to the results that it carries."""
 
 
+class StudyError(Exception):
+    """A study that cannot go on; what is done is kept."""
+
+
 def one_line(text: str) -> str:
     """Line breaks, other control characters and undecodable bytes of a file's name as Python writes them."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

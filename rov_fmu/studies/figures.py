@@ -1,6 +1,7 @@
 """The figures of a run: expressions over its outputs, and the functions that they may use."""
 
 import ast
+import re
 from collections.abc import Callable, Mapping
 from math import nan
 from typing import Any
@@ -14,6 +15,8 @@ from rov_fmu.motion.riccati import RISE
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
 """The last part of a window, over which the mean is what is steady."""
+_ARGUMENTS = re.compile(r"Error running function .* and kwargs \{.*?\}: ", re.S)
+"""What asteval tells of a call before it tells what is wrong."""
 _NOT_FOR_FIGURES = ("open", "print", "dir", "type")
 _BAND = 0.05
 """Of the way from the beginning: within it a response is settled."""
@@ -25,7 +28,7 @@ class Responses:
     def __init__(self, times: Array) -> None:
         self._times = times
         self._windows: dict[tuple[float | None, float | None], tuple[slice, slice]] = {}
-        self.functions: Mapping[str, Callable[..., float]] = {
+        self.functions: dict[str, Callable[..., float]] = {
             "V_ss": self.steady, "Tau": self.time_constant, "overshoot": self.overshoot,
             "settling_time": self.settling_time, "at": self.at, "final": self.final,
         }  # fmt: skip
@@ -65,7 +68,8 @@ class Responses:
         A band of 0.05 is 5 % of its way there.
         """
         way, t = self._way(y, start, end)
-        n = len(way) - int((~(np.abs(way - 1.0) <= band))[::-1].argmax())  # of the first that is inside for good
+        outside = np.flatnonzero(~(np.abs(way - 1.0) <= band))
+        n = int(outside[-1]) + 1 if outside.size else 0
         return float(t[n] - t[0]) if n < len(way) else nan
 
     def _window(self, start: float | None, end: float | None) -> tuple[slice, slice]:
@@ -82,7 +86,7 @@ class Responses:
         return self._windows[start, end]
 
     def _way(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
-        """How far y has come, from 0 where it is first to 1 where it is steady; NaN where that is the same. The times."""
+        """How far y has come, 0 where it is first and 1 where it is steady; NaN where that is the same. The times."""
         window, steady = self._window(start, end)
         part = y[window]
         whole = y[steady].mean() - part[0]
@@ -159,7 +163,7 @@ class Figures:
             return nan, brief(f"{type(error).__name__}: {error}")
         if interpreter.error:
             _, words = interpreter.error[0].get_error()
-            return nan, brief(words.strip().splitlines()[-1].strip())
+            return nan, brief(_ARGUMENTS.sub("", words.strip()).splitlines()[-1].strip())
         if np.ndim(value) != 0 or not isinstance(value, int | float | np.number | np.bool_):
             return nan, f"must be one number, and not {shown(value)}"
         return float(value), ""

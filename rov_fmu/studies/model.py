@@ -53,6 +53,10 @@ class Variable:
             return f"must be within {self.minimum:.12g} ... {self.maximum:.12g}{f' {self.unit}' * (self.unit != '1')}"
         return ""
 
+    def dtype(self, version: int) -> str:
+        """NumPy's name of its type."""
+        return TYPES[version][self.type]
+
     def function(self, version: int) -> str:
         """The end of the names of the functions that get and set it."""
         return _FUNCTIONS[version].get(self.type, self.type)
@@ -110,9 +114,8 @@ def unknown(name: str, names: Mapping[str, object]) -> str:
     from difflib import get_close_matches
 
     near = get_close_matches(name, names, 3)
-    return f"the FMU has no variable {shown(name)} that is a number{'; did you mean ' if near else ''}" + " or ".join(
-        near
-    )
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    return f"the FMU has no variable {shown(name)} that is a number{hint}"
 
 
 def _variable(v: Any) -> Variable:

@@ -143,6 +143,11 @@ class Signal(Strict):
             raise ValueError("must have either steps or ramps")
         return self
 
+    @property
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Of either."""
+        return self.steps or self.ramps or ()
+
 
 class InputFile(Strict):
     """Inputs in a CSV file: the time (s) in a column `time`, a variable of the FMU in each other one."""

@@ -109,7 +109,8 @@ def _sobol(width: int, seed: int) -> _Draw:
     def draw(first: int, end: int) -> Array:
         if first < source.num_generated:
             source.reset()
-        source.fast_forward(first - source.num_generated)
+        if first > source.num_generated:
+            source.fast_forward(first - source.num_generated)
         with warnings.catch_warnings():  # that a sample is balanced where it is a power of two long
             warnings.simplefilter("ignore", UserWarning)
             return np.asarray(source.random(end - first))

@@ -1,6 +1,7 @@
 """Runs of an FMU for Co-Simulation, many in one instance, by the functions of its library and arrays made once."""
 
 import ctypes
+import os
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -181,9 +182,9 @@ class Simulator:
                 self._functions[f"Set{some[0].function(self._version)}"],
                 [variable.name for variable in some],
                 np.array([variable.reference for variable in some], np.uint32),
-                np.zeros((rows, len(some)), TYPES[self._version][kind]),
+                np.zeros((rows, len(some)), some[0].dtype(self._version)),
             )
-            for kind, some in by_type.items()
+            for some in by_type.values()
         ]
 
     def _instantiate(self) -> Any:
@@ -197,11 +198,10 @@ class Simulator:
 
         try:
             return fmpy.simulation.instantiate_fmu(
-                self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=keep,
-                require_functions=False,
-            )  # fmt: skip
+                self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=keep
+            )
         except Exception as error:  # FMPy raises that itself
-            raise LoadError(brief(str(error).rstrip("."), 240)) from error
+            raise LoadError(brief(str(error).replace(self._folder + os.sep, "").rstrip("."), 240)) from error
 
     def _with_message(self, values: Sequence[float]) -> str:
         """Why a run fails, with the FMU's last warning: it is done once more, with messages on."""

@@ -1,0 +1,215 @@
+"""The runs of a study on workers of Dask: in tasks of about a second, and their rows written as they come."""
+
+import logging
+import tempfile
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from math import ceil
+from time import perf_counter
+from typing import Any
+
+import dask
+from distributed import Client, KilledWorker, LocalCluster, as_completed
+
+from rov_fmu.files.messages import FileError, StudyError, brief
+from rov_fmu.studies.sampling import Design
+from rov_fmu.studies.simulator import LoadError
+from rov_fmu.studies.store import Store
+from rov_fmu.studies.worker import Delivery, Job, Part, Trial, do_runs, lost_run, try_out
+
+_TASK = 1.0
+"""Seconds that a task shall take."""
+_LEAST = 0.2
+"""Seconds that a task takes at least, where the runs come to their end."""
+_AHEAD = 3
+"""Tasks by thread that are given out, so that none waits for the next one."""
+_CHANCES = 3
+"""How often a run may be under way as its worker dies, before the run is taken for the cause."""
+_WAIT = 20.0
+"""Seconds until a scheduler, or a worker of it, must have answered."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a study is."""
+
+    done: int
+    """Runs, those of before included."""
+    total: int
+    failed: int
+    """Of those that were done this time."""
+    dashboard: str
+    """Dask's page on what its workers do; nothing where there is none."""
+
+
+@dataclass
+class Spent:
+    """Where the time went."""
+
+    runs: int = 0
+    failed: int = 0
+    started: float = 0.0
+    """Seconds until the workers were there."""
+    elapsed: float = 0.0
+    """Seconds in all."""
+    working: float = 0.0
+    """Seconds of all workers together."""
+    simulating: float = 0.0
+    """Seconds of these that the FMU took."""
+
+
+def execute(
+    job: Job,
+    design: Design,
+    store: Store,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    on_progress: Callable[[Progress], None] = lambda _: None,
+) -> Spent:
+    """Do the runs that are missing in the store. Raises FileError, StudyError, WriteError, and KeyboardInterrupt."""
+    spent, begin = Spent(), perf_counter()
+    missing = deque(store.missing(design.runs))
+    if not missing:
+        return spent
+    with _client(workers, scheduler) as client:
+        client.register_plugin(Delivery(job, own_cluster=scheduler is None))
+        spent.started = perf_counter() - begin
+        try:
+            _Runs(client, job, design, store, missing, spent, on_progress).do()
+        finally:
+            spent.elapsed = perf_counter() - begin
+            if scheduler:
+                with suppress(Exception):  # that scheduler may be gone
+                    client.unregister_worker_plugin(job.key)
+    return spent
+
+
+class _Runs:
+    """The runs that are under way."""
+
+    def __init__(
+        self, client: Client, job: Job, design: Design, store: Store, missing: deque[tuple[int, int]], spent: Spent,
+        on_progress: Callable[[Progress], None],
+    ) -> None:  # fmt: skip
+        self._client, self._job, self._design, self._store = client, job, design, store
+        self._missing, self._spent, self._tell = missing, spent, on_progress
+        self._there = design.runs - sum(end - first for first, end in missing)
+        self._futures: dict[Any, tuple[int, int]] = {}
+        self._chances: dict[int, int] = {}
+        self._resets, self._seconds = False, _TASK
+
+    def do(self) -> None:
+        """All of them."""
+        self._report()
+        trial = self._trial()
+        self._resets, self._seconds = trial.resets, max(trial.seconds, 1e-6)
+        coming = as_completed(loop=self._client.loop, raise_errors=False)
+        try:
+            self._give(coming)
+            for future in coming:
+                self._take(future)
+                del future  # or its rows would stay
+                self._give(coming)
+        finally:
+            self._client.cancel(list(self._futures), force=True)
+
+    def _trial(self) -> Trial:
+        first = self._missing[0][0]
+        rows = self._design.rows(first, min(first + 8, self._design.runs))
+        try:
+            return self._client.submit(try_out, self._job.key, rows, pure=False).result()
+        except LoadError as error:
+            raise FileError(f"{self._job.model.name}: cannot be run: {error}") from error
+        except KilledWorker:
+            return Trial(False, _TASK)  # the runs will tell which of them it is
+
+    def _give(self, coming: Any) -> None:
+        """Have enough under way."""
+        threads = sum(self._client.nthreads().values()) or 1
+        while self._missing and len(self._futures) < _AHEAD * threads:
+            first, end = self._missing.popleft()
+            left = sum(b - a for a, b in self._missing) + end - first
+            size = max(min(ceil(_TASK / self._seconds), ceil(left / threads)), ceil(_LEAST / self._seconds))
+            if end - first > size:
+                self._missing.appendleft((first + size, end))
+                end = first + size
+            self._submit(coming, first, end)
+
+    def _submit(self, coming: Any, first: int, end: int) -> None:
+        rows = self._design.rows(first, end)
+        future = self._client.submit(do_runs, self._job.key, first, rows, self._resets, pure=False)
+        self._futures[future] = first, end
+        coming.add(future)
+
+    def _take(self, future: Any) -> None:
+        """Write what has come; what was lost is done again."""
+        first, end = self._futures.pop(future)
+        try:
+            part: Part = future.result()
+        except KilledWorker as error:
+            self._again(first, end, error)
+            return
+        except LoadError as error:
+            raise FileError(f"{self._job.model.name}: cannot be run on a worker: {error}") from error
+        except Exception as error:  # of the cluster
+            raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
+        self._write(first, end, part)
+        self._spent.working += part.seconds
+        self._spent.simulating += part.simulating
+        self._seconds = max(part.seconds / (end - first), 1e-6)
+
+    def _again(self, first: int, end: int, error: KilledWorker) -> None:
+        """Runs whose worker died: each half of them alone, until it is clear which run it is."""
+        if end - first > 1:
+            middle = (first + end) // 2
+            self._missing.extendleft([(middle, end), (first, middle)])
+            return
+        self._chances[first] = self._chances.get(first, 0) + 1
+        if self._chances[first] < _CHANCES:
+            self._missing.appendleft((first, end))
+            return
+        values = self._design.rows(first, end)[0]
+        self._write(first, end, lost_run(self._job, first, values, f"the FMU ended its process: {brief(str(error))}"))
+
+    def _write(self, first: int, end: int, part: Part) -> None:
+        self._store.write(first, end, part.runs, part.trajectories)
+        self._spent.runs += end - first
+        self._spent.failed += part.failed
+        self._report()
+
+    def _report(self) -> None:
+        link = self._client.dashboard_link
+        self._tell(Progress(self._there + self._spent.runs, self._design.runs, self._spent.failed, link or ""))
+
+
+@contextmanager
+def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
+    """Workers of this machine, a process and a thread each, or those of a scheduler. Raises FileError."""
+    if scheduler:
+        try:
+            client = Client(scheduler, timeout=_WAIT, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise FileError(f"--scheduler {scheduler}: no scheduler of Dask answers there") from error
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=_WAIT)
+            except TimeoutError:
+                raise FileError(f"--scheduler {scheduler}: it has no workers") from None
+            yield client
+        return
+    settings = {
+        "distributed.scheduler.allowed-failures": 0,  # a task is divided then, until the run is found
+        "distributed.worker.memory.terminate": False,
+    }
+    with (
+        tempfile.TemporaryDirectory(prefix="study-", ignore_cleanup_errors=True) as folder,
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL, local_directory=folder,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):  # fmt: skip
+        yield client

@@ -1,0 +1,209 @@
+"""A plan put together with its FMU: what does not fit in words, and what the workers must know."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rov_fmu.files.messages import FileError, shown
+from rov_fmu.files.reading import read_text
+from rov_fmu.files.series import series
+from rov_fmu.files.toml_file import line
+from rov_fmu.studies.figures import known_names, names_in
+from rov_fmu.studies.model import Model, Variable, unknown
+from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied, digest
+from rov_fmu.studies.sampling import Design
+from rov_fmu.studies.simulator import Manoeuvre
+from rov_fmu.studies.uncertainty import uncertainty
+from rov_fmu.studies.worker import REASON, RUN, STATUS, TIME, Job
+from rov_fmu.vehicle.shipped import find_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A plan that fits its FMU."""
+
+    plan: Plan
+    job: Job
+    design: Design
+    mark: Mapping[str, Any]
+    """What results depend on."""
+
+
+def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
+    """See that a plan, read from a path, fits an FMU. Raises PlanError with every reason."""
+    varied = {**_from_vehicle(plan, path), **plan.vary}
+    from_file = _file_inputs(plan, path, model)
+    if wrong := [*_nonsense(plan, model, varied, from_file)]:
+        raise PlanError(*(f"{path}: {words}" for words in wrong))
+    design = Design(plan, varied, model.variables)
+    times = plan.start_time + plan.step * np.arange(plan.steps, dtype=np.float64)
+    inputs = {name: _sampled(signal, times, plan.step) for name, signal in {**plan.inputs, **from_file}.items()}
+    kept = plan.keep.outputs if plan.keep else ()
+    named = {name for text in plan.figures.values() for name in names_in(text)} & model.variables.keys()
+    recorded = [*dict.fromkeys([*kept, *sorted(named - varied.keys())])]
+    manoeuvre = Manoeuvre(
+        plan.start_time, plan.step, plan.steps, plan.tolerance, plan.set, design.names, inputs, recorded
+    )
+    mark = {
+        **plan.mark,
+        "vary": [[name, way.model_dump(by_alias=True, mode="json", exclude_none=True)] for name, way in varied.items()],
+        "inputs": {name: signal.model_dump(mode="json", exclude_none=True)
+                   for name, signal in {**plan.inputs, **from_file}.items()},
+    }  # fmt: skip
+    mark.pop("input_file", None)
+    key = f"rov-fmu-{digest(json.dumps(mark, sort_keys=True).encode() + model.content)[:16]}"
+    return Prepared(plan, Job(key, model, manoeuvre, plan.figures, kept, _kept_points(plan)), design, mark)
+
+
+def vehicle_file(given: str, path: Path) -> Path:
+    """A vehicle file beside the plan, or one that ships."""
+    beside = path.parent / given
+    return beside if beside.is_file() else find_vehicle(given)
+
+
+def _from_vehicle(plan: Plan, path: Path) -> dict[str, Varied]:
+    if plan.vary_from is None:
+        return {}
+    found = uncertainty(load_vehicle(vehicle_file(plan.vary_from, path)))
+    if not found:
+        raise PlanError(
+            f"{path}: {line('vary_from', 'no coefficient of this vehicle has an interval', plan.vary_from)}"
+        )
+    return found
+
+
+def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
+    if not plan.input_file:
+        return {}
+    file = path.parent / plan.input_file.path
+
+    def error(reason: str) -> FileError:
+        return FileError(f"{file}: {reason}")
+
+    def check_column(name: str) -> None:
+        if name not in model.variables:
+            raise error(unknown(name, model.variables))
+
+    (_, times), *columns = series(read_text(file), error, check_column).items()
+    found = {}
+    for name, values in columns:
+        points = tuple(zip(times, values, strict=True))
+        held = plan.input_file.is_held or not model.variables[name].is_continuous
+        found[name] = Signal(steps=points) if held else Signal(ramps=points)
+    return found
+
+
+# ---- What does not fit -----------------------------------------------------------------------------------------------
+
+
+def _nonsense(plan: Plan, model: Model, varied: Mapping[str, Varied], from_file: Mapping[str, Signal]) -> Iterator[str]:
+    """A line each."""
+    has = model.variables
+    for name, way in varied.items():
+        key = f"vary.{name}"
+        if reason := _unsettable(name, has):
+            yield line(key, reason)
+        elif name in plan.set or name in plan.inputs or name in from_file:
+            yield line(key, "is given in [set] or [inputs] too")
+        else:
+            yield from (line(key, reason, value) for reason, value in _beyond(way, has[name], plan.sampler == "grid"))
+    if not varied and plan.sampler != "grid":
+        yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
+    for name, value in plan.set.items():
+        if reason := _unsettable(name, has) or has[name].wrong(value):
+            yield line(f"set.{name}", reason, value)
+    yield from _wrong_inputs(plan, has, from_file)
+    for name in plan.keep.outputs if plan.keep else ():
+        if name not in has:
+            yield line("keep.outputs", unknown(name, has))
+    yield from _wrong_figures(plan, has, varied)
+
+
+def _unsettable(name: str, has: Mapping[str, Variable]) -> str:
+    if name not in has:
+        return unknown(name, has)
+    return "" if has[name].can_be_set else "the FMU computes it, and it cannot be set"
+
+
+def _beyond(way: Varied, variable: Variable, is_grid: bool) -> Iterator[tuple[str, Any]]:
+    """What cannot be of a distribution: the reason and the value."""
+    if is_grid and way.choices is None:
+        yield "a grid needs values or a range", way.model_dump(exclude_none=True)
+        return
+    numbers = way.choices or way.uniform or ((way.normal.mean,) if way.normal else ())
+    numbers = numbers or ((way.lognormal.median,) if way.lognormal else ())
+    for value in numbers:
+        if reason := variable.wrong(value):
+            yield reason, value
+            return
+
+
+def _wrong_inputs(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
+    for name, signal in {**plan.inputs, **from_file}.items():
+        if name not in has:
+            yield line(f"inputs.{name}", unknown(name, has))
+        elif has[name].causality != "input":
+            yield line(f"inputs.{name}", f"is no input of the FMU; its causality is {has[name].causality}")
+        elif name in plan.set or (name in plan.inputs and name in from_file):
+            yield line(f"inputs.{name}", "is given twice")
+        elif signal.ramps and not has[name].is_continuous:
+            yield line(f"inputs.{name}", "must be steps, for it is not continuous")
+        else:
+            wrong = ((has[name].wrong(value), value) for _, value in signal.points)
+            yield from (line(f"inputs.{name}", reason, value) for reason, value in [(r, v) for r, v in wrong if r][:1])
+
+
+def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: Mapping[str, Varied]) -> Iterator[str]:
+    known = known_names()
+    for name, text in plan.figures.items():
+        if name in {RUN, STATUS, REASON} | varied.keys():
+            yield line(f"figures.{name}", "the results have another column of this name")
+            continue
+        try:
+            strange = sorted(names_in(text) - known - has.keys())
+        except ValueError as error:
+            yield line(f"figures.{name}", str(error), text)
+            continue
+        if strange:
+            yield line(
+                f"figures.{name}",
+                f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number",
+                text,
+            )
+    if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
+        yield line("keep.outputs", f"the results have another column {taken.pop()}")
+
+
+# ---- Over time -------------------------------------------------------------------------------------------------------
+
+
+def _kept_points(plan: Plan) -> Sequence[int]:
+    if plan.keep is None:
+        return ()
+    if plan.keep.at:
+        return [n for time in plan.keep.at if (n := plan.step_at(time)) is not None]
+    stride = round(plan.keep.every / plan.step) if plan.keep.every else 1
+    return range(0, plan.steps + 1, stride)
+
+
+def _sampled(signal: Signal, times: Array, step: float) -> Array:
+    """The signal at the beginning of each step, after a jump there; before its first point it is as there."""
+    at, values = np.array(signal.points, np.float64).T
+    now = times + 1e-9 * step  # a decimal time is found in spite of rounding
+    place = np.searchsorted(at, now, side="right") - 1
+    held: Array = values[np.maximum(place, 0)]
+    if signal.steps:
+        return held
+    inside = (place >= 0) & (place < len(at) - 1)
+    n = place[inside]
+    share = np.clip((times[inside] - at[n]) / (at[n + 1] - at[n]), 0.0, 1.0)
+    held[inside] = values[n] + share * (values[n + 1] - values[n])
+    return held

@@ -1,0 +1,105 @@
+"""The results of a study as data frames of pandas."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow.dataset as ds
+
+from rov_fmu.files.messages import FileError, shown
+from rov_fmu.studies.store import RUNS, TRAJECTORIES, Store
+from rov_fmu.studies.worker import FAILED, RUN, STATUS, TIME
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_AT_ONCE = 20_000_000
+"""Numbers of a trajectory that are in memory at a time."""
+
+
+class Results:
+    """What a study has come to, as far as it is done. Raises FileError where the folder holds none."""
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+        self._store = Store(self.folder)
+        told = self._store.description()
+        self.parameters: tuple[str, ...] = tuple(told["columns"]["parameters"])
+        """What was varied; columns of `runs`."""
+        self.figures: tuple[str, ...] = tuple(told["columns"]["figures"])
+        """What was computed; columns of `runs`."""
+        self.outputs: tuple[str, ...] = tuple(told["columns"]["outputs"])
+        """What was kept; columns of `trajectories`."""
+        self.planned: int = told["runs"]
+        """Runs of the whole study."""
+        self.plan: dict[str, Any] = told["plan"]
+        """As the results depend on it."""
+
+    @cached_property
+    def runs(self) -> pd.DataFrame:
+        """A row a run, in order, by its number: parameters, figures, status, reason."""
+        table = self._dataset(RUNS).to_table()
+        return table.to_pandas().sort_values(RUN).set_index(RUN)  # type: ignore[no-any-return]
+
+    def trajectories(self, runs: Sequence[int] | None = None) -> pd.DataFrame:
+        """A row a run and time (s, columns `run` and `t`), of all runs that ended or of these: the kept outputs."""
+        rows = None if runs is None else ds.field(RUN).isin([*runs])
+        table = self._dataset(TRAJECTORIES).to_table(filter=rows)
+        return table.to_pandas().sort_values([RUN, TIME], kind="stable").reset_index(drop=True)  # type: ignore[no-any-return]
+
+    def bands(self, output: str, quantiles: Sequence[float] = QUANTILES) -> pd.DataFrame:
+        """Quantiles of an output over the runs (columns) at each time (s, the index). Raises FileError."""
+        if output not in self.outputs:
+            raise FileError(f"{self.folder}: no trajectory of {shown(output)} is kept, only {', '.join(self.outputs)}")
+        trajectories = self._dataset(TRAJECTORIES)
+        times = np.unique(trajectories.head(self._points, columns=[TIME])[TIME].to_numpy())
+        ended = trajectories.count_rows() // max(len(times), 1)
+        block = max(1, _AT_ONCE // max(ended, 1))
+        found = []
+        for start in range(0, len(times), block):
+            low, high = times[start], times[min(start + block, len(times)) - 1]
+            part = trajectories.to_table(
+                columns=[TIME, output], filter=(ds.field(TIME) >= low) & (ds.field(TIME) <= high)
+            )
+            values = part[output].to_numpy().reshape(ended, -1)  # times go through from run to run
+            found.append(np.quantile(values, quantiles, axis=0).T)
+        return pd.DataFrame(np.concatenate(found), pd.Index(times, name=TIME), pd.Index(quantiles, name="quantile"))
+
+    def sensitivity(self, figure: str, seed: int = 0) -> pd.DataFrame:
+        """Sobol indices of a figure by parameter: S1, ST, and the half widths of their 95 % intervals.
+
+        A study by sampler saltelli has them. A block of runs counts where the figure is known in all of it. Raises
+        FileError.
+        """
+        from SALib.analyze import sobol
+
+        if figure not in self.figures:
+            raise FileError(f"{self.folder}: there is no figure {shown(figure)}, only {', '.join(self.figures)}")
+        if self.plan["sampler"] != "saltelli":
+            raise FileError(f'{self.folder}: Sobol indices need sampler = "saltelli" in the plan')
+        block = len(self.parameters) + 2
+        values = self.runs[figure].reindex(range(self.planned)).to_numpy().reshape(-1, block)
+        whole = values[np.isfinite(values).all(axis=1)]
+        if len(whole) < 2:
+            raise FileError(f"{self.folder}: too few runs have {figure}")
+        problem = {"num_vars": len(self.parameters), "names": list(self.parameters)}
+        found = sobol.analyze(problem, whole.ravel(), calc_second_order=False, seed=seed)
+        columns = {"S1": "S1", "S1_95": "S1_conf", "ST": "ST", "ST_95": "ST_conf"}
+        return pd.DataFrame({name: found[key] for name, key in columns.items()}, pd.Index(self.parameters))
+
+    @property
+    def failed(self) -> pd.DataFrame:
+        """The runs that failed, with their reasons."""
+        return self.runs[self.runs[STATUS] == FAILED]
+
+    @property
+    def _points(self) -> int:
+        """Rows of a trajectory."""
+        return int(self._store.description()["points"])
+
+    def _dataset(self, name: str) -> Any:
+        """Files in the order of their runs."""
+        if not (paths := sorted(str(path) for path in (self.folder / name).glob("part-*.parquet"))):
+            raise FileError(f"{self.folder / name}: holds no results yet")
+        return ds.dataset(paths)

@@ -1,0 +1,70 @@
+"""A study from its plan to its results."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from rov_fmu.build import build
+from rov_fmu.files.output import Output, write_whole
+from rov_fmu.studies.engine import Progress, Spent, execute
+from rov_fmu.studies.model import Model, read_model
+from rov_fmu.studies.plan import Plan, digest, load_plan
+from rov_fmu.studies.prepared import prepare, vehicle_file
+from rov_fmu.studies.results import Results
+from rov_fmu.studies.store import Store
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+
+def study(
+    plan: Path | str,
+    folder: Path | str,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    on_progress: Callable[[Progress], None] = lambda _: None,
+) -> Results:
+    """Do what is missing of a study, and open its results.
+
+    `workers` are processes on this machine, as many as it has cores by default; `scheduler` is the address of a
+    scheduler of Dask in place of them. On this machine other processes are started, so a script that calls this has
+    its `if __name__ == "__main__":`.
+
+    Raises FileError with a line for each reason, BuildError where the FMU of a vehicle cannot be built, StudyError
+    where the workers are lost, WriteError, KeyboardInterrupt; what is done is kept, and the same call goes on from
+    there.
+    """
+    _, results = run_study(Path(plan), Path(folder), workers, scheduler, on_progress)
+    return results
+
+
+def run_study(
+    path: Path,
+    folder: Path,
+    workers: int | None,
+    scheduler: str | None,
+    on_progress: Callable[[Progress], None],
+) -> tuple[Spent, Results]:
+    """The same, and where the time went."""
+    plan = load_plan(path)
+    store = Store(folder)
+    model = _model(plan, path)
+    prepared = prepare(plan, path, model)
+    with store.held():
+        job, design = prepared.job, prepared.design
+        columns = {"parameters": design.names, "figures": [*job.figures], "outputs": job.kept}
+        store.belongs_to(prepared.mark, digest(model.content), design.runs, columns, len(job.kept_points))
+        if plan.vehicle:
+            write_whole(Output(folder / model.name, model.content))
+        spent = execute(job, design, store, workers, scheduler, on_progress)
+        return spent, Results(folder)
+
+
+def _model(plan: Plan, path: Path) -> Model:
+    """The FMU that the plan names, or that of its vehicle."""
+    if plan.fmu:
+        return read_model(path.parent / plan.fmu)
+    assert plan.vehicle
+    vehicle = load_vehicle(vehicle_file(plan.vehicle, path))
+    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+        built = build(vehicle, Path(folder, f"{vehicle.identifier}.fmu"), platforms=["host"])
+        return read_model(built.path)

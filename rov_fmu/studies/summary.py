@@ -1,0 +1,34 @@
+"""What the command line tells of a study when it has ended."""
+
+import numpy as np
+from rich.text import Text
+
+from rov_fmu.pages.console import console, table, text
+from rov_fmu.studies.engine import Spent
+from rov_fmu.studies.results import Results
+from rov_fmu.studies.worker import REASON
+
+_SHOWN = (0.05, 0.5, 0.95)
+_FAILURES = 5
+"""Reasons that are shown, the most frequent first."""
+
+
+def print_summary(results: Results, spent: Spent) -> None:
+    """How many runs, how fast, the figures' quantiles, and why runs failed or figures are missing."""
+    out, runs = console(), results.runs
+    out.print(Text.assemble((str(results.folder), "bold"), f"  {len(runs)} runs, {len(results.failed)} failed"))
+    if spent.runs:
+        rate = spent.runs / max(spent.elapsed - spent.started, 1e-3)
+        out.print(
+            f"  {spent.runs} of them now, in {spent.elapsed:.1f} s; {rate:.0f} a second once the workers were there"
+        )
+    if results.figures:
+        shown = table("", "figure", [*(f"{q:.0%}" for q in _SHOWN), "mean", "runs"])
+        for name in results.figures:
+            values = runs[name].to_numpy(float)
+            there = values[np.isfinite(values)]
+            numbers = [*np.quantile(there, _SHOWN), there.mean()] if there.size else [np.nan] * (len(_SHOWN) + 1)
+            shown.add_row(name, *(text(number, ".5g") for number in numbers), str(there.size))
+        out.print(shown)
+    for reason, count in runs[REASON].value_counts().head(_FAILURES).items():
+        out.print(f"  {count} runs: {reason}", soft_wrap=True)

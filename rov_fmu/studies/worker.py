@@ -1,0 +1,225 @@
+"""What a worker does: it has the FMU unpacked, an instance a thread, and makes the rows of many runs at a time."""
+
+import io
+import shutil
+import signal
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock, current_thread, main_thread
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.parquet as pq
+from distributed import Worker
+from distributed.diagnostics.plugin import WorkerPlugin
+
+from rov_fmu.studies.figures import Figures
+from rov_fmu.studies.model import Model, unpack
+from rov_fmu.studies.simulator import Manoeuvre, RunError, Simulator
+
+Array = npt.NDArray[np.float64]
+RUN, STATUS, REASON, TIME = "run", "status", "reason", "t"
+"""Columns that every study has."""
+DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
+"""Statuses: all there; the run was done, and a figure cannot be computed; the run was not done to its end."""
+_TRIED = 8
+"""Runs of which one that ends is sought, to try the FMU with."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that workers must know of a study; it travels to each of them once."""
+
+    key: str
+    """Of this study among others on the same workers."""
+    model: Model
+    manoeuvre: Manoeuvre
+    figures: Mapping[str, str]
+    kept: Sequence[str]
+    """Outputs of which the trajectory is kept."""
+    kept_points: Sequence[int]
+    """At which communication points."""
+
+    @property
+    def runs_schema(self) -> pa.Schema:
+        """Of the table with a row a run."""
+        numbers = [(name, pa.float64()) for name in (*self.manoeuvre.varied, *self.figures)]
+        return pa.schema([(RUN, pa.int64()), *numbers, (STATUS, pa.string()), (REASON, pa.string())])
+
+
+@dataclass(frozen=True)
+class Part:
+    """The rows of some runs, one after another, as Parquet files."""
+
+    runs: bytes
+    trajectories: bytes | None
+    failed: int
+    seconds: float
+    """How long a worker had to do with it."""
+    simulating: float
+    """How much of that the FMU took."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What was found of the FMU before the study."""
+
+    resets: bool
+    """Whether a run after a reset is to the bit the one in a new instance."""
+    seconds: float
+    """That a run takes."""
+
+
+class Shop:
+    """The FMU on one worker. Instances are lent to a thread at a time, and used again."""
+
+    def __init__(self, job: Job, folder: Path) -> None:
+        self.job = job
+        self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=folder))
+        self._description = unpack(job.model.content, self._folder)
+        self._idle: list[tuple[Simulator, Figures]] = []
+        self._one_only = Lock() if job.model.once_per_process else None
+
+    @contextmanager
+    def lent(self) -> Iterator[tuple[Simulator, Figures]]:
+        """An instance, ready for a run. Raises LoadError."""
+        if self._one_only:
+            self._one_only.acquire()
+        try:
+            try:
+                tools = self._idle.pop()
+            except IndexError:
+                simulator = Simulator(str(self._folder), self._description, self.job.model, self.job.manoeuvre)
+                tools = simulator, Figures(self.job.figures, self.job.manoeuvre.times)
+            yield tools
+            self._idle.append(tools)
+        finally:
+            if self._one_only:
+                self._one_only.release()
+
+    def close(self) -> None:
+        """End the instances; the files go."""
+        for simulator, _ in self._idle:
+            simulator.free()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+_SHOPS: dict[str, Shop] = {}
+"""Of this process, by the key of the study."""
+
+
+class Delivery(WorkerPlugin):
+    """Brings a study to every worker, those that come later or anew among them."""
+
+    def __init__(self, job: Job, own_cluster: bool) -> None:
+        self.name = job.key
+        self._job, self._own = job, own_cluster
+
+    def setup(self, worker: Worker) -> None:
+        """Called on a worker as it comes."""
+        if self._own and current_thread() is main_thread():
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has started these
+        _SHOPS[self.name] = Shop(self._job, Path(worker.local_directory))
+
+    def teardown(self, worker: Worker) -> None:  # noqa: ARG002 (as it is called)
+        """Called as the study ends."""
+        if shop := _SHOPS.pop(self.name, None):
+            shop.close()
+
+
+def try_out(key: str, rows: Array) -> Trial:
+    """Whether a run after a reset, which came after another run, is as the first one. Raises LoadError."""
+    with _SHOPS[key].lent() as (simulator, _):
+        start = perf_counter()
+        for values in rows[:_TRIED]:
+            simulator.renew()
+            try:
+                first = _copied(simulator.run(values))
+                taken = perf_counter() - start
+                for other in (rows[-1], values):
+                    simulator.reset()
+                    again = simulator.run(other)
+            except RunError:
+                start = perf_counter()
+                continue
+            same = all(np.array_equal(first[name], again[name], equal_nan=True) for name in first)
+            simulator.renew()
+            return Trial(same, taken)
+        simulator.renew()
+        return Trial(False, (perf_counter() - start) / len(rows[:_TRIED]))
+
+
+def do_runs(key: str, first: int, rows: Array, resets: bool) -> Part:
+    """Do the runs from this number on, a row of values each. Raises LoadError."""
+    began, simulating, failed = perf_counter(), 0.0, 0
+    shop = _SHOPS[key]
+    job = shop.job
+    m = job.manoeuvre
+    figures = np.full((len(rows), len(job.figures)), np.nan)
+    points = np.array(job.kept_points, int)
+    every = len(points) == m.steps + 1
+    kept = [np.empty((len(rows), len(points)), job.model.variables[name].dtype(job.model.version)) for name in job.kept]
+    statuses, reasons, ended = [], [], np.ones(len(rows), bool)
+    with shop.lent() as (simulator, figures_of):
+        for n, values in enumerate(rows):
+            start = perf_counter()
+            try:
+                run = simulator.run(values)
+            except RunError as error:
+                statuses.append(FAILED)
+                reasons.append(str(error))
+                ended[n] = False
+                continue
+            finally:
+                simulating += perf_counter() - start
+            for place, name in zip(kept, job.kept, strict=True):
+                place[n] = run[name] if every else run[name][points]
+            reason = ""
+            if job.figures:
+                figures[n], reason = figures_of.of({**dict(zip(m.varied, values.tolist(), strict=True)), **run})
+            statuses.append(INCOMPLETE if reason else DONE)
+            reasons.append(reason)
+            start = perf_counter()
+            if resets:
+                simulator.reset()
+            else:
+                simulator.renew()
+            simulating += perf_counter() - start
+    numbers = np.arange(first, first + len(rows))
+    columns = [numbers, *rows.T, *figures.T, statuses, pa.array(reasons, pa.string(), mask=np.array(reasons) == "")]
+    table = pa.table([pa.array(column) for column in columns], schema=job.runs_schema)
+    trajectories = None
+    if job.kept:
+        times = np.tile(m.times[points], int(ended.sum()))
+        long = {RUN: np.repeat(numbers[ended], len(points)), TIME: times}
+        long |= {name: place[ended].ravel() for name, place in zip(job.kept, kept, strict=True)}
+        trajectories = _parquet(pa.table(long), [RUN, TIME])
+    failed = int((~ended).sum())
+    return Part(_parquet(table, [STATUS, REASON]), trajectories, failed, perf_counter() - began, simulating)
+
+
+def lost_run(job: Job, number: int, values: Array, reason: str) -> Part:
+    """The row of a run that ends the process which does it."""
+    columns = [[number], *([value] for value in values), *([np.nan] for _ in job.figures), [FAILED], [reason]]
+    return Part(_parquet(pa.table(columns, schema=job.runs_schema), [STATUS]), None, 1, 0.0, 0.0)
+
+
+def _copied(run: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    return {name: values.copy() for name, values in run.items()}
+
+
+def _parquet(table: pa.Table, repeated: Sequence[str]) -> bytes:
+    """A file; columns in which values come again and again are written as a dictionary."""
+    doubles = [field.name for field in table.schema if pa.types.is_floating(field.type) and field.name not in repeated]
+    file = io.BytesIO()
+    pq.write_table(
+        table, file, compression="zstd", compression_level=1, use_dictionary=list(repeated),
+        use_byte_stream_split=doubles,
+    )  # fmt: skip
+    return file.getvalue()

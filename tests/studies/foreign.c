@@ -1,0 +1,114 @@
+/* An FMU of another make, in FMI 2.0: what it does right, and what it does wrong, is for studies to bear.
+
+   y' = (a + 2 b + 3 c + u - y)/0.5; gain is an integer that multiplies u. mode: 1 fails at 1 s, 2 ends the process. RESET
+   says what fmi2Reset does: 0 its work, 1 nothing while it says that it did, 2 nothing, with an error. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+
+typedef struct {
+    double a, b, c, u, y;
+    int gain, mode, fast;
+    const fmi2CallbackFunctions *host;
+} Instance;
+
+static void begin(Instance *i) {
+    i->a = i->b = i->c = i->u = i->y = 0.0;
+    i->gain = 1;
+    i->mode = i->fast = 0;
+}
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *host, fmi2Boolean visible, fmi2Boolean logging) {
+    (void)name, (void)type, (void)guid, (void)resources, (void)visible, (void)logging;
+    Instance *i = calloc(1, sizeof *i);
+    begin(i);
+    i->host = host;
+    return i;
+}
+void fmi2FreeInstance(fmi2Component c) { free(c); }
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean d, fmi2Real t, fmi2Real s, fmi2Boolean e, fmi2Real f) {
+    (void)c, (void)d, (void)t, (void)s, (void)e, (void)f;
+    return fmi2OK;
+}
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return (void)c, fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return (void)c, fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) { return (void)c, fmi2OK; }
+fmi2Status fmi2Reset(fmi2Component c) {
+    if (RESET == 0) begin(c);
+    return RESET == 2 ? fmi2Error : fmi2OK;
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    const Instance *i = c;
+    const double all[] = {i->a, i->b, i->c, i->u, i->y};
+    for (size_t k = 0; k < n; k++) value[k] = all[vr[k]];
+    return fmi2OK;
+}
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
+    Instance *i = c;
+    double *all[] = {&i->a, &i->b, &i->c, &i->u, &i->y};
+    for (size_t k = 0; k < n; k++) *all[vr[k]] = value[k];
+    return fmi2OK;
+}
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
+    const Instance *i = c;
+    for (size_t k = 0; k < n; k++) value[k] = vr[k] ? i->mode : i->gain;
+    return fmi2OK;
+}
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[]) {
+    Instance *i = c;
+    for (size_t k = 0; k < n; k++) *(vr[k] ? &i->mode : &i->gain) = value[k];
+    return fmi2OK;
+}
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) value[k] = ((const Instance *)c)->fast;
+    return fmi2OK;
+}
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) ((Instance *)c)->fast = value[k];
+    return fmi2OK;
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no) {
+    (void)no;
+    Instance *i = c;
+    if (i->mode == 2) abort();
+    if (i->mode == 1 && t >= 1.0 - 1e-9) {
+        i->host->logger(NULL, "foreign", fmi2Error, "error", "the pump is blocked");
+        return fmi2Error;
+    }
+    const double to = i->a + 2.0 * i->b + 3.0 * i->c + i->gain * i->u;
+    i->y = i->fast ? to : to + (i->y - to) * exp(-h / 0.5);
+    return fmi2OK;
+}
+
+/* What an importer looks for and a study does not call. */
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+const char *fmi2GetVersion(void) { return fmi2Version; }
+#define NOT_THERE(name, ...) \
+    fmi2Status name(__VA_ARGS__) { return fmi2Error; }
+typedef fmi2Component C;
+typedef const fmi2ValueReference *V;
+NOT_THERE(fmi2SetDebugLogging, C c, fmi2Boolean on, size_t n, const fmi2String k[])
+NOT_THERE(fmi2GetString, C c, V vr, size_t n, fmi2String value[])
+NOT_THERE(fmi2SetString, C c, V vr, size_t n, const fmi2String value[])
+NOT_THERE(fmi2GetFMUstate, C c, fmi2FMUstate *state)
+NOT_THERE(fmi2SetFMUstate, C c, fmi2FMUstate state)
+NOT_THERE(fmi2FreeFMUstate, C c, fmi2FMUstate *state)
+NOT_THERE(fmi2SerializedFMUstateSize, C c, fmi2FMUstate state, size_t *size)
+NOT_THERE(fmi2SerializeFMUstate, C c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+NOT_THERE(fmi2DeSerializeFMUstate, C c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+NOT_THERE(fmi2GetDirectionalDerivative, C c, V z, size_t nz, V v, size_t nv, const fmi2Real dv[], fmi2Real dz[])
+NOT_THERE(fmi2SetRealInputDerivatives, C c, V vr, size_t n, const fmi2Integer order[], const fmi2Real value[])
+NOT_THERE(fmi2GetRealOutputDerivatives, C c, V vr, size_t n, const fmi2Integer order[], fmi2Real value[])
+NOT_THERE(fmi2CancelStep, C c)
+NOT_THERE(fmi2GetStatus, C c, const fmi2StatusKind kind, fmi2Status *value)
+NOT_THERE(fmi2GetRealStatus, C c, const fmi2StatusKind kind, fmi2Real *value)
+NOT_THERE(fmi2GetIntegerStatus, C c, const fmi2StatusKind kind, fmi2Integer *value)
+NOT_THERE(fmi2GetBooleanStatus, C c, const fmi2StatusKind kind, fmi2Boolean *value)
+NOT_THERE(fmi2GetStringStatus, C c, const fmi2StatusKind kind, fmi2String *value)

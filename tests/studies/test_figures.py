@@ -1,0 +1,60 @@
+"""Figures of responses whose figures are known."""
+
+from math import exp, log, nan, pi, sqrt
+
+import numpy as np
+import pytest
+
+from rov_fmu.studies.figures import Figures
+
+T = np.linspace(0.0, 40.0, 4001)
+FIRST = np.where(T > 2.0, 3.0 * (1.0 - np.exp(-np.maximum(T - 2.0, 0.0) / 1.5)), 0.0)
+"""From rest at 2 s to 3, by a time constant of 1.5 s."""
+ZETA, OMEGA = 0.4, 2.0
+_D = OMEGA * sqrt(1.0 - ZETA**2)
+SECOND = 1.0 - np.exp(-ZETA * OMEGA * T) * (np.cos(_D * T) + ZETA * OMEGA / _D * np.sin(_D * T))
+"""A step response that overshoots."""
+
+KNOWN = {
+    "V_ss(y)": 3.0,
+    "Tau(y, 2)": 1.5,
+    "Tau(y)": 3.5,
+    "overshoot(y)": 0.0,
+    "settling_time(y, 2)": 1.5 * log(20.0),
+    "settling_time(y, 2, 40, 0.02)": 1.5 * log(50.0),
+    "overshoot(z)": exp(-pi * ZETA / sqrt(1.0 - ZETA**2)),
+    "V_ss(-2*y)": -6.0,
+    "Tau(-2*y, 2)": 1.5,
+    "at(y, 3.5)": 3.0 * (1.0 - exp(-1.0)),
+    "at(y, 41)": nan,
+    "final(y)": 3.0,
+    "Tau(0*y)": nan,
+    "overshoot(0*y)": nan,
+    "settling_time(0*y)": nan,
+    "max(z) - m": exp(-pi * ZETA / sqrt(1.0 - ZETA**2)) + 1.0 - 6.5,
+    "out['der(y)'][-1]": 1.0,
+    "y[t >= 10][0]": 3.0 * (1.0 - exp(-8.0 / 1.5)),
+    "1 if m > 6 else 2": 1.0,
+    "z[-1] > 0.5": 1.0,
+}
+
+
+@pytest.mark.parametrize("expression", KNOWN)
+def test_a_figure_is_what_the_response_has_in_closed_form(expression: str) -> None:
+    run = {"y": FIRST, "z": SECOND, "m": 6.5, "der(y)": np.ones(len(T))}
+    (found,), reason = Figures({"f": expression}, T).of(run)
+    assert found == pytest.approx(KNOWN[expression], abs=1.1e-2, nan_ok=True)  # a step is 0.01 s
+    assert reason == ""
+
+
+def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there() -> None:
+    figures = Figures({"far": "y[9999]", "all": "2*y", "zero": "1/0", "late": "V_ss(y, 50, 60)", "m": "m"}, T)
+    found, reason = figures.of({"y": FIRST, "m": 6.5})
+    assert found == pytest.approx([nan, nan, nan, nan, 6.5], nan_ok=True)
+    far, others, zero, late = reason.split("; ")
+    assert far == "far: IndexError: index 9999 is out of bounds for axis 0 with size 4001"
+    assert others.startswith("all: must be one number, and not array(")
+    assert zero == "zero: ZeroDivisionError: division by zero"
+    assert late == "late: ValueError: there is no time from 50 to 60"
+    found, reason = figures.of({"y": np.full(10_000, 2.0), "m": 1.0})
+    assert found[0] == 2.0, "the next run has nothing of this one's errors"

@@ -1,0 +1,100 @@
+"""What is wrong with a plan is told in a line each, before anything is run."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.studies.model import read_model
+from rov_fmu.studies.plan import load_plan
+from rov_fmu.studies.prepared import prepare
+
+HEAD = 'fmu = "videoray.fmu"\nstop_time = 1.0\nstep = 0.1\nruns = 4\n'
+TAIL = '[figures]\nend = "u[-1]"\n'
+VARY = "[vary]\nalpha_u.uniform = [1.0, 1.2]\n"
+
+WRONG = {
+    "": "stop_time: this key is missing",
+    "fmu = 1": "fmu = 1: must be text in quotes",
+    'stop = 3.0\nfmu = "videoray.fmu"': "stop: there is no such key; did you mean step?",
+    HEAD.replace("1.0", "0.95") + VARY + TAIL:
+        "stop_time = 0.95: must be a whole number of steps of 0.1 s after the start",
+    HEAD.replace("1.0", "-1.0") + VARY + TAIL: "stop_time = -1.0: must be after start_time = 0",
+    HEAD.replace("4", "0") + VARY + TAIL: "runs = 0: must be within 1 ... 1e+08",
+    HEAD + VARY: "must have [keep] or [figures], or nothing remains of a run",
+    HEAD + TAIL: 'vary: nothing varies: write [vary], or sampler = "grid" for the one run',
+    HEAD + 'sampler = "grid"\n' + VARY + TAIL: "runs = 4: a grid has as many as it has points; leave this out",
+    HEAD.replace("runs = 4", 'sampler = "grid"') + VARY + TAIL:
+        "vary.alpha_u = {'uniform': (1.0, 1.2)}: a grid needs values or a range",
+    HEAD + 'sampler = "soboll"\n' + VARY + TAIL:
+        "sampler = 'soboll': must be 'grid', 'sobol', 'latin-hypercube', 'random' or 'saltelli'",
+    HEAD + 'vehicle = "videoray"\n' + VARY + TAIL: "must have either fmu or vehicle",
+    HEAD + 'vary_from = "videoray"\n' + TAIL: "vary_from = 'videoray': no coefficient of this vehicle has an interval",
+    HEAD + "[vary]\nalpha_uu.uniform = [1.0, 1.2]\n" + TAIL:
+        "vary.alpha_uu: the FMU has no variable 'alpha_uu' that is a number; did you mean alpha_",
+    HEAD + "[vary]\nalpha_u.uniform = [-1.0, 1.2]\n" + TAIL: "vary.alpha_u = -1.0: must be within 0 ... 1000",
+    HEAD + "[vary]\nalpha_u.values = [1.0, 1e9]\n" + TAIL: "vary.alpha_u = 1000000000.0: must be within 0 ... 1000",
+    HEAD + "[vary]\nm_rov.normal = { mean = -1.0, sd = 1.0 }\n" + TAIL:
+        "vary.m_rov = -1.0: must be within 0.001 ... 1000000 kg",
+    HEAD + "[vary]\nalpha_u = { uniform = [1.0, 2.0], values = [1.0] }\n" + TAIL:
+        "vary.alpha_u: must have one of normal, lognormal, uniform,",
+    HEAD + "[vary]\nF_l.uniform = [1.0, 2.0]\n" + TAIL: "vary.F_l: the FMU computes it, and it cannot be set",
+    HEAD + VARY + "[set]\nalpha_u = 1.0\n" + TAIL: "vary.alpha_u: is given in [set] or [inputs] too",
+    HEAD + VARY + "[set]\nm_rov = 0.0\n" + TAIL: "set.m_rov = 0.0: must be within 0.001 ... 1000000 kg",
+    HEAD + VARY + "[inputs]\nu_l = 1.5\n" + TAIL: "inputs.u_l = 1.5: must be within -1 ... 1",
+    HEAD + VARY + "[inputs]\nu = 0.5\n" + TAIL: "inputs.u: is no input of the FMU; its causality is output",
+    HEAD + VARY + "[inputs]\nu_l.steps = []\n" + TAIL: "inputs.u_l.steps = []: must have an entry",
+    HEAD + VARY + "[inputs]\nu_l.ramps = [[1.0, 0.0], [0.5, 1.0]]\n" + TAIL:
+        "inputs.u_l.ramps = [[1.0, 0.0], [0.5, 1.0]]: the time must not go back, as it does from 1 to 0.5",
+    HEAD + VARY + '[keep]\noutputs = ["q"]\n': "keep.outputs: the FMU has no variable 'q' that is a number",
+    HEAD + VARY + '[keep]\noutputs = ["u"]\nevery = 0.25\n': "keep.every = 0.25: must be a multiple of step = 0.1",
+    HEAD + VARY + '[keep]\noutputs = ["u"]\nat = [0.5, 1.1]\n':
+        "keep.at = [0.5, 1.1]: must be times from the start to the end",
+    HEAD + VARY + '[figures]\nend = "u[-1"\n': "figures.end = 'u[-1': is no expression: '[' was never closed",
+    HEAD + VARY + '[figures]\nend = "q[-1]"\n': "figures.end = 'q[-1]': 'q' is neither a function nor a variable",
+    HEAD + VARY + '[figures]\nend = "open(1)"\n': "figures.end = 'open(1)': 'open' is neither a function nor a",
+    HEAD + VARY + '[figures]\nalpha_u = "u[-1]"\n': "figures.alpha_u: the results have another column of this name",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", WRONG, ids=WRONG.values())
+def test_a_mistake_is_a_line_and_nothing_is_written(
+    text: str, tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan = tmp_path / "plan.toml"
+    plan.write_text(text)
+    (tmp_path / "videoray.fmu").symlink_to(videoray_fmu)
+    assert main(["study", str(plan), "-o", str(tmp_path / "results")]) == 2
+    told = capsys.readouterr().err
+    assert f": {WRONG[text]}" in told
+    if text.startswith(HEAD):
+        assert told.count("\n") == 1
+    assert not (tmp_path / "results").exists()
+
+
+def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = tmp_path / "plan.toml"
+    plan.write_text(HEAD + VARY + TAIL)
+    (tmp_path / "videoray.fmu").write_bytes(b"no archive")
+    assert main(["study", str(plan), "-o", str(tmp_path / "results")]) == 2
+    assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'videoray.fmu'}: is no FMU that FMPy reads: ")
+
+
+def test_inputs_are_held_or_straight_and_jump_where_two_points_are_of_one_time(
+    foreign: Callable[..., Path], tmp_path: Path
+) -> None:
+    (tmp_path / "u.csv").write_text("time,u\n0.1,1\n0.3,3\n0.3,-1\n0.5,-1\n")
+    head = f'fmu = "{foreign()}"\nstop_time = 0.7\nstep = 0.1\nsampler = "grid"\n[keep]\noutputs = ["y"]\n'
+    expected = {
+        "[inputs]\nu = 0.5\n": [0.5] * 7,
+        "[inputs]\nu.steps = [[0.2, 1.0], [0.3, 2.0], [0.6, 0.0]]\n": [1, 1, 1, 2, 2, 2, 0],
+        "[inputs]\nu.ramps = [[0.1, 1.0], [0.3, 3.0], [0.3, -1.0], [0.5, -1.0]]\n": [1, 1, 2, -1, -1, -1, -1],
+        '[input_file]\npath = "u.csv"\n': [1, 1, 2, -1, -1, -1, -1],
+        '[input_file]\npath = "u.csv"\nbetween = "steps"\n': [1, 1, 1, -1, -1, -1, -1],
+    }
+    for text, values in expected.items():
+        path = tmp_path / "plan.toml"
+        path.write_text(head + text)
+        manoeuvre = prepare(load_plan(path), path, read_model(foreign())).job.manoeuvre
+        assert manoeuvre.inputs["u"].tolist() == pytest.approx(values, abs=1e-12), text

@@ -1,0 +1,242 @@
+"""Studies done: the rows are those of the closed form, whoever does them, whatever happens to whom."""
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from SALib.analyze import sobol  # noqa: F401 (what sensitivity needs is there)
+
+from rov_fmu.cli import main
+from rov_fmu.studies import Results, study
+from tests.commands import start
+
+Foreign = Callable[..., Path]
+posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+
+
+def _plan(folder: Path, fmu: Path, runs: int = 40, more: str = "", vary: str = "", step: float = 0.1) -> Path:
+    path = folder / "plan.toml"
+    path.write_text(f"""fmu = "{fmu}"
+stop_time = 2.0
+step = {step}
+runs = {runs}
+seed = 5
+[inputs]
+u.steps = [[1.0, 0.5]]
+[vary]
+a.uniform = [0.0, 1.0]
+b.uniform = [0.0, 1.0]
+c.uniform = [0.0, 1.0]
+{vary}
+[keep]
+outputs = ["y"]
+every = 0.5
+[figures]
+end = "y[-1]"
+sooner = "at(y, 1)"
+{more}
+""")
+    return path
+
+
+def _expected(runs: pd.DataFrame, t: float) -> "pd.Series[float]":
+    """y of the foreign FMU; before the first point of its input that is as there, 0.5."""
+    return (runs.a + 2.0 * runs.b + 3.0 * runs.c + 0.5) * (1.0 - np.exp(-t / 0.5))
+
+
+def _same(one: Results, other: Results) -> None:
+    pd.testing.assert_frame_equal(one.runs, other.runs, check_exact=True)
+    pd.testing.assert_frame_equal(one.trajectories(), other.trajectories(), check_exact=True)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
+    """By one worker."""
+    folder = tmp_path_factory.mktemp("whole")
+    return study(_plan(folder, foreign()), folder / "results", workers=1)
+
+
+def test_the_rows_are_those_of_the_closed_form(whole: Results) -> None:
+    runs = whole.runs
+    assert runs.index.tolist() == [*range(40)]
+    assert {*runs.status} == {"done"}
+    assert runs.reason.isna().all()
+    assert runs.end == pytest.approx(_expected(runs, 2.0), rel=1e-12)
+    assert runs.sooner == pytest.approx(_expected(runs, 1.0), rel=1e-12)
+    long = whole.trajectories()
+    assert long.t.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0] * 40
+    assert long.run.tolist() == np.repeat(np.arange(40), 5).tolist()
+    for t, part in long.groupby("t"):
+        assert part.y.to_numpy() == pytest.approx(_expected(runs, t).to_numpy(), rel=1e-12)
+    assert whole.trajectories([3, 7]).run.unique().tolist() == [3, 7]
+
+
+def test_bands_are_quantiles_over_the_runs(whole: Results) -> None:
+    bands = whole.bands("y", (0.0, 0.5, 1.0))
+    assert bands.index.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    for t in bands.index:
+        y = _expected(whole.runs, t)
+        assert bands.loc[t].tolist() == pytest.approx([y.min(), y.median(), y.max()], rel=1e-12, abs=1e-15)
+
+
+@pytest.mark.parametrize("reset", [1, 2])
+def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
+    reset: int, foreign: Foreign, tmp_path: Path, whole: Results
+) -> None:
+    """y itself is left as it was by a reset that does nothing."""
+    _same(study(_plan(tmp_path, foreign(reset)), tmp_path / "results", workers=2), whole)
+
+
+def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(foreign: Foreign, tmp_path: Path) -> None:
+    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1]", more='bad = "1/(mode - mode)"')
+    results = study(plan, tmp_path / "results", workers=1)
+    failed, others = results.runs[results.runs["mode"] == 1], results.runs[results.runs["mode"] == 0]
+    assert 0 < len(failed) < 30
+    assert {*failed.status} == {"failed"}
+    assert {*failed.reason} == {"the step at 1 s: error; the FMU: the pump is blocked"}
+    assert failed[["end", "sooner"]].isna().all(axis=None)
+    assert {*others.status} == {"incomplete"}
+    assert {*others.reason} == {"bad: ZeroDivisionError: float division by zero"}
+    assert others.end == pytest.approx(_expected(others, 2.0), rel=1e-12)
+    assert {*results.trajectories().run} == {*others.index}
+
+
+def test_a_run_that_ends_its_process_is_found(foreign: Foreign, tmp_path: Path) -> None:
+    """c is what drives the mode: one run of sixteen."""
+    plan = _plan(tmp_path, foreign(), runs=16, vary="mode.values = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2]")
+    results = study(plan, tmp_path / "results", workers=2)
+    crashed, others = results.runs[results.runs["mode"] == 2], results.runs[results.runs["mode"] == 0]
+    assert len(crashed) >= 1
+    assert {*crashed.status} == {"failed"}
+    assert all(reason.startswith("the FMU ended its process") for reason in crashed.reason)
+    assert len(others) + len(crashed) == 16
+    assert {*others.status} == {"done"}
+    assert others.end == pytest.approx(_expected(others, 2.0), rel=1e-12)
+
+
+def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
+    foreign: Foreign, tmp_path: Path, whole: Results, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = tmp_path / "results"
+    study(_plan(tmp_path, foreign(), runs=16), results, workers=1)
+    before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
+    _same(study(_plan(tmp_path, foreign(), runs=40), results, workers=2), whole)
+    assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
+    capsys.readouterr()
+    for plan, told in (
+        (_plan(tmp_path, foreign(), more='other = "y[0]"'), "holds runs of another plan (figures changed)"),
+        (_plan(tmp_path, foreign(1)), "holds runs of another FMU"),
+        (_plan(tmp_path, foreign(), runs=12), "holds runs up to number 39, and the plan has 12 alone"),
+    ):
+        assert main(["study", str(plan), "-o", str(results)]) == 2
+        told_line = capsys.readouterr().err
+        assert told_line.startswith(f"rov-fmu: {results}: {told}")
+        assert told_line.count("\n") == 1
+    _same(Results(results), whole)
+
+
+def test_sobol_indices_of_a_linear_fmu_are_those_of_the_closed_form(foreign: Foreign, tmp_path: Path) -> None:
+    """Of a sum of uniform terms with factors 1, 2, 3: shares of the variance 1/14, 4/14, 9/14, and no interaction."""
+    plan = _plan(tmp_path, foreign(), runs=5 * 1024)
+    plan.write_text(plan.read_text().replace("seed = 5", 'sampler = "saltelli"'))
+    found = study(plan, tmp_path / "results", workers=2).sensitivity("end")
+    shares = [1 / 14, 4 / 14, 9 / 14]
+    assert found.index.tolist() == ["a", "b", "c"]
+    assert found.S1.tolist() == pytest.approx(shares, abs=0.01)
+    assert found.ST.tolist() == pytest.approx(shares, abs=0.01)
+    assert (abs(found.S1 - shares) <= found.S1_95).all()
+    assert (found.S1_95 < 0.1).all()
+
+
+# ---- Interrupted and killed ------------------------------------------------------------------------------------------
+
+SLOW = {"runs": 3000, "step": 0.0005}
+"""Some seconds."""
+
+
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
+    """Undisturbed."""
+    folder = tmp_path_factory.mktemp("slow")
+    return study(_plan(folder, foreign(), **SLOW), folder / "results", workers=2)  # type: ignore[arg-type]
+
+
+def _parts(results: Path) -> list[Path]:
+    return [*(results / "runs").glob("part-*.parquet")] if results.is_dir() else []
+
+
+def _begun(plan: Path, results: Path) -> "subprocess.Popen[str]":
+    """A study under way, of which some is done."""
+    process = start(
+        ["study", str(plan), "-o", str(results), "--workers", "2"], stdout=subprocess.DEVNULL, start_new_session=True
+    )
+    deadline = time.monotonic() + 60.0
+    while len(_parts(results)) < 2:
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.01)
+    return process
+
+
+def _children(pid: int) -> list[int]:
+    found = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=True)
+    lines = found.stdout.splitlines()
+    return [int(line.split()[0]) for line in lines if "spawn_main" in line]
+
+
+@posix
+def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
+    process = _begun(plan, results)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
+    error = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert error.splitlines() == [
+        "rov-fmu: what is done is kept; the same command goes on from there",
+        "rov-fmu: interrupted, no file is half-written",
+    ]
+    done = len(Results(results).runs)
+    assert 0 < done < SLOW["runs"]
+    kept = {path: path.read_bytes() for path in _parts(results)}
+    assert sum(pq.read_metadata(path).num_rows for path in kept) == done
+    _same(study(plan, results, workers=1), slow)
+    assert all(path.read_bytes() == content for path, content in kept.items())
+
+
+@posix
+def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
+    process = _begun(plan, results)
+    for victim in _children(process.pid):
+        os.kill(victim, signal.SIGKILL)
+    assert process.communicate(timeout=120)[1] == ""
+    assert process.returncode == 0
+    _same(Results(results), slow)
+
+
+@posix
+def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
+    process = _begun(plan, results)
+    process.kill()
+    process.communicate(timeout=30)
+    (results / "trajectories" / "part-000000000-000009999.parquet").write_bytes(b"half of it, without its runs")
+    (results / "runs" / ".part-000000000-000009999.parquet.abc.part").write_bytes(b"a draft")
+    _same(study(plan, results, workers=2), slow)
+    assert not [*results.glob("*/.*")]
+
+
+def test_a_scheduler_that_is_not_there_is_a_line(
+    foreign: Foreign, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rov_fmu.studies.engine._WAIT", 1.0)
+    where = ["-o", str(tmp_path / "results"), "--scheduler", "tcp://127.0.0.1:9"]
+    assert main(["study", str(_plan(tmp_path, foreign())), *where]) == 2
+    assert capsys.readouterr().err == ("rov-fmu: --scheduler tcp://127.0.0.1:9: no scheduler of Dask answers there\n")
