@@ -44,7 +44,7 @@ def _description() -> str:
 
 
 @pytest.fixture(scope="session")
-def foreign(made_once: Made) -> Callable[[int], Path]:
+def foreign(made_once: Made) -> Callable[..., Path]:
     """The FMU by what its fmi2Reset does."""
 
     def fill(folder: Path, reset: int) -> None:
@@ -56,4 +56,7 @@ def foreign(made_once: Made) -> Callable[[int], Path]:
             fmu.writestr("modelDescription.xml", _description())
             fmu.write(library, f"binaries/{fmpy.platform}/{name}")
 
-    return lambda reset=0: made_once(f"foreign{reset}", lambda folder: fill(folder, reset)) / "foreign.fmu"
+    def made(reset: int = 0) -> Path:
+        return made_once(f"foreign{reset}", lambda folder: fill(folder, reset)) / "foreign.fmu"
+
+    return made
