@@ -203,11 +203,13 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
 def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None) -> None:
     """Do the runs of PLAN (TOML): a sweep, or what is uncertain, over any FMU for Co-Simulation.
 
-    What is done is kept: the same command goes on where an earlier one ended.
+    RESULTS has the tables runs and trajectories (Parquet) and the page study.html. What is done is kept: the same
+    command goes on where an earlier one ended.
     """
     if workers and scheduler:
         raise click.UsageError("study: --scheduler has the workers that it has: leave --workers out")
     try:
+        from rov_fmu.studies.page import page_output
         from rov_fmu.studies.run import run_study
         from rov_fmu.studies.summary import print_summary
     except ModuleNotFoundError as error:
@@ -218,6 +220,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     except KeyboardInterrupt:
         click.echo("rov-fmu: what is done is kept; the same command goes on from there", err=True)
         raise
+    write_whole(page_output(results))
     print_summary(results, spent)
 
 

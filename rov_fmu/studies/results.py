@@ -35,6 +35,14 @@ class Results:
         """Runs of the whole study."""
         self.plan: dict[str, Any] = told["plan"]
         """As the results depend on it."""
+        self.units: dict[str, str] = told["units"]
+        """Of parameters and outputs."""
+        self.model: str = told["model"]
+        """The name of the FMU's file."""
+        self.fmu: str = told["fmu"]
+        """SHA-256 of the FMU."""
+        self.made_by: str = told["made_by"]
+        self._points: int = told["points"]
 
     @cached_property
     def runs(self) -> pd.DataFrame:
@@ -66,8 +74,8 @@ class Results:
             found.append(np.quantile(values, quantiles, axis=0).T)
         return pd.DataFrame(np.concatenate(found), pd.Index(times, name=TIME), pd.Index(quantiles, name="quantile"))
 
-    def sensitivity(self, figure: str, seed: int = 0) -> pd.DataFrame:
-        """Sobol indices of a figure by parameter: S1, ST, and the half widths of their 95 % intervals.
+    def sensitivity(self, figure: str, seed: int = 1) -> pd.DataFrame:
+        """Sobol indices of a figure by parameter: S1, ST, and the half widths of their 95 % intervals (seed not 0).
 
         A study by sampler saltelli has them. A block of runs counts where the figure is known in all of it. Raises
         FileError.
@@ -92,11 +100,6 @@ class Results:
     def failed(self) -> pd.DataFrame:
         """The runs that failed, with their reasons."""
         return self.runs[self.runs[STATUS] == FAILED]
-
-    @property
-    def _points(self) -> int:
-        """Rows of a trajectory."""
-        return int(self._store.description()["points"])
 
     def _dataset(self, name: str) -> Any:
         """Files in the order of their runs."""

@@ -52,7 +52,9 @@ def run_study(
     with store.held():
         job, design = prepared.job, prepared.design
         columns = {"parameters": design.names, "figures": [*job.figures], "outputs": job.kept}
-        store.belongs_to(prepared.mark, digest(model.content), design.runs, columns, len(job.kept_points))
+        units = {name: model.variables[name].unit for name in (*design.names, *job.kept)}
+        more = {"points": len(job.kept_points), "model": model.name, "units": units}
+        store.belongs_to(prepared.mark, digest(model.content), design.runs, columns, **more)
         if plan.vehicle:
             write_whole(Output(folder / model.name, model.content))
         spent = execute(job, design, store, workers, scheduler, on_progress)

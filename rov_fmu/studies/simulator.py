@@ -142,7 +142,7 @@ class Simulator:
             for put, references, count, address in self._changes.get(n, ()):
                 if (status := put(component, references, count, address)) > _WARNING:
                     _check(status, "setting the inputs", times[n])
-            if (status := do_step(component, times[n], step)) > _WARNING:
+            if (status := do_step(component, times[n], step, True)) > _WARNING:
                 _check(status, "the step", times[n])
             for get, references, count, address, row in reads:
                 if (status := get(component, references, count, address + (n + 1) * row)) > _WARNING:
@@ -242,8 +242,7 @@ def _functions(library: Any, version: int) -> dict[str, Callable[..., int]]:
     if version == 2:
         found["SetupExperiment"] = typed("SetupExperiment", *experiment)
         found["EnterInitializationMode"] = typed("EnterInitializationMode")
-        step = typed("DoStep", number, number, whole)
-        found["DoStep"] = lambda component, time, length: step(component, time, length, True)
+        found["DoStep"] = typed("DoStep", number, number, whole)
         kinds = ("Real", "Integer", "Boolean")
         return found | {
             f"{way}{kind}": typed(f"{way}{kind}", pointer, size, pointer) for way in ("Get", "Set") for kind in kinds
@@ -267,8 +266,8 @@ def _step_of_3(function: Callable[..., int]) -> Callable[..., int]:
     event, ends, early = (ctypes.addressof(flags) + n for n in range(3))
     reached = ctypes.addressof(last)
 
-    def step(component: int, time: float, length: float) -> int:
-        status = function(component, time, length, True, event, ends, early, reached)
+    def step(component: int, time: float, length: float, no_return: bool) -> int:
+        status = function(component, time, length, no_return, event, ends, early, reached)
         if flags[1]:
             raise _FailedError(f"the FMU ended the run at {last.value:.6g} s")
         return status

@@ -45,11 +45,11 @@ class Store:
             lock.release()
 
     def belongs_to(
-        self, plan: Mapping[str, Any], fmu: str, runs: int, columns: Mapping[str, Sequence[str]], points: int
+        self, plan: Mapping[str, Any], fmu: str, runs: int, columns: Mapping[str, Sequence[str]], **more: Any
     ) -> None:
-        """See that what is there is of this plan and FMU (its digest), and write down that it is.
+        """See that what is there is of this plan and FMU (its digest), and write down that it is, with more on it.
 
-        `points` is how many rows a trajectory has. Raises FileError, WriteError.
+        Raises FileError, WriteError.
         """
         path = self.folder / STUDY
         mark = {"plan": dict(plan), "fmu": fmu}
@@ -68,7 +68,7 @@ class Store:
             raise FileError(f"{self.folder}: holds runs up to number {end - 1}, and the plan has {runs} alone")
         self._clean()
         head = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", "runs": runs}
-        text = json.dumps({**head, **mark, "columns": columns, "points": points}, indent=2, ensure_ascii=False)
+        text = json.dumps({**head, **mark, "columns": columns, **more}, indent=2, ensure_ascii=False)
         write_whole(Output(path, f"{text}\n".encode()))
 
     def description(self) -> dict[str, Any]:

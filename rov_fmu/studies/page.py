@@ -1,0 +1,126 @@
+"""The page on a study: bands, distributions, sensitivities, failures; one HTML file."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from rov_fmu.files.messages import FileError
+from rov_fmu.files.output import Output
+from rov_fmu.pages.svg import LIGHT, inline_svg
+from rov_fmu.pages.templates import number, page, pretty_unit
+from rov_fmu.studies.results import QUANTILES, Results
+from rov_fmu.studies.worker import REASON, STATUS
+
+PAGE = "study.html"
+_PLOT = (3.7, 2.6)  # inches
+_BINS = 40
+_POINTS = 400
+"""Points of a band that are drawn; more are not seen."""
+_REASONS = 50
+
+
+def page_output(results: Results) -> Output:
+    """The page of what is done of a study, to write into its folder. Raises FileError."""
+    return Output(results.folder / PAGE, study_page(results).encode())
+
+
+def study_page(results: Results) -> str:
+    """The page as HTML, the same for the same results."""
+    runs, plan = results.runs, results.plan
+    reasons = [*_failures(runs)]
+    return page(
+        "study.html.j2",
+        title=results.model.removesuffix(".fmu"),
+        fmu=results.fmu,
+        made_by=results.made_by,
+        done=len(runs),
+        planned=results.planned,
+        failed=len(results.failed),
+        sampler=plan["sampler"],
+        seed=plan["seed"],
+        quantiles=QUANTILES,
+        figures=[_figure(name, runs[name], plan["figures"][name]) for name in results.figures],
+        sensitivities=_sensitivities(results) if plan["sampler"] == "saltelli" else {},
+        bands={name: _band(results, name) for name in results.outputs} if len(results.failed) < len(runs) else {},
+        parameters={name: _parameter(runs[name], way, results.units[name]) for name, way in plan["vary"]},
+        failures=reasons[:_REASONS],
+        more_failures=len(reasons[_REASONS:]),
+    )
+
+
+def _figure(name: str, column: "pd.Series[float]", expression: str) -> dict[str, Any]:
+    values = column.to_numpy(float)
+    there = values[np.isfinite(values)]
+    found: dict[str, Any] = {"name": name, "expression": expression, "runs": there.size, "plot": ""}
+    if not there.size:
+        return {**found, "quantiles": [None] * len(QUANTILES), "mean": None, "sd": None}
+    quantiles = np.quantile(there, QUANTILES).tolist()
+    plot = inline_svg(f"Distribution of {name}", partial(_draw_distribution, values=there, quantiles=quantiles), _PLOT)
+    sd = float(there.std(ddof=1)) if there.size > 1 else None
+    return {**found, "quantiles": quantiles, "mean": float(there.mean()), "sd": sd, "plot": plot}
+
+
+def _draw_distribution(figure: Figure, values: Any, quantiles: list[float]) -> None:
+    ax = figure.subplots()
+    low, median, high = quantiles[0], quantiles[len(quantiles) // 2], quantiles[-1]
+    ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+    shares = np.full(len(values), 100.0 / len(values))
+    ax.hist(values, bins=min(_BINS, max(5, round(len(values) ** 0.5))), weights=shares, color=LIGHT["blue"], alpha=0.75)
+    ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
+    ax.set_ylabel("runs (%)")
+    ax.locator_params(nbins=6)
+
+
+def _band(results: Results, output: str) -> Markup:
+    bands = results.bands(output)
+    shown = bands.iloc[:: max(1, len(bands) // _POINTS)]
+    return inline_svg(f"Trajectories of {output}", partial(_draw_band, bands=shown, unit=results.units[output]), _PLOT)
+
+
+def _draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
+    ax = figure.subplots()
+    t = bands.index.to_numpy()
+    low, below, median, above, high = (bands[q].to_numpy(float) for q in QUANTILES)
+    ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
+    ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
+    ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6)
+    ax.set(xlabel="time (s)", ylabel="" if unit == "1" else pretty_unit(unit))
+    ax.locator_params(nbins=6)
+
+
+def _sensitivities(results: Results) -> dict[str, Any]:
+    """Rows by figure, or why there are none."""
+    found: dict[str, Any] = {}
+    for figure in results.figures:
+        try:
+            rows = results.sensitivity(figure).sort_values("ST", ascending=False, kind="stable")
+        except FileError as error:
+            found[figure] = str(error).removeprefix(f"{results.folder}: ")
+        else:
+            found[figure] = rows.reset_index(names="name").to_dict("records")
+    return found
+
+
+def _parameter(column: "pd.Series[float]", way: dict[str, Any], unit: str) -> dict[str, Any]:
+    ((kind, told),) = way.items()
+    numbers = told.items() if isinstance(told, dict) else [("", value) for value in told]
+    some = [f"{name} {number(value, 4)}".strip() for name, value in numbers]
+    words = ", ".join([*some[:6], *(["…"] if len(some) > 6 else [])])
+    values = column.to_numpy(float)
+    return {
+        "planned": f"{kind}: {words}", "least": float(values.min()), "median": float(np.median(values)),
+        "greatest": float(values.max()), "unit": unit,
+    }  # fmt: skip
+
+
+def _failures(runs: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """By reason, the most frequent first."""
+    there = runs[runs[REASON].notna()]
+    for (status, reason), some in sorted(there.groupby([STATUS, REASON]), key=lambda found: -len(found[1])):
+        first = ", ".join(str(n) for n in some.index[:5])
+        yield {"runs": len(some), "status": status, "reason": reason, "first": first}

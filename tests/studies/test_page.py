@@ -1,0 +1,61 @@
+"""The page on a study says what the data frames say."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from lxml import html
+
+from rov_fmu.cli import main
+from rov_fmu.studies import Results
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path]) -> Path:
+    """A study of which some runs fail, and its page, by the command."""
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "plan.toml").write_text(f"""fmu = "{foreign()}"
+stop_time = 2.0
+step = 0.1
+runs = 600
+sampler = "saltelli"
+[vary]
+a.uniform = [0.0, 1.0]
+b.normal = {{ mean = 0.0, sd = 1.0 }}
+mode.values = [0, 0, 0, 0, 0, 0, 0, 1]
+[keep]
+outputs = ["y"]
+[figures]
+end = "y[-1]"
+odd = "y if a < 9 else 0"
+""")
+    assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--workers", "1"]) == 0
+    return folder / "results"
+
+
+def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> None:
+    results = Results(done)
+    text = (done / "study.html").read_text(encoding="utf-8")
+    page = html.fromstring(text)
+    rows = {row[0].text_content(): [cell.text_content() for cell in row] for row in page.iter("tr")}
+    ended = results.runs[results.runs.status != "failed"]
+    assert f"600 of 600 runs, {len(results.failed)} failed" in page.text_content()
+    assert float(rows["end"][3].replace("−", "-")) == pytest.approx(ended.end.median(), rel=1e-3)
+    assert rows["end"][-1] == str(len(ended))
+    assert rows["odd"][-1] == "0"
+    index = results.sensitivity("end").loc["b"]
+    indices = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='b']/td")
+    assert float(indices[1].text_content().replace("−", "-")) == pytest.approx(index.S1, abs=1e-3)
+    assert "Too few runs have odd" in page.text_content()
+    failed = next(row for row in page.iter("tr") if "the pump is blocked" in row.text_content())
+    assert failed[0].text_content() == str(len(results.failed))
+    labels = re.findall(r'aria-label="([^"]*)"', text)
+    assert labels == ["Distribution of end", "Trajectories of y"]
+    assert "<script" not in text
+
+
+def test_the_page_is_the_same_for_the_same_results(done: Path) -> None:
+    from rov_fmu.studies.page import study_page
+
+    assert study_page(Results(done)) == (done / "study.html").read_text(encoding="utf-8")
