@@ -37,6 +37,8 @@ class Variable:
     minimum: float
     maximum: float
     unit: str
+    start: float
+    """0 where the FMU tells none."""
 
     @property
     def is_whole(self) -> bool:
@@ -124,5 +126,13 @@ def _variable(v: Any) -> Variable:
     low, high, unit = (getattr(v, key) or getattr(declared, key, None) for key in ("min", "max", "unit"))
     return Variable(
         v.name, v.valueReference, v.type, v.causality, can_be_set, v.variability == "continuous",
-        -inf if low is None else float(low), inf if high is None else float(high), unit or "1",
+        -inf if low is None else float(low), inf if high is None else float(high), unit or "1", _number(v.start),
     )  # fmt: skip
+
+
+def _number(start: Any) -> float:
+    """Of what FMPy read of a start value."""
+    try:
+        return float({"true": 1.0, "false": 0.0}.get(str(start), start))
+    except (TypeError, ValueError):
+        return 0.0

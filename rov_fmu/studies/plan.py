@@ -16,6 +16,8 @@ from rov_fmu.vehicle.quantity import Finite
 
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
+_ALWAYS = -1e300
+"""A time before any start."""
 
 
 class PlanError(FileError):
@@ -104,7 +106,7 @@ class Varied(Strict):
 def _held(given: Any) -> Any:
     """A number alone is held from the start to the end."""
     is_number = isinstance(given, int | float) and not isinstance(given, bool)
-    return {"steps": [[0.0, float(given)]]} if is_number else given
+    return {"steps": [[_ALWAYS, float(given)]]} if is_number else given
 
 
 def _as_number(given: Any) -> Any:
@@ -130,7 +132,10 @@ Points = Annotated[
 
 
 class Signal(Strict):
-    """An input over time: held from point to point, or straight from point to point."""
+    """An input over time: held from point to point, or straight from point to point.
+
+    Before its first point it has the start value of the FMU, after its last one the value of that.
+    """
 
     steps: Points | None = None
     """[[time, value], ...]: each value is held until the next time."""

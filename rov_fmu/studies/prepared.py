@@ -45,7 +45,8 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
         raise PlanError(*(f"{path}: {words}" for words in wrong))
     design = Design(plan, varied, model.variables)
     times = plan.start_time + plan.step * np.arange(plan.steps, dtype=np.float64)
-    inputs = {name: _sampled(signal, times, plan.step) for name, signal in {**plan.inputs, **from_file}.items()}
+    signals = {**plan.inputs, **from_file}
+    inputs = {name: _sampled(signal, times, plan.step, model.variables[name].start) for name, signal in signals.items()}
     kept = plan.keep.outputs if plan.keep else ()
     named = {name for text in plan.figures.values() for name in names_in(text)} & model.variables.keys()
     recorded = [*dict.fromkeys([*kept, *sorted(named - varied.keys())])]
@@ -55,9 +56,8 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     mark = {
         **plan.mark,
         "vary": [[name, way.model_dump(by_alias=True, mode="json", exclude_none=True)] for name, way in varied.items()],
-        "inputs": {name: signal.model_dump(mode="json", exclude_none=True)
-                   for name, signal in {**plan.inputs, **from_file}.items()},
-    }  # fmt: skip
+        "inputs": {name: signal.model_dump(mode="json", exclude_none=True) for name, signal in signals.items()},
+    }
     mark.pop("input_file", None)
     key = f"rov-fmu-{digest(json.dumps(mark, sort_keys=True).encode() + model.content)[:16]}"
     return Prepared(plan, Job(key, model, manoeuvre, plan.figures, kept, _kept_points(plan)), design, mark)
@@ -194,16 +194,16 @@ def _kept_points(plan: Plan) -> Sequence[int]:
     return range(0, plan.steps + 1, stride)
 
 
-def _sampled(signal: Signal, times: Array, step: float) -> Array:
-    """The signal at the beginning of each step, after a jump there; before its first point it is as there."""
+def _sampled(signal: Signal, times: Array, step: float, before: float) -> Array:
+    """The signal at the beginning of each step, after a jump there."""
     at, values = np.array(signal.points, np.float64).T
     now = times + 1e-9 * step  # a decimal time is found in spite of rounding
     place = np.searchsorted(at, now, side="right") - 1
-    held: Array = values[np.maximum(place, 0)]
+    found: Array = np.where(place >= 0, values[np.maximum(place, 0)], before)
     if signal.steps:
-        return held
+        return found
     inside = (place >= 0) & (place < len(at) - 1)
     n = place[inside]
     share = np.clip((times[inside] - at[n]) / (at[n + 1] - at[n]), 0.0, 1.0)
-    held[inside] = values[n] + share * (values[n + 1] - values[n])
-    return held
+    found[inside] = values[n] + share * (values[n + 1] - values[n])
+    return found

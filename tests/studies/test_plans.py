@@ -88,10 +88,10 @@ def test_inputs_are_held_or_straight_and_jump_where_two_points_are_of_one_time(
     head = f'fmu = "{foreign()}"\nstop_time = 0.7\nstep = 0.1\nsampler = "grid"\n[keep]\noutputs = ["y"]\n'
     expected = {
         "[inputs]\nu = 0.5\n": [0.5] * 7,
-        "[inputs]\nu.steps = [[0.2, 1.0], [0.3, 2.0], [0.6, 0.0]]\n": [1, 1, 1, 2, 2, 2, 0],
-        "[inputs]\nu.ramps = [[0.1, 1.0], [0.3, 3.0], [0.3, -1.0], [0.5, -1.0]]\n": [1, 1, 2, -1, -1, -1, -1],
-        '[input_file]\npath = "u.csv"\n': [1, 1, 2, -1, -1, -1, -1],
-        '[input_file]\npath = "u.csv"\nbetween = "steps"\n': [1, 1, 1, -1, -1, -1, -1],
+        "[inputs]\nu.steps = [[0.2, 1.0], [0.3, 2.0], [0.6, 0.0]]\n": [0, 0, 1, 2, 2, 2, 0],
+        "[inputs]\nu.ramps = [[0.1, 1.0], [0.3, 3.0], [0.3, -1.0], [0.5, -1.0]]\n": [0, 1, 2, -1, -1, -1, -1],
+        '[input_file]\npath = "u.csv"\n': [0, 1, 2, -1, -1, -1, -1],
+        '[input_file]\npath = "u.csv"\nbetween = "steps"\n': [0, 1, 1, -1, -1, -1, -1],
     }
     for text, values in expected.items():
         path = tmp_path / "plan.toml"

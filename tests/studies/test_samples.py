@@ -27,7 +27,7 @@ VARIED = {
 
 def _variable(name: str) -> Variable:
     low = 0.0 if name == "b" else -np.inf
-    return Variable(name, 0, "Integer" if name == "n" else "Real", "parameter", True, False, low, np.inf, "1")
+    return Variable(name, 0, "Integer" if name == "n" else "Real", "parameter", True, False, low, np.inf, "1", 0.0)
 
 
 def _design(sampler: str, runs: int | None, seed: int = 7, names: str = "abcden") -> Design:

@@ -47,8 +47,9 @@ sooner = "at(y, 1)"
 
 
 def _expected(runs: pd.DataFrame, t: Any) -> Any:
-    """y of the foreign FMU; before the first point of its input that is as there, 0.5."""
-    return (runs.a + 2.0 * runs.b + 3.0 * runs.c + 0.5) * (1.0 - np.exp(-t / 0.5))
+    """y of the foreign FMU, whose input is 0 before 1 s and 0.5 after."""
+    to = runs.a + 2.0 * runs.b + 3.0 * runs.c
+    return to * (1.0 - np.exp(-t / 0.5)) + 0.5 * (1.0 - np.exp(-max(t - 1.0, 0.0) / 0.5))
 
 
 def _same(one: Results, other: Results) -> None:
