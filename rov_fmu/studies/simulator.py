@@ -201,7 +201,12 @@ class Simulator:
                 self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=keep
             )
         except Exception as error:  # FMPy raises that itself
-            raise LoadError(brief(str(error).replace(self._folder + os.sep, "").rstrip("."), 240)) from error
+            what = str(error).replace(self._folder + os.sep, "").rstrip(".")
+            raise LoadError(brief(f"{what}{self._message()}", 240)) from error
+
+    def _message(self) -> str:
+        """The FMU's last warning, or nothing."""
+        return "".join(f"; the FMU: {told}" for told in self._told)
 
     def _with_message(self, values: Sequence[float]) -> str:
         """Why a run fails, with the FMU's last warning: it is done once more, with messages on."""
@@ -210,7 +215,7 @@ class Simulator:
         try:
             self._run(values)
         except _FailedError as failed:
-            return f"{failed}{''.join(f'; the FMU: {told}' for told in self._told)}"
+            return f"{failed}{self._message()}"
         finally:
             self._logs = False
         return ""

@@ -3,6 +3,7 @@
 import builtins
 import errno
 import os
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from distributed import LocalCluster
 
 from rov_fmu.cli import main
 from rov_fmu.studies import Progress, Results, study
+from rov_fmu.studies.store import Store
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -144,3 +146,26 @@ def test_without_its_packages_the_command_says_what_to_install(
     monkeypatch.setattr(builtins, "__import__", missing)
     assert main(["study", "plan.toml", "-o", str(tmp_path)]) == 2
     assert capsys.readouterr().err == "rov-fmu: study: needs dask: pip install 'rov-fmu[study]'\n"
+
+
+def test_a_folder_takes_one_study_at_a_time(
+    tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan, folder = _plan(tmp_path, f'fmu = "{videoray_fmu}"'), tmp_path / "results"
+    with Store(folder).held():
+        assert main(["study", str(plan), "-o", str(folder), "--workers", "1"]) == 2
+    assert capsys.readouterr().err == f"rov-fmu: {folder}: another study is writing there\n"
+    assert not list((folder / "runs").iterdir())
+
+
+def test_an_fmu_that_cannot_be_loaded_is_a_line(
+    tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = tmp_path / "videoray.fmu"
+    with zipfile.ZipFile(videoray_fmu) as whole, zipfile.ZipFile(fmu, "w") as part:
+        part.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
+    plan = _plan(tmp_path, 'fmu = "videoray.fmu"')
+    assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--workers", "1"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("rov-fmu: videoray.fmu: cannot be run: Cannot find shared library binaries")
+    assert told.count("\n") == 1
