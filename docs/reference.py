@@ -24,7 +24,9 @@ _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number",
 def tables() -> dict[str, Table]:
     """By name."""
     schema = json_schema()
-    named = {"vehicle": "FileHead", "provenance": "Made"} | {f"axis_{name}": f"_{name.capitalize()}" for name in AXES}
+    named = {"vehicle": "FileHead", "provenance": "Made", "estimated": "Estimated"} | {
+        f"axis_{name}": f"_{name.capitalize()}" for name in AXES
+    }
     named |= {name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster")}
     categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
     found = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}

@@ -28,13 +28,14 @@ from rov_fmu.identify.response_fit import ResponseFit, fit_response
 from rov_fmu.identify.slips import beta_out_of_range
 from rov_fmu.identify.step_responses import StepResponse, steps
 from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, measured
+from rov_fmu.identify.together import Together
 from rov_fmu.identify.trajectory import MotionError
 from rov_fmu.identify.usable import check_push, check_recording, check_slips, is_pushed
 from rov_fmu.motion.layout import Axis, Curve
 from rov_fmu.motion.rov import Rov
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import TankTests
-from rov_fmu.vehicle.schema import NOT_GIVEN
+from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.sense import no_thrust
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
@@ -79,7 +80,7 @@ def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Id
     warnings = [f"{t} thrust: {words}" for t, fit in thrust.items() for words in diagnostics.on_thrust(t, fit)]
     warnings += [w for result in results for w in result.warnings]
     warnings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
-    vehicle = found.vehicle(results, [*tests.notes, *doubts, *warnings])
+    vehicle = found.vehicle(results, Together(thrust.values(), results), [*tests.notes, *doubts, *warnings])
     return Identification(tests, vehicle, thrust, tuple(results), against)
 
 
@@ -128,7 +129,25 @@ class _Found:
         self.sources |= dict.fromkeys(estimate.names, source)
         self.intervals |= estimate.intervals
 
-    def vehicle(self, results: Sequence[AxisResult], warnings: Sequence[str]) -> Vehicle:
+    def _estimates(self, together: Together) -> dict[str, Estimated]:
+        """How far those that these tests tell hang together, and what the base says of others that it still gives."""
+        given = self.tests.given
+        base = load_vehicle(given.base) if given.base else None
+        rows = base.estimates if base else {}
+        kept = {
+            name for name in rows
+            if base and (q := given.known.get(name)) and (q.value, q.interval) == (base.rov[name], base.intervals[name])
+        }  # fmt: skip
+        found: dict[str, Estimated] = {}
+        for name in self.rov.layout.coefficients:
+            if name in kept:
+                others = {other: value for other, value in rows[name].correlation.items() if other in kept}
+                found[name] = Estimated(error=rows[name].error, correlation=others)
+            elif name in together.names and name in self.intervals:
+                found[name] = Estimated(error=together.error(name), correlation=together.correlation(name, found))
+        return found
+
+    def vehicle(self, results: Sequence[AxisResult], together: Together, warnings: Sequence[str]) -> Vehicle:
         """The vehicle with its provenance."""
         given, names = self.tests.given, self.rov.layout.coefficients
         method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
@@ -145,6 +164,7 @@ class _Found:
             data=None,
             limits=(*given.limits, *delays),
             intervals={name: self.intervals[name] for name in names if name in self.intervals},
+            estimates=self._estimates(together),
             provenance=made,
             thruster_sources=given.thruster_sources,
         )

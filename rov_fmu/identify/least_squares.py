@@ -10,13 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.special import stdtrit
 
 from rov_fmu.motion.layout import AXIS, CURVE, TUNING, Kind
 from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 Loss = Literal["huber", "linear"]
-LEVEL = 0.95
 _RANK = 1e-6  # singular values below this fraction of the largest belong to what is not identifiable
 _LEAST_FACTOR = 1e-6
 
@@ -110,11 +109,6 @@ def kind_of(name: str) -> Kind:
     return next(kind for key, kind in (CURVE | AXIS | TUNING).items() if name.startswith(f"{key}_"))
 
 
-def is_factor(name: str) -> bool:
-    """Whether the coefficient is fitted by its logarithm."""
-    return name.startswith(("alpha_", "beta_"))
-
-
 def internal(names: Sequence[str], values: Mapping[str, float]) -> Array:
     """Internal parameters of named coefficients."""
     return np.array([log(values[n]) if is_factor(n) else values[n] for n in names])
@@ -190,8 +184,13 @@ def covariance(gram: Array, meat: Array | None = None) -> Array:
 
 def propagated(jacobian: Array, of_known: Array, of_known_covariance: Array) -> Array:
     """Covariance of the parameters that comes from numbers taken as known: their residuals' Jacobian, covariance."""
-    gain = -np.linalg.pinv(jacobian) @ of_known
-    return np.asarray(gain @ of_known_covariance @ gain.T)
+    by_known = gain(jacobian, of_known)
+    return np.asarray(by_known @ of_known_covariance @ by_known.T)
+
+
+def gain(jacobian: Array, of_known: Array) -> Array:
+    """By how much the parameters move with numbers taken as known: their residuals' Jacobian."""
+    return np.asarray(-np.linalg.pinv(jacobian) @ of_known)
 
 
 def estimate(names: Sequence[str], x: Array, of_x: Array, degrees_of_freedom: float, noise: float) -> Estimate:
@@ -225,11 +224,6 @@ def leave_one_out(groups: Array, predict: Callable[[Flags], Array | None]) -> Ar
         if (predicted := predict(out)) is not None:
             found[out] = predicted
     return found
-
-
-def quantile(degrees_of_freedom: float) -> float:
-    """How many standard errors a 95 % interval reaches (Student)."""
-    return float(stdtrit(degrees_of_freedom, 0.5 + 0.5 * LEVEL))
 
 
 def rms(errors: Array) -> float:

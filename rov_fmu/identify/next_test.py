@@ -6,7 +6,7 @@ from math import inf
 
 import numpy as np
 
-from rov_fmu.identify.least_squares import Estimate, is_factor
+from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.runs import prepare
 from rov_fmu.identify.simulator import Simulator
 from rov_fmu.identify.trajectory import MotionError
@@ -14,6 +14,7 @@ from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
+from rov_fmu.vehicle.uncertainty import is_factor
 
 _COMMANDS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
 _RATE = 10.0  # Hz

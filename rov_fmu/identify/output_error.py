@@ -20,7 +20,7 @@ from rov_fmu.identify.extras import Extra
 from rov_fmu.identify.held_out import HeldOut, hold_out
 from rov_fmu.identify.least_squares import Estimate, Loss, external
 from rov_fmu.identify.limits import refuse_nonsense
-from rov_fmu.identify.recordings_fit import Effect, RecordingsFit, effects_of, estimate_of
+from rov_fmu.identify.recordings_fit import Effect, RecordingsFit, effects_of, estimate_of, part_of
 from rov_fmu.identify.residual_analysis import ResidualAnalysis
 from rov_fmu.identify.runs import PreparedRecording, axes_of, prepare
 from rov_fmu.identify.selection import candidates, earn_their_place, likely
@@ -232,10 +232,12 @@ class _Fit:
             e: effect for e, effect in effects.items()
             if e.of in curves or (any(map(e.concerns, own)) and not (e.kind in (NORTH, EAST) and e.of in flows))
         }  # fmt: skip
+        rov, together = analysis.model.rov(analysis.x), estimate_of(analysis)
         return RecordingsFit(
             axis,
-            analysis.model.rov(analysis.x),
-            estimate_of(analysis, axis),
+            rov,
+            together,
+            part_of(together, axis, rov),
             tuple(s for s in analysis.simulations if s.recording.axis is axis),
             tuple(of_axis.values()),
             partial(self.held_out, axis, analysis, analysis.model.extras),

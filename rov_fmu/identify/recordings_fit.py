@@ -9,12 +9,13 @@ import numpy as np
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.extras import Extra, Kind
 from rov_fmu.identify.held_out import HeldOut
-from rov_fmu.identify.least_squares import Estimate, is_factor, quantile
+from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.residual_analysis import ResidualAnalysis, Simulation
 from rov_fmu.identify.response_fit import response_band
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 _DISAGREEMENT = 3.0
 """Times a standard error: three recordings of what the model has differ by more once in 10,000 cases."""
@@ -42,7 +43,10 @@ class RecordingsFit:
     axis: Axis
     rov: Rov
     """With the coefficients that were found, and those that came with them: F_0, T, reverse."""
+    together: Estimate
+    """Of all that the axes recorded have, and their thrust curves; those standard errors are not widened."""
     estimate: Estimate
+    """Of what concerns this axis."""
     simulations: tuple[Simulation, ...]
     effects: tuple[Effect, ...]
     hold_out: Callable[[], HeldOut] = field(repr=False)
@@ -94,8 +98,8 @@ class RecordingsFit:
         return response_band(self.axis, self.rov, self.estimate, commands)
 
 
-def estimate_of(analysis: ResidualAnalysis, axis: Axis) -> Estimate:
-    """Of the coefficients that concern an axis, those that come with extras among them."""
+def estimate_of(analysis: ResidualAnalysis) -> Estimate:
+    """Of the coefficients of the vehicle, those that come with extras among them."""
     model = analysis.model
     rov, p = model.rov(analysis.x), len(model.names)
     slopes: dict[str, Array] = {}
@@ -109,17 +113,21 @@ def estimate_of(analysis: ResidualAnalysis, axis: Axis) -> Estimate:
             slopes[name][n] = rov[forward] if forward else 1.0
             if forward in model.names:
                 slopes[name] += value * slopes[forward]
-    curves = curves_of(rov.layout, axis)
-    form = rov.layout.kinds[axis.name]
-    concerned = {form.coefficient(key) for key in (*form.keys, "beta")}
-    concerned |= {c.coefficient(key) for c in curves for key in c.keys}
-    names = tuple(name for name in slopes if name in concerned)
+    names = tuple(slopes)
     M = np.array([slopes[name] for name in names])
     found = analysis.covariance()
     vague = ~np.isfinite(np.diag(found))
     of = M @ np.where(np.isfinite(found), found, 0.0) @ M.T
     of[np.diag_indices(len(names))] += np.where((M[:, vague] != 0.0).any(axis=1), np.inf, 0.0)
     return Estimate(names, np.array([rov[name] for name in names]), of, analysis.degrees_of_freedom, 1.0)
+
+
+def part_of(together: Estimate, axis: Axis, rov: Rov) -> Estimate:
+    """The part of the coefficients that concern an axis."""
+    form = rov.layout.kinds[axis.name]
+    concerned = {form.coefficient(key) for key in (*form.keys, "beta")}
+    concerned |= {c.coefficient(key) for c in curves_of(rov.layout, axis) for key in c.keys}
+    return together.part([name for name in together.names if name in concerned])
 
 
 def effects_of(analysis: ResidualAnalysis, kept: Collection[Extra]) -> dict[Extra, Effect]:

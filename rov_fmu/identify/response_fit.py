@@ -9,10 +9,20 @@ import numpy as np
 
 from rov_fmu.identify.choice import MARGIN, Choice, aicc
 from rov_fmu.identify.drag_forms import LEFT_OUT, DragForm, Point, candidate_forms, level
-from rov_fmu.identify.least_squares import Estimate, Solution, estimate_alike, external, fit_named, leave_one_out, rms
+from rov_fmu.identify.least_squares import (
+    Estimate,
+    Solution,
+    estimate_alike,
+    external,
+    fit_named,
+    gain,
+    leave_one_out,
+    rms,
+)
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
 from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.vehicle.uncertainty import is_factor
 
 _DIGITS = 1e-5
 """Of a relative error: nothing is measured to more digits."""
@@ -30,6 +40,8 @@ class ResponseFit:
     """The same, were the thrust curve certain; V_ss and Tau are hardly less so if it is not, for drag bends with it."""
     assumed: Mapping[str, str]
     """Coefficients that are not identifiable from the points, and what is assumed instead."""
+    by_thrust: Mapping[str, Array]
+    """p each: by how much its coefficients move with those of the thrust curves that `thrust` is the estimate of."""
     leave_one_out: Array
     """n: prediction of every point by a fit without the points of its thrust; NaN where too few are left."""
     choices: tuple[Choice, ...] = ()
@@ -73,6 +85,7 @@ def fit_response(
         whole.estimate(at, thrust),
         whole.estimate(at),
         {**chosen.form.assumed, **reasons},
+        whole.gains(at, thrust) if thrust is not None else {},
         chosen.leave_one_out,
         tuple(other.choice(plain, other is chosen) for other in others if other.form.is_open and isfinite(other.aicc)),
     )
@@ -95,14 +108,23 @@ class _Candidate:
 
     def estimate(self, at: Rov, thrust: Estimate | None = None) -> Estimate:
         """Its uncertainty, around other values."""
-        names, by_thrust = self.form.names, None
-        if thrust is not None and names:
-            steps = {name: 1e-5 * max(abs(at[name]), 0.1) for name in thrust.names}
-            values = external(names, self._solution.x)
-            slopes = _slopes(lambda k: _residuals(self.axis, self.used, k, values), self.form.base, steps)
-            by_thrust = slopes, thrust.covariance
+        names = self.form.names
+        by_thrust = (self._slopes(at, thrust), thrust.covariance) if thrust is not None and names else None
         found = estimate_alike(names, self._solution, len(self.used), by_thrust)
         return replace(found, values=np.array([at[name] for name in names]))
+
+    def gains(self, at: Rov, thrust: Estimate) -> dict[str, Array]:
+        """By how much its coefficients, around other values, move with each of thrust."""
+        found = external(self.form.names, self._solution.x)
+        scale = np.array([value if is_factor(name) else 1.0 for name, value in found.items()])
+        moved = gain(self._solution.jacobian, self._slopes(at, thrust)) * scale[:, None]
+        return dict(zip(thrust.names, moved.T, strict=True))
+
+    def _slopes(self, at: Rov, thrust: Estimate) -> Array:
+        """Of the residuals by the coefficients of thrust."""
+        steps = {name: 1e-5 * max(abs(at[name]), 0.1) for name in thrust.names}
+        values = external(self.form.names, self._solution.x)
+        return _slopes(lambda k: _residuals(self.axis, self.used, k, values), self.form.base, steps)
 
     @cached_property
     def leave_one_out(self) -> Array:

@@ -19,11 +19,11 @@ from rov_fmu.identify.least_squares import (
     estimate_alike,
     leave_one_out,
     minimize,
-    quantile,
 )
 from rov_fmu.motion.layout import REVERSE, Curve
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.sense import no_thrust
+from rov_fmu.vehicle.uncertainty import quantile
 
 _DIGITS = 1e-5  # of the strongest force: no scale resolves less
 _GRID = {1: 24, 2: 8}  # dead bands to begin with, by how many are fitted

@@ -201,6 +201,15 @@ class Alternative(Strict, extra="allow"):
         return self.__pydantic_extra__
 
 
+class Estimated(Strict):
+    """How tests tell of a coefficient, beside its interval: what a draw of vehicles needs."""
+
+    error: Annotated[Finite, Field(ge=0.0)]
+    """Standard error, in the unit of the coefficient, as of a normal distribution."""
+    correlation: dict[str, Annotated[Finite, Field(ge=-1.0, le=1.0)]] = Field(default={})
+    """With other coefficients of this table, by their names in the FMU; each pair once, and 0 where it is not given."""
+
+
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
 
 
@@ -271,6 +280,8 @@ class Parts(Hardware, _Opening):
 
     alternatives: dict[str, Alternative] = Field(default={})
     """Coefficients published beside the ones used, under a name each."""
+    estimates: dict[str, Estimated] = Field(default={})
+    """Coefficients that tests tell, by their names in the FMU: how far they hang together. Each has an `interval`."""
     provenance: Made | None = None
 
 

@@ -29,7 +29,7 @@ from rov_fmu.vehicle.quantity import Quantity, within
 from rov_fmu.vehicle.schema import Hardware, Parts, given
 
 _Form = TypeVar("_Form", bound=Hardware)
-_PARTS = ("curves", "thruster", "axes", "inputs", "alternatives", "known", "windows")
+_PARTS = ("curves", "thruster", "axes", "inputs", "alternatives", "estimates", "known", "windows")
 """Tables of tables: where one of them has a mistake the others can still be judged."""
 
 
@@ -71,6 +71,8 @@ def nonsense(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
         yield from coincidences(layout)
         for title, alternative in parts.alternatives.items():
             yield from misgiven(f"alternatives.{title}", alternative.quantities, layout.coefficients)
+        if "estimates" not in lost:
+            yield from _estimates(parts, layout)
 
 
 def incoherent(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
@@ -213,6 +215,31 @@ def _coupling(parts: Parts, layout: Layout) -> Iterator[str]:
         if beta and beta.value < LEAST_BETA:
             reason = f"must be at least {LEAST_BETA:g} where axes are coupled"
             yield line(f"axes.{axis.name}.beta.value", reason, beta.value)
+
+
+def _estimates(parts: Parts, layout: Layout) -> Iterator[str]:
+    """Estimates of what the vehicle does not have or nothing is estimated of, and correlations that cannot be."""
+    wrong, found, rows = False, parts.quantities(layout), parts.estimates
+    for name, row in rows.items():
+        key, quantity = f"estimates.{name}", found.get(name)
+        reasons = []
+        if name not in found:
+            reasons.append(line(key, "there is no such coefficient of this vehicle"))
+        elif not (quantity and quantity.interval):
+            reasons.append(line(key, f"{name} has no interval, so it is no estimate"))
+        for other, value in row.correlation.items():
+            reason = "of a coefficient with itself is 1 and is not given" if other == name else ""
+            reason = reason or ("" if other in rows else "there is no such coefficient in this table")
+            if reason or (name in rows[other].correlation and list(rows).index(name) > list(rows).index(other)):
+                reason = reason or f"estimates.{other} gives it already"
+                reasons.append(line(f"{key}.correlation.{other}", reason, value))
+        wrong |= bool(reasons)
+        yield from reasons
+    if not wrong and any(row.correlation for row in rows.values()):
+        from rov_fmu.vehicle.uncertainty import LEAST_EIGENVALUE, least_eigenvalue  # NumPy, which few files need
+
+        if (least := least_eigenvalue(rows)) < LEAST_EIGENVALUE:
+            yield line("estimates", f"no numbers have these correlations: the least eigenvalue is {least:.3g}, not 0")
 
 
 def misgiven(table: str, found: Mapping[str, Quantity], metas: Mapping[str, Meta]) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.toml_file import Toml, check, read_toml, told
@@ -12,8 +13,11 @@ from rov_fmu.vehicle.first import FirstFile, quantities
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Quantity
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, File, Parts
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
 from rov_fmu.vehicle.sense import as_far_as_readable, no_thrust, nonsense
+
+if TYPE_CHECKING:
+    from rov_fmu.vehicle.uncertainty import Uncertainty
 
 TABLES = {
     "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
@@ -81,6 +85,8 @@ class Vehicle:
     """What was found of the vehicle that the model leaves out, in sentences."""
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """95 % confidence intervals of the coefficients that have one."""
+    estimates: Mapping[str, Estimated] = field(default_factory=dict)
+    """How far those that tests tell hang together, by name."""
     provenance: Provenance | None = None
     thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=lambda: PAPER_SOURCES)
     """Where `direction` and `position` of each thruster come from, by its name."""
@@ -97,6 +103,13 @@ class Vehicle:
         tables = [self.data / name for names in TABLES.values() for name in names] if self.data else []
         pictures = [self.pictures / name for name in PICTURES] if self.pictures else []
         return [path for path in (*tables, *pictures, report) if path and path.is_file()]
+
+    @property
+    def uncertainty(self) -> "Uncertainty":
+        """How well its coefficients are known, and how far they hang together."""
+        from rov_fmu.vehicle.uncertainty import uncertainty  # NumPy and SciPy: few need it
+
+        return uncertainty(self.rov, self.intervals, self.estimates)
 
     def picture(self, name: str) -> Path | None:
         """The vehicle's own picture of this name, if it has one."""
@@ -133,7 +146,7 @@ def _second(path: Path, data: Toml, context: Mapping[str, object]) -> Vehicle:
         raise VehicleFileError(*(f"{path}: {mistake}" for mistake in mistakes))
     alternatives = {name: _alternative(a.description, a.quantities) for name, a in file.alternatives.items()}
     found = file.quantities(file.layout)
-    return _vehicle(path, file, file.layout, found, alternatives, file.thruster_sources)
+    return _vehicle(path, file, file.layout, found, alternatives, file.thruster_sources, file.estimates)
 
 
 def _alternative(description: str, found: Mapping[str, Quantity]) -> Alternative:
@@ -148,6 +161,7 @@ def _vehicle(
     found: Mapping[str, Quantity | None],
     alternatives: Mapping[str, Alternative],
     thruster_sources: Mapping[str, Mapping[str, str]] = PAPER_SOURCES,
+    estimates: Mapping[str, Estimated] | None = None,
 ) -> Vehicle:
     head, made = file.vehicle, file.provenance
     words = {key: getattr(made, key) for key in ("tool", "method", "inputs", "warnings")} if made else {}
@@ -161,6 +175,7 @@ def _vehicle(
         pictures=path.parent / head.pictures if head.pictures else None,
         limits=file.validity.limits,
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
+        estimates=estimates or {},
         provenance=Provenance(**words, report=made.report_in(path.parent)) if made else None,
         thruster_sources=thruster_sources,
     )

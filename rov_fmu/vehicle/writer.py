@@ -14,9 +14,11 @@ from rov_fmu.files.output import Output, write_whole
 from rov_fmu.files.reading import read_text
 from rov_fmu.motion.layout import Curve, Meta, Thruster
 from rov_fmu.vehicle.form import Head
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, where
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
+_DECIMALS = 6
+"""Of a correlation: thrust and drag that tests tell hardly apart are correlated by nearly 1."""
 _DIGITS = 6  # significant ones: more than any tank test has, few enough to be the same on every machine
 
 
@@ -41,6 +43,8 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
             | {n: _inline(value, vehicle.layout.coefficients[n], other.sources[n]) for n, value in other.values.items()}
             for name, other in vehicle.alternatives.items()
         }
+    if vehicle.estimates:
+        document["estimates"] = {name: _estimated(row) for name, row in vehicle.estimates.items()}
     if made := vehicle.provenance:
         report = {"report": _seen_from(folder, made.report)} if made.report else {}
         head = {"tool": made.tool, "method": made.method, **report, **_lines("warnings", made.warnings)}
@@ -98,7 +102,20 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
             table[key].pop("interval", None)
         else:
             table[key] = _inline(value, vehicle.layout.coefficients[name], reason)
+        _forget(document, name)
     write_whole(moved(document, source, path))
+
+
+def _forget(document: Any, name: str) -> None:
+    """A coefficient that is no estimate any more; what is known of the others stays."""
+    rows = document.get("estimates", {})
+    rows.pop(name, None)
+    for row in rows.values():
+        row.get("correlation", {}).pop(name, None)
+        if not row.get("correlation", True):
+            del row["correlation"]
+    if "estimates" in document and not rows:
+        del document["estimates"]
 
 
 def read_document(source: Path) -> Any:
@@ -159,6 +176,12 @@ def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
     value, interval = _rounded(vehicle.rov[name]), vehicle.intervals.get(name)
     ends = [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)] if interval else None
     return _inline(value, vehicle.layout.coefficients[name], vehicle.sources[name], ends)
+
+
+def _estimated(row: Estimated) -> InlineTable:
+    shares = {name: share for name, value in row.correlation.items() if (share := round(value, _DECIMALS))}
+    entry: dict[str, Any] = {"error": _rounded(row.error)}
+    return _inline_of(entry | ({"correlation": _inline_of(shares)} if shares else {}))
 
 
 def _inline(value: float, meta: Meta, source: str, interval: list[float] | None = None) -> InlineTable:

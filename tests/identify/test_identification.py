@@ -274,7 +274,11 @@ def test_full_folder_to_vehicle_file_in_20_seconds(
     assert read.intervals.keys() == made.intervals.keys()
     for name, (low, high) in made.intervals.items():
         assert read.intervals[name] == pytest.approx((low, high), rel=1e-5)
-    assert replace(read, rov=made.rov, intervals=made.intervals) == made
+    one, other = read.uncertainty, made.uncertainty
+    assert one.names == other.names
+    assert one.errors == pytest.approx(other.errors, rel=1e-5)
+    assert one.correlation == pytest.approx(other.correlation, abs=1e-6)
+    assert replace(read, rov=made.rov, intervals=made.intervals, estimates=made.estimates) == made
     assert read.provenance
     assert "heave: output error over 3 recordings" in read.provenance.method
 

@@ -52,7 +52,7 @@ def recorded(
 def result_of(k: Rov, *simulations: Simulation, acts: tuple[Effect, ...] = ()) -> AxisResult:
     estimate = Estimate((), np.zeros(0), np.zeros((0, 0)), 1.0, 1.0)
 
-    fit = RecordingsFit(HEAVE, k, estimate, simulations, acts, lambda: HeldOut((), by_halves=False))
+    fit = RecordingsFit(HEAVE, k, estimate, estimate, simulations, acts, lambda: HeldOut((), by_halves=False))
     return AxisResult(HEAVE, (), (), None, None, fit, {}, ())
 
 

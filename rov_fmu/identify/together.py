@@ -1,0 +1,79 @@
+"""How far all that tests tell hangs together: fits that have a thrust curve in common err together."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from rov_fmu.identify.identification import AxisResult
+from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.thrust_fit import ThrustFit
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.uncertainty import quantile
+
+
+class Together:
+    """The covariance of coefficients of several fits, those that are identifiable; SI units.
+
+    Few data tell their own scatter badly, which Student's distribution counts; here the normal one is used with errors
+    as much larger, so that those of several fits add up.
+    """
+
+    def __init__(self, thrust: Iterable[ThrustFit], results: Iterable[AxisResult]) -> None:
+        """Recordings first, for they have a say in the thrust curves; then curves that only tests tell; then points."""
+        self.names: tuple[str, ...] = ()
+        self.covariance: Array = np.zeros((0, 0))
+        chosen = [*results]
+        for result in chosen:
+            if result.recordings:  # the same of all axes that were fitted at once
+                self._add(_as_normal(result.recordings.together))
+        for fit in thrust:
+            self._add(_as_normal(fit.estimate))
+        for result in chosen:
+            if result.response and result.chosen == "points":
+                self._add(_as_normal(result.response.given_thrust), result.response.by_thrust)
+        for result in chosen:
+            for name, by in result.recordings.disagreement.items() if result.recordings else ():
+                self._widen(name, by)
+
+    def _add(self, found: Estimate, by: Mapping[str, Array] | None = None) -> None:
+        """An estimate of its own, but for how it moves with numbers that are there already."""
+        places = [n for n, (name, error) in enumerate(found.errors.items())
+                  if np.isfinite(error) and name not in self.names]  # fmt: skip
+        if not places:
+            return
+        none = np.zeros(len(places))
+        gains = np.array([by[n][places] if by and n in by else none for n in self.names]).reshape(-1, len(places)).T
+        both = gains @ self.covariance
+        own = found.covariance[np.ix_(places, places)] + both @ gains.T
+        self.names += tuple(found.names[n] for n in places)
+        self.covariance = np.block([[self.covariance, both.T], [both, own]])
+
+    def _widen(self, name: str, by: float) -> None:
+        """Where recordings disagree."""
+        n = self.names.index(name)
+        self.covariance[n, :] *= by
+        self.covariance[:, n] *= by
+
+    def error(self, name: str) -> float:
+        """Standard error."""
+        n = self.names.index(name)
+        return float(np.sqrt(self.covariance[n, n]))
+
+    def correlation(self, name: str, others: Iterable[str]) -> dict[str, float]:
+        """Of a coefficient with others, by name; without those that it is not correlated with."""
+        place = {name: n for n, name in enumerate(self.names)}
+        found = {}
+        for other in others:
+            n, m = place.get(name), place.get(other)
+            if n is not None and m is not None and (shared := float(self.covariance[n, m])):
+                found[other] = shared / float(np.sqrt(self.covariance[n, n] * self.covariance[m, m]))
+        return {other: min(max(value, -1.0), 1.0) for other, value in found.items()}
+
+
+def _as_normal(found: Estimate) -> Estimate:
+    """With errors of which the normal distribution has the same 95 %."""
+    if not found.degrees_of_freedom > 0.0:
+        return found
+    return replace(found, covariance=(quantile(found.degrees_of_freedom) / quantile(inf)) ** 2 * found.covariance)

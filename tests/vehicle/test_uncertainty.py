@@ -1,0 +1,270 @@
+"""[estimates] of a vehicle file: written and read back, checked, and what is drawn by them."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+from scipy.stats import kstest, norm, qmc, spearmanr
+
+from rov_fmu.cli import main
+from rov_fmu.vehicle.schema import Estimated
+from rov_fmu.vehicle.uncertainty import Uncertainty
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.writer import write_tuned, write_vehicle
+from tests.commands import ALONE, REFIT
+
+TEXT = REFIT.read_text(encoding="utf-8")
+ROW = "b_d_u = { error = 1.30987, correlation = { a_d_u = -0.883478 } }"
+
+
+@pytest.fixture(scope="module")
+def refit() -> Vehicle:
+    return load_vehicle(REFIT)
+
+
+def of(values: list[float], errors: list[float], correlation: list[list[float]]) -> Uncertainty:
+    """Of drag, which is not below 0."""
+    p = len(values)
+    bounds = np.column_stack([np.zeros(p), np.full(p, np.inf)])
+    names = ("a_d_u", "b_d_u", "a_d_w")[:p]
+    return Uncertainty(names, np.array(values), np.array(errors), np.array(correlation), bounds)
+
+
+# ---- Written and read ------------------------------------------------------------------------------------------------
+
+
+def test_what_is_written_reads_back(refit: Vehicle, tmp_path: Path) -> None:
+    rows = {
+        "a_d_u": Estimated(error=4.0),
+        "b_d_u": Estimated(error=1234.5, correlation={"a_d_u": -1.0}),
+        "beta_w": Estimated(error=0.5, correlation={"a_d_u": 0.123456, "b_d_u": -0.123456}),
+    }
+    write_vehicle(replace(refit, estimates=rows), tmp_path / "made.toml")
+    assert load_vehicle(tmp_path / "made.toml").estimates == rows
+    write_vehicle(replace(refit, estimates={}), tmp_path / "none.toml")
+    assert "estimates" not in (tmp_path / "none.toml").read_text(encoding="utf-8")
+
+
+def test_a_correlation_of_nothing_is_not_written(refit: Vehicle, tmp_path: Path) -> None:
+    rows = {
+        "a_d_u": Estimated(error=4.0),
+        "b_d_u": Estimated(error=4.0, correlation={"a_d_u": -4e-7}),
+    }
+    write_vehicle(replace(refit, estimates=rows), tmp_path / "made.toml")
+    assert load_vehicle(tmp_path / "made.toml").estimates["b_d_u"].correlation == {}
+
+
+def test_what_is_tuned_is_no_estimate_and_the_rest_stays(refit: Vehicle, tmp_path: Path) -> None:
+    path = tmp_path / "tuned.toml"
+    assert main(["tune", str(REFIT), "--axis=heave", "--command=0.3", "--v-ss=0.17", "--tau=2", "-o", str(path)]) == 0
+    tuned = load_vehicle(path)
+    assert {*refit.estimates} - {*tuned.estimates} == {"beta_w"}
+    assert all(tuned.estimates[name] == refit.estimates[name] for name in tuned.estimates)
+    write_tuned(REFIT, path, {"a_d_u": 9.0}, "a test")
+    others = load_vehicle(path).estimates
+    assert "a_d_u" not in others
+    assert others["b_d_u"] == refit.estimates["b_d_u"].model_copy(update={"correlation": {}})
+    write_tuned(REFIT, path, {name: 1.01 * refit.rov[name] + 0.1 for name in refit.estimates}, "a test")
+    assert "estimates" not in path.read_text(encoding="utf-8")
+
+
+BAD: dict[str, tuple[Callable[[str], str], str]] = {
+    "of no coefficient": (
+        lambda text: text.replace("a_d_u = { err", "a_d_v = { err").replace("{ a_d_u =", "{ a_d_w ="),
+        "estimates.a_d_v: there is no such coefficient of this vehicle",
+    ),
+    "of no estimate": (
+        lambda text: text.replace("beta_r = { err", "m_rov = { err"),
+        "estimates.m_rov: m_rov has no interval, so it is no estimate",
+    ),
+    "with no estimate": (
+        lambda text: text.replace("{ a_d_u =", "{ m_rov ="),
+        "estimates.b_d_u.correlation.m_rov = -0.883478: there is no such coefficient in this table",
+    ),
+    "with itself": (
+        lambda text: text.replace("{ a_d_u =", "{ b_d_u ="),
+        "estimates.b_d_u.correlation.b_d_u = -0.883478: of a coefficient with itself is 1 and is not given",
+    ),
+    "twice": (
+        lambda text: text.replace("a_d_u = { error", "a_d_u = { correlation.b_d_u = 0.5, error"),
+        "estimates.b_d_u.correlation.a_d_u = -0.883478: estimates.a_d_u gives it already",
+    ),
+    "above 1": (
+        lambda text: text.replace("-0.883478", "-1.5"),
+        "estimates.b_d_u.correlation.a_d_u = -1.5: must be within -1 ... 1",
+    ),
+    "not a number": (
+        lambda text: text.replace("-0.883478", "nan"),
+        "estimates.b_d_u.correlation.a_d_u = nan: must be a finite number",
+    ),
+    "in quotes": (
+        lambda text: text.replace("-0.883478", "'strong'"),
+        "estimates.b_d_u.correlation.a_d_u = 'strong': must be a number",
+    ),
+    "no error": (
+        lambda text: text.replace(ROW, "b_d_u = {}"),
+        "estimates.b_d_u.error: this key is missing",
+    ),
+    "below 0": (
+        lambda text: text.replace(ROW, "b_d_u = { error = -1 }"),
+        "estimates.b_d_u.error = -1: must be greater than or equal to 0",
+    ),
+    "no table": (
+        lambda text: text.replace(ROW, "b_d_u = 0.5"),
+        "estimates.b_d_u = 0.5: must be a table: write [estimates.b_d_u]",
+    ),
+    "of another key": (
+        lambda text: text.replace(ROW, "b_d_u = { error = 2.0, degrees = 4 }"),
+        "estimates.b_d_u.degrees: there is no such key, only error, correlation",
+    ),
+    "that no numbers have": (
+        lambda text: text.replace("a_d_w = -0.652272", "a_d_w = 0.9"),
+        "estimates: no numbers have these correlations: the least eigenvalue is -0.441, not 0",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_estimate_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change, words = BAD[case]
+    path = tmp_path / "bad.toml"
+    text = change(TEXT)
+    assert text != TEXT
+    path.write_text(text, encoding="utf-8")
+    assert main(["build", str(path)]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith(f"rov-fmu: {path}: {words}")
+
+
+def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "bad.toml"
+    text = TEXT.replace("{ a_d_u =", "{ m_rov =").replace("a_d_w = -0.652272", "beta_w = 0.9")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(VehicleFileError) as caught:
+        load_vehicle(path)
+    assert len(str(caught.value).splitlines()) == 2
+
+
+def test_numbers_that_move_as_one_may(tmp_path: Path) -> None:
+    """Drag in reverse is found as a multiple of that ahead: their correlation is 1, but for the digits written."""
+    path = tmp_path / "one.toml"
+    third = " a_d_w = -0.652272, b_d_w = 0.366024"
+    text = TEXT.replace("-0.860225", "1.0").replace(third, " a_d_w = 0.5, b_d_w = 0.50001")
+    path.write_text(text, encoding="utf-8")
+    found = load_vehicle(path).uncertainty
+    drawn = found.drawn(np.random.default_rng(0).random((500, len(found.names))))
+    a_d, b_d = (drawn[:, found.names.index(name)] for name in ("a_d_w", "b_d_w"))
+    both = (a_d > 0.0) & (b_d > 0.0)
+    assert both.sum() > 200
+    assert spearmanr(a_d[both], b_d[both]).statistic > 0.999
+
+
+# ---- What it tells ---------------------------------------------------------------------------------------------------
+
+
+def test_errors_and_correlations_are_those_of_the_fit(refit: Vehicle) -> None:
+    """Of the shipped refit, by the intervals that it prints, 1.96 standard errors to either side."""
+    found = refit.uncertainty
+    place = {name: n for n, name in enumerate(found.names)}
+    assert {*found.names} == {*refit.intervals} == {*refit.estimates}
+    assert found.values[place["a_d_u"]] == 8.88145
+    assert found.errors[place["a_d_u"]] == pytest.approx((12.8104 - 8.88145) / 1.95996, rel=1e-4)
+    assert found.errors[place["b_d_r"]] == pytest.approx(0.165744 / 1.95996, rel=1e-4), "cut at 0 below"
+    assert found.errors[place["beta_w"]] == pytest.approx(0.620654 * np.log(0.805371 / 0.620654) / 1.95996, rel=1e-4)
+    for axis, both in (("u", -0.88), ("w", -0.86), ("r", -0.92)):  # as the warnings of the file have them
+        assert found.correlation[place[f"a_d_{axis}"], place[f"b_d_{axis}"]] == pytest.approx(both, abs=0.005)
+    assert (found.correlation == found.correlation.T).all()
+    assert (np.diag(found.correlation) == 1.0).all()
+    assert found.correlation[place["a_d_u"], place["a_d_w"]] == 0.0
+    assert np.linalg.eigvalsh(found.correlation)[0] > 0.01
+
+
+def test_an_interval_by_hand_is_normal_and_alone(tmp_path: Path) -> None:
+    path = tmp_path / "with.toml"
+    text = ALONE.replace('6.57, unit = "kg"', '6.57, unit = "kg", interval = [6.374, 6.766]')
+    path.write_text(text, encoding="utf-8")
+    found = load_vehicle(path).uncertainty
+    assert found.names == ("m_rov",)
+    assert found.errors == pytest.approx([0.1], rel=1e-4)
+    drawn = found.drawn(qmc.Sobol(1, scramble=False).random(1024))
+    assert kstest(drawn[1:, 0], norm(6.57, 0.1).cdf).statistic < 0.002
+    assert np.isfinite(drawn).all(), "the first number of Sobol's sequence is 0"
+
+
+def test_a_value_set_by_hand_within_its_interval_keeps_the_error(refit: Vehicle, tmp_path: Path) -> None:
+    path = tmp_path / "set.toml"
+    path.write_text(TEXT.replace("value = 8.88145", "value = 11.0"), encoding="utf-8")
+    found = load_vehicle(path).uncertainty
+    assert found.values[found.names.index("a_d_u")] == 11.0
+    assert found.errors == pytest.approx(refit.uncertainty.errors)
+    assert (found.correlation == refit.uncertainty.correlation).all()
+
+
+def test_an_interval_cut_on_either_side_tells_the_error_by_the_other(refit: Vehicle) -> None:
+    """b_d_u not below 0, β_w at most 1000; and an interval that is all that is physical tells what it can."""
+    cut = {"a_d_u": (0.0, 1e6), "b_d_u": (0.0, 5.0 + 1.959964), "beta_w": (500.0, 1000.0)}
+    rov = refit.rov.replaced({"a_d_u": 9.0, "b_d_u": 5.0, "beta_w": 900.0})
+    found = replace(refit, rov=rov, intervals=cut, estimates={}).uncertainty
+    assert found.names == ("a_d_u", "b_d_u", "beta_w")
+    assert found.errors == pytest.approx([(1e6 - 9.0) / 1.959964, 1.0, 900.0 * np.log(900.0 / 500.0) / 1.959964])
+    drawn = found.drawn(qmc.Sobol(3, seed=0).random(1024))
+    assert (drawn >= 0.0).all()
+    assert drawn.max(axis=0)[[0, 2]].tolist() == [1e6, 1000.0]
+
+
+def test_without_intervals_nothing_is_drawn(vehicle: Vehicle) -> None:
+    found = vehicle.uncertainty
+    assert found.names == ()
+    assert found.drawn(np.empty((5, 0))).shape == (5, 0)
+
+
+def test_what_is_drawn_is_normal_and_as_correlated_as_asked() -> None:
+    """Against SciPy's distribution, and the rank correlation of normal numbers, 6/π arcsin(ρ/2)."""
+    found = of([50.0, 80.0, 60.0], [1.0, 2.0, 3.0], [[1.0, -0.9, 0.3], [-0.9, 1.0, 0.0], [0.3, 0.0, 1.0]])
+    drawn = found.drawn(qmc.Sobol(3, seed=0).random(4096))
+    for n in range(3):
+        assert kstest(drawn[:, n], norm(found.values[n], found.errors[n]).cdf).statistic < 0.01
+    ranks = spearmanr(drawn).statistic
+    assert ranks == pytest.approx(6.0 / np.pi * np.arcsin(found.correlation / 2.0), abs=0.01)
+
+
+def test_the_intervals_hold_95_percent_of_what_is_drawn(refit: Vehicle) -> None:
+    """Of those that no bound cuts, on either side alike, of β too, a positive factor."""
+    alone = {name: Estimated(error=row.error) for name, row in refit.estimates.items()}
+    found = replace(refit, estimates=alone).uncertainty
+    drawn = found.drawn(qmc.Sobol(len(found.names), seed=0).random(8192))
+    for name in ("a_d_u", "b_d_u", "beta_w", "beta_r"):
+        low, high = refit.intervals[name]
+        values = drawn[:, found.names.index(name)]
+        assert [np.mean(values < low), np.mean(values > high)] == pytest.approx([0.025, 0.025], abs=0.006)
+    assert (drawn >= 0.0).all()
+
+
+@pytest.mark.parametrize("b", [0.0, 0.5, 3.0])
+def test_at_a_bound_the_rest_is_what_the_fit_would_be(b: float) -> None:
+    """y = a x^2 + b x + noise, b not below 0: what is drawn against as many bounded fits (SciPy) of noisy data."""
+    x = np.linspace(0.2, 1.0, 8)
+    M = np.column_stack([x * x, x])
+    random, noise, n = np.random.default_rng(1), 0.4, 2000
+    data = M @ [8.0, b] + noise * random.standard_normal((n, 8))
+    fits = np.array([lsq_linear(M, y, bounds=([0.0, 0.0], np.inf), method="bvls").x for y in data])
+    covariance = noise**2 * np.linalg.inv(M.T @ M)
+    error = np.sqrt(np.diag(covariance))
+    drawn = of([8.0, b], [*error], (covariance / np.outer(error, error)).tolist()).drawn(random.random((n, 2)))
+    for numbers in ([1.0, 0.0], [0.0, 1.0], [0.36, 0.6]):  # a, b, and the force at x = 0.6
+        assert kstest(drawn @ numbers, fits @ numbers).statistic < 0.06
+    assert np.mean(drawn[:, 1] == 0.0) == pytest.approx(np.mean(fits[:, 1] < 1e-12), abs=0.05)
+
+
+def test_the_table_is_for_people_too(refit: Vehicle) -> None:
+    """A row a coefficient, with those above it."""
+    rows = re.search(r"^\[estimates\]\n((?:\w+ = .*\n)+)", TEXT, re.M)
+    assert rows
+    names = [line.split(" = ")[0] for line in rows[1].splitlines()]
+    assert names == list(refit.estimates)
+    for n, name in enumerate(names):
+        assert {*refit.estimates[name].correlation} <= {*names[:n]}
