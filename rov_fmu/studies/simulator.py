@@ -5,6 +5,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from threading import local
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,6 @@ class Simulator:
 
     def __init__(self, folder: str, description: Any, model: Model, manoeuvre: Manoeuvre) -> None:
         self._folder, self._description, self._manoeuvre, self._version = folder, description, manoeuvre, model.version
-        self._told: list[str] = []
         self._logs = False
         self._fmu = self._instantiate()
         self._functions = _functions(self._fmu.dll, model.version)
@@ -190,15 +190,10 @@ class Simulator:
     def _instantiate(self) -> Any:
         import fmpy.simulation
 
-        def keep(*told: Any) -> None:
-            """A message of the FMU: its last arguments are the same in every version of FMI."""
-            status, _, text = told[-3:]
-            if status >= _WARNING:
-                self._told[:] = [(text or b"").decode(errors="replace")]
-
+        _TOLD.last = ""
         try:
             return fmpy.simulation.instantiate_fmu(
-                self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=keep
+                self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=_keep
             )
         except Exception as error:  # FMPy raises that itself
             what = str(error).replace(self._folder + os.sep, "").rstrip(".")
@@ -206,11 +201,11 @@ class Simulator:
 
     def _message(self) -> str:
         """The FMU's last warning, or nothing."""
-        return "".join(f"; the FMU: {told}" for told in self._told)
+        return f"; the FMU: {_TOLD.last}" if getattr(_TOLD, "last", "") else ""
 
     def _with_message(self, values: Sequence[float]) -> str:
         """Why a run fails, with the FMU's last warning: it is done once more, with messages on."""
-        self._logs, self._told = True, []
+        self._logs = True
         self.renew()
         try:
             self._run(values)
@@ -219,6 +214,17 @@ class Simulator:
         finally:
             self._logs = False
         return ""
+
+
+_TOLD = local()
+"""The last warning of an FMU, by the thread that called it: FMPy hands those of all to whom it was asked to last."""
+
+
+def _keep(*told: Any) -> None:
+    """A message of an FMU: its last arguments are the same in every version of FMI."""
+    status, _, text = told[-3:]
+    if status >= _WARNING:
+        _TOLD.last = (text or b"").decode(errors="replace")
 
 
 class _FailedError(Exception):
