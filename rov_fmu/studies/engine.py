@@ -2,7 +2,7 @@
 
 import logging
 import tempfile
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from rov_fmu.files.messages import FileError, StudyError, brief
 from rov_fmu.studies.sampling import Design
 from rov_fmu.studies.simulator import LoadError
 from rov_fmu.studies.store import Store
-from rov_fmu.studies.worker import Delivery, Job, Part, Trial, do_runs, lost_run, try_out
+from rov_fmu.studies.worker import Delivery, Job, Part, Trial, do_runs, lost_runs, try_out
 
 _TASK = 1.0
 """Seconds that a task shall take."""
@@ -26,7 +26,7 @@ _LEAST = 0.2
 _AHEAD = 3
 """Tasks by thread that are given out, so that none waits for the next one."""
 _CHANCES = 3
-"""How often a run may be under way as its worker dies, before the run is taken for the cause."""
+"""How often workers may die until all runs are done apart from them, and then those of a task until it is given up."""
 _WAIT = 20.0
 """Seconds until a scheduler, or a worker of it, must have answered."""
 
@@ -96,8 +96,12 @@ class _Runs:
         self._client, self._job, self._design, self._store = client, job, design, store
         self._missing, self._spent, self._tell = missing, spent, on_progress
         self._there = design.runs - sum(end - first for first, end in missing)
-        self._futures: dict[Any, tuple[int, int]] = {}
-        self._chances: dict[int, int] = {}
+        self._futures: dict[Any, tuple[int, int, bool]] = {}
+        """First run, the one after the last, whether they are done apart from their worker."""
+        self._lost: deque[tuple[int, int]] = deque()
+        """Runs whose worker died, to be done apart."""
+        self._deaths = 0
+        self._chances: Counter[int] = Counter()
         self._resets, self._seconds = False, _TASK
 
     def do(self) -> None:
@@ -118,38 +122,43 @@ class _Runs:
     def _trial(self) -> Trial:
         first = self._missing[0][0]
         rows = self._design.rows(first, min(first + 8, self._design.runs))
-        try:
-            return self._client.submit(try_out, self._job.key, rows, pure=False).result()
-        except LoadError as error:
-            raise FileError(f"{self._job.model.name}: cannot be run: {error}") from error
-        except KilledWorker:
-            return Trial(False, _TASK)  # the runs will tell which of them it is
+        for apart in (False, True):
+            try:
+                return self._client.submit(try_out, self._job.key, rows, apart, pure=False).result()
+            except LoadError as error:
+                raise FileError(f"{self._job.model.name}: cannot be run: {error}") from error
+            except KilledWorker:
+                self._deaths += 1
+        return Trial(False, _TASK)
 
     def _give(self, coming: Any) -> None:
         """Have enough under way."""
         threads = sum(self._client.nthreads().values()) or 1
-        while self._missing and len(self._futures) < _AHEAD * threads:
+        while (self._lost or self._missing) and len(self._futures) < _AHEAD * threads:
+            if self._lost:
+                self._submit(coming, *self._lost.popleft(), apart=True)
+                continue
             first, end = self._missing.popleft()
             left = sum(b - a for a, b in self._missing) + end - first
             size = max(min(ceil(_TASK / self._seconds), ceil(left / threads)), ceil(_LEAST / self._seconds))
             if end - first > size:
                 self._missing.appendleft((first + size, end))
                 end = first + size
-            self._submit(coming, first, end)
+            self._submit(coming, first, end, apart=self._deaths >= _CHANCES)
 
-    def _submit(self, coming: Any, first: int, end: int) -> None:
+    def _submit(self, coming: Any, first: int, end: int, apart: bool) -> None:
         rows = self._design.rows(first, end)
-        future = self._client.submit(do_runs, self._job.key, first, rows, self._resets, pure=False)
-        self._futures[future] = first, end
+        future = self._client.submit(do_runs, self._job.key, first, rows, self._resets, apart, pure=False)
+        self._futures[future] = first, end, apart
         coming.add(future)
 
     def _take(self, future: Any) -> None:
         """Write what has come; what was lost is done again."""
-        first, end = self._futures.pop(future)
+        first, end, apart = self._futures.pop(future)
         try:
             part: Part = future.result()
         except KilledWorker as error:
-            self._again(first, end, error)
+            self._again(first, end, apart, error)
             return
         except LoadError as error:
             raise FileError(f"{self._job.model.name}: cannot be run on a worker: {error}") from error
@@ -160,18 +169,15 @@ class _Runs:
         self._spent.simulating += part.simulating
         self._seconds = max(part.seconds / (end - first), 1e-6)
 
-    def _again(self, first: int, end: int, error: KilledWorker) -> None:
-        """Runs whose worker died: each half of them alone, until it is clear which run it is."""
-        if end - first > 1:
-            middle = (first + end) // 2
-            self._missing.extendleft([(middle, end), (first, middle)])
-            return
-        self._chances[first] = self._chances.get(first, 0) + 1
+    def _again(self, first: int, end: int, apart: bool, error: KilledWorker) -> None:
+        """Runs whose worker died are done apart from it: it is told then which of them is the cause, and why."""
+        self._deaths += 1
+        self._chances[first] += apart
         if self._chances[first] < _CHANCES:
-            self._missing.appendleft((first, end))
+            self._lost.append((first, end))
             return
-        values = self._design.rows(first, end)[0]
-        self._write(first, end, lost_run(self._job, first, values, f"the FMU ended its process: {brief(str(error))}"))
+        rows = self._design.rows(first, end)
+        self._write(first, end, lost_runs(self._job, first, rows, f"its worker died: {brief(str(error))}"))
 
     def _write(self, first: int, end: int, part: Part) -> None:
         self._store.write(first, end, part.runs, part.trajectories)
@@ -202,6 +208,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     settings = {
         "distributed.scheduler.allowed-failures": 0,  # a task is divided then, until the run is found
         "distributed.worker.memory.terminate": False,
+        "distributed.worker.profile.enabled": False,  # it takes the interpreter from the steps a hundred times a second
     }
     with (
         tempfile.TemporaryDirectory(prefix="study-", ignore_cleanup_errors=True) as folder,

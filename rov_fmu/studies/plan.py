@@ -212,6 +212,8 @@ class Plan(Strict):
     """Communication step, s: inputs are set, and outputs read, once a step."""
     tolerance: Positive | None = None
     """Relative, for an FMU whose solver takes one."""
+    time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = 300.0
+    """s on the clock: a run that takes longer fails."""
     runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
     """How many; a grid has as many as it has points. Of sampler saltelli rounded up to a multiple of (number of
     varied variables + 2)."""
@@ -252,8 +254,9 @@ class Plan(Strict):
         The numbers of a Latin hypercube depend on how many there are; those of the other samplers do not.
         """
         told: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True, exclude_none=True))
-        for where in ("fmu", "vehicle", "vary_from", *([] if self.sampler == "latin-hypercube" else ["runs"])):
-            told.pop(where, None)
+        runs = [] if self.sampler == "latin-hypercube" else ["runs"]
+        for key in ("fmu", "vehicle", "vary_from", "time_limit", *runs):
+            told.pop(key, None)
         return told
 
 

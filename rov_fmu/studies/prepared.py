@@ -1,10 +1,10 @@
 """A plan put together with its FMU: what does not fit in words, and what the workers must know."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from rov_fmu.files.series import series
 from rov_fmu.files.toml_file import line
 from rov_fmu.studies.figures import known_names, names_in
 from rov_fmu.studies.model import Model, Variable, unknown
-from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied, digest
+from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied
 from rov_fmu.studies.sampling import Design
 from rov_fmu.studies.simulator import Manoeuvre
 from rov_fmu.studies.uncertainty import uncertainty
@@ -59,8 +59,8 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
         "inputs": {name: signal.model_dump(mode="json", exclude_none=True) for name, signal in signals.items()},
     }
     mark.pop("input_file", None)
-    key = f"rov-fmu-{digest(json.dumps(mark, sort_keys=True).encode() + model.content)[:16]}"
-    return Prepared(plan, Job(key, model, manoeuvre, plan.figures, kept, _kept_points(plan)), design, mark)
+    job = Job(f"rov-fmu-{uuid4().hex}", model, manoeuvre, plan.figures, kept, _kept_points(plan), plan.time_limit)
+    return Prepared(plan, job, design, mark)
 
 
 def vehicle_file(given: str, path: Path) -> Path:

@@ -1,15 +1,16 @@
 """What a worker does: it has the FMU unpacked, an instance a thread, and makes the rows of many runs at a time."""
 
 import io
+import os
 import shutil
 import signal
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from threading import Lock, current_thread, main_thread
-from time import perf_counter
+from threading import Event, Lock, Thread, current_thread, get_ident, main_thread
+from time import monotonic, perf_counter
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ import pyarrow.parquet as pq
 from distributed import Worker
 from distributed.diagnostics.plugin import WorkerPlugin
 
+from rov_fmu.studies.apart import Apart
 from rov_fmu.studies.figures import Figures
 from rov_fmu.studies.model import Model, unpack
 from rov_fmu.studies.simulator import Manoeuvre, RunError, Simulator
@@ -45,6 +47,8 @@ class Job:
     """Outputs of which the trajectory is kept."""
     kept_points: Sequence[int]
     """At which communication points."""
+    time_limit: float
+    """Seconds that a run may take."""
 
     @property
     def runs_schema(self) -> pa.Schema:
@@ -79,35 +83,64 @@ class Trial:
 class Shop:
     """The FMU on one worker. Instances are lent to a thread at a time, and used again."""
 
-    def __init__(self, job: Job, folder: Path) -> None:
+    def __init__(self, job: Job, folder: Path, is_watched: bool) -> None:
         self.job = job
         self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=folder))
         self._description = unpack(job.model.content, self._folder)
-        self._idle: list[tuple[Simulator, Figures]] = []
+        self._idle: dict[bool, list[tuple[Simulator | Apart, Figures]]] = {False: [], True: []}
         self._one_only = Lock() if job.model.once_per_process else None
+        self._is_watched = is_watched
+        self._ends: dict[int, float] = {}
+        self._closed = Event()
+        if is_watched:
+            Thread(target=self._watch, daemon=True).start()
 
     @contextmanager
-    def lent(self) -> Iterator[tuple[Simulator, Figures]]:
-        """An instance, ready for a run. Raises LoadError."""
-        if self._one_only:
+    def lent(self, apart: bool) -> Iterator[tuple[Simulator | Apart, Figures]]:
+        """An instance, ready for a run; in a process of its own where asked for. Raises LoadError.
+
+        A worker that nobody starts again when its process ends has all of them so.
+        """
+        apart = apart or not self._is_watched
+        if self._one_only and not apart:
             self._one_only.acquire()
         try:
-            try:
-                tools = self._idle.pop()
-            except IndexError:
-                simulator = Simulator(str(self._folder), self._description, self.job.model, self.job.manoeuvre)
-                tools = simulator, Figures(self.job.figures, self.job.manoeuvre.times)
-            yield tools
-            self._idle.append(tools)
+            self.begin(apart)
+            yield (tools := self._tools(apart))
+            self._idle[apart].append(tools)
         finally:
-            if self._one_only:
+            self._ends.pop(get_ident(), None)
+            if self._one_only and not apart:
                 self._one_only.release()
+
+    def begin(self, apart: bool) -> None:
+        """A run begins: the worker's process ends where it takes too long, for nothing else ends such a run."""
+        if self._is_watched and not apart:
+            self._ends[get_ident()] = monotonic() + self.job.time_limit
 
     def close(self) -> None:
         """End the instances; the files go."""
-        for simulator, _ in self._idle:
+        self._closed.set()
+        for simulator, _ in (*self._idle[False], *self._idle[True]):
             simulator.free()
         shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _tools(self, apart: bool) -> tuple[Simulator | Apart, Figures]:
+        if self._idle[apart]:
+            return self._idle[apart].pop()
+        job, folder = self.job, str(self._folder)
+        simulator = (
+            Apart(folder, replace(job.model, content=b""), job.manoeuvre, job.time_limit)
+            if apart
+            else Simulator(folder, self._description, job.model, job.manoeuvre)
+        )
+        return simulator, Figures(job.figures, job.manoeuvre.times)
+
+    def _watch(self) -> None:
+        while not self._closed.wait(min(1.0, 0.25 * self.job.time_limit)):
+            now = monotonic()
+            if any(end < now for end in [*self._ends.values()]):
+                os._exit(1)
 
 
 _SHOPS: dict[str, Shop] = {}
@@ -125,7 +158,7 @@ class Delivery(WorkerPlugin):
         """Called on a worker as it comes."""
         if self._own and current_thread() is main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has started these
-        _SHOPS[self.name] = Shop(self._job, Path(worker.local_directory))
+        _SHOPS[self.name] = Shop(self._job, Path(worker.local_directory), is_watched=worker.nanny is not None)
 
     def teardown(self, worker: Worker) -> None:  # noqa: ARG002 (as it is called)
         """Called as the study ends."""
@@ -133,11 +166,13 @@ class Delivery(WorkerPlugin):
             shop.close()
 
 
-def try_out(key: str, rows: Array) -> Trial:
+def try_out(key: str, rows: Array, apart: bool) -> Trial:
     """Whether a run after a reset, which came after another run, is as the first one. Raises LoadError."""
-    with _SHOPS[key].lent() as (simulator, _):
+    shop = _SHOPS[key]
+    with shop.lent(apart) as (simulator, _):
         start = perf_counter()
         for values in rows[:_TRIED]:
+            shop.begin(apart)
             simulator.renew()
             try:
                 first = _copied(simulator.run(values))
@@ -155,8 +190,8 @@ def try_out(key: str, rows: Array) -> Trial:
         return Trial(False, (perf_counter() - start) / len(rows[:_TRIED]))
 
 
-def do_runs(key: str, first: int, rows: Array, resets: bool) -> Part:
-    """Do the runs from this number on, a row of values each. Raises LoadError."""
+def do_runs(key: str, first: int, rows: Array, resets: bool, apart: bool) -> Part:
+    """Do the runs from this number on, a row of values each; in a process of their own or not. Raises LoadError."""
     began, simulating, failed = perf_counter(), 0.0, 0
     shop = _SHOPS[key]
     job = shop.job
@@ -166,8 +201,9 @@ def do_runs(key: str, first: int, rows: Array, resets: bool) -> Part:
     every = len(points) == m.steps + 1
     kept = [np.empty((len(rows), len(points)), job.model.variables[name].dtype(job.model.version)) for name in job.kept]
     statuses, reasons, ended = [], [], np.ones(len(rows), bool)
-    with shop.lent() as (simulator, figures_of):
+    with shop.lent(apart) as (simulator, figures_of):
         for n, values in enumerate(rows):
+            shop.begin(apart)
             start = perf_counter()
             try:
                 run = simulator.run(values)
@@ -204,10 +240,15 @@ def do_runs(key: str, first: int, rows: Array, resets: bool) -> Part:
     return Part(_parquet(table, [STATUS, REASON]), trajectories, failed, perf_counter() - began, simulating)
 
 
-def lost_run(job: Job, number: int, values: Array, reason: str) -> Part:
-    """The row of a run that ends the process which does it."""
-    columns = [[number], *([value] for value in values), *([np.nan] for _ in job.figures), [FAILED], [reason]]
-    return Part(_parquet(pa.table(columns, schema=job.runs_schema), [STATUS]), None, 1, 0.0, 0.0)
+def lost_runs(job: Job, first: int, rows: Array, reason: str) -> Part:
+    """The rows of runs that came to no end."""
+    count = len(rows)
+    columns = [
+        np.arange(first, first + count), *rows.T, *np.full((len(job.figures), count), np.nan),
+        [FAILED] * count, [reason] * count,
+    ]  # fmt: skip
+    table = pa.table([pa.array(column) for column in columns], schema=job.runs_schema)
+    return Part(_parquet(table, [STATUS, REASON]), None, count, 0.0, 0.0)
 
 
 def _copied(run: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:

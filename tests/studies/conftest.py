@@ -1,11 +1,12 @@
 """An FMU that is not of this house, and plans over it."""
 
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import fmpy
 import pytest
+from distributed import LocalCluster
 
 from checks.c_programs import compile_c
 from tests.conftest import Made
@@ -60,3 +61,18 @@ def foreign(made_once: Made) -> Callable[..., Path]:
         return made_once(f"foreign{reset}", lambda folder: fill(folder, reset)) / "foreign.fmu"
 
     return made
+
+
+@pytest.fixture(scope="session")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
+    """Workers for studies that are not about their workers: to start some for each takes seconds."""
+    folder = tmp_path_factory.mktemp("cluster")
+    places = {"dashboard_address": "127.0.0.1:0", "local_directory": folder}
+    with LocalCluster(n_workers=2, threads_per_worker=2, **places) as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
+def scheduler(cluster: LocalCluster) -> str:
+    """Where they are."""
+    return str(cluster.scheduler_address)

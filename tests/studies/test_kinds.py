@@ -48,9 +48,9 @@ drift = "mean(out['der(x)'])"
 
 
 @pytest.fixture(scope="module")
-def native(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path) -> Results:
+def native(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, scheduler: str) -> Results:
     folder = tmp_path_factory.mktemp("native")
-    return study(_plan(folder, f'fmu = "{videoray_fmu}"'), folder / "results", workers=4)
+    return study(_plan(folder, f'fmu = "{videoray_fmu}"'), folder / "results", scheduler=scheduler)
 
 
 def _close(one: Results, other: Results) -> None:
@@ -73,30 +73,45 @@ def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
         assert (last.t, last.u, last.psi) == pytest.approx((4.0, state["u"], state["psi"]), rel=1e-9)
 
 
-def test_an_fmu_of_fmi_3_gives_the_same_rows(tmp_path: Path, videoray3_fmu: Path, native: Results) -> None:
-    _close(study(_plan(tmp_path, f'fmu = "{videoray3_fmu}"'), tmp_path / "results", workers=2), native)
+def test_an_fmu_of_fmi_3_gives_the_same_rows(
+    tmp_path: Path, videoray3_fmu: Path, native: Results, scheduler: str
+) -> None:
+    _close(study(_plan(tmp_path, f'fmu = "{videoray3_fmu}"'), tmp_path / "results", scheduler=scheduler), native)
 
 
+@pytest.mark.long
 def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results) -> None:
     assert main(["build", "--backend", "pythonfmu", "-o", str(tmp_path / "python.fmu")]) == 0
     _close(study(_plan(tmp_path, 'fmu = "python.fmu"'), tmp_path / "results", workers=1), native)
 
 
-def test_a_vehicle_is_built_for_its_study(tmp_path: Path, native: Results) -> None:
-    results = study(_plan(tmp_path, 'vehicle = "videoray"'), tmp_path / "results", workers=1)
+@pytest.mark.long
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_any_number_of_workers_gives_the_same_rows(
+    tmp_path: Path, videoray_fmu: Path, native: Results, workers: int
+) -> None:
+    results = study(_plan(tmp_path, f'fmu = "{videoray_fmu}"'), tmp_path / "results", workers=workers)
+    pd.testing.assert_frame_equal(results.runs, native.runs, check_exact=True)
+    pd.testing.assert_frame_equal(results.trajectories(), native.trajectories(), check_exact=True)
+
+
+@pytest.mark.long
+def test_a_vehicle_is_built_for_its_study(tmp_path: Path, native: Results, scheduler: str) -> None:
+    results = study(_plan(tmp_path, 'vehicle = "videoray"'), tmp_path / "results", scheduler=scheduler)
     _close(results, native)
     assert (tmp_path / "results" / "videoray.fmu").is_file()
 
 
-def test_workers_of_a_scheduler_give_the_same_rows_and_are_left_as_they_were(
-    tmp_path: Path, videoray_fmu: Path, native: Results
+def test_workers_of_a_scheduler_are_left_as_they_were(
+    tmp_path: Path, videoray_fmu: Path, native: Results, cluster: LocalCluster
 ) -> None:
     told: list[Progress] = []
-    with LocalCluster(n_workers=2, threads_per_worker=2, dashboard_address=None, local_directory=tmp_path) as cluster:
-        plan = _plan(tmp_path, f'fmu = "{videoray_fmu}"')
-        address = cluster.scheduler_address
-        _close(study(plan, tmp_path / "results", scheduler=address, on_progress=told.append), native)
-        assert not [*tmp_path.rglob("modelDescription.xml")], "the FMU is gone from its workers"
+    plan, address = _plan(tmp_path, f'fmu = "{videoray_fmu}"'), cluster.scheduler_address
+    _close(study(plan, tmp_path / "results", scheduler=address, on_progress=told.append), native)
+    scheduler: Any = cluster.scheduler
+    folders = [Path(worker.local_directory) for worker in scheduler.workers.values()]
+    assert len(folders) == 2
+    assert not [path for folder in folders for path in folder.rglob("modelDescription.xml")]
     assert [told[0].done, told[-1].done, told[-1].total] == [0, RUNS, RUNS]
 
 
@@ -109,7 +124,7 @@ def test_the_tables_open_in_other_tools(native: Results) -> None:
 
 
 def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
-    tmp_path: Path, videoray_fmu: Path, native: Results, monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, videoray_fmu: Path, native: Results, monkeypatch: pytest.MonkeyPatch, scheduler: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     plan, folder = _plan(tmp_path, f'fmu = "{videoray_fmu}"'), tmp_path / "results"
@@ -124,13 +139,13 @@ def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
         patched.setattr("rov_fmu.studies.engine._LEAST", 0.0)
         patched.setattr("rov_fmu.studies.engine._TASK", 1e-4)
         patched.setattr(os, "fsync", full)
-        assert main(["study", str(plan), "-o", str(folder), "--workers", "1"]) == 2
+        assert main(["study", str(plan), "-o", str(folder), "--scheduler", scheduler]) == 2
     told = capsys.readouterr().err
     assert told.startswith(f"rov-fmu: {folder}")
     assert told.endswith("cannot be written: No space left on device\n")
     assert told.count("\n") == 1
     assert 0 < len(Results(folder).runs) < RUNS
-    _close(study(plan, folder, workers=1), native)
+    _close(study(plan, folder, scheduler=scheduler), native)
 
 
 def test_without_its_packages_the_command_says_what_to_install(
@@ -159,13 +174,13 @@ def test_a_folder_takes_one_study_at_a_time(
 
 
 def test_an_fmu_that_cannot_be_loaded_is_a_line(
-    tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, videoray_fmu: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     fmu = tmp_path / "videoray.fmu"
     with zipfile.ZipFile(videoray_fmu) as whole, zipfile.ZipFile(fmu, "w") as part:
         part.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
     plan = _plan(tmp_path, 'fmu = "videoray.fmu"')
-    assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--workers", "1"]) == 2
+    assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 2
     told = capsys.readouterr().err
     assert told.startswith("rov-fmu: videoray.fmu: cannot be run: Cannot find shared library binaries")
     assert told.count("\n") == 1

@@ -12,7 +12,7 @@ from rov_fmu.studies import Results
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path]) -> Path:
+def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path], scheduler: str) -> Path:
     """A study of which some runs fail, and its page, by the command."""
     folder = tmp_path_factory.mktemp("page")
     (folder / "plan.toml").write_text(f"""fmu = "{foreign()}"
@@ -30,7 +30,7 @@ outputs = ["y"]
 end = "y[-1]"
 odd = "y if a < 9 else 0"
 """)
-    assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--workers", "1"]) == 0
+    assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
     return folder / "results"
 
 

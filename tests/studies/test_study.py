@@ -12,18 +12,27 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from distributed import LocalCluster
 
 from rov_fmu.cli import main
-from rov_fmu.studies import Results, study
+from rov_fmu.studies import Progress, Results, study
+from rov_fmu.studies.apart import Apart
+from rov_fmu.studies.model import read_model, unpack
+from rov_fmu.studies.plan import load_plan
+from rov_fmu.studies.prepared import prepare
+from rov_fmu.studies.simulator import RunError
 from tests.commands import start
 
 Foreign = Callable[..., Path]
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 
 
-def _plan(folder: Path, fmu: Path, runs: int = 40, more: str = "", vary: str = "", step: float = 0.1) -> Path:
+def _plan(
+    folder: Path, fmu: Path, runs: int = 40, more: str = "", vary: str = "", step: float = 0.1, limit: float = 60.0
+) -> Path:
     path = folder / "plan.toml"
     path.write_text(f"""fmu = "{fmu}"
+time_limit = {limit}
 stop_time = 2.0
 step = {step}
 runs = {runs}
@@ -89,15 +98,17 @@ def test_bands_are_quantiles_over_the_runs(whole: Results) -> None:
 
 @pytest.mark.parametrize("reset", [1, 2])
 def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
-    reset: int, foreign: Foreign, tmp_path: Path, whole: Results
+    reset: int, foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str
 ) -> None:
     """y itself is left as it was by a reset that does nothing."""
-    _same(study(_plan(tmp_path, foreign(reset)), tmp_path / "results", workers=2), whole)
+    _same(study(_plan(tmp_path, foreign(reset)), tmp_path / "results", scheduler=scheduler), whole)
 
 
-def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(foreign: Foreign, tmp_path: Path) -> None:
+def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
+    foreign: Foreign, tmp_path: Path, scheduler: str
+) -> None:
     plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1]", more='bad = "1/(mode - mode)"')
-    results = study(plan, tmp_path / "results", workers=1)
+    results = study(plan, tmp_path / "results", scheduler=scheduler)
     failed, others = results.runs[results.runs["mode"] == 1], results.runs[results.runs["mode"] == 0]
     assert 0 < len(failed) < 30
     assert {*failed.status} == {"failed"}
@@ -109,26 +120,70 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(foreign:
     assert {*results.trajectories().run} == {*others.index}
 
 
-def test_a_run_that_ends_its_process_is_found(foreign: Foreign, tmp_path: Path) -> None:
-    """c is what drives the mode: one run of sixteen."""
-    plan = _plan(tmp_path, foreign(), runs=16, vary="mode.values = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2]")
-    results = study(plan, tmp_path / "results", workers=2)
-    crashed, others = results.runs[results.runs["mode"] == 2], results.runs[results.runs["mode"] == 0]
-    assert len(crashed) >= 1
-    assert {*crashed.status} == {"failed"}
-    assert all(reason.startswith("the FMU ended its process") for reason in crashed.reason)
-    assert len(others) + len(crashed) == 16
+UNKIND = {2: "the FMU ended its process: SIGABRT", 3: "the FMU ended its process: SIGSEGV"} | {
+    4: "the FMU did not return within time_limit = 2 s"
+}
+
+
+def _unkind(plan: Path, folder: Path, **where: Any) -> None:
+    """One run of sixteen is of each unkind mode, on the average."""
+    runs = study(plan, folder, **where).runs
+    assert runs.index.tolist() == [*range(64)]
+    for mode, reason in UNKIND.items():
+        of_mode = runs[runs["mode"] == mode]
+        assert len(of_mode) >= 2
+        assert {*of_mode.status} == {"failed"}
+        assert {*of_mode.reason} == {reason}
+    others = runs[runs["mode"] == 0]
     assert {*others.status} == {"done"}
     assert others.end.to_numpy() == pytest.approx(_expected(others, 2.0).to_numpy(), rel=1e-12)
 
 
+def _unkind_plan(folder: Path, fmu: Path) -> Path:
+    return _plan(folder, fmu, runs=64, vary=f"mode.values = {[0] * 13 + [*UNKIND]}", limit=2.0)
+
+
+@posix
+@pytest.mark.long
+@pytest.mark.parametrize("reset", [0, 2])
+def test_a_run_that_ends_its_process_or_does_not_return_is_a_row(reset: int, foreign: Foreign, tmp_path: Path) -> None:
+    _unkind(_unkind_plan(tmp_path, foreign(reset)), tmp_path / "results", workers=2)
+
+
+@posix
+@pytest.mark.long
+def test_workers_that_nobody_starts_again_outlive_an_fmu(foreign: Foreign, tmp_path: Path) -> None:
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0") as cluster:
+        _unkind(_unkind_plan(tmp_path, foreign()), tmp_path / "results", scheduler=cluster.scheduler_address)
+
+
+@posix
+def test_a_process_apart_is_a_simulator(foreign: Foreign, tmp_path: Path) -> None:
+    """And tells what has become of it, and goes on with the next run."""
+    path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 3, 4]", limit=1.0)
+    model = read_model(foreign())
+    job = prepare(load_plan(path), path, model).job
+    unpack(model.content, tmp_path / "fmu")
+    apart = Apart(str(tmp_path / "fmu"), model, job.manoeuvre, job.time_limit)
+    y = []
+    for mode in (0, 2, 3, 4, 1, 0):
+        try:
+            y.append(apart.run([1.0, 0.0, 0.0, mode])["y"][10])
+            apart.reset()
+        except RunError as error:
+            y.append(str(error).replace("= 1 s", "= 2 s"))
+    apart.free()
+    end = pytest.approx(1.0 - np.exp(-2.0), rel=1e-12)
+    assert y == [end, *UNKIND.values(), "the step at 1 s: error; the FMU: the pump is blocked", end]
+
+
 def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
-    foreign: Foreign, tmp_path: Path, whole: Results, capsys: pytest.CaptureFixture[str]
+    foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     results = tmp_path / "results"
-    study(_plan(tmp_path, foreign(), runs=16), results, workers=1)
+    study(_plan(tmp_path, foreign(), runs=16), results, scheduler=scheduler)
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
-    _same(study(_plan(tmp_path, foreign(), runs=40), results, workers=2), whole)
+    _same(study(_plan(tmp_path, foreign(), runs=40, limit=99.0), results, scheduler=scheduler), whole)
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
     others = {
@@ -144,11 +199,13 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     _same(Results(results), whole)
 
 
-def test_sobol_indices_of_a_linear_fmu_are_those_of_the_closed_form(foreign: Foreign, tmp_path: Path) -> None:
+def test_sobol_indices_of_a_linear_fmu_are_those_of_the_closed_form(
+    foreign: Foreign, tmp_path: Path, scheduler: str
+) -> None:
     """Of a sum of uniform terms with factors 1, 2, 3: shares of the variance 1/14, 4/14, 9/14, and no interaction."""
     plan = _plan(tmp_path, foreign(), runs=5 * 1024)
     plan.write_text(plan.read_text().replace("seed = 5", 'sampler = "saltelli"'))
-    found = study(plan, tmp_path / "results", workers=2).sensitivity("end")
+    found = study(plan, tmp_path / "results", scheduler=scheduler).sensitivity("end")
     shares = [1 / 14, 4 / 14, 9 / 14]
     assert found.index.tolist() == ["a", "b", "c"]
     assert found.S1.tolist() == pytest.approx(shares, abs=0.01)
@@ -159,7 +216,25 @@ def test_sobol_indices_of_a_linear_fmu_are_those_of_the_closed_form(foreign: For
 
 # ---- Interrupted and killed ------------------------------------------------------------------------------------------
 
-SLOW = {"runs": 1500, "step": 0.0005}
+
+def test_a_study_that_is_interrupted_half_way_goes_on_to_the_same_rows(
+    foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rov_fmu.studies.engine._LEAST", 0.0)
+    monkeypatch.setattr("rov_fmu.studies.engine._TASK", 1e-4)
+    plan, results = _plan(tmp_path, foreign()), tmp_path / "results"
+
+    def interrupt(now: Progress) -> None:
+        if now.done > 10:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study(plan, results, scheduler=scheduler, on_progress=interrupt)
+    assert 10 < len(Results(results).runs) < 40
+    _same(study(plan, results, scheduler=scheduler), whole)
+
+
+SLOW = {"runs": 600, "step": 0.0005}
 """Some seconds."""
 
 
@@ -194,6 +269,7 @@ def _children(pid: int) -> list[int]:
 
 
 @posix
+@pytest.mark.long
 def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
     process = _begun(plan, results)
@@ -213,6 +289,7 @@ def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: P
 
 
 @posix
+@pytest.mark.long
 def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
     process = _begun(plan, results)
@@ -224,6 +301,7 @@ def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, s
 
 
 @posix
+@pytest.mark.long
 def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
     process = _begun(plan, results)
