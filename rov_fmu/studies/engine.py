@@ -27,7 +27,7 @@ _AHEAD = 3
 """Tasks by thread that are given out, so that none waits for the next one."""
 _CHANCES = 3
 """How often workers may die until all runs are done apart from them, and then those of a task until it is given up."""
-_WAIT = 20.0
+_WAIT = 10.0
 """Seconds until a scheduler, or a worker of it, must have answered."""
 
 

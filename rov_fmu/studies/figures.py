@@ -2,7 +2,7 @@
 
 import ast
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from math import nan
 from typing import Any
 
@@ -17,6 +17,9 @@ _STEADY = 0.1
 """The last part of a window, over which the mean is what is steady."""
 _ARGUMENTS = re.compile(r"Error running function .* and kwargs \{.*?\}: ", re.S)
 """What asteval tells of a call before it tells what is wrong."""
+_METHOD = re.compile(r"Responses\.\w+")
+_NEVER = ("must be one number", "NotImplementedError", "AttributeError", "TypeError", "NameError")
+"""How reasons begin that no run can change."""
 _NOT_FOR_FIGURES = ("open", "print", "dir", "type")
 _BAND = 0.05
 """Of the way from the beginning: within it a response is settled."""
@@ -139,7 +142,9 @@ class Figures:
         self.names = tuple(expressions)
         self._interpreter = _interpreter()
         self._symbols = self._interpreter.symtable
-        self._symbols |= {TIME: times} | Responses(times).functions
+        functions = Responses(times).functions
+        self._symbols |= {TIME: times} | functions
+        self._called = {function.__qualname__: name for name, function in functions.items()}
         self._parsed = {name: self._interpreter.parse(text.strip()) for name, text in expressions.items()}
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
@@ -163,7 +168,16 @@ class Figures:
             return nan, brief(f"{type(error).__name__}: {error}")
         if interpreter.error:
             _, words = interpreter.error[0].get_error()
-            return nan, brief(_ARGUMENTS.sub("", words.strip()).splitlines()[-1].strip())
+            told = _ARGUMENTS.sub("", words.strip()).splitlines()[-1].strip()
+            return nan, brief(_METHOD.sub(lambda method: self._called[method[0]], told))
         if np.ndim(value) != 0 or not isinstance(value, int | float | np.number | np.bool_):
             return nan, f"must be one number, and not {shown(value)}"
         return float(value), ""
+
+
+def unusable(expression: str, variables: Iterable[str], varied: Iterable[str]) -> str:
+    """Why an expression is no figure, whatever the run; nothing where a run must tell."""
+    times = np.linspace(0.0, 1.0, 11)
+    run = {**dict.fromkeys(variables, times), **dict.fromkeys(varied, 1.0)}
+    reason = Figures({"": expression}, times).of(run)[1].removeprefix(": ")
+    return reason if reason.startswith(_NEVER) else ""

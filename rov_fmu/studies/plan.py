@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterator
 from itertools import pairwise
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -104,9 +105,12 @@ class Varied(Strict):
 
 
 def _held(given: Any) -> Any:
-    """A number alone is held from the start to the end."""
-    is_number = isinstance(given, int | float) and not isinstance(given, bool)
-    return {"steps": [[_ALWAYS, float(given)]]} if is_number else given
+    """A number alone is held from the start to the end; true and false are 1 and 0."""
+    if isinstance(given, int | float):
+        return {"steps": [[_ALWAYS, float(given)]]}
+    if not isinstance(given, dict | Signal):
+        raise ValueError("must be a number, { steps = [[time, value], ...] } or { ramps = ... }")
+    return given
 
 
 def _as_number(given: Any) -> Any:
@@ -168,6 +172,12 @@ class InputFile(Strict):
         return self.between == "steps"
 
 
+def _once(names: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(names)) < len(names):
+        raise ValueError("must name each once")
+    return names
+
+
 def _ascending(times: tuple[float, ...]) -> tuple[float, ...]:
     if list(times) != sorted(set(times)):
         raise ValueError("must be times one after another")
@@ -177,7 +187,7 @@ def _ascending(times: tuple[float, ...]) -> tuple[float, ...]:
 class Keep(Strict):
     """The trajectories that are kept; without this table none are, and figures alone remain."""
 
-    outputs: Annotated[tuple[str, ...], BeforeValidator(pair), AfterValidator(_some)]
+    outputs: Annotated[tuple[str, ...], BeforeValidator(pair), AfterValidator(_some), AfterValidator(_once)]
     """Names of variables."""
     every: Positive | None = None
     """s, from the start on; a multiple of the step. Every step where neither this nor `at` is given."""
@@ -287,6 +297,8 @@ def _nonsense(plan: Plan) -> Iterator[str]:
         yield from _unreachable(plan, plan.keep)
     if plan.sampler == "grid" and plan.runs is not None:
         yield line("runs", "a grid has as many as it has points; leave this out", plan.runs)
+    if plan.sampler == "grid" and (points := prod(len(way.choices or ()) for way in plan.vary.values())) > _MOST_RUNS:
+        yield line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {points:.3g}")
     if plan.sampler != "grid" and plan.runs is None:
         yield "runs: this key is missing"
     if not plan.keep and not plan.figures:
@@ -297,6 +309,8 @@ def _unreachable(plan: Plan, keep: Keep) -> Iterator[str]:
     """Times to keep that no step ends at."""
     if keep.every is not None and not _whole(keep.every / plan.step):
         yield line("keep.every", f"must be a multiple of step = {plan.step:g}", keep.every)
+    elif keep.every is not None and keep.every > plan.stop_time - plan.start_time:
+        yield line("keep.every", "must not be longer than a run", keep.every)
     for time in keep.at or ():
         if plan.step_at(time) is None:
             told = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"

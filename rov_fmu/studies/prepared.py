@@ -13,7 +13,7 @@ from rov_fmu.files.messages import FileError, shown
 from rov_fmu.files.reading import read_text
 from rov_fmu.files.series import series
 from rov_fmu.files.toml_file import line
-from rov_fmu.studies.figures import known_names, names_in
+from rov_fmu.studies.figures import known_names, names_in, unusable
 from rov_fmu.studies.model import Model, Variable, unknown
 from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied
 from rov_fmu.studies.sampling import Design
@@ -64,9 +64,12 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
 
 
 def vehicle_file(given: str, path: Path) -> Path:
-    """A vehicle file beside the plan, or one that ships."""
+    """A vehicle file beside the plan, or one that ships. Raises PlanError."""
     beside = path.parent / given
-    return beside if beside.is_file() else find_vehicle(given)
+    try:
+        return beside if beside.is_file() else find_vehicle(given)
+    except FileError as error:
+        raise PlanError(f"{path}: {error}") from error
 
 
 def _from_vehicle(plan: Plan, path: Path) -> dict[str, Varied]:
@@ -178,6 +181,8 @@ def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: Mapping[str,
                 f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number",
                 text,
             )
+        elif reason := unusable(text, has, varied):
+            yield line(f"figures.{name}", reason, text)
     if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
         yield line("keep.outputs", f"the results have another column {taken.pop()}")
 

@@ -84,6 +84,8 @@ class Results:
 
         if figure not in self.figures:
             raise FileError(f"{self.folder}: there is no figure {shown(figure)}, only {', '.join(self.figures)}")
+        if self.runs[figure].nunique() == 1:
+            raise FileError(f"{self.folder}: {figure} is the same in all runs")
         if self.plan["sampler"] != "saltelli":
             raise FileError(f'{self.folder}: Sobol indices need sampler = "saltelli" in the plan')
         block = len(self.parameters) + 2

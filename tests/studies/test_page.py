@@ -28,7 +28,7 @@ mode.values = [0, 0, 0, 0, 0, 0, 0, 1]
 outputs = ["y"]
 [figures]
 end = "y[-1]"
-odd = "y if a < 9 else 0"
+odd = "y[99]"
 """)
     assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
     return folder / "results"

@@ -27,9 +27,14 @@ WRONG = {
     HEAD + 'sampler = "grid"\n' + VARY + TAIL: "runs = 4: a grid has as many as it has points; leave this out",
     HEAD.replace("runs = 4", 'sampler = "grid"') + VARY + TAIL:
         "vary.alpha_u = {'uniform': (1.0, 1.2)}: a grid needs values or a range",
+    HEAD.replace("runs = 4", 'sampler = "grid"') + "[vary]\n"
+    + "".join(f"{name}.range = {{ from = 1.0, to = 2.0, count = 1000 }}\n" for name in ("m_rov", "I_r", "R")) + TAIL:
+        "vary: a grid must have at most 100000000 points, and not 1e+09",
     HEAD + 'sampler = "soboll"\n' + VARY + TAIL:
         "sampler = 'soboll': must be 'grid', 'sobol', 'latin-hypercube', 'random' or 'saltelli'",
     HEAD + 'vehicle = "videoray"\n' + VARY + TAIL: "must have either fmu or vehicle",
+    HEAD.replace('fmu = "videoray.fmu"', 'vehicle = "videory"') + VARY + TAIL:
+        "videory: there is no such file, and no vehicle of this name ships, only bluerov2",
     HEAD + 'vary_from = "videoray"\n' + TAIL: "vary_from = 'videoray': no coefficient of this vehicle has an interval",
     HEAD + "[vary]\nalpha_uu.uniform = [1.0, 1.2]\n" + TAIL:
         "vary.alpha_uu: the FMU has no variable 'alpha_uu' that is a number; did you mean alpha_",
@@ -44,16 +49,25 @@ WRONG = {
     HEAD + VARY + "[set]\nm_rov = 0.0\n" + TAIL: "set.m_rov = 0.0: must be within 0.001 ... 1000000 kg",
     HEAD + VARY + "[inputs]\nu_l = 1.5\n" + TAIL: "inputs.u_l = 1.5: must be within -1 ... 1",
     HEAD + VARY + "[inputs]\nu = 0.5\n" + TAIL: "inputs.u: is no input of the FMU; its causality is output",
+    HEAD + VARY + '[inputs]\nu_l = "full"\n' + TAIL:
+        "inputs.u_l = 'full': must be a number, { steps = [[time, value], ...] } or { ramps = ... }",
     HEAD + VARY + "[inputs]\nu_l.steps = []\n" + TAIL: "inputs.u_l.steps = []: must have an entry",
     HEAD + VARY + "[inputs]\nu_l.ramps = [[1.0, 0.0], [0.5, 1.0]]\n" + TAIL:
         "inputs.u_l.ramps = [[1.0, 0.0], [0.5, 1.0]]: the time must not go back, as it does from 1 to 0.5",
     HEAD + VARY + '[keep]\noutputs = ["q"]\n': "keep.outputs: the FMU has no variable 'q' that is a number",
+    HEAD + VARY + '[keep]\noutputs = ["u", "u"]\n': "keep.outputs = ['u', 'u']: must name each once",
+    HEAD + VARY + '[keep]\noutputs = ["u"]\nevery = 2.0\n': "keep.every = 2.0: must not be longer than a run",
     HEAD + VARY + '[keep]\noutputs = ["u"]\nevery = 0.25\n': "keep.every = 0.25: must be a multiple of step = 0.1",
     HEAD + VARY + '[keep]\noutputs = ["u"]\nat = [0.5, 1.1]\n':
         "keep.at = [0.5, 1.1]: must be times from the start to the end",
     HEAD + VARY + '[figures]\nend = "u[-1"\n': "figures.end = 'u[-1': is no expression: '[' was never closed",
     HEAD + VARY + '[figures]\nend = "q[-1]"\n': "figures.end = 'q[-1]': 'q' is neither a function nor a variable",
     HEAD + VARY + '[figures]\nend = "open(1)"\n': "figures.end = 'open(1)': 'open' is neither a function nor a",
+    HEAD + VARY + '[figures]\nend = "u"\n': "figures.end = 'u': must be one number, and not array(",
+    HEAD + VARY + '[figures]\nend = "V_ss()"\n':
+        "figures.end = 'V_ss()': TypeError: V_ss() missing 1 required positional argument: 'y'",
+    HEAD + VARY + '[figures]\nend = "(lambda: 1)()"\n':
+        "figures.end = '(lambda: 1)()': NotImplementedError: Lambda not supported",
     HEAD + VARY + '[figures]\nalpha_u = "u[-1]"\n': "figures.alpha_u: the results have another column of this name",
 }  # fmt: skip
 

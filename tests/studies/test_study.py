@@ -15,6 +15,7 @@ import pytest
 from distributed import LocalCluster
 
 from rov_fmu.cli import main
+from rov_fmu.files.messages import FileError
 from rov_fmu.studies import Progress, Results, study
 from rov_fmu.studies.apart import Apart
 from rov_fmu.studies.model import read_model, unpack
@@ -203,9 +204,12 @@ def test_sobol_indices_of_a_linear_fmu_are_those_of_the_closed_form(
     foreign: Foreign, tmp_path: Path, scheduler: str
 ) -> None:
     """Of a sum of uniform terms with factors 1, 2, 3: shares of the variance 1/14, 4/14, 9/14, and no interaction."""
-    plan = _plan(tmp_path, foreign(), runs=5 * 1024)
+    plan = _plan(tmp_path, foreign(), runs=5 * 1024, more='same = "0*y[0]"')
     plan.write_text(plan.read_text().replace("seed = 5", 'sampler = "saltelli"'))
-    found = study(plan, tmp_path / "results", scheduler=scheduler).sensitivity("end")
+    results = study(plan, tmp_path / "results", scheduler=scheduler)
+    with pytest.raises(FileError, match="same is the same in all runs"):
+        results.sensitivity("same")
+    found = results.sensitivity("end")
     shares = [1 / 14, 4 / 14, 9 / 14]
     assert found.index.tolist() == ["a", "b", "c"]
     assert found.S1.tolist() == pytest.approx(shares, abs=0.01)
