@@ -206,7 +206,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     RESULTS has the tables runs and trajectories (Parquet) and the page study.html. What is done is kept: the same
     command goes on where an earlier one ended.
     """
-    if workers and scheduler:
+    if workers and scheduler is not None:
         raise click.UsageError("study: --scheduler has the workers that it has: leave --workers out")
     try:
         from rov_fmu.studies.page import page_output

@@ -1,9 +1,11 @@
 """The runs of a study on workers of Dask: in tasks of about a second, and their rows written as they come."""
 
+import asyncio
 import logging
 import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from math import ceil
@@ -11,7 +13,9 @@ from time import perf_counter
 from typing import Any
 
 import dask
-from distributed import Client, KilledWorker, LocalCluster, as_completed
+from distributed import Client, KilledWorker, LocalCluster, Security, as_completed, rpc
+from distributed.comm.core import CommClosedError
+from distributed.utils import silence_logging_cmgr
 
 from rov_fmu.files.messages import FileError, StudyError, brief
 from rov_fmu.studies.sampling import Design
@@ -27,6 +31,8 @@ _AHEAD = 3
 """Tasks by thread that are given out, so that none waits for the next one."""
 _CHANCES = 3
 """How often workers may die until all runs are done apart from them, and then those of a task until it is given up."""
+_GONE = (CancelledError, CommClosedError)
+"""What Dask raises where there is no scheduler any more."""
 _WAIT = 10.0
 """Seconds until a scheduler, or a worker of it, must have answered."""
 
@@ -74,13 +80,15 @@ def execute(
     if not missing:
         return spent
     with _client(workers, scheduler) as client:
-        client.register_plugin(Delivery(job, own_cluster=scheduler is None))
+        _deliver(client, Delivery(job, own_cluster=scheduler is None))
         spent.started = perf_counter() - begin
         try:
             _Runs(client, job, design, store, missing, spent, on_progress).do()
+        except _GONE as error:
+            raise StudyError("the scheduler is gone; what is done is kept") from error
         finally:
             spent.elapsed = perf_counter() - begin
-            if scheduler:
+            if scheduler is not None:
                 with suppress(Exception):  # that scheduler may be gone
                     client.unregister_worker_plugin(job.key)
     return spent
@@ -133,7 +141,10 @@ class _Runs:
 
     def _give(self, coming: Any) -> None:
         """Have enough under way."""
-        threads = sum(self._client.nthreads().values()) or 1
+        try:
+            threads = sum(self._client.nthreads().values()) or 1
+        except OSError as error:
+            raise CommClosedError("no answer") from error
         while (self._lost or self._missing) and len(self._futures) < _AHEAD * threads:
             if self._lost:
                 self._submit(coming, *self._lost.popleft(), apart=True)
@@ -162,6 +173,8 @@ class _Runs:
             return
         except LoadError as error:
             raise FileError(f"{self._job.model.name}: cannot be run on a worker: {error}") from error
+        except _GONE:
+            raise
         except Exception as error:  # of the cluster
             raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
         self._write(first, end, part)
@@ -190,15 +203,20 @@ class _Runs:
         self._tell(Progress(self._there + self._spent.runs, self._design.runs, self._spent.failed, link or ""))
 
 
+def _deliver(client: Client, delivery: Delivery) -> None:
+    try:
+        client.register_plugin(delivery)
+    except Exception as error:  # whatever a worker may raise
+        told = brief(str(error))
+        raise StudyError(f"a worker cannot take the study; it needs the same rov-fmu[study] as here: {told}") from error
+
+
 @contextmanager
 def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     """Workers of this machine, a process and a thread each, or those of a scheduler. Raises FileError."""
-    if scheduler:
-        try:
-            client = Client(scheduler, timeout=_WAIT, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise FileError(f"--scheduler {scheduler}: no scheduler of Dask answers there") from error
-        with client:
+    if scheduler is not None:
+        _see(scheduler)
+        with silence_logging_cmgr(logging.CRITICAL), Client(scheduler, timeout=_WAIT, set_as_default=False) as client:
             try:
                 client.wait_for_workers(1, timeout=_WAIT)
             except TimeoutError:
@@ -220,3 +238,19 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
         Client(cluster, set_as_default=False) as client,
     ):  # fmt: skip
         yield client
+
+
+def _see(scheduler: str) -> None:
+    """That a scheduler answers: a client without one waits, and says more than a line. Raises FileError."""
+
+    async def ask() -> bool:
+        async with rpc(scheduler, connection_args=Security().get_connection_args("client")) as there:
+            return bool((await asyncio.wait_for(there.identity(), _WAIT))["type"] == "Scheduler")
+
+    try:
+        with ThreadPoolExecutor(1) as other:  # a notebook has a loop of its own in this thread
+            is_there = other.submit(asyncio.run, ask()).result()
+    except Exception:  # whatever else is there may answer
+        is_there = False
+    if not is_there:
+        raise FileError(f"--scheduler {scheduler}: no scheduler of Dask answers there")

@@ -15,7 +15,7 @@ import pytest
 from distributed import LocalCluster
 
 from rov_fmu.cli import main
-from rov_fmu.files.messages import FileError
+from rov_fmu.files.messages import FileError, StudyError
 from rov_fmu.studies import Progress, Results, study
 from rov_fmu.studies.apart import Apart
 from rov_fmu.studies.model import read_model, unpack
@@ -317,10 +317,27 @@ def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, s
     assert not [*results.glob("*/.*")]
 
 
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "host", ""])
 def test_a_scheduler_that_is_not_there_is_a_line(
-    foreign: Foreign, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    address: str, foreign: Foreign, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rov_fmu.studies.engine._WAIT", 1.0)
-    where = ["-o", str(tmp_path / "results"), "--scheduler", "tcp://127.0.0.1:9"]
-    assert main(["study", str(_plan(tmp_path, foreign())), *where]) == 2
-    assert capsys.readouterr().err == ("rov-fmu: --scheduler tcp://127.0.0.1:9: no scheduler of Dask answers there\n")
+    assert (
+        main(["study", str(_plan(tmp_path, foreign())), "-o", str(tmp_path / "results"), "--scheduler", address]) == 2
+    )
+    assert capsys.readouterr().err == f"rov-fmu: --scheduler {address}: no scheduler of Dask answers there\n"
+
+
+@pytest.mark.long
+def test_a_scheduler_that_goes_takes_nothing_with_it(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
+    with LocalCluster(n_workers=1, dashboard_address="127.0.0.1:0", local_directory=tmp_path / "cluster") as cluster:
+
+        def close(now: Progress) -> None:
+            if now.done:
+                cluster.close()
+
+        with pytest.raises(StudyError, match="the scheduler is gone; what is done is kept"):
+            study(plan, results, scheduler=cluster.scheduler_address, on_progress=close)
+    assert 0 < len(Results(results).runs) < SLOW["runs"]
+    _same(study(plan, results, workers=2), slow)
