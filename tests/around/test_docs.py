@@ -172,7 +172,7 @@ def test_the_pages_with_commands_are_found() -> None:
 def test_programs_print_what_is_said(page: Path, workplace: Path) -> None:
     for program in blocks(page, "python"):
         printed = run(workplace, sys.executable, "-c", program).splitlines()
-        said = re.findall(r"^print\(.*?  # (.*)$", program, re.MULTILINE)
+        said = re.findall(r"^ *print\(.*?  # (.*)$", program, re.MULTILINE)
         assert len(printed) == len(said) == 1
         if printed != said:
             value = re.search(r"\d+\.(\d+) ", said[0])

@@ -154,11 +154,12 @@ def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
 
 
 def lowest(folder: Path) -> Path:
-    """A file of constraints: each dependency of the package at the lower bound that pyproject.toml gives it."""
+    """A file of constraints: what the package and its studies depend on, at the lower bounds of pyproject.toml."""
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    needed = text[text.index("\ndependencies = [") : text.index("[project.optional-dependencies]")]
-    pins = [f"{name}=={bound}" for name, bound in re.findall(r'^    "([a-z0-9-]+)>=([0-9.]+)', needed, re.M)]
-    assert len(pins) > 12
+    lists = [re.search(rf"^{key} = \[\n(.*?)^\]", text, re.M | re.S) for key in ("dependencies", "study")]
+    needed = "".join(found[1] for found in lists if found)
+    pins = [f"{name}=={bound}" for name, bound in re.findall(r'^    "([A-Za-z0-9-]+)>=([0-9.]+)', needed, re.M)]
+    assert len(pins) > 20
     path = folder / "lowest.txt"
     path.write_text("\n".join(pins) + "\n", encoding="utf-8")
     return path
@@ -172,7 +173,7 @@ def test_the_lowest_versions_are_enough(tmp_path: Path) -> None:
     made = environment(tmp_path / "venv", "-c", lowest(tmp_path), f"{ROOT}[test]", python=python)
     quick = ("cli/test_start.py", "export/test_build.py", "export/test_osp.py", "pages", "vehicle/test_vehicle.py",
              *(f"vehicle/test_{part}.py" for part in ("writer", "first_version", "json_schema", "bluerov2")),
-             *(f"identify/test_{part}.py" for part in ("identification", "refit", "tuning")))  # fmt: skip
+             *(f"identify/test_{part}.py" for part in ("identification", "refit", "tuning")), "studies")  # fmt: skip
     command = [made.python, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *(f"tests/{part}" for part in quick)]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout[-3000:]

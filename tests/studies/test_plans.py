@@ -67,7 +67,7 @@ WRONG = {
     HEAD + VARY + '[figures]\nend = "V_ss()"\n':
         "figures.end = 'V_ss()': TypeError: V_ss() missing 1 required positional argument: 'y'",
     HEAD + VARY + '[figures]\nend = "(lambda: 1)()"\n':
-        "figures.end = '(lambda: 1)()': NotImplementedError: Lambda not supported",
+        "figures.end = '(lambda: 1)()': NotImplementedError: ",
     HEAD + VARY + '[figures]\nalpha_u = "u[-1]"\n': "figures.alpha_u: the results have another column of this name",
 }  # fmt: skip
 
