@@ -21,6 +21,7 @@ from . import archive, fleet, importer, picture, sections
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
 from .steps import HeavyPlan, Measured, Plan
+from .studies import Study
 from .work import Work
 
 
@@ -35,6 +36,7 @@ class Effort:
     runs: int = 100_000
     runs_in_fmpy: int = 2000
     loads: int = 20
+    study_runs: tuple[int, ...] = (10_000, 1000, 100_000)  # beside the runs alone, and few and many
     all_platforms: bool = True
 
 
@@ -43,7 +45,7 @@ A cell's second number is the error at the end of a held command against 50 digi
 for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal, and fmi3DoStep
 fmi3SetFloat64.
 """
-_QUICK = Effort(3, 1024, 8, 1, 1000, 100, 3, all_platforms=False)
+_QUICK = Effort(3, 1024, 8, 1, 1000, 100, 3, (200, 100, 400), all_platforms=False)
 
 
 @click.command(help=__doc__)
@@ -102,6 +104,10 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
         runs["FMPy"] = fleet.through_fmpy(slave, variations, effort.runs_in_fmpy, effort.manoeuvres)
         slave.freeInstance()
         yield sections.variations(runs)
+    with say("studies"):
+        study, (beside, *others) = Study(native, folder), effort.study_runs
+        pairs = [*study.pairs(beside, effort.manoeuvres)]
+        yield sections.studies(pairs, [study.cost(count, workers=2) for count in sorted([beside, *others])])
     yield from sections.archive(builds, loaded)
     if plain_c:
         yield sections.promises(plan, measured, heavier, measured_heavy)

@@ -9,6 +9,7 @@ from .importer import INTERVAL, NATIVE, STOP
 from .page import Section, digits, duration, error
 from .plain_c import BDF, CLOSED, CVODE, EULER, FMU, FMU_3, FMU_3_SET, FMU_SET, RK4, Reals
 from .steps import KINDS, NAMES, SUBSTEP, TARGET, H, HeavyPlan, Job, Measured, Plan, compared, methods
+from .studies import Cost, overhead
 
 _STEPS = [f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H]
 _OURS = {FMU: "ours, fmi2DoStep", CLOSED: "ours, without FMI"}
@@ -87,6 +88,19 @@ def variations(runs: Mapping[str, Runs]) -> Section:
         ["Variations of α and β, 100 s, turning", "runs", "a run", "runs a second", "error at the end"],
         *([name, f"{found.count:,}", duration(1.0 / found.rate), digits(found.rate), error(found.error)]
           for name, found in runs.items()),
+    ]  # fmt: skip
+
+
+def studies(pairs: Sequence[tuple[float, Cost]], costs: Sequence[Cost]) -> Section:
+    """Runs by the engine of studies, beside those alone; the engine's time is that of all its processes."""
+    alone = float(np.median([seconds / cost.runs for seconds, cost in pairs]))
+    by_one = float(np.median([cost.processor / cost.runs for _, cost in pairs]))
+    return [
+        ["A study: 30 s, two outputs each 0.1 s, three figures", "runs", "a run", "on the clock", "memory grows by"],
+        ["the runs alone", f"{pairs[0][1].runs:,}", duration(alone), "", ""],
+        ["by one worker", f"{pairs[0][1].runs:,}", duration(by_one), f"{overhead(pairs):+.0%}", ""],
+        *(["by two workers", f"{cost.runs:,}", duration(cost.processor / cost.runs), duration(cost.spent.elapsed),
+           f"{cost.growth / 1e6:,.0f} MB"] for cost in costs),
     ]  # fmt: skip
 
 

@@ -153,7 +153,8 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
     for part in (
         "Velocities u, w, r", "Velocities and pose, turning", "Velocities and pose, straight", "fmi2DoStep",
         "fmi3DoStep", "forward Euler", "RK4", "CVODE BDF", "CVODE Adams", "A command of 1 s to 1e-9", "PythonFMU",
-        "Model Exchange", "10,000", "memory of each", "runs a second", "build, cold", "library alone", "Promised",
+        "Model Exchange", "10,000", "memory of each", "runs a second", "by two workers", "build, cold",
+        "library alone", "Promised",
     ):  # fmt: skip
         assert part in printed, printed
     times_ours = next(line.split()[4] for line in printed.splitlines() if line.startswith("CVODE BDF  "))
