@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import signal
 import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
@@ -231,13 +232,24 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     with (
         tempfile.TemporaryDirectory(prefix="study-", ignore_cleanup_errors=True) as folder,
         dask.config.set(settings),
-        LocalCluster(
+        _started(
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
             silence_logs=logging.CRITICAL, local_directory=folder,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):  # fmt: skip
         yield client
+
+
+def _started(**options: Any) -> LocalCluster:
+    """Workers that Ctrl-C does not reach, for it is for this process, which sees it as soon as they are there."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return LocalCluster(**options)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return LocalCluster(**options)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _see(scheduler: str) -> None:
