@@ -216,7 +216,9 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
     try:
         with _runs_bar() as tell:
-            spent, results = run_study(plan, output, workers, scheduler, tell)
+            spent, results = run_study(
+                plan, output, workers, scheduler, tell, lambda told: click.echo(f"rov-fmu: warning: {told}", err=True)
+            )
     except KeyboardInterrupt:
         click.echo("rov-fmu: what is done is kept; the same command goes on from there", err=True)
         raise

@@ -111,6 +111,13 @@ def unpack(content: bytes, folder: Path) -> Any:
     return fmpy.read_model_description(str(folder), validate=False)
 
 
+def unsettable(name: str, has: Mapping[str, Variable]) -> str:
+    """Why no variable of this name can be given a value; nothing where one can."""
+    if name not in has:
+        return unknown(name, has)
+    return "" if has[name].can_be_set else "the FMU computes it, and it cannot be set"
+
+
 def unknown(name: str, names: Mapping[str, object]) -> str:
     """What is wrong with a name that the FMU has not."""
     from difflib import get_close_matches

@@ -47,7 +47,8 @@ def study_page(results: Results) -> str:
         figures=[_figure(name, runs[name], plan["figures"][name]) for name in results.figures],
         sensitivities=_sensitivities(results) if plan["sampler"] == "saltelli" else {},
         bands={name: _band(results, name) for name in results.outputs} if len(results.failed) < len(runs) else {},
-        parameters={name: _parameter(runs[name], way, results.units[name]) for name, way in plan["vary"]},
+        warnings=results.warnings,
+        parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
         failures=reasons[:_REASONS],
         more_failures=len(reasons[_REASONS:]),
     )
@@ -106,15 +107,17 @@ def _sensitivities(results: Results) -> dict[str, Any]:
     return found
 
 
-def _parameter(column: "pd.Series[float]", way: dict[str, Any], unit: str) -> dict[str, Any]:
-    ((kind, told),) = way.items()
+def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], results: Results) -> dict[str, Any]:
+    ways = dict(plan["vary"])
+    ((kind, told),) = (ways[name] if name in ways else {"estimate": plan["vary_from"]["estimates"][name]}).items()
     numbers = told.items() if isinstance(told, dict) else [("", value) for value in told]
-    some = [f"{name} {number(value, 4)}".strip() for name, value in numbers]
+    some = [f"{key} {number(value, 4)}".strip() for key, value in numbers]
     words = ", ".join([*some[:6], *(["…"] if len(some) > 6 else [])])
+    others = [other for group in results.groups if name in group for other in group if other != name]
     values = column.to_numpy(float)
     return {
-        "planned": f"{kind}: {words}", "least": float(values.min()), "median": float(np.median(values)),
-        "greatest": float(values.max()), "unit": unit,
+        "name": name, "planned": f"{kind}: {words}", "others": others, "least": float(values.min()),
+        "median": float(np.median(values)), "greatest": float(values.max()), "unit": results.units[name],
     }  # fmt: skip
 
 

@@ -226,14 +226,14 @@ class Plan(Strict):
     """s on the clock: a run that takes longer fails."""
     runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
     """How many; a grid has as many as it has points. Of sampler saltelli rounded up to a multiple of (number of
-    varied variables + 2)."""
+    varied variables + 2), where those that are correlated count as one."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """The parameters of a run depend on this and on the run's number alone."""
     sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
     """How the numbers are drawn; saltelli is what Sobol indices are computed from."""
     vary_from: str | None = None
-    """A vehicle file, or the name of a vehicle that ships: its coefficients vary by the intervals that identification
-    wrote there. [vary] comes first."""
+    """A vehicle file, or the name of a vehicle that ships: its coefficients vary by the errors and correlations that
+    identification wrote there, but for those in [vary] and [set]."""
     vary: dict[str, Varied] = Field({})
     """By variable: what differs from run to run. An input that varies is held."""
     set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({})

@@ -13,12 +13,12 @@ from rov_fmu.files.messages import FileError, shown
 from rov_fmu.files.reading import read_text
 from rov_fmu.files.series import series
 from rov_fmu.files.toml_file import line
+from rov_fmu.studies.estimates import Estimates
 from rov_fmu.studies.figures import known_names, names_in, unusable
-from rov_fmu.studies.model import Model, Variable, unknown
+from rov_fmu.studies.model import Model, Variable, unknown, unsettable
 from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied
 from rov_fmu.studies.sampling import Design
 from rov_fmu.studies.simulator import Manoeuvre
-from rov_fmu.studies.uncertainty import uncertainty
 from rov_fmu.studies.worker import REASON, RUN, STATUS, TIME, Job
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -35,32 +35,38 @@ class Prepared:
     design: Design
     mark: Mapping[str, Any]
     """What results depend on."""
+    warnings: Sequence[str]
+    """What they have in them that a reader may not expect, in sentences."""
 
 
 def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     """See that a plan, read from a path, fits an FMU. Raises PlanError with every reason."""
-    varied = {**_from_vehicle(plan, path), **plan.vary}
+    vehicle = load_vehicle(vehicle_file(plan.vary_from, path)) if plan.vary_from else None
+    estimates = Estimates(plan, vehicle, model.variables)
     from_file = _file_inputs(plan, path, model)
-    if wrong := [*_nonsense(plan, model, varied, from_file)]:
+    if wrong := [*estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file)]:
         raise PlanError(*(f"{path}: {words}" for words in wrong))
-    design = Design(plan, varied, model.variables)
+    design = Design(plan, model.variables, estimates.known)
     times = plan.start_time + plan.step * np.arange(plan.steps, dtype=np.float64)
     signals = {**plan.inputs, **from_file}
     inputs = {name: _sampled(signal, times, plan.step, model.variables[name].start) for name, signal in signals.items()}
     kept = plan.keep.outputs if plan.keep else ()
     named = {name for text in plan.figures.values() for name in names_in(text)} & model.variables.keys()
-    recorded = [*dict.fromkeys([*kept, *sorted(named - varied.keys())])]
+    recorded = [*dict.fromkeys([*kept, *sorted(named - {*design.names})])]
     manoeuvre = Manoeuvre(
         plan.start_time, plan.step, plan.steps, plan.tolerance, plan.set, design.names, inputs, recorded
     )
     mark = {
         **plan.mark,
-        "vary": [[name, way.model_dump(by_alias=True, mode="json", exclude_none=True)] for name, way in varied.items()],
+        **estimates.mark,
+        "vary": [
+            [name, way.model_dump(by_alias=True, mode="json", exclude_none=True)] for name, way in plan.vary.items()
+        ],
         "inputs": {name: signal.model_dump(mode="json", exclude_none=True) for name, signal in signals.items()},
     }
     mark.pop("input_file", None)
     job = Job(f"rov-fmu-{uuid4().hex}", model, manoeuvre, plan.figures, kept, _kept_points(plan), plan.time_limit)
-    return Prepared(plan, job, design, mark)
+    return Prepared(plan, job, design, mark, [*estimates.warnings()])
 
 
 def vehicle_file(given: str, path: Path) -> Path:
@@ -70,17 +76,6 @@ def vehicle_file(given: str, path: Path) -> Path:
         return beside if beside.is_file() else find_vehicle(given)
     except FileError as error:
         raise PlanError(f"{path}: {error}") from error
-
-
-def _from_vehicle(plan: Plan, path: Path) -> dict[str, Varied]:
-    if plan.vary_from is None:
-        return {}
-    found = uncertainty(load_vehicle(vehicle_file(plan.vary_from, path)))
-    if not found:
-        raise PlanError(
-            f"{path}: {line('vary_from', 'no coefficient of this vehicle has an interval', plan.vary_from)}"
-        )
-    return found
 
 
 def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
@@ -107,33 +102,27 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
 # ---- What does not fit -----------------------------------------------------------------------------------------------
 
 
-def _nonsense(plan: Plan, model: Model, varied: Mapping[str, Varied], from_file: Mapping[str, Signal]) -> Iterator[str]:
-    """A line each."""
+def _nonsense(plan: Plan, model: Model, known: Sequence[str], from_file: Mapping[str, Signal]) -> Iterator[str]:
+    """A line each; `known` varies besides [vary]."""
     has = model.variables
-    for name, way in varied.items():
+    for name, way in plan.vary.items():
         key = f"vary.{name}"
-        if reason := _unsettable(name, has):
+        if reason := unsettable(name, has):
             yield line(key, reason)
         elif name in plan.set or name in plan.inputs or name in from_file:
             yield line(key, "is given in [set] or [inputs] too")
         else:
             yield from (line(key, reason, value) for reason, value in _beyond(way, has[name], plan.sampler == "grid"))
-    if not varied and plan.sampler != "grid":
+    if not (known or plan.vary or plan.vary_from) and plan.sampler != "grid":
         yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
     for name, value in plan.set.items():
-        if reason := _unsettable(name, has) or has[name].wrong(value):
+        if reason := unsettable(name, has) or has[name].wrong(value):
             yield line(f"set.{name}", reason, value)
     yield from _wrong_inputs(plan, has, from_file)
     for name in plan.keep.outputs if plan.keep else ():
         if name not in has:
             yield line("keep.outputs", unknown(name, has))
-    yield from _wrong_figures(plan, has, varied)
-
-
-def _unsettable(name: str, has: Mapping[str, Variable]) -> str:
-    if name not in has:
-        return unknown(name, has)
-    return "" if has[name].can_be_set else "the FMU computes it, and it cannot be set"
+    yield from _wrong_figures(plan, has, {*known, *plan.vary})
 
 
 def _beyond(way: Varied, variable: Variable, is_grid: bool) -> Iterator[tuple[str, Any]]:
@@ -164,10 +153,10 @@ def _wrong_inputs(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[st
             yield from (line(f"inputs.{name}", reason, value) for reason, value in [(r, v) for r, v in wrong if r][:1])
 
 
-def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: Mapping[str, Varied]) -> Iterator[str]:
+def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str]) -> Iterator[str]:
     known = known_names()
     for name, text in plan.figures.items():
-        if name in {RUN, STATUS, REASON} | varied.keys():
+        if name in {RUN, STATUS, REASON} | varied:
             yield line(f"figures.{name}", "the results have another column of this name")
             continue
         try:

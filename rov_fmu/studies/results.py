@@ -41,6 +41,10 @@ class Results:
         """The name of the FMU's file."""
         self.fmu: str = told["fmu"]
         """SHA-256 of the FMU."""
+        self.groups: tuple[tuple[str, ...], ...] = tuple(map(tuple, told["groups"]))
+        """The parameters; those that are correlated together."""
+        self.warnings: tuple[str, ...] = tuple(told["warnings"])
+        """What the results have in them that a reader may not expect, in sentences."""
         self.made_by: str = told["made_by"]
         self._points: int = told["points"]
 
@@ -77,8 +81,9 @@ class Results:
     def sensitivity(self, figure: str, seed: int = 1) -> pd.DataFrame:
         """Sobol indices of a figure by parameter: S1, ST, and the half widths of their 95 % intervals (seed not 0).
 
-        A study by sampler saltelli has them. A block of runs counts where the figure is known in all of it. Raises
-        FileError.
+        A study by sampler saltelli has them. Parameters that are correlated have one together, for the variance that
+        is due to one of them alone is not defined. A block of runs counts where the figure is known in all of it.
+        Raises FileError.
         """
         from SALib.analyze import sobol
 
@@ -88,15 +93,16 @@ class Results:
             raise FileError(f"{self.folder}: {figure} is the same in all runs")
         if self.plan["sampler"] != "saltelli":
             raise FileError(f'{self.folder}: Sobol indices need sampler = "saltelli" in the plan')
-        block = len(self.parameters) + 2
+        names = [", ".join(group) for group in self.groups]
+        block = len(names) + 2
         values = self.runs[figure].reindex(range(self.planned)).to_numpy().reshape(-1, block)
         whole = values[np.isfinite(values).all(axis=1)]
         if len(whole) < 2:
             raise FileError(f"{self.folder}: too few runs have {figure}")
-        problem = {"num_vars": len(self.parameters), "names": list(self.parameters)}
+        problem = {"num_vars": len(names), "names": names}
         found = sobol.analyze(problem, whole.ravel(), calc_second_order=False, seed=seed)
         columns = {"S1": "S1", "S1_95": "S1_conf", "ST": "ST", "ST_95": "ST_conf"}
-        return pd.DataFrame({name: found[key] for name, key in columns.items()}, pd.Index(self.parameters))
+        return pd.DataFrame({name: found[key] for name, key in columns.items()}, pd.Index(names))
 
     @property
     def failed(self) -> pd.DataFrame:

@@ -43,18 +43,22 @@ def run_study(
     workers: int | None,
     scheduler: str | None,
     on_progress: Callable[[Progress], None],
+    on_warning: Callable[[str], None] = lambda _: None,
 ) -> tuple[Spent, Results]:
-    """The same, and where the time went."""
+    """The same, and where the time went; warnings are told before the first run."""
     plan = load_plan(path)
     store = Store(folder)
     model = _model(plan, path)
     prepared = prepare(plan, path, model)
+    for warning in prepared.warnings:
+        on_warning(warning)
     with store.held():
         job, design = prepared.job, prepared.design
         columns = {"parameters": design.names, "figures": [*job.figures], "outputs": job.kept}
+        told = {"groups": design.groups, "warnings": prepared.warnings}
         units = {name: model.variables[name].unit for name in (*design.names, *job.kept)}
         more = {"points": len(job.kept_points), "model": model.name, "units": units}
-        store.belongs_to(prepared.mark, digest(model.content), design.runs, columns, **more)
+        store.belongs_to(prepared.mark, digest(model.content), design.runs, columns, **more, **told)
         if plan.vehicle:
             write_whole(Output(folder / model.name, model.content))
         spent = execute(job, design, store, workers, scheduler, on_progress)

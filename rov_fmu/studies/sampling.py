@@ -11,6 +11,7 @@ from scipy.stats import qmc
 
 from rov_fmu.studies.model import Variable
 from rov_fmu.studies.plan import Plan, Varied
+from rov_fmu.vehicle.uncertainty import NOTHING, Uncertainty
 
 Array = npt.NDArray[np.float64]
 _Draw = Callable[[int, int], Array]
@@ -18,19 +19,22 @@ _Draw = Callable[[int, int], Array]
 
 
 class Design:
-    """What varies, and how."""
+    """What varies, and how: first what is known of a vehicle, together, then what the plan tells, each alone."""
 
-    def __init__(self, plan: Plan, varied: Mapping[str, Varied], variables: Mapping[str, Variable]) -> None:
-        self.names = tuple(varied)
-        self._varied = list(varied.values())
-        self._variables = [variables[name] for name in varied]
-        self.runs = _runs(plan, self._varied)
+    def __init__(self, plan: Plan, variables: Mapping[str, Variable], known: Uncertainty = NOTHING) -> None:
+        self._known, self._varied = known, plan.vary
+        self._variables = variables
+        self.names = (*known.names, *plan.vary)
+        self.groups = (*known.groups, *((name,) for name in plan.vary))
+        """The names; what is in different groups is independent."""
+        self.runs = _runs(plan, len(self.groups))
         """How many."""
         width, seed = len(self.names), plan.seed
+        places = [[self.names.index(name) for name in group] for group in self.groups]
         draws: dict[str, Callable[[], _Draw]] = {
-            "grid": lambda: _grid([len(way.choices or ()) for way in self._varied]),
+            "grid": lambda: _grid([len(way.choices or ()) for way in plan.vary.values()]),
             "sobol": lambda: _sobol(width, seed),
-            "saltelli": lambda: _saltelli(width, seed),
+            "saltelli": lambda: _saltelli(places, seed),
             "latin-hypercube": lambda: _latin_hypercube(width, seed, self.runs),
             "random": lambda: _random(width, seed),
         }
@@ -38,19 +42,19 @@ class Design:
 
     def rows(self, first: int, end: int) -> Array:
         """The values of what varies, a row a run, a column a variable, from the first run to the one before `end`."""
-        drawn = self._draw(first, end)
-        columns = [
-            _values(way, variable, drawn[:, n])
-            for n, (way, variable) in enumerate(zip(self._varied, self._variables, strict=True))
-        ]
-        return np.stack(columns, axis=1) if columns else np.zeros((end - first, 0))
+        drawn, together = self._draw(first, end), len(self._known.names)
+        found = np.empty_like(drawn)
+        found[:, :together] = self._known.drawn(drawn[:, :together])
+        for n, (name, way) in enumerate(self._varied.items(), together):
+            found[:, n] = _values(way, self._variables[name], drawn[:, n])
+        return found
 
 
-def _runs(plan: Plan, varied: Sequence[Varied]) -> int:
+def _runs(plan: Plan, groups: int) -> int:
     if plan.sampler == "grid":
-        return prod(len(way.choices or ()) for way in varied)
+        return prod(len(way.choices or ()) for way in plan.vary.values())
     runs = plan.runs or 0
-    block = len(varied) + 2
+    block = groups + 2
     return -(-runs // block) * block if plan.sampler == "saltelli" else runs
 
 
@@ -118,12 +122,14 @@ def _sobol(width: int, seed: int) -> _Draw:
     return draw
 
 
-def _saltelli(width: int, seed: int) -> _Draw:
-    """Blocks of rows: one of a matrix A, for each column the same with that of another matrix B, and that of B.
+def _saltelli(groups: Sequence[Sequence[int]], seed: int) -> _Draw:
+    """Blocks of rows: one of a matrix A, for each group of columns the same with those of a matrix B, and that of B.
 
-    Saltelli et al. (2010); the order is SALib's. A and B are the halves of a Sobol sequence.
+    Saltelli et al. (2010); for groups of what is correlated, Jacques et al. (2006). The order is SALib's. A and B are
+    the halves of a Sobol sequence.
     """
-    block, pairs = width + 2, _sobol(2 * width, seed)
+    width, block = sum(map(len, groups)), len(groups) + 2
+    pairs = _sobol(2 * width, seed)
 
     def draw(first: int, end: int) -> Array:
         rows = np.arange(first, end)
@@ -131,9 +137,10 @@ def _saltelli(width: int, seed: int) -> _Draw:
         both = pairs(start, (end - 1) // block + 1)[rows // block - start]
         drawn = both[:, :width].copy()
         places = rows % block
-        for column in range(width):
-            taken = (places == column + 1) | (places == block - 1)
-            drawn[taken, column] = both[taken, width + column]
+        for n, group in enumerate(groups):
+            taken = (places == n + 1) | (places == block - 1)
+            for column in group:
+                drawn[taken, column] = both[taken, width + column]
         return drawn
 
     return draw

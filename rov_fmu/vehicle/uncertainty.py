@@ -9,6 +9,7 @@ from math import inf, log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 from scipy.special import ndtri, stdtrit
 
 from rov_fmu.motion.layout import TUNING, Meta
@@ -42,15 +43,33 @@ class Uncertainty:
         """n x p: coefficients from independent uniform numbers (n x p, 0 to 1), those of any sampler.
 
         One that would pass a bound stops there, and the rest are what the fit would make of them with it held: where
-        linear and quadratic drag are hardly told apart, the sum of both stays what it is.
+        linear and quadratic drag are hardly told apart, the sum of both stays what it is. A row depends on its own
+        numbers alone, to the bit, and a coefficient that is correlated with no other on its own column.
         """
         squares, V = np.linalg.eigh(self.correlation)
-        root = V * np.sqrt(np.maximum(squares, 0.0))
+        root = (V * np.sqrt(np.maximum(squares, 0.0))) @ V.T  # the root that is one, whatever eigenvectors are found
         root /= np.linalg.norm(root, axis=1, keepdims=True)
-        scores = self._held(ndtri(np.clip(uniform, _EDGE, 1.0 - _EDGE)) @ root.T)
+        scores = self._held(_times(ndtri(np.clip(uniform, _EDGE, 1.0 - _EDGE)), root.T))
         off = self.errors * scores
         low, high = self.bounds.T
         return np.asarray(np.clip(np.where(self._is_factor, self._scaled(off), self.values + off), low, high))
+
+    @property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """Its coefficients, those that are correlated together; what is in different groups is independent."""
+        _, group = connected_components(self.correlation != 0.0, directed=False)
+        return tuple(
+            tuple(name for name, of in zip(self.names, group.tolist(), strict=True) if of == n)
+            for n in dict.fromkeys(group.tolist())
+        )
+
+    def part(self, names: Sequence[str]) -> "Uncertainty":
+        """Of some of them; of the others nothing is known then."""
+        place = [self.names.index(name) for name in names]
+        return Uncertainty(
+            tuple(names), self.values[place], self.errors[place], self.correlation[np.ix_(place, place)],
+            self.bounds[place],
+        )  # fmt: skip
 
     @property
     def _is_factor(self) -> NDArray[np.bool_]:
@@ -69,7 +88,7 @@ class Uncertainty:
             for some in np.unique(held[beyond.any(axis=1)], axis=0):
                 rows = (held == some).all(axis=1)
                 by = np.linalg.pinv(self.correlation[np.ix_(some, some)], hermitian=True) @ self.correlation[some]
-                scores[rows] = free[rows] + (edges - free)[rows][:, some] @ by
+                scores[rows] = free[rows] + _times((edges - free)[rows][:, some], by)
         return np.where(held, edges, scores)
 
     def _ends(self) -> tuple[Array, Array]:
@@ -80,6 +99,10 @@ class Uncertainty:
                 far = np.where(self._is_factor, self.values * np.log(bound / self.values), bound - self.values)
                 ends.append(np.where(self.errors > 0.0, far / self.errors, none))
         return ends[0], ends[1]
+
+
+NOTHING = Uncertainty((), np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros((0, 2)))
+"""Of no coefficient."""
 
 
 def uncertainty(
@@ -114,6 +137,14 @@ def correlation(names: Sequence[str], estimates: Mapping[str, Estimated]) -> Arr
 def least_eigenvalue(estimates: Mapping[str, Estimated]) -> float:
     """Of the matrix of all correlations: below 0, no numbers have them."""
     return float(np.linalg.eigvalsh(correlation([*estimates], estimates))[0])
+
+
+def _times(rows: Array, matrix: Array) -> Array:
+    """The product, of which a row has the same bits however many others there are, as that of BLAS has not."""
+    found = np.zeros((len(rows), matrix.shape[1]))
+    for column, factors in zip(rows.T, matrix, strict=True):
+        found += column[:, None] * factors
+    return found
 
 
 def is_factor(name: str) -> bool:

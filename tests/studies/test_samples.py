@@ -1,18 +1,13 @@
 """What varies: by the run's number and the seed alone, and distributed as the plan says."""
 
-from math import exp, log
-
 import numpy as np
 import pytest
 from SALib.sample import sobol as salib
 from scipy import stats
 
 from rov_fmu.studies.model import Variable
-from rov_fmu.studies.plan import Plan, Varied
+from rov_fmu.studies.plan import Plan
 from rov_fmu.studies.sampling import Design
-from rov_fmu.studies.uncertainty import uncertainty
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
 
 SAMPLERS = ["sobol", "latin-hypercube", "random", "saltelli"]
 VARIED = {
@@ -32,8 +27,8 @@ def _variable(name: str) -> Variable:
 
 def _design(sampler: str, runs: int | None, seed: int = 7, names: str = "abcden") -> Design:
     told = {"sampler": sampler, "runs": runs, "seed": seed, "stop_time": 1.0, "step": 1.0}
-    varied = {name: Varied.model_validate(VARIED[name]) for name in names}
-    return Design(Plan.model_validate(told), varied, {name: _variable(name) for name in names})
+    plan = Plan.model_validate({**told, "vary": {name: VARIED[name] for name in names}})
+    return Design(plan, {name: _variable(name) for name in names})
 
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
@@ -78,22 +73,3 @@ def test_blocks_of_saltelli_are_in_the_order_of_salib() -> None:
     equal = [(block[:, None, :] == block[None, :, :]).tolist() for block in theirs.reshape(64, 5, 3)]
     assert [(block[:, None, :] == block[None, :, :]).tolist() for block in ours] == equal
     assert _design("saltelli", 7, names="abc").runs == 10
-
-
-def test_a_vehicle_tells_what_is_uncertain() -> None:
-    """The 2.5 % and 97.5 % points are the interval's ends, but where the interval was cut off at a bound."""
-    vehicle = load_vehicle(SHIPPED["videoray_refit"])
-    found = uncertainty(vehicle)
-    assert found.keys() == vehicle.intervals.keys()
-    for name, way in found.items():
-        low, high = vehicle.intervals[name]
-        if way.lognormal:
-            assert name.startswith(("alpha", "beta"))
-            ends = [exp(log(way.lognormal.median) + way.lognormal.sd * z) for z in (-1.959964, 1.959964)]
-            assert ends == pytest.approx([low, high], rel=2e-3)
-        else:
-            assert way.normal
-            assert way.normal.mean == vehicle.rov[name]
-            assert way.normal.mean + 1.959964 * way.normal.sd == pytest.approx(high, rel=1e-3)
-            if low > 0.0:
-                assert way.normal.mean - 1.959964 * way.normal.sd == pytest.approx(low, rel=1e-3)
