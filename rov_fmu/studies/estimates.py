@@ -84,10 +84,9 @@ class Estimates:
         ]  # fmt: skip
         if differ:
             yield f"the FMU has other values than {file} of {_listed(differ)}: the estimates were found beside those"
-        if self._plan.sampler == "saltelli":
-            for group in self._part.groups:
-                if len(group) > 1:
-                    yield f"one Sobol index together: {_listed(group)} are correlated"
+        together = [_listed(group) for group in self._part.groups if len(group) > 1]
+        if self._plan.sampler == "saltelli" and together:
+            yield f"what is correlated has one Sobol index together: {'; '.join(together)}"
 
     def _given(self, name: str) -> bool:
         """Whether the plan itself says what a variable is."""

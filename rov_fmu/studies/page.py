@@ -103,7 +103,7 @@ def _sensitivities(results: Results) -> dict[str, Any]:
         except FileError as error:
             found[figure] = str(error).removeprefix(f"{results.folder}: ")
         else:
-            found[figure] = rows.reset_index(names="name").to_dict("records")
+            found[figure] = (rows.round(6) + 0.0).reset_index(names="name").to_dict("records")  # without -0
     return found
 
 

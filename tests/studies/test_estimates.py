@@ -34,7 +34,7 @@ MADE = replace(
 """Far from its bounds, so that all of it is normal."""
 WARNED = [
     "the FMU has other values than made.toml of b_d_w (0.6324, not 0.372294), a_d_r (0.1246, not 0.147144), ",
-    "one Sobol index together: a_d_u and b_d_u are correlated",
+    "what is correlated has one Sobol index together: a_d_u and b_d_u",
 ]
 
 
@@ -105,7 +105,7 @@ WARNINGS: dict[str, tuple[Vehicle, Mapping[str, Variable] | None, dict[str, Any]
         (MADE, None, {"set": {"a_d_u": 9.0}}),
     "the FMU has other values than its.toml of beta_w (0.5, not 0.620654): the estimates were found beside those":
         (MADE, _has(MADE, beta_w=0.5, a_d_u=7.0), {}),
-    "one Sobol index together: a_d_u and b_d_u are correlated":
+    "what is correlated has one Sobol index together: a_d_u and b_d_u":
         (MADE, None, {"sampler": "saltelli"}),
 }  # fmt: skip
 
