@@ -162,8 +162,9 @@ def test_commands_run(page: Path, workplace: Path) -> None:
 
 
 def test_the_pages_with_commands_are_found() -> None:
-    pages = ("identify", "importers", "model", "platforms", "tutorial-dive-log", "tutorial-tank-tests")
-    wanted = {"README.md", *(f"docs/{page}.md" for page in pages)}
+    pages = ("identify", "importers", "model", "platforms", "studies")
+    tutorials = (f"tutorial-{name}" for name in ("dive-log", "tank-tests", "stopping-distance"))
+    wanted = {"README.md", *(f"docs/{page}.md" for page in (*pages, *tutorials))}
     assert wanted <= {name(page) for page in SHELL_PAGES}
 
 

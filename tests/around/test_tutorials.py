@@ -5,7 +5,7 @@ A test that fails tells the rows as they are now.
 
 import re
 from collections.abc import Iterable
-from math import nan
+from math import log, nan
 from pathlib import Path
 
 import pytest
@@ -17,11 +17,13 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.recordings_fit import Effect
 from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.motion.rov import Rov
+from rov_fmu.studies import Results, study
 from rov_fmu.tank.tank_tests import load_tank_tests
-from tests.commands import ROOT
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import REFIT, ROOT
 from tests.vehicles import at_rest, still
 
-TANK, DIVE = (ROOT / "docs" / f"tutorial-{name}.md" for name in ("tank-tests", "dive-log"))
+TANK, DIVE, STOP = (ROOT / "docs" / f"tutorial-{name}.md" for name in ("tank-tests", "dive-log", "stopping-distance"))
 
 
 @pytest.fixture(scope="module")
@@ -110,3 +112,57 @@ def test_dive(harbour: Identification) -> None:
         f"{fit['surge']} of the velocity in surge, {fit['sway']} in sway, {fit['heave']} in heave, {fit['yaw']} in yaw"
     )
     assert said in text(DIVE), said
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Results]:
+    """The studies of the tutorial, and the first without the correlations of its vehicle."""
+    folder = tmp_path_factory.mktemp("stopping")
+    plans = dict(
+        re.findall(r"> (\w+)\.toml <<END\n(.*?)^END$", STOP.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    )
+    assert [*plans] == ["stop", "wall"]
+    plans["wall"] += plans["stop"]
+    plans["alone"] = plans["stop"].replace('"videoray_refit"', '"alone.toml"')
+    vehicle = re.sub(r"^\[estimates\]\n(?:\w+ = .*\n)+", "", REFIT.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    (folder / "alone.toml").write_text(vehicle, encoding="utf-8")
+    found = {}
+    for name, plan in plans.items():
+        (folder / f"plan_{name}.toml").write_text(plan, encoding="utf-8")
+        found[name] = study(folder / f"plan_{name}.toml", folder / name)
+    return found
+
+
+@pytest.mark.long
+def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Results]) -> None:
+    expected = []
+    for name in ("stop", "wall"):
+        for figure, words in (("speed", "speed, m/s"), ("stopping_distance", "stopping distance, m")):
+            low, middle, high = stopped[name].runs[figure].quantile([0.05, 0.5, 0.95])
+            expected.append(f"| {words} | {low:.3g} | {middle:.3g} | {high:.3g} |")
+    index = stopped["wall"].sensitivity("stopping_distance")
+    for of in ("beta_u", "a_d_u, b_d_u"):
+        expected.append(f"| `{of}` | {index.S1[of]:.2f} | {index.S1_95[of]:.2f} |")
+    low, high = stopped["alone"].runs.stopping_distance.quantile([0.05, 0.95])
+    expected.append(f"the same study would give {low:.3g} m to {high:.3g} m")
+    rov = load_vehicle(REFIT).rov
+    a, b = rov["a_d_u"], rov["b_d_u"]
+    expected.append(f"{rov['m_rov'] / a * log(1.0 + a * 0.31 / b):.2f} m of it are gone at less than 0.31 m/s")
+    assert [words for words in expected if words not in text(STOP)] == [], "\n".join(expected)
+
+
+@pytest.mark.long
+def test_what_the_tutorial_says_of_the_stopping_distance_is_so(stopped: dict[str, Results]) -> None:
+    distance = {name: results.runs.stopping_distance for name, results in stopped.items()}
+    assert distance["wall"].median() > distance["stop"].quantile(0.95)
+    assert distance["wall"].quantile(0.95) < 1.25
+    assert [len(stopped[name].warnings) for name in ("stop", "wall", "alone")] == [0, 1, 1]
+    assert "a_d_u and b_d_u" in stopped["wall"].warnings[0]
+    at = stopped["stop"].trajectories([0]).set_index("t")
+    assert at.u[30.0] < 1e-3, "it has stopped"
+    table = "".join(
+        line
+        for line in REFIT.read_text(encoding="utf-8").splitlines(True)
+        if line.startswith(("a_d_u = { e", "b_d_u = { e"))
+    )
+    assert f"[estimates]\n{table}" in STOP.read_text(encoding="utf-8")
