@@ -24,6 +24,7 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
             if sys.stdout:  # --help leaves by SystemExit
                 sys.stdout.flush()
     except (KeyboardInterrupt, Abort):
+        exec("")  # CPython ends by SIGINT, whatever is asked for, if the last text that was executed was interrupted
         return _say(program, "interrupted, no file is half-written", 130)
     except BrokenPipeError:
         _end_output()

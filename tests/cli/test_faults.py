@@ -134,6 +134,17 @@ def test_an_interrupted_command_says_so_and_leaves_nothing(
     assert not any(output.parent.iterdir())
 
 
+def test_an_interrupt_while_text_is_executed_is_one_as_any(tmp_path: Path) -> None:
+    """As a module that makes a dataclass does; CPython takes it for one that nobody caught."""
+    (tmp_path / "interrupted.py").write_text(
+        "from rov_fmu.process import exit_code, run_process\n"
+        "run_process(lambda: exit_code('rov-fmu', lambda: exec('raise KeyboardInterrupt'), {OSError: 2}))\n"
+    )
+    command = [sys.executable, "-m", "interrupted"]
+    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (130, "rov-fmu: interrupted, no file is half-written\n")
+
+
 @pytest.mark.parametrize(
     "moment", [b"heave", pytest.param(b"reading", marks=pytest.mark.long), pytest.param(b"dra", marks=pytest.mark.long)]
 )
