@@ -3,9 +3,11 @@
 import ctypes
 import os
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from threading import local
+from pathlib import Path
+from threading import Lock, local
 from typing import Any
 
 import numpy as np
@@ -192,9 +194,10 @@ class Simulator:
 
         _TOLD.last = ""
         try:
-            return fmpy.simulation.instantiate_fmu(
-                self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=_keep
-            )
+            with _loading():
+                return fmpy.simulation.instantiate_fmu(
+                    self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=_keep
+                )
         except Exception as error:  # FMPy raises that itself
             what = str(error).replace(self._folder + os.sep, "").rstrip(".")
             raise LoadError(brief(f"{what}{self._message()}", 240)) from error
@@ -214,6 +217,20 @@ class Simulator:
         finally:
             self._logs = False
         return ""
+
+
+_ONE_ONLY = Lock()
+
+
+@contextmanager
+def _loading() -> Iterator[None]:
+    """One thread at a time: FMPy takes the process to the library's folder, and not back where it cannot be loaded."""
+    with _ONE_ONLY:
+        here = Path.cwd()
+        try:
+            yield
+        finally:
+            os.chdir(here)
 
 
 _TOLD = local()

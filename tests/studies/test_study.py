@@ -5,6 +5,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from rov_fmu.studies.apart import Apart
 from rov_fmu.studies.model import read_model, unpack
 from rov_fmu.studies.plan import load_plan
 from rov_fmu.studies.prepared import prepare
-from rov_fmu.studies.simulator import RunError
+from rov_fmu.studies.simulator import LoadError, RunError, Simulator
 from tests.commands import start
 
 Foreign = Callable[..., Path]
@@ -178,6 +179,29 @@ def test_a_process_apart_is_a_simulator(foreign: Foreign, tmp_path: Path) -> Non
     assert y == [end, *UNKIND.values(), "the step at 1 s: error; the FMU: the pump is blocked", end]
 
 
+def test_what_loads_an_fmu_or_cannot_leaves_the_process_where_it_was(foreign: Foreign, tmp_path: Path) -> None:
+    """Many threads at once."""
+    path, model, here = _plan(tmp_path, foreign()), read_model(foreign()), Path.cwd()
+    job = prepare(load_plan(path), path, model).job
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    description, _ = (unpack(model.content, folder) for folder in (whole, broken))
+    (library,) = broken.glob("binaries/*/foreign.*")
+    library.write_text("no library")
+
+    def load(folder: Path) -> None:
+        Simulator(str(folder), description, model, job.manoeuvre).free()
+
+    try:
+        with ThreadPoolExecutor(8) as threads:
+            [*threads.map(load, [whole] * 200)]
+        assert Path.cwd() == here
+        with pytest.raises(LoadError, match="Failed to load"):
+            load(broken)
+        assert Path.cwd() == here
+    finally:
+        os.chdir(here)
+
+
 def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -256,7 +280,11 @@ def _parts(results: Path) -> list[Path]:
 def _begun(plan: Path, results: Path) -> "subprocess.Popen[str]":
     """A study under way, of which some is done."""
     process = start(
-        ["study", str(plan), "-o", str(results), "--workers", "2"], stdout=subprocess.DEVNULL, start_new_session=True
+        ["study", str(plan), "-o", str(results), "--workers", "2"],
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
+        # a shell starts what it runs in the background with interrupts ignored, and that is inherited
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60.0
     while len(_parts(results)) < 2:
