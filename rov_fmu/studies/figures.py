@@ -3,7 +3,9 @@
 import ast
 import re
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from math import nan
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,13 @@ _ARGUMENTS = re.compile(r"Error running function .* and kwargs \{.*?\}: ", re.S)
 _METHOD = re.compile(r"Responses\.\w+")
 _NEVER = ("must be one number", "NotImplementedError", "AttributeError", "TypeError", "NameError")
 """How reasons begin that no run can change."""
+_PLAIN = (
+    ast.Expression, ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.UnaryOp, ast.UAdd, ast.USub, ast.Subscript,
+    ast.Slice, ast.Call, ast.keyword, ast.Name, ast.Load, ast.Constant,
+)  # fmt: skip
+"""What arithmetic of outputs is made of."""
+_NUMBERS_OF = ("abs", "max", "mean", "min", "sum")
+"""Functions of NumPy, or as it has them, whose values are numbers."""
 _NOT_FOR_FIGURES = ("open", "print", "dir", "type")
 _BAND = 0.05
 """Of the way from the beginning: within it a response is settled."""
@@ -135,6 +144,23 @@ def names_in(expression: str) -> set[str]:
     return (names - bound) | quoted
 
 
+def compiled(expression: str) -> CodeType | None:
+    """Arithmetic with the functions above and numbers alone, as code, which is many times faster; of others None.
+
+    Nothing in it can reach further than asteval lets it, or grow: it has no attributes, texts, lists and powers.
+    """
+    tree = ast.parse(expression.strip(), mode="eval")
+    functions = {*Responses(np.zeros(1)).functions, *_NUMBERS_OF}
+    for n in ast.walk(tree):
+        if (
+            not isinstance(n, _PLAIN)
+            or (isinstance(n, ast.Call) and not (isinstance(n.func, ast.Name) and n.func.id in functions))
+            or (isinstance(n, ast.Constant) and not isinstance(n.value, int | float))
+        ):
+            return None
+    return compile(tree, "figure", "eval")
+
+
 class Figures:
     """The figures of a plan, for one thread at a time."""
 
@@ -145,7 +171,9 @@ class Figures:
         functions = Responses(times).functions
         self._symbols |= {TIME: times} | functions
         self._called = {function.__qualname__: name for name, function in functions.items()}
-        self._parsed = {name: self._interpreter.parse(text.strip()) for name, text in expressions.items()}
+        self._parsed = {
+            name: (compiled(text), self._interpreter.parse(text.strip())) for name, text in expressions.items()
+        }
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
         """In the order of their names, for a run's outputs and parameters; why one is NaN, or nothing."""
@@ -153,11 +181,18 @@ class Figures:
         self._symbols[BY_NAME] = run
         found, reasons = [], []
         with np.errstate(all="ignore"):
-            for name, parsed in self._parsed.items():
-                value, reason = self._value(parsed)
+            for name, (code, parsed) in self._parsed.items():
+                value, reason = self._soon(code) or self._value(parsed)
                 found.append(value)
                 reasons += [f"{name}: {reason}"] if reason else []
         return found, "; ".join(reasons)
+
+    def _soon(self, code: CodeType | None) -> tuple[float, str] | None:
+        """The number by code; None where there is none, and asteval shall say why."""
+        with suppress(Exception):
+            if code and isinstance(value := eval(code, {"__builtins__": {}}, self._symbols), float):
+                return float(value), ""
+        return None
 
     def _value(self, parsed: Any) -> tuple[float, str]:
         interpreter = self._interpreter

@@ -5,7 +5,7 @@ from math import exp, log, nan, pi, sqrt
 import numpy as np
 import pytest
 
-from rov_fmu.studies.figures import Figures
+from rov_fmu.studies.figures import Figures, compiled
 
 T = np.linspace(0.0, 40.0, 4001)
 FIRST = np.where(T > 2.0, 3.0 * (1.0 - np.exp(-np.maximum(T - 2.0, 0.0) / 1.5)), 0.0)
@@ -58,3 +58,19 @@ def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there
     assert late == "late: ValueError: there is no time from 50 to 60"
     found, reason = figures.of({"y": np.full(10_000, 2.0), "m": 1.0})
     assert found[0] == 2.0, "the next run has nothing of this one's errors"
+
+
+CODE = ["y[-1] - at(y, 1)", "V_ss(y, 0, 10)", "Tau(y, end=10)", "-m/2 + 3*max(y)", "V_ss(y[:9])", "t[0]"]
+OTHERS = ["9**9", "'9'*9", "y.size", "(y for y in t)", "[0]*9", "str(m)*9", "at(y, 1) if m else 0", "(max)(*y)",
+          "out['y'][-1]", "y[t > 1][0]", "(0).real", "abs(at)(1)", "f'{m}'", "{1}", "exp(m)"]  # fmt: skip
+
+
+@pytest.mark.parametrize("expression", [*CODE, *OTHERS])
+def test_arithmetic_is_code_and_to_the_bit_what_asteval_has_and_all_else_is_for_asteval(
+    expression: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert (compiled(expression) is not None) == (expression in CODE)
+    run = {"y": FIRST, "m": 6.5}
+    by_code = Figures({"f": expression}, T).of(run)
+    monkeypatch.setattr("rov_fmu.studies.figures.compiled", lambda _: None)
+    assert repr(by_code) == repr(Figures({"f": expression}, T).of(run))
