@@ -91,16 +91,19 @@ def variations(runs: Mapping[str, Runs]) -> Section:
     ]  # fmt: skip
 
 
-def studies(pairs: Sequence[tuple[float, Cost]], costs: Sequence[Cost]) -> Section:
-    """Runs by the engine of studies, beside those alone; the engine's time is that of all its processes."""
-    alone = float(np.median([seconds / cost.runs for seconds, cost in pairs]))
-    by_one = float(np.median([cost.processor / cost.runs for _, cost in pairs]))
+def studies(pairs: Sequence[tuple[Cost, Cost]], costs: Sequence[Cost]) -> Section:
+    """Runs by the engine of studies, beside those alone: processor time of who does them, and time on the clock."""
+    runs = pairs[0][0].runs
+    sides = zip(("the runs alone, in a loop", "by one worker"), zip(*pairs, strict=True), strict=True)
+    started = float(np.median([cost.started for cost in costs]))
     return [
         ["A study: 30 s, two outputs each 0.1 s, three figures", "runs", "a run", "on the clock", "memory grows by"],
-        ["the runs alone", f"{pairs[0][1].runs:,}", duration(alone), "", ""],
-        ["by one worker", f"{pairs[0][1].runs:,}", duration(by_one), f"{overhead(pairs):+.0%}", ""],
-        *(["by two workers", f"{cost.runs:,}", duration(cost.processor / cost.runs), duration(cost.spent.elapsed),
+        *([name, f"{runs:,}", duration(float(np.median([cost.processor for cost in side])) / runs),
+           duration(float(np.median([cost.clock for cost in side])))] for name, side in sides),
+        ["which is more by", "", f"{overhead(pairs, 'processor'):+.0%}", f"{overhead(pairs, 'clock'):+.0%}"],
+        *(["by two workers", f"{cost.runs:,}", duration(cost.processor / cost.runs), duration(cost.clock),
            f"{cost.growth / 1e6:,.0f} MB"] for cost in costs),
+        ["until two workers are there", "", "", duration(started)],
     ]  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from rov_fmu.studies.engine import Progress, Spent
+from rov_fmu.studies.engine import Progress
 from rov_fmu.studies.model import read_model, unpack
 from rov_fmu.studies.plan import load_plan
 from rov_fmu.studies.prepared import prepare
@@ -39,14 +39,28 @@ T = "Tau(u, 0, 10)"
 
 @dataclass(frozen=True)
 class Cost:
-    """What a study took."""
+    """What runs took, from when the workers were there."""
 
     runs: int
-    spent: Spent
     processor: float
-    """Seconds of processor time of all processes, from when the workers were there."""
-    growth: float
+    """Seconds of processor time of the process that does the runs, or of all that do."""
+    clock: float
+    """Seconds."""
+    started: float = 0.0
+    """Seconds until the workers were there."""
+    growth: float = 0.0
     """Bytes of all processes together, from a tenth of the runs to the end."""
+
+
+@dataclass(frozen=True)
+class _Look:
+    """At the processes of a study."""
+
+    time: float
+    workers: float
+    """Processor time, s."""
+    memory: int
+    """Of all, bytes."""
 
 
 class Study:
@@ -55,26 +69,29 @@ class Study:
     def __init__(self, fmu: Path, folder: Path) -> None:
         self._fmu, self._folder = fmu, folder
 
-    def pairs(self, runs: int, repetitions: int) -> Iterator[tuple[float, Cost]]:
-        """In turn: seconds of processor time of the runs alone, in a loop here; the study with one worker."""
+    def pairs(self, runs: int, repetitions: int) -> Iterator[tuple[Cost, Cost]]:
+        """In turn: the runs alone, in a loop in this process; the study with one worker."""
         for _ in range(repetitions):
             yield self._alone(runs), self.cost(runs, workers=1)
 
     def cost(self, runs: int, workers: int) -> Cost:
         """Of a study from its beginning."""
-        seen: list[tuple[float, int]] = []
+        looks: list[_Look] = []
         later: list[int] = []
 
         def see(now: Progress) -> None:
-            seen.append(_used())
+            looks.append(_look())
             if 10 * now.done >= now.total:
-                later.append(seen[-1][1])
+                later.append(looks[-1].memory)
 
         with tempfile.TemporaryDirectory(dir=self._folder) as results:
             spent, _ = run_study(self._plan(runs), Path(results, "results"), workers, None, see)
-        return Cost(runs, spent, seen[-1][0] - seen[0][0], later[-1] - later[0])
+        first, last = looks[0], looks[-1]
+        clock = last.time - first.time
+        return Cost(runs, last.workers - first.workers, clock, spent.started, later[-1] - later[0])
 
-    def _alone(self, runs: int) -> float:
+    def _alone(self, runs: int) -> Cost:
+        """By the same simulator."""
         path = self._plan(runs)
         plan, model = load_plan(path), read_model(self._fmu)
         prepared = prepare(plan, path, model)
@@ -82,13 +99,13 @@ class Study:
             description = unpack(model.content, Path(folder))
             simulator = Simulator(folder, description, model, prepared.job.manoeuvre)
             rows = prepared.design.rows(0, runs)
-            start = time.process_time()
+            processor, clock = time.process_time(), time.perf_counter()
             for values in rows:
                 simulator.run(values)
                 simulator.reset()
-            taken = time.process_time() - start
+            cost = Cost(runs, time.process_time() - processor, time.perf_counter() - clock)
             simulator.free()
-        return taken
+        return cost
 
     def _plan(self, runs: int) -> Path:
         path = self._folder / "plan.toml"
@@ -96,13 +113,14 @@ class Study:
         return path
 
 
-def overhead(pairs: Iterable[tuple[float, Cost]]) -> float:
-    """Of the engine, by the simulation alone: the median of the pairs."""
-    return float(np.median([cost.processor / alone - 1.0 for alone, cost in pairs]))
+def overhead(pairs: Iterable[tuple[Cost, Cost]], of: str) -> float:
+    """What the engine adds to the runs alone, 0.1 is 10 %: the median over the pairs, of a field of their costs."""
+    return float(np.median([getattr(by_one, of) / getattr(alone, of) - 1.0 for alone, by_one in pairs]))
 
 
-def _used() -> tuple[float, int]:
-    """Processor time (s) and resident memory (bytes) of this process and those that it has started."""
+def _look() -> _Look:
     here = psutil.Process()
-    both = [(process.cpu_times(), process.memory_info()) for process in (here, *here.children(recursive=True))]
-    return sum(cpu.user + cpu.system for cpu, _ in both), sum(memory.rss for _, memory in both)
+    started = here.children(recursive=True)
+    spent = [process.cpu_times() for process in started]
+    memory = sum(process.memory_info().rss for process in (here, *started))
+    return _Look(time.perf_counter(), sum(cpu.user + cpu.system for cpu in spent), memory)
