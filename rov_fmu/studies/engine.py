@@ -19,6 +19,7 @@ from distributed.comm.core import CommClosedError
 from distributed.utils import silence_logging_cmgr
 
 from rov_fmu.files.messages import FileError, StudyError, brief
+from rov_fmu.files.output import WriteError
 from rov_fmu.studies.sampling import Design
 from rov_fmu.studies.simulator import LoadError
 from rov_fmu.studies.store import Store
@@ -85,8 +86,12 @@ def execute(
         spent.started = perf_counter() - begin
         try:
             _Runs(client, job, design, store, missing, spent, on_progress).do()
-        except _GONE as error:
-            raise StudyError("the scheduler is gone; what is done is kept") from error
+        except (FileError, StudyError, WriteError):
+            raise
+        except Exception as error:  # of a client that is closed, for it has lost its scheduler, this and that
+            if isinstance(error, _GONE) or client.status != "running":
+                raise StudyError("the scheduler is gone; what is done is kept") from error
+            raise
         finally:
             spent.elapsed = perf_counter() - begin
             if scheduler is not None:
@@ -126,7 +131,8 @@ class _Runs:
                 del future  # or its rows would stay
                 self._give(coming)
         finally:
-            self._client.cancel(list(self._futures), force=True)
+            with suppress(Exception):  # a client that is closed raises
+                self._client.cancel(list(self._futures), force=True)
 
     def _trial(self) -> Trial:
         first = self._missing[0][0]

@@ -357,13 +357,19 @@ def test_a_scheduler_that_is_not_there_is_a_line(
 
 
 @pytest.mark.long
-def test_a_scheduler_that_goes_takes_nothing_with_it(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+@pytest.mark.parametrize("wait", [0.0, 5.0])
+def test_a_scheduler_that_goes_takes_nothing_with_it(
+    wait: float, foreign: Foreign, tmp_path: Path, slow: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Noticed at once, or when the client has given it up."""
+    monkeypatch.setattr("rov_fmu.studies.engine._WAIT", 4.0)
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
     with LocalCluster(n_workers=1, dashboard_address="127.0.0.1:0", local_directory=tmp_path / "cluster") as cluster:
 
         def close(now: Progress) -> None:
             if now.done:
                 cluster.close()
+                time.sleep(wait)
 
         with pytest.raises(StudyError, match="the scheduler is gone; what is done is kept"):
             study(plan, results, scheduler=cluster.scheduler_address, on_progress=close)
