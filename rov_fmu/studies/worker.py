@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd  # noqa: F401 (PyArrow does, which takes a third of a second, at the first table)
 import pyarrow as pa
 import pyarrow.parquet as pq
 from distributed import Worker
@@ -232,9 +233,10 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, apart: bool) -> Par
     table = pa.table([pa.array(column) for column in columns], schema=job.runs_schema)
     trajectories = None
     if job.kept:
+        whole = slice(None) if ended.all() else ended  # which is no copy
         times = np.tile(m.times[points], int(ended.sum()))
-        long = {RUN: np.repeat(numbers[ended], len(points)), TIME: times}
-        long |= {name: place[ended].ravel() for name, place in zip(job.kept, kept, strict=True)}
+        long = {RUN: np.repeat(numbers[whole], len(points)), TIME: times}
+        long |= {name: place[whole].ravel() for name, place in zip(job.kept, kept, strict=True)}
         trajectories = _parquet(pa.table(long), [RUN, TIME])
     failed = int((~ended).sum())
     return Part(_parquet(table, [STATUS, REASON]), trajectories, failed, perf_counter() - began, simulating)
