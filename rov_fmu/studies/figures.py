@@ -24,9 +24,9 @@ _NEVER = ("must be one number", "NotImplementedError", "AttributeError", "TypeEr
 """How reasons begin that no run can change."""
 _PLAIN = (
     ast.Expression, ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.UnaryOp, ast.UAdd, ast.USub, ast.Subscript,
-    ast.Slice, ast.Call, ast.keyword, ast.Name, ast.Load, ast.Constant,
+    ast.Slice, ast.keyword, ast.Name, ast.Load,
 )  # fmt: skip
-"""What arithmetic of outputs is made of."""
+"""What arithmetic of outputs is made of, besides numbers and calls."""
 _NUMBERS_OF = ("abs", "max", "mean", "min", "sum")
 """Functions of NumPy, or as it has them, whose values are numbers."""
 _NOT_FOR_FIGURES = ("open", "print", "dir", "type")
@@ -129,7 +129,7 @@ def known_names() -> set[str]:
 def names_in(expression: str) -> set[str]:
     """What an expression names, but for what it binds itself. Raises ValueError with the reason where it is none."""
     try:
-        tree = ast.parse(expression.strip(), mode="eval")
+        tree = ast.fix_missing_locations(ast.parse(expression.strip(), mode="eval"))  # as asteval does
     except (SyntaxError, RecursionError, MemoryError) as error:
         reason = getattr(error, "msg", "too long")
         raise ValueError(f"is no expression: {reason}") from error
@@ -149,16 +149,20 @@ def compiled(expression: str) -> CodeType | None:
 
     Nothing in it can reach further than asteval lets it, or grow: it has no attributes, texts, lists and powers.
     """
-    tree = ast.parse(expression.strip(), mode="eval")
     functions = {*Responses(np.zeros(1)).functions, *_NUMBERS_OF}
-    for n in ast.walk(tree):
-        if (
-            not isinstance(n, _PLAIN)
-            or (isinstance(n, ast.Call) and not (isinstance(n.func, ast.Name) and n.func.id in functions))
-            or (isinstance(n, ast.Constant) and not isinstance(n.value, int | float))
-        ):
-            return None
-    return compile(tree, "figure", "eval")
+    with suppress(RecursionError, MemoryError):  # too long
+        tree = ast.parse(expression.strip(), mode="eval")
+        if all(_is_plain(node, functions) for node in ast.walk(tree)):
+            return compile(tree, "figure", "eval")
+    return None
+
+
+def _is_plain(node: ast.AST, functions: set[str]) -> bool:
+    if isinstance(node, ast.Call):
+        return isinstance(node.func, ast.Name) and node.func.id in functions
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, int | float)
+    return isinstance(node, _PLAIN)
 
 
 class Figures:

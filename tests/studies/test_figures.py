@@ -5,7 +5,7 @@ from math import exp, log, nan, pi, sqrt
 import numpy as np
 import pytest
 
-from rov_fmu.studies.figures import Figures, compiled
+from rov_fmu.studies.figures import Figures, compiled, names_in
 
 T = np.linspace(0.0, 40.0, 4001)
 FIRST = np.where(T > 2.0, 3.0 * (1.0 - np.exp(-np.maximum(T - 2.0, 0.0) / 1.5)), 0.0)
@@ -74,3 +74,9 @@ def test_arithmetic_is_code_and_to_the_bit_what_asteval_has_and_all_else_is_for_
     by_code = Figures({"f": expression}, T).of(run)
     monkeypatch.setattr("rov_fmu.studies.figures.compiled", lambda _: None)
     assert repr(by_code) == repr(Figures({"f": expression}, T).of(run))
+
+
+def test_an_expression_that_is_too_long_is_none() -> None:
+    long = "m" + "+1" * 1500
+    with pytest.raises(ValueError, match="is no expression: too long"):
+        names_in(long)
