@@ -142,9 +142,12 @@ class Signal(Strict):
     """
 
     steps: Points | None = None
-    """[[time, value], ...]: each value is held until the next time."""
+    """[[time, value], ...]: each value is held until the next time; communication points."""
     ramps: Points | None = None
-    """[[time, value], ...]: straight between them; two of the same time are a jump."""
+    """[[time, value], ...]: straight between them; two of the same time are a jump, at a communication point.
+
+    An FMU takes what a step begins with for all of it: that is the value of the middle of the step.
+    """
 
     @model_validator(mode="after")
     def _either(self) -> Self:
@@ -156,6 +159,14 @@ class Signal(Strict):
     def points(self) -> tuple[tuple[float, float], ...]:
         """Of either."""
         return self.steps or self.ramps or ()
+
+    def jumps(self, before: float) -> Iterator[int]:
+        """The numbers of the points at which the value is another at once; `before` the first one it is this."""
+        last: tuple[float, float] | None = None
+        for n, (time, value) in enumerate(self.points):
+            if value != (last[1] if last else before) and (self.steps or last is None or time == last[0]):
+                yield n
+            last = time, value
 
 
 class InputFile(Strict):

@@ -47,9 +47,9 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     if wrong := [*estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file)]:
         raise PlanError(*(f"{path}: {words}" for words in wrong))
     design = Design(plan, model.variables, estimates.known)
-    times = plan.start_time + plan.step * np.arange(plan.steps, dtype=np.float64)
+    middles = plan.start_time + plan.step * (np.arange(plan.steps, dtype=np.float64) + 0.5)
     signals = {**plan.inputs, **from_file}
-    inputs = {name: _sampled(signal, times, plan.step, model.variables[name].start) for name, signal in signals.items()}
+    inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in signals.items()}
     kept = plan.keep.outputs if plan.keep else ()
     named = {name for text in plan.figures.values() for name in names_in(text)} & model.variables.keys()
     recorded = [*dict.fromkeys([*kept, *sorted(named - {*design.names})])]
@@ -151,6 +151,17 @@ def _wrong_inputs(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[st
         else:
             wrong = ((has[name].wrong(value), value) for _, value in signal.points)
             yield from (line(f"inputs.{name}", reason, value) for reason, value in [(r, v) for r, v in wrong if r][:1])
+            yield from _between(name, signal, plan, has[name].start)
+
+
+def _between(name: str, signal: Signal, plan: Plan, before: float) -> Iterator[str]:
+    """A jump that no step begins with, for it would come late."""
+    for n in signal.jumps(before):
+        time, _ = point = signal.points[n]
+        if plan.start_time < time < plan.stop_time and plan.step_at(time) is None:
+            told = f"a jump must be at a communication point, a multiple of step = {plan.step:g} s after the start"
+            yield line(f"inputs.{name}", told, [*point])
+            return
 
 
 def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str]) -> Iterator[str]:
@@ -188,16 +199,15 @@ def _kept_points(plan: Plan) -> Sequence[int]:
     return range(0, plan.steps + 1, stride)
 
 
-def _sampled(signal: Signal, times: Array, step: float, before: float) -> Array:
-    """The signal at the beginning of each step, after a jump there."""
+def _sampled(signal: Signal, times: Array, before: float) -> Array:
+    """The signal at the middle of each step, which held over the step is exact to second order of it."""
     at, values = np.array(signal.points, np.float64).T
-    now = times + 1e-9 * step  # a decimal time is found in spite of rounding
-    place = np.searchsorted(at, now, side="right") - 1
+    place = np.searchsorted(at, times, side="right") - 1
     found: Array = np.where(place >= 0, values[np.maximum(place, 0)], before)
     if signal.steps:
         return found
     inside = (place >= 0) & (place < len(at) - 1)
     n = place[inside]
-    share = np.clip((times[inside] - at[n]) / (at[n + 1] - at[n]), 0.0, 1.0)
+    share = (times[inside] - at[n]) / (at[n + 1] - at[n])
     found[inside] = values[n] + share * (values[n + 1] - values[n])
     return found

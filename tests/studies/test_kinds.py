@@ -66,7 +66,7 @@ def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
         state = dict.fromkeys(rov.layout.state, 0.0) | {"w": 0.1}
         inputs = dict.fromkeys(rov.layout.inputs, 0.0) | {"V_N": run.V_N, "u_r": 0.3}
         for n in range(40):
-            left = 0.05 * n if n < 10 else 0.5 if n < 20 else -0.2
+            left = 0.05 * (n + 0.5) if n < 10 else 0.5 if n < 20 else -0.2
             state = own.step(inputs | {"u_l": left}, state, 0.1)
         assert run.final_x == pytest.approx(state["x"], rel=1e-9), number
         last = native.trajectories([int(str(number))]).iloc[-1]

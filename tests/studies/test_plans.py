@@ -54,6 +54,10 @@ WRONG = {
     HEAD + VARY + "[inputs]\nu_l.steps = []\n" + TAIL: "inputs.u_l.steps = []: must have an entry",
     HEAD + VARY + "[inputs]\nu_l.ramps = [[1.0, 0.0], [0.5, 1.0]]\n" + TAIL:
         "inputs.u_l.ramps = [[1.0, 0.0], [0.5, 1.0]]: the time must not go back, as it does from 1 to 0.5",
+    HEAD + VARY + "[inputs]\nu_l.steps = [[0.2, 0.5], [0.55, 0.0]]\n" + TAIL:
+        "inputs.u_l = [0.55, 0.0]: a jump must be at a communication point, a multiple of step = 0.1 s after the start",
+    HEAD + VARY + "[inputs]\nu_l.ramps = [[0.0, 0.0], [0.45, 0.5], [0.45, 0.0]]\n" + TAIL:
+        "inputs.u_l = [0.45, 0.0]: a jump must be at a communication point",
     HEAD + VARY + '[keep]\noutputs = ["q"]\n': "keep.outputs: the FMU has no variable 'q' that is a number",
     HEAD + VARY + '[keep]\noutputs = ["u", "u"]\n': "keep.outputs = ['u', 'u']: must name each once",
     HEAD + VARY + '[keep]\noutputs = ["u"]\nevery = 2.0\n': "keep.every = 2.0: must not be longer than a run",
@@ -95,7 +99,7 @@ def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path, capsys: pytest
     assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'videoray.fmu'}: is no FMU that FMPy reads: ")
 
 
-def test_inputs_are_held_or_straight_and_jump_where_two_points_are_of_one_time(
+def test_inputs_are_held_or_straight_by_the_middle_of_a_step_and_jump_where_two_points_are_of_one_time(
     foreign: Callable[..., Path], tmp_path: Path
 ) -> None:
     (tmp_path / "u.csv").write_text("time,u\n0.1,1\n0.3,3\n0.3,-1\n0.5,-1\n")
@@ -103,8 +107,10 @@ def test_inputs_are_held_or_straight_and_jump_where_two_points_are_of_one_time(
     expected = {
         "[inputs]\nu = 0.5\n": [0.5] * 7,
         "[inputs]\nu.steps = [[0.2, 1.0], [0.3, 2.0], [0.6, 0.0]]\n": [0, 0, 1, 2, 2, 2, 0],
-        "[inputs]\nu.ramps = [[0.1, 1.0], [0.3, 3.0], [0.3, -1.0], [0.5, -1.0]]\n": [0, 1, 2, -1, -1, -1, -1],
-        '[input_file]\npath = "u.csv"\n': [0, 1, 2, -1, -1, -1, -1],
+        "[inputs]\nu.ramps = [[0.1, 1.0], [0.3, 3.0], [0.3, -1.0], [0.5, -1.0]]\n": [0, 1.5, 2.5, -1, -1, -1, -1],
+        "[inputs]\nu.steps = [[0.15, 0.0], [2.05, 1.0]]\n": [0] * 7,  # which are no jumps, or not of this run
+        "[inputs]\nu.ramps = [[0.0, 0.0], [0.15, 3.0], [0.7, 3.0]]\n": [1, 3, 3, 3, 3, 3, 3],
+        '[input_file]\npath = "u.csv"\n': [0, 1.5, 2.5, -1, -1, -1, -1],
         '[input_file]\npath = "u.csv"\nbetween = "steps"\n': [0, 1, 1, -1, -1, -1, -1],
     }
     for text, values in expected.items():

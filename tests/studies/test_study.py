@@ -98,6 +98,21 @@ def test_bands_are_quantiles_over_the_runs(whole: Results) -> None:
         assert bands.loc[t].tolist() == pytest.approx([y.min(), y.median(), y.max()], rel=1e-12, abs=1e-15)
 
 
+def test_a_ramp_is_exact_to_second_order_of_the_step(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
+    """y of an input that is the time, in closed form: t - Tau (1 - exp(-t / Tau)); by the start of each step half a
+    step late."""
+    errors = []
+    for step in (0.1, 0.05):
+        plan = _plan(tmp_path, foreign(), runs=1, step=step)
+        plan.write_text(plan.read_text().replace("steps = [[1.0, 0.5]]", "ramps = [[0.0, 0.0], [2.0, 2.0]]"))
+        runs = study(plan, tmp_path / f"results{step}", scheduler=scheduler).runs
+        to = runs.a + 2.0 * runs.b + 3.0 * runs.c
+        known = to * (1.0 - np.exp(-4.0)) + 2.0 - 0.5 * (1.0 - np.exp(-4.0))
+        errors.append(float((runs.end - known).iloc[0]))
+    assert abs(errors[0]) < 2e-3
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.01)
+
+
 @pytest.mark.parametrize("reset", [1, 2])
 def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
     reset: int, foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str
