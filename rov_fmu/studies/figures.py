@@ -4,6 +4,7 @@ import ast
 import re
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from functools import reduce
 from math import nan
 from types import CodeType
 from typing import Any
@@ -28,7 +29,7 @@ _PLAIN = (
 )  # fmt: skip
 """What arithmetic of outputs is made of, besides numbers and calls."""
 _NUMBERS_OF = ("abs", "max", "mean", "min", "sum")
-"""Functions of NumPy, or as it has them, whose values are numbers."""
+"""Functions of NumPy whose values are numbers."""
 _NOT_FOR_FIGURES = ("open", "print", "dir", "type")
 _BAND = 0.05
 """Of the way from the beginning: within it a response is settled."""
@@ -118,7 +119,20 @@ def _interpreter() -> Any:
     interpreter = Interpreter(minimal=True, with_ifexp=True, with_listcomp=True, use_numpy=True)
     for name in _NOT_FOR_FIGURES:
         interpreter.symtable.pop(name, None)
+    # Python's own skip NaN, or not, as it comes
+    numpys = {"max": _of_all("max", np.max, np.maximum), "min": _of_all("min", np.min, np.minimum), "sorted": np.sort}
+    interpreter.symtable.update(numpys)
     return interpreter
+
+
+def _of_all(name: str, of_one: Callable[[Any], Any], of_two: Callable[[Any, Any], Any]) -> Callable[..., Any]:
+    """NumPy's function of an array, and of several values as Python has it."""
+
+    def function(y: Any, *others: Any) -> Any:
+        return reduce(of_two, others, y) if others else of_one(y)
+
+    function.__qualname__ = name  # as errors tell it
+    return function
 
 
 def known_names() -> set[str]:
@@ -142,6 +156,16 @@ def names_in(expression: str) -> set[str]:
         and isinstance(n.slice, ast.Constant) and isinstance(n.slice.value, str)
     }  # fmt: skip
     return (names - bound) | quoted
+
+
+def taken_of(module: str, expression: str) -> str:
+    """The first name that is taken of a module, as max in np.max(y); or nothing."""
+    taken = (
+        n.attr
+        for n in ast.walk(ast.parse(expression.strip(), mode="eval"))
+        if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name) and n.value.id == module
+    )
+    return next(taken, "")
 
 
 def compiled(expression: str) -> CodeType | None:

@@ -14,7 +14,7 @@ from rov_fmu.files.reading import read_text
 from rov_fmu.files.series import series
 from rov_fmu.files.toml_file import line
 from rov_fmu.studies.estimates import Estimates
-from rov_fmu.studies.figures import known_names, names_in, unusable
+from rov_fmu.studies.figures import known_names, names_in, taken_of, unusable
 from rov_fmu.studies.model import Model, Variable, unknown, unsettable
 from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied
 from rov_fmu.studies.sampling import Design
@@ -176,11 +176,10 @@ def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str]) ->
             yield line(f"figures.{name}", str(error), text)
             continue
         if strange:
-            yield line(
-                f"figures.{name}",
-                f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number",
-                text,
-            )
+            told = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
+            if (function := taken_of(strange[0], text)) in known:
+                told += f": write {function}"
+            yield line(f"figures.{name}", told, text)
         elif reason := unusable(text, has, varied):
             yield line(f"figures.{name}", reason, text)
     if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):

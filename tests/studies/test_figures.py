@@ -60,6 +60,23 @@ def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there
     assert found[0] == 2.0, "the next run has nothing of this one's errors"
 
 
+@pytest.mark.parametrize("function", ["max", "min", "abs", "round", "sum", "mean", "sorted", "any", "all"])
+def test_a_function_is_numpys_and_hides_no_nan(function: str) -> None:
+    y = np.array([2.0, -7.0, nan, 1.0])
+    whole = Figures({"f": f"float(sum({function}(y)))"}, y).of({"y": y[[0, 1, 3]]})[0]
+    numpys = getattr(np, {"sorted": "sort"}.get(function, function))
+    assert whole == [float(np.sum(numpys(y[[0, 1, 3]])))]
+    if function not in ("any", "all"):
+        assert Figures({"f": f"sum({function}(y))"}, y).of({"y": y})[0] == pytest.approx([nan], nan_ok=True)
+
+
+def test_max_and_min_of_several_are_the_greatest_and_the_least() -> None:
+    texts = ("max(m, 2)", "min(m, 2, -1.5)", "max(2.0, y[1])", "max(max(y, 3))", "max(y, 0)")
+    found, reason = Figures(dict(zip("abcde", texts, strict=True)), T).of({"m": 6.5, "y": np.array([1.0, nan])})
+    assert found == pytest.approx([6.5, -1.5, nan, nan, nan], nan_ok=True)
+    assert "e: must be one number, and not array(" in reason
+
+
 CODE = ["y[-1] - at(y, 1)", "V_ss(y, 0, 10)", "Tau(y, end=10)", "-m/2 + 3*max(y)", "V_ss(y[:9])", "t[0]"]
 OTHERS = ["9**9", "'9'*9", "y.size", "(y for y in t)", "[0]*9", "str(m)*9", "at(y, 1) if m else 0", "(max)(*y)",
           "out['y'][-1]", "y[t > 1][0]", "(0).real", "abs(at)(1)", "f'{m}'", "{1}", "exp(m)"]  # fmt: skip

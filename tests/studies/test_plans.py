@@ -66,6 +66,8 @@ WRONG = {
         "keep.at = [0.5, 1.1]: must be times from the start to the end",
     HEAD + VARY + '[figures]\nend = "u[-1"\n': "figures.end = 'u[-1': is no expression: '[' was never closed",
     HEAD + VARY + '[figures]\nend = "q[-1]"\n': "figures.end = 'q[-1]': 'q' is neither a function nor a variable",
+    HEAD + VARY + '[figures]\nend = "np.max(u)"\n':
+        "figures.end = 'np.max(u)': 'np' is neither a function nor a variable of the FMU that is a number: write max",
     HEAD + VARY + '[figures]\nend = "open(1)"\n': "figures.end = 'open(1)': 'open' is neither a function nor a",
     HEAD + VARY + '[figures]\nend = "u"\n': "figures.end = 'u': must be one number, and not array(",
     HEAD + VARY + '[figures]\nend = "V_ss()"\n':
