@@ -5,7 +5,8 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import reduce
-from math import nan
+from inspect import signature
+from math import isfinite, isnan, nan
 from types import CodeType
 from typing import Any
 
@@ -40,6 +41,7 @@ class Responses:
 
     def __init__(self, times: Array) -> None:
         self._times = times
+        self._slack = 1e-9 * max(1.0, abs(times[0]), abs(times[-1]))
         self._windows: dict[tuple[float | None, float | None], tuple[slice, slice]] = {}
         self.functions: dict[str, Callable[..., float]] = {
             "V_ss": self.steady, "Tau": self.time_constant, "overshoot": self.overshoot,
@@ -48,8 +50,9 @@ class Responses:
         """By the name in an expression."""
 
     def at(self, y: Array, time: float) -> float:
-        """y at a time, straight between two points; NaN outside the run."""
-        return float(np.interp(time, self._times, y, nan, nan))
+        """y at a time, straight between two points."""
+        self._see(time)
+        return float(np.interp(time, self._times, y))
 
     def final(self, y: Array) -> float:
         """The last y."""
@@ -88,15 +91,39 @@ class Responses:
     def _window(self, start: float | None, end: float | None) -> tuple[slice, slice]:
         """The points between two times, both included but for rounding, and those of their last tenth."""
         if (start, end) not in self._windows:
-            t = self._times
-            slack = 1e-9 * max(1.0, abs(t[0]), abs(t[-1]))
+            t, slack = self._times, self._slack
+            self._see(*(time for time in (start, end) if time is not None))
             first = int(np.searchsorted(t, (t[0] if start is None else start) - slack))
             last = int(np.searchsorted(t, (t[-1] if end is None else end) + slack))
             if first >= last:
-                raise ValueError(f"there is no time from {start} to {end}")
+                raise ValueError(f"there is no communication point from {start} to {end}")
             steady = t[last - 1] - _STEADY * (t[last - 1] - t[first]) - slack
             self._windows[start, end] = slice(first, last), slice(int(np.searchsorted(t, steady)), last)
         return self._windows[start, end]
+
+    def _see(self, *times: float) -> None:
+        """That they are times of the run."""
+        first, last = self._times[0], self._times[-1]
+        for time in times:
+            if not first - self._slack <= time <= last + self._slack:
+                raise ValueError(f"there is no time {time:g} s in a run from {first:g} to {last:g} s")
+
+    def wrong_times(self, call: ast.Call) -> str:
+        """What is wrong with the times that are given in numbers where one of the functions is called; or nothing."""
+        function = self.functions.get(call.func.id) if isinstance(call.func, ast.Name) else None
+        if function is None:
+            return ""
+        try:
+            written = signature(function).bind(*call.args, **{k.arg or "": k.value for k in call.keywords})
+        except TypeError:  # told as that
+            return ""
+        given = {key: _constant(node) for key, node in written.arguments.items()}
+        try:
+            self._window(given.get("time"), None)
+            self._window(given.get("start"), given.get("end"))
+        except ValueError as error:
+            return str(error)
+        return ""
 
     def _way(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
         """How far y has come, 0 where it is first and 1 where it is steady; NaN where that is the same. The times."""
@@ -158,6 +185,15 @@ def names_in(expression: str) -> set[str]:
     return (names - bound) | quoted
 
 
+def _constant(node: ast.expr) -> float | None:
+    """The number that is written there; None of what a run must tell."""
+    code = None if any(isinstance(n, ast.Name) for n in ast.walk(node)) else compiled(ast.unparse(node))
+    with suppress(Exception):
+        if code and isinstance(value := eval(code, {"__builtins__": {}}), int | float):
+            return value
+    return None
+
+
 def taken_of(module: str, expression: str) -> str:
     """The first name that is taken of a module, as max in np.max(y); or nothing."""
     taken = (
@@ -204,14 +240,16 @@ class Figures:
         }
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
-        """In the order of their names, for a run's outputs and parameters; why one is NaN, or nothing."""
+        """In the order of their names, for a run's outputs and parameters; NaN with its reason where there is none."""
         self._symbols.update(run)
         self._symbols[BY_NAME] = run
         found, reasons = [], []
         with np.errstate(all="ignore"):
             for name, (code, parsed) in self._parsed.items():
                 value, reason = self._soon(code) or self._value(parsed)
-                found.append(value)
+                if not (reason or isfinite(value)):
+                    reason = f"is {'NaN' if isnan(value) else 'infinite'}"
+                found.append(nan if reason else value)
                 reasons += [f"{name}: {reason}"] if reason else []
         return found, "; ".join(reasons)
 
@@ -238,8 +276,12 @@ class Figures:
         return float(value), ""
 
 
-def unusable(expression: str, variables: Iterable[str], varied: Iterable[str]) -> str:
+def unusable(expression: str, variables: Iterable[str], varied: Iterable[str], run_times: Array) -> str:
     """Why an expression is no figure, whatever the run; nothing where a run must tell."""
+    responses = Responses(run_times)
+    for n in ast.walk(ast.parse(expression.strip(), mode="eval")):
+        if isinstance(n, ast.Call) and (reason := responses.wrong_times(n)):
+            return reason
     times = np.linspace(0.0, 1.0, 11)
     run = {**dict.fromkeys(variables, times), **dict.fromkeys(varied, 1.0)}
     reason = Figures({"": expression}, times).of(run)[1].removeprefix(": ")

@@ -47,7 +47,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     if wrong := [*estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file)]:
         raise PlanError(*(f"{path}: {words}" for words in wrong))
     design = Design(plan, model.variables, estimates.known)
-    middles = plan.start_time + plan.step * (np.arange(plan.steps, dtype=np.float64) + 0.5)
+    middles = _times(plan)[:-1] + 0.5 * plan.step
     signals = {**plan.inputs, **from_file}
     inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in signals.items()}
     kept = plan.keep.outputs if plan.keep else ()
@@ -165,7 +165,7 @@ def _between(name: str, signal: Signal, plan: Plan, before: float) -> Iterator[s
 
 
 def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str]) -> Iterator[str]:
-    known = known_names()
+    known, times = known_names(), _times(plan)
     for name, text in plan.figures.items():
         if name in {RUN, STATUS, REASON} | varied:
             yield line(f"figures.{name}", "the results have another column of this name")
@@ -180,13 +180,18 @@ def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str]) ->
             if (function := taken_of(strange[0], text)) in known:
                 told += f": write {function}"
             yield line(f"figures.{name}", told, text)
-        elif reason := unusable(text, has, varied):
+        elif reason := unusable(text, has, varied, times):
             yield line(f"figures.{name}", reason, text)
     if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
         yield line("keep.outputs", f"the results have another column {taken.pop()}")
 
 
 # ---- Over time -------------------------------------------------------------------------------------------------------
+
+
+def _times(plan: Plan) -> Array:
+    """Of the communication points, s."""
+    return plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
 
 
 def _kept_points(plan: Plan) -> Sequence[int]:

@@ -5,7 +5,7 @@ from math import exp, log, nan, pi, sqrt
 import numpy as np
 import pytest
 
-from rov_fmu.studies.figures import Figures, compiled, names_in
+from rov_fmu.studies.figures import Figures, compiled, names_in, unusable
 
 T = np.linspace(0.0, 40.0, 4001)
 FIRST = np.where(T > 2.0, 3.0 * (1.0 - np.exp(-np.maximum(T - 2.0, 0.0) / 1.5)), 0.0)
@@ -26,11 +26,8 @@ KNOWN = {
     "V_ss(-2*y)": -6.0,
     "Tau(-2*y, 2)": 1.5,
     "at(y, 3.5)": 3.0 * (1.0 - exp(-1.0)),
-    "at(y, 41)": nan,
+    "at(y, 40)": 3.0,
     "final(y)": 3.0,
-    "Tau(0*y)": nan,
-    "overshoot(0*y)": nan,
-    "settling_time(0*y)": nan,
     "max(z) - m": exp(-pi * ZETA / sqrt(1.0 - ZETA**2)) + 1.0 - 6.5,
     "out['der(y)'][-1]": 1.0,
     "y[t >= 10][0]": 3.0 * (1.0 - exp(-8.0 / 1.5)),
@@ -43,7 +40,7 @@ KNOWN = {
 def test_a_figure_is_what_the_response_has_in_closed_form(expression: str) -> None:
     run = {"y": FIRST, "z": SECOND, "m": 6.5, "der(y)": np.ones(len(T))}
     (found,), reason = Figures({"f": expression}, T).of(run)
-    assert found == pytest.approx(KNOWN[expression], abs=1.1e-2, nan_ok=True)  # a step is 0.01 s
+    assert found == pytest.approx(KNOWN[expression], abs=1.1e-2)  # a step is 0.01 s
     assert reason == ""
 
 
@@ -55,7 +52,7 @@ def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there
     assert far == "far: IndexError: index 9999 is out of bounds for axis 0 with size 4001"
     assert others.startswith("all: must be one number, and not array(")
     assert zero == "zero: ZeroDivisionError: division by zero"
-    assert late == "late: ValueError: there is no time from 50 to 60"
+    assert late == "late: ValueError: there is no time 50 s in a run from 0 to 40 s"
     found, reason = figures.of({"y": np.full(10_000, 2.0), "m": 1.0})
     assert found[0] == 2.0, "the next run has nothing of this one's errors"
 
@@ -75,6 +72,31 @@ def test_max_and_min_of_several_are_the_greatest_and_the_least() -> None:
     found, reason = Figures(dict(zip("abcde", texts, strict=True)), T).of({"m": 6.5, "y": np.array([1.0, nan])})
     assert found == pytest.approx([6.5, -1.5, nan, nan, nan], nan_ok=True)
     assert "e: must be one number, and not array(" in reason
+
+
+@pytest.mark.parametrize("expression", ["Tau(0*y)", "overshoot(0*y)", "settling_time(0*y)", "log(-m)", "V_ss(0*y/0)"])
+def test_a_figure_that_is_nan_has_that_for_a_reason(expression: str) -> None:
+    found, reason = Figures({"f": expression}, T).of({"y": FIRST, "m": 6.5})
+    assert (repr(found), reason) == ("[nan]", "f: is NaN")
+
+
+def test_a_figure_that_is_infinite_is_missing_with_that_for_a_reason() -> None:
+    found, reason = Figures({"f": "max(y/0)", "g": "m"}, T).of({"y": FIRST[300:], "m": 6.5})
+    assert (repr(found), reason) == ("[nan, 6.5]", "f: is infinite")
+
+
+@pytest.mark.parametrize("function", ["V_ss", "Tau", "overshoot", "settling_time"])
+def test_a_time_that_no_run_has_is_told_before_the_first_one_by_one_rule(function: str) -> None:
+    told = "there is no time {} s in a run from 0 to 40 s"
+    late = {"(y, 0, 100)": "100", "(y, end=4*10.5)": "42", "(y, -1)": "-1", "(y, m, 41)": "41"}
+    for arguments, time in late.items():
+        assert unusable(f"1 + {function}{arguments}", ["y"], ["m"], T) == told.format(time)
+    assert unusable(f"{function}(y, 9, 8)", ["y"], ["m"], T) == "there is no communication point from 9 to 8"
+    for arguments in ("(y)", "(y, 0, 40)", "(y, m, m + 50)", "(y, end=39.995)"):
+        assert unusable(f"{function}{arguments}", ["y"], ["m"], T) == ""
+    assert Figures({"f": f"{function}(y, 0, m)"}, T).of({"y": FIRST, "m": 41.0})[1].endswith(told.format("41"))
+    assert unusable("at(y, 50)", ["y"], ["m"], T) == told.format("50")
+    assert unusable("at(y, m + 50)", ["y"], ["m"], T) == ""
 
 
 CODE = ["y[-1] - at(y, 1)", "V_ss(y, 0, 10)", "Tau(y, end=10)", "-m/2 + 3*max(y)", "V_ss(y[:9])", "t[0]"]
