@@ -229,8 +229,7 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, apart: bool) -> Par
                 simulator.renew()
             simulating += perf_counter() - start
     numbers = np.arange(first, first + len(rows))
-    columns = [numbers, *rows.T, *figures.T, statuses, pa.array(reasons, pa.string(), mask=np.array(reasons) == "")]
-    table = pa.table([pa.array(column) for column in columns], schema=job.runs_schema)
+    table = _runs_table(job, first, rows, figures, statuses, reasons)
     trajectories = None
     if job.kept:
         whole = slice(None) if ended.all() else ended  # which is no copy
@@ -245,12 +244,23 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, apart: bool) -> Par
 def lost_runs(job: Job, first: int, rows: Array, reason: str) -> Part:
     """The rows of runs that came to no end."""
     count = len(rows)
-    columns = [
-        np.arange(first, first + count), *rows.T, *np.full((len(job.figures), count), np.nan),
-        [FAILED] * count, [reason] * count,
-    ]  # fmt: skip
-    table = pa.table([pa.array(column) for column in columns], schema=job.runs_schema)
+    none = np.full((count, len(job.figures)), np.nan)
+    table = _runs_table(job, first, rows, none, [FAILED] * count, [reason] * count)
     return Part(_parquet(table, [STATUS, REASON]), None, count, 0.0, 0.0)
+
+
+def _runs_table(
+    job: Job, first: int, rows: Array, figures: Array, statuses: Sequence[str], reasons: Sequence[str]
+) -> pa.Table:
+    """What is not there is null, which a median of DuckDB or Polars leaves out; NaN it takes for a great number."""
+    columns = [
+        np.arange(first, first + len(rows)),
+        *rows.T,
+        *(pa.array(column, mask=np.isnan(column)) for column in figures.T),
+        statuses,
+        pa.array(reasons, pa.string(), mask=np.array(reasons) == ""),
+    ]
+    return pa.table([pa.array(column) for column in columns], schema=job.runs_schema)
 
 
 def _copied(run: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
