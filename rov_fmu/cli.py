@@ -224,6 +224,8 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
         raise
     write_whole(page_output(results))
     print_summary(results, spent)
+    if len(results.failed) + len(results.incomplete) == len(results.runs):
+        raise StudyError(f"{output}: no run is done, with all its figures")
 
 
 @contextmanager

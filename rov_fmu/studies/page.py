@@ -41,6 +41,7 @@ def study_page(results: Results) -> str:
         done=len(runs),
         planned=results.planned,
         failed=len(results.failed),
+        incomplete=len(results.incomplete),
         sampler=plan["sampler"],
         seed=plan["seed"],
         quantiles=QUANTILES,

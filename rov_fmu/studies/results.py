@@ -11,7 +11,7 @@ import pyarrow.dataset as ds
 
 from rov_fmu.files.messages import FileError, shown
 from rov_fmu.studies.store import RUNS, TRAJECTORIES, Store
-from rov_fmu.studies.worker import FAILED, RUN, STATUS, TIME
+from rov_fmu.studies.worker import FAILED, INCOMPLETE, RUN, STATUS, TIME
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _AT_ONCE = 20_000_000
@@ -108,6 +108,11 @@ class Results:
     def failed(self) -> pd.DataFrame:
         """The runs that failed, with their reasons."""
         return self.runs[self.runs[STATUS] == FAILED]
+
+    @property
+    def incomplete(self) -> pd.DataFrame:
+        """The runs that ended, and have not all figures, with their reasons."""
+        return self.runs[self.runs[STATUS] == INCOMPLETE]
 
     def _dataset(self, name: str) -> Any:
         """Files in the order of their runs."""

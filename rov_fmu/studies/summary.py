@@ -16,7 +16,8 @@ _FAILURES = 5
 def print_summary(results: Results, spent: Spent) -> None:
     """How many runs, how fast, the figures' quantiles, and why runs failed or figures are missing."""
     out, runs = console(), results.runs
-    out.print(Text.assemble((str(results.folder), "bold"), f"  {len(runs)} runs, {len(results.failed)} failed"))
+    counts = f"{len(runs)} runs, {len(results.failed)} failed, {len(results.incomplete)} incomplete"
+    out.print(Text.assemble((str(results.folder), "bold"), f"  {counts}"))
     if spent.runs:
         rate = spent.runs / max(spent.elapsed - spent.started, 1e-3)
         out.print(

@@ -13,7 +13,7 @@ from rov_fmu.studies import Results
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path], scheduler: str) -> Path:
-    """A study of which some runs fail, and its page, by the command."""
+    """A study of which some runs fail, and none is done, for `odd` is not there; its page, by the command."""
     folder = tmp_path_factory.mktemp("page")
     (folder / "plan.toml").write_text(f"""fmu = "{foreign()}"
 stop_time = 2.0
@@ -30,7 +30,7 @@ outputs = ["y"]
 end = "y[-1]"
 odd = "y[99]"
 """)
-    assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
+    assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 1
     return folder / "results"
 
 
@@ -40,7 +40,7 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     page = html.fromstring(text)
     rows = {row[0].text_content(): [cell.text_content() for cell in row] for row in page.iter("tr")}
     ended = results.runs[results.runs.status != "failed"]
-    assert f"600 of 600 runs, {len(results.failed)} failed" in page.text_content()
+    assert f"600 of 600 runs, {len(results.failed)} failed, {len(ended)} incomplete." in page.text_content()
     assert float(rows["end"][3].replace("−", "-")) == pytest.approx(ended.end.median(), rel=1e-3)
     assert rows["end"][-1] == str(len(ended))
     assert rows["odd"][-1] == "0"
@@ -59,3 +59,13 @@ def test_the_page_is_the_same_for_the_same_results(done: Path) -> None:
     from rov_fmu.studies.page import study_page
 
     assert study_page(Results(done)) == (done / "study.html").read_text(encoding="utf-8")
+
+
+def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_done(
+    done: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failed = len(Results(done).failed)
+    assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
+    told = capsys.readouterr()
+    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in told.out.replace("\n", " ")
+    assert told.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
