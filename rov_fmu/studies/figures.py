@@ -2,6 +2,7 @@
 
 import ast
 import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import reduce
@@ -284,5 +285,7 @@ def unusable(expression: str, variables: Iterable[str], varied: Iterable[str], r
             return reason
     times = np.linspace(0.0, 1.0, 11)
     run = {**dict.fromkeys(variables, times), **dict.fromkeys(varied, 1.0)}
-    reason = Figures({"": expression}, times).of(run)[1].removeprefix(": ")
+    with warnings.catch_warnings():  # of NumPy, on numbers that are none of the FMU's
+        warnings.simplefilter("ignore", RuntimeWarning)
+        reason = Figures({"": expression}, times).of(run)[1].removeprefix(": ")
     return reason if reason.startswith(_NEVER) else ""

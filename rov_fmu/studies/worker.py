@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import tempfile
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -159,6 +160,7 @@ class Delivery(WorkerPlugin):
         """Called on a worker as it comes."""
         if self._own and current_thread() is main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has started these
+            warnings.simplefilter("ignore", RuntimeWarning)  # of NumPy: what is NaN is told of the run
         _SHOPS[self.name] = Shop(self._job, Path(worker.local_directory), is_watched=worker.nanny is not None)
 
     def teardown(self, worker: Worker) -> None:  # noqa: ARG002 (as it is called)

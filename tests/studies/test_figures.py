@@ -1,5 +1,6 @@
 """Figures of responses whose figures are known."""
 
+import warnings
 from math import exp, log, nan, pi, sqrt
 
 import numpy as np
@@ -97,6 +98,13 @@ def test_a_time_that_no_run_has_is_told_before_the_first_one_by_one_rule(functio
     assert Figures({"f": f"{function}(y, 0, m)"}, T).of({"y": FIRST, "m": 41.0})[1].endswith(told.format("41"))
     assert unusable("at(y, 50)", ["y"], ["m"], T) == told.format("50")
     assert unusable("at(y, m + 50)", ["y"], ["m"], T) == ""
+
+
+def test_a_plan_is_seen_without_warnings_of_numpy() -> None:
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert unusable("y[t > 30].mean()", ["y"], [], T) == ""
+    assert not told
 
 
 CODE = ["y[-1] - at(y, 1)", "V_ss(y, 0, 10)", "Tau(y, end=10)", "-m/2 + 3*max(y)", "V_ss(y[:9])", "t[0]"]
