@@ -181,6 +181,8 @@ def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str]) ->
                 told += f": write {function}"
             yield line(f"figures.{name}", told, text)
         elif reason := unusable(text, has, varied, times):
+            if reason.startswith("TypeError") and (numbers := names_in(text) & varied):
+                reason += f"; {min(numbers)} varies, and what varies is a number"
             yield line(f"figures.{name}", reason, text)
     if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
         yield line("keep.outputs", f"the results have another column {taken.pop()}")

@@ -70,6 +70,8 @@ WRONG = {
         "figures.end = 'np.max(u)': 'np' is neither a function nor a variable of the FMU that is a number: write max",
     HEAD + VARY + '[figures]\nend = "V_ss(u, 0, 100)"\n':
         "figures.end = 'V_ss(u, 0, 100)': there is no time 100 s in a run from 0 to 1 s",
+    HEAD + "[vary]\nx.uniform = [0.0, 1.0]\n" + '[figures]\nend = "final(x)"\n':
+        "figures.end = 'final(x)': TypeError: 'float' object is not subscriptable; x varies, and what varies is a numb",
     HEAD + VARY + '[figures]\nend = "open(1)"\n': "figures.end = 'open(1)': 'open' is neither a function nor a",
     HEAD + VARY + '[figures]\nend = "u"\n': "figures.end = 'u': must be one number, and not array(",
     HEAD + VARY + '[figures]\nend = "V_ss()"\n':
