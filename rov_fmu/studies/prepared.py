@@ -44,8 +44,14 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     vehicle = load_vehicle(vehicle_file(plan.vary_from, path)) if plan.vary_from else None
     estimates = Estimates(plan, vehicle, model.variables)
     from_file = _file_inputs(plan, path, model)
-    if wrong := [*estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file)]:
-        raise PlanError(*(f"{path}: {words}" for words in wrong))
+    wrong = [
+        f"{path}: {words}" for words in (*estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file))
+    ]
+    if plan.input_file:
+        file = path.parent / plan.input_file.path
+        wrong += [f"{file}: {words}" for words in _wrong_rows(plan, model.variables, from_file)]
+    if wrong:
+        raise PlanError(*wrong)
     design = Design(plan, model.variables, estimates.known)
     middles = _times(plan)[:-1] + 0.5 * plan.step
     signals = {**plan.inputs, **from_file}
@@ -118,7 +124,7 @@ def _nonsense(plan: Plan, model: Model, known: Sequence[str], from_file: Mapping
     for name, value in plan.set.items():
         if reason := unsettable(name, has) or has[name].wrong(value):
             yield line(f"set.{name}", reason, value)
-    yield from _wrong_inputs(plan, has, from_file)
+    yield from _wrong_inputs(plan, has)
     for name in plan.keep.outputs if plan.keep else ():
         if name not in has:
             yield line("keep.outputs", unknown(name, has))
@@ -138,29 +144,52 @@ def _beyond(way: Varied, variable: Variable, is_grid: bool) -> Iterator[tuple[st
             return
 
 
-def _wrong_inputs(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
-    for name, signal in {**plan.inputs, **from_file}.items():
+def _wrong_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
+    for name, signal in plan.inputs.items():
+        key = f"inputs.{name}"
         if name not in has:
-            yield line(f"inputs.{name}", unknown(name, has))
-        elif has[name].causality != "input":
-            yield line(f"inputs.{name}", f"is no input of the FMU; its causality is {has[name].causality}")
-        elif name in plan.set or (name in plan.inputs and name in from_file):
-            yield line(f"inputs.{name}", "is given twice")
+            yield line(key, unknown(name, has))
+        elif reason := _no_input(name, plan, has):
+            yield line(key, reason)
         elif signal.ramps and not has[name].is_continuous:
-            yield line(f"inputs.{name}", "must be steps, for it is not continuous")
+            yield line(key, "must be steps, for it is not continuous")
         else:
-            wrong = ((has[name].wrong(value), value) for _, value in signal.points)
-            yield from (line(f"inputs.{name}", reason, value) for reason, value in [(r, v) for r, v in wrong if r][:1])
-            yield from _between(name, signal, plan, has[name].start)
+            points = signal.points
+            yield from (line(key, reason, points[n][1]) for n, reason in _beyond_bounds(signal, has[name]))
+            yield from (line(key, reason, [*points[n]]) for n, reason in _between(signal, plan, has[name].start))
 
 
-def _between(name: str, signal: Signal, plan: Plan, before: float) -> Iterator[str]:
-    """A jump that no step begins with, for it would come late."""
+def _wrong_rows(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
+    """The same of the inputs in a file, by its columns and rows."""
+    for name, signal in from_file.items():
+        column, points = f"column {shown(name)}", signal.points
+        if reason := "is given in [inputs] too" if name in plan.inputs else _no_input(name, plan, has):
+            yield f"{column}: {reason}"
+        else:
+            for n, reason in (*_beyond_bounds(signal, has[name]), *_between(signal, plan, has[name].start)):
+                yield f"row {n + 1}, {column} = {points[n][1]:g} at {points[n][0]:g} s: {reason}"
+
+
+def _no_input(name: str, plan: Plan, has: Mapping[str, Variable]) -> str:
+    if has[name].causality != "input":
+        return f"is no input of the FMU; its causality is {has[name].causality}"
+    return "is given in [set] too" if name in plan.set else ""
+
+
+def _beyond_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, str]]:
+    """The number of the first point whose value cannot be, and why."""
+    for n, (_, value) in enumerate(signal.points):
+        if reason := variable.wrong(value):
+            yield n, reason
+            return
+
+
+def _between(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, str]]:
+    """The number of the first point with a jump that no step begins with, for it would come late, and why not."""
     for n in signal.jumps(before):
-        time, _ = point = signal.points[n]
+        time = signal.points[n][0]
         if plan.start_time < time < plan.stop_time and plan.step_at(time) is None:
-            told = f"a jump must be at a communication point, a multiple of step = {plan.step:g} s after the start"
-            yield line(f"inputs.{name}", told, [*point])
+            yield n, f"a jump must be at a communication point, a multiple of step = {plan.step:g} s after the start"
             return
 
 

@@ -105,6 +105,29 @@ def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path, capsys: pytest
     assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'videoray.fmu'}: is no FMU that FMPy reads: ")
 
 
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    {
+        "time,u_l\n0,0\n\n0.1,1.5\n": "row 2, column 'u_l' = 1.5 at 0.1 s: must be within -1 ... 1",
+        "time,u_l\n0,0\n0.55,0.5\n": "row 2, column 'u_l' = 0.5 at 0.55 s: a jump must be at a communication point, ",
+        "time,u_l\n0,0\n0.5,full\n": "row 2, column 'u_l' = 'full': must be a number",
+        "time,u\n0,0\n": "column 'u': is no input of the FMU; its causality is output",
+        "time,u_r\n0,0\n": "column 'u_r': is given in [inputs] too",
+    }.items(),
+)
+def test_a_mistake_in_a_file_of_inputs_is_told_by_its_row(
+    rows: str, told: str, tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "u.csv").write_text(rows)
+    (tmp_path / "videoray.fmu").symlink_to(videoray_fmu)
+    file = 'input_file = { path = "u.csv", between = "steps" }\n'
+    (tmp_path / "plan.toml").write_text(HEAD + file + VARY + "[inputs]\nu_r = 0.5\n" + TAIL)
+    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results")]) == 2
+    line = capsys.readouterr().err
+    assert line.startswith(f"rov-fmu: {tmp_path / 'u.csv'}: {told}")
+    assert line.count("\n") == 1
+
+
 def test_inputs_are_held_or_straight_by_the_middle_of_a_step_and_jump_where_two_points_are_of_one_time(
     foreign: Callable[..., Path], tmp_path: Path
 ) -> None:
