@@ -278,10 +278,9 @@ class Figures:
 
 
 def unusable(expression: str, variables: Iterable[str], varied: Iterable[str], run_times: Array) -> str:
-    """Why an expression is no figure, whatever the run; nothing where a run must tell."""
-    responses = Responses(run_times)
+    """Why an expression is no figure, whatever the run; nothing where a run must tell. There may be no times yet."""
     for n in ast.walk(ast.parse(expression.strip(), mode="eval")):
-        if isinstance(n, ast.Call) and (reason := responses.wrong_times(n)):
+        if run_times.size and isinstance(n, ast.Call) and (reason := Responses(run_times).wrong_times(n)):
             return reason
     times = np.linspace(0.0, 1.0, 11)
     run = {**dict.fromkeys(variables, times), **dict.fromkeys(varied, 1.0)}

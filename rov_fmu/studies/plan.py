@@ -287,17 +287,15 @@ def _whole(steps: float) -> bool:
 
 
 def load_plan(path: Path) -> Plan:
-    """Read a plan. Raises PlanError."""
+    """Read a plan; what does not go together in it is told with what does not fit its FMU. Raises PlanError."""
     plan = read_checked(path, Plan, PlanError)
-    if wrong := [*_nonsense(plan)]:
-        raise PlanError(*(f"{path}: {words}" for words in wrong))
+    if (plan.fmu is None) == (plan.vehicle is None):
+        raise PlanError(*(f"{path}: {words}" for words in ("must have either fmu or vehicle", *nonsense(plan))))
     return plan
 
 
-def _nonsense(plan: Plan) -> Iterator[str]:
+def nonsense(plan: Plan) -> Iterator[str]:
     """What does not go together, in a line each."""
-    if (plan.fmu is None) == (plan.vehicle is None):
-        yield "must have either fmu or vehicle"
     if plan.stop_time <= plan.start_time:
         yield line("stop_time", f"must be after start_time = {plan.start_time:g}", plan.stop_time)
     elif not _whole((plan.stop_time - plan.start_time) / plan.step):

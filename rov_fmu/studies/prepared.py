@@ -16,7 +16,7 @@ from rov_fmu.files.toml_file import line
 from rov_fmu.studies.estimates import Estimates
 from rov_fmu.studies.figures import known_names, names_in, taken_of, unusable
 from rov_fmu.studies.model import Model, Variable, unknown, unsettable
-from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied
+from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied, nonsense
 from rov_fmu.studies.sampling import Design
 from rov_fmu.studies.simulator import Manoeuvre
 from rov_fmu.studies.worker import REASON, RUN, STATUS, TIME, Job
@@ -43,17 +43,21 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     """See that a plan, read from a path, fits an FMU. Raises PlanError with every reason."""
     vehicle = load_vehicle(vehicle_file(plan.vary_from, path)) if plan.vary_from else None
     estimates = Estimates(plan, vehicle, model.variables)
-    from_file = _file_inputs(plan, path, model)
-    wrong = [
-        f"{path}: {words}" for words in (*estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file))
-    ]
+    own, from_file, unread = [*nonsense(plan)], {}, []
+    try:
+        from_file = _file_inputs(plan, path, model)
+    except FileError as error:
+        unread = [str(error)]
+    times = np.zeros(0) if own else _times(plan)
+    words = [*own, *estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file, times)]
+    wrong = [f"{path}: {told}" for told in words] + unread
     if plan.input_file:
         file = path.parent / plan.input_file.path
-        wrong += [f"{file}: {words}" for words in _wrong_rows(plan, model.variables, from_file)]
+        wrong += [f"{file}: {told}" for told in _wrong_rows(plan, model.variables, from_file)]
     if wrong:
         raise PlanError(*wrong)
     design = Design(plan, model.variables, estimates.known)
-    middles = _times(plan)[:-1] + 0.5 * plan.step
+    middles = times[:-1] + 0.5 * plan.step
     signals = {**plan.inputs, **from_file}
     inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in signals.items()}
     kept = plan.keep.outputs if plan.keep else ()
@@ -108,7 +112,9 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
 # ---- What does not fit -----------------------------------------------------------------------------------------------
 
 
-def _nonsense(plan: Plan, model: Model, known: Sequence[str], from_file: Mapping[str, Signal]) -> Iterator[str]:
+def _nonsense(
+    plan: Plan, model: Model, known: Sequence[str], from_file: Mapping[str, Signal], times: Array
+) -> Iterator[str]:
     """A line each; `known` varies besides [vary]."""
     has = model.variables
     for name, way in plan.vary.items():
@@ -128,7 +134,7 @@ def _nonsense(plan: Plan, model: Model, known: Sequence[str], from_file: Mapping
     for name in plan.keep.outputs if plan.keep else ():
         if name not in has:
             yield line("keep.outputs", unknown(name, has))
-    yield from _wrong_figures(plan, has, {*known, *plan.vary})
+    yield from _wrong_figures(plan, has, {*known, *plan.vary}, times)
 
 
 def _beyond(way: Varied, variable: Variable, is_grid: bool) -> Iterator[tuple[str, Any]]:
@@ -193,8 +199,8 @@ def _between(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, s
             return
 
 
-def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str]) -> Iterator[str]:
-    known, times = known_names(), _times(plan)
+def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], times: Array) -> Iterator[str]:
+    known = known_names()
     for name, text in plan.figures.items():
         if name in {RUN, STATUS, REASON} | varied:
             yield line(f"figures.{name}", "the results have another column of this name")

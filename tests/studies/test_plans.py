@@ -24,7 +24,8 @@ WRONG = {
     HEAD.replace("4", "0") + VARY + TAIL: "runs = 0: must be within 1 ... 1e+08",
     HEAD + VARY: "must have [keep] or [figures], or nothing remains of a run",
     HEAD + TAIL: 'vary: nothing varies: write [vary], or sampler = "grid" for the one run',
-    HEAD + 'sampler = "grid"\n' + VARY + TAIL: "runs = 4: a grid has as many as it has points; leave this out",
+    HEAD + 'sampler = "grid"\n[vary]\nalpha_u.values = [1.0]\n' + TAIL:
+        "runs = 4: a grid has as many as it has points; leave this out",
     HEAD.replace("runs = 4", 'sampler = "grid"') + VARY + TAIL:
         "vary.alpha_u = {'uniform': (1.0, 1.2)}: a grid needs values or a range",
     HEAD.replace("runs = 4", 'sampler = "grid"') + "[vary]\n"
@@ -95,6 +96,18 @@ def test_a_mistake_is_a_line_and_nothing_is_written(
     if text.startswith(HEAD):
         assert told.count("\n") == 1
     assert not (tmp_path / "results").exists()
+
+
+def test_mistakes_of_all_kinds_are_told_at_once(
+    tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "videoray.fmu").symlink_to(videoray_fmu)
+    (tmp_path / "u.csv").write_text("time,u_r\n0,much\n")
+    head = HEAD.replace("1.0", "0.95").replace("runs = 4\n", 'input_file = { path = "u.csv" }\n')
+    (tmp_path / "plan.toml").write_text(head + VARY + "[inputs]\nu_l = 1.5\n" + '[figures]\nend = "q[-1]"\n')
+    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results")]) == 2
+    told = [line.split(":")[2].split()[0] for line in capsys.readouterr().err.splitlines()]
+    assert told == ["stop_time", "runs", "inputs.u_l", "figures.end", "row"]
 
 
 def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
