@@ -63,7 +63,8 @@ class Results:
     def bands(self, output: str, quantiles: Sequence[float] = QUANTILES) -> pd.DataFrame:
         """Quantiles of an output over the runs (columns) at each time (s, the index). Raises FileError."""
         if output not in self.outputs:
-            raise FileError(f"{self.folder}: no trajectory of {shown(output)} is kept, only {', '.join(self.outputs)}")
+            others = f", only {', '.join(self.outputs)}" if self.outputs else ", nor any other: the plan has no [keep]"
+            raise FileError(f"{self.folder}: no trajectory of {shown(output)} is kept{others}")
         trajectories = self._dataset(TRAJECTORIES)
         times = np.unique(trajectories.head(self._points, columns=[TIME])[TIME].to_numpy())
         ended = trajectories.count_rows() // max(len(times), 1)
@@ -88,7 +89,10 @@ class Results:
         from SALib.analyze import sobol
 
         if figure not in self.figures:
-            raise FileError(f"{self.folder}: there is no figure {shown(figure)}, only {', '.join(self.figures)}")
+            others = (
+                f", only {', '.join(self.figures)}" if self.figures else ", nor any other: the plan has no [figures]"
+            )
+            raise FileError(f"{self.folder}: there is no figure {shown(figure)}{others}")
         if self.runs[figure].nunique() == 1:
             raise FileError(f"{self.folder}: {figure} is the same in all runs")
         if self.plan["sampler"] != "saltelli":

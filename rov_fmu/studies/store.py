@@ -74,6 +74,8 @@ class Store:
     def description(self) -> dict[str, Any]:
         """What the folder belongs to. Raises FileError."""
         path = self.folder / STUDY
+        if not self.folder.is_dir():
+            raise FileError(f"{self.folder}: there is no such folder")
         try:
             found = json.loads(read_text(path))
             known = isinstance(found, dict) and found.get("format") == _FORMAT

@@ -241,6 +241,18 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     _same(Results(results), whole)
 
 
+def test_results_that_are_not_there_are_told(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
+    with pytest.raises(FileError, match="nowhere: there is no such folder"):
+        Results(tmp_path / "nowhere")
+    plan = _plan(tmp_path, foreign(), runs=2)
+    plan.write_text(plan.read_text().replace('[keep]\noutputs = ["y"]\nevery = 0.5\n', ""))
+    results = study(plan, tmp_path / "results", scheduler=scheduler)
+    with pytest.raises(FileError, match=r"no trajectory of 'y' is kept, nor any other: the plan has no \[keep\]"):
+        results.bands("y")
+    with pytest.raises(FileError, match="there is no figure 'y', only end, sooner"):
+        results.sensitivity("y")
+
+
 def test_sobol_indices_of_a_linear_fmu_are_those_of_the_closed_form(
     foreign: Foreign, tmp_path: Path, scheduler: str
 ) -> None:
