@@ -58,7 +58,7 @@ def run_study(
         told = {"groups": design.groups, "warnings": prepared.warnings}
         units = {name: model.variables[name].unit for name in (*design.names, *job.kept)}
         more = {"points": len(job.kept_points), "model": model.name, "units": units}
-        store.belongs_to(prepared.mark, digest(model.content), design.runs, columns, **more, **told)
+        store.belongs_to(prepared.mark, digest(model.content), plan.vehicle, design.runs, columns, **more, **told)
         if plan.vehicle:
             write_whole(Output(folder / model.name, model.content))
         spent = execute(job, design, store, workers, scheduler, on_progress)

@@ -45,18 +45,25 @@ class Store:
             lock.release()
 
     def belongs_to(
-        self, plan: Mapping[str, Any], fmu: str, runs: int, columns: Mapping[str, Sequence[str]], **more: Any
+        self,
+        plan: Mapping[str, Any],
+        fmu: str,
+        vehicle: str | None,
+        runs: int,
+        columns: Mapping[str, Sequence[str]],
+        **more: Any,
     ) -> None:
         """See that what is there is of this plan and FMU (its digest), and write down that it is, with more on it.
 
-        Raises FileError, WriteError.
+        A vehicle is what the FMU was built of for the study. Raises FileError, WriteError.
         """
         path = self.folder / STUDY
         mark = {"plan": dict(plan), "fmu": fmu}
         if self.done() and path.exists():
             there = self.description()
             if there["fmu"] != fmu:
-                raise FileError(f"{self.folder}: holds runs of another FMU: choose another folder")
+                why = f", for the vehicle {vehicle} has changed, or rov-fmu, which builds it" if vehicle else ""
+                raise FileError(f"{self.folder}: holds runs of another FMU{why}: choose another folder")
             keys = {*there["plan"], *plan}
             if changed := sorted(key for key in keys if there["plan"].get(key) != plan.get(key)):
                 raise FileError(

@@ -23,6 +23,7 @@ from rov_fmu.studies.model import read_model, unpack
 from rov_fmu.studies.plan import load_plan
 from rov_fmu.studies.prepared import prepare
 from rov_fmu.studies.simulator import LoadError, RunError, Simulator
+from rov_fmu.studies.store import Store
 from tests.commands import start
 
 Foreign = Callable[..., Path]
@@ -239,6 +240,15 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
         assert line.startswith(f"rov-fmu: {results}: {told}")
         assert line.count("\n") == 1
     _same(Results(results), whole)
+
+
+def test_the_fmu_of_a_changed_vehicle_is_told_as_that(tmp_path: Path) -> None:
+    store = Store(tmp_path / "results")
+    with store.held():
+        store.belongs_to({}, "one", "rov.toml", 1, {})
+        store.write(0, 1, b"", None)
+        with pytest.raises(FileError, match=r"another FMU, for the vehicle rov\.toml has changed, or rov-fmu, which"):
+            store.belongs_to({}, "another", "rov.toml", 1, {})
 
 
 def test_results_that_are_not_there_are_told(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
