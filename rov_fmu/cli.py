@@ -209,11 +209,12 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     if workers and scheduler is not None:
         raise click.UsageError("study: --scheduler has the workers that it has: leave --workers out")
     try:
-        from rov_fmu.studies.page import page_output
+        from rov_fmu.studies.page import page_output, see_place
         from rov_fmu.studies.run import run_study
         from rov_fmu.studies.summary import print_summary
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
+    see_place(output)
     try:
         with _runs_bar() as tell:
             spent, results = run_study(

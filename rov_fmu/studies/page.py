@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from rov_fmu.studies.results import QUANTILES, Results
 from rov_fmu.studies.worker import REASON, STATUS
 
 PAGE = "study.html"
+_KIND = b'<p class="kind">Study</p>'
+"""Which every page has."""
 _PLOT = (3.7, 2.6)  # inches
 _BINS = 40
 _POINTS = 400
@@ -27,6 +30,13 @@ _REASONS = 50
 def page_output(results: Results) -> Output:
     """The page of what is done of a study, to write into its folder. Raises FileError."""
     return Output(results.folder / PAGE, study_page(results).encode())
+
+
+def see_place(folder: Path) -> None:
+    """That the page overwrites nothing else in a folder. Raises FileError."""
+    path = folder / PAGE
+    if path.exists() and _KIND not in path.read_bytes():
+        raise FileError(f"{path}: is no page of this tool and would be overwritten: choose another folder")
 
 
 def study_page(results: Results) -> str:

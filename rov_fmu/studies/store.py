@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,9 +27,10 @@ class Store:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Make the folder, for this process alone. Raises FileError, WriteError."""
+        """Make the folder, for this process alone; it goes where no run came into it. Raises FileError, WriteError."""
         import locket
 
+        is_new = not self.folder.exists()
         try:
             for each in (self.folder, self.folder / RUNS, self.folder / TRAJECTORIES):
                 each.mkdir(exist_ok=True)
@@ -42,6 +44,8 @@ class Store:
         try:
             yield
         finally:
+            if is_new and not self.done():
+                shutil.rmtree(self.folder, ignore_errors=True)
             lock.release()
 
     def belongs_to(

@@ -169,8 +169,8 @@ def test_a_folder_takes_one_study_at_a_time(
     plan, folder = _plan(tmp_path, f'fmu = "{videoray_fmu}"'), tmp_path / "results"
     with Store(folder).held():
         assert main(["study", str(plan), "-o", str(folder), "--workers", "1"]) == 2
+        assert not list((folder / "runs").iterdir())
     assert capsys.readouterr().err == f"rov-fmu: {folder}: another study is writing there\n"
-    assert not list((folder / "runs").iterdir())
 
 
 def test_an_fmu_that_cannot_be_loaded_is_a_line(

@@ -393,6 +393,7 @@ def test_a_scheduler_that_is_not_there_is_a_line(
         main(["study", str(_plan(tmp_path, foreign())), "-o", str(tmp_path / "results"), "--scheduler", address]) == 2
     )
     assert capsys.readouterr().err == f"rov-fmu: --scheduler {address}: no scheduler of Dask answers there\n"
+    assert not (tmp_path / "results").exists()
 
 
 @pytest.mark.long
