@@ -220,9 +220,8 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
             spent, results = run_study(
                 plan, output, workers, scheduler, tell, lambda told: click.echo(f"rov-fmu: warning: {told}", err=True)
             )
-    except KeyboardInterrupt:
-        click.echo("rov-fmu: what is done is kept; the same command goes on from there", err=True)
-        raise
+    except KeyboardInterrupt as interrupt:
+        raise KeyboardInterrupt("what is done is kept; the same command goes on from there") from interrupt
     write_whole(page_output(results))
     print_summary(results, spent)
     if len(results.failed) + len(results.incomplete) == len(results.runs):

@@ -13,7 +13,7 @@ from rov_fmu.files.output import WriteError
 def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exception], int]) -> int:
     """Do what is asked for: 0 done, 130 interrupted, 1 no one reads what is printed, or the code of what is raised.
 
-    OSError is among the codes. The messages of the others are printed as they are.
+    OSError is among the codes. The messages of the others are printed as they are, as is that of an interrupt.
     """
     from click import Abort, ClickException  # late: where it is not installed, the command line can say so
 
@@ -23,9 +23,9 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
         finally:
             if sys.stdout:  # --help leaves by SystemExit
                 sys.stdout.flush()
-    except (KeyboardInterrupt, Abort):
+    except (KeyboardInterrupt, Abort) as interrupt:
         exec("")  # CPython ends by SIGINT, whatever is asked for, if the last text that was executed was interrupted
-        return _say(program, "interrupted, no file is half-written", 130)
+        return _say(program, "\n".join(["interrupted, no file is half-written", *map(str, interrupt.args)]), 130)
     except BrokenPipeError:
         _end_output()
         return 1  # as Rich does

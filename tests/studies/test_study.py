@@ -348,8 +348,8 @@ def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: P
     error = process.communicate(timeout=60)[1]
     assert process.returncode == 130
     assert error.splitlines() == [
-        "rov-fmu: what is done is kept; the same command goes on from there",
         "rov-fmu: interrupted, no file is half-written",
+        "rov-fmu: what is done is kept; the same command goes on from there",
     ]
     done = len(Results(results).runs)
     assert 0 < done < SLOW["runs"]
