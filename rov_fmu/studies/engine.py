@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import signal
+import sys
 import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from math import ceil
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -35,6 +37,7 @@ _CHANCES = 3
 """How often workers may die until all runs are done apart from them, and then those of a task until it is given up."""
 _GONE = (CancelledError, CommClosedError)
 """What Dask raises where there is no scheduler any more."""
+_GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
 _WAIT = 10.0
 """Seconds until a scheduler, or a worker of it, must have answered."""
 
@@ -249,13 +252,18 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
 
 def _started(**options: Any) -> LocalCluster:
     """Workers that Ctrl-C does not reach, for it is for this process, which sees it as soon as they are there."""
-    if not hasattr(signal, "pthread_sigmask"):
-        return LocalCluster(**options)
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    script = getattr(sys.modules["__main__"], "__file__", None)
+    if script and not Path(script).exists():
+        raise StudyError(f"workers cannot be started of {script}, which is no file; {_GUARD}")
+    can_block = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else set()
     try:
         return LocalCluster(**options)
+    except RuntimeError:
+        raise StudyError(f"the workers do not start; {_GUARD}") from None
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if can_block:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _see(scheduler: str) -> None:

@@ -1,7 +1,9 @@
 """A study from its plan to its results."""
 
+import sys
 import tempfile
 from collections.abc import Callable
+from multiprocessing import current_process
 from pathlib import Path
 
 from rov_fmu.build import build
@@ -33,6 +35,8 @@ def study(
     where the workers are lost, WriteError, KeyboardInterrupt; what is done is kept, and the same call goes on from
     there.
     """
+    if getattr(current_process(), "_inheriting", False):
+        sys.exit(1)  # in a worker that imports a script without it: the process that has started this one tells why
     _, results = run_study(Path(plan), Path(folder), workers, scheduler, on_progress)
     return results
 

@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -337,6 +338,28 @@ def _children(pid: int) -> list[int]:
     found = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=True)
     lines = found.stdout.splitlines()
     return [int(line.split()[0]) for line in lines if "spawn_main" in line]
+
+
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        pytest.param("script.py", "the workers do not start; ", marks=pytest.mark.long),
+        ("-", "workers cannot be started of <stdin>, which is no file; "),
+    ],
+)
+def test_a_script_that_workers_cannot_import_is_told_of_its_guard(
+    script: str, told: str, foreign: Foreign, tmp_path: Path
+) -> None:
+    """And no worker says a word."""
+    _plan(tmp_path, foreign())
+    text = "from rov_fmu.studies import study\nstudy('plan.toml', 'results', workers=2)\n"
+    (tmp_path / "script.py").write_text(text)
+    begin = [sys.executable, script]
+    ran = subprocess.run(begin, check=False, input=text, capture_output=True, text=True, cwd=tmp_path)
+    *_, last = ran.stderr.splitlines()
+    assert last.startswith(f'rov_fmu.files.messages.StudyError: {told}a script calls study under `if __name__ == "__m')
+    assert ran.stderr.count("Traceback") == 1
+    assert not (tmp_path / "results").exists()
 
 
 @posix
