@@ -195,7 +195,11 @@ def _between(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, s
     for n in signal.jumps(before):
         time = signal.points[n][0]
         if plan.start_time < time < plan.stop_time and plan.step_at(time) is None:
-            yield n, f"a jump must be at a communication point, a multiple of step = {plan.step:g} s after the start"
+            was = signal.points[n - 1][1] if n else before
+            told = (
+                f"a jump, as from {was:g} here, must be at a communication point, a multiple of step = {plan.step:g} s"
+            )
+            yield n, f"{told} after the start"
             return
 
 

@@ -56,9 +56,9 @@ WRONG = {
     HEAD + VARY + "[inputs]\nu_l.ramps = [[1.0, 0.0], [0.5, 1.0]]\n" + TAIL:
         "inputs.u_l.ramps = [[1.0, 0.0], [0.5, 1.0]]: the time must not go back, as it does from 1 to 0.5",
     HEAD + VARY + "[inputs]\nu_l.steps = [[0.2, 0.5], [0.55, 0.0]]\n" + TAIL:
-        "inputs.u_l = [0.55, 0.0]: a jump must be at a communication point, a multiple of step = 0.1 s after the start",
+        "inputs.u_l = [0.55, 0.0]: a jump, as from 0.5 here, must be at a communication point, a multiple of step",
     HEAD + VARY + "[inputs]\nu_l.ramps = [[0.0, 0.0], [0.45, 0.5], [0.45, 0.0]]\n" + TAIL:
-        "inputs.u_l = [0.45, 0.0]: a jump must be at a communication point",
+        "inputs.u_l = [0.45, 0.0]: a jump, as from 0.5 here, must be at a communication point",
     HEAD + VARY + '[keep]\noutputs = ["q"]\n': "keep.outputs: the FMU has no variable 'q' that is a number",
     HEAD + VARY + '[keep]\noutputs = ["u", "u"]\n': "keep.outputs = ['u', 'u']: must name each once",
     HEAD + VARY + '[keep]\noutputs = ["u"]\nevery = 2.0\n': "keep.every = 2.0: must not be longer than a run",
@@ -122,7 +122,7 @@ def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path, capsys: pytest
     ("rows", "told"),
     {
         "time,u_l\n0,0\n\n0.1,1.5\n": "row 2, column 'u_l' = 1.5 at 0.1 s: must be within -1 ... 1",
-        "time,u_l\n0,0\n0.55,0.5\n": "row 2, column 'u_l' = 0.5 at 0.55 s: a jump must be at a communication point, ",
+        "time,u_l\n0.03,0.5\n0.1,0.5\n": "row 1, column 'u_l' = 0.5 at 0.03 s: a jump, as from 0 here, must be at a ",
         "time,u_l\n0,0\n0.5,full\n": "row 2, column 'u_l' = 'full': must be a number",
         "time,u\n0,0\n": "column 'u': is no input of the FMU; its causality is output",
         "time,u_r\n0,0\n": "column 'u_r': is given in [inputs] too",
