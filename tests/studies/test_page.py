@@ -53,6 +53,7 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     labels = re.findall(r'aria-label="([^"]*)"', text)
     assert labels == ["Distribution of end", "Trajectories of y"]
     assert "<script" not in text
+    assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
 
 
 def test_the_page_is_the_same_for_the_same_results(done: Path) -> None:
