@@ -17,7 +17,8 @@ from rov_fmu.vehicle.published import ResponseTable
 
 Number = TypeVar("Number", float, Decimal)
 
-_STEPS = ("teal", "blue", "violet", "orange")
+LINES = ("teal", "blue", "violet", "orange")
+"""Colours of lines beside each other."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def measured_step(table: ResponseTable | None, command: Decimal) -> Step:
 
 def evenly(commands: Sequence[Number]) -> list[Number]:
     """Up to four of the commands, evenly from the first to the last."""
-    last = len(_STEPS) - 1
+    last = len(LINES) - 1
     return sorted({commands[round((len(commands) - 1) * n / last)] for n in range(last + 1)})
 
 
@@ -91,7 +92,7 @@ def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tup
     Taus += [Tau for step in steps for Tau in step.Tau]
     end = ceil(3.3 * max((Tau for Tau in Taus if isfinite(Tau)), default=3.0))
     t = [end * (n / 45) ** 1.5 for n in range(46)]  # closer where the curve bends
-    roles = dict(zip(sorted({abs(step.command) for step in steps}), _STEPS, strict=False))
+    roles = dict(zip(sorted({abs(step.command) for step in steps}), LINES, strict=False))
     for step in steps:
         color = LIGHT[roles[abs(step.command)]]
         for rov, dashes in models:

@@ -39,6 +39,7 @@ class Variable:
     unit: str
     start: float
     """0 where the FMU tells none."""
+    description: str = ""
 
     @property
     def is_whole(self) -> bool:
@@ -134,6 +135,7 @@ def _variable(v: Any) -> Variable:
     return Variable(
         v.name, v.valueReference, v.type, v.causality, can_be_set, v.variability == "continuous",
         -inf if low is None else float(low), inf if high is None else float(high), unit or "1", _number(v.start),
+        v.description or "",
     )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """The page on a study: bands, distributions, sensitivities, failures; one HTML file."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.output import Output
-from rov_fmu.pages.svg import LIGHT, inline_svg
+from rov_fmu.pages.plots import LINES, evenly
+from rov_fmu.pages.svg import LIGHT, Draw, inline_svg
 from rov_fmu.pages.templates import number, page, pretty_unit
 from rov_fmu.studies.results import QUANTILES, Results
 from rov_fmu.studies.worker import REASON, STATUS
@@ -25,6 +27,14 @@ _BINS = 40
 _POINTS = 400
 """Points of a band that are drawn; more are not seen."""
 _REASONS = 50
+_ROWS = 60
+"""Of a grid, that are shown."""
+_MARKED = 40
+"""Points of a line that are marked."""
+_STILL = 1e-6
+"""Of the greatest number: what varies by less does not vary."""
+_NARROW = 1e-3
+"""Where numbers vary by less, those at an axis are long, and so fewer."""
 
 
 def page_output(results: Results) -> Output:
@@ -43,6 +53,7 @@ def study_page(results: Results) -> str:
     """The page as HTML, the same for the same results."""
     runs, plan = results.runs, results.plan
     reasons = [*_failures(runs)]
+    grid = _grid(results)
     return page(
         "study.html.j2",
         title=results.model.removesuffix(".fmu"),
@@ -55,9 +66,13 @@ def study_page(results: Results) -> str:
         sampler=plan["sampler"],
         seed=plan["seed"],
         quantiles=QUANTILES,
-        figures=[_figure(name, runs[name], plan["figures"][name]) for name in results.figures],
+        figures=[_figure(name, results, grid) for name in results.figures],
+        grid=grid,
+        rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
+        more_rows=len(runs[_ROWS:]),
         sensitivities=_sensitivities(results) if plan["sampler"] == "saltelli" else {},
         bands={name: _band(results, name) for name in results.outputs} if len(results.failed) < len(runs) else {},
+        descriptions=results.descriptions,
         warnings=results.warnings,
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
         failures=reasons[:_REASONS],
@@ -65,27 +80,78 @@ def study_page(results: Results) -> str:
     )
 
 
-def _figure(name: str, column: "pd.Series[float]", expression: str) -> dict[str, Any]:
-    values = column.to_numpy(float)
-    there = values[np.isfinite(values)]
-    found: dict[str, Any] = {"name": name, "expression": expression, "runs": there.size, "plot": ""}
+def _grid(results: Results) -> Sequence[str]:
+    """The one or two variables of a grid, that with more values first; nothing of what is no such grid."""
+    if results.plan["sampler"] != "grid" or len(results.parameters) not in (1, 2):
+        return ()
+    return sorted(results.parameters, key=lambda name: -results.runs[name].nunique())
+
+
+def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
+    values = results.runs[name].to_numpy(float)
+    there, unit = values[np.isfinite(values)], results.figure_units[name]
+    found = {"name": name, "expression": results.plan["figures"][name], "unit": unit, "runs": there.size}
     if not there.size:
-        return {**found, "quantiles": [None] * len(QUANTILES), "mean": None, "sd": None}
+        return {**found, "quantiles": [None] * len(QUANTILES), "mean": None, "sd": None, "plot": "", "is_still": False}
     quantiles = np.quantile(there, QUANTILES).tolist()
-    plot = inline_svg(f"Distribution of {name}", partial(_draw_distribution, values=there, quantiles=quantiles), _PLOT)
     sd = float(there.std(ddof=1)) if there.size > 1 else None
-    return {**found, "quantiles": quantiles, "mean": float(there.mean()), "sd": sd, "plot": plot}
+    told = {**found, "quantiles": quantiles, "mean": float(there.mean()), "sd": sd}
+    if _is_still(there):
+        return {**told, "plot": "", "is_still": True}
+    if grid:
+        draw: Draw = partial(_draw_lines, name=name, results=results, grid=grid)
+        title = f"{name} over {' and '.join(grid)}"
+    else:
+        draw = partial(_draw_distribution, values=there, quantiles=quantiles, label=_axis("", unit))
+        title = f"Distribution of {name}"
+    return {**told, "plot": inline_svg(title, draw, _PLOT), "is_still": False}
 
 
-def _draw_distribution(figure: Figure, values: Any, quantiles: list[float]) -> None:
+def _is_still(values: Any) -> bool:
+    """Whether numbers are the same, but for what no one sees."""
+    return bool(np.ptp(values) <= _STILL * np.abs(values).max())
+
+
+def _axis(name: str, unit: str) -> str:
+    """What is written at an axis."""
+    return name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
+
+
+def _draw_distribution(figure: Figure, values: Any, quantiles: list[float], label: str) -> None:
     ax = figure.subplots()
     low, median, high = quantiles[0], quantiles[len(quantiles) // 2], quantiles[-1]
     ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     shares = np.full(len(values), 100.0 / len(values))
     ax.hist(values, bins=min(_BINS, max(5, round(len(values) ** 0.5))), weights=shares, color=LIGHT["blue"], alpha=0.75)
     ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
-    ax.set_ylabel("runs (%)")
-    ax.locator_params(nbins=6)
+    ax.set(xlabel=label, ylabel="runs (%)")
+    _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
+
+
+def _draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str]) -> None:
+    """Over what has more values; a line for some values of the other."""
+    ax = figure.subplots()
+    along, *others = grid
+    runs = results.runs.sort_values(along, kind="stable")
+    lines = [("", runs)]
+    for other in others:
+        some = evenly(np.unique(runs[other]).tolist())
+        lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
+    for (label, line), color in zip(lines, LINES, strict=False):
+        marker = "o" if len(line) <= _MARKED else ""
+        ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
+    for other in others:
+        title = _axis(other, results.units[other])
+        figure.legend(title=title, title_fontsize=8.5, handlelength=1.0, loc="outside right upper")
+    ax.set(xlabel=_axis(along, results.units[along]), ylabel=_axis("", results.figure_units[name]))
+    _set_ticks(ax)
+
+
+def _set_ticks(ax: Axes, along: int = 6) -> None:
+    """Numbers as they are, and not what they are above another."""
+    ax.ticklabel_format(useOffset=False)
+    ax.locator_params("x", nbins=along)
+    ax.locator_params("y", nbins=6)
 
 
 def _band(results: Results, output: str) -> Markup:
@@ -101,14 +167,18 @@ def _draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
     ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
     ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
     ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6)
-    ax.set(xlabel="time (s)", ylabel="" if unit == "1" else pretty_unit(unit))
-    ax.locator_params(nbins=6)
+    ax.set(xlabel="time (s)", ylabel=_axis("", unit))
+    _set_ticks(ax)
 
 
 def _sensitivities(results: Results) -> dict[str, Any]:
     """Rows by figure, or why there are none."""
     found: dict[str, Any] = {}
     for figure in results.figures:
+        there = results.runs[figure].dropna().to_numpy(float)
+        if there.size and _is_still(there):
+            found[figure] = "does not vary"
+            continue
         try:
             rows = results.sensitivity(figure).sort_values("ST", ascending=False, kind="stable")
         except FileError as error:
@@ -129,6 +199,7 @@ def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], resu
     return {
         "name": name, "planned": f"{kind}: {words}", "others": others, "least": float(values.min()),
         "median": float(np.median(values)), "greatest": float(values.max()), "unit": results.units[name],
+        "description": results.descriptions[name],
     }  # fmt: skip
 
 

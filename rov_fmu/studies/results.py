@@ -10,6 +10,7 @@ import pandas as pd
 import pyarrow.dataset as ds
 
 from rov_fmu.files.messages import FileError, shown
+from rov_fmu.studies.figure_units import figure_unit
 from rov_fmu.studies.store import RUNS, TRAJECTORIES, Store
 from rov_fmu.studies.worker import FAILED, INCOMPLETE, RUN, STATUS, TIME
 
@@ -37,6 +38,12 @@ class Results:
         """As the results depend on it."""
         self.units: dict[str, str] = told["units"]
         """Of parameters and outputs."""
+        self.figure_units: dict[str, str] = {
+            name: figure_unit(text, self.units) for name, text in self.plan["figures"].items()
+        }
+        """Nothing where a figure's expression does not tell it."""
+        self.descriptions: dict[str, str] = told["descriptions"]
+        """Of parameters and outputs, as the FMU has them."""
         self.model: str = told["model"]
         """The name of the FMU's file."""
         self.fmu: str = told["fmu"]

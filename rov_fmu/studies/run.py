@@ -60,9 +60,10 @@ def run_study(
         job, design = prepared.job, prepared.design
         columns = {"parameters": design.names, "figures": [*job.figures], "outputs": job.kept}
         told = {"groups": design.groups, "warnings": prepared.warnings}
-        units = {name: model.variables[name].unit for name in (*design.names, *job.kept)}
-        more = {"points": len(job.kept_points), "model": model.name, "units": units}
-        store.belongs_to(prepared.mark, digest(model.content), plan.vehicle, design.runs, columns, **more, **told)
+        named = [model.variables[name] for name in (*design.names, *job.manoeuvre.recorded)]
+        words = {"units": {v.name: v.unit for v in named}, "descriptions": {v.name: v.description for v in named}}
+        more = {"points": len(job.kept_points), "model": model.name, **words}
+        store.belongs_to(prepared.mark, digest(model.content), design.runs, columns, **more, **told)
         if plan.vehicle:
             write_whole(Output(folder / model.name, model.content))
         spent = execute(job, design, store, workers, scheduler, on_progress)

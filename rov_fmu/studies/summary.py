@@ -4,6 +4,7 @@ import numpy as np
 from rich.text import Text
 
 from rov_fmu.pages.console import console, table, text
+from rov_fmu.pages.templates import pretty_unit
 from rov_fmu.studies.engine import Spent
 from rov_fmu.studies.results import Results
 from rov_fmu.studies.worker import REASON
@@ -29,7 +30,9 @@ def print_summary(results: Results, spent: Spent) -> None:
             values = runs[name].to_numpy(float)
             there = values[np.isfinite(values)]
             numbers = [*np.quantile(there, _SHOWN), there.mean()] if there.size else [np.nan] * (len(_SHOWN) + 1)
-            shown.add_row(name, *(text(number, ".5g") for number in numbers), str(there.size))
+            unit = results.figure_units[name]
+            told = name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})"
+            shown.add_row(told, *(text(number, ".5g") for number in numbers), str(there.size))
         out.print(shown)
     for reason, count in runs[REASON].value_counts().head(_FAILURES).items():
         out.print(f"  {count} runs: {reason}", soft_wrap=True)

@@ -29,6 +29,7 @@ outputs = ["y"]
 [figures]
 end = "y[-1]"
 odd = "y[99]"
+offset = "2.0 + 0*b"
 """)
     assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 1
     return folder / "results"
@@ -52,6 +53,7 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert failed[0].text_content() == str(len(results.failed))
     labels = re.findall(r'aria-label="([^"]*)"', text)
     assert labels == ["Distribution of end", "Trajectories of y"]
+    assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
     assert "<script" not in text
     assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
 
@@ -62,23 +64,35 @@ def test_the_page_is_the_same_for_the_same_results(done: Path) -> None:
     assert study_page(Results(done)) == (done / "study.html").read_text(encoding="utf-8")
 
 
-def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_done(
-    done: Path, capsys: pytest.CaptureFixture[str]
+def test_a_grid_shows_figures_over_what_varies_with_their_units(
+    videoray_fmu: Path, tmp_path: Path, scheduler: str
 ) -> None:
-    failed = len(Results(done).failed)
-    assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
-    told = capsys.readouterr()
-    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in told.out.replace("\n", " ")
-    assert told.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
-
-
-def test_another_page_of_this_name_is_not_overwritten(
-    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    own = tmp_path / "study.html"
-    own.write_text("<p>My studies</p>")
-    assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
-    told = "is no page of this tool and would be overwritten: choose another folder"
-    assert capsys.readouterr().err == f"rov-fmu: {own}: {told}\n"
-    assert [*tmp_path.iterdir()] == [own]
-    assert own.read_text() == "<p>My studies</p>"
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{videoray_fmu}"
+stop_time = 2.0
+step = 0.1
+sampler = "grid"
+inputs.u_r = 0.3
+[vary]
+u_l.values = [0.3, 0.2]
+m_rov.range = {{ from = 6.0, to = 8.0, count = 5 }}
+[keep]
+outputs = ["u"]
+[figures]
+V = "final(u) - u[0]"
+way = "max(x)"
+sway = "1.0 * t[0]"
+T = "Tau(u)"
+""")
+    arguments = [str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results"), "--scheduler", scheduler]
+    assert main(["study", *arguments]) == 0
+    text = (tmp_path / "results" / "study.html").read_text(encoding="utf-8")
+    page, runs = html.fromstring(text), Results(tmp_path / "results").runs
+    labels = re.findall(r'aria-label="([^"]*)"', text)
+    assert labels == [*(f"{name} over m_rov and u_l" for name in ("V", "way", "T")), "Trajectories of u"]
+    head, *rows = [
+        [cell.text_content() for cell in row] for row in page.xpath("//h2[@id='figures']/following::table[1]//tr")
+    ]
+    assert head == ["u_l", "m_rov (kg)", "V (m/s)", "way (m)", "sway", "T (s)"]
+    shown = [[float(cell.replace("−", "-")) for cell in row] for row in rows]
+    assert shown == [pytest.approx(row, rel=1e-5) for row in runs[["u_l", "m_rov", "V", "way", "sway", "T"]].to_numpy()]
+    assert "Surge velocity" in page.xpath("string(//h2[@id='trajectories']/following::figure[1])")
