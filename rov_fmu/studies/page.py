@@ -31,6 +31,10 @@ _ROWS = 60
 """Of a grid, that are shown."""
 _MARKED = 40
 """Points of a line that are marked."""
+_FEW = 16
+"""Blocks of runs from which not even the intervals of indices are known: of 2, that of 0.5 was 0.6 to 1.1."""
+_SURE = 0.1
+"""Half width of an interval that tells that an index is small."""
 _STILL = 1e-6
 """Of the greatest number: what varies by less does not vary."""
 _NARROW = 1e-3
@@ -71,6 +75,8 @@ def study_page(results: Results) -> str:
         rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
         more_rows=len(runs[_ROWS:]),
         sensitivities=_sensitivities(results) if plan["sampler"] == "saltelli" else {},
+        blocks=results.planned // (len(results.groups) + 2),
+        few=_FEW,
         bands={name: _band(results, name) for name in results.outputs} if len(results.failed) < len(runs) else {},
         descriptions=results.descriptions,
         warnings=results.warnings,
@@ -184,8 +190,14 @@ def _sensitivities(results: Results) -> dict[str, Any]:
         except FileError as error:
             found[figure] = str(error).removeprefix(f"{results.folder}: ")
         else:
+            rows["S1_tells"], rows["ST_tells"] = (_tells(rows[key], rows[f"{key}_95"]) for key in ("S1", "ST"))
             found[figure] = (rows.round(6) + 0.0).reset_index(names="name").to_dict("records")  # without -0
     return found
+
+
+def _tells(index: "pd.Series[float]", half_width: "pd.Series[float]") -> "pd.Series[bool]":
+    """Whether an index is known: its interval is narrower than itself, or narrow anyway, as that of a small one is."""
+    return (2.0 * half_width < index.abs()) | (half_width < _SURE)
 
 
 def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], results: Results) -> dict[str, Any]:

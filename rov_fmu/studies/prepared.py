@@ -76,7 +76,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     }
     mark.pop("input_file", None)
     job = Job(f"rov-fmu-{uuid4().hex}", model, manoeuvre, plan.figures, kept, _kept_points(plan), plan.time_limit)
-    return Prepared(plan, job, design, mark, [*estimates.warnings()])
+    return Prepared(plan, job, design, mark, [*estimates.warnings(), *design.warnings()])
 
 
 def vehicle_file(given: str, path: Path) -> Path:

@@ -1,7 +1,7 @@
 """The parameters of every run: they depend on the plan, its seed and the run's number alone."""
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import log, prod
 
 import numpy as np
@@ -23,7 +23,7 @@ class Design:
 
     def __init__(self, plan: Plan, variables: Mapping[str, Variable], known: Uncertainty = NOTHING) -> None:
         self._known, self._varied = known, plan.vary
-        self._variables = variables
+        self._variables, self._planned = variables, plan.runs
         self.names = (*known.names, *plan.vary)
         self.groups = (*known.groups, *((name,) for name in plan.vary))
         """The names; what is in different groups is independent."""
@@ -39,6 +39,12 @@ class Design:
             "random": lambda: _random(width, seed),
         }
         self._draw = draws[plan.sampler]()
+
+    def warnings(self) -> Iterator[str]:
+        """What the results have in them that a reader may not expect, a sentence each."""
+        if self._planned is not None and self.runs > self._planned:
+            block = len(self.groups) + 2
+            yield f"runs = {self._planned} becomes {self.runs}, which are {self.runs // block} whole blocks of {block}"
 
     def rows(self, first: int, end: int) -> Array:
         """The values of what varies, a row a run, a column a variable, from the first run to the one before `end`."""

@@ -96,3 +96,34 @@ T = "Tau(u)"
     shown = [[float(cell.replace("−", "-")) for cell in row] for row in rows]
     assert shown == [pytest.approx(row, rel=1e-5) for row in runs[["u_l", "m_rov", "V", "way", "sway", "T"]].to_numpy()]
     assert "Surge velocity" in page.xpath("string(//h2[@id='trajectories']/following::figure[1])")
+
+
+def test_indices_of_few_blocks_are_said_to_tell_nothing(
+    foreign: Callable[..., Path], tmp_path: Path, scheduler: str
+) -> None:
+    """Two terms of the same variance: S1 is 1/2 each, which 3 blocks do not show and 500 do."""
+    pages = {}
+    for runs in (12, 2000):
+        (tmp_path / f"{runs}.toml").write_text(f"""fmu = "{foreign()}"
+stop_time = 1.0
+step = 0.5
+runs = {runs}
+sampler = "saltelli"
+[vary]
+a.uniform = [0.0, 1.0]
+u.uniform = [0.0, 1.0]
+[figures]
+sum = "a + u"
+""")
+        arguments = [str(tmp_path / f"{runs}.toml"), "-o", str(tmp_path / f"{runs}"), "--scheduler", scheduler]
+        assert main(["study", *arguments]) == 0
+        pages[runs] = html.parse(tmp_path / f"{runs}" / "study.html")
+    said = "An index whose interval is as wide as itself (grey) tells nothing"
+    cells = "//h2[@id='sensitivity']/following::table[1]//td[@class='number same' or @class='number first same']"
+    assert said in pages[12].xpath("string(//body)")
+    assert pages[12].xpath(cells)
+    assert "So few blocks tell nothing" in pages[12].xpath("string(//body)")
+    assert "So few blocks tell nothing" not in pages[2000].xpath("string(//body)")
+    assert said not in pages[2000].xpath("string(//body)")
+    assert not pages[2000].xpath(cells)
+    assert "from 500 blocks" in pages[2000].xpath("string(//body)")

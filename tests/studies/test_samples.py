@@ -56,6 +56,13 @@ def test_the_parameters_are_distributed_as_the_plan_says(sampler: str) -> None:
         assert counts == pytest.approx(8000 / len(values), rel=0.12)
 
 
+def test_runs_of_saltelli_are_whole_blocks_and_it_is_told() -> None:
+    rounded, whole = _design("saltelli", 9, names="ab"), _design("saltelli", 8, names="ab")
+    assert (rounded.runs, whole.runs) == (12, 8)
+    assert [*rounded.warnings()] == ["runs = 9 becomes 12, which are 3 whole blocks of 4"]
+    assert [*whole.warnings()] == [*_design("sobol", 9).warnings()] == []
+
+
 def test_a_grid_has_every_combination_once() -> None:
     design = _design("grid", None, names="de")
     assert design.runs == 15
