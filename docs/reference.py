@@ -9,14 +9,16 @@ from typing import Any
 
 from rov_fmu.export.interface import LOG_CATEGORIES
 from rov_fmu.export.terminals import terminals
+from rov_fmu.files.toml_file import Strict
 from rov_fmu.motion.layout import AXES
 from rov_fmu.pages.templates import number
+from rov_fmu.studies.plan import InputFile, Keep, Plan, Signal, Varied
 from rov_fmu.vehicle.json_schema import json_schema
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 Table = list[tuple[str, ...]]
-PAGES = [Path(__file__).with_name(name) for name in ("vehicle-file.md", "variables.md")]
+PAGES = [Path(__file__).with_name(name) for name in ("vehicle-file.md", "variables.md", "studies.md")]
 
 _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number", "object": "table", "array": "list"}
 
@@ -30,6 +32,8 @@ def tables() -> dict[str, Table]:
     named |= {name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster")}
     categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
     found = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
+    plans = {"plan": Plan, "varied": Varied, "signal": Signal, "input_file": InputFile, "keep": Keep}
+    found |= {name: _plan_table(of) for name, of in plans.items()}
     return found | {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
 
 
@@ -67,13 +71,33 @@ def _table(table: dict[str, Any], schema: dict[str, Any]) -> Table:
     """A row a key."""
     rows = []
     for key, entry in table["properties"].items():
-        found = schema["$defs"][entry["$ref"].removeprefix("#/$defs/")] if "$ref" in entry else entry
+        found = _resolved(entry, schema)
         of_value = found.get("properties", {}).get("value")
         unit = found["properties"].get("unit", {}).get("const", "") if of_value else ""
         needed = "needed" if key in table.get("required", ()) else ""
-        words = found.get("description", "").replace("\n", " ").replace("|", r"\|")
-        rows.append((f"`{key}`", needed, unit, _allowed(of_value or found), words))
+        rows.append((f"`{key}`", needed, unit, _allowed(of_value or found), _words(found)))
     return [("key", "", "unit", "allowed", "what"), ("---",) * 5, *rows]
+
+
+def _plan_table(of: type[Strict]) -> Table:
+    """A row a key of a plan of a study, or of a table in it."""
+    schema, rows = json_schema(of), []
+    for (key, entry), field in zip(schema["properties"].items(), of.model_fields.values(), strict=True):
+        found = _resolved(entry, schema)
+        without = "needed" if field.is_required() else f"`{field.default}`" if field.default not in (None, {}) else ""
+        keys = ", ".join(f"{inner} = ..." for inner in found.get("properties", ()))
+        allowed = f"`{{ {keys} }}`" if keys else _allowed(found)
+        rows.append((f"`{key}`", without, allowed, _words(found)))
+    return [("key", "without it", "allowed", "what"), ("---",) * 4, *rows]
+
+
+def _resolved(entry: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = schema["$defs"][entry["$ref"].removeprefix("#/$defs/")] if "$ref" in entry else entry
+    return found
+
+
+def _words(entry: dict[str, Any]) -> str:
+    return str(entry.get("description", "")).replace("\n", " ").replace("|", r"\|")
 
 
 def _allowed(entry: dict[str, Any]) -> str:
@@ -81,6 +105,9 @@ def _allowed(entry: dict[str, Any]) -> str:
         return f"{number(entry['minimum'], 6)}\xa0…\xa0{number(entry['maximum'], 6)}"
     if choices := entry.get("enum", [entry["const"]] if "const" in entry else []):
         return ", ".join(f"`{choice}`" for choice in choices)
+    if "exclusiveMinimum" in entry:
+        most = f", at most {number(entry['maximum'], 6)}" if "maximum" in entry else ""
+        return f"more than {number(entry['exclusiveMinimum'], 6)}{most}"
     if entry.get("minItems") == entry.get("maxItems", 0):
         return f"{entry['minItems']} numbers"
     return _TYPES.get(entry.get("type", ""), "number")

@@ -1,16 +1,17 @@
-"""JSON schema of the vehicle file: for editors, and for its reference page."""
+"""JSON schema of the vehicle file: for editors, and for its reference page, as that of other files."""
 
 import json
 from typing import Any
 
+from rov_fmu.files.toml_file import Strict
 from rov_fmu.vehicle.schema import File
 
 _NULL = {"type": "null"}
 
 
-def json_schema() -> dict[str, Any]:
+def json_schema(of: type[Strict] = File) -> dict[str, Any]:
     """The schema."""
-    found: dict[str, Any] = _plain(File.model_json_schema())
+    found: dict[str, Any] = _plain(of.model_json_schema())
     return found
 
 
