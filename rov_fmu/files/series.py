@@ -23,6 +23,8 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
     if len(lines) < 2:
         raise error("has no rows below a header")
     header = [name.strip() for name in lines[0]]
+    if len(header) == 1 and (mark := next((mark for mark in ";\t" if mark in header[0]), None)):
+        raise error(f"columns are parted by commas, and not by {shown(mark)}; numbers have a point")
     if twice := next((name for name in header if header.count(name) > 1), None):
         raise error(f"column {shown(twice)}: there is such a column before")
     for name in header[1:]:

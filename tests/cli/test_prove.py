@@ -295,6 +295,7 @@ BAD: dict[str, tuple[Files, str]] = {
     "an unknown input": ({_U: "time,q\n0,1\n"}, f"{_U}: the FMU has no variable 'q'"),
     "no number": ({_Y: "time,y\n0,a\n"}, f"{_Y}: row 1, column 'y' = 'a': must be a number"),
     "NaN": ({_Y: "time,y\n0,nan\n"}, f"{_Y}: row 1, column 'y' = 'nan': must be a number"),
+    "semicolons": ({_Y: "time;y\n0,0;0,5\n"}, f"{_Y}: columns are parted by commas, and not by ';'"),
     "a torn row": ({_Y: "time,y\n0\n"}, f"{_Y}: row 1: 1 cells below 2 columns"),
     "time that goes back": ({_Y: "time,y\n1,0\n0,0\n"}, f"{_Y}: row 2: the time goes back"),
     "a column twice": ({_Y: "time,y,y\n0,0,0\n"}, f"{_Y}: column 'y': there is such a column before"),
