@@ -58,6 +58,8 @@ def study_page(results: Results) -> str:
     runs, plan = results.runs, results.plan
     reasons = [*_failures(runs)]
     grid = _grid(results)
+    indices = _sensitivities(results) if plan["sampler"] == "saltelli" else {}
+    rows = [row for told in indices.values() if not isinstance(told, str) for row in told]
     return page(
         "study.html.j2",
         title=results.model.removesuffix(".fmu"),
@@ -74,7 +76,8 @@ def study_page(results: Results) -> str:
         grid=grid,
         rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
         more_rows=len(runs[_ROWS:]),
-        sensitivities=_sensitivities(results) if plan["sampler"] == "saltelli" else {},
+        sensitivities=indices,
+        is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
         blocks=results.planned // (len(results.groups) + 2),
         few=_FEW,
         bands={name: _band(results, name) for name in results.outputs} if len(results.failed) < len(runs) else {},
