@@ -22,9 +22,10 @@ _AT_ONCE = 20_000_000
 class Results:
     """What a study has come to, as far as it is done. Raises FileError where the folder holds none.
 
-    As data frames: `runs`, `failed`, `trajectories()`, `bands()`, `sensitivity()`. What they are of: `parameters` (what
-    was varied), `figures`, `outputs` (what was kept), `units`, `figure_units`, `descriptions`, `groups` (correlated
-    together), `planned` (runs), `plan`, `model` (the FMU's file) and its digest `fmu`, `warnings`, `made_by`, `folder`.
+    As data frames: `runs`, `failed`, `incomplete`, `trajectories()`, `bands()`, `sensitivity()`. What they are of:
+    `parameters` (what was varied), `figures`, `outputs` (what was kept), `units`, `figure_units`, `descriptions`,
+    `groups` (correlated together), `planned` (runs), `plan`, `model` (the FMU's file) and its digest `fmu`,
+    `warnings`, `made_by`, `folder`.
     """
 
     def __init__(self, folder: Path | str) -> None:

@@ -63,7 +63,7 @@ def run_study(
         named = [model.variables[name] for name in (*design.names, *job.manoeuvre.recorded)]
         words = {"units": {v.name: v.unit for v in named}, "descriptions": {v.name: v.description for v in named}}
         more = {"points": len(job.kept_points), "model": model.name, **words}
-        store.belongs_to(prepared.mark, digest(model.content), design.runs, columns, **more, **told)
+        store.belongs_to(prepared.mark, digest(model.content), plan.vehicle, design.runs, columns, **more, **told)
         if plan.vehicle:
             write_whole(Output(folder / model.name, model.content))
         spent = execute(job, design, store, workers, scheduler, on_progress)

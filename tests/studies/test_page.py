@@ -127,3 +127,25 @@ sum = "a + u"
     assert said not in pages[2000].xpath("string(//body)")
     assert not pages[2000].xpath(cells)
     assert "from 500 blocks" in pages[2000].xpath("string(//body)")
+
+
+def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_done(
+    done: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failed = len(Results(done).failed)
+    assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
+    told = capsys.readouterr()
+    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in told.out.replace("\n", " ")
+    assert told.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
+
+
+def test_another_page_of_this_name_is_not_overwritten(
+    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "study.html"
+    own.write_text("<p>My studies</p>")
+    assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
+    told = "is no page of this tool and would be overwritten: choose another folder"
+    assert capsys.readouterr().err == f"rov-fmu: {own}: {told}\n"
+    assert [*tmp_path.iterdir()] == [own]
+    assert own.read_text() == "<p>My studies</p>"
