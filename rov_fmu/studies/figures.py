@@ -32,7 +32,7 @@ _PLAIN = (
 """What arithmetic of outputs is made of, besides numbers and calls."""
 _NUMBERS_OF = ("abs", "max", "mean", "min", "sum")
 """Functions of NumPy whose values are numbers."""
-_NOT_FOR_FIGURES = ("open", "print", "dir", "type")
+_NOT_FOR_FIGURES = ("open", "print", "dir", "type", "loadtxt", "genfromtxt", "fromfile", "fromregex")
 _BAND = 0.05
 """Of the way from the beginning: within it a response is settled."""
 

@@ -74,6 +74,7 @@ WRONG = {
     HEAD + "[vary]\nx.uniform = [0.0, 1.0]\n" + '[figures]\nend = "final(x)"\n':
         "figures.end = 'final(x)': TypeError: 'float' object is not subscriptable; x varies, and what varies is a numb",
     HEAD + VARY + '[figures]\nend = "open(1)"\n': "figures.end = 'open(1)': 'open' is neither a function nor a",
+    HEAD + VARY + '[figures]\nend = "sum(loadtxt(1))"\n': "figures.end = 'sum(loadtxt(1))': 'loadtxt' is neither",
     HEAD + VARY + '[figures]\nend = "u"\n': "figures.end = 'u': must be one number, and not array(",
     HEAD + VARY + '[figures]\nend = "V_ss()"\n':
         "figures.end = 'V_ss()': TypeError: V_ss() missing 1 required positional argument: 'y'",
