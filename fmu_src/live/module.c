@@ -1,0 +1,71 @@
+/* The model for a page, compiled to WebAssembly: the mathematics of the FMU as it is, and what a page asks of it. */
+#pragma STDC FP_CONTRACT OFF
+
+#include "model.h"
+
+#include "riccati.c"
+#include "rov.c"
+#include "track.c"
+#include "series.c"
+#include "rov_step.c"
+
+#define EXPORT(name) __attribute__((export_name(name)))
+
+static double at[N_VARIABLES];  /* by value reference */
+static double marks[N_AXES][2]; /* V_ss and Tau of each axis */
+static rov_gains gains;         /* follows the coefficients */
+
+EXPORT("variables") double *variables_start(void);
+EXPORT("marks") double *marks_start(void);
+EXPORT("tune") void tune(void);
+EXPORT("step") int step(double h);
+EXPORT("observe") void observe(void);
+
+double *variables_start(void)
+{
+    return at;
+}
+
+double *marks_start(void)
+{
+    return &marks[0][0];
+}
+
+/* To be called after a change of coefficients. */
+void tune(void)
+{
+    rov_prepare(at, &gains);
+}
+
+/* h > 0 seconds with the inputs held; 0, with all as it was, where the step is refused or its result overflows. */
+int step(double h)
+{
+    double next[N_STATES];
+    bool done = rov_step(at, &gains, h, next);
+    for (int i = 0; i < N_STATES; i++) {
+        done &= isfinite(next[i]) != 0;
+    }
+    if (done) {
+        memcpy(at + FIRST_STATE, next, sizeof next);
+    }
+    return done;
+}
+
+/* What is calculated: thrust and derivatives; and of each axis alone under the inputs of now, once the thrust is steady, V_ss
+ * by C = B V + A V^2 and Tau (17), the time from rest to p V, p = 1 - 1/e. */
+void observe(void)
+{
+    rov_held held;
+    double C[WIDTH];
+    rov_thrust_of(at, &gains);
+    rov_derivatives(at, &gains);
+    rov_hold(at, &gains, &held);
+    rov_push(at, &gains, held.steady, C);
+    for (int a = 0; a < N_AXES; a++) {
+        const int back = C[a] < 0.0;
+        const double A = gains.axis[a].A[back], B = gains.axis[a].B[back], force = fabs(C[a]), p = -expm1(-1.0);
+        const double D = sqrt(B * B + 4.0 * A * force), V = 2.0 * force / (B + D);
+        marks[a][0] = force == 0.0 ? 0.0 : back ? -V : V;
+        marks[a][1] = 2.0 * atanh(D * p * V / (2.0 * force - B * p * V)) / D;
+    }
+}

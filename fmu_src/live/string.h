@@ -1,0 +1,8 @@
+/* What the mathematics asks of <string.h>, where there is no library. */
+#ifndef STRING_H
+#define STRING_H
+
+#define memcpy(to, from, size) __builtin_memcpy(to, from, size)
+#define memset(to, byte, size) __builtin_memset(to, byte, size)
+
+#endif
