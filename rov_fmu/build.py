@@ -9,6 +9,7 @@ from time import perf_counter
 from rov_fmu.export.archive import archive, native_content, python_content
 from rov_fmu.export.compile import PLATFORMS, BuildError, OptionError, compile_all, host_platform
 from rov_fmu.export.model_description import NATIVE
+from rov_fmu.export.module import module
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.export.reference_results import reference_results
 from rov_fmu.files.output import Output, check_targets, write_whole
@@ -74,7 +75,8 @@ def build(
     chosen = chosen_platforms(platforms, fmi) if native else []
     left_out: list[str] = []
     results = reference_results(vehicle, left_out.append)
-    pages = {**documentation(vehicle, native=native, fmi=fmi, proves=bool(results)), **results}
+    flown = module(vehicle.rov)
+    pages = {**documentation(vehicle, native=native, fmi=fmi, proves=bool(results), module=flown), **results}
     content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
     start = perf_counter()
     seconds: dict[str, float] = {}

@@ -85,7 +85,7 @@ class Scene:
 
 def scenes(rov: Rov) -> dict[str, Scene]:
     """By view, at the scale that both share."""
-    inch = 0.9 * _size(rov)
+    inch = 0.9 * size_of(rov)
     for _ in range(3):  # the larger the part of the drawing that text takes, the smaller the rest
         found = {view: _arranged(rov, view, inch) for view in VIEWS}
         left, right = zip(*(scene.limits[0] for scene in found.values()), strict=True)
@@ -94,14 +94,15 @@ def scenes(rov: Rov) -> dict[str, Scene]:
     return {view: replace(scene, limits=(across, scene.limits[1])) for view, scene in found.items()}
 
 
-def _size(rov: Rov) -> float:
+def size_of(rov: Rov) -> float:
+    """How far thrusters are from the centre of mass, in m."""
     return max([_SMALLEST, *(abs(part) for thruster in rov.layout.thrusters for part in place(rov, thruster))])
 
 
 def _arranged(rov: Rov, view: str, inch: float) -> Scene:
     """A view with its names, where an inch is so many metres."""
     down, sight, toward = VIEWS[view]
-    size = _size(rov)
+    size = size_of(rov)
     space = Space(inch, [(-1.2 * size, 0.0)])  # the width of a drawing with little in it
     marks = list(_marks(rov, down, sight, toward))
     ends = {SURGE: (1.4 * size, 0.0), down: (0.0, 0.9 * size)}
@@ -179,7 +180,7 @@ def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
 
 def draw_icon(ax: Axes, rov: Rov) -> None:
     """The vehicle from above without words: its thrusters, on a body as wide as they are apart, round at the bow."""
-    size, marks = _size(rov), list(_marks(rov, *VIEWS["from above"]))
+    size, marks = size_of(rov), list(_marks(rov, *VIEWS["from above"]))
     x, y = 1.2 * size, max([0.5 * size, *(abs(mark.at[1]) for mark in marks)])
     ax.add_patch(PathPatch(_body(x, y), facecolor=LIGHT["band"], edgecolor=LIGHT["metal"], linewidth=2.0))
     for mark in marks:

@@ -1,6 +1,6 @@
 """documentation/index.html: one page that stands alone, with the numbers and plots of the vehicle it is about."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 from functools import partial
@@ -20,11 +20,20 @@ from rov_fmu.motion.layout import ARM, Axis, Layout
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages import equations
 from rov_fmu.pages.drawing import draw_thrusters, scenes
+from rov_fmu.pages.live import Flown, live
 from rov_fmu.pages.pictures import pictures
-from rov_fmu.pages.plots import Step, draw_curve, draw_steps, evenly, finish, measured_step
+from rov_fmu.pages.plots import (
+    Step,
+    draw_curve,
+    draw_steps,
+    finish,
+    held_commands,
+    measured_step,
+    tables_by_axis,
+)
 from rov_fmu.pages.svg import LIGHT, inline_file, inline_svg, svg_file
 from rov_fmu.pages.templates import page
-from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables, untuned
+from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _PANEL = (3.7, 2.9)  # inches
@@ -37,22 +46,26 @@ _FRAMES = {
 # ---- The page ------------------------------------------------------------------------------------------------------
 
 
-def documentation(vehicle: Vehicle, *, native: bool, fmi: int = 2, proves: bool = True) -> dict[str, bytes]:
+def documentation(
+    vehicle: Vehicle, *, native: bool, fmi: int = 2, proves: bool = True, module: bytes | None = None
+) -> dict[str, bytes]:
     """The page and the pictures by their path in the FMU. Raises FileError."""
-    text = documentation_page(vehicle, native=native, fmi=fmi, proves=proves)
+    text = documentation_page(vehicle, native=native, fmi=fmi, proves=proves, module=module)
     return {"documentation/index.html": text.encode(), **pictures(vehicle.rov)}
 
 
-def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, proves: bool = True) -> str:
+def documentation_page(
+    vehicle: Vehicle, *, native: bool = True, fmi: int = 2, proves: bool = True, module: bytes | None = None
+) -> str:
     """The page of a vehicle as HTML, of the native FMU in a version of FMI or the one in pure Python.
 
-    `proves`: the FMU carries reference results.
+    `proves`: the FMU carries reference results. `module`: the model as WebAssembly; without it nothing flies.
 
     Without a data folder it goes without tables and measurements.
     """
     rov, layout = vehicle.rov, vehicle.layout
     tables = tables_by_axis(vehicle)
-    held = _commands(vehicle, tables.values())
+    held = held_commands(vehicle, tables.values())
     axes = [form.axis for form in layout.axes]
     first = axes[0]
     start = {name: 0.3 * sign for name, sign in layout.signs(first).items()}
@@ -78,6 +91,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, p
         has={*chain(*(form.keys for form in layout.axes), *(curve.keys for curve in layout.curves))},
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
         arm=[rov[name] for name in ARM] if layout.has_arm else None,
+        live=live([Flown(vehicle, module)]) if module else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
         tolerance=f"{TOLERANCE:g}",
@@ -144,22 +158,6 @@ def differs_by_direction(rov: Rov, axis: Axis) -> bool:
         if not (isclose(V, -back, rel_tol=1e-9) and isclose(Tau, Tau_back, rel_tol=1e-9)):
             return True
     return False
-
-
-def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
-    """The published tables of a vehicle by axis, none without a data folder. Raises DataFileError."""
-    return {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
-
-
-def _commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Decimal]:
-    """Up to four commands (%) for the step responses: those that all tables hold, else tens across the range."""
-    rows = [{row.command for row in table.rows} for table in tables]
-    common = sorted(set.intersection(*rows)) if rows else []
-    if len(common) < 2:
-        low, high = (max(1, round(100.0 * end)) for end in vehicle.command_range)
-        tens = range(-(-low // 10) * 10, high + 1, 10)
-        common = [Decimal(c) for c in (tens if len(tens) > 1 else range(low, high + 1))]
-    return evenly(common)
 
 
 def _agreement(table: ResponseTable) -> dict[str, Any]:

@@ -17,8 +17,8 @@ from rov_fmu.files.output import Output, write_whole
 from rov_fmu.identify.quadratic_fit import fit_quadratic, quadratic
 from rov_fmu.motion.layout import SURGE
 from rov_fmu.motion.rov import Rov
-from rov_fmu.pages.fmu_page import steady_picture, tables_by_axis
-from rov_fmu.pages.plots import draw_steps, finish, measured_step
+from rov_fmu.pages.fmu_page import steady_picture
+from rov_fmu.pages.plots import draw_steps, finish, measured_step, tables_by_axis
 from rov_fmu.pages.svg import LIGHT, svg_file
 from rov_fmu.vehicle.published import ResponseTable, untuned
 from rov_fmu.vehicle.shipped import VIDEORAY

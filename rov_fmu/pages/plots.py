@@ -1,6 +1,6 @@
 """The plot that all pages share: steps of the command from rest, modelled and measured."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import pairwise
@@ -13,7 +13,8 @@ from rov_fmu.motion.layout import Axis, Curve
 from rov_fmu.motion.riccati import RISE
 from rov_fmu.motion.rov import Rov
 from rov_fmu.pages.svg import LIGHT
-from rov_fmu.vehicle.published import ResponseTable
+from rov_fmu.vehicle.published import ResponseTable, load_tables
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = TypeVar("Number", float, Decimal)
 
@@ -42,6 +43,22 @@ def evenly(commands: Sequence[Number]) -> list[Number]:
     """Up to four of the commands, evenly from the first to the last."""
     last = len(LINES) - 1
     return sorted({commands[round((len(commands) - 1) * n / last)] for n in range(last + 1)})
+
+
+def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
+    """The published tables of a vehicle by axis, none without a data folder. Raises DataFileError."""
+    return {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
+
+
+def held_commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Decimal]:
+    """Up to four commands (%) for the step responses: those that all tables hold, else tens across the range."""
+    rows = [{row.command for row in table.rows} for table in tables]
+    common = sorted(set.intersection(*rows)) if rows else []
+    if len(common) < 2:
+        low, high = (max(1, round(100.0 * end)) for end in vehicle.command_range)
+        tens = range(-(-low // 10) * 10, high + 1, 10)
+        common = [Decimal(c) for c in (tens if len(tens) > 1 else range(low, high + 1))]
+    return evenly(common)
 
 
 def finish(

@@ -5,7 +5,6 @@ SCREENSHOTS=docs pytest -m interop tests/pages/test_browser.py takes the picture
 
 import importlib.util
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -15,7 +14,6 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -24,64 +22,14 @@ from rov_fmu.export.interface import UNITS, Variable, variables
 from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import TESTS
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+from tests.pages.conftest import Visit
 
 pytestmark = pytest.mark.interop
-
-_FLAGS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
 
 
 @pytest.fixture(scope="module")
 def declared(vehicle: Vehicle) -> tuple[Variable, ...]:
     return variables(vehicle.rov)
-
-
-@pytest.fixture(scope="module")
-def browser() -> "Iterator[Browser]":
-    playwright = pytest.importorskip("playwright.sync_api")
-    chromium = shutil.which("chromium") or pytest.skip("there is no chromium")
-    with playwright.sync_playwright() as engine:
-        browser = engine.chromium.launch(executable_path=chromium, headless=True, args=_FLAGS)
-        yield browser
-        browser.close()
-
-
-class Visit:
-    """A page with what it said and what it asked for."""
-
-    def __init__(self, browser: "Browser", *, width: int = 1280, height: int = 900, scheme: Any = "light") -> None:
-        self.page: Page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
-        self.said: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
-        self.page.on("pageerror", lambda error: self.said.append(f"exception: {error}"))
-        self.page.on("request", lambda request: self.asked.append(request.url))
-
-    def problems(self) -> list[str]:
-        return [text for text in self.said if text.startswith(("error", "warning", "exception", "assert"))]
-
-
-@pytest.fixture
-def visit(browser: "Browser") -> Iterator[Callable[..., Visit]]:
-    visits: list[Visit] = []
-
-    def new(**options: Any) -> Visit:
-        visits.append(Visit(browser, **options))
-        return visits[-1]
-
-    yield new
-    for one in visits:
-        one.page.close()
 
 
 # ---- documentation/index.html ----------------------------------------------------------------------------------------
@@ -99,7 +47,7 @@ def test_the_documentation_asks_for_nothing_and_fits(
     assert seen.said == []
     assert seen.asked == [url]
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width  # nothing to scroll sideways for
-    plots = seen.page.locator("svg")
+    plots = seen.page.locator("svg:not(.live svg)")
     assert plots.count() == 12
     for plot in plots.all():
         box = plot.bounding_box()

@@ -1,6 +1,10 @@
 """documentation/index.html and model.png: complete, self-contained, the same bytes every time."""
 
+import base64
+import hashlib
+import json
 import re
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from math import atan2, hypot, sin
@@ -13,13 +17,15 @@ from matplotlib.text import Annotation
 
 from rov_fmu.export.archive import Content, native_content, python_content
 from rov_fmu.export.interface import variables
+from rov_fmu.export.module import module
 from rov_fmu.pages.drawing import VIEWS, draw_thrusters, place, scenes
 from rov_fmu.pages.fmu_page import documentation, documentation_page
 from rov_fmu.pages.paper_figures import write_figures
 from rov_fmu.pages.pictures import pictures
 from rov_fmu.pages.templates import number, pretty_unit
 from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import VEHICLES, a_vehicle
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
@@ -135,6 +141,32 @@ def test_references_within_plots_resolve(page: str) -> None:
 def test_small_and_the_same_twice(page: str, vehicle: Vehicle) -> None:
     assert documentation_page(vehicle) == page
     assert len(page.encode()) < 150_000
+
+
+@pytest.mark.parametrize("name", ["videoray", pytest.param("bluerov2_heavy", marks=pytest.mark.long)])
+def test_what_flies_is_small_allowed_alone_and_the_same_twice(name: str) -> None:
+    flown = load_vehicle(SHIPPED[name])
+    still, page = documentation_page(flown), documentation_page(flown, module=module(flown.rov))
+    assert len(page.encode()) - len(still.encode()) < 80_000
+    assert len(zlib.compress(page.encode(), 9)) - len(zlib.compress(still.encode(), 9)) < 60_000
+    assert documentation_page(flown, module=module(flown.rov)) == page
+    root = html.fromstring(page)
+    scripts = [s for s in root.iter("script") if s.get("type") != "application/json"]
+    assert [dict(s.attrib) for s in root.iter("script")] == [{"type": "application/json", "id": "live-vehicles"}, {}]
+    digest = base64.b64encode(hashlib.sha256((scripts[0].text or "").encode()).digest()).decode()
+    (policy,) = (m.get("content") for m in root.iter("meta") if m.get("http-equiv") == "Content-Security-Policy")
+    allowed = dict(part.strip().split(" ", 1) for part in policy.split(";"))
+    assert allowed == {
+        "default-src": "'none'",
+        "style-src": "'unsafe-inline'",
+        "script-src": f"'sha256-{digest}' 'wasm-unsafe-eval'",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
+    (told,) = json.loads(root.get_element_by_id("live-vehicles").text)
+    measured = {test["V"] for test in told["tests"]} - {None}
+    published = load_tables(flown) if flown.data else ()
+    assert measured == {float(V) for table in published for row in table.rows if (V := row.scaled.V_ss.measured)}
 
 
 def test_goes_without_a_data_folder(bare_page: str) -> None:

@@ -1,0 +1,220 @@
+// A flight: the pilot's vehicle and a ghost under the same commands, and what they left behind.
+
+const LONGEST_STEP = 0.05; // s, so that curves and the track are smooth at any speed
+const MOST_KEPT = 4000;
+
+/** A vehicle on its way. */
+class Craft {
+  /** @param {Model} model */
+  constructor(model) {
+    this.model = model;
+    /** North and east of places on the track, one after the other. @type {number[]} */
+    this.track = [];
+    /** By axis, at the times of the flight. @type {number[][]} */
+    this.velocities = model.vehicle.axes.map(() => []);
+    /** Depth, heading, or what was gone along the axis. @type {number[][]} */
+    this.positions = model.vehicle.axes.map(() => []);
+    /** What was gone along each axis. */
+    this.ways = model.vehicle.axes.map(() => 0);
+  }
+
+  reset() {
+    this.model.reset();
+    this.track = [];
+    this.velocities = this.velocities.map(() => []);
+    this.positions = this.positions.map(() => []);
+    this.ways = this.ways.map(() => 0);
+    this.keep();
+  }
+
+  /** @param {number} h */
+  step(h) {
+    const { model, ways } = this;
+    const { axes } = model.vehicle;
+    const before = axes.map(({ velocity }) => model.get(velocity));
+    if (!model.step(h)) return false;
+    axes.forEach(({ velocity }, a) => {
+      ways[a] += (h / 2) * (before[a] + model.get(velocity));
+    });
+    return true;
+  }
+
+  /** Remembers where it is and how fast. */
+  keep() {
+    const { model, track } = this;
+    model.vehicle.axes.forEach(({ velocity }, a) => {
+      this.velocities[a].push(model.get(velocity));
+      this.positions[a].push(this.position(a));
+    });
+    const x = model.get("x");
+    const y = model.get("y");
+    const n = track.length;
+    if (n < 2 || Math.hypot(x - track[n - 2], y - track[n - 1]) > model.vehicle.size / 8) track.push(x, y);
+    if (n > 2 * MOST_KEPT) track.splice(0, MOST_KEPT);
+  }
+
+  /** Depth, heading, or what was gone along an axis. @param {number} a */
+  position(a) {
+    const { position } = this.model.vehicle.axes[a];
+    return position ? this.model.get(position) : this.ways[a];
+  }
+
+  /** @param {number} n */
+  forget(n) {
+    for (const trace of [...this.velocities, ...this.positions]) trace.splice(0, n);
+  }
+}
+
+class Flight {
+  /** @param {Model} pilot @param {Model | null} other Another vehicle beside it; by default its own with the file's tuning. */
+  constructor(pilot, other) {
+    this.pilot = new Craft(pilot);
+    this.isOther = other !== null;
+    this.ghost = new Craft(other ?? pilot.twin());
+    this.ghostShown = this.isOther;
+    this.time = 0;
+    /** @type {number[]} */
+    this.times = [];
+    /** Of the last change of an input, by axis: when, and how fast it was. */
+    this.since = pilot.vehicle.axes.map(() => ({ time: 0, velocity: 0 }));
+    /** @type {StepTest | null} */
+    this.test = null;
+    /** @type {Playback | null} */
+    this.playback = null;
+    /** Whether anything was ever asked of it: until then time stands. */
+    this.begun = false;
+    this.reset();
+  }
+
+  /** Back to the start; commands and loads stay. */
+  reset() {
+    this.time = 0;
+    this.times = [0];
+    this.test = null;
+    this.playback = null;
+    this.pilot.reset();
+    this.ghost.reset();
+    for (const since of this.since) Object.assign(since, { time: 0, velocity: 0 });
+  }
+
+  /** Gives inputs by name, to both. @param {Record<string, number>} given */
+  set(given) {
+    const { model } = this.pilot;
+    const changed = Object.entries(given).filter(([name, value]) => model.get(name) !== value);
+    if (changed.length === 0) return;
+    for (const [name, value] of changed) model.set(name, value);
+    const { vehicle } = model;
+    const handed = handedOver(vehicle, this.ghost.model.vehicle, (name) => model.get(name));
+    for (const [name, value] of Object.entries(handed)) this.ghost.model.set(name, value);
+    this.followed();
+    vehicle.axes.forEach(({ velocity, signs, external }, a) => {
+      if (changed.some(([name]) => name in signs || name === external)) {
+        this.since[a] = { time: this.time, velocity: model.get(velocity) };
+      }
+    });
+    this.test = null;
+    this.begun = true;
+  }
+
+  /** α and β of the pilot. @param {Record<string, number>} given */
+  tune(given) {
+    const { model } = this.pilot;
+    for (const [name, value] of Object.entries(given)) model.set(name, value);
+    model.tune();
+  }
+
+  followed() {
+    this.pilot.model.observe();
+    this.ghost.model.observe();
+  }
+
+  /** h seconds; false, and back at the start, where a step overflows. @param {number} h */
+  advance(h) {
+    let left = h;
+    while (left > 0) {
+      let step = Math.min(left, LONGEST_STEP);
+      if (this.playback) {
+        const next = this.playback.next();
+        if (next === null) break;
+        step = Math.min(step, next - this.time);
+        if (step <= 0) {
+          this.playback.arrive(this);
+          continue;
+        }
+      }
+      const followed = this.playback ? this.playback.move(this.ghost, step) : this.ghost.step(step);
+      if (!this.pilot.step(step) || !followed) {
+        this.reset();
+        return false;
+      }
+      this.time += step;
+      left -= step;
+      this.keep();
+    }
+    this.followed();
+    return true;
+  }
+
+  keep() {
+    this.times.push(this.time);
+    this.pilot.keep();
+    this.ghost.keep();
+    if (this.times.length > MOST_KEPT) {
+      const n = MOST_KEPT / 2;
+      this.times.splice(0, n);
+      this.pilot.forget(n);
+      this.ghost.forget(n);
+    }
+  }
+
+  /** A recording from its start; the ghost is what was measured. @param {Recording} recording */
+  play(recording) {
+    this.reset();
+    this.playback = new Playback(recording, this);
+    this.begun = true;
+  }
+
+  /** A step test of the paper: from rest, with all else at zero. @param {StepTest} test */
+  run(test) {
+    const { vehicle } = this.pilot.model;
+    const { signs } = vehicle.axes[test.axis];
+    const inputs = vehicle.variables.slice(0, vehicle.inputs).map(([name]) => name);
+    this.set(Object.fromEntries(inputs.map((name) => [name, test.command * (signs[name] ?? 0)])));
+    this.reset();
+    this.test = test;
+    this.begun = true;
+  }
+}
+
+/**
+ * The inputs of one vehicle for another: those of the same names; where its commands are others, by the axes that they drive.
+ * @param {Vehicle} from @param {Vehicle} to @param {(name: string) => number} get
+ * @returns {Record<string, number>}
+ */
+function handedOver(from, to, get) {
+  /** @type {Record<string, number>} */
+  const given = {};
+  for (const [name] of from.variables.slice(0, from.inputs)) given[name] = get(name);
+  if (to.commands.every((name) => from.commands.includes(name))) return given;
+  const demands = new Map(
+    from.axes.map(({ name, signs }) => {
+      const driving = Object.entries(signs);
+      return [name, driving.reduce((sum, [command, sign]) => sum + (sign * get(command)) / driving.length, 0)];
+    }),
+  );
+  return { ...given, ...commandsOf(to, demands) };
+}
+
+/**
+ * Commands along axes: each drives its inputs with their signs.
+ * @param {Vehicle} vehicle @param {Map<string, number>} demands @returns {Record<string, number>}
+ */
+function commandsOf(vehicle, demands) {
+  /** @type {Record<string, number>} */
+  const commands = Object.fromEntries(vehicle.commands.map((name) => [name, 0]));
+  for (const { name, signs } of vehicle.axes) {
+    for (const [command, sign] of Object.entries(signs)) commands[command] += sign * (demands.get(name) ?? 0);
+  }
+  for (const name of vehicle.commands) commands[name] = Math.max(-1, Math.min(1, commands[name]));
+  return commands;
+}

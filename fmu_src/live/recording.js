@@ -1,0 +1,234 @@
+// A recording of tank tests (docs/identify.md, "Logs") flown again: measured beside predicted.
+
+const MOST_BYTES = 20e6;
+const MOST_ROWS = 200000;
+const FACTORS = new Map(
+  Object.entries({ "%": 0.01, 1: 1, m: 1, cm: 0.01, mm: 0.001, rad: 1, deg: Math.PI / 180, s: 1, ms: 0.001 }),
+);
+
+/** A file that is no recording of this vehicle, in words. */
+class Unreadable extends Error {}
+
+/**
+ * What an axis was measured by: positions, or velocities. Not a number where a row has none.
+ * @typedef {{axis: number, isPosition: boolean, values: number[]}} Signal
+ */
+/**
+ * Times in s, commands by row and name, signals.
+ * @typedef {{name: string, times: number[], commands: Record<string, number>[], signals: Signal[], left: number}} Recording
+ */
+
+/** @param {string} text @param {string} name Of the file. @param {Vehicle} vehicle @returns {Recording} */
+function readRecording(text, name, vehicle) {
+  const lines = text
+    .replace(/^\uFEFF/, "")
+    .split(/\r\n|\r|\n/)
+    .filter((line) => line.trim() !== "");
+  if (lines.length < 3) throw new Unreadable("it has less than two rows below its header");
+  if (lines.length > MOST_ROWS) throw new Unreadable(`it has more than ${MOST_ROWS} rows`);
+  const separator = [";", "\t", ","].find((mark) => lines[0].includes(mark));
+  if (separator === undefined) throw new Unreadable("its first line is no header of columns");
+  const headers = lines[0].split(separator).map((cell) => cell.trim().replace(/^"(.*)"$/, "$1"));
+  /** @param {string} cell */
+  const number = (cell) => {
+    const plain = cell.trim().replace(/^"(.*)"$/, "$1");
+    return plain === "" ? Number.NaN : Number(separator === "," ? plain : plain.replace(",", "."));
+  };
+  const columns = headers.map((header) => columnOf(header, name, vehicle));
+  const time = columns.findIndex((column) => column?.what === "time");
+  if (time < 0) throw new Unreadable("it has no column “time [s]”");
+  const commanding = columns.flatMap((column, n) => (column?.what === "command" ? [n] : []));
+  if (commanding.length === 0) {
+    throw new Unreadable(`it has no column of a command, such as “${vehicle.commands[0]} [%]”`);
+  }
+  const measuring = columns.flatMap((column, n) => (column?.what === "signal" ? [n] : []));
+  const rows = lines
+    .slice(1)
+    .map((line) => line.split(separator))
+    .filter((cells) => cells.length <= headers.length)
+    .map((cells) => columns.map((column, n) => (column ? column.convert(number(cells[n] ?? "")) : Number.NaN)))
+    .filter((row) => Number.isFinite(row[time]) && commanding.every((n) => Number.isFinite(row[n])))
+    .sort((one, other) => one[time] - other[time]);
+  if (rows.length < 2) throw new Unreadable("no two of its rows have a time and a command");
+  const start = rows[0][time];
+  if (rows[rows.length - 1][time] - start > 1e5) throw new Unreadable("it lasts longer than a day");
+  const signals = measuring.map((n) => {
+    const { axis, isPosition } = /** @type {Column} */ (columns[n]);
+    const values = rows.map((row) => row[n]);
+    return {
+      axis,
+      isPosition,
+      values: vehicle.axes[axis].position === "psi" && isPosition ? unwrapped(values) : values,
+    };
+  });
+  const used = signals.filter(
+    ({ axis, isPosition, values }) =>
+      values.some(Number.isFinite) && (isPosition || !signals.some((other) => other.axis === axis && other.isPosition)),
+  );
+  if (used.length === 0) throw new Unreadable("it has no motion of an axis of this vehicle");
+  const none = Object.fromEntries(vehicle.commands.map((command) => [command, 0]));
+  return {
+    name,
+    times: rows.map((row) => row[time] - start),
+    commands: rows.map((row) => {
+      const commands = { ...none };
+      for (const n of commanding) {
+        const { drives } = /** @type {Column} */ (columns[n]);
+        for (const [command, sign] of Object.entries(drives)) commands[command] = saturated(sign * row[n]);
+      }
+      return commands;
+    }),
+    signals: used,
+    left: lines.length - 1 - rows.length,
+  };
+}
+
+/** @typedef {{what: "time" | "command" | "signal", axis: number, isPosition: boolean, drives: Record<string, number>,
+ *   convert: (x: number) => number}} Column */
+
+/** What a column is, by its header; null of what is not used. @param {string} header @param {string} file @param {Vehicle} vehicle
+ * @returns {Column | null} */
+function columnOf(header, file, vehicle) {
+  const parts = /^(.*?)\s*\[(.*)\]$/.exec(header);
+  if (!parts) return null;
+  const title = parts[1].trim().toLowerCase();
+  const column = { axis: -1, isPosition: false, drives: {}, convert: converter(parts[2].trim(), header) };
+  if (title === "time") return { ...column, what: "time" };
+  const { axes } = vehicle;
+  const ofFile = axes.findIndex(({ name }) => new RegExp(`^log_${name}`, "i").test(file));
+  const ofCommand = ofFile >= 0 ? ofFile : axes.length === 1 ? 0 : -1;
+  if (title === "command") {
+    if (ofCommand < 0) {
+      throw new Unreadable(
+        `whose axis its command is, the name of the file does not tell: call it log_${axes[0].name}.csv or the like`,
+      );
+    }
+    return { ...column, what: "command", drives: axes[ofCommand].signs };
+  }
+  const command = vehicle.commands.find(
+    (name) => name.toLowerCase() === title || (!vehicle.mixed && name.toLowerCase() === `u_${title}`),
+  );
+  if (command !== undefined) return { ...column, what: "command", drives: { [command]: 1 } };
+  for (const [axis, { name, velocity, position }] of axes.entries()) {
+    const isPosition = [position ?? "", { z: "depth", psi: "heading" }[position ?? ""], `${name} distance`].includes(
+      title,
+    );
+    const alone = axis === ofFile && (title === "velocity" || title === "distance");
+    if (isPosition || alone || title === `${name} velocity` || title === velocity) {
+      return { ...column, what: "signal", axis, isPosition: isPosition || title === "distance" };
+    }
+  }
+  return null;
+}
+
+/** @param {string} unit @param {string} header @returns {(x: number) => number} */
+function converter(unit, header) {
+  const pulse = /^(?:us|µs)(?:\s+([\d.]+)\s+(-?[\d.]+))?$/.exec(unit);
+  if (pulse) {
+    const [neutral, span] = [Number(pulse[1] ?? 1500), Number(pulse[2] ?? 400)];
+    return (x) => (x === 0 || x === 65535 ? 0 : (x - neutral) / span);
+  }
+  const factor = FACTORS.get(unit.replace(/\/s$/, ""));
+  return (x) => {
+    if (factor === undefined) throw new Unreadable(`the unit of its column “${header.slice(0, 40)}” is not known`);
+    return x * factor;
+  };
+}
+
+/** @param {number} command */
+function saturated(command) {
+  return Math.max(-1, Math.min(1, command));
+}
+
+/** Angles without jumps of a turn. @param {number[]} angles */
+function unwrapped(angles) {
+  let last = Number.NaN;
+  return angles.map((angle) => {
+    if (!Number.isFinite(angle)) return angle;
+    last = Number.isFinite(last) ? last + remainder(angle - last, 2 * Math.PI) : angle;
+    return last;
+  });
+}
+
+/** A recording as it is flown: the pilot's vehicle gets its commands, the ghost goes as it was measured. */
+class Playback {
+  /** @param {Recording} recording @param {Flight} flight */
+  constructor(recording, flight) {
+    this.recording = recording;
+    this.row = 0;
+    /** Of each signal: what was last measured and when, its rate, the sum of squares and number of deviations. */
+    this.measured = recording.signals.map(({ values }) => {
+      const now = values.find(Number.isFinite) ?? 0;
+      return { now, time: 0, rate: 0, start: now, sum: 0, n: 0 };
+    });
+    for (const craft of [flight.pilot, flight.ghost]) {
+      recording.signals.forEach(({ axis, isPosition }, n) => {
+        const { velocity, position } = craft.model.vehicle.axes[axis];
+        const name = isPosition ? position : velocity;
+        if (name) craft.model.set(name, this.measured[n].now);
+        else craft.ways[axis] = this.measured[n].now;
+      });
+      craft.track = [];
+      craft.forget(1);
+      craft.keep();
+    }
+    this.arrive(flight);
+  }
+
+  /** Whether the ghost has a track: where surge was measured. @param {Vehicle} vehicle */
+  hasTrack(vehicle) {
+    return this.recording.signals.some(({ axis }) => vehicle.axes[axis].name === "surge");
+  }
+
+  /** When the next row begins; null at the end. */
+  next() {
+    return this.row < this.recording.times.length ? this.recording.times[this.row] : null;
+  }
+
+  /** Takes a row: compares, and hands its commands on. @param {Flight} flight */
+  arrive(flight) {
+    const { signals, commands, times } = this.recording;
+    signals.forEach(({ axis, isPosition, values }, n) => {
+      const value = values[this.row];
+      if (!Number.isFinite(value)) return;
+      const { pilot } = flight;
+      const predicted = isPosition ? pilot.position(axis) : pilot.model.get(pilot.model.vehicle.axes[axis].velocity);
+      const signal = this.measured[n];
+      const passed = times[this.row] - signal.time;
+      signal.rate = passed > 0 ? (value - signal.now) / passed : signal.rate;
+      signal.sum += (predicted - value) ** 2;
+      signal.n += 1;
+      signal.now = value;
+      signal.time = times[this.row];
+    });
+    flight.set(commands[this.row]);
+    this.row += 1;
+  }
+
+  /** The ghost h seconds on. @param {Craft} ghost @param {number} h */
+  move({ model, ways }, h) {
+    this.recording.signals.forEach(({ axis, isPosition }, n) => {
+      const { velocity, position } = model.vehicle.axes[axis];
+      const { now, rate } = this.measured[n];
+      model.set(velocity, isPosition ? rate : now);
+      if (isPosition && position) model.set(position, now);
+      else if (position) model.set(position, model.get(position) + now * h);
+      else ways[axis] = isPosition ? now : ways[axis] + now * h;
+    });
+    const [u, v, psi] = ["u", "v", "psi"].map((name) => model.get(name));
+    model.set("x", model.get("x") + h * (u * Math.cos(psi) - v * Math.sin(psi) + model.get("V_N")));
+    model.set("y", model.get("y") + h * (u * Math.sin(psi) + v * Math.cos(psi) + model.get("V_E")));
+    return true;
+  }
+
+  /** How far the prediction is from what was measured, root mean square. @param {Vehicle} vehicle */
+  verdict(vehicle) {
+    const deviations = this.recording.signals.map(({ axis, isPosition }, n) => {
+      const { name, unit, positionUnit } = vehicle.axes[axis];
+      const { sum, n: many } = this.measured[n];
+      return `${name} ${Math.sqrt(sum / Math.max(1, many)).toPrecision(2)} ${isPosition ? positionUnit : unit}`;
+    });
+    const left = this.recording.left;
+    return `The end of the recording. The prediction is off by (root mean square): ${deviations.join(", ")}.${left ? ` Rows that could not be used: ${left}.` : ""}`;
+  }
+}
