@@ -1,11 +1,13 @@
-"""The command rov-fmu: build | prove | study | identify | tune | convert | schema | tables | figures."""
+"""The command rov-fmu: build | fly | prove | study | identify | tune | convert | schema | tables | figures."""
 
+import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from math import inf
 from pathlib import Path
+from tempfile import mkdtemp
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -175,6 +177,36 @@ def _print_built(built: "Built", seconds: float) -> None:
     for path in built.beside:
         out.print(Text(str(path), "bold"), soft_wrap=True)
     out.print(f"  built in {seconds:.1f} s")
+
+
+@_commands.command("fly")
+@_vehicle(default=str(VIDEORAY))
+@click.option(
+    "--against",
+    callback=lambda _, __, given: given and find_vehicle(given),
+    metavar="OTHER.toml",
+    help="Another vehicle, which flies the same commands as a ghost.",
+    shell_complete=_vehicles,
+)
+@click.option("-o", "--output", type=_FILE, metavar="PAGE.html",
+              help="Where to write the page, in place of opening it in a browser.")  # fmt: skip
+def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
+    """Fly a vehicle in a browser, without building an FMU: the VideoRay Pro 4 by default."""
+    from rov_fmu.export.module import module
+    from rov_fmu.files.output import Output
+    from rov_fmu.pages.live import Flown, fly_page
+    from rov_fmu.vehicle.vehicle import load_vehicle
+
+    paths = [vehicle, *([against] if against else [])]
+    loaded = [load_vehicle(path) for path in paths]
+    if output:
+        check_targets([output], [*paths, *(file for one in loaded for file in one.files)])
+    page = fly_page([Flown(one, module(one.rov)) for one in loaded]).encode()
+    path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
+    write_whole(Output(path, page))
+    click.echo(path)
+    if output is None:
+        webbrowser.open(path.as_uri())
 
 
 @_commands.command("prove")

@@ -103,7 +103,7 @@ def _completed(*words: str, shell: str = "bash") -> list[str]:
 
 
 def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
-    commands = ("build", "convert", "figures", "identify", "prove", "schema", "study", "tables", "tune")
+    commands = ("build", "convert", "figures", "fly", "identify", "prove", "schema", "study", "tables", "tune")
     assert _completed("") == [f"plain,{name}" for name in commands]
     assert _completed("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
     assert _completed("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
