@@ -12,6 +12,11 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
 from docs import compared, reference  # noqa: E402 (they stand beside this file)
+from rov_fmu.export.module import module  # noqa: E402
+from rov_fmu.files.output import Output, write_whole  # noqa: E402
+from rov_fmu.pages.live import Flown, fly_page  # noqa: E402
+from rov_fmu.vehicle.shipped import SHIPPED  # noqa: E402
+from rov_fmu.vehicle.vehicle import load_vehicle  # noqa: E402
 
 project = "rov-fmu"
 release = __version__
@@ -41,6 +46,14 @@ html_theme_options = {
 
 TABLES = compared.tables()
 
+FLOWN = [load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2_heavy")]
+_LINKS = " or ".join(f'<a href="fly/{one.identifier}.html" target="fly">{one.name}</a>' for one in FLOWN)
+COCKPIT = f"""<p>Fly it here: the {_LINKS}.</p>
+<iframe class="fly" name="fly" src="fly/{FLOWN[0].identifier}.html" title="A vehicle in flight"></iframe>
+
+"""
+"""On the first page, before the first heading of the README."""
+
 
 def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
     """Put in what stands elsewhere; its links are seen from docs/, and to what is not on the site there is none."""
@@ -49,10 +62,21 @@ def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
         if match[1] in TABLES:
             return reference.markdown(TABLES[match[1]])
         whole = (ROOT / match[1]).read_text(encoding="utf-8").replace("](docs/", "](")
+        whole = whole.replace("\n## ", f"\n{COCKPIT}## ", 1) if match[1] == "README.md" else whole
         whole = re.sub(r"\]\((CHANGELOG|CONTRIBUTING)\.md\)", lambda name: f"]({name[1].lower()}.md)", whole)
         return re.sub(r"\[([^\]]+)\]\(CITATION\.cff\)", r"\1 (`CITATION.cff`)", whole)
 
     source[0] = re.sub(r"\{\{ (\S+) \}\}", text, source[0])
+
+
+def _fly(app: Sphinx, error: Exception | None) -> None:
+    """The pages that fly, beside the site's own."""
+    folder = Path(app.outdir, "fly")
+    if error is None:
+        folder.mkdir(exist_ok=True)
+        for one in FLOWN:
+            page = fly_page([Flown(one, module(one.rov))])
+            write_whole(Output(folder / f"{one.identifier}.html", page.encode()))
 
 
 def _plain(*arguments: list[str]) -> None:
@@ -64,4 +88,5 @@ def _plain(*arguments: list[str]) -> None:
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
     app.connect("source-read", _fill)
+    app.connect("build-finished", _fly)
     app.connect("autodoc-process-docstring", _plain)

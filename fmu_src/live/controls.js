@@ -131,6 +131,7 @@ class Live {
   takeOver() {
     if (!this.flight.playback) return;
     this.flight.playback = null;
+    this.flight.ghostShown = this.flight.isOther || this.isTuned();
     this.span = SPAN;
     this.say("You have control; the recording has ended.");
   }
@@ -163,6 +164,7 @@ class Live {
   /** @param {boolean} paused */
   pause(paused) {
     this.paused = paused;
+    if (!paused && this.flight.playback?.next() === null) this.takeOver();
     this.show();
   }
 
@@ -319,7 +321,7 @@ class Live {
     this.changed = false;
     const { flight } = this;
     const { model } = flight.pilot;
-    const ghost = flight.playback !== null || flight.ghostShown;
+    const ghost = flight.ghostShown;
     this.track?.draw(flight);
     this.compass?.draw(flight, ghost);
     this.depth?.draw(flight, ghost);

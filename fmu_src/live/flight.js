@@ -171,6 +171,7 @@ class Flight {
   play(recording) {
     this.reset();
     this.playback = new Playback(recording, this);
+    this.ghostShown = true;
     this.begun = true;
   }
 

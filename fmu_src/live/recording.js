@@ -2,9 +2,13 @@
 
 const MOST_BYTES = 20e6;
 const MOST_ROWS = 200000;
-const FACTORS = new Map(
-  Object.entries({ "%": 0.01, 1: 1, m: 1, cm: 0.01, mm: 0.001, rad: 1, deg: Math.PI / 180, s: 1, ms: 0.001 }),
-);
+/** To SI, by what a column holds. @type {Record<string, Record<string, number>>} */
+const FACTORS = {
+  s: { s: 1, ms: 0.001 },
+  command: { "%": 0.01, 1: 1 },
+  m: { m: 1, cm: 0.01, mm: 0.001 },
+  rad: { rad: 1, deg: Math.PI / 180 },
+};
 
 /** A file that is no recording of this vehicle, in words. */
 class Unreadable extends Error {}
@@ -86,53 +90,56 @@ function readRecording(text, name, vehicle) {
 /** @typedef {{what: "time" | "command" | "signal", axis: number, isPosition: boolean, drives: Record<string, number>,
  *   convert: (x: number) => number}} Column */
 
-/** What a column is, by its header; null of what is not used. @param {string} header @param {string} file @param {Vehicle} vehicle
- * @returns {Column | null} */
+/** What a column is, by its header; null of what is not used.
+ * @param {string} header @param {string} file @param {Vehicle} vehicle @returns {Column | null} */
 function columnOf(header, file, vehicle) {
   const parts = /^(.*?)\s*\[(.*)\]$/.exec(header);
   if (!parts) return null;
-  const title = parts[1].trim().toLowerCase();
-  const column = { axis: -1, isPosition: false, drives: {}, convert: converter(parts[2].trim(), header) };
-  if (title === "time") return { ...column, what: "time" };
-  const { axes } = vehicle;
+  const [title, unit] = [parts[1].trim().toLowerCase(), parts[2].trim()];
+  const none = { axis: -1, isPosition: false, drives: {} };
+  if (title === "time") return { ...none, what: "time", convert: converter(header, FACTORS.s, unit) };
+  const { axes, commands } = vehicle;
   const ofFile = axes.findIndex(({ name }) => new RegExp(`^log_${name}`, "i").test(file));
-  const ofCommand = ofFile >= 0 ? ofFile : axes.length === 1 ? 0 : -1;
-  if (title === "command") {
-    if (ofCommand < 0) {
+  const alone = ofFile < 0 && axes.length === 1 ? 0 : ofFile;
+  const isOf = (/** @type {string} */ name) => [name, vehicle.mixed ? name : name.replace("u_", "")].includes(title);
+  const command = commands.find((name) => isOf(name.toLowerCase()));
+  if (command !== undefined || title === "command") {
+    if (command === undefined && alone < 0) {
+      const example = `log_${axes[0].name}.csv`;
       throw new Unreadable(
-        `whose axis its command is, the name of the file does not tell: call it log_${axes[0].name}.csv or the like`,
+        `the name of the file does not tell whose axis its command is: call it ${example} or the like`,
       );
     }
-    return { ...column, what: "command", drives: axes[ofCommand].signs };
+    const drives = command === undefined ? axes[alone].signs : { [command]: 1 };
+    return { ...none, what: "command", drives, convert: pulses(unit) ?? converter(header, FACTORS.command, unit) };
   }
-  const command = vehicle.commands.find(
-    (name) => name.toLowerCase() === title || (!vehicle.mixed && name.toLowerCase() === `u_${title}`),
-  );
-  if (command !== undefined) return { ...column, what: "command", drives: { [command]: 1 } };
-  for (const [axis, { name, velocity, position }] of axes.entries()) {
-    const isPosition = [position ?? "", { z: "depth", psi: "heading" }[position ?? ""], `${name} distance`].includes(
-      title,
-    );
-    const alone = axis === ofFile && (title === "velocity" || title === "distance");
-    if (isPosition || alone || title === `${name} velocity` || title === velocity) {
-      return { ...column, what: "signal", axis, isPosition: isPosition || title === "distance" };
-    }
+  for (const [axis, { name, velocity, position, positionUnit }] of axes.entries()) {
+    const own = axis === alone;
+    const words = { z: "depth", psi: "heading" }[position ?? ""];
+    const isPosition = [position, words, `${name} distance`].includes(title) || (own && title === "distance");
+    const isVelocity = [velocity, `${name} velocity`].includes(title) || (own && title === "velocity");
+    if (!isPosition && !isVelocity) continue;
+    const length = isPosition ? unit : unit.replace(/\/s$/, "");
+    const convert = converter(header, isPosition || length !== unit ? FACTORS[positionUnit] : {}, length);
+    return { what: "signal", axis, isPosition, drives: {}, convert };
   }
   return null;
 }
 
-/** @param {string} unit @param {string} header @returns {(x: number) => number} */
-function converter(unit, header) {
-  const pulse = /^(?:us|µs)(?:\s+([\d.]+)\s+(-?[\d.]+))?$/.exec(unit);
-  if (pulse) {
-    const [neutral, span] = [Number(pulse[1] ?? 1500), Number(pulse[2] ?? 400)];
-    return (x) => (x === 0 || x === 65535 ? 0 : (x - neutral) / span);
+/** @param {string} header @param {Record<string, number>} factors @param {string} unit @returns {(x: number) => number} */
+function converter(header, factors, unit) {
+  if (!Object.hasOwn(factors, unit)) {
+    throw new Unreadable(`“${header.slice(0, 40)}” has no unit that this column can have`);
   }
-  const factor = FACTORS.get(unit.replace(/\/s$/, ""));
-  return (x) => {
-    if (factor === undefined) throw new Unreadable(`the unit of its column “${header.slice(0, 40)}” is not known`);
-    return x * factor;
-  };
+  return (x) => x * factors[unit];
+}
+
+/** From the pulse that a speed controller gets; null of another unit. @param {string} unit */
+function pulses(unit) {
+  const parts = /^[uµ]s(?:\s+([\d.]+)\s+(-?[\d.]+))?$/.exec(unit);
+  if (!parts) return null;
+  const [neutral, span] = [Number(parts[1] ?? 1500), Number(parts[2] ?? 400)];
+  return (/** @type {number} */ x) => (x === 0 || x === 65535 ? 0 : (x - neutral) / span);
 }
 
 /** @param {number} command */

@@ -90,7 +90,7 @@ class TrackView {
     this.tracks = [drawn(svg, "path", { class: "line ghostly" }), drawn(svg, "path", { class: "line" })];
     this.ghost = new Figure(svg, flight.ghost.model.vehicle, "craft ghostly");
     this.pilot = new Figure(svg, flight.pilot.model.vehicle, "craft");
-    this.bar = drawn(svg, "path", { class: "bar" });
+    this.bar = drawn(svg, "path", { class: "scale" });
     this.length = drawn(svg, "text", { x: 14 });
     drawn(svg, "text", { x: 14, y: 22 }).textContent = "↑ N";
     this.scale = 50 / (2.4 * flight.pilot.model.vehicle.size);
@@ -119,7 +119,7 @@ class TrackView {
     const py = (/** @type {number} */ north) => this.height / 2 - (north - this.centre[0]) * this.scale;
     this.lay(px, py);
     const { playback } = flight;
-    const ghostIsThere = playback ? playback.hasTrack(ghost.model.vehicle) : flight.ghostShown;
+    const ghostIsThere = flight.ghostShown && (playback?.hasTrack(ghost.model.vehicle) ?? true);
     this.tracks[0].setAttribute("d", ghostIsThere ? pathOf(ghost, px, py) : "");
     this.tracks[1].setAttribute("d", pathOf(pilot, px, py));
     this.ghost.group.setAttribute("visibility", ghostIsThere ? "visible" : "hidden");
@@ -159,7 +159,7 @@ class Compass {
     drawn(svg, "circle", { class: "thruster", cx: 60, cy: 60, r: 44 });
     for (let angle = 0; angle < 360; angle += 30) {
       drawn(svg, "path", {
-        class: "bar thin",
+        class: "scale thin",
         d: `M60 ${angle % 90 ? 20 : 16}V24`,
         transform: `rotate(${angle} 60 60)`,
       });
@@ -190,7 +190,7 @@ class Compass {
 class DepthTape {
   /** @param {Element} svg */
   constructor(svg) {
-    this.ticks = drawn(svg, "path", { class: "bar thin" });
+    this.ticks = drawn(svg, "path", { class: "scale thin" });
     this.labels = [0, 1, 2, 3, 4, 5].map(() => drawn(svg, "text", { x: 34 }));
     this.marks = ["ghostly", ""].map((kind) => drawn(svg, "path", { class: `needle ${kind}`, d: "M14 0L2 -7V7Z" }));
   }
@@ -245,10 +245,7 @@ class Chart {
     const start = Math.max(0, time - span);
     const [V, Tau] = pilot.model.marks.subarray(2 * number, 2 * number + 2);
     const mine = tracesOf(pilot);
-    const other =
-      (playback ? signal : ghost) && number < flight.ghost.model.vehicle.axes.length
-        ? this.ghostTrace(flight, isPosition)
-        : null;
+    const other = ghost && (playback === null || signal) ? this.ghostTrace(flight, isPosition) : null;
     const published =
       test && test.axis === number && test.V !== null
         ? { V: test.command < 0 ? -test.V : test.V, Tau: test.Tau }
@@ -278,6 +275,7 @@ class Chart {
     this.ends[0].textContent = `${shown(start, 0)} s`;
     this.ends[1].textContent = `${shown(start + span, 0)} s`;
     this.lines[1].setAttribute("d", lineOf(times, mine, first, px, py));
+    this.lines[0].classList.toggle("measured", playback !== null);
     this.lines[0].setAttribute("d", other ? lineOf(times, other, first, px, py) : "");
     const since = flight.since[number];
     const fromRest = V !== 0 && Math.abs(since.velocity) < 0.02 * Math.abs(V) && Number.isFinite(Tau);

@@ -44,8 +44,6 @@ class Live:
     policy: str
     """What the content security policy allows beside the page's own."""
     tests: Sequence[dict[str, Any]]
-    measured: bool
-    """Whether some test was measured."""
     loads: Sequence[tuple[str, float, str]]
     """Inputs beside the commands: name, how far the slider goes, unit."""
     tunable: Sequence[tuple[str, str, float, float, float]]
@@ -67,7 +65,6 @@ def live(flown: Sequence[Flown]) -> Live:
         script=Markup(script),
         policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'; base-uri 'none'; form-action 'none'",
         tests=[{**test, "words": _words(pilot, test)} for test in tests],
-        measured=any(test["V"] is not None for test in tests),
         loads=list(_loads(pilot.rov)),
         tunable=list(_tunable(pilot.rov)),
         other=flown[1].vehicle.name if len(flown) > 1 else None,

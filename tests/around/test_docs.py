@@ -293,6 +293,9 @@ def test_site_builds_strictly_and_fetches_nothing(tmp_path: Path) -> None:
     pages = {page.name: page.read_text(encoding="utf-8") for page in tmp_path.glob("*.html")}
     assert {f"{page.stem}.html" for page in (ROOT / "docs").glob("*.md")} <= set(pages)
     assert "ends at u = 0.4729 m/s" in pages["index.html"], "the README is the first page"
+    flown = re.findall(r'(?:href|src)="(fly/[^"]+)"', pages["index.html"])
+    assert {"fly/videoray.html", "fly/bluerov2_heavy.html"} == {*flown}
+    assert all("live-vehicles" in (tmp_path / page).read_text(encoding="utf-8") for page in flown)
     for key in (*BODY, *ARM, *CURVE, *AXIS, *TUNING):
         assert f">{key}</span>" in pages["vehicle-file.html"]
     for title, page in pages.items():
