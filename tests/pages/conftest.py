@@ -1,13 +1,14 @@
-"""Pages in headless Chromium."""
+"""Pages in headless browsers."""
 
 import shutil
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Page, Playwright
 
 _FLAGS = (
     "--no-sandbox",
@@ -21,13 +22,27 @@ _FLAGS = (
 
 
 @pytest.fixture(scope="module")
-def browser() -> "Iterator[Browser]":
+def engine() -> "Iterator[Playwright]":
     playwright = pytest.importorskip("playwright.sync_api")
-    chromium = shutil.which("chromium") or pytest.skip("there is no chromium")
     with playwright.sync_playwright() as engine:
-        browser = engine.chromium.launch(executable_path=chromium, headless=True, args=_FLAGS)
-        yield browser
-        browser.close()
+        yield engine
+
+
+@pytest.fixture(scope="module")
+def browser(engine: "Playwright") -> "Iterator[Browser]":
+    chromium = shutil.which("chromium") or pytest.skip("there is no chromium")
+    browser = engine.chromium.launch(executable_path=chromium, headless=True, args=_FLAGS)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture(scope="module")
+def firefox(engine: "Playwright") -> "Iterator[Browser]":
+    if not Path(engine.firefox.executable_path).exists():
+        pytest.skip("there is no Firefox of Playwright's: playwright install firefox")
+    browser = engine.firefox.launch(headless=True)
+    yield browser
+    browser.close()
 
 
 class Visit:
