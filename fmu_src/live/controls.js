@@ -25,6 +25,12 @@ function part(id) {
   return /** @type {HTMLElement} */ (document.getElementById(`live-${id}`));
 }
 
+/** What a hand sets on a slider: to a hundredth or so of its range. @param {number} value @param {number} most */
+function rounded(value, most) {
+  const step = 10 ** (Math.floor(Math.log10(most)) - 2);
+  return Number((Math.round(value / step) * step).toPrecision(12));
+}
+
 class Live {
   /** @param {Model} pilot @param {Model | null} other */
   constructor(pilot, other) {
@@ -58,7 +64,7 @@ class Live {
     const stage = part("stage");
     for (const slider of this.sliders) {
       slider.addEventListener("input", () => {
-        slider.value = String(Math.round(Number(slider.value) * 100) / 100);
+        slider.value = String(rounded(Number(slider.value), Number(slider.max)));
         this.slid(slider);
       });
     }
@@ -349,4 +355,4 @@ async function start() {
   live = new Live(pilot, other ?? null);
 }
 
-start();
+start().catch(() => document.getElementById("live-sorry")?.removeAttribute("hidden"));

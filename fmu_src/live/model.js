@@ -3,12 +3,12 @@
 
 /**
  * An axis: names of its velocity, load and tuning; the commands that drive it with their signs; the position that follows.
- * @typedef {{name: string, velocity: string, unit: string, positive: string, negative: string, external: string, position: string | null,
- *   positionUnit: string, signs: Record<string, number>}} Axis
+ * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string,
+ *   signs: Record<string, number>}} Axis
  */
 /**
  * A thruster: the variable of its force, its place (x, y) and direction (x, y, z) in the body frame, its strongest force in N.
- * @typedef {{name: string, force: string, at: [number, number], along: [number, number, number], most: number}} Thruster
+ * @typedef {{force: string, at: [number, number], along: [number, number, number], most: number}} Thruster
  */
 /**
  * A published step test: a command along an axis from rest, with what was measured of it.

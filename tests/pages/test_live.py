@@ -227,6 +227,22 @@ def test_it_is_flown_by_keys_alone(pages: Callable[[str], str], quiet: Visitor) 
     assert page.evaluate("live.flight.pilot.model.get('u_5')") > 0.0
 
 
+def test_a_gamepad_steers_and_lets_go(pages: Callable[[str], str], quiet: Visitor, heavy: Vehicle) -> None:
+    page = flying(quiet, pages("heavy")).page
+    sticks = {"yaw": 0.5, "heave": -0.25, "sway": 0.05, "surge": 0.75}  # sway is within the dead zone
+    axes = [sticks["yaw"], sticks["heave"], sticks["sway"], -sticks["surge"]]
+    page.evaluate("axes => { navigator.getGamepads = () => [null, { mapping: 'standard', axes }]; }", axes)
+    until(page, "live.flight.pilot.model.get('r') > 0.1")
+    asked = page.evaluate("Object.fromEntries(live.vehicle.commands.map(c => [c, live.flight.pilot.model.get(c)]))")
+    expected = dict.fromkeys(heavy.layout.commands, 0.0)
+    for form in heavy.layout.axes:
+        for name, sign in heavy.layout.signs(form.axis).items():
+            expected[name] += sign * sticks[form.axis.name] * (form.axis.name != "sway")
+    assert asked == pytest.approx({name: max(-1.0, min(1.0, value)) for name, value in expected.items()})
+    page.evaluate("() => { navigator.getGamepads = () => []; }")
+    until(page, "live.vehicle.commands.every(name => live.flight.pilot.model.get(name) === 0)")
+
+
 def test_a_step_test_stands_beside_what_was_measured(
     pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle
 ) -> None:
@@ -263,6 +279,18 @@ def test_alpha_and_beta_are_felt_and_the_ghost_keeps_those_of_the_file(
         "Object.fromEntries(live.vehicle.tunable.map(name => [name, live.flight.pilot.model.get(name)]))"
     )
     assert tuned == {name: vehicle.rov[name] for name in tuned}
+
+
+def test_loads_and_current_act(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
+    page = flying(quiet, pages("videoray")).page
+    page.locator("summary", has_text="Loads").click()
+    page.locator("input[name=Z_ext]").fill("1")
+    page.locator("input[name=V_E]").fill("0.5")
+    until(page, "live.flight.time > 1")
+    time, y, z = page.evaluate("[live.flight.time, ...['y', 'z'].map(name => live.flight.pilot.model.get(name))]")
+    rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
+    assert z > 0.9 * vehicle.rov.step(rest | {"Z_ext": 1.0}, rest, time)["z"] > 0.0
+    assert 0.4 * time < y <= 0.5 * time
 
 
 def test_another_vehicle_flies_the_same_commands_as_a_ghost(tmp_path: Path, quiet: Visitor) -> None:
@@ -372,6 +400,23 @@ def test_a_file_that_is_no_recording_is_told_and_the_model_flies_on(
 # ---- The page --------------------------------------------------------------------------------------------------------
 
 
+def test_a_file_is_taken_where_it_is_dropped(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
+    page = flying(quiet, pages("videoray")).page
+    page.evaluate(
+        """text => {
+            const dataTransfer = new DataTransfer();
+            dataTransfer.items.add(new File([text], "pool.csv"));
+            document.getElementById("live-track").dispatchEvent(
+                new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
+        }""",
+        a_recording(vehicle),
+    )
+    until(page, "live.flight.playback !== null")
+    page.locator("input[name=u_t]").fill("0.5")
+    until(page, "live.flight.pilot.model.get('u_t') === 0.5")
+    assert page.evaluate("live.flight.playback") is None, "the pilot has control again"
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1280])
 def test_axe_finds_nothing_and_it_fits(
@@ -386,6 +431,14 @@ def test_axe_finds_nothing_and_it_fits(
     page.screenshot(path=tmp_path / f"fly-{width}-{scheme}.png", full_page=True)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert axe.Axe().run(page).response["violations"] == []
+
+
+def test_a_browser_that_cannot_is_told(pages: Callable[[str], str], quiet: Visitor) -> None:
+    seen = quiet()
+    seen.page.add_init_script("delete globalThis.WebAssembly")
+    seen.page.goto(pages("videoray"))
+    seen.page.wait_for_selector("#live-sorry:not([hidden])")
+    assert not seen.page.locator("#live-section").is_visible()
 
 
 def test_without_scripts_and_on_paper_the_page_of_the_fmu_is_as_it_was(
