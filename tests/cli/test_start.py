@@ -48,7 +48,18 @@ def test_an_fmu_of_fmi_3_bears_it_in_its_name(
     assert read_model_description(str(path)).fmiVersion == "3.0"
 
 
-@pytest.mark.parametrize("command", [["build"], ["tables"], ["tune", "--axis=yaw"]])
+def test_fly_opens_the_page_that_it_wrote(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    assert main(["fly", str(BARE), "--against", str(BARE)]) == 0
+    path = Path(capsys.readouterr().out.strip())
+    assert opened == [path.as_uri()]
+    text = path.read_text(encoding="utf-8")
+    assert "The ghost is Bare, under the same commands." in text
+    shutil.rmtree(path.parent)
+
+
+@pytest.mark.parametrize("command", [["build"], ["fly", "--against"], ["tables"], ["tune", "--axis=yaw"]])
 def test_an_unknown_name_is_one_line_with_those_that_ship(
     command: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -214,6 +214,8 @@ def test_no_command_writes_over_what_it_reads_or_writes_itself(tmp_path: Path, c
     ):
         _refused(["build", str(vehicle), "-o", str(output), "--osp"], tmp_path, capsys)
     _refused(["build", "-o", str(tmp_path / osp.name), "--osp"], tmp_path, capsys)
+    for output in (rov, refit, tmp_path / "tables" / "table3_heave_steady.csv"):
+        _refused(["fly", str(rov), "--against", str(refit), "-o", str(output)], tmp_path, capsys)
     for options in (
         ["-o", str(tests / "rov.toml")],
         ["-o", str(rov)],

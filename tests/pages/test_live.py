@@ -18,13 +18,14 @@ from rov_fmu.pages.live import Flown, fly_page
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import BARE
 from tests.pages.conftest import Visit
 from tests.vehicles import EVERYTHING
 
 pytestmark = pytest.mark.interop
 
 Visitor = Callable[..., Visit]
-FILES = {"videoray": SHIPPED["videoray"], "heavy": SHIPPED["bluerov2_heavy"], "everything": EVERYTHING}
+FILES = {"videoray": SHIPPED["videoray"], "heavy": SHIPPED["bluerov2_heavy"], "everything": EVERYTHING, "bare": BARE}
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +126,7 @@ def natively(folder: Path, vehicle: Vehicle, legs: list[Leg]) -> Iterator[list[f
         slave.freeInstance()
 
 
-@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("kind", ["videoray", "heavy", "everything"])
 def test_a_manoeuvre_is_that_of_the_native_fmu(
     kind: str, pages: Callable[[str], str], quiet: Visitor, request: pytest.FixtureRequest
 ) -> None:
@@ -279,6 +280,15 @@ def test_alpha_and_beta_are_felt_and_the_ghost_keeps_those_of_the_file(
         "Object.fromEntries(live.vehicle.tunable.map(name => [name, live.flight.pilot.model.get(name)]))"
     )
     assert tuned == {name: vehicle.rov[name] for name in tuned}
+
+
+def test_a_vehicle_of_one_axis_flies_too(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("bare")).page
+    page.select_option("#live-test", index=0)
+    page.click("#live-run")
+    until(page, "live.flight.time > 0.3")
+    assert page.evaluate("live.flight.pilot.model.get('z')") > 0.0
+    assert page.locator("#live-track").count() == page.locator("#live-compass").count() == 0
 
 
 def test_loads_and_current_act(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
