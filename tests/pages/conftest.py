@@ -2,7 +2,6 @@
 
 import shutil
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -38,9 +37,9 @@ def browser(engine: "Playwright") -> "Iterator[Browser]":
 
 @pytest.fixture(scope="module")
 def firefox(engine: "Playwright") -> "Iterator[Browser]":
-    if not Path(engine.firefox.executable_path).exists():
-        pytest.skip("there is no Firefox of Playwright's: playwright install firefox")
-    browser = engine.firefox.launch(headless=True)
+    firefox = shutil.which("firefox") or shutil.which("firefox-esr") or pytest.skip("there is no firefox")
+    # By this channel Playwright speaks WebDriver BiDi, so that it drives a Firefox that is not of its own build.
+    browser = engine.firefox.launch(channel="moz-firefox", executable_path=firefox, headless=True)
     yield browser
     browser.close()
 
