@@ -210,7 +210,8 @@ def estimate_alike(
     """
     degrees, J = float(count - len(names)), solution.jacobian
     noise = sqrt(float(solution.residuals @ solution.residuals) / degrees) if degrees > 0.0 else nan
-    of_x = covariance(J.T @ J) * noise**2 if degrees > 0.0 else np.full((len(names), len(names)), np.inf)
+    of_x = covariance(J.T @ J) if degrees > 0.0 else np.full((len(names), len(names)), np.inf)
+    of_x[np.isfinite(of_x)] *= noise**2  # which may be 0, of what is identifiable alone
     if thrust is not None:
         of_x = of_x + propagated(J, *thrust)
     return estimate(names, solution.x, of_x, degrees, noise)
