@@ -18,6 +18,8 @@ _FLAGS = (
     "--disable-component-update",
     "--disable-sync",
 )
+_LONG = 120_000.0
+"""Milliseconds that a browser on a busy machine may take for anything."""
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +32,7 @@ def engine() -> "Iterator[Playwright]":
 @pytest.fixture(scope="module")
 def browser(engine: "Playwright") -> "Iterator[Browser]":
     chromium = shutil.which("chromium") or pytest.skip("there is no chromium")
-    browser = engine.chromium.launch(executable_path=chromium, headless=True, args=_FLAGS)
+    browser = engine.chromium.launch(executable_path=chromium, headless=True, args=_FLAGS, timeout=_LONG)
     yield browser
     browser.close()
 
@@ -39,7 +41,7 @@ def browser(engine: "Playwright") -> "Iterator[Browser]":
 def firefox(engine: "Playwright") -> "Iterator[Browser]":
     firefox = shutil.which("firefox") or shutil.which("firefox-esr") or pytest.skip("there is no firefox")
     # By this channel Playwright speaks WebDriver BiDi, so that it drives a Firefox that is not of its own build.
-    browser = engine.firefox.launch(channel="moz-firefox", executable_path=firefox, headless=True)
+    browser = engine.firefox.launch(channel="moz-firefox", executable_path=firefox, headless=True, timeout=_LONG)
     yield browser
     browser.close()
 
@@ -49,6 +51,7 @@ class Visit:
 
     def __init__(self, browser: "Browser", *, width: int = 1280, height: int = 900, scheme: Any = "light") -> None:
         self.page: Page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+        self.page.set_default_timeout(_LONG)
         self.said: list[str] = []
         self.asked: list[str] = []
         self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))

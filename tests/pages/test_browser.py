@@ -139,7 +139,7 @@ def webapp(videoray_fmu: Path, declared: tuple[Variable, ...], tmp_path: Path) -
         )
     address = f"http://127.0.0.1:{port}/"
     try:
-        for _ in range(300):
+        for _ in range(1200):
             with suppress(OSError):
                 urllib.request.urlopen(address).close()
                 break
@@ -182,7 +182,7 @@ def test_the_web_app_offers_the_declared_values_simulates_and_tells_what_the_mod
         box.fill(str(value))
         box.blur()  # only then the app takes it
     page.click("#simulate-button")
-    page.wait_for_selector("#result-col .js-plotly-plot .trace", timeout=30_000)
+    page.wait_for_selector("#result-col .js-plotly-plot .trace")
     assert page.locator(".alert").count() == 0
     page.wait_for_timeout(500)  # it draws with a transition
     page.screenshot(path=Path(os.environ.get("SCREENSHOTS", tmp_path)) / "webapp.png")
