@@ -141,8 +141,10 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     assert {*results.trajectories().run} == {*others.index}
 
 
+LIMIT = 4.0
+"""Seconds for runs that take thousandths, for a busy machine may hold a process for long."""
 UNKIND = {2: "the FMU ended its process: SIGABRT", 3: "the FMU ended its process: SIGSEGV"} | {
-    4: "the FMU did not return within time_limit = 2 s"
+    4: f"the FMU did not return within time_limit = {LIMIT:g} s"
 }
 
 
@@ -161,7 +163,7 @@ def _unkind(plan: Path, folder: Path, **where: Any) -> None:
 
 
 def _unkind_plan(folder: Path, fmu: Path) -> Path:
-    return _plan(folder, fmu, runs=64, vary=f"mode.values = {[0] * 13 + [*UNKIND]}", limit=2.0)
+    return _plan(folder, fmu, runs=64, vary=f"mode.values = {[0] * 13 + [*UNKIND]}", limit=LIMIT)
 
 
 @posix
@@ -181,7 +183,7 @@ def test_workers_that_nobody_starts_again_outlive_an_fmu(foreign: Foreign, tmp_p
 @posix
 def test_a_process_apart_is_a_simulator(foreign: Foreign, tmp_path: Path) -> None:
     """And tells what has become of it, and goes on with the next run."""
-    path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 3, 4]", limit=1.0)
+    path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 3, 4]", limit=LIMIT)
     model = read_model(foreign())
     job = prepare(load_plan(path), path, model).job
     unpack(model.content, tmp_path / "fmu")
@@ -192,7 +194,7 @@ def test_a_process_apart_is_a_simulator(foreign: Foreign, tmp_path: Path) -> Non
             y.append(apart.run([1.0, 0.0, 0.0, mode])["y"][10])
             apart.reset()
         except RunError as error:
-            y.append(str(error).replace("= 1 s", "= 2 s"))
+            y.append(str(error))
     apart.free()
     end = pytest.approx(1.0 - np.exp(-2.0), rel=1e-12)
     assert y == [end, *UNKIND.values(), "the step at 1 s: error; the FMU: the pump is blocked", end]
@@ -326,7 +328,7 @@ def _begun(plan: Path, results: Path) -> "subprocess.Popen[str]":
         # a shell starts what it runs in the background with interrupts ignored, and that is inherited
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 300.0
     while len(_parts(results)) < 2:
         assert time.monotonic() < deadline
         assert process.poll() is None
@@ -368,7 +370,7 @@ def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: P
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
     process = _begun(plan, results)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
-    error = process.communicate(timeout=60)[1]
+    error = process.communicate(timeout=300)[1]
     assert process.returncode == 130
     assert error.splitlines() == [
         "rov-fmu: interrupted, no file is half-written",
@@ -389,7 +391,7 @@ def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, s
     process = _begun(plan, results)
     for victim in _children(process.pid):
         os.kill(victim, signal.SIGKILL)
-    assert process.communicate(timeout=120)[1] == ""
+    assert process.communicate(timeout=300)[1] == ""
     assert process.returncode == 0
     _same(Results(results), slow)
 
@@ -400,7 +402,7 @@ def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, s
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
     process = _begun(plan, results)
     process.kill()
-    process.communicate(timeout=30)
+    process.communicate(timeout=300)
     (results / "trajectories" / "part-000000000-000009999.parquet").write_bytes(b"half of it, without its runs")
     (results / "runs" / ".part-000000000-000009999.parquet.abc.part").write_bytes(b"a draft")
     _same(study(plan, results, workers=2), slow)
