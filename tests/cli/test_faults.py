@@ -30,12 +30,12 @@ OLD = b"the old one"
 
 def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> None:
     """Kill after so many seconds, or as soon as a draft stands in the folder."""
-    deadline = time.monotonic() + (60.0 if after is None else after)
+    deadline = time.monotonic() + (300.0 if after is None else after)
     while time.monotonic() < deadline and not (after is None and list(folder.glob(".*.part"))):
         assert after is not None or process.poll() is None
         time.sleep(0.001)
     process.kill()
-    process.communicate(timeout=30)
+    process.communicate(timeout=300)
 
 
 def _moments(seconds: float) -> list[float | None]:
@@ -45,7 +45,7 @@ def _moments(seconds: float) -> list[float | None]:
 
 def _succeeds(arguments: list[str]) -> None:
     process = start(arguments, stdout=subprocess.DEVNULL)
-    assert process.communicate(timeout=120)[1] == ""
+    assert process.communicate(timeout=300)[1] == ""
     assert process.returncode == 0
 
 
@@ -95,7 +95,7 @@ def test_of_two_builds_at_once_one_is_whole(tmp_path: Path) -> None:
         guids.append(native_content(load_vehicle(vehicle)).guid)
         arguments = ["build", str(vehicle), "--platform", "host", "-o", str(target)]
         builds.append(start(arguments, stdout=subprocess.DEVNULL))
-    assert [build.communicate(timeout=60)[1] for build in builds] == ["", ""]
+    assert [build.communicate(timeout=300)[1] for build in builds] == ["", ""]
     from fmpy import simulate_fmu
     from fmpy.model_description import read_model_description
 
@@ -128,7 +128,7 @@ def test_an_interrupted_command_says_so_and_leaves_nothing(
     )
     with pipe.open("wb"):  # opens when the command reads it
         process.send_signal(signal_)
-        _, said = process.communicate(timeout=30)
+        _, said = process.communicate(timeout=300)
     assert process.returncode == 130
     assert said == "rov-fmu: interrupted, no file is half-written\n"
     assert not any(output.parent.iterdir())
@@ -172,7 +172,7 @@ def test_an_identification_that_is_cancelled_as_it_works_loses_nothing(moment: b
         while part := os.read(ours, 4096):
             told += part
     os.close(ours)
-    assert process.communicate(timeout=30)[1] == "rov-fmu: interrupted, no file is half-written\n"
+    assert process.communicate(timeout=300)[1] == "rov-fmu: interrupted, no file is half-written\n"
     assert process.returncode == 130
     assert b"Coefficients" not in told
     assert [path.name for path in target.parent.iterdir()] == [target.name]
@@ -242,7 +242,7 @@ def test_who_does_not_read_on_gets_no_message(case: str) -> None:
     os.close(end)
     process = start(PRINTING[case], stdout=start_)
     os.close(start_)
-    _, said = process.communicate(timeout=30)
+    _, said = process.communicate(timeout=300)
     assert (process.returncode, said) == (1, "")
 
 
@@ -251,7 +251,7 @@ def test_who_does_not_read_on_gets_no_message(case: str) -> None:
 def test_output_that_has_no_room_is_one_line(case: str) -> None:
     with Path("/dev/full").open("w", encoding="utf-8") as full:
         process = start(PRINTING[case], stdout=full)
-        _, said = process.communicate(timeout=30)
+        _, said = process.communicate(timeout=300)
     assert said == "rov-fmu: the output, or a temporary file: cannot be written: No space left on device\n"
     assert process.returncode == 2
 
@@ -274,12 +274,12 @@ def test_a_terminal_that_knows_ascii_alone_gets_every_line(name: str, tmp_path: 
     shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
     ascii_ = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii", "COLUMNS": "3"}
     process = start(["tables", str(path)], environment=ascii_, stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=30)
+    out, said = process.communicate(timeout=300)
     assert (process.returncode, said) == (0, "")
     assert out.startswith("R\\xf6v \\u03b1. ")
     assert "Table 8. Surge, alpha_u = 1.1, beta_u = 1" in out
     process = start(["tables", str(path) + "x"], environment=ascii_, stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=30)
+    out, said = process.communicate(timeout=300)
     assert (process.returncode, out) == (2, "")
     assert said.isascii()
     assert said.startswith("rov-fmu: ")

@@ -108,7 +108,7 @@ def _completed(*words: str, shell: str = "bash") -> list[str]:
         "COMP_CWORD": str(len(words)) if shell == "bash" else words[-1],
     }
     process = start([], environment=asked, stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=30)
+    out, said = process.communicate(timeout=300)
     assert (process.returncode, said) == (0, "")
     return out.splitlines()
 
@@ -130,7 +130,7 @@ def test_the_script_for_a_shell_is_there(shell: str) -> None:
     if shell == "bash" and not shutil.which("bash"):
         pytest.skip("click asks bash for its version")
     process = start([], environment={"_ROV_FMU_COMPLETE": f"{shell}_source"}, stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=30)
+    out, said = process.communicate(timeout=300)
     assert (process.returncode, said) == (0, "")
     assert f"_ROV_FMU_COMPLETE={shell}_complete" in out
 
@@ -166,7 +166,7 @@ def _on_a_terminal(arguments: Sequence[str]) -> bytes:
     while part := _read(ours):
         said += part
     os.close(ours)
-    assert process.communicate(timeout=60)[1] == ""
+    assert process.communicate(timeout=300)[1] == ""
     assert process.returncode == 0
     return said
 
@@ -180,7 +180,7 @@ def _read(terminal: int) -> bytes:
 
 def test_a_build_is_quiet_where_there_is_no_terminal(tmp_path: Path) -> None:
     process = start([*_BUILD, str(tmp_path / "x.fmu")], stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=60)
+    out, said = process.communicate(timeout=300)
     assert (process.returncode, said) == (0, "")
     assert "compiling" not in out
     assert "\x1b" not in out
@@ -281,7 +281,7 @@ def test_an_interrupted_build_in_a_notebook_ends_at_once_and_leaves_nothing(tmp_
         # a shell starts what it runs in the background with interrupts ignored, and that is inherited
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
     )  # fmt: skip
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 300.0
     while not list((tmp_path / "tmp").glob("fmu-*/fmu.c")) or not (tmp_path / "cache").exists():
         assert time.monotonic() < deadline
         assert process.poll() is None
