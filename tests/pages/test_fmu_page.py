@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import atan2, hypot, sin
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lxml import html
@@ -40,6 +41,13 @@ def page(vehicle: Vehicle) -> str:
 def bare_page(vehicle: Vehicle) -> str:
     """Of a vehicle without a data folder."""
     return documentation_page(replace(vehicle, data=None))
+
+
+def told(vehicle: Vehicle, **how: Any) -> str:
+    """The page without its plots: drawing takes most of the time, and words do not need it."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("rov_fmu.pages.fmu_page.inline_svg", lambda *_: "")
+        return documentation_page(vehicle, **how)
 
 
 def rows(page: str) -> list[list[str]]:
@@ -147,7 +155,7 @@ def test_small_and_the_same_twice(page: str, vehicle: Vehicle) -> None:
 def test_what_flies_is_small_allowed_alone_and_the_same_twice(name: str) -> None:
     flown = load_vehicle(SHIPPED[name])
     compiled = module(flown.rov)
-    still, page = documentation_page(flown), documentation_page(flown, module=compiled)
+    still, page = told(flown), told(flown, module=compiled)
     assert len(page.encode()) - len(still.encode()) < 80_000
     assert len(zlib.compress(page.encode(), 9)) - len(zlib.compress(still.encode(), 9)) < 60_000
     assert module(flown.rov) == compiled
@@ -164,8 +172,8 @@ def test_what_flies_is_small_allowed_alone_and_the_same_twice(name: str) -> None
         "base-uri": "'none'",
         "form-action": "'none'",
     }
-    (told,) = json.loads(root.get_element_by_id("live-vehicles").text)
-    measured = {test["V"] for test in told["tests"]} - {None}
+    (one,) = json.loads(root.get_element_by_id("live-vehicles").text)
+    measured = {test["V"] for test in one["tests"]} - {None}
     published = load_tables(flown) if flown.data else ()
     assert measured == {float(V) for table in published for row in table.rows if (V := row.scaled.V_ss.measured)}
 
@@ -179,7 +187,7 @@ def test_goes_without_a_data_folder(bare_page: str) -> None:
 
 def test_text_of_the_vehicle_file_is_escaped(vehicle: Vehicle) -> None:
     odd = replace(vehicle, name=ODD_NAME, description="<script>", data=None)
-    root = html.fromstring(documentation_page(odd))
+    root = html.fromstring(told(odd))
     assert root.findtext(".//h1") == ODD_NAME
     assert not list(root.iter("script"))
 
@@ -188,8 +196,12 @@ def test_text_of_the_vehicle_file_is_escaped(vehicle: Vehicle) -> None:
     ("changes", "limits"),
     [
         ({"a_t_rear": 100.3, "b_t_rear": -27.09}, (0.0, 1.0)),
-        ({"alpha_u": 0.0, "beta_w": 0.0, "R": 0.0, "a_d_u": 0.0, "b_d_w": 0.0, "a_t_top": -6.0}, (0.2, 0.201)),
-        ({"m_rov": 1e-3, "a_t_rear": 1e6}, (0.001, 0.002)),
+        pytest.param(
+            {"alpha_u": 0.0, "beta_w": 0.0, "R": 0.0, "a_d_u": 0.0, "b_d_w": 0.0, "a_t_top": -6.0},
+            (0.2, 0.201),
+            marks=pytest.mark.long,
+        ),
+        pytest.param({"m_rov": 1e-3, "a_t_rear": 1e6}, (0.001, 0.002), marks=pytest.mark.long),
     ],
     ids=str,
 )
@@ -241,14 +253,14 @@ def test_picture_of_the_readme(tmp_path: Path) -> None:
 
 
 def test_the_page_of_the_python_flavour_claims_no_more_than_it_does(vehicle: Vehicle, page: str) -> None:
-    python = documentation_page(vehicle, native=False)
+    python = told(vehicle, native=False)
     for claim in ("Model Exchange", "fmi2Discard", "Directional derivatives", "Time derivatives"):
         assert claim in page
         assert claim not in python
 
 
 def test_the_page_tells_of_the_version_of_fmi_that_it_is_in(vehicle: Vehicle, page: str) -> None:
-    two, three = page, documentation_page(vehicle, fmi=3)
+    two, three = page, told(vehicle, fmi=3)
     assert " ".join(two.split()).count("up to order 19") == 1
     assert "rov-fmu prove videoray.fmu" in two
     assert "rov-fmu prove videoray.fmi3.fmu" in three
@@ -267,7 +279,7 @@ def test_the_page_tells_of_the_version_of_fmi_that_it_is_in(vehicle: Vehicle, pa
         assert claim not in three
 
 
-@pytest.mark.parametrize("content_of", [native_content, python_content])
+@pytest.mark.parametrize("content_of", [native_content, pytest.param(python_content, marks=pytest.mark.long)])
 def test_nothing_of_the_videoray_stands_in_the_fmu_of_another_vehicle(
     vehicle: Vehicle, content_of: Callable[..., Content]
 ) -> None:
@@ -294,7 +306,7 @@ def test_nothing_of_the_videoray_stands_in_the_fmu_of_another_vehicle(
 @pytest.fixture(scope="module")
 def heavy_page(heavy: Vehicle) -> str:
     intervals = {"a_d_u": (130.5, 151.5)}
-    return documentation_page(replace(heavy, intervals=intervals))
+    return told(replace(heavy, intervals=intervals))
 
 
 def words(page: str) -> str:
@@ -395,24 +407,22 @@ def test_the_arm_of_the_paper_stands_where_its_torque_says(vehicle: Vehicle) -> 
     ],
 )
 def test_a_vehicle_of_one_axis_is_told_as_one(kind: str, absent: tuple[str, ...]) -> None:
-    text = words(documentation_page(a_vehicle(VEHICLES[kind])))
+    text = words(told(a_vehicle(VEHICLES[kind])))
     for name in absent:
         assert name not in text, name
     assert f"drive {kind.split(maxsplit=1)[0]} with quadratic and linear drag" in text
 
 
 def test_directions_that_differ_are_not_said_to_mirror() -> None:
-    def told(kind: str) -> str:
-        return words(documentation_page(a_vehicle(VEHICLES[kind])))
-
-    assert "change sign with the direction" not in told("drag by direction, coupled, late")
-    assert "Directions. Drag only changes sign" in told("yaw only")
+    late, yaw = (words(told(a_vehicle(VEHICLES[kind]))) for kind in ("drag by direction, coupled, late", "yaw only"))
+    assert "change sign with the direction" not in late
+    assert "Directions. Drag only changes sign" in yaw
 
 
 def test_what_commands_push_beside_their_axis_is_told() -> None:
     """A turn of a pair: one thruster ahead, one in reverse, which is weaker; F = a_t m^2 + b_t m, m = 1 - c_0."""
     rov = VEHICLES["lag without coupling"]
-    table = {row[0]: row for row in rows(documentation_page(a_vehicle(rov))) if len(row) > 2}
+    table = {row[0]: row for row in rows(told(a_vehicle(rov))) if len(row) > 2}
     m = 1.0 - rov["c_0_t200"]
     ahead, back = (rov[f"a_t_t200{end}"] * m**2 + rov[f"b_t_t200{end}"] * m for end in ("", "_reverse"))
     hold = "u_l = c, u_r = −c"
@@ -421,7 +431,7 @@ def test_what_commands_push_beside_their_axis_is_told() -> None:
 
 
 def test_a_sum_has_its_signs_before_its_numbers() -> None:
-    page = documentation_page(a_vehicle(VEHICLES["with an input mix"]))
+    page = told(a_vehicle(VEHICLES["with an input mix"]))
     sums = {"".join(math.text_content().split()) for math in html.fromstring(page).iter("math")}
     assert {"c1=uahead−uaside−0.5uturn", "c2=uahead+uaside+0.5uturn", "c5=−udown"} <= sums
 

@@ -103,6 +103,7 @@ def test_loads_nothing(page: str) -> None:
     assert set(re.findall(r"url\((.)", page)) == {"#"}
 
 
+@pytest.mark.parametrize("results", ["of_tables", pytest.param("of_recordings", marks=pytest.mark.long)], indirect=True)
 def test_the_same_twice(results: Identification, page: str) -> None:
     assert report_page(results) == page
 
@@ -139,6 +140,7 @@ def test_every_measured_point_stands_beside_the_models(of_tables: Identification
     assert ["Surge, Vss", "6", "5.3 %", "9.7 %", "16.6 %"] in table
 
 
+@pytest.mark.usefixtures("without_plots")
 def test_a_vehicle_of_another_kind_stands_beside(of_tables: Identification) -> None:
     heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
     axes = tuple(form for form in heavy.layout.axes if form.axis is not YAW)
@@ -366,7 +368,9 @@ def identified(with_report: Path, tmp_path: Path) -> Path:
     return tmp_path / "vehicle.toml"
 
 
-@pytest.mark.parametrize("backend", [["--platform", "host"], ["--backend", "pythonfmu"]])
+@pytest.mark.parametrize(
+    "backend", [["--platform", "host"], pytest.param(["--backend", "pythonfmu"], marks=pytest.mark.long)]
+)
 def test_the_fmu_has_the_report(identified: Path, tmp_path: Path, backend: list[str]) -> None:
     output = tmp_path / "out.fmu"
     assert 'report = "pages/report.html"' in identified.read_text(encoding="utf-8")
