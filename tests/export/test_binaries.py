@@ -25,6 +25,7 @@ from rov_fmu.cli import main
 from rov_fmu.export.compile import PLATFORMS, fmi_headers, host_platform
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import SHIPPED
+from tests.conftest import Made
 
 lief.logging.disable()
 
@@ -64,13 +65,17 @@ class Binaries:
 
 
 @pytest.fixture(scope="session", params=[2, pytest.param(3, marks=pytest.mark.long)], ids=["FMI 2.0", "FMI 3.0"])
-def binaries(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Binaries:
+def binaries(request: pytest.FixtureRequest, made_once: Made) -> Binaries:
     """The FMU that a build writes by default."""
-    folder = tmp_path_factory.mktemp("all platforms")
-    found = Binaries(folder / "videoray.fmu", folder / "fmu", request.param)
-    assert main(["build", "--fmi", str(found.fmi), "-o", str(found.archive)]) == 0
-    fmpy.extract(str(found.archive), unzipdir=str(found.folder))
-    return found
+
+    def found(folder: Path) -> Binaries:
+        return Binaries(folder / "videoray.fmu", folder / "fmu", request.param)
+
+    def fill(folder: Path) -> None:
+        assert main(["build", "--fmi", str(request.param), "-o", str(found(folder).archive)]) == 0
+        fmpy.extract(str(found(folder).archive), unzipdir=str(found(folder).folder))
+
+    return found(made_once(f"all platforms of FMI {request.param}", fill))
 
 
 def test_one_archive_holds_all_platforms(binaries: Binaries) -> None:

@@ -113,7 +113,9 @@ def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> Non
         assert [element.get(flag) for flag in flags] == ["false"] * len(flags)
 
 
+@pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.long)], indirect=True)
 def test_the_same_inputs_give_the_same_bytes(either_fmu: Path, fmi: int, tmp_path: Path) -> None:
+    """FMI 2.0 by default in a notebook, too: tests/cli/test_start.py."""
     again = tmp_path / "elsewhere" / "other name.fmu"
     again.parent.mkdir()
     assert _build(again, "--fmi", str(fmi)) == 0
@@ -130,20 +132,16 @@ def test_another_coefficient_is_another_guid(videoray_fmu: Path, vehicle: Vehicl
     assert vehicle.rov["m_rov"] == 6.57
 
 
-def test_the_command_line_says_what_it_built(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_says_what_it_built_and_which_results_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("rov_fmu.export.extrapolation._ENOUGH", -1.0)  # no step is good enough
     assert _build(tmp_path / "rov.fmu") == 0
     told = capsys.readouterr().out
     assert str(fmu_compile.host_platform()) in told
     assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in told
     assert "built in" in told
-
-
-def test_the_command_line_says_which_results_are_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("rov_fmu.export.extrapolation._ENOUGH", -1.0)  # no step is good enough
-    assert _build(tmp_path / "rov.fmu") == 0
-    (line,) = [x for x in capsys.readouterr().out.splitlines() if "no expected results, for it moves too fast: " in x]
+    (line,) = [x for x in told.splitlines() if "no expected results, for it moves too fast: " in x]
     assert line.endswith(", yaw_70_tuned, yaw_70_untuned, manoeuvre")
     with zipfile.ZipFile(tmp_path / "rov.fmu") as archive:
         assert not [name for name in archive.namelist() if name.startswith("extra/")]

@@ -10,7 +10,7 @@ from rov_fmu.export.interface import UNITS, variables
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.motion.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import ALONE, BARE
+from tests.commands import BARE
 from tests.vehicles import VEHICLES
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
@@ -122,9 +122,8 @@ def test_the_option_writes_it_beside_the_fmu(tmp_path: Path) -> None:
 
 
 def test_another_vehicle_has_its_own(tmp_path: Path) -> None:
-    text = ALONE
-    other = tmp_path / "other.toml"
-    other.write_text(text.replace('"videoray"\nversion', '"pilchard"\nversion'), encoding="utf-8")
+    text, other = BARE.read_text(encoding="utf-8"), tmp_path / "other.toml"
+    other.write_text(text.replace('"bare"\nversion', '"pilchard"\nversion'), encoding="utf-8")
     assert _build(tmp_path / "other.fmu", "--osp", str(other)) == 0
     assert (tmp_path / "pilchard_OspModelDescription.xml").is_file()
 

@@ -14,21 +14,24 @@ from checks.fmpy_slave import fmpy_slave, keep_loaded
 from rov_fmu.cli import main
 from rov_fmu.export.interface import Variable, variables
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.conftest import Made
 from tests.fmi import WARNING, Message
 from tests.fmi2 import recording_callbacks
 
 
 @pytest.fixture(scope="session")
-def python_fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def python_fmu(made_once: Made) -> Path:
+    def fill(folder: Path) -> None:
+        path = folder / "videoray-python.fmu"
+        assert main(["build", "--backend", "pythonfmu", "-o", str(path)]) == 0
+        fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
+
     # PythonFMU's binary takes no other special character than the space in its path
-    path = tmp_path_factory.mktemp("python flavour") / "videoray-python.fmu"
-    assert main(["build", "--backend", "pythonfmu", "-o", str(path)]) == 0
-    return path
+    return made_once("python flavour", fill) / "videoray-python.fmu"
 
 
 @pytest.fixture(scope="session")
 def python_dir(python_fmu: Path) -> Path:
-    fmpy.extract(str(python_fmu), unzipdir=str(python_fmu.with_suffix("")))
     keep_loaded(python_fmu.with_suffix(""))
     return python_fmu.with_suffix("")
 

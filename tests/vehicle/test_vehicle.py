@@ -211,8 +211,8 @@ def test_only_what_is_read_counts_as_an_input(tmp_path: Path, capsys: pytest.Cap
     path, fmu = tmp_path / "here.toml", tmp_path / "here.fmu"
     path.write_text(re.sub(r'^(data|pictures) = "\w+"', r'\1 = "."', TEXT, flags=re.M), encoding="utf-8")
     table, picture = tmp_path / "table3_heave_steady.csv", tmp_path / "model.png"
-    for _ in range(2):
-        assert main(["build", str(path), "--backend", "pythonfmu", "-o", str(fmu)]) == 0
+    fmu.write_bytes(b"that of the first build")
+    assert main(["build", str(path), "--backend", "pythonfmu", "-o", str(fmu)]) == 0
     assert {table, picture} < set(load_vehicle(path).files)
     assert fmu not in load_vehicle(path).files
     capsys.readouterr()
