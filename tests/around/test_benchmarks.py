@@ -62,12 +62,14 @@ def small(vehicle: Vehicle, plain_c: PlainC) -> Small:
     return Small(vehicle, plain_c)
 
 
+@pytest.mark.long
 @in_plain_c
 @pytest.mark.parametrize("h", [0.01, 1.0, 100.0])
 def test_our_velocities_are_exact_to_rounding(small: Small, h: float) -> None:
     assert small.measured.error(small.ours(CLOSED, 3, h)) < 1e-14
 
 
+@pytest.mark.long
 @in_plain_c
 @pytest.mark.parametrize(("h", "limit"), [(0.01, 1e-13), (1.0, 1e-14), (100.0, 1e-12)])
 def test_our_pose_is_exact_to_rounding(small: Small, h: float, limit: float) -> None:
@@ -75,6 +77,7 @@ def test_our_pose_is_exact_to_rounding(small: Small, h: float, limit: float) -> 
     assert small.measured.error(small.ours(FMU, 7, h)) < limit
 
 
+@pytest.mark.long
 @in_plain_c
 @pytest.mark.parametrize("h", [0.01, 1.0, 100.0])
 def test_the_formulas_without_fmi_are_those_of_the_fmu_of_either_version(small: Small, h: float) -> None:
@@ -82,6 +85,7 @@ def test_the_formulas_without_fmi_are_those_of_the_fmu_of_either_version(small: 
     assert fmus == [bare] * 3
 
 
+@pytest.mark.long
 @in_plain_c
 @pytest.mark.parametrize("states", [3, 7])
 @pytest.mark.parametrize(("method", "order"), [(EULER, 1), (RK4, 4)])
@@ -91,6 +95,7 @@ def test_explicit_methods_are_of_their_order(small: Small, method: str, order: i
     assert log2(coarse / fine) == pytest.approx(order, abs=0.25)
 
 
+@pytest.mark.long
 @in_plain_c
 @pytest.mark.parametrize("states", [3, 7])
 @pytest.mark.parametrize("method", CVODE)
@@ -99,6 +104,7 @@ def test_cvode_keeps_near_its_tolerance(small: Small, method: str, states: int) 
         assert 0.1 * tolerance < small.measured.error(small.solver(method, states, tolerance)) < 300.0 * tolerance
 
 
+@pytest.mark.long
 @in_plain_c
 def test_every_job_is_timed_in_every_repetition(small: Small) -> None:
     for job in small.jobs:

@@ -254,12 +254,14 @@ def test_fmpy_holds_and_agrees(folder: Path, expected: tuple[str, Trajectory]) -
     assert result["rov.z"].max() < 5.0 + 0.02  # and not beyond
 
 
+@pytest.mark.long
 def test_the_parameter_sets_make_a_difference() -> None:
     apart = run.difference(*(plain(name) for name in SETS))
     assert apart["rov.z"] > 1e-3
     assert degrees(apart["rov.psi"]) > 1.0
 
 
+@pytest.mark.long
 def test_the_order_of_stepping_makes_a_difference(expected: tuple[str, Trajectory]) -> None:
     parameters, trajectory = expected
     apart = run.difference(plain(parameters, sequential=True), trajectory)
@@ -376,6 +378,7 @@ def test_the_stick_balances_current_and_tether() -> None:
     assert sin(result["rov.psi"][-1]) == pytest.approx(1.0)  # it faces the current
 
 
+@pytest.mark.long
 def test_the_picture_shows_all_four(tmp_path: Path) -> None:
     path = tmp_path / "picture.svg"
     run.draw({name: plain(name) for name in SETS}, path)

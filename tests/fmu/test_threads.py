@@ -34,9 +34,8 @@ def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls
     ("fmi", "sanitizers"),
     [
         (2, "thread"),
-        (2, "address,undefined"),
         (3, "thread"),
-        pytest.param(3, "address,undefined", marks=pytest.mark.long),  # as the fuzzer's corpus has it
+        *(pytest.param(fmi, "address,undefined", marks=pytest.mark.long) for fmi in (2, 3)),  # as the corpus has it
     ],
 )
 def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
@@ -61,7 +60,10 @@ def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
             "static rov_held held; flow f; flow_begin",
             "data race",
         ),
-        ("address", "fmi2_common.c", "    free(c);\n", "(void)c;\n", "detected memory leaks"),
+        pytest.param(
+            *("address", "fmi2_common.c", "    free(c);\n", "(void)c;\n", "detected memory leaks"),
+            marks=pytest.mark.long,
+        ),
     ],
     ids=["shared variable", "lost instance"],
 )
