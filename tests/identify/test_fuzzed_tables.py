@@ -66,7 +66,7 @@ def check_line(text: str, folder: Path) -> None:
         assert len(line.replace(str(folder), "")) < 350
 
 
-@pytest.mark.parametrize("examples", [100, pytest.param(2000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [40, pytest.param(2000, marks=pytest.mark.long)])
 def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_path: Path) -> None:
     folder = tmp_path / "changed"
 
@@ -87,7 +87,13 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
 
 
 @pytest.mark.parametrize("examples", [3, pytest.param(30, marks=pytest.mark.long)])
-@pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", "time_constant_yaw.csv", "thrust_top.csv", LOG])
+@pytest.mark.parametrize(
+    "only",
+    [
+        *("rov.toml", "steady_heave_down.csv", "time_constant_yaw.csv", "thrust_top.csv"),
+        pytest.param(LOG, marks=pytest.mark.long),
+    ],
+)
 def test_any_folder_is_identified_or_one_clear_line(
     only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
@@ -234,8 +240,14 @@ HARDLY = [
 ]
 
 
-@pytest.mark.parametrize("forces", HARDLY)
-@pytest.mark.parametrize("recorded", [True, False])
+@pytest.mark.parametrize(
+    ("forces", "recorded"),
+    [
+        *((forces, False) for forces in HARDLY),
+        (HARDLY[0], True),
+        *(pytest.param(forces, True, marks=pytest.mark.long) for forces in HARDLY[1:]),
+    ],
+)
 def test_a_thrust_curve_that_hardly_pushes_is_one_clear_line_or_a_vehicle(
     forces: str, recorded: bool, tests: Path, tmp_path: Path, capsys: Capsys
 ) -> None:

@@ -72,7 +72,7 @@ def round_trip(
     return {name: float(np.mean(hits)) for name, hits in covered.items()}
 
 
-@pytest.mark.parametrize("m", AXES[:2], ids=lambda m: m.name)
+@pytest.mark.parametrize("m", [HEAVE, pytest.param(SURGE, marks=pytest.mark.long)], ids=lambda m: m.name)
 def test_intervals_cover_the_truth(m: Axis, k: Rov) -> None:
     """Of four seeds, which are fixed, a 95 % interval misses more than one in 1.4 % of all cases."""
     assert min(round_trip(k, m, range(4)).values()) >= 3 / 4
@@ -128,7 +128,13 @@ def test_coloured_noise_widens_the_intervals(k: Rov) -> None:
 # ---- Recordings of all kinds -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("rate", "plan"), [(10.0, PLANS["yaw"][0]), (33.0, PLANS["yaw"][2]), (400.0, PLANS["yaw"][0])])
+@pytest.mark.parametrize(
+    ("rate", "plan"),
+    [
+        *((10.0, PLANS["yaw"][0]), (33.0, PLANS["yaw"][2])),
+        pytest.param(400.0, PLANS["yaw"][0], marks=pytest.mark.long),
+    ],
+)
 def test_any_rate(rate: float, plan: Sequence[tuple[float, float]], k: Rov) -> None:
     fit = only([clean(k, YAW, plan, rate).noisy(np.random.default_rng(1))], unknowing(k, YAW))
     assert steady_error(fit, k) < 0.005
@@ -204,7 +210,7 @@ def thrust_test(k: Rov, thruster: str, spread: float, seed: int) -> Estimate:
 
 def test_scale_of_uncertain_thrust_is_that_of_drag(k: Rov) -> None:
     """The motion tells A, B and C only: thrust 5 % more uncertain as a whole makes drag and β so, but not V_ss."""
-    recordings = [clean(k, YAW, plan).noisy(np.random.default_rng(6)) for plan in PLANS["yaw"]]
+    recordings = [clean(k, YAW, plan, 20.0).noisy(np.random.default_rng(6)) for plan in PLANS["yaw"]]
     values = np.array([k["a_t_rear"], k["b_t_rear"]])
     spread = 0.05**2 * np.outer(values, values) + np.diag((1e-3 * values) ** 2)
     fit = only(recordings, unknowing(k, YAW), thrust=Estimate(("a_t_rear", "b_t_rear"), values, spread, 6.0, 1.0))
@@ -216,7 +222,7 @@ def test_scale_of_uncertain_thrust_is_that_of_drag(k: Rov) -> None:
 
 def test_recordings_mend_the_shape_of_the_thrust_curve(k: Rov) -> None:
     """A sensor of 0.05 N has the weak thrust at 20 % wrong by far; under many commands the motion knows better."""
-    recordings = [clean(k, HEAVE, plan).noisy(np.random.default_rng(7)) for plan in PLANS["heave"]]
+    recordings = [clean(k, HEAVE, plan, 20.0).noisy(np.random.default_rng(7)) for plan in PLANS["heave"]]
     thrust = thrust_test(k, "top", 0.05, 3)
     base = unknowing(k, HEAVE).replaced(thrust.named)
     taken, mended = only(recordings, base), only(recordings, base, thrust=thrust)
@@ -226,7 +232,7 @@ def test_recordings_mend_the_shape_of_the_thrust_curve(k: Rov) -> None:
 
 def test_surge_and_yaw_share_the_thrust_of_the_rear_pair(k: Rov) -> None:
     random = np.random.default_rng(8)
-    recordings = [clean(k, m, plan).noisy(random) for m in (SURGE, YAW) for plan in PLANS[m.name][:2]]
+    recordings = [clean(k, m, plan, 20.0).noisy(random) for m in (SURGE, YAW) for plan in PLANS[m.name][:2]]
     thrust = thrust_test(k, "rear", 0.3, 4)
     base = unknowing(unknowing(k, SURGE), YAW).replaced(thrust.named)
     surge, yaw = fit_recordings(each_by_itself(recordings), base, thrust=thrust)
@@ -246,7 +252,7 @@ def test_surge_and_yaw_share_the_thrust_of_the_rear_pair(k: Rov) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_is_found_in_clean_recordings(seed: int, k: Rov) -> None:
     """What is looked for is left at zero, but for one case in twenty each."""
-    recordings = [clean(k, HEAVE, plan).noisy(np.random.default_rng(seed)) for plan in PLANS["heave"]]
+    recordings = [clean(k, HEAVE, plan, 20.0).noisy(np.random.default_rng(seed)) for plan in PLANS["heave"]]
     fit = only(recordings, unknowing(k, HEAVE))
     assert {effect.kind for effect in fit.effects} == {"load", "delay", "dead band", "reverse thrust", "reverse drag"}
     kept = {effect.kind: effect.value for effect in fit.effects if effect.kept}

@@ -153,14 +153,13 @@ def shares(name: str, seeds: Sequence[int]) -> Shares:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [BY_DEFAULT, *(pytest.param(n, marks=pytest.mark.long) for n in SCENARIOS if n not in (*MAIN, *SLOW))],
+    ("name", "seeds"),
+    [(BY_DEFAULT, 6), *(pytest.param(n, 20, marks=pytest.mark.long) for n in SCENARIOS if n not in (*MAIN, *SLOW))],
 )
-def test_intervals_cover_the_truth(name: str) -> None:
+def test_intervals_cover_the_truth(name: str, seeds: int) -> None:
     """Of 20 seeds an interval that covers in 95 % of all cases covers in at least 15, but for one case in 1,000."""
-    seeds = range(20)
-    found = shares(name, seeds)
-    assert (found.covered.sum(axis=0) >= binom.ppf(1e-3, len(seeds), 0.95)).all(), str(found)
+    found = shares(name, range(seeds))
+    assert (found.covered.sum(axis=0) >= binom.ppf(1e-3, seeds, 0.95)).all(), str(found)
     assert (np.abs(found.off.mean(axis=0)) < SCENARIOS[name].bias).all(), str(found)
 
 
@@ -195,7 +194,7 @@ def test_intervals_cover_the_truth_under_slow_noise(name: str) -> None:
         assert covered >= binom.ppf(1e-3, len(fits), 0.95), f"{coefficient}: {covered} of {len(fits)}"
 
 
-@pytest.mark.parametrize("name", ["one current", "another current each time"])
+@pytest.mark.parametrize("name", ["another current each time", pytest.param("one current", marks=pytest.mark.long)])
 def test_the_current_is_found(name: str) -> None:
     """In each recording by itself; it is told from loads and from what differs by direction."""
     (fit,) = fitted(name, 0)
@@ -216,7 +215,9 @@ def velocity_fit(measured: np.ndarray, modelled: np.ndarray) -> float:
     return float(100.0 * (1.0 - np.linalg.norm(measured - modelled) / np.linalg.norm(measured - measured.mean())))
 
 
-@pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
+@pytest.mark.parametrize(
+    "axis", [HEAVE, *(pytest.param(a, marks=pytest.mark.long) for a in (SURGE, YAW))], ids=lambda axis: axis.name
+)
 def test_pulses_that_were_not_fitted_are_predicted(axis: Axis) -> None:
     """After lag and delay, with the vehicle and the delay that the fit gives; the pool moves both."""
     name = f"lag and delay in {axis.name}"

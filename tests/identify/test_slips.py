@@ -100,8 +100,14 @@ def names(sentences: Sequence[str], file: str, words: str) -> bool:
     return any(re.search(words, sentence.replace(file, ""), re.IGNORECASE) for sentence in about)
 
 
-@pytest.mark.parametrize("kind", SLIPS)
-@pytest.mark.parametrize("how_many", ["one of three", "all"])
+HOW_MANY = ("one of three", "all")
+# Each kind by default, in turn in one recording and in all.
+_BOTH = [(kind, HOW_MANY[(n + at) % 2], at) for n, kind in enumerate(SLIPS) for at in (0, 1)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "how_many"), [pytest.param(*case, marks=[pytest.mark.long] * second) for *case, second in _BOTH]
+)
 def test_a_slip_is_named_or_refused(kind: str, how_many: str, tmp_path: Path) -> None:
     slip = SLIPS[kind]
     logs = recordings(slip.axis)
