@@ -2,15 +2,17 @@
 
 import os
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from functools import cache
 from importlib.util import find_spec
-from io import StringIO
+from io import BytesIO, StringIO, TextIOWrapper
 from math import hypot, pi, sin
 from pathlib import Path
 
@@ -78,8 +80,18 @@ def usage(command: tuple[str, ...]) -> str:
         with redirect_stdout(said):
             assert main([*(command[2:] or ["build"]), "--help"]) == 0
         return said.getvalue()
-    whole = [sys.executable, *command, "--help"]
-    return subprocess.run(whole, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    # in this process, which has imported most of what they need
+    printed, code = BytesIO(), None
+    text = TextIOWrapper(printed, encoding="utf-8", write_through=True)
+    with warnings.catch_warnings(), redirect_stdout(text), pytest.MonkeyPatch.context() as patched:
+        warnings.simplefilter("ignore", RuntimeWarning)  # that it is imported already
+        patched.setattr("sys.argv", [command[1], "--help"])
+        try:
+            runpy.run_module(command[1], run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+    assert not code
+    return printed.getvalue().decode()
 
 
 def module_of(words: Sequence[str]) -> tuple[tuple[str, ...], Sequence[str]]:
