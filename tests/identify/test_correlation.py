@@ -73,8 +73,9 @@ def refitted(data: dict[str, Array], start: Rov) -> dict[str, float]:
     return found
 
 
-def test_drag_and_thrust_scatter_as_the_file_says(tmp_path: Path) -> None:
-    """Surge and yaw have the rear curve in common: 600 sets of data, fitted by other means, about what was found."""
+@pytest.mark.parametrize("sets", [150, pytest.param(600, marks=pytest.mark.long)])
+def test_drag_and_thrust_scatter_as_the_file_says(sets: int, tmp_path: Path) -> None:
+    """Surge and yaw have the rear curve in common: sets of data, fitted by other means, about what was found."""
     found = identified(measured(K, np.random.default_rng(3), 0.2, {"surge": 0.005, "yaw": 0.005}), tmp_path / "tests")
     write_vehicle(found.vehicle, tmp_path / "made.toml")
     vehicle = load_vehicle(tmp_path / "made.toml")
@@ -84,15 +85,16 @@ def test_drag_and_thrust_scatter_as_the_file_says(tmp_path: Path) -> None:
     share = {
         r.axis.name: r.response.estimate.noise * stdtrit(14.0 - 3.0, 0.975) / 1.96 for r in found.axes if r.response
     }
-    fits = [refitted(measured(vehicle.rov, random, newton, share), vehicle.rov) for _ in range(600)]
+    fits = [refitted(measured(vehicle.rov, random, newton, share), vehicle.rov) for _ in range(sets)]
+    near = 0.12 * np.sqrt(600 / sets)
     scatter = np.array([[fit[name] for name in told.names] for fit in fits])
-    assert scatter.std(axis=0) == pytest.approx(told.errors, rel=0.12)
+    assert scatter.std(axis=0) == pytest.approx(told.errors, rel=near)
     pairs = np.triu_indices(8, 1)
     fisher = [np.arctanh(matrix[pairs]) for matrix in (np.corrcoef(scatter.T), told.correlation)]
-    assert fisher[0] == pytest.approx(fisher[1], abs=4.0 / np.sqrt(600))
-    numbers = scatter, told.drawn(random.random((600, 8))), told_apart(vehicle).drawn(random.random((600, 8)))
+    assert fisher[0] == pytest.approx(fisher[1], abs=4.0 / np.sqrt(sets))
+    numbers = scatter, told.drawn(random.random((sets, 8))), told_apart(vehicle).drawn(random.random((sets, 8)))
     measured_ones, drawn, alone = (spread(vehicle, told.names, rows, SURGE) for rows in numbers)
-    assert drawn == pytest.approx(measured_ones, rel=0.12)
+    assert drawn == pytest.approx(measured_ones, rel=near)
     assert alone > 4.0 * measured_ones, "thrust and drag that do not know of each other"
 
 
@@ -108,7 +110,7 @@ def spread(vehicle: Vehicle, names: Sequence[str], numbers: Array, axis: Axis) -
     return float(np.std(V_ss) / np.mean(V_ss))
 
 
-@pytest.mark.parametrize("seeds", [2, pytest.param(12, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seeds", [1, pytest.param(12, marks=pytest.mark.long)])
 def test_recordings_scatter_as_the_fit_of_all_axes_says(seeds: int) -> None:
     """Surge and yaw by recordings, their thrust curve as its tests left it: the truth is as far off as the covariance
     of all coefficients together has it (χ²), in all directions, of which thrust by drag is known a hundred times
