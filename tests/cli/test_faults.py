@@ -108,7 +108,7 @@ def test_of_two_builds_at_once_one_is_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("signal_", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
-@pytest.mark.parametrize("command", ["identify", "tune"])
+@pytest.mark.parametrize("command", ["identify", pytest.param("tune", marks=pytest.mark.long)])
 def test_an_interrupted_command_says_so_and_leaves_nothing(
     command: str, signal_: signal.Signals, tmp_path: Path
 ) -> None:
@@ -179,7 +179,10 @@ def test_an_identification_that_is_cancelled_as_it_works_loses_nothing(moment: b
     assert target.read_bytes() == OLD
 
 
-@pytest.mark.parametrize("name", ["the vehicle", "the report", "the tuned vehicle", "the figures"])
+_DRAWN = [pytest.param(name, marks=pytest.mark.long) for name in ("the report", "the figures")]
+
+
+@pytest.mark.parametrize("name", ["the vehicle", "the tuned vehicle", *_DRAWN])
 def test_an_interrupt_before_the_last_move_leaves_nothing(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -234,9 +237,11 @@ PRINTING = {
     "help": ["--help"],
     "help of build": ["build", "--help"],
 }
+_QUICK = ("tables", "help")
+_CASES = [*_QUICK, *(pytest.param(case, marks=pytest.mark.long) for case in PRINTING if case not in _QUICK)]
 
 
-@pytest.mark.parametrize("case", PRINTING)
+@pytest.mark.parametrize("case", _CASES)
 def test_who_does_not_read_on_gets_no_message(case: str) -> None:
     end, start_ = os.pipe()
     os.close(end)
@@ -247,7 +252,7 @@ def test_who_does_not_read_on_gets_no_message(case: str) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-@pytest.mark.parametrize("case", PRINTING)
+@pytest.mark.parametrize("case", _CASES)
 def test_output_that_has_no_room_is_one_line(case: str) -> None:
     with Path("/dev/full").open("w", encoding="utf-8") as full:
         process = start(PRINTING[case], stdout=full)

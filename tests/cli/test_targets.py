@@ -43,9 +43,18 @@ IMPOSSIBLE: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
+# The figures, which are drawn before, take a second each.
+_CASES = [
+    pytest.param(command, case, marks=[pytest.mark.long] * (name == "the figures" and case != "a folder"))
+    for name, command in COMMANDS.items()
+    for case in IMPOSSIBLE
+]
+
+
 @_posix
-@pytest.mark.parametrize("case", IMPOSSIBLE)
-@pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
+@pytest.mark.parametrize(
+    ("command", "case"), _CASES, ids=[f"{name}-{case}" for name in COMMANDS for case in IMPOSSIBLE]
+)
 def test_an_impossible_target_is_refused_before_the_work(
     command: Command, case: str, tmp_path: Path, capsys: Capsys
 ) -> None:
@@ -105,6 +114,7 @@ def test_what_is_read_only_stays(what: str, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="a disk of a given size is mounted as on Linux")
 def test_a_full_disk_leaves_the_old_files(tmp_path: Path) -> None:
     (tmp_path / "target").mkdir()
@@ -145,7 +155,7 @@ def test_a_limit_on_the_size_of_files_leaves_the_old_files(tmp_path: Path) -> No
 # ---- Several files ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["build", "identify"])
+@pytest.mark.parametrize("command", ["build", pytest.param("identify", marks=pytest.mark.long)])
 def test_two_files_are_written_both_or_neither(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
