@@ -98,7 +98,7 @@ def test_a_folder_that_takes_no_file_is_named(capsys: pytest.CaptureFixture[str]
     assert "/proc/rov.fmu: cannot be written" in _one_line(capsys)
 
 
-@pytest.mark.parametrize("function", ["fsync", "replace"])
+@pytest.mark.parametrize("function", ["fsync", pytest.param("replace", marks=pytest.mark.long)])
 def test_a_full_disk_leaves_the_old_fmu(
     old: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], function: str
 ) -> None:
@@ -171,7 +171,7 @@ def _is_running(process: int) -> bool:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals are POSIX, /proc is Linux")
-@pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("signal_", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
     old: Path, tmp_path: Path, signal_: signal.Signals
 ) -> None:

@@ -161,7 +161,7 @@ def test_a_shared_library_has_plain_names_and_flies_the_same(
     _flies_the_same(fmu, library, shipped)
 
 
-@pytest.mark.parametrize("release", ["2.0.0", "3.0"])
+@pytest.mark.parametrize("release", [pytest.param("2.0.0", marks=pytest.mark.long), "3.0"])
 def test_as_cpp_they_fly_the_same(
     fmus: dict[int, Fmu], headers: dict[str, Path], shipped: bytes, tmp_path: Path, release: str
 ) -> None:
@@ -173,8 +173,16 @@ def test_as_cpp_they_fly_the_same(
     _flies_the_same(fmu, library, shipped)
 
 
-@pytest.mark.parametrize("release", ["2.0.0", "2.0.1", "2.0.4", "3.0"])
-@pytest.mark.parametrize("override", [False, True])
+# Each way that a release has it once; all of them in the long tests.
+_SOME_PREFIXES = {("2.0.0", False), ("2.0.4", False), ("2.0.4", True)}
+_PREFIXES = [
+    pytest.param(r, o, marks=() if (r, o) in _SOME_PREFIXES else pytest.mark.long)
+    for o in (False, True)
+    for r in ("2.0.0", "2.0.1", "2.0.4", "3.0")
+]
+
+
+@pytest.mark.parametrize(("release", "override"), _PREFIXES)
 def test_the_prefix_reaches_the_exports_only_where_it_is_meant_to(
     fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, override: bool
 ) -> None:
@@ -213,7 +221,10 @@ _DECLARE = {
 
 @pytest.mark.parametrize(
     ("releases", "sister"),
-    [(("2.0.0",) * 2, "sister"), (("2.0.4",) * 2, "sister"), (("3.0",) * 2, "sister"), (("2.0.4", "3.0"), "videoray")],
+    [
+        *(pytest.param((release,) * 2, "sister", marks=pytest.mark.long) for release in ("2.0.0", "2.0.4", "3.0")),
+        (("2.0.4", "3.0"), "videoray"),
+    ],
     ids=["2.0.0", "2.0.4", "3.0", "one model in both versions"],
 )
 def test_two_models_link_into_one_program_under_their_prefixes(
@@ -276,8 +287,14 @@ _MICROSOFT = {
 }
 
 
-@pytest.mark.parametrize("release", RELEASES)
-@pytest.mark.parametrize("standard", _STANDARDS)
+@pytest.mark.parametrize(
+    ("release", "standard"),
+    [
+        pytest.param(release, standard, marks=() if i % 2 == j else pytest.mark.long)
+        for i, release in enumerate(RELEASES)
+        for j, standard in enumerate(_STANDARDS)
+    ],
+)
 def test_microsofts_compiler_would_take_them(
     fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, standard: str
 ) -> None:

@@ -26,6 +26,7 @@ def zig_as_cc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CMAKE_GENERATOR", "Ninja")
 
 
+@pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.long)], indirect=True)
 @pytest.mark.usefixtures("zig_as_cc")
 def test_fmpy_compiles_and_runs_them(either_dir: Path, tmp_path: Path) -> None:
     folder = tmp_path / "source fmu"
@@ -39,7 +40,7 @@ def test_fmpy_compiles_and_runs_them(either_dir: Path, tmp_path: Path) -> None:
         assert built[name] == pytest.approx(shipped[name], rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("optimization", ["-O0", "-O3"])
+@pytest.mark.parametrize("optimization", [pytest.param("-O0", marks=pytest.mark.long), "-O3"])
 def test_no_warning_under_the_strictest_flags(either_dir: Path, tmp_path: Path, optimization: str) -> None:
     more = ["-Wshadow", "-Wundef", "-Wstrict-prototypes", "-Wcast-qual", "-Wvla"]
     flags = ["-std=c11", *WARNINGS, *more, optimization, "-isystem", str(fmi_headers())]

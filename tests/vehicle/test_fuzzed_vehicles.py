@@ -16,7 +16,7 @@ from rov_fmu.motion.layout import YAW
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-from tests.commands import REFIT
+from tests.commands import BARE, REFIT
 from tests.damage import changed_bytes, changed_lines, changed_numbers, changed_toml, fuzz
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
@@ -68,7 +68,7 @@ def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
     return read_model_description(str(fmu), validate=True)
 
 
-@pytest.mark.parametrize("examples", [60, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [30, pytest.param(1000, marks=pytest.mark.long)])
 def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int, path: Path) -> None:
     usable = 0
 
@@ -194,7 +194,10 @@ ODD: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
 }
 
 
-@pytest.mark.parametrize("case", ODD)
+_SLOW = "a key of 3000 parts"
+
+
+@pytest.mark.parametrize("case", [pytest.param(c, marks=[pytest.mark.long] * (c == _SLOW)) for c in ODD])
 def test_what_chance_hardly_finds_is_one_clear_line(case: str, path: Path) -> None:
     change, named = ODD[case]
     path.write_text(change(TEXT), encoding="utf-8")
@@ -209,7 +212,8 @@ def test_what_chance_hardly_finds_is_one_clear_line(case: str, path: Path) -> No
     "identifier", ["x" * 100, *(pytest.param(word, marks=pytest.mark.long) for word in ("int", "__init__"))]
 )
 def test_any_identifier_makes_an_fmu(identifier: str, path: Path) -> None:
-    path.write_text(TEXT.replace('identifier = "videoray"', f'identifier = "{identifier}"'), encoding="utf-8")
+    text = BARE.read_text(encoding="utf-8")
+    path.write_text(text.replace('identifier = "bare"', f'identifier = "{identifier}"'), encoding="utf-8")
     fmu = path.with_name("out.fmu")
     assert main(["build", str(path), "-o", str(fmu), "--platform", "host", "--osp"]) == 0
     assert read_model_description(str(fmu)).modelName == identifier
