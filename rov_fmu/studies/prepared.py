@@ -20,7 +20,7 @@ from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied, nonsense
 from rov_fmu.studies.sampling import Design
 from rov_fmu.studies.simulator import Manoeuvre
 from rov_fmu.studies.worker import REASON, RUN, STATUS, TIME, Job
-from rov_fmu.vehicle.shipped import find_vehicle
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 Array = npt.NDArray[np.float64]
@@ -41,7 +41,7 @@ class Prepared:
 
 def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     """See that a plan, read from a path, fits an FMU. Raises PlanError with every reason."""
-    vehicle = load_vehicle(vehicle_file(plan.vary_from, path)) if plan.vary_from else None
+    vehicle = load_vehicle(vehicle_file("vary_from", plan.vary_from, path)) if plan.vary_from else None
     estimates = Estimates(plan, vehicle, model.variables)
     own, from_file, unread = [*nonsense(plan)], {}, []
     try:
@@ -79,13 +79,16 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     return Prepared(plan, job, design, mark, [*estimates.warnings(), *design.warnings()])
 
 
-def vehicle_file(given: str, path: Path) -> Path:
-    """A vehicle file beside the plan, or one that ships. Raises PlanError."""
+def vehicle_file(key: str, given: str, path: Path) -> Path:
+    """What a key of the plan at a path names: a vehicle file beside the plan, or one that ships. Raises PlanError."""
     beside = path.parent / given
-    try:
-        return beside if beside.is_file() else find_vehicle(given)
-    except FileError as error:
-        raise PlanError(f"{path}: {error}") from error
+    if beside.is_file():
+        return beside
+    if given not in SHIPPED:
+        ships = ", ".join(SHIPPED)
+        told = f"there is no such file, as seen from the plan, and no vehicle of this name ships, only {ships}"
+        raise PlanError(f"{path}: {line(key, told, given)}")
+    return SHIPPED[given]
 
 
 def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:

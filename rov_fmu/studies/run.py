@@ -75,7 +75,7 @@ def _model(plan: Plan, path: Path) -> Model:
     if plan.fmu:
         return read_model(path.parent / plan.fmu)
     assert plan.vehicle
-    vehicle = load_vehicle(vehicle_file(plan.vehicle, path))
+    vehicle = load_vehicle(vehicle_file("vehicle", plan.vehicle, path))
     with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
         built = build(vehicle, Path(folder, f"{vehicle.identifier}.fmu"), platforms=["host"])
         return read_model(built.path)

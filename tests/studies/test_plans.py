@@ -1,5 +1,6 @@
 """What is wrong with a plan is told in a line each, before anything is run."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from rov_fmu.cli import main
 from rov_fmu.studies.model import read_model
 from rov_fmu.studies.plan import load_plan
 from rov_fmu.studies.prepared import prepare
+from rov_fmu.vehicle.shipped import VIDEORAY
 
 HEAD = 'fmu = "videoray.fmu"\nstop_time = 1.0\nstep = 0.1\nruns = 4\n'
 TAIL = '[figures]\nend = "u[-1]"\n'
@@ -35,7 +37,8 @@ WRONG = {
         "sampler = 'soboll': must be 'grid', 'sobol', 'latin-hypercube', 'random' or 'saltelli'",
     HEAD + 'vehicle = "videoray"\n' + VARY + TAIL: "must have either fmu or vehicle",
     HEAD.replace('fmu = "videoray.fmu"', 'vehicle = "videory"') + VARY + TAIL:
-        "videory: there is no such file, and no vehicle of this name ships, only bluerov2",
+        "vehicle = 'videory': there is no such file, as seen from the plan, and no vehicle of this name ships, only bl",
+    HEAD + 'vary_from = "mine.toml"\n' + TAIL: "vary_from = 'mine.toml': there is no such file, as seen from the plan",
     HEAD + 'vary_from = "videoray"\n' + TAIL: "vary_from = 'videoray': no coefficient of this vehicle has an interval",
     HEAD + "[vary]\nalpha_uu.uniform = [1.0, 1.2]\n" + TAIL:
         "vary.alpha_uu: the FMU has no variable 'alpha_uu' that is a number; did you mean alpha_",
@@ -96,6 +99,19 @@ def test_a_mistake_is_a_line_and_nothing_is_written(
     assert f": {WRONG[text]}" in told
     if text.startswith(HEAD):
         assert told.count("\n") == 1
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_vehicle_file_is_seen_from_the_plan_and_not_from_where_the_command_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(VIDEORAY, tmp_path / "mine.toml")
+    plan = tmp_path / "plans" / "plan.toml"
+    plan.parent.mkdir()
+    plan.write_text(HEAD.replace('fmu = "videoray.fmu"', 'vehicle = "mine.toml"') + VARY + TAIL)
+    monkeypatch.chdir(tmp_path)
+    assert main(["study", str(plan), "-o", "results"]) == 2
+    assert f"{plan}: vehicle = 'mine.toml': there is no such file, as seen from the plan" in capsys.readouterr().err
     assert not (tmp_path / "results").exists()
 
 
