@@ -194,7 +194,7 @@ def _sensitivities(results: Results) -> dict[str, Any]:
             found[figure] = str(error).removeprefix(f"{results.folder}: ")
         else:
             rows["S1_tells"], rows["ST_tells"] = (_tells(rows[key], rows[f"{key}_95"]) for key in ("S1", "ST"))
-            found[figure] = (rows.round(6) + 0.0).reset_index(names="name").to_dict("records")  # without -0
+            found[figure] = (rows.round(3) + 0.0).reset_index(names="name").to_dict("records")  # without -0
     return found
 
 

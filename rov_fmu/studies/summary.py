@@ -21,9 +21,8 @@ def print_summary(results: Results, spent: Spent) -> None:
     out.print(Text.assemble((str(results.folder), "bold"), f"  {counts}"))
     if spent.runs:
         rate = spent.runs / max(spent.elapsed - spent.started, 1e-3)
-        out.print(
-            f"  {spent.runs} of them now, in {spent.elapsed:.1f} s; {rate:.0f} a second once the workers were there"
-        )
+        often = f"{rate:.0f}" if rate >= 10.0 else f"{rate:.2g}"
+        out.print(f"  {spent.runs} of them now, in {spent.elapsed:.1f} s; {often} a second once the workers were there")
     if results.figures:
         shown = table("", "figure", [*(f"{q:.0%}" for q in _SHOWN), "mean", "runs"])
         for name in results.figures:
@@ -34,5 +33,8 @@ def print_summary(results: Results, spent: Spent) -> None:
             told = name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})"
             shown.add_row(told, *(text(number, ".5g") for number in numbers), str(there.size))
         out.print(shown)
-    for reason, count in runs[REASON].value_counts().head(_FAILURES).items():
+    reasons = runs[REASON].value_counts()
+    for reason, count in reasons.head(_FAILURES).items():
         out.print(f"  {count} runs: {reason}", soft_wrap=True)
+    if len(others := reasons[_FAILURES:]):
+        out.print(f"  {others.sum()} runs: other reasons ({len(others)}), which are on the page", soft_wrap=True)

@@ -149,3 +149,47 @@ def test_another_page_of_this_name_is_not_overwritten(
     assert capsys.readouterr().err == f"rov-fmu: {own}: {told}\n"
     assert [*tmp_path.iterdir()] == [own]
     assert own.read_text() == "<p>My studies</p>"
+
+
+def test_an_index_of_nothing_has_no_sign(foreign: Callable[..., Path], tmp_path: Path, scheduler: str) -> None:
+    """What brings a millionth of the variance has an index of 0.000, which chance makes negative as often as not."""
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{foreign()}"
+stop_time = 1.0
+step = 0.5
+runs = 200
+sampler = "saltelli"
+[vary]
+a.uniform = [0.0, 1.0]
+u.uniform = [0.0, 1.0]
+[figures]
+up = "a + u / 1000"
+down = "a - u / 1000"
+""")
+    results = tmp_path / "results"
+    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(results), "--scheduler", scheduler]) == 0
+    small = [Results(results).sensitivity(name).loc["u"].S1 for name in ("up", "down")]
+    assert -0.0005 < min(small) < -1e-5
+    rows = html.parse(results / "study.html").xpath("//h2[@id='sensitivity']/following::tr[td/code='u']/td[2]")
+    assert [row.text_content() for row in rows[:2]] == ["0.000", "0.000"]
+
+
+def test_reasons_that_are_not_shown_are_counted(
+    foreign: Callable[..., Path], tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A reason for each of seven values, of which the command shows five and the page all."""
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{foreign()}"
+stop_time = 1.0
+step = 0.5
+sampler = "grid"
+vary.a.range = {{ from = 3.0, to = 9.0, count = 7 }}
+vary.u.values = [0.0, 1.0]
+figures.odd = "t[int(a)]"
+figures.end = "t[-1]"
+""")
+    results = tmp_path / "results"
+    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(results), "--scheduler", scheduler]) == 1
+    said = [line.strip() for line in capsys.readouterr().out.splitlines() if " runs: " in line]
+    assert len(said) == 6
+    assert said[-1] == "4 runs: other reasons (2), which are on the page"
+    page = (results / "study.html").read_text(encoding="utf-8")
+    assert all(f"index {n} is out of bounds" in page for n in range(3, 10))
