@@ -53,6 +53,11 @@ class Craft {
     if (n > 2 * MOST_KEPT) track.splice(0, MOST_KEPT);
   }
 
+  /** The number of an axis; -1 where the vehicle has no such one. @param {string} name */
+  axis(name) {
+    return this.model.vehicle.axes.findIndex((axis) => axis.name === name);
+  }
+
   /** Depth, heading, or what was gone along an axis. @param {number} a */
   position(a) {
     const { position } = this.model.vehicle.axes[a];

@@ -2,6 +2,9 @@
 
 const MOST_BYTES = 20e6;
 const MOST_ROWS = 200000;
+const MOST_BACK = 0.2; // of the rows: with more of them out of order the time begins anew
+const MOST_POSITION = 1e7; // m, rad
+const MOST_VELOCITY = 1e3; // m/s, rad/s
 /** To SI, by what a column holds. @type {Record<string, Record<string, number>>} */
 const FACTORS = {
   s: { s: 1, ms: 0.001 },
@@ -49,16 +52,33 @@ function readRecording(text, name, vehicle) {
   const rows = lines
     .slice(1)
     .map((line) => line.split(separator))
-    .filter((cells) => cells.length <= headers.length)
+    .filter((cells) => cells.slice(headers.length).every((cell) => cell.trim() === ""))
     .map((cells) => columns.map((column, n) => (column ? column.convert(number(cells[n] ?? "")) : Number.NaN)))
-    .filter((row) => Number.isFinite(row[time]) && commanding.every((n) => Number.isFinite(row[n])))
-    .sort((one, other) => one[time] - other[time]);
+    .filter((row) => Number.isFinite(row[time]) && commanding.every((n) => Number.isFinite(row[n])));
   if (rows.length < 2) throw new Unreadable("no two of its rows have a time and a command");
+  let latest = Number.NEGATIVE_INFINITY;
+  let back = 0;
+  for (const row of rows) {
+    if (row[time] < latest) back += 1;
+    else latest = row[time];
+  }
+  if (back > MOST_BACK * rows.length) {
+    throw new Unreadable("its time goes back, and stays back, as with two logs in one file");
+  }
+  const percent = commanding.filter((n) => /\[\s*%\s*\]$/.test(headers[n]));
+  const most = rows.reduce((sum, row) => Math.max(sum, ...percent.map((n) => Math.abs(row[n]))), 0);
+  if (most > 0 && most <= 0.01) {
+    throw new Unreadable("no command passes 1 %: if these are fractions, their unit is [1]");
+  }
+  rows.sort((one, other) => one[time] - other[time]);
   const start = rows[0][time];
   if (rows[rows.length - 1][time] - start > 1e5) throw new Unreadable("it lasts longer than a day");
   const signals = measuring.map((n) => {
     const { axis, isPosition } = /** @type {Column} */ (columns[n]);
     const values = rows.map((row) => row[n]);
+    if (values.some((value) => Math.abs(value) > (isPosition ? MOST_POSITION : MOST_VELOCITY))) {
+      throw new Unreadable(`“${headers[n].slice(0, 40)}” has numbers that no vehicle reaches`);
+    }
     return {
       axis,
       isPosition,
@@ -70,6 +90,8 @@ function readRecording(text, name, vehicle) {
       values.some(Number.isFinite) && (isPosition || !signals.some((other) => other.axis === axis && other.isPosition)),
   );
   if (used.length === 0) throw new Unreadable("it has no motion of an axis of this vehicle");
+  const twice = used.find(({ axis }, n) => used.findIndex((other) => other.axis === axis) < n);
+  if (twice) throw new Unreadable(`two of its columns tell the same of ${vehicle.axes[twice.axis].name}`);
   const none = Object.fromEntries(vehicle.commands.map((command) => [command, 0]));
   return {
     name,
@@ -95,9 +117,12 @@ function readRecording(text, name, vehicle) {
 function columnOf(header, file, vehicle) {
   const parts = /^(.*?)\s*\[(.*)\]$/.exec(header);
   if (!parts) return null;
-  const [title, unit] = [parts[1].trim().toLowerCase(), parts[2].trim()];
+  const [title, unit] = [parts[1].trim().toLowerCase().replace(/\s+/g, " "), parts[2].trim().toLowerCase()];
   const none = { axis: -1, isPosition: false, drives: {} };
-  if (title === "time") return { ...none, what: "time", convert: converter(header, FACTORS.s, unit) };
+  if (title === "time") {
+    const convert = converter(header, FACTORS.s, unit, false);
+    return convert && { ...none, what: "time", convert };
+  }
   const { axes, commands } = vehicle;
   const ofFile = axes.findIndex(({ name }) => new RegExp(`^log_${name}`, "i").test(file));
   const alone = ofFile < 0 && axes.length === 1 ? 0 : ofFile;
@@ -111,7 +136,9 @@ function columnOf(header, file, vehicle) {
       );
     }
     const drives = command === undefined ? axes[alone].signs : { [command]: 1 };
-    return { ...none, what: "command", drives, convert: pulses(unit) ?? converter(header, FACTORS.command, unit) };
+    const isShort = command !== undefined && title !== command.toLowerCase();
+    const convert = pulses(unit) ?? converter(header, FACTORS.command, unit, isShort);
+    return convert && { ...none, what: "command", drives, convert };
   }
   for (const [axis, { name, velocity, position, positionUnit }] of axes.entries()) {
     const own = axis === alone;
@@ -120,15 +147,19 @@ function columnOf(header, file, vehicle) {
     const isVelocity = [velocity, `${name} velocity`].includes(title) || (own && title === "velocity");
     if (!isPosition && !isVelocity) continue;
     const length = isPosition ? unit : unit.replace(/\/s$/, "");
-    const convert = converter(header, isPosition || length !== unit ? FACTORS[positionUnit] : {}, length);
-    return { what: "signal", axis, isPosition, drives: {}, convert };
+    const factors = isPosition || length !== unit ? FACTORS[positionUnit] : {};
+    const convert = converter(header, factors, length, title === position || title === velocity);
+    return convert && { what: "signal", axis, isPosition, drives: {}, convert };
   }
   return null;
 }
 
-/** @param {string} header @param {Record<string, number>} factors @param {string} unit @returns {(x: number) => number} */
-function converter(header, factors, unit) {
+/** To SI; null where the name is as short as another column's may be, such as “v [V]”, and the unit says that it is one.
+ * @param {string} header @param {Record<string, number>} factors @param {string} unit @param {boolean} isShort
+ * @returns {((x: number) => number) | null} */
+function converter(header, factors, unit, isShort) {
   if (!Object.hasOwn(factors, unit)) {
+    if (isShort) return null;
     throw new Unreadable(`“${header.slice(0, 40)}” has no unit that this column can have`);
   }
   return (x) => x * factors[unit];
@@ -136,7 +167,7 @@ function converter(header, factors, unit) {
 
 /** From the pulse that a speed controller gets; null of another unit. @param {string} unit */
 function pulses(unit) {
-  const parts = /^[uµ]s(?:\s+([\d.]+)\s+(-?[\d.]+))?$/.exec(unit);
+  const parts = /^[u\u00b5\u03bc]s(?:\s+([\d.]+)\s+(-?[\d.]+))?$/.exec(unit);
   if (!parts) return null;
   const [neutral, span] = [Number(parts[1] ?? 1500), Number(parts[2] ?? 400)];
   return (/** @type {number} */ x) => (x === 0 || x === 65535 ? 0 : (x - neutral) / span);
@@ -163,13 +194,18 @@ class Playback {
   constructor(recording, flight) {
     this.recording = recording;
     this.row = 0;
+    const { axes } = flight.pilot.model.vehicle;
+    /** Of each signal: its axis, by name, for the ghost may be of another vehicle. */
+    this.names = recording.signals.map(({ axis }) => axes[axis].name);
     /** Of each signal: what was last measured and when, its rate, the sum of squares and number of deviations. */
     this.measured = recording.signals.map(({ values }) => {
       const now = values.find(Number.isFinite) ?? 0;
       return { now, time: 0, rate: 0, start: now, sum: 0, n: 0 };
     });
     for (const craft of [flight.pilot, flight.ghost]) {
-      recording.signals.forEach(({ axis, isPosition }, n) => {
+      recording.signals.forEach(({ isPosition }, n) => {
+        const axis = craft.axis(this.names[n]);
+        if (axis < 0) return;
         const { velocity, position } = craft.model.vehicle.axes[axis];
         const name = isPosition ? position : velocity;
         if (name) craft.model.set(name, this.measured[n].now);
@@ -182,9 +218,9 @@ class Playback {
     this.arrive(flight);
   }
 
-  /** Whether the ghost has a track: where surge was measured. @param {Vehicle} vehicle */
-  hasTrack(vehicle) {
-    return this.recording.signals.some(({ axis }) => vehicle.axes[axis].name === "surge");
+  /** Whether the ghost has a track: where surge was measured. */
+  hasTrack() {
+    return this.names.includes("surge");
   }
 
   /** When the next row begins; null at the end. */
@@ -213,8 +249,11 @@ class Playback {
   }
 
   /** The ghost h seconds on. @param {Craft} ghost @param {number} h */
-  move({ model, ways }, h) {
-    this.recording.signals.forEach(({ axis, isPosition }, n) => {
+  move(ghost, h) {
+    const { model, ways } = ghost;
+    this.recording.signals.forEach(({ isPosition }, n) => {
+      const axis = ghost.axis(this.names[n]);
+      if (axis < 0) return;
       const { velocity, position } = model.vehicle.axes[axis];
       const { now, rate } = this.measured[n];
       model.set(velocity, isPosition ? rate : now);
