@@ -188,6 +188,7 @@ class Live {
   }
 
   reset() {
+    this.takeOver();
     this.flight.reset();
     this.span = SPAN;
     this.say("");
@@ -220,7 +221,8 @@ class Live {
   /** A step test of the list. */
   run() {
     const test = this.vehicle.tests[Number(/** @type {HTMLSelectElement} */ (part("test")).value)];
-    const { signs, name } = this.vehicle.axes[test.axis];
+    const { signs, name, unit } = this.vehicle.axes[test.axis];
+    this.takeOver();
     for (const slider of this.sliders) if (slider.dataset.kind === "load") slider.value = "0";
     this.flight.run(test);
     this.slideCommands(Object.fromEntries(Object.entries(signs).map(([input, sign]) => [input, sign * test.command])));
@@ -228,7 +230,7 @@ class Live {
     this.span = Math.min(60, Math.max(4, Math.ceil(6 * (Number.isFinite(Tau) ? Tau : 3))));
     this.paused = false;
     this.say(
-      `${name} ${Math.round(test.command * 100)} % from rest${test.V === null ? "" : `; measured: V_ss ${test.V}${test.Tau === null ? "" : `, Tau ${test.Tau} s`}`}.`,
+      `${name} ${Math.round(test.command * 100)} % from rest${test.V === null ? "" : `; measured: V_ss ${test.V} ${unit}${test.Tau === null ? "" : `, Tau ${test.Tau} s`}`}.`,
     );
     this.show();
   }
@@ -332,7 +334,7 @@ class Live {
     this.compass?.draw(flight, ghost);
     this.depth?.draw(flight, ghost);
     for (const chart of this.charts) chart.draw(flight, this.span, ghost);
-    const heading = ((((model.get("psi") * 180) / Math.PI) % 360) + 360) % 360;
+    const heading = ((Math.round((model.get("psi") * 180) / Math.PI) % 360) + 360) % 360;
     const told = [`${shown(flight.time, 1)} s`];
     if (model.has("x")) told.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);
     if (model.has("z")) told.push(`depth ${shown(model.get("z"), 2)} m`);

@@ -21,7 +21,7 @@ function roundUp(x) {
 
 /** @param {number} x @param {number} digits */
 function shown(x, digits) {
-  const text = x.toFixed(digits);
+  const text = Math.abs(x) < 1e7 ? x.toFixed(digits) : x.toExponential(2).replace("e+", "e");
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
@@ -119,7 +119,7 @@ class TrackView {
     const py = (/** @type {number} */ north) => this.height / 2 - (north - this.centre[0]) * this.scale;
     this.lay(px, py);
     const { playback } = flight;
-    const ghostIsThere = flight.ghostShown && (playback?.hasTrack(ghost.model.vehicle) ?? true);
+    const ghostIsThere = flight.ghostShown && (playback?.hasTrack() ?? true);
     this.tracks[0].setAttribute("d", ghostIsThere ? pathOf(ghost, px, py) : "");
     this.tracks[1].setAttribute("d", pathOf(pilot, px, py));
     this.ghost.group.setAttribute("visibility", ghostIsThere ? "visible" : "hidden");
@@ -132,9 +132,12 @@ class TrackView {
     const step = roundUp(60 / this.scale);
     const [left, top] = [this.centre[1] - this.width / 2 / this.scale, this.centre[0] - this.height / 2 / this.scale];
     const lines = [];
-    for (let e = Math.ceil(left / step) * step; px(e) < this.width; e += step)
-      lines.push(`M${px(e).toFixed(1)} 0V${this.height}`);
-    for (let n = Math.ceil(top / step) * step; py(n) > 0; n += step) lines.push(`M0 ${py(n).toFixed(1)}H${this.width}`);
+    const [east, north] = [left, top].map((edge) => Math.ceil(edge / step) * step);
+    // Counted: far enough out a step more is the same number.
+    for (let i = 0; i < this.width / (step * this.scale); i++)
+      lines.push(`M${px(east + i * step).toFixed(1)} 0V${this.height}`);
+    for (let i = 0; i < this.height / (step * this.scale); i++)
+      lines.push(`M0 ${py(north + i * step).toFixed(1)}H${this.width}`);
     this.grid.setAttribute("d", lines.join(""));
     this.bar.setAttribute("d", `M14 ${this.height - 14}h${step * this.scale}`);
     place(this.length, { y: this.height - 22 });
@@ -298,7 +301,7 @@ class Chart {
 
   /** The ghost's trace of the same axis, which may be another one of its axes. @param {Flight} flight @param {boolean} isPosition */
   ghostTrace(flight, isPosition) {
-    const number = flight.ghost.model.vehicle.axes.findIndex(({ name }) => name === this.axis.name);
+    const number = flight.ghost.axis(this.axis.name);
     const traces = isPosition ? flight.ghost.positions : flight.ghost.velocities;
     return number < 0 ? null : traces[number];
   }

@@ -259,7 +259,7 @@ def test_a_step_test_stands_beside_what_was_measured(
         title = page.text_content("#live-chart-heave .title") or ""
         assert title.endswith(f"V_ss {V:.3f} · Tau {Tau:.2f} s")
         said = page.inner_text("#live-said")
-        assert f"measured: V_ss {row.scaled.V_ss.measured}, Tau {row.scaled.Tau.measured} s" in said
+        assert f"measured: V_ss {row.scaled.V_ss.measured} m/s, Tau {row.scaled.Tau.measured} s" in said
         assert page.get_attribute("#live-chart-heave .point", "visibility") == "visible"
     page.locator("input[name=u_l]").fill("0.25")
     until(page, "document.querySelector('#live-chart-heave .point').getAttribute('visibility') === 'hidden'")
@@ -291,6 +291,38 @@ def test_a_vehicle_of_one_axis_flies_too(pages: Callable[[str], str], quiet: Vis
     until(page, "live.flight.time > 0.3")
     assert page.evaluate("live.flight.pilot.model.get('z')") > 0.0
     assert page.locator("#live-track").count() == page.locator("#live-compass").count() == 0
+    assert page.evaluate("document.getElementById('live-chart-heave').clientWidth") <= 420, "text grows with it"
+
+
+def test_words_fit_their_places(tmp_path: Path, quiet: Visitor) -> None:
+    file, target = tmp_path / "long.toml", tmp_path / "long.html"
+    name = "a_name_of_a_thruster_as_may_be"
+    file.write_text(BARE.read_text(encoding="utf-8").replace('name = "t"', f'name = "{name}"'), encoding="utf-8")
+    assert main(["fly", str(file), "-o", str(target)]) == 0
+    page = flying(quiet, target.as_uri()).page
+    wide, room = page.evaluate("(span => [span.scrollWidth, span.clientWidth])(document.querySelector('label span'))")
+    assert wide <= room
+    title = "surge: u \N{MINUS SIGN}1.165 m/s · V_ss \N{MINUS SIGN}1.211 · Tau 10.65 s"
+    page.evaluate("words => { live.charts[0].title.textContent = words; }", title)
+    assert page.evaluate("live.charts[0].title.getComputedTextLength()") < 298
+
+
+def test_a_track_far_away_is_drawn(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("videoray")).page
+    lines = page.evaluate("""() => {
+        live.flight.pilot.model.set("x", 1e17);
+        live.zoom(1000);
+        live.draw();
+        return live.track.grid.getAttribute("d").split("M").length;
+    }""")
+    assert lines < 40
+    assert "north 1.00e17 m" in page.inner_text("#live-told")
+
+
+def test_a_heading_is_below_360(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("videoray")).page
+    page.evaluate("() => { live.flight.pilot.model.set('psi', -0.005); live.draw(); }")
+    assert page.inner_text("#live-told").endswith("heading 0°")
 
 
 def test_loads_and_current_act(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
@@ -364,6 +396,37 @@ def test_a_recording_flies_again_beside_its_prediction(
     deviations = [float(number) for number in re.findall(r"(?:surge|heave|yaw) (\S+) ", said)]
     assert len(deviations) == 3
     assert max(deviations) < 1e-8, said  # the recording is that of the model
+    assert page.is_checked("#live-ghost")
+    page.click("#live-reset")
+    assert not page.is_checked("#live-ghost"), "what was measured is gone"
+
+
+@pytest.mark.parametrize("other", ["bluerov2_heavy", "bare"])
+def test_what_was_measured_is_of_the_same_axes_in_a_ghost_of_others(other: str, tmp_path: Path, quiet: Visitor) -> None:
+    target = tmp_path / "both.html"
+    against = str(SHIPPED.get(other, BARE))
+    assert main(["fly", "videoray", "--against", against, "-o", str(target)]) == 0
+    page = flying(quiet, target.as_uri()).page
+    page.evaluate("live.pause(true)")
+    drop(
+        page, "pool.csv", b"time [s],u_l [%],u_r [%],u_t [%],depth [m]\n0,0,0,9,0\n1,0,0,9,0.5\n2,0,0,9,1\n3,0,0,9,2\n"
+    )
+    until(page, "live.flight.playback !== null")
+    page.evaluate("live.flight.advance(3)")
+    ghost = page.evaluate("['z', 'w', 'v'].map(name => live.flight.ghost.model.get(name))")
+    assert ghost == [1.0, 0.5, 0.0]
+
+
+def test_a_log_may_be_written_otherwise_and_have_other_columns(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("heavy")).page
+    rows = [f"{n},1700,{0.5 * n},12.6,," for n in range(3)]
+    header = "Time [S],U_5 [\N{GREEK SMALL LETTER MU}s],DEPTH [M],v [V]"
+    drop(page, "pool.csv", "\n".join([header, *rows]).encode())
+    until(page, "live.flight.playback !== null")
+    recording = page.evaluate("live.flight.playback.recording")
+    assert recording["commands"][2]["u_5"] == 0.5
+    assert [signal["values"] for signal in recording["signals"]] == [[0.0, 0.5, 1.0]]
+    assert recording["left"] == 0
 
 
 def test_a_log_of_one_axis_is_known_by_its_name(pages: Callable[[str], str], quiet: Visitor) -> None:
@@ -387,11 +450,15 @@ BAD = {
     "no axis": (b"time [s],command [%],depth [m]\n0,1,0\n1,2,0\n", "call it log_surge.csv"),
     "unit": (b"time [s],u_l [kg],depth [m]\n0,1,0\n1,2,0\n", "u_l [kg]\N{RIGHT DOUBLE QUOTATION MARK} has no unit"),
     "length": (b"time [s],u_l [%],depth [deg]\n0,1,0\n1,2,0\n", "has no unit that this column can have"),
-    "velocity": (b"time [s],u_l [%],u [m]\n0,1,0\n1,2,0\n", "has no unit that this column can have"),
+    "velocity": (b"time [s],u_l [%],surge velocity [m]\n0,1,0\n1,2,0\n", "has no unit that this column can have"),
     "words": (b"time [s],u_l [%],depth [m]\nx,y,z\nx,y,z\n", "no two of its rows"),
     "many rows": (b"time [s],u_l [%],depth [m]\n" + b"0,1,0\n" * 200_001, "more than 200000 rows"),
     "huge": (b"time [s],u_l [%],depth [m]\n" + b"0,1,0\n" * 4_000_000, "larger than 20 MB"),
-    "long": (b"time [s],u_l [%],depth [m]\n0,1,0\n1e9,1,0\n", "longer than a day"),
+    "fractions": (b"time [s],u_l [%],depth [m]\n0,0.2,0\n1,0.5,0\n", "no command passes 1 %"),
+    "two logs": (b"time [s],u_l [%],depth [m]\n" + b"0,9,0\n1,9,0\n2,9,0\n" * 2, "its time goes back, and stays back"),
+    "far": (b"time [s],u_l [%],depth [m]\n0,9,0\n1,9,1e308\n", "numbers that no vehicle reaches"),
+    "twice": (b"time [s],u_l [%],depth [m],z [m]\n0,9,0,0\n1,9,1,1\n", "two of its columns tell the same of heave"),
+    "long": (b"time [s],u_l [%],depth [m]\n0,9,0\n1e9,9,0\n", "longer than a day"),
 }
 
 
