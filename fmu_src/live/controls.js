@@ -109,7 +109,7 @@ class Live {
     }).observe(section);
     new ResizeObserver(() => {
       this.track?.fit();
-      this.changed = true;
+      this.draw(); // before the new size is painted
     }).observe(stage);
   }
 
