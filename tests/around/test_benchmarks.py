@@ -113,6 +113,7 @@ def test_every_job_is_timed_in_every_repetition(small: Small) -> None:
         assert all(0.0 < s < inf for s in seconds)
 
 
+@pytest.mark.long
 @in_plain_c
 def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, plain_c: PlainC) -> None:
     runs = in_c(plain_c, Variations(vehicle.rov, 20), 2)
@@ -121,6 +122,7 @@ def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, p
     assert runs.error < 1e-11
 
 
+@pytest.mark.long
 @in_plain_c
 def test_many_instances_are_stepped_and_small(plain_c: PlainC) -> None:
     assert INSTANCES == (1, 100, 10_000)

@@ -117,7 +117,9 @@ def test_a_slip_is_named_or_refused(kind: str, how_many: str, tmp_path: Path) ->
     assert how_many == "all" or not any(names(sentences, r.file, "likely") for r in logs if r not in wrong), sentences
 
 
-@pytest.mark.parametrize("axis", AXES, ids=lambda axis: axis.name)
+@pytest.mark.parametrize(
+    "axis", [HEAVE, *(pytest.param(axis, marks=pytest.mark.long) for axis in (SURGE, YAW))], ids=lambda axis: axis.name
+)
 def test_nothing_is_said_of_logs_without_slip(axis: Axis, tmp_path: Path) -> None:
     assert not told(write_folder(tmp_path, recordings(axis)))
 
