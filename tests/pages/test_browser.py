@@ -40,6 +40,7 @@ def declared(vehicle: Vehicle) -> tuple[Variable, ...]:
 def test_the_documentation_asks_for_nothing_and_fits(
     videoray_dir: Path, visit: Callable[..., Visit], tmp_path: Path, width: int, scheme: str
 ) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     seen = visit(width=width, scheme=scheme)
     url = (videoray_dir / "documentation" / "index.html").as_uri()
     seen.page.goto(url)
@@ -56,6 +57,8 @@ def test_the_documentation_asks_for_nothing_and_fits(
         assert box["height"] > 100
     light = seen.page.evaluate("getComputedStyle(document.body).backgroundColor").removeprefix("rgb(").split(",")[0]
     assert (int(light) > 128) == (scheme == "light")
+    seen.page.wait_for_selector("#live-section:not([hidden])")
+    assert axe.Axe().run(seen.page).response["violations"] == []
 
 
 def test_the_documentation_shows_the_variables_in_groups(
