@@ -1,8 +1,17 @@
 /* An FMU of another make, in FMI 2.0: what it does right, and what it does wrong, is for studies to bear.
 
    y' = (a + 2 b + 3 c + u - y)/0.5; gain is an integer that multiplies u. mode: 1 fails at 1 s, 2 ends the process, 3 reads
-   where nothing is, 4 does not return. RESET says what fmi2Reset does: 0 its work, 1 nothing while it says that it did,
-   2 nothing, with an error. */
+   where nothing is, 4 does not return, 5 waits for a millisecond each step. RESET says what fmi2Reset does: 0 its work,
+   1 nothing while it says that it did, 2 nothing, with an error. */
+#ifdef _WIN32
+#include <windows.h>
+#define WAIT() Sleep(1)
+#else
+#define _POSIX_C_SOURCE 199309L
+#include <time.h>
+#define WAIT() nanosleep(&(struct timespec){0, 1000000}, NULL)
+#endif
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -81,6 +90,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no) {
     if (i->mode == 2) abort();
     if (i->mode == 3) return *(volatile fmi2Status *)0;
     for (volatile int waits = i->mode == 4; waits;) continue;
+    if (i->mode == 5) WAIT();
     if (i->mode == 1 && t >= 1.0 - 1e-9) {
         i->host->logger(NULL, "foreign", fmi2Error, "error", "the pump is blocked");
         return fmi2Error;

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import psutil
 import pyarrow.parquet as pq
 import pytest
 from distributed import LocalCluster
@@ -304,15 +305,15 @@ def test_a_study_that_is_interrupted_half_way_goes_on_to_the_same_rows(
     _same(study(plan, results, scheduler=scheduler), whole)
 
 
-SLOW = {"runs": 1500, "step": 0.0005}
-"""Seven seconds of work, of which two at least are left when the first two parts, of a second each, are there."""
+SLOW = {"runs": 1500, "more": "[set]\nmode = 5"}
+"""Fifteen seconds of two workers, nearly all of them waiting: of which most are left when the first two parts are there."""
 
 
 @pytest.fixture(scope="module")
 def slow(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
     """Undisturbed."""
     folder = tmp_path_factory.mktemp("slow")
-    return study(_plan(folder, foreign(), **SLOW), folder / "results", workers=2)  # type: ignore[arg-type]
+    return study(_plan(folder, foreign(), **SLOW), folder / "results", workers=4)  # type: ignore[arg-type]
 
 
 def _parts(results: Path) -> list[Path]:
@@ -336,10 +337,8 @@ def _begun(plan: Path, results: Path) -> "subprocess.Popen[str]":
     return process
 
 
-def _children(pid: int) -> list[int]:
-    found = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(pid)], capture_output=True, text=True, check=True)
-    lines = found.stdout.splitlines()
-    return [int(line.split()[0]) for line in lines if "spawn_main" in line]
+def _workers(pid: int) -> list[psutil.Process]:
+    return [child for child in psutil.Process(pid).children() if any("spawn_main" in word for word in child.cmdline())]
 
 
 @pytest.mark.parametrize(
@@ -371,7 +370,7 @@ def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: P
     process = _begun(plan, results)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
     error = process.communicate(timeout=300)[1]
-    assert process.returncode == 130
+    assert process.returncode == 130, error
     assert error.splitlines() == [
         "rov-fmu: interrupted, no file is half-written",
         "rov-fmu: what is done is kept; the same command goes on from there",
@@ -389,10 +388,10 @@ def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: P
 def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
     process = _begun(plan, results)
-    victims = _children(process.pid)
-    assert victims
+    victims = _workers(process.pid)
+    assert len(victims) == 2
     for victim in victims:
-        os.kill(victim, signal.SIGKILL)
+        victim.kill()
     assert process.communicate(timeout=600)[1] == ""
     assert process.returncode == 0
     _same(Results(results), slow)
