@@ -3,11 +3,16 @@
 import os
 import signal
 import sys
+from _thread import interrupt_main
 from collections.abc import Callable, Mapping
-from typing import NoReturn
+from threading import Timer
+from typing import Any, NoReturn
 
 from rov_fmu.files.messages import one_line
 from rov_fmu.files.output import WriteError
+
+_SOON = 0.01
+"""s, after which a finalizer has ended."""
 
 
 def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exception], int]) -> int:
@@ -44,10 +49,26 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
 def run_process(main: Callable[[], int]) -> NoReturn:
     """Run a command line that is a process of its own."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended from outside, it cleans up as at Ctrl-C
+    sys.unraisablehook = _interrupt_again
     for stream in (sys.stdout, sys.stderr):
         if stream:  # a terminal without Greek letters gets \u03b1
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     sys.exit(main())
+
+
+def _interrupt_again(ignored: Any) -> None:
+    """Python ignores what a finalizer raises, an interrupt that comes meanwhile among it: it comes again."""
+    if isinstance(ignored.exc_value, KeyboardInterrupt):
+        Timer(_SOON, _interrupt).start()
+    else:
+        sys.__unraisablehook__(ignored)
+
+
+def _interrupt() -> None:
+    if hasattr(signal, "pthread_kill"):  # which ends a wait, too
+        os.kill(os.getpid(), signal.SIGINT)
+    else:
+        interrupt_main()
 
 
 def _say(program: str, message: str, code: int) -> int:

@@ -134,14 +134,30 @@ def test_an_interrupted_command_says_so_and_leaves_nothing(
     assert not any(output.parent.iterdir())
 
 
-def test_an_interrupt_while_text_is_executed_is_one_as_any(tmp_path: Path) -> None:
-    """As a module that makes a dataclass does; CPython takes it for one that nobody caught."""
+TEXT = "def action(): exec('raise KeyboardInterrupt')"
+"""As a module that makes a dataclass does; CPython takes it for one that nobody caught."""
+FINALIZER = """
+import os, signal, time
+class Ended:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.0)
+def action():
+    Ended()
+    time.sleep(60.0)
+"""
+
+
+@pytest.mark.parametrize("action", [TEXT, FINALIZER], ids=["text", "finalizer"])
+def test_an_interrupt_is_one_as_any_where_python_makes_less_of_it(action: str, tmp_path: Path) -> None:
     (tmp_path / "interrupted.py").write_text(
-        "from rov_fmu.process import exit_code, run_process\n"
-        "run_process(lambda: exit_code('rov-fmu', lambda: exec('raise KeyboardInterrupt'), {OSError: 2}))\n"
+        f"from rov_fmu.process import exit_code, run_process\n{action}\n"
+        "run_process(lambda: exit_code('rov-fmu', action, {OSError: 2}))\n"
     )
-    command = [sys.executable, "-m", "interrupted"]
-    ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    ran = subprocess.run(
+        [sys.executable, "-m", "interrupted"], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=50,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
     assert (ran.returncode, ran.stderr) == (130, "rov-fmu: interrupted, no file is half-written\n")
 
 

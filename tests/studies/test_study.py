@@ -305,15 +305,15 @@ def test_a_study_that_is_interrupted_half_way_goes_on_to_the_same_rows(
     _same(study(plan, results, scheduler=scheduler), whole)
 
 
-SLOW = {"runs": 1500, "more": "[set]\nmode = 5"}
-"""Fifteen seconds of two workers, nearly all of them waiting: of which most are left when the first two parts are there."""
+SLOW: dict[str, Any] = {"runs": 1500, "more": "[set]\nmode = 5"}
+"""Fifteen seconds of two workers, nearly all of them waiting: most are left when the first two parts are there."""
 
 
 @pytest.fixture(scope="module")
 def slow(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
     """Undisturbed."""
     folder = tmp_path_factory.mktemp("slow")
-    return study(_plan(folder, foreign(), **SLOW), folder / "results", workers=4)  # type: ignore[arg-type]
+    return study(_plan(folder, foreign(), **SLOW), folder / "results", workers=4)
 
 
 def _parts(results: Path) -> list[Path]:
@@ -366,7 +366,7 @@ def test_a_script_that_workers_cannot_import_is_told_of_its_guard(
 @posix
 @pytest.mark.long
 def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
-    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
     process = _begun(plan, results)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
     error = process.communicate(timeout=300)[1]
@@ -386,7 +386,7 @@ def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: P
 @posix
 @pytest.mark.long
 def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
-    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
     process = _begun(plan, results)
     victims = _workers(process.pid)
     assert len(victims) == 2
@@ -400,7 +400,7 @@ def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, s
 @posix
 @pytest.mark.long
 def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
-    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
     process = _begun(plan, results)
     process.kill()
     process.communicate(timeout=300)
@@ -430,7 +430,7 @@ def test_a_scheduler_that_goes_takes_nothing_with_it(
 ) -> None:
     """Noticed at once, or when the client has given it up."""
     monkeypatch.setattr("rov_fmu.studies.engine._WAIT", 4.0)
-    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"  # type: ignore[arg-type]
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
     with LocalCluster(n_workers=1, dashboard_address="127.0.0.1:0", local_directory=tmp_path / "cluster") as cluster:
 
         def close(now: Progress) -> None:
