@@ -142,10 +142,25 @@ class Fmu(ABC):
     def references(self, names: Sequence[str]) -> Any:
         return references(*(self.vr[name] for name in names))
 
-    def nominal(self, name: str) -> float:
-        """Of a variable, or of its type."""
+    def number(self, name: str, attribute: str) -> float | None:
+        """The `min`, `max` or `nominal` of a variable, which in FMI 3.0 is that of its declared type."""
         variable = self.variables[name]
-        return float(variable.nominal or variable.declaredType.nominal)
+        value = getattr(variable if self.VERSION == 2 else variable.declaredType, attribute)
+        return None if value is None else float(value)
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """The range of a variable that has one."""
+        low, high = self.number(name, "min"), self.number(name, "max")
+        assert low is not None
+        assert high is not None
+        return low, high
+
+    @property
+    def commands(self) -> list[str]:
+        """The inputs that have bounds."""
+        found = [name for name in self.inputs if self.number(name, "min") is not None]
+        assert found
+        return found
 
     def settable(self, mode: str) -> list[str]:
         """What may be set when; beyond the standard, inputs of FMI 2.0 before initialization, and tuning between the

@@ -35,7 +35,7 @@ void begin(const char *path)
 {
     for (int i = 0; i < N_VARIABLES; i++) {
         m.at[i] = VARIABLES[i].start;
-        reference[i] = (unsigned)i;
+        reference[i] = FIRST_REFERENCE + (unsigned)i;
     }
     rov_prepare(m.at, &m.gains);
     load_fmu(path);

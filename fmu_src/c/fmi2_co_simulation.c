@@ -9,7 +9,7 @@ static outcome holds_inputs(fmu *f, size_t n)
 FMI2_Export fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                                    const fmi2Integer order[], const fmi2Real value[])
 {
-    OPEN_FOR(CO_SIMULATION, fmi2SetRealInputDerivatives, MAY_WRITE_DISCRETE);
+    OPEN_FOR(TYPE_CO_SIMULATION, fmi2SetRealInputDerivatives, MAY_WRITE_DISCRETE);
     (void)vr;
     (void)order;
     (void)value;
@@ -19,7 +19,7 @@ FMI2_Export fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2Va
 FMI2_Export fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                                     const fmi2Integer order[], fmi2Real value[])
 {
-    OPEN_FOR(CO_SIMULATION, fmi2GetRealOutputDerivatives, MAY_ASK_OUTPUTS);
+    OPEN_FOR(TYPE_CO_SIMULATION, fmi2GetRealOutputDerivatives, MAY_ASK_OUTPUTS);
     return (fmi2Status)get_output_rates(f, vr, nvr, order, value);
 }
 
@@ -51,7 +51,7 @@ static outcome has_no_status(fmu *f, int kind)
 #define STATUS(function, type, exists, answer)                                                                       \
     FMI2_Export fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value)                            \
     {                                                                                                                \
-        OPEN_FOR(CO_SIMULATION, function, MAY_ASK_STATUS);                                                           \
+        OPEN_FOR(TYPE_CO_SIMULATION, function, MAY_ASK_STATUS);                                                           \
         GIVEN(value != NULL, "value");                                                                               \
         if (!(exists)) {                                                                                             \
             return (fmi2Status)has_no_status(f, (int)s);                                                             \

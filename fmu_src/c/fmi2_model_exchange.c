@@ -2,7 +2,7 @@
 
 FMI2_Export fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi2EnterEventMode, MAY_MEET_EVENTS);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2EnterEventMode, MAY_MEET_EVENTS);
     return (fmi2Status)enter(f, EVENT);
 }
 
@@ -16,7 +16,7 @@ FMI2_Export fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi
 
 FMI2_Export fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi2EnterContinuousTimeMode, MAY_UPDATE);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2EnterContinuousTimeMode, MAY_UPDATE);
     return (fmi2Status)enter(f, CONTINUOUS);
 }
 
@@ -33,7 +33,7 @@ FMI2_Export fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean 
 
 FMI2_Export fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi2SetTime, MAY_MOVE_TIME);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2SetTime, MAY_MOVE_TIME);
     return (fmi2Status)set_time(f, time);
 }
 
@@ -45,25 +45,25 @@ FMI2_Export fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x
 
 FMI2_Export fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi2GetDerivatives, MAY_READ_LATER);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2GetDerivatives, MAY_READ_LATER);
     return (fmi2Status)get_rates(f, derivatives, nx);
 }
 
 FMI2_Export fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi2GetEventIndicators, MAY_READ_LATER);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2GetEventIndicators, MAY_READ_LATER);
     (void)eventIndicators;
     return (fmi2Status)get_indicators(f, ni);
 }
 
 FMI2_Export fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi2GetContinuousStates, MAY_READ_LATER);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2GetContinuousStates, MAY_READ_LATER);
     return (fmi2Status)get_states(f, x, nx);
 }
 
 FMI2_Export fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi2GetNominalsOfContinuousStates, MAY_READ);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi2GetNominalsOfContinuousStates, MAY_READ);
     return (fmi2Status)get_nominals(f, x_nominal, nx);
 }

@@ -2,7 +2,7 @@
 
 FMI3_Export fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
-    OPEN_FOR(CO_SIMULATION, fmi3EnterStepMode, MAY_UPDATE);
+    OPEN_FOR(TYPE_CO_SIMULATION, fmi3EnterStepMode, MAY_UPDATE);
     return (fmi3Status)enter(f, STEP);
 }
 
@@ -10,7 +10,7 @@ FMI3_Export fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi
                                                 size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
                                                 size_t nValues)
 {
-    OPEN_FOR(CO_SIMULATION, fmi3GetOutputDerivatives, MAY_ASK_OUTPUTS);
+    OPEN_FOR(TYPE_CO_SIMULATION, fmi3GetOutputDerivatives, MAY_ASK_OUTPUTS);
     const outcome counted = is_counted(f, nValueReferences, nValues);
     return (fmi3Status)(counted == DONE ? get_output_rates(f, valueReferences, nValueReferences, orders, values) : counted);
 }

@@ -20,7 +20,7 @@ FMI3_Export fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, f
     const host of = {instanceEnvironment, logMessage, NULL, false, false};
     (void)resourcePath; /* everything is in the binary, whatever the path says */
     (void)visible;
-    return instantiate("fmi3InstantiateModelExchange", &of, instanceName, instantiationToken, MODEL_EXCHANGE, loggingOn);
+    return instantiate("fmi3InstantiateModelExchange", &of, instanceName, instantiationToken, TYPE_MODEL_EXCHANGE, loggingOn);
 }
 
 FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
@@ -38,12 +38,12 @@ FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fm
     (void)resourcePath;
     (void)visible;
     for (size_t i = 0; i < nRequiredIntermediateVariables; i++) {
-        if (requiredIntermediateVariables == NULL || requiredIntermediateVariables[i] > TIME) {
+        if (requiredIntermediateVariables == NULL || place_of(requiredIntermediateVariables[i]) > TIME) {
             REJECT(&of, instanceName, function, loggingOn,
                    "requiredIntermediateVariables is NULL or has a value reference of no variable.");
         }
     }
-    return instantiate(function, &of, instanceName, instantiationToken, CO_SIMULATION, loggingOn);
+    return instantiate(function, &of, instanceName, instantiationToken, TYPE_CO_SIMULATION, loggingOn);
 }
 
 FMI3_Export fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -250,10 +250,10 @@ static outcome differentiate_adjoint(fmu *f, const unsigned unknowns[], size_t n
     for (int pass = 0; pass < 2; pass++) { /* nothing is written unless all are finite */
         for (size_t k = 0; k < n_knowns; k++) {
             double d[N_VARIABLES] = {0.0}, sum = 0.0;
-            d[knowns[k]] = 1.0;
+            d[place_of(knowns[k])] = 1.0;
             rov_tangent(f->now.values, d);
             for (size_t i = 0; i < n_unknowns; i++) {
-                sum += seed[i] * d[unknowns[i]];
+                sum += seed[i] * d[place_of(unknowns[i])];
             }
             REQUIRE(isfinite(sum), "that of %s is not a finite number.", name_of(knowns[k]));
             if (pass == 1) {

@@ -2,7 +2,7 @@
 
 FMI3_Export fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi3EnterContinuousTimeMode, MAY_UPDATE);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi3EnterContinuousTimeMode, MAY_UPDATE);
     return (fmi3Status)enter(f, CONTINUOUS);
 }
 
@@ -18,7 +18,7 @@ FMI3_Export fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Bo
 
 FMI3_Export fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi3SetTime, MAY_MOVE_TIME);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi3SetTime, MAY_MOVE_TIME);
     return (fmi3Status)set_time(f, time);
 }
 
@@ -32,14 +32,14 @@ FMI3_Export fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3
 FMI3_Export fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[],
                                                          size_t nContinuousStates)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi3GetContinuousStateDerivatives, MAY_READ_LATER);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi3GetContinuousStateDerivatives, MAY_READ_LATER);
     return (fmi3Status)get_rates(f, derivatives, nContinuousStates);
 }
 
 FMI3_Export fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[],
                                               size_t nEventIndicators)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi3GetEventIndicators, MAY_READ_LATER);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi3GetEventIndicators, MAY_READ_LATER);
     (void)eventIndicators;
     return (fmi3Status)get_indicators(f, nEventIndicators);
 }
@@ -47,14 +47,14 @@ FMI3_Export fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64
 FMI3_Export fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[],
                                                size_t nContinuousStates)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi3GetContinuousStates, MAY_READ_LATER);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi3GetContinuousStates, MAY_READ_LATER);
     return (fmi3Status)get_states(f, continuousStates, nContinuousStates);
 }
 
 FMI3_Export fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
                                                          size_t nContinuousStates)
 {
-    OPEN_FOR(MODEL_EXCHANGE, fmi3GetNominalsOfContinuousStates, MAY_READ_LATER);
+    OPEN_FOR(TYPE_MODEL_EXCHANGE, fmi3GetNominalsOfContinuousStates, MAY_READ_LATER);
     return (fmi3Status)get_nominals(f, nominals, nContinuousStates);
 }
 
@@ -62,7 +62,7 @@ FMI3_Export fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, 
 #define COUNT(function, name, number)                                             \
     FMI3_Export fmi3Status function(fmi3Instance instance, size_t *name)          \
     {                                                                             \
-        OPEN_FOR(MODEL_EXCHANGE, function, MAY_COUNT);                            \
+        OPEN_FOR(TYPE_MODEL_EXCHANGE, function, MAY_COUNT);                            \
         GIVEN(name != NULL, #name);                                               \
         *name = number;                                                           \
         return fmi3OK;                                                            \

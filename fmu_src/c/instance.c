@@ -79,7 +79,7 @@ static outcome choose_logs(fmu *f, bool logging_on, size_t n, const char *const 
         REQUIRE(known, "there is no log category %s.", categories[i] == NULL ? "NULL" : categories[i]);
     }
     for (int j = 0; j < N_LOG_CATEGORIES; j++) {
-        if (n == 0 || chosen[j]) {
+        if (n == 0 || chosen[j] || chosen[logAll]) {
             f->log_enabled[j] = logging_on;
         }
     }
@@ -105,7 +105,7 @@ static outcome initialize(fmu *f)
 
 static outcome run(fmu *f)
 {
-    return enter(f, f->now.type == MODEL_EXCHANGE || has_event_mode(&f->host) ? EVENT : STEP);
+    return enter(f, f->now.type == TYPE_MODEL_EXCHANGE || has_event_mode(&f->host) ? EVENT : STEP);
 }
 
 static outcome terminate(fmu *f)
@@ -132,10 +132,10 @@ static void calculate(fmu *f)
     rov_derivatives(f->now.values, &f->gains);
 }
 
-/* A variable by its reference, time among them where it is one; NULL where there is none. */
-static const double *variable(const fmu *f, unsigned reference)
+/* The value of a variable by its place, with that of the time where it is a variable; NULL where there is none. */
+static const double *variable(const fmu *f, unsigned place)
 {
-    return reference < N_VARIABLES ? &f->now.values[reference] : HAS_TIME && reference == TIME ? &f->now.time : NULL;
+    return place < N_VARIABLES ? &f->now.values[place] : HAS_TIME && place == TIME ? &f->now.time : NULL;
 }
 
 static outcome get_values(fmu *f, const unsigned vr[], size_t n, double value[])
@@ -143,21 +143,23 @@ static outcome get_values(fmu *f, const unsigned vr[], size_t n, double value[])
     REQUIRE(n == 0 || (vr != NULL && value != NULL), "vr or value is NULL.");
     bool calculated = false;
     for (size_t i = 0; i < n; i++) {
-        REQUIRE(variable(f, vr[i]) != NULL, "there is no " REAL " with value reference %u.", vr[i]);
-        calculated = calculated || (vr[i] < N_VARIABLES && VARIABLES[vr[i]].kind == CALCULATED);
+        const unsigned place = place_of(vr[i]);
+        REQUIRE(variable(f, place) != NULL, "there is no " REAL " with value reference %u.", vr[i]);
+        calculated = calculated || (place < N_VARIABLES && VARIABLES[place].kind == CALCULATED);
     }
     if (calculated) {
         calculate(f);
         for (size_t i = 0; i < n; i++) {
-            if (!isfinite(*variable(f, vr[i]))) {
-                const bool exchange = f->now.type == MODEL_EXCHANGE;
+            const unsigned place = place_of(vr[i]);
+            if (!isfinite(*variable(f, place))) {
+                const bool exchange = f->now.type == TYPE_MODEL_EXCHANGE;
                 REFUSE(f, exchange ? DISCARDED : REFUSED, exchange ? logStatusDiscard : logStatusError, "%s overflows.",
-                       VARIABLES[vr[i]].name);
+                       VARIABLES[place].name);
             }
         }
     }
     for (size_t i = 0; i < n; i++) {
-        value[i] = *variable(f, vr[i]);
+        value[i] = *variable(f, place_of(vr[i]));
     }
     if (f->now.mode == INSTANTIATED) {
         WARN_ONCE(f, READ_EARLY, "done, though the standard has no such call before initialization; said once.");
@@ -193,10 +195,11 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
     REQUIRE(n == 0 || (vr != NULL && value != NULL), "vr or value is NULL.");
     bool coefficient = false;
     for (size_t i = 0; i < n; i++) { /* all are checked before any is set */
-        REQUIRE(vr[i] < N_VARIABLES, "there is no " REAL " with value reference %u%s.", vr[i],
-                HAS_TIME && vr[i] == TIME ? " to be set" : "");
-        const variable_info *const info = &VARIABLES[vr[i]];
-        const double old = f->now.values[vr[i]];
+        const unsigned place = place_of(vr[i]);
+        REQUIRE(place < N_VARIABLES, "there is no " REAL " with value reference %u%s.", vr[i],
+                HAS_TIME && place == TIME ? " to be set" : "");
+        const variable_info *const info = &VARIABLES[place];
+        const double old = f->now.values[place];
         REQUIRE(may_set(f, info->kind), "%s must not be set in %s.", info->name, mode_name(f->now.mode));
         if (!isfinite(value[i])) {
             DISCARD(f, "%s = %g is not a finite number; it stays %.15g.", info->name, value[i], old);
@@ -210,10 +213,11 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
         }
     }
     for (size_t i = 0; i < n; i++) {
-        const variable_info *const info = &VARIABLES[vr[i]];
-        f->now.values[vr[i]] = value[i];
+        const unsigned place = place_of(vr[i]);
+        const variable_info *const info = &VARIABLES[place];
+        f->now.values[place] = value[i];
         if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
-            WARN_ONCE(f, vr[i], "%s = %.15g saturates at %g; said once.", info->name, value[i],
+            WARN_ONCE(f, place, "%s = %.15g saturates at %g; said once.", info->name, value[i],
                       value[i] < 0.0 ? info->minimum : info->maximum);
         } else if (info->kind == TUNABLE && is_for_event_mode(f)) {
             WARN_ONCE(f, TUNED_LATE, "%s is set, though the standard wants Event Mode for it; said once.", info->name);
@@ -301,19 +305,22 @@ static outcome set_time(fmu *f, double time)
 
 static const char *name_of(unsigned reference)
 {
-    return reference < N_VARIABLES ? VARIABLES[reference].name : "an unknown value reference";
+    const unsigned place = place_of(reference);
+    return place < N_VARIABLES ? VARIABLES[place].name : "an unknown value reference";
 }
 
 /* Parameters are knowns of the initialization (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.12). */
 static bool is_known(const fmu *f, unsigned reference)
 {
-    const variable_kind kind = reference < N_VARIABLES ? VARIABLES[reference].kind : CALCULATED;
+    const unsigned place = place_of(reference);
+    const variable_kind kind = place < N_VARIABLES ? VARIABLES[place].kind : CALCULATED;
     return kind == INPUT || kind == STATE || (kind != CALCULATED && f->now.mode == INITIALIZATION);
 }
 
 static bool is_unknown(unsigned reference)
 {
-    return reference < N_VARIABLES && (VARIABLES[reference].kind == STATE || VARIABLES[reference].kind == CALCULATED);
+    const unsigned place = place_of(reference);
+    return place < N_VARIABLES && (VARIABLES[place].kind == STATE || VARIABLES[place].kind == CALCULATED);
 }
 
 static outcome are_partial(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[], size_t n_knowns,
@@ -342,21 +349,22 @@ static outcome differentiate(fmu *f, const unsigned unknowns[], size_t n_unknown
     TRY(are_partial(f, unknowns, n_unknowns, knowns, n_knowns, seed, n_seed, sensitivity, n_sensitivity, false));
     double d[N_VARIABLES] = {0.0};
     for (size_t i = 0; i < n_knowns; i++) {
-        d[knowns[i]] += seed[i];
+        d[place_of(knowns[i])] += seed[i];
     }
     rov_tangent(f->now.values, d);
     for (size_t i = 0; i < n_unknowns; i++) {
-        REQUIRE(isfinite(d[unknowns[i]]), "that of %s is not a finite number.", name_of(unknowns[i]));
+        REQUIRE(isfinite(d[place_of(unknowns[i])]), "that of %s is not a finite number.", name_of(unknowns[i]));
     }
     for (size_t i = 0; i < n_unknowns; i++) {
-        sensitivity[i] = d[unknowns[i]];
+        sensitivity[i] = d[place_of(unknowns[i])];
     }
     return DONE;
 }
 
 static bool is_output(unsigned reference)
 {
-    const bool rate = reference >= FIRST_CALCULATED && reference < FIRST_CALCULATED + N_STATES;
+    const unsigned place = place_of(reference);
+    const bool rate = place >= FIRST_CALCULATED && place < FIRST_CALCULATED + N_STATES;
     return is_unknown(reference) && !rate;
 }
 
@@ -367,15 +375,16 @@ static outcome get_output_rates(fmu *f, const unsigned vr[], size_t n, const int
     for (size_t i = 0; i < n; i++) {
         REQUIRE(is_output(vr[i]), "value reference %u is no output.", vr[i]);
         REQUIRE(order[i] >= 1 && order[i] <= ORDER, "order %d of %s is not available, only 1 to %d.", order[i],
-                VARIABLES[vr[i]].name, ORDER);
+                name_of(vr[i]), ORDER);
     }
     for (int pass = 0; pass < 2; pass++) { /* nothing is written unless all are finite */
         for (size_t i = 0; i < n; i++) {
             double rates[N_VARIABLES];
             rov_rates_of_order(f->now.values, &f->gains, order[i], rates);
-            REQUIRE(isfinite(rates[vr[i]]), "the derivative of %s overflows.", VARIABLES[vr[i]].name);
+            const double rate = rates[place_of(vr[i])];
+            REQUIRE(isfinite(rate), "the derivative of %s overflows.", name_of(vr[i]));
             if (pass == 1) {
-                value[i] = rates[vr[i]];
+                value[i] = rate;
             }
         }
     }

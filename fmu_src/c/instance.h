@@ -19,7 +19,15 @@ typedef enum {
     INTERMEDIATE = 128 /* Co-Simulation, inside a step: intermediate update of FMI 3.0 */
 } lifecycle;
 
-enum { TIME = N_VARIABLES }; /* the reference of the independent variable, where it is a variable */
+/* Variables are numbered by their place in VARIABLES, from 0. FMI 2.0 numbers value references likewise. FMI 3.0 numbers
+ * them from 1 (FIRST_REFERENCE), because OMSimulator takes them for positions in ModelVariables, which begin at 1. This
+ * function is the only one that knows the difference. The reference 0 of FMI 3.0 gives a place that no variable has. */
+static unsigned place_of(unsigned reference)
+{
+    return reference - FIRST_REFERENCE;
+}
+
+enum { TIME = N_VARIABLES }; /* the place of the independent variable, which only FMI 3.0 declares: after all others */
 
 /* What is legal when: the tables of FMI 2.0, sections 3.2.3 and 4.2.4, and of FMI 3.0, 2.3.1 and 4.2. */
 enum {
@@ -46,8 +54,9 @@ enum {
     MAY_ASK_STATUS = STEP | TERMINATED
 };
 
-/* As fmi2Type numbers them. */
-typedef enum { MODEL_EXCHANGE, CO_SIMULATION } interface_type;
+/* As fmi2Type numbers them. They are not called MODEL_EXCHANGE and CO_SIMULATION, because the projects that
+ * `fmpy create-cmake-project` makes define macros with these names. */
+typedef enum { TYPE_MODEL_EXCHANGE, TYPE_CO_SIMULATION } interface_type;
 
 /* As fmi2Status and fmi3Status number them. */
 typedef enum { DONE, WARNED, DISCARDED, REFUSED } outcome;
@@ -58,10 +67,10 @@ typedef struct {
     lifecycle mode;
     bool experiment_defined, stop_defined;
     double time, stop;
-    double values[N_VARIABLES]; /* by value reference */
+    double values[N_VARIABLES]; /* by place */
 } fmu_state;
 
-/* What is warned of once: a command that saturates, by value reference, and what importers do against the standard. */
+/* What is warned of once: a command that saturates, by place, and what importers do against the standard. */
 enum { READ_EARLY = FIRST_STATE, TUNED_LATE, ENDED_EARLY, TIME_JUMPED, N_WARNINGS };
 
 typedef struct {
@@ -168,7 +177,7 @@ static outcome open_instance(fmu *f, const char *function, int modes, int wanted
     f->function = function;
     REQUIRE(((int)f->now.mode & modes) != 0, "not allowed in %s.", mode_name(f->now.mode));
     REQUIRE(wanted == ANY_INTERFACE || (int)f->now.type == wanted, "only an instance for %s has this function.",
-            wanted == MODEL_EXCHANGE ? "Model Exchange" : "Co-Simulation");
+            wanted == TYPE_MODEL_EXCHANGE ? "Model Exchange" : "Co-Simulation");
     return DONE;
 }
 

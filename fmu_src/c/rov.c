@@ -1,7 +1,7 @@
 /* The ROV as tables (model.h) and numbers: thrust, derivatives, tangents. The numbers in brackets are
  * the paper's equations. Units are SI, signs those of Fossen and SNAME, z down. No state, no allocation.
  *
- * `at` holds all variables by value reference, `state` and `rate` the states in their order. */
+ * `at` holds all variables by place, `state` and `rate` the states in their order. */
 #include "model.h"
 
 #include <math.h>

@@ -54,7 +54,7 @@ static uint64_t checksum(const unsigned char *bytes, size_t size) /* FNV-1a */
 static outcome knows_mode_of(fmu *f, const fmu_state *s)
 {
     const int stepping = STEP | FAILED | (has_event_mode(&f->host) ? EVENT : 0), mode = (int)s->mode;
-    const int modes = s->type == MODEL_EXCHANGE ? EVENT | CONTINUOUS : stepping;
+    const int modes = s->type == TYPE_MODEL_EXCHANGE ? EVENT | CONTINUOUS : stepping;
     REQUIRE((mode & (modes | INSTANTIATED | INITIALIZATION | TERMINATED)) != 0 && (mode & (mode - 1)) == 0,
             "the state is in %s, which this instance does not use.", mode_name(s->mode));
     return DONE;

@@ -15,7 +15,7 @@
  * @typedef {{axis: number, command: number, V: number | null, Tau: number | null}} StepTest
  */
 /**
- * What a page is told of a vehicle. Variables stand by value reference, with their start values; the module is deflated, in Base64.
+ * What a page is told of a vehicle. Variables stand by their place among all variables, with their start values; the module is deflated, in Base64.
  * @typedef {{name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[], mixed: boolean,
  *   axes: Axis[], thrusters: Thruster[], tunable: string[], tests: StepTest[], size: number}} Vehicle
  */
@@ -41,11 +41,11 @@ class Model {
     this.module = module;
     this.exports = /** @type {Exports} */ (/** @type {unknown} */ (instance.exports));
     const { memory, variables, marks } = this.exports;
-    /** By value reference. */
+    /** By place. */
     this.values = new Float64Array(memory.buffer, variables(), vehicle.variables.length);
     /** V_ss and Tau of each axis. */
     this.marks = new Float64Array(memory.buffer, marks(), 2 * vehicle.axes.length);
-    this.references = new Map(vehicle.variables.map(([name], reference) => [name, reference]));
+    this.places = new Map(vehicle.variables.map(([name], place) => [name, place]));
     this.values.set(vehicle.variables.map(([, start]) => start));
     this.tune();
   }
@@ -64,19 +64,19 @@ class Model {
 
   /** @param {string} name */
   has(name) {
-    return this.references.has(name);
+    return this.places.has(name);
   }
 
   /** A variable; 0 where the vehicle does not have it. @param {string} name */
   get(name) {
-    const reference = this.references.get(name);
-    return reference === undefined ? 0 : this.values[reference];
+    const place = this.places.get(name);
+    return place === undefined ? 0 : this.values[place];
   }
 
   /** An input or a state, where the vehicle has it. @param {string} name @param {number} value */
   set(name, value) {
-    const reference = this.references.get(name);
-    if (reference !== undefined) this.values[reference] = value;
+    const place = this.places.get(name);
+    if (place !== undefined) this.values[place] = value;
   }
 
   /** Takes over coefficients that were set. */

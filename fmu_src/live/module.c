@@ -11,7 +11,7 @@
 
 #define EXPORT(name) __attribute__((export_name(name)))
 
-static double at[N_VARIABLES];  /* by value reference */
+static double at[N_VARIABLES];  /* by place */
 static double marks[N_AXES][2]; /* V_ss and Tau of each axis */
 static rov_gains gains;         /* follows the coefficients */
 

@@ -85,7 +85,7 @@ static void PLAY(SetDebugLogging)(slot *s)
         }                                              \
     }
 
-CALL_THAT_LEADS(ExitInitializationMode, true, s->at.type == MODEL_EXCHANGE || s->of.events ? EVENT : STEP)
+CALL_THAT_LEADS(ExitInitializationMode, true, s->at.type == TYPE_MODEL_EXCHANGE || s->of.events ? EVENT : STEP)
 CALL_THAT_LEADS(Terminate, true, TERMINATED)
 CALL_THAT_LEADS(EnterEventMode, true, EVENT)
 CALL_THAT_LEADS(EnterContinuousTimeMode, true, CONTINUOUS)
@@ -146,8 +146,9 @@ static void PLAY(GetReal)(slot *s)
     LENT double *const values = take_room(m, sizeof *values);
     bool good = m == n && (n == 0 || (vr != NULL && values != NULL)), derived = false;
     for (size_t i = 0; i < n && vr != NULL; i++) {
-        good = good && vr[i] < N_VARIABLES + (FMI_VERSION == 3); /* the time */
-        derived = derived || (vr[i] >= FIRST_CALCULATED && vr[i] < (N_LAGGING > 0 ? FIRST_COEFFICIENT : FIRST_THRUST));
+        const unsigned place = place_of(vr[i]);
+        good = good && place < N_VARIABLES + (FMI_VERSION == 3); /* the time */
+        derived = derived || (place >= FIRST_CALCULATED && place < (N_LAGGING > 0 ? FIRST_COEFFICIENT : FIRST_THRUST));
     }
     verdict wanted = legal(s, WHICH(GetReal), good);
     if (wanted == ALLOWED && derived && !is_moderate(s->f)) {
@@ -157,9 +158,9 @@ static void PLAY(GetReal)(slot *s)
 }
 
 /* FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and 4.2. */
-static bool settable(const slot *s, unsigned vr)
+static bool settable(const slot *s, unsigned place)
 {
-    const variable_kind kind = VARIABLES[vr].kind;
+    const variable_kind kind = VARIABLES[place].kind;
     switch ((int)s->at.mode) {
     case INSTANTIATED:
     case INITIALIZATION: return kind != CALCULATED;
@@ -177,9 +178,10 @@ static void PLAY(SetReal)(slot *s)
     LENT double *const values = take_reals(m);
     bool good = m == n && (n == 0 || (vr != NULL && values != NULL));
     for (size_t i = 0; i < n && good; i++) {
-        good = vr[i] < N_VARIABLES && settable(s, vr[i]) && isfinite(values[i])
-               && (VARIABLES[vr[i]].kind == INPUT
-                   || (values[i] >= VARIABLES[vr[i]].minimum && values[i] <= VARIABLES[vr[i]].maximum));
+        const unsigned place = place_of(vr[i]);
+        good = place < N_VARIABLES && settable(s, place) && isfinite(values[i])
+               && (VARIABLES[place].kind == INPUT
+                   || (values[i] >= VARIABLES[place].minimum && values[i] <= VARIABLES[place].maximum));
     }
     if (CALL(s, good, true, SetReal, s->f, vr, n, values AND(m))) {
         for (size_t i = n; i-- > 0;) { /* the last one counts */
@@ -187,7 +189,7 @@ static void PLAY(SetReal)(slot *s)
             for (size_t j = i + 1; j < n; j++) {
                 later = later || vr[j] == vr[i];
             }
-            PROPERTY(later || memcmp(&s->f->now.values[vr[i]], &values[i], sizeof(double)) == 0, "not set");
+            PROPERTY(later || memcmp(&s->f->now.values[place_of(vr[i])], &values[i], sizeof(double)) == 0, "not set");
         }
     }
 }
@@ -211,11 +213,11 @@ typedef struct {
     double *seed, *result;
 } partial;
 
-/* Mostly one of the variables from `first` on, before `end`. */
+/* Mostly a reference to one of the places from `first` on, before `end`. */
 static unsigned take_reference_among(unsigned first, unsigned end)
 {
     const unsigned n = take_byte();
-    return n < 230 ? first + n % (end - first) : take_reference();
+    return n < 230 ? FIRST_REFERENCE + first + n % (end - first) : take_reference();
 }
 
 static unsigned take_known(void)
@@ -260,11 +262,13 @@ static verdict may_differentiate(const slot *s, call which, const partial *p, bo
     bool good = (p->n_unknown == 0 || p->unknown != NULL) && (p->n_known == 0 || p->known != NULL)
                 && (from == 0 || p->seed != NULL) && p->n_seed >= from && p->n_result >= to;
     for (size_t i = 0; i < p->n_known && good; i++) {
-        const variable_kind kind = p->known[i] < N_VARIABLES ? VARIABLES[p->known[i]].kind : CALCULATED;
+        const unsigned place = place_of(p->known[i]);
+        const variable_kind kind = place < N_VARIABLES ? VARIABLES[place].kind : CALCULATED;
         good = kind == INPUT || kind == STATE || (kind != CALCULATED && s->at.mode == INITIALIZATION);
     }
     for (size_t i = 0; i < p->n_unknown && good; i++) {
-        const variable_kind kind = p->unknown[i] < N_VARIABLES ? VARIABLES[p->unknown[i]].kind : INPUT;
+        const unsigned place = place_of(p->unknown[i]);
+        const variable_kind kind = place < N_VARIABLES ? VARIABLES[place].kind : INPUT;
         good = kind == STATE || kind == CALCULATED;
     }
     verdict wanted = legal(s, which, good);

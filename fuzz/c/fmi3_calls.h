@@ -110,21 +110,21 @@ static void check_line(fmi3InstanceEnvironment environment, fmi3Status status, f
 }
 
 /* A new instance in place of what is there; NULL where an argument is wrong. `n`: of the variables that updates shall have. */
-static void place(slot *s, const char *name, int type, const char *token, manner of, const unsigned vr[], size_t n)
+static void replace_instance(slot *s, const char *name, int type, const char *token, manner of, const unsigned vr[], size_t n)
 {
     const fmi3LogMessageCallback log = of.logs ? check_line : NULL;
     const fmi3IntermediateUpdateCallback update = of.updates ? update_step : NULL;
     bool good = is_name(name) && is_token(token) && type >= 0 && type <= 1;
     fmu *made;
-    for (size_t i = 0; i < n && type == CO_SIMULATION; i++) {
-        good = good && vr != NULL && vr[i] <= N_VARIABLES;
+    for (size_t i = 0; i < n && type == TYPE_CO_SIMULATION; i++) {
+        good = good && vr != NULL && place_of(vr[i]) <= N_VARIABLES;
     }
     free_instance(s);
     before_call();
-    if (type == MODEL_EXCHANGE) {
+    if (type == TYPE_MODEL_EXCHANGE) {
         made = fmi3InstantiateModelExchange(name, token, NULL, false, of.is_told, s, log);
         of.events = of.updates = of.returns_early = false;
-    } else if (type == CO_SIMULATION) {
+    } else if (type == TYPE_CO_SIMULATION) {
         made = fmi3InstantiateCoSimulation(name, token, NULL, false, of.is_told, of.events, of.returns_early, vr, n, s, log,
                                            update);
         of.updates = of.updates && (n > 0 || of.returns_early);
@@ -153,16 +153,16 @@ static void call_fmi3Instantiate(slot *s)
     of.logs = take_byte() < 200;
     of.is_told = take_bool();
     for (size_t i = 0; i < n && proper; i++) {
-        vr[i] = (unsigned)i % N_VARIABLES;
+        vr[i] = FIRST_REFERENCE + (unsigned)i % N_VARIABLES;
     }
-    place(s, name, type, token, of, vr, n);
+    replace_instance(s, name, type, token, of, vr, n);
     memory_is_full = false;
 }
 
 static void make(slot *s, interface_type type, manner of)
 {
-    static const unsigned first[1];
-    place(s, "rov", (int)type, MODEL_TOKEN, of, first, 1);
+    static const unsigned first[] = {FIRST_REFERENCE};
+    replace_instance(s, "rov", (int)type, MODEL_TOKEN, of, first, 1);
 }
 
 static void enter_initialization(slot *s, double start, bool stops, double stop)

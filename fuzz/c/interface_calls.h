@@ -82,16 +82,17 @@ static void PLAY(GetRealOutputDerivatives)(slot *s)
         const unsigned any = take_byte();
         order[i] = any < 100 ? 1 : (int)any % (ORDER + 3) - 1;
         first = first && order[i] == 1;
-        good = good && order[i] >= 1 && order[i] <= ORDER && vr[i] >= FIRST_STATE && vr[i] < N_VARIABLES
-               && (vr[i] < FIRST_CALCULATED || (vr[i] >= FIRST_CALCULATED + N_STATES && VARIABLES[vr[i]].kind == CALCULATED));
+        const unsigned place = vr == NULL ? 0 : place_of(vr[i]);
+        good = good && order[i] >= 1 && order[i] <= ORDER && place >= FIRST_STATE && place < N_VARIABLES
+               && (place < FIRST_CALCULATED || (place >= FIRST_CALCULATED + N_STATES && VARIABLES[place].kind == CALCULATED));
     }
     verdict wanted = legal(s, WHICH(GetRealOutputDerivatives), good);
     wanted = wanted == ALLOWED && !(first && is_moderate(s->f)) ? EITHER : wanted; /* the higher, the larger */
     const bool accepted = CALL_AS(s, wanted, false, GetRealOutputDerivatives, s->f, vr, n, order, values AND(m));
     check_results("GetRealOutputDerivatives", accepted, values, m);
     for (size_t i = 0; i < n && accepted; i++) {
-        if (order[i] == 1 && vr[i] < FIRST_CALCULATED) {
-            check_first_derivative(s->f, vr[i] - FIRST_STATE, values[i]);
+        if (order[i] == 1 && place_of(vr[i]) < FIRST_CALCULATED) {
+            check_first_derivative(s->f, place_of(vr[i]) - FIRST_STATE, values[i]);
         }
     }
     if (accepted) {

@@ -248,7 +248,7 @@ static void check_taylor(const fmu *f)
 /* The first time derivative of a state is what the model says that it is. */
 static void check_first_derivative(fmu *f, unsigned state, double derivative)
 {
-    const unsigned vr = FIRST_CALCULATED + state;
+    const unsigned vr = FIRST_REFERENCE + FIRST_CALCULATED + state;
     double rate, size[N_STATES];
     PROPERTY(FMI(GetReal)(f, &vr, 1, &rate AND(1)) == 0, "a derivative cannot be read");
     sizes_of(f, 1.0, size);
@@ -262,7 +262,7 @@ static void check_instance(const slot *s)
     unsigned vr[N_STATES + N_THRUST];
     double values[N_STATES + N_THRUST];
     for (unsigned i = 0; i < N_STATES + N_THRUST; i++) {
-        vr[i] = FIRST_STATE + i + (i < N_STATES ? 0 : N_STATES);
+        vr[i] = FIRST_REFERENCE + FIRST_STATE + i + (i < N_STATES ? 0 : N_STATES);
     }
     if (s->f == NULL) {
         return;
@@ -277,6 +277,6 @@ static void check_instance(const slot *s)
     PROPERTY(FMI(GetReal)(s->f, vr, n, values AND(n)) == 0, "the outputs cannot be read");
     PROPERTY(is_same(s, true), "to read changes the instance");
     for (unsigned i = 0; i < n; i++) {
-        PROPERTY(isfinite(values[i]), "%s = %g", VARIABLES[vr[i]].name, values[i]);
+        PROPERTY(isfinite(values[i]), "%s = %g", VARIABLES[place_of(vr[i])].name, values[i]);
     }
 }

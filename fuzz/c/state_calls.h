@@ -28,7 +28,7 @@ static void PLAY(GetFMUstate)(slot *s)
 /* In which an instance of an interface can be saved, were it made as this one was. */
 static int modes_of(const slot *s, interface_type type)
 {
-    return BETWEEN & ~(type == MODEL_EXCHANGE ? STEP | FAILED : s->of.events ? CONTINUOUS : EVENT | CONTINUOUS);
+    return BETWEEN & ~(type == TYPE_MODEL_EXCHANGE ? STEP | FAILED : s->of.events ? CONTINUOUS : EVENT | CONTINUOUS);
 }
 
 static void PLAY(SetFMUstate)(slot *s)

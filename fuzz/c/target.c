@@ -14,7 +14,7 @@ static void any_call(slot *s, unsigned which)
 /* From Event Mode to where time passes. */
 static void leave_event_mode(slot *s)
 {
-    if (s->at.type == MODEL_EXCHANGE) {
+    if (s->at.type == TYPE_MODEL_EXCHANGE) {
         PLAY(EnterContinuousTimeMode)(s);
     }
 #if FMI_VERSION == 3
@@ -80,7 +80,7 @@ static void coast(slot *s)
     static const double nothing[FIRST_STATE];
     unsigned vr[FIRST_STATE];
     for (unsigned i = 0; i < FIRST_STATE; i++) {
-        vr[i] = i;
+        vr[i] = FIRST_REFERENCE + i;
     }
     CALL(s, true, true, SetReal, s->f, vr, FIRST_STATE, nothing AND(FIRST_STATE));
     PLAY(DoStep)(s);
@@ -141,7 +141,7 @@ static void carry(slot *s)
 static void clear_world(void)
 {
     if (slots[0].f == NULL) { /* states are freed by an instance */
-        make(&slots[0], CO_SIMULATION, (manner){.logs = false});
+        make(&slots[0], TYPE_CO_SIMULATION, (manner){.logs = false});
     }
     for (int i = 0; i < N_SAVED; i++) {
         PROPERTY(FMI(FreeFMUstate)(slots[0].f, &saves[i].state) == DONE, "not freed");

@@ -135,15 +135,15 @@ static unsigned take_reference(void)
 {
     const unsigned n = take_byte();
     if (n < 100) {
-        return n % FIRST_STATE; /* an input */
+        return FIRST_REFERENCE + n % FIRST_STATE; /* an input */
     }
     if (n < 150) {
-        return N_VARIABLES - 1 - n % 8; /* a tuning parameter */
+        return FIRST_REFERENCE + N_VARIABLES - 1 - n % 8; /* a tuning parameter */
     }
     if (n < 245) {
-        return n % N_VARIABLES;
+        return FIRST_REFERENCE + n % N_VARIABLES;
     }
-    return n < 253 ? N_VARIABLES + n % 4 : (unsigned)take_word(4);
+    return n < 253 ? FIRST_REFERENCE + N_VARIABLES + n % 4 : (unsigned)take_word(4);
 }
 
 /* ---- One call: was it right to accept or refuse it, and did it leave alone what it must ---- */

@@ -1,8 +1,8 @@
 """Every FMU variable, declared once.
 
 modelDescription.xml, the C structs and value references, the documentation and the PythonFMU registration are all
-derived from `variables`. They stand in the order inputs, state, derivatives, thrust, coefficients;
-the value reference of a variable is its place.
+derived from `variables`. Their order is: inputs, state, derivatives, thrust, coefficients. The value reference of a
+variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
 from collections.abc import Mapping
@@ -56,6 +56,7 @@ class Variable:
 
     name: str
     value_reference: int
+    """In FMI 2.0. It is also the place of the variable in the arrays of the C code, from 0."""
     description: str
     unit: str
     causality: str
@@ -73,6 +74,10 @@ class Variable:
     def index(self) -> int:
         """Position in <ModelVariables>, from 1."""
         return self.value_reference + 1
+
+    def reference(self, fmi: int) -> int:
+        """Value reference in a version of FMI. In FMI 3.0 it is the index, because OMSimulator takes one for the other."""
+        return self.value_reference if fmi == 2 else self.index
 
     @property
     def kind(self) -> str:
@@ -220,13 +225,14 @@ LOG_CATEGORIES = {
     "logStatusWarning": "A command beyond ±1 that saturates, a call or a time that the standard does not foresee; once",
     "logStatusDiscard": "A refused value, of a variable or of a solver's state: not finite, or outside min ... max",
     "logStatusError": "Illegal calls and arguments, steps past stopTime, results that overflow",
+    "logAll": "All of these categories at once",
 }
 
 # ---- The same declaration for the C compiler -----------------------------------------------------------------------
 
 
 def model_header(rov: Rov) -> str:
-    """model.h: what the vehicle has, for the mathematics; a variable is known by its value reference, REF_<name>."""
+    """model.h: what the vehicle has, for the mathematics; a variable is known by its place, REF_<name>."""
     layout = rov.layout
     names = [v.name for v in variables(rov) if not v.derivative_of]
 
@@ -292,6 +298,7 @@ def interface_header(rov: Rov, identifier: str, token: str, fmi: int = 2) -> str
     return render(
         "interface.h.j2",
         variables=variables(rov),
+        first_reference=variables(rov)[0].reference(fmi),
         identifier=identifier,
         token=token,
         fmi=fmi,

@@ -86,7 +86,7 @@ def model_description(
     }
     if fmi == 3:
         variables = (*variables, Variable("time", len(variables), "Time", "s", "independent", "continuous"))
-    number = {v.name: v.index if fmi == 2 else v.value_reference for v in variables}
+    number = {v.name: v.index for v in variables}
     return render(
         "modelDescription.xml.j2",
         head=head,
@@ -109,16 +109,28 @@ def build_description(identifier: str) -> bytes:
     return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
 
 
-# In FMI 3.0 unit and size stand with a type, for some importers do not know them of a variable.
+# In FMI 3.0 a variable has its unit, nominal value and bounds from its declared type and has none of its own. FMI Library
+# loses the unit of a variable that has bounds of its own beside a type, and fmi-sim refuses a unit on a variable.
 
 
 def _type(variable: Variable) -> dict[str, str | float | None]:
-    return {"unit": variable.unit, "displayUnit": variable.display_unit, "nominal": variable.nominal}
+    return {
+        "unit": variable.unit,
+        "displayUnit": variable.display_unit,
+        "min": variable.minimum,
+        "max": variable.maximum,
+        "nominal": variable.nominal,
+    }
 
 
 def _type_name(variable: Variable) -> str:
-    shown = f", shown in {variable.display_unit}" if variable.display_unit else ""
-    return f"{variable.unit}{shown}{'' if variable.nominal is None else f', about {variable.nominal:g}'}"
+    parts = {
+        "shown in {}": variable.display_unit,
+        "at least {:g}": variable.minimum,
+        "at most {:g}": variable.maximum,
+        "about {:g}": variable.nominal,
+    }
+    return ", ".join([variable.unit, *(words.format(value) for words, value in parts.items() if value is not None)])
 
 
 _LISTS = {

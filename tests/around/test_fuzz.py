@@ -66,8 +66,8 @@ PLANTED = {
     ),
     "a value reference is not looked at": (
         "instance.c",
-        "return reference < N_VARIABLES ? &f->now.values[reference]",
-        "return reference < N_VARIABLES + 2 ? &f->now.values[reference]",
+        "return place < N_VARIABLES ? &f->now.values[place]",
+        "return place < N_VARIABLES + 2 ? &f->now.values[place]",
         "heap-buffer-overflow|GetReal: illegal",
     ),
     "a call is legal in a mode too many": (

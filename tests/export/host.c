@@ -1,6 +1,6 @@
 /* Drives the FMU from standard input; the same program on every platform.
  *
- * Usage: host LIBRARY. Each line of input is a step: its length, then the values of the inputs by value reference.
+ * Usage: host LIBRARY. Each line of input is a step: its length, then the values of the inputs in their order.
  * Each line of output holds states and thrust after it. Numbers are the bits of a double in hexadecimal: exact
  * everywhere. */
 #include "fmu.h"
@@ -30,10 +30,10 @@ int main(int argc, char *argv[])
     fmu_instance c = new_instance("rov", &callbacks);
     unsigned inputs[N_INPUTS], outputs[N_OUTPUTS];
     for (unsigned i = 0; i < N_INPUTS; i++) {
-        inputs[i] = i;
+        inputs[i] = FIRST_REFERENCE + i;
     }
     for (unsigned i = 0; i < N_OUTPUTS; i++) {
-        outputs[i] = i < N_STATES ? FIRST_STATE + i : FIRST_THRUST + i - N_STATES;
+        outputs[i] = FIRST_REFERENCE + (i < N_STATES ? FIRST_STATE + i : FIRST_THRUST + i - N_STATES);
     }
     double t = 0.0, h, values[N_INPUTS > N_OUTPUTS ? N_INPUTS : N_OUTPUTS];
     while (read_double(&h)) {

@@ -4,6 +4,7 @@ import os
 import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import fmpy
@@ -34,10 +35,32 @@ def test_fmpy_compiles_and_runs_them(either_dir: Path, tmp_path: Path) -> None:
     shutil.rmtree(folder / "binaries")
     (tmp_path / "build").mkdir()
     build_platform_binary(folder, tmp_path / "build")
-    built = fmpy.simulate_fmu(str(folder), start_values={"u_l": 0.3, "u_r": 0.1})
-    shipped = fmpy.simulate_fmu(str(either_dir), start_values={"u_l": 0.3, "u_r": 0.1})
-    for name in built.dtype.names:
-        assert built[name] == pytest.approx(shipped[name], rel=1e-12, abs=1e-12)
+    _assert_same_simulation(folder, either_dir)
+
+
+@pytest.mark.usefixtures("zig_as_cc")
+def test_the_cmake_project_that_fmpy_creates_builds_and_simulates(
+    either_fmu: Path, either_dir: Path, tmp_path: Path
+) -> None:
+    """FMPy defines the macros CO_SIMULATION and MODEL_EXCHANGE in it, so no identifier may have these names."""
+    project, build = tmp_path / "a project", tmp_path / "build"
+    project.mkdir()
+    for command in (
+        [sys.executable, "-m", "fmpy", "create-cmake-project", str(either_fmu), "--cmake-project-dir", str(project)],
+        ["cmake", "-S", str(project), "-B", str(build)],
+    ):
+        subprocess.run(command, capture_output=True, check=True)
+    shutil.rmtree(project / "binaries")  # what is simulated is what is built
+    built = subprocess.run(["cmake", "--build", str(build)], capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stdout
+    assert "warning" not in built.stdout
+    _assert_same_simulation(project / "videoray.fmu", either_dir)
+
+
+def _assert_same_simulation(built: Path, shipped: Path) -> None:
+    ours, theirs = (fmpy.simulate_fmu(str(path), start_values={"u_l": 0.3, "u_r": 0.1}) for path in (built, shipped))
+    for name in ours.dtype.names:
+        assert ours[name] == pytest.approx(theirs[name], rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.parametrize("optimization", [pytest.param("-O0", marks=pytest.mark.long), "-O3"])

@@ -1,4 +1,7 @@
-"""One declaration, two versions of FMI: both descriptions are valid, and say the same of the same vehicle."""
+"""One declaration, two versions of FMI: both descriptions are valid, and say the same of the same vehicle.
+
+They differ in how they number variables, and in where the unit and the bounds of a variable stand.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -10,6 +13,8 @@ from lxml import etree
 from rov_fmu.export.interface import variables
 from rov_fmu.export.model_description import NATIVE, OUTPUT_ORDER, build_description, model_description
 from rov_fmu.motion.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import VEHICLES, a_vehicle
 
 SCHEMAS = Path(fmpy.__file__).with_name("schema")
@@ -17,7 +22,7 @@ ORDER = Path(__file__).parents[2] / "fmu_src" / "c" / "series.c"
 TIME = {
     "name": "time", "description": "Time", "causality": "independent", "variability": "continuous", "unit": "s",
 }  # fmt: skip
-_OF_A_VARIABLE = ("name", "valueReference", "description", "causality", "variability", "initial")
+_OF_A_VARIABLE = ("name", "description", "causality", "variability", "initial")
 _OF_A_NUMBER = ("unit", "displayUnit", "min", "max", "nominal", "start")
 _LISTS = {
     "Outputs": "Output",
@@ -79,8 +84,7 @@ def units(root: etree._Element) -> dict[str, bytes]:
 def test_both_versions_declare_the_same(kind: str) -> None:
     two, three = (described(VEHICLES[kind], fmi) for fmi in (2, 3))
     variables_2, variables_3 = declared(two), declared(three)
-    number = str(len(variables_2))
-    assert variables_3.pop("time") == TIME | {"valueReference": number}
+    assert variables_3.pop("time") == TIME
     assert list(variables_3) == list(variables_2)
     assert variables_3 == variables_2
     assert structure(three, 3) == structure(two, 2)
@@ -89,6 +93,50 @@ def test_both_versions_declare_the_same(kind: str) -> None:
     assert units_3 == units(two) | {"s": units_3["s"]}
     same = ("Category", "DefaultExperiment")
     assert [dict(e.attrib) for e in three.iter(*same)] == [dict(e.attrib) for e in two.iter(*same)]
+
+
+def value_references(root: etree._Element) -> list[int]:
+    """In the order of ModelVariables."""
+    return [int(v.get("valueReference")) for v in root.find("ModelVariables")]
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_fmi_2_numbers_variables_from_0_and_fmi_3_from_1(kind: str) -> None:
+    two, three = (value_references(described(VEHICLES[kind], fmi)) for fmi in (2, 3))
+    assert two == [*range(len(two))]
+    assert three == [*range(1, len(two) + 2)]  # FMI 3.0 has the time besides
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_omsimulator_resolves_every_dependency_to_the_variable_that_is_meant(name: str) -> None:
+    """OMSimulator takes the references of ModelStructure for positions in ModelVariables, from 1.
+
+    It ends with "bad dependency on variable with index 0" where there is no such position, and else takes the variable
+    at that position for the one that is meant.
+    """
+    root = described(load_vehicle(SHIPPED[name]).rov, 3)
+    at = value_references(root)
+    entries = list(root.find("ModelStructure"))
+    taken = [int(n) for entry in entries for n in (entry.get("valueReference"), *entry.get("dependencies").split())]
+    assert taken
+    for n in taken:
+        assert 1 <= n <= len(at), f"bad dependency on variable with index {n}"
+        assert at[n - 1] == n
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_fmi_3_says_all_of_a_number_in_its_type_and_nothing_in_the_variable(kind: str) -> None:
+    """FMI Library loses the unit of a variable with bounds of its own; fmi-sim refuses a unit on a variable."""
+    root = described(VEHICLES[kind], 3)
+    types = {of.get("name"): of for of in root.iter("Float64Type")}
+    variables_of = list(root.find("ModelVariables"))
+    for v in variables_of:
+        assert not {"unit", "displayUnit", "quantity", "min", "max", "nominal"} & {*v.attrib}, v.get("name")
+        assert types[v.get("declaredType")].get("unit"), v.get("name")
+    said = [tuple(sorted((key, x) for key, x in of.attrib.items() if key != "name")) for of in types.values()]
+    assert len({*said}) == len(said) == len(root.findall("TypeDefinitions/*")), "one type per unit, range and nominal"
+    assert {*types} == {v.get("declaredType") for v in variables_of}
+    assert not {*types} & {v.get("name") for v in variables_of}, "the names of types and variables differ"
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

@@ -18,7 +18,7 @@ static void command(fmi3Instance instance, double t)
     for (unsigned i = 0; i < N_VARIABLES; i++) {
         if (VARIABLES[i].kind == INPUT && isfinite(VARIABLES[i].minimum)) {
             values[n] = sin((1.0 + 0.3 * (double)n) * t + (double)n);
-            vr[n++] = i;
+            vr[n++] = i + FIRST_REFERENCE;
         }
     }
     CHECK(n > 0 && fmi3SetFloat64(instance, vr, n, values, n) == fmi3OK);
@@ -44,7 +44,7 @@ static void log_message(fmi3InstanceEnvironment environment, fmi3Status status, 
 
 static fmi3Instance new_instance(fmi3InstanceEnvironment environment, fmi3IntermediateUpdateCallback callback)
 {
-    static const fmi3ValueReference commanded[] = {0};
+    static const fmi3ValueReference commanded[] = {FIRST_REFERENCE};
     const fmi3Instance instance =
         fmi3InstantiateCoSimulation("rov", MODEL_TOKEN, NULL, fmi3False, fmi3False, fmi3False, fmi3False, commanded,
                                     callback == NULL ? 0 : 1, environment, log_message, callback);
@@ -68,7 +68,7 @@ static double difference(fmi3Instance a, fmi3Instance b)
     fmi3ValueReference vr[N_PLACES];
     double x[N_PLACES], y[N_PLACES], largest = 0.0;
     for (unsigned i = 0; i < N_PLACES; i++) {
-        vr[i] = FIRST_STATE + i;
+        vr[i] = FIRST_REFERENCE + FIRST_STATE + i;
     }
     CHECK(fmi3GetFloat64(a, vr, N_PLACES, x, N_PLACES) == fmi3OK);
     CHECK(fmi3GetFloat64(b, vr, N_PLACES, y, N_PLACES) == fmi3OK);

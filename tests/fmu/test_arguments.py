@@ -3,7 +3,7 @@
 import ctypes
 from ctypes import c_size_t, c_void_p
 from math import inf, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -36,10 +36,29 @@ from tests.fmi3 import CLOCKS, TYPES, flags
 
 CS, ME = CO_SIMULATION, MODEL_EXCHANGE
 WRAPPERS: tuple[type[Fmu], ...] = (fmi2.Fmu, fmi3.Fmu)
-_VR = {v.name: v.value_reference for v in variables(load_vehicle(VIDEORAY).rov)}
-U_L, U, DER_U, F_L, BETA_U = (references(_VR[name]) for name in ("u_l", "u", "der(u)", "F_l", "beta_u"))
-TIME, NOTHING = references(len(_VR)), references(len(_VR) + 1)
-U_AND_NOTHING, U_L_AND_NOTHING = references(U[0], 2**32 - 1), references(U_L[0], 2**32 - 1)
+
+
+class References(NamedTuple):
+    """Arrays of one value reference of the VideoRay, as a version of FMI numbers them."""
+
+    u_l: Any
+    u: Any
+    der_u: Any
+    f_l: Any
+    beta_u: Any
+    nothing: Any
+    """The lowest one above all variables."""
+
+
+def _references(fmi: int) -> References:
+    found = {v.name: v.reference(fmi) for v in variables(load_vehicle(VIDEORAY).rov)}
+    chosen = (found[name] for name in ("u_l", "u", "der(u)", "F_l", "beta_u"))
+    return References(*(references(n) for n in (*chosen, max(found.values()) + (1 if fmi == 2 else 2))))
+
+
+R2, R3 = _references(2), _references(3)
+TIME, ZERO = references(R3.nothing[0] - 1), references(0)
+"""In FMI 3.0, where references begin at 1."""
 FOREIGN = ctypes.create_string_buffer(4096)
 
 Case = tuple[int, str, str, tuple[Any, ...]]
@@ -55,7 +74,7 @@ def counted(*of: Any) -> tuple[Any, ...]:
 _BAD: list[Case] = [
     (CS, STEP, "SetDebugLogging", (1, 1, None)),
     (CS, STEP, "SetDebugLogging", (1, 1, strings(None))),
-    (CS, STEP, "SetDebugLogging", (0, 2, strings(b"logEvents", b"logAll"))),
+    (CS, STEP, "SetDebugLogging", (0, 2, strings(b"logEvents", b"logNoSuch"))),
     (CS, STEP, "GetFMUState", (None,)),
     (CS, STEP, "GetFMUState", (ctypes.pointer(ctypes.cast(FOREIGN, c_void_p)),)),
     (CS, STEP, "SetFMUState", (None,)),
@@ -77,53 +96,61 @@ _BAD: list[Case] = [
     ),
     (ME, CONTINUOUS, "GetEventIndicators", (room(), 1)),
 ]
-_UNKNOWNS_AND_KNOWNS = [
-    (NOTHING, U),
-    (U, NOTHING),
-    (U_L, U),  # an input is no unknown
-    (U, F_L),  # a calculated output is no known
-    (U, BETA_U),  # a parameter is one in Initialization Mode alone
-]
-_OUTPUTS_AND_ORDERS = [
-    (NOTHING, 1),
-    (U_L, 1),
-    (DER_U, 1),  # der(u) is no output
-    (BETA_U, 1),
-    *((U, order) for order in (-1, 0, 20)),
-]
+
+
+def _unknowns_and_knowns(of: References) -> list[tuple[Any, Any]]:
+    return [
+        (of.nothing, of.u),
+        (of.u, of.nothing),
+        (of.u_l, of.u),  # an input is no unknown
+        (of.u, of.f_l),  # a calculated output is no known
+        (of.u, of.beta_u),  # a parameter is one in Initialization Mode alone
+    ]
+
+
+def _outputs_and_orders(of: References) -> list[tuple[Any, int]]:
+    return [
+        (of.nothing, 1),
+        (of.u_l, 1),
+        (of.der_u, 1),  # der(u) is no output
+        (of.beta_u, 1),
+        *((of.u, order) for order in (-1, 0, 20)),
+    ]
+
+
 _TIMES = [(0.0, h) for h in (0.0, -0.0, -0.1, nan, inf, -inf)] + [(t, 0.1) for t in (nan, inf, -inf)] + [(1e308, 1e308)]
 BAD_CALLS: list[Case] = [
     *((kind, mode, of.name(name), a) for of in WRAPPERS for kind, mode, name, a in _BAD),
     # ---- FMI 2.0 ----
     *((CS, INSTANTIATED, "fmi2SetupExperiment", (0, 0.0, start, 0, 0.0)) for start in (nan, inf, -inf)),
     *((CS, INSTANTIATED, "fmi2SetupExperiment", (0, 0.0, 1.0, 1, stop)) for stop in (nan, -inf, 0.999)),
-    *((CS, STEP, "fmi2GetReal", a) for a in [(None, 1, room()), (U, 1, None), (NOTHING, 1, room())]),
-    (CS, STEP, "fmi2GetReal", (U_AND_NOTHING, 2, room(2))),
-    *((CS, STEP, "fmi2SetReal", a) for a in [(None, 1, room()), (U_L, 1, None), (NOTHING, 1, room())]),
-    (CS, STEP, "fmi2SetReal", (U_L_AND_NOTHING, 2, room(2))),
-    *((CS, STEP, f"fmi2{f}{t}", (U, 1, integers(-7))) for f in ("Get", "Set") for t in ("Integer", "Boolean")),
-    *((CS, STEP, f"fmi2{f}String", (U, 1, strings(b"x"))) for f in ("Get", "Set")),
+    *((CS, STEP, "fmi2GetReal", a) for a in [(None, 1, room()), (R2.u, 1, None), (R2.nothing, 1, room())]),
+    (CS, STEP, "fmi2GetReal", (references(R2.u[0], 2**32 - 1), 2, room(2))),
+    *((CS, STEP, "fmi2SetReal", a) for a in [(None, 1, room()), (R2.u_l, 1, None), (R2.nothing, 1, room())]),
+    (CS, STEP, "fmi2SetReal", (references(R2.u_l[0], 2**32 - 1), 2, room(2))),
+    *((CS, STEP, f"fmi2{f}{t}", (R2.u, 1, integers(-7))) for f in ("Get", "Set") for t in ("Integer", "Boolean")),
+    *((CS, STEP, f"fmi2{f}String", (R2.u, 1, strings(b"x"))) for f in ("Get", "Set")),
     *(
         (CS, STEP, "fmi2GetDirectionalDerivative", a)
         for a in [
-            (None, 1, U, 1, reals(1.0), room()),
-            (U, 1, None, 1, reals(1.0), room()),
-            (U, 1, U, 1, None, room()),
-            (U, 1, U, 1, reals(1.0), None),
-            *((unknown, 1, known, 1, reals(1.0), room()) for unknown, known in _UNKNOWNS_AND_KNOWNS),
+            (None, 1, R2.u, 1, reals(1.0), room()),
+            (R2.u, 1, None, 1, reals(1.0), room()),
+            (R2.u, 1, R2.u, 1, None, room()),
+            (R2.u, 1, R2.u, 1, reals(1.0), None),
+            *((unknown, 1, known, 1, reals(1.0), room()) for unknown, known in _unknowns_and_knowns(R2)),
         ]
     ),
     (ME, EVENT, "fmi2NewDiscreteStates", (None,)),
     (ME, CONTINUOUS, "fmi2CompletedIntegratorStep", (1, None, integers(-7))),
     (ME, CONTINUOUS, "fmi2CompletedIntegratorStep", (1, integers(-7), None)),
-    (CS, STEP, "fmi2SetRealInputDerivatives", (U_L, 1, integers(1), reals(0.0))),
+    (CS, STEP, "fmi2SetRealInputDerivatives", (R2.u_l, 1, integers(1), reals(0.0))),
     *(
         (CS, STEP, "fmi2GetRealOutputDerivatives", a)
         for a in [
             (None, 1, integers(1), room()),
-            (U, 1, None, room()),
-            (U, 1, integers(1), None),
-            *((vr, 1, integers(order), room()) for vr, order in _OUTPUTS_AND_ORDERS),
+            (R2.u, 1, None, room()),
+            (R2.u, 1, integers(1), None),
+            *((vr, 1, integers(order), room()) for vr, order in _outputs_and_orders(R2)),
         ]
     ),
     *((CS, STEP, "fmi2DoStep", (*times, 1)) for times in _TIMES),
@@ -134,11 +161,12 @@ BAD_CALLS: list[Case] = [
     *((CS, INSTANTIATED, "fmi3EnterInitializationMode", (0, 0.0, 1.0, 1, stop)) for stop in (nan, -inf, 0.999)),
     *(
         (CS, STEP, f"fmi3{do}Float64", a)
-        for do, of in [("Get", U), ("Set", U_L)]
+        for do, of in [("Get", R3.u), ("Set", R3.u_l)]
         for a in [
             (None, 1, room(), 1),
             (of, 1, None, 1),
-            (NOTHING, 1, room(), 1),
+            (R3.nothing, 1, room(), 1),
+            (ZERO, 1, room(), 1),
             (references(of[0], 2**32 - 1), 2, room(2), 2),
             *((of, 1, room(2), n) for n in (0, 2)),  # a value too few or too many
             (None, 0, None, 1),
@@ -153,13 +181,13 @@ BAD_CALLS: list[Case] = [
         (CS, STEP, function, a)
         for function in ("fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative")
         for a in [
-            (None, 1, *counted(U, reals(1.0), room())),
-            (*counted(U), None, 1, *counted(reals(1.0), room())),
-            (*counted(U, U), None, 1, *counted(room())),
-            (*counted(U, U, reals(1.0)), None, 1),
-            (*counted(U, U), reals(1.0), 0, *counted(room())),
-            (*counted(U, U, reals(1.0)), room(), 0),
-            *(counted(unknown, known, reals(1.0), room()) for unknown, known in _UNKNOWNS_AND_KNOWNS),
+            (None, 1, *counted(R3.u, reals(1.0), room())),
+            (*counted(R3.u), None, 1, *counted(reals(1.0), room())),
+            (*counted(R3.u, R3.u), None, 1, *counted(room())),
+            (*counted(R3.u, R3.u, reals(1.0)), None, 1),
+            (*counted(R3.u, R3.u), reals(1.0), 0, *counted(room())),
+            (*counted(R3.u, R3.u, reals(1.0)), room(), 0),
+            *(counted(unknown, known, reals(1.0), room()) for unknown, known in _unknowns_and_knowns(R3)),
         ]
     ),
     *(
@@ -174,10 +202,10 @@ BAD_CALLS: list[Case] = [
         (CS, STEP, "fmi3GetOutputDerivatives", a)
         for a in [
             (None, 1, integers(1), room(), 1),
-            (U, 1, None, room(), 1),
-            (U, 1, integers(1), None, 1),
-            *((U, 1, integers(1), room(2), n) for n in (0, 2)),
-            *((vr, 1, integers(order), room(), 1) for vr, order in _OUTPUTS_AND_ORDERS),
+            (R3.u, 1, None, room(), 1),
+            (R3.u, 1, integers(1), None, 1),
+            *((R3.u, 1, integers(1), room(2), n) for n in (0, 2)),
+            *((vr, 1, integers(order), room(), 1) for vr, order in _outputs_and_orders(R3)),
         ]
     ),
     *((CS, STEP, "fmi3DoStep", (*times, True, *(flags(True) for _ in range(3)), room())) for times in _TIMES),
@@ -231,7 +259,7 @@ ODD_CALLS: list[Case] = [
     (CS, INSTANTIATED, "fmi2SetupExperiment", (0, 0.0, -5.0, 2, inf)),
     *((CS, STEP, f"fmi2{f}{t}", (None, 0, None)) for f in ("Get", "Set") for t in ("Real", "Integer", "String")),
     (CS, STEP, "fmi2GetDirectionalDerivative", (None, 0, None, 0, None, None)),
-    (CS, STEP, "fmi2GetDirectionalDerivative", (U, 1, None, 0, None, room())),
+    (CS, STEP, "fmi2GetDirectionalDerivative", (R2.u, 1, None, 0, None, room())),
     (CS, STEP, "fmi2GetRealOutputDerivatives", (None, 0, None, None)),
     (CS, STEP, "fmi2SetRealInputDerivatives", (None, 0, None, None)),
     *((CS, STEP, "fmi2DoStep", (t, 0.09999999999999998, -1)) for t in (-1.4e-17, -1.0, 0.1, 1e6)),
@@ -242,8 +270,8 @@ ODD_CALLS: list[Case] = [
     (CS, INSTANTIATED, "fmi3EnterInitializationMode", (False, 0.0, -5.0, True, inf)),
     *((CS, STEP, f"fmi3{f}Float64", (None, 0, None, 0)) for f in ("Get", "Set")),
     *((CS, STEP, f"fmi3Get{f}Derivative", (None, 0) * 4) for f in ("Directional", "Adjoint")),
-    (CS, STEP, "fmi3GetDirectionalDerivative", (U, 1, None, 0, None, 0, room(), 1)),
-    (CS, STEP, "fmi3GetAdjointDerivative", (None, 0, U, 1, None, 0, room(), 1)),
+    (CS, STEP, "fmi3GetDirectionalDerivative", (R3.u, 1, None, 0, None, 0, room(), 1)),
+    (CS, STEP, "fmi3GetAdjointDerivative", (None, 0, R3.u, 1, None, 0, room(), 1)),
     (CS, STEP, "fmi3GetOutputDerivatives", (None, 0, None, None, 0)),
 ]
 

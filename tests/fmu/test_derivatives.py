@@ -64,16 +64,12 @@ def rov_of(fmu: Fmu) -> Rov:
     return next(rov for rov in ROVS.values() if set(rov.layout.inputs) == set(fmu.inputs))
 
 
-def commands(fmu: Fmu) -> list[str]:
-    return [name for name in fmu.inputs if fmu.variables[name].min is not None]
-
-
 def random_motion(fmu: Fmu, rng: random.Random) -> dict[str, float]:
     """Inputs and states of either sign, zeros, and commands beyond full, none on the corner."""
     values = {name: rng.uniform(-3.0, 3.0) for name in fmu.inputs + fmu.states}
-    for name in commands(fmu):
+    for name in fmu.commands:
         values[name] = rng.choice([rng.uniform(-0.99, 0.99), rng.choice([-1, 1]) * rng.uniform(1.01, 2.0)])
-    for name in (*commands(fmu), *(velocity for velocity in "uvwr" if velocity in values)):
+    for name in (*fmu.commands, *(velocity for velocity in "uvwr" if velocity in values)):
         values[name] = rng.choice([values[name], values[name], 0.0])
     return values
 

@@ -127,8 +127,8 @@ def test_of_fmi_3_a_bad_instantiation_gives_no_instance(
 
 
 def test_variables_of_intermediate_update_are_those_of_the_fmu(fmu3: fmi3.Fmu) -> None:
-    n = len(fmu3.variables)
-    for vr, size in [(references(0, n), 2), (None, 1)]:
+    n = len(fmu3.variables)  # references are 1 to n
+    for vr, size in [(references(1, n + 1), 2), (references(0), 1), (None, 1)]:
         log: list[Message] = []
         assert instantiate(fmu3, b"rov", fmu3.token, fmi3.recorder(log), vr, size) is None
         assert instantiate(fmu3, b"rov", fmu3.token, fmi3.recorder(log), vr, size, logging=False) is None
@@ -137,7 +137,7 @@ def test_variables_of_intermediate_update_are_those_of_the_fmu(fmu3: fmi3.Fmu) -
 
 
 def test_intermediate_variables_without_a_callback_are_those_of_some_importers(fmu3: fmi3.Fmu) -> None:
-    component = instantiate(fmu3, b"rov", fmu3.token, NO_LOGGER, references(*range(len(fmu3.variables))), 1)
+    component = instantiate(fmu3, b"rov", fmu3.token, NO_LOGGER, references(*fmu3.vr.values()), len(fmu3.vr))
     assert fmu3.call("EnterInitializationMode", component, False, 0.0, 0.0, False, 0.0) == OK
     assert fmu3.call("ExitInitializationMode", component) == OK
     flags = [fmi3.flags(True) for _ in range(3)]

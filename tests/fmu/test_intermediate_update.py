@@ -27,20 +27,16 @@ def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
     return fmi3.Fmu(request.getfixturevalue(request.param))
 
 
-def commands(fmu3: fmi3.Fmu) -> list[str]:
-    return [name for name in fmu3.inputs if fmu3.variables[name].min is not None]
-
-
 def swing(fmu3: fmi3.Fmu) -> Control:
     """Commands that swing, each in its own time."""
-    return lambda t: {name: 0.8 * sin((3.0 + 2.0 * n) * t + n) for n, name in enumerate(commands(fmu3))}
+    return lambda t: {name: 0.8 * sin((3.0 + 2.0 * n) * t + n) for n, name in enumerate(fmu3.commands)}
 
 
 def moving(
     fmu3: fmi3.Fmu, control: Control, early: bool = False, kind: int = CO_SIMULATION, **start: float
 ) -> Instance:
     """In Step Mode, commanded in intermediate update."""
-    rov = fmu3.instance(kind, intermediate=[*commands(fmu3), *fmu3.outputs], early=early)
+    rov = fmu3.instance(kind, intermediate=[*fmu3.commands, *fmu3.outputs], early=early)
     assert rov.set(MOVING | start) == OK
     rov.reach(STEP)
     rov.on_update = lambda rov, update: _command(rov, control(update.time))
@@ -121,7 +117,7 @@ def test_inputs_set_inside_are_held_from_then_on_and_outputs_are_those_of_that_t
 
 
 def test_what_is_not_set_again_stays(fmu3: fmi3.Fmu) -> None:
-    command = commands(fmu3)[0]
+    command = fmu3.commands[0]
     with moving(fmu3, lambda t: {command: 0.5} if t > 0.00549 else {}) as rov:
         assert rov.step(0.0, 0.01) == OK
         rov.on_update = None
@@ -142,7 +138,7 @@ def test_nothing_but_inputs_can_be_set_inside(fmu3: fmi3.Fmu) -> None:
     def act(rov: Instance, update: Update) -> None:
         for name in ("beta_u", "m_rov", "u", "F_0_w", "time"):
             if name in fmu3.vr:
-                assert rov.set({commands(fmu3)[0]: 1.0, name: 0.5}) == ERROR
+                assert rov.set({fmu3.commands[0]: 1.0, name: 0.5}) == ERROR
         assert rov.step(update.time, 0.1) == ERROR  # nor is there a step in a step
         assert all(m.status == ERROR for m in rov.log)
         _command(rov, control(update.time))

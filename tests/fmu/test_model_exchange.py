@@ -128,7 +128,7 @@ def test_nominals_are_those_of_the_description(fmu: Fmu) -> None:
     with fmu.instance(MODEL_EXCHANGE) as rov:
         rov.reach(INITIALIZATION)
         rov.expect("GetNominalsOfContinuousStates", nominals, n)
-    assert list(nominals) == [fmu.nominal(name) for name in fmu.states]
+    assert list(nominals) == [fmu.number(name, "nominal") for name in fmu.states]
     assert min(nominals) > 0.0
 
 

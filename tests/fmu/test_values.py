@@ -65,7 +65,7 @@ def test_a_parameter_takes_its_bounds_and_nothing_beyond(fmu: Fmu) -> None:
     with fmu.instance() as rov:
         rov.reach(INITIALIZATION)
         for name in fmu.parameters:
-            low, high = float(fmu.variables[name].min), float(fmu.variables[name].max)
+            low, high = fmu.bounds(name)
             for value in (nextafter(low, -inf), nextafter(high, inf), low - 1e300, 1e308):
                 assert_discarded(rov, name, value)
             for value in (low, high):
@@ -191,3 +191,17 @@ def test_log_categories_are_switched_on_and_off(fmu: Fmu) -> None:
         rov.expect("Reset")  # what instantiation was given holds again
         assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
         assert {c.name for c in fmu.description.logCategories} >= {"logStatusError", "logStatusDiscard", "logEvents"}
+
+
+def test_the_category_of_all_messages_switches_every_category(fmu: Fmu) -> None:
+    """FMUSDK switches logAll on right after instantiation, and gives up unless that is OK."""
+    assert "logAll" in {c.name for c in fmu.description.logCategories}
+    with fmu.instance(logging=False) as rov:
+        rov.expect("SetDebugLogging", True, 1, strings(b"logAll"))
+        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
+        rov.expect("SetDebugLogging", False, 1, strings(b"logAll"))
+        assert refused(rov) == []
+        rov.expect("SetDebugLogging", True, 2, strings(b"logStatusError", b"logEvents"))
+        assert refused(rov) == ["logEvents", "logStatusError"]
+        rov.expect("SetDebugLogging", True, 2, strings(b"logEvents", b"logAll"))
+        assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]

@@ -69,7 +69,7 @@ static result set_inputs(session *s, void *c)
     unsigned vr[FIRST_STATE];
     double values[FIRST_STATE];
     for (unsigned i = 0; i < FIRST_STATE; i++) {
-        vr[i] = i;
+        vr[i] = FIRST_REFERENCE + i;
         values[i] = draw_between(s, -1.1, 1.1);
     }
     return FMI(SetReal)(c, vr, FIRST_STATE, values AND(FIRST_STATE));
@@ -90,15 +90,15 @@ static void update_step(fmi3InstanceEnvironment environment, double time, bool m
     *early = may_return && draw(s, 20) == 0;
     *end = time;
     if (may_set && may_get && finished && draw(s, 4) == 0) {
-        set_inputs(s, s->of[CO_SIMULATION].instance);
+        set_inputs(s, s->of[TYPE_CO_SIMULATION].instance);
     }
 }
 
 static void instantiate_of(session *s, int kind, const char *name)
 {
     const bool tells = draw(s, 2) == 0, updates = draw(s, 2) == 0;
-    s->of[kind].longest = kind == CO_SIMULATION && updates ? 2e-3 : 2.0;
-    s->of[kind].instance = kind == MODEL_EXCHANGE
+    s->of[kind].longest = kind == TYPE_CO_SIMULATION && updates ? 2e-3 : 2.0;
+    s->of[kind].instance = kind == TYPE_MODEL_EXCHANGE
                                ? fmi3InstantiateModelExchange(name, MODEL_TOKEN, NULL, false, tells, s, logger)
                                : fmi3InstantiateCoSimulation(name, MODEL_TOKEN, NULL, false, tells, draw(s, 2) == 0, updates,
                                                              NULL, 0, s, logger, update_step);
@@ -113,7 +113,7 @@ static result begin_at(session *s, int kind, double time)
     worst |= fmi3ExitInitializationMode(c);
     if (((fmu *)c)->now.mode == EVENT) {
         worst |= fmi3UpdateDiscreteStates(c, &flags[0], &flags[1], &flags[2], &flags[3], &flags[4], &next);
-        worst |= (kind == MODEL_EXCHANGE ? fmi3EnterContinuousTimeMode(c) : fmi3EnterStepMode(c));
+        worst |= (kind == TYPE_MODEL_EXCHANGE ? fmi3EnterContinuousTimeMode(c) : fmi3EnterStepMode(c));
     }
     return worst;
 }
@@ -148,7 +148,7 @@ static result begin_at(session *s, int kind, double time)
     result worst = fmi2SetupExperiment(c, fmi2False, 0.0, time, fmi2False, 0.0);
     worst |= fmi2EnterInitializationMode(c);
     worst |= fmi2ExitInitializationMode(c);
-    if (kind == MODEL_EXCHANGE) {
+    if (kind == TYPE_MODEL_EXCHANGE) {
         worst |= fmi2NewDiscreteStates(c, &info);
         worst |= fmi2EnterContinuousTimeMode(c);
     }
@@ -180,7 +180,7 @@ static result begin(session *s, int kind)
 static result set_any(session *s, void *c)
 {
     static const double strange[] = {0.0, -0.0, NAN, INFINITY, 1e308, 5e-324};
-    const unsigned vr = draw(s, N_VARIABLES + 1);
+    const unsigned vr = FIRST_REFERENCE + draw(s, N_VARIABLES + 1);
     const bool plain = draw(s, 4) != 0;
     const double value = plain ? draw_between(s, -2.0, 2.0) : strange[draw(s, sizeof strange / sizeof strange[0])];
     return FMI(SetReal)(c, &vr, 1, &value AND(1));
@@ -190,7 +190,7 @@ static result take_step(session *s, int kind)
 {
     void *const c = s->of[kind].instance;
     const double h = draw_between(s, 1e-3, s->of[kind].longest);
-    if (kind == CO_SIMULATION || draw(s, 20) == 0) {
+    if (kind == TYPE_CO_SIMULATION || draw(s, 20) == 0) {
         return do_step(s, kind, h);
     }
     double x[N_STATES], rate[N_STATES]; /* explicit Euler */
@@ -221,11 +221,11 @@ static result serialize_again(session *s, int kind)
 
 static result get_partial(session *s, void *c)
 {
-    const unsigned known = draw(s, FIRST_CALCULATED + 1);
+    const unsigned known = FIRST_REFERENCE + draw(s, FIRST_CALCULATED + 1);
     unsigned unknown[N_STATES];
     double seed = 1.0, change[N_STATES] = {0.0};
     for (unsigned i = 0; i < N_STATES; i++) {
-        unknown[i] = FIRST_CALCULATED + i;
+        unknown[i] = FIRST_REFERENCE + FIRST_CALCULATED + i;
     }
     const result status = FMI(GetDirectionalDerivative)(c, unknown, N_STATES, &known, 1, &seed AND(1), change AND(N_STATES));
     see(s, change, sizeof change);
@@ -280,7 +280,7 @@ static void drive(session *s)
         double values[N_VARIABLES] = {0.0};
         unsigned all[N_VARIABLES];
         for (unsigned j = 0; j < N_VARIABLES; j++) {
-            all[j] = j;
+            all[j] = FIRST_REFERENCE + j;
         }
         FMI(GetReal)(s->of[kind].instance, all, N_VARIABLES, values AND(N_VARIABLES));
         see(s, &status, sizeof status);

@@ -1,4 +1,4 @@
-/* A step of the C without FMI, for Python: all variables by value reference. */
+/* A step of the C without FMI, for Python: all variables by place. */
 #include "riccati.c"
 #include "rov.c"
 #include "track.c"
