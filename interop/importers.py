@@ -117,7 +117,8 @@ _CARGO = "runners/fmu_runner/Cargo.toml"
 _FMI_SIM = "rust/fmi-sim-{version}/bin/fmi-sim"
 
 # Not among them: FMI++ (fmipp 2.1.0) and mosaik-fmi 1.1.0, which is built on it, come without binaries for Linux and
-# compile with SUNDIALS 3 only; OMSimulator's package fetches its binaries from another host as it is installed.
+# compile with SUNDIALS 3 only; OMSimulator's package (3.0.0.post198) fetches its binaries from another host as it is
+# installed, so tests/export/test_versions.py checks its rule for value references.
 # Jaxonomy's Model Exchange agrees to 4e-6, but takes minutes.
 IMPORTERS = (
     *_both(_python("fmpy-cs", "FMPy", "CS, state restored", "fmpy"),
@@ -134,6 +135,7 @@ IMPORTERS = (
            _python("pathsim-me", "PathSim", "ME, RKDP87", "pathsim-fmi", SOLVER)),
     _python("jaxonomy", "Jaxonomy", "CS", "jaxonomy"),
     _python("cofmupy", "CoFmuPy", "CS", "cofmupy", requirements="requirements-cofmupy.txt"),
+    *_both(_python("fmuloader", "fmuloader", "CS, state restored", "fmuloader")),
     _python("fmugym", "FMUGym", "CS, single precision", "fmugym", SINGLE),
     *_both(_python("fmucontainer", "fmutool", "CS, container of two ROVs", "fmu-manipulation-toolbox"),
            replace(_python("fmutool", "fmutool", "-check: schema, rules", "fmu-manipulation-toolbox", None),

@@ -11,7 +11,7 @@ from uuid import UUID
 
 from rov_fmu.export.compile import C_SOURCES, UNITY_FILE, fmi_headers
 from rov_fmu.export.interface import interface_header, model_header, variables
-from rov_fmu.export.model_description import NATIVE, PYTHON, build_description, model_description
+from rov_fmu.export.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
 from rov_fmu.export.python_flavour import python_files, python_sources
 from rov_fmu.export.terminals import FOLDER, ICON, terminals_and_icons
 from rov_fmu.files.places import LICENSE
@@ -64,7 +64,7 @@ def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     """The FMU in pure Python, for Co-Simulation."""
     declared = variables(vehicle.rov)
     sources = python_sources(vehicle, declared)
-    describe = partial(model_description, vehicle, declared, interfaces=PYTHON)
+    describe = partial(model_description, vehicle, declared, interfaces=PYTHON, note=PYTHON_NOTE)
     guid = _guid(describe(guid=""), sources)
     files = python_files(vehicle, sources)
     return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})

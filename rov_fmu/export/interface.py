@@ -76,7 +76,7 @@ class Variable:
         return self.value_reference + 1
 
     def reference(self, fmi: int) -> int:
-        """Value reference in a version of FMI. In FMI 3.0 it is the index, because OMSimulator takes one for the other."""
+        """Value reference in a version of FMI: in FMI 3.0 the index, because OMSimulator takes one for the other."""
         return self.value_reference if fmi == 2 else self.index
 
     @property

@@ -58,6 +58,11 @@ NATIVE = {
 }
 """By version of FMI."""
 PYTHON = {"CoSimulation": {"needsExecutionTool": "true", **_CO_SIMULATION}}
+PYTHON_NOTE = (
+    "Needs a Python on this machine. On Linux an importer that is not itself a Python process must be started with "
+    "LD_PRELOAD=/path/to/libpython3.x.so, or it cannot load the library (undefined symbol: _Py_NoneStruct)."
+)
+"""What the description of the Python flavour says beside what the vehicle is."""
 
 _EXPERIMENT = {"startTime": 0.0, "stopTime": 10.0, "tolerance": 1e-6, "stepSize": 0.01}
 
@@ -70,13 +75,17 @@ def model_description(
     interfaces: Mapping[str, Mapping[str, str]],
     source_files: tuple[str, ...] = (),
     fmi: int = 2,
+    note: str = "",
 ) -> bytes:
-    """The XML document of a version of FMI, UTF-8, indented, the same bytes for the same arguments."""
+    """The XML document of a version of FMI, UTF-8, indented, the same bytes for the same arguments.
+
+    The description of the model is that of the vehicle, and then the note.
+    """
     head = {
         "fmiVersion": f"{fmi}.0",
         "modelName": vehicle.identifier,
         "guid" if fmi == 2 else "instantiationToken": guid,
-        "description": vehicle.description,
+        "description": f"{vehicle.description}. {note}" if note else vehicle.description,
         "author": vehicle.source,
         "version": vehicle.version,
         "license": "MIT, see documentation/licenses/license.txt",
@@ -109,8 +118,8 @@ def build_description(identifier: str) -> bytes:
     return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
 
 
-# In FMI 3.0 a variable has its unit, nominal value and bounds from its declared type and has none of its own. FMI Library
-# loses the unit of a variable that has bounds of its own beside a type, and fmi-sim refuses a unit on a variable.
+# In FMI 3.0 a variable has its unit, nominal value and bounds from its declared type and has none of its own. FMI
+# Library loses the unit of a variable that has bounds of its own beside a type; fmi-sim refuses a unit on a variable.
 
 
 def _type(variable: Variable) -> dict[str, str | float | None]:

@@ -261,7 +261,7 @@ def test_names_are_unique() -> None:
 
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
 def test_importer_is_pinned_and_its_runner_is_there(importer: Importer) -> None:
-    assert re.fullmatch(r"\d+(\.\d+)+", importer.version)
+    assert re.fullmatch(r"\d+(\.\d+)+(rc\d+)?", importer.version)
     for part in importer.command_line(TOOLS):
         if part.startswith("interop."):
             assert Path(*part.split(".")).with_suffix(".py").is_file()
@@ -273,7 +273,7 @@ def test_importer_is_pinned_and_its_runner_is_there(importer: Importer) -> None:
 def test_every_requirement_is_pinned(file: Path) -> None:
     lines = [line for line in file.read_text().splitlines() if not line.startswith("#")]
     assert lines
-    assert all(re.fullmatch(r"[\w-]+==[\d.]+( +#.*)?", line) for line in lines)
+    assert all(re.fullmatch(r"[\w-]+==[\d.]+(rc\d+)?( +#.*)?", line) for line in lines)
     with pytest.raises(LookupError):
         pinned("requirements.txt", "fmp")
 

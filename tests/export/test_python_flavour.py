@@ -1,6 +1,8 @@
 """The FMU in pure Python: valid, and the same as the native one."""
 
+import os
 import random
+import sysconfig
 import zipfile
 from pathlib import Path
 
@@ -10,6 +12,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
+from checks.c_programs import Ended, compile_c, run_program
 from checks.fmpy_slave import fmpy_slave, keep_loaded
 from rov_fmu.cli import main
 from rov_fmu.export.interface import Variable, variables
@@ -176,3 +179,43 @@ def test_what_the_native_one_refuses_is_refused(python_dir: Path, vehicle: Vehic
         slave.setReal(reference, [value])
         assert slave.getReal(reference) == [by_name[name].start]
     slave.freeInstance()
+
+
+@pytest.fixture
+def importer(tmp_path: Path) -> Path:
+    """An importer that is no Python process."""
+    if fmpy.platform != "linux64":
+        pytest.skip(
+            "PythonFMU has a binary for Linux on x86-64; that of Windows is not preloaded but finds python3.dll"
+        )
+    return compile_c(Path(__file__).with_name("c_importer.c"), tmp_path / "c_importer", tmp_path, "-ldl")
+
+
+def _imported(importer: Path, folder: Path, **environment: str) -> Ended:
+    description = fmpy.read_model_description(str(folder))
+    library = folder / "binaries" / "linux64" / "videoray.so"
+    resources = (folder / "resources").as_uri()
+    return run_program(importer, library, description.guid, resources, env=os.environ | environment)
+
+
+def test_an_importer_that_is_no_python_process_preloads_libpython(
+    importer: Path, python_dir: Path, videoray_dir: Path
+) -> None:
+    """As docs/platforms.md says, and as the FMU's own description and page do."""
+    alone = _imported(importer, python_dir)
+    assert (alone.code, alone.lines) == (1, [])
+    assert "undefined symbol: _Py_NoneStruct" in alone.errors
+    libpython = Path(sysconfig.get_config_var("LIBDIR"), sysconfig.get_config_var("INSTSONAME"))
+    if not sysconfig.get_config_var("Py_ENABLE_SHARED") or not libpython.exists():
+        pytest.skip(f"this Python has no shared library: {libpython}")
+    preloaded, native = _imported(importer, python_dir, LD_PRELOAD=str(libpython)), _imported(importer, videoray_dir)
+    assert preloaded.code == native.code == 0, preloaded.errors + native.errors
+    ((u,),), ((expected,),) = preloaded.lines, native.lines
+    assert float(u) == pytest.approx(float(expected), rel=1e-12)
+
+
+def test_it_says_that_an_importer_in_another_language_preloads_libpython(python_dir: Path, videoray_dir: Path) -> None:
+    for folder, told in ((python_dir, True), (videoray_dir, False)):
+        description = fmpy.read_model_description(str(folder)).description
+        page = (folder / "documentation" / "index.html").read_text(encoding="utf-8")
+        assert ("LD_PRELOAD" in description) == ("LD_PRELOAD" in page) == told
