@@ -61,7 +61,7 @@ PLANTED = {
     "a refused value stays": (
         "instance.c",
         "        if (!isfinite(value[i])) {",
-        "        f->now.values[vr[i]] = isfinite(value[i]) ? value[i] : old;\n        if (!isfinite(value[i])) {",
+        "        f->now.values[place] = isfinite(value[i]) ? value[i] : old;\n        if (!isfinite(value[i])) {",
         "SetReal changes instance",
     ),
     "a value reference is not looked at": (
@@ -172,8 +172,8 @@ PLANTED_IN_HEAVY = {
 PLANTED_IN_FMI3 = {
     "the adjoint takes another row": (
         "fmi3_common.c",
-        "sum += seed[i] * d[unknowns[i]];",
-        "sum += seed[i] * d[unknowns[n_unknowns - 1]];",
+        "sum += seed[i] * d[place_of(unknowns[i])];",
+        "sum += seed[i] * d[place_of(unknowns[n_unknowns - 1])];",
         "adjoint .*, directional",
     ),
     "the number of values is not looked at": (
