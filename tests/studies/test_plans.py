@@ -88,7 +88,7 @@ WRONG = {
         "figures.end = 'out[0]': out gives a variable by its name: write out[\"der(u)\"]",
     HEAD + VARY + '[figures]\nend = "final(out[\\"q\\"])"\n':
         "figures.end = 'final(out[\"q\"])': 'q' is neither a function nor a variable",
-    HEAD + VARY + '[figures]\nend = "mex(u)"\n': "figures.end = 'mex(u)': 'mex' is neither a function nor a variable of",
+    HEAD + VARY + '[figures]\nend = "mex(u)"\n': "figures.end = 'mex(u)': 'mex' is neither a function nor a variable",
     HEAD + VARY + '[figures]\n" " = "u[-1]"\n': "figures.  = ' ': must have a name that is not blank",
     HEAD + VARY + '[figures]\nalpha_u = "u[-1]"\n': "figures.alpha_u: the results have another column of this name",
 }  # fmt: skip
