@@ -14,7 +14,7 @@ from typing_extensions import Self
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.toml_file import Strict, beside, line, pair, read_checked
 from rov_fmu.studies.figures import read_expression
-from rov_fmu.vehicle.quantity import Finite
+from rov_fmu.vehicle.quantity import Finite, not_blank
 
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
@@ -219,12 +219,6 @@ def _file(name: str, info: ValidationInfo) -> str:
     return name
 
 
-def _figure_name(name: str) -> str:
-    if not name.strip():
-        raise ValueError("must have a name that is not blank")
-    return name
-
-
 def _expression(text: str) -> str:
     read_expression(text)
     return text
@@ -268,7 +262,7 @@ class Plan(Strict):
     keep: Keep | None = None
     """Which trajectories are kept."""
     figures: dict[
-        Annotated[str, AfterValidator(_figure_name)],
+        Annotated[str, AfterValidator(not_blank)],
         Annotated[str, Field(min_length=1, max_length=2000), AfterValidator(_expression)],
     ] = Field({})
     """By name: an expression over the outputs."""

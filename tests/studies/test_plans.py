@@ -89,7 +89,7 @@ WRONG = {
     HEAD + VARY + '[figures]\nend = "final(out[\\"q\\"])"\n':
         "figures.end = 'final(out[\"q\"])': 'q' is neither a function nor a variable",
     HEAD + VARY + '[figures]\nend = "mex(u)"\n': "figures.end = 'mex(u)': 'mex' is neither a function nor a variable",
-    HEAD + VARY + '[figures]\n" " = "u[-1]"\n': "figures.  = ' ': must have a name that is not blank",
+    HEAD + VARY + '[figures]\n" " = "u[-1]"\n': "figures.  = ' ': must not be blank",
     HEAD + VARY + '[figures]\nalpha_u = "u[-1]"\n': "figures.alpha_u: the results have another column of this name",
 }  # fmt: skip
 
@@ -139,7 +139,7 @@ def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path, capsys: pytest
     plan.write_text(HEAD + VARY + TAIL)
     (tmp_path / "videoray.fmu").write_bytes(b"no archive")
     assert main(["study", str(plan), "-o", str(tmp_path / "results")]) == 2
-    assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'videoray.fmu'}: is no FMU that FMPy reads: ")
+    assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'videoray.fmu'}: is no FMU, or a damaged one: ")
 
 
 @pytest.mark.parametrize(
