@@ -97,12 +97,11 @@ class Carried:
             # the times stand in a child of their own in drafts after 1.0.0-beta.1
             given = dict(element.attrib) | dict(getattr(parts.get("TransientSimulation"), "attrib", {}))
 
-            def setting(key: str, otherwise: Any, given: Mapping[str, str] = given, name: str = name) -> float:
+            def setting(key: str, fallback: float, given: Mapping[str, str] = given, name: str = name) -> float:
                 if key in given:
                     return number(given[key], f"experiment {shown(name)}: {key}", place.error)
-                if (value := getattr(default, key, None)) is None:
-                    return otherwise
-                return number(value, f"DefaultExperiment: {key}", self._description.error)
+                value: str | None = getattr(default, key, None)
+                return number(value, f"DefaultExperiment: {key}", self._description.error) if value else fallback
 
             start = setting("startTime", 0.0)
             stop = setting("stopTime", start + 1.0)

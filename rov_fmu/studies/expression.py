@@ -256,7 +256,7 @@ class _Reader:
         name = node.func.id
         function = self._functions.get(name)
         if function is None:
-            near = get_close_matches(name, self._functions, 1)
+            near = get_close_matches(name, self._functions, 1, 0.7)
             hint = f"; did you mean {near[0]}?" if near else ""
             raise ExpressionError(f"{shown(name)} is neither a function nor a variable of the FMU{hint}")
         if name == "where" and len(node.args) == 1:
