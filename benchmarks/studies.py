@@ -10,7 +10,7 @@ import numpy as np
 import psutil
 
 from rov_fmu.studies.engine import Progress
-from rov_fmu.studies.model import read_model, unpack
+from rov_fmu.studies.model import read_model
 from rov_fmu.studies.plan import load_plan
 from rov_fmu.studies.prepared import prepare
 from rov_fmu.studies.run import run_study
@@ -96,7 +96,7 @@ class Study:
         plan, model = load_plan(path), read_model(self._fmu)
         prepared = prepare(plan, path, model)
         with tempfile.TemporaryDirectory(dir=self._folder) as folder:
-            description = unpack(model.content, Path(folder))
+            description = model.unpack(Path(folder))
             simulator = Simulator(folder, description, model, prepared.job.manoeuvre)
             rows = prepared.design.rows(0, runs)
             processor, clock = time.process_time(), time.perf_counter()

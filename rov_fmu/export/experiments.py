@@ -20,6 +20,8 @@ _LOOSE = 1e-3
 """The tolerance where neither experiment nor FMU has one."""
 _STEPS = 500
 """Communication steps where nothing tells their length."""
+_MOST_STEPS = 1_000_000
+"""Communication steps of an experiment; FMPy takes minutes for so many."""
 _NOT_READ = ("String", "Binary", "Clock")
 """Types of variables that no column of numbers holds."""
 
@@ -64,6 +66,7 @@ class Carried:
 
     def __init__(self, fmu: Path) -> None:
         self._manifest = _Place(fmu, MANIFEST)
+        self._description = _Place(fmu, "modelDescription.xml")
         try:
             self._archive = zipfile.ZipFile(fmu)
         except zipfile.BadZipFile as error:
@@ -94,10 +97,11 @@ class Carried:
             # the times stand in a child of their own in drafts after 1.0.0-beta.1
             given = dict(element.attrib) | dict(getattr(parts.get("TransientSimulation"), "attrib", {}))
 
-            def setting(key: str, otherwise: Any, given: Mapping[str, str] = given, name: str = name) -> float:
+            def setting(key: str, fallback: float, given: Mapping[str, str] = given, name: str = name) -> float:
                 if key in given:
                     return number(given[key], f"experiment {shown(name)}: {key}", place.error)
-                return otherwise if (value := getattr(default, key, None)) is None else float(value)
+                value: str | None = getattr(default, key, None)
+                return number(value, f"DefaultExperiment: {key}", self._description.error) if value else fallback
 
             start = setting("startTime", 0.0)
             stop = setting("stopTime", start + 1.0)
@@ -105,6 +109,10 @@ class Carried:
             tolerance = setting("tolerance", _LOOSE)
             if not (stop > start and step > 0.0 and tolerance > 0.0):
                 raise place.error(f"experiment {shown(name)}: must go on from its start, in steps, with a tolerance")
+            steps = (stop - start) / step
+            if not steps <= _MOST_STEPS:
+                told = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
+                raise place.error(f"experiment {shown(name)}: {told}; at most {_MOST_STEPS} are run")
             files = {part: place.beside(parts[part].get("source"))
                      for part in ("Parameters", "Stimuli", "References") if part in parts}  # fmt: skip
             parameters = self._parameters(files["Parameters"], variables) if "Parameters" in files else {}

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.export.experiments import Carried, Experiment
+from rov_fmu.export.unpacking import unpack_fmu
 from rov_fmu.files.messages import FileError, ProofError, brief, one_line
 from rov_fmu.files.series import Series
 
@@ -66,12 +67,8 @@ def prove(
 
     carried = Carried(fmu)
     with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
-        try:
-            fmpy.extract(str(fmu), unzipdir=folder)
-            description = fmpy.read_model_description(folder, validate=False)
-            platforms = fmpy.supported_platforms(folder)
-        except Exception as error:  # what FMPy raises
-            raise FileError(f"{fmu}: is no FMU that FMPy reads: {brief(str(error))}") from error
+        description = unpack_fmu(fmu, fmu, Path(folder))
+        platforms = fmpy.supported_platforms(folder)
         experiments = carried.experiments(description)
         if fmpy.platform not in platforms:
             raise FileError(

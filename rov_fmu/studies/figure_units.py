@@ -3,11 +3,11 @@
 import ast
 from collections.abc import Mapping
 
-from rov_fmu.studies.figures import BY_NAME, TIME
+from rov_fmu.studies.expression import BY_NAME, TIME
 
 _OWN = {"Tau": "s", "settling_time": "s", "overshoot": "1"}
 """Units that functions bring."""
-_SAME = ("V_ss", "at", "final", "abs", "max", "min", "mean", "median", "std", "ptp", "sum", "quantile", "percentile")
+_SAME = ("V_ss", "at", "final", "abs", "max", "min", "mean", "median", "std", "ptp", "sum", "percentile")
 """Functions whose value has the unit of what they are given first."""
 
 

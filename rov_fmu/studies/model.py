@@ -3,11 +3,13 @@
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from math import inf
 from pathlib import Path
 from typing import Any
 
-from rov_fmu.files.messages import FileError, brief, shown
+from rov_fmu.export.unpacking import unpack_fmu
+from rov_fmu.files.messages import FileError, shown
 from rov_fmu.files.reading import read_bytes
 
 TYPES = {
@@ -79,16 +81,16 @@ class Model:
     variables: Mapping[str, Variable]
     """By name."""
 
+    def unpack(self, folder: Path) -> Any:
+        """Put the FMU's files into a folder; FMPy's description of it. Raises FileError."""
+        return unpack_fmu(BytesIO(self.content), Path(self.name), folder)
+
 
 def read_model(path: Path) -> Model:
-    """Read an FMU. Raises FileError where it is none for Co-Simulation of FMI 2.0 or 3.0."""
-    import fmpy
-
+    """Read an FMU. Raises FileError if it cannot be unpacked, or is not for Co-Simulation of FMI 2.0 or 3.0."""
     content = read_bytes(path)
-    try:
-        description = fmpy.read_model_description(str(path), validate=False)
-    except Exception as error:  # what FMPy raises
-        raise FileError(f"{path}: is no FMU that FMPy reads: {brief(str(error))}") from error
+    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+        description = unpack_fmu(BytesIO(content), path, Path(folder))
     version = {"2": 2, "3": 3}.get(description.fmiVersion[:1])
     if version is None:
         raise FileError(f"{path}: is of FMI {description.fmiVersion}, and not of 2.0 or 3.0")
@@ -99,17 +101,6 @@ def read_model(path: Path) -> Model:
     }
     once = description.coSimulation.canBeInstantiatedOnlyOncePerProcess
     return Model(path.name, content, version, bool(once), variables)
-
-
-def unpack(content: bytes, folder: Path) -> Any:
-    """Put an FMU's files into a folder; FMPy's description of it."""
-    import fmpy
-
-    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as packed:
-        archive = Path(packed, "study.fmu")
-        archive.write_bytes(content)
-        fmpy.extract(str(archive), unzipdir=str(folder))
-    return fmpy.read_model_description(str(folder), validate=False)
 
 
 def unsettable(name: str, has: Mapping[str, Variable]) -> str:

@@ -13,7 +13,8 @@ from typing_extensions import Self
 
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.toml_file import Strict, beside, line, pair, read_checked
-from rov_fmu.vehicle.quantity import Finite
+from rov_fmu.studies.figures import read_expression
+from rov_fmu.vehicle.quantity import Finite, not_blank
 
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
@@ -218,6 +219,11 @@ def _file(name: str, info: ValidationInfo) -> str:
     return name
 
 
+def _expression(text: str) -> str:
+    read_expression(text)
+    return text
+
+
 class Plan(Strict):
     """A study: many runs of one FMU."""
 
@@ -255,7 +261,10 @@ class Plan(Strict):
     """Inputs from a CSV file."""
     keep: Keep | None = None
     """Which trajectories are kept."""
-    figures: dict[str, Annotated[str, Field(min_length=1, max_length=2000)]] = Field({})
+    figures: dict[
+        Annotated[str, AfterValidator(not_blank)],
+        Annotated[str, Field(min_length=1, max_length=2000), AfterValidator(_expression)],
+    ] = Field({})
     """By name: an expression over the outputs."""
 
     @property

@@ -14,7 +14,9 @@ from rov_fmu.files.reading import read_text
 from rov_fmu.files.series import series
 from rov_fmu.files.toml_file import line
 from rov_fmu.studies.estimates import Estimates
-from rov_fmu.studies.figures import known_names, names_in, taken_of, unusable
+from rov_fmu.studies.expression import CONSTANTS
+from rov_fmu.studies.expression import TIME as TIMES
+from rov_fmu.studies.figures import meaning, read_expression, unusable
 from rov_fmu.studies.model import Model, Variable, unknown, unsettable
 from rov_fmu.studies.plan import Plan, PlanError, Signal, Varied, nonsense
 from rov_fmu.studies.sampling import Design
@@ -61,7 +63,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     signals = {**plan.inputs, **from_file}
     inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in signals.items()}
     kept = plan.keep.outputs if plan.keep else ()
-    named = {name for text in plan.figures.values() for name in names_in(text)} & model.variables.keys()
+    named = {name for text in plan.figures.values() for name in read_expression(text).names} & model.variables.keys()
     recorded = [*dict.fromkeys([*kept, *sorted(named - {*design.names})])]
     manoeuvre = Manoeuvre(
         plan.start_time, plan.step, plan.steps, plan.tolerance, plan.set, design.names, inputs, recorded
@@ -207,23 +209,16 @@ def _between(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, s
 
 
 def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], times: Array) -> Iterator[str]:
-    known = known_names()
     for name, text in plan.figures.items():
         if name in {RUN, STATUS, REASON} | varied:
             yield line(f"figures.{name}", "the results have another column of this name")
             continue
-        try:
-            strange = sorted(names_in(text) - known - has.keys())
-        except ValueError as error:
-            yield line(f"figures.{name}", str(error), text)
-            continue
-        if strange:
+        names = read_expression(text).names
+        if strange := sorted(names - CONSTANTS.keys() - {TIMES} - has.keys()):
             told = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
-            if (function := taken_of(strange[0], text)) in known:
-                told += f": write {function}"
-            yield line(f"figures.{name}", told, text)
+            yield line(f"figures.{name}", meaning(strange[0]) or told, text)
         elif reason := unusable(text, has, varied, times):
-            if reason.startswith("TypeError") and (numbers := names_in(text) & varied):
+            if reason.startswith("TypeError") and (numbers := names & varied):
                 reason += f"; {min(numbers)} varies, and what varies is a number"
             yield line(f"figures.{name}", reason, text)
     if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):

@@ -24,7 +24,7 @@ from distributed.diagnostics.plugin import WorkerPlugin
 
 from rov_fmu.studies.apart import Apart
 from rov_fmu.studies.figures import Figures
-from rov_fmu.studies.model import Model, unpack
+from rov_fmu.studies.model import Model
 from rov_fmu.studies.simulator import Manoeuvre, RunError, Simulator
 
 Array = npt.NDArray[np.float64]
@@ -88,7 +88,7 @@ class Shop:
     def __init__(self, job: Job, folder: Path, is_watched: bool) -> None:
         self.job = job
         self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=folder))
-        self._description = unpack(job.model.content, self._folder)
+        self._description = job.model.unpack(self._folder)
         self._idle: dict[bool, list[tuple[Simulator | Apart, Figures]]] = {False: [], True: []}
         self._one_only = Lock() if job.model.once_per_process else None
         self._is_watched = is_watched

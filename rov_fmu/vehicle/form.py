@@ -12,10 +12,15 @@ from rov_fmu.files.output import is_same
 from rov_fmu.files.toml_file import Strict, beside, pair
 from rov_fmu.vehicle.quantity import Name, Text
 
+_RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)
+"""Names of devices in Windows, which no file can have there, whatever its extension."""
+
 
 def _identifier(text: str) -> str:
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,99}", text):
         raise ValueError("must be a C identifier: at most 100 letters, digits and underscores, no digit first")
+    if _RESERVED.fullmatch(text):
+        raise ValueError("must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0 ... COM9, LPT0 ... LPT9")
     return text
 
 
@@ -25,7 +30,7 @@ class Head(Strict):
     name: Name
     """For people; at most 100 characters."""
     identifier: Annotated[str, AfterValidator(_identifier)]
-    """A C identifier: modelIdentifier and modelName of the FMU, and its file name."""
+    """A C identifier that Windows does not reserve: modelIdentifier and modelName of the FMU, and its file name."""
     version: Name
     """Of the vehicle; goes into the FMU."""
     description: Text

@@ -15,8 +15,18 @@ def _printable(text: str) -> str:
     return text
 
 
-Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_printable)]
-Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"), AfterValidator(_printable)]
+def not_blank(text: str) -> str:
+    """The text, if there is something to read in it."""
+    if not text.strip():
+        raise ValueError("must not be blank")
+    return text
+
+
+Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_printable), AfterValidator(not_blank)]
+Name = Annotated[
+    str, Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"), AfterValidator(_printable),
+    AfterValidator(not_blank),
+]  # fmt: skip
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 

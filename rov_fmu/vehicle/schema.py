@@ -10,7 +10,7 @@ from rov_fmu.files.toml_file import DOCUMENTED, Strict, pair, table_of
 from rov_fmu.motion import layout
 from rov_fmu.motion.layout import ARM, AXES, AXIS, BODY, CURVE, TUNING, Axis, Kind, Layout, Meta, VehicleAxis
 from rov_fmu.vehicle.form import FileHead, Made, Validity
-from rov_fmu.vehicle.quantity import Finite, Name, Quantity, Symbol, Text, quantity
+from rov_fmu.vehicle.quantity import Finite, Name, Quantity, Symbol, Text, not_blank, quantity
 
 FORMAT = 2
 UNTUNED = 1.0
@@ -278,7 +278,7 @@ class OpenHardware(Hardware):
 class Parts(Hardware, _Opening):
     """A vehicle file as far as it could be read."""
 
-    alternatives: dict[str, Alternative] = Field(default={})
+    alternatives: dict[Annotated[str, AfterValidator(not_blank)], Alternative] = Field(default={})
     """Coefficients published beside the ones used, under a name each."""
     estimates: dict[str, Estimated] = Field(default={})
     """Coefficients that tests tell, by their names in the FMU: how far they hang together. Each has an `interval`."""

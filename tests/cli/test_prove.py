@@ -317,7 +317,15 @@ BAD: dict[str, tuple[Files, str]] = {
         {"k.ssv": '<ParameterSet><Parameter name="k"><Real value="1" unit="N"/></Parameter></ParameterSet>'},
         f"{FOLDER}/k.ssv: parameter 'k': is in N, and not in None",
     ),
-    "no description": ({"modelDescription.xml/": "", "modelDescription.xml": None}, "is no FMU that FMPy reads: "),
+    "a file that is a folder, too": ({"modelDescription.xml/": ""}, "cannot be unpacked: File exists: modelDescript"),
+    "steps without end": (
+        {_EXP: _exp('stopTime="10" stepSize="1e-9">')},
+        f"{_EXP}: experiment 'a': stepSize = 1e-09 s takes 1e+10 steps from 0 to 10 s; at most 1000000 are run\n",
+    ),
+    "a time without end": (
+        {_EXP: _exp('startTime="-1e308" stopTime="1e308" stepSize="1">')},
+        f"{_EXP}: experiment 'a': stepSize = 1 s takes inf steps from -1e+308 to 1e+308 s; at most 1000000 are run\n",
+    ),
 }  # fmt: skip
 
 
@@ -332,6 +340,26 @@ def test_bad_input_is_one_line_that_names_the_file(case: str, foreign: Path, tmp
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("step", "told"),
+    {
+        "1e-9": f"{_EXP}: experiment 'a': stepSize = 1e-09 s takes 1e+10 steps from 0 to 10 s; at most 1000000 are run",
+        "soon": "modelDescription.xml: DefaultExperiment: stepSize = 'soon': must be a number",
+    }.items(),
+)
+def test_a_default_experiment_is_checked_as_the_others(
+    step: str, told: str, foreign: Path, tmp_path: Path, capsys: Capsys
+) -> None:
+    experiment = '<Experiments name="x"><Experiment name="a"/></Experiments>'
+    fmu = _with(foreign, {_EXP: experiment}, tmp_path / "experiment.fmu")
+    default = f'<DefaultExperiment stopTime="10" stepSize="{step}"/><ModelVariables>'.encode()
+    other = _changed(
+        fmu, "modelDescription.xml", lambda old: old.replace(b"<ModelVariables>", default), tmp_path / "other.fmu"
+    )
+    assert main(["prove", str(other)]) == 2
+    assert capsys.readouterr().err == f"rov-fmu: {other}: {told}\n"
+
+
 def _cut(fmu: Path, path: Path) -> None:
     path.write_bytes(fmu.read_bytes()[:-100])
 
@@ -344,7 +372,7 @@ def _flipped(fmu: Path, path: Path) -> None:
 
 DAMAGE: dict[str, tuple[Callable[[Path, Path], None], str]] = {
     "cut off": (_cut, "is no FMU, or a damaged one: "),
-    "a byte changed": (_flipped, f"is no FMU that FMPy reads: Bad CRC-32 for file '{MANIFEST}'"),
+    "a byte changed": (_flipped, f"is no FMU, or a damaged one: Bad CRC-32 for file '{MANIFEST}'"),
     "not there": (lambda _, __: None, "No such file or directory"),
     "a folder": (lambda _, path: path.mkdir(), "Is a directory"),
 }

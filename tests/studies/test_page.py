@@ -183,7 +183,7 @@ step = 0.5
 sampler = "grid"
 vary.a.range = {{ from = 3.0, to = 9.0, count = 7 }}
 vary.u.values = [0.0, 1.0]
-figures.odd = "t[int(a)]"
+figures.odd = "t[a]"
 figures.end = "t[-1]"
 """)
     results = tmp_path / "results"

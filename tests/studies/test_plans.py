@@ -71,7 +71,7 @@ WRONG = {
     HEAD + VARY + '[figures]\nend = "u[-1"\n': "figures.end = 'u[-1': is no expression: '[' was never closed",
     HEAD + VARY + '[figures]\nend = "q[-1]"\n': "figures.end = 'q[-1]': 'q' is neither a function nor a variable",
     HEAD + VARY + '[figures]\nend = "np.max(u)"\n':
-        "figures.end = 'np.max(u)': 'np' is neither a function nor a variable of the FMU that is a number: write max",
+        "figures.end = 'np.max(u)': np.max is an attribute, which is not allowed: write max(...)",
     HEAD + VARY + '[figures]\nend = "V_ss(u, 0, 100)"\n':
         "figures.end = 'V_ss(u, 0, 100)': there is no time 100 s in a run from 0 to 1 s",
     HEAD + "[vary]\nx.uniform = [0.0, 1.0]\n" + '[figures]\nend = "final(x)"\n':
@@ -80,9 +80,16 @@ WRONG = {
     HEAD + VARY + '[figures]\nend = "sum(loadtxt(1))"\n': "figures.end = 'sum(loadtxt(1))': 'loadtxt' is neither",
     HEAD + VARY + '[figures]\nend = "u"\n': "figures.end = 'u': must be one number, and not array(",
     HEAD + VARY + '[figures]\nend = "V_ss()"\n':
-        "figures.end = 'V_ss()': TypeError: V_ss() missing 1 required positional argument: 'y'",
+        "figures.end = 'V_ss()': V_ss takes 1 to 3 values (y, start, end), each once, and not 0",
     HEAD + VARY + '[figures]\nend = "(lambda: 1)()"\n':
-        "figures.end = '(lambda: 1)()': NotImplementedError: ",
+        "figures.end = '(lambda: 1)()': lambda: 1 is not allowed; an expression has numbers, variables, operators, ind",
+    HEAD + VARY + '[figures]\nend = "max"\n': "figures.end = 'max': max is a function: write max(...)",
+    HEAD + VARY + '[figures]\nend = "out[0]"\n':
+        "figures.end = 'out[0]': out gives a variable by its name: write out[\"der(u)\"]",
+    HEAD + VARY + '[figures]\nend = "final(out[\\"q\\"])"\n':
+        "figures.end = 'final(out[\"q\"])': 'q' is neither a function nor a variable",
+    HEAD + VARY + '[figures]\nend = "mex(u)"\n': "figures.end = 'mex(u)': 'mex' is neither a function nor a variable",
+    HEAD + VARY + '[figures]\n" " = "u[-1]"\n': "figures.  = ' ': must not be blank",
     HEAD + VARY + '[figures]\nalpha_u = "u[-1]"\n': "figures.alpha_u: the results have another column of this name",
 }  # fmt: skip
 
@@ -132,7 +139,7 @@ def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path, capsys: pytest
     plan.write_text(HEAD + VARY + TAIL)
     (tmp_path / "videoray.fmu").write_bytes(b"no archive")
     assert main(["study", str(plan), "-o", str(tmp_path / "results")]) == 2
-    assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'videoray.fmu'}: is no FMU that FMPy reads: ")
+    assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'videoray.fmu'}: is no FMU, or a damaged one: ")
 
 
 @pytest.mark.parametrize(

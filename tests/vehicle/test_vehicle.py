@@ -134,6 +134,23 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "identifier with a digit first": (edit(r"^identifier = .*$", 'identifier = "4pro"'), ("identifier", "'4pro'")),
     "identifier with an umlaut": (edit(r"^identifier = .*$", 'identifier = "über"'), ("identifier", "'über'")),
     "identifier with a line break": (edit(r"^identifier = .*$", r'identifier = "rov\n"'), ("identifier", r"'rov\n'")),
+    **{
+        f"identifier {name}, which Windows reserves": (
+            edit(r"^identifier = .*$", f'identifier = "{name}"'),
+            (f"vehicle.identifier = '{name}': must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0",),
+        )
+        for name in ("CON", "con", "Prn", "aux", "nUL", "COM0", "com1", "Lpt9")
+    },
+    "blank name": (edit(r"^name = .*$", 'name = " "'), ("vehicle.name = ' ': must not be blank",)),
+    "blank version": (
+        edit(r"^version = .*$", 'version = "\\u00a0"'),
+        ("vehicle.version = '\\xa0': must not be blank",),
+    ),
+    "blank source": (edit(r"^source = .*$", 'source = "\\t\\n"'), ("vehicle.source = '\\t\\n': must not be blank",)),
+    "blank alternative": (
+        edit(r"^\[alternatives.unweighted_rear_thrust\]$", '[alternatives." "]'),
+        ("alternatives.  = ' ': must not be blank",),
+    ),
     "empty identifier": (edit(r"^identifier = .*$", 'identifier = ""'), ("vehicle.identifier", "''")),
     "commands in percent": (edit(r"^command_max = .*$", "command_max = 70.0"), ("validity.command_max", "70.0")),
     "no range of commands": (
