@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.export.experiments import Carried, Experiment
+from rov_fmu.files.kinds import FMU, check_suffix
 from rov_fmu.files.messages import FileError, ProofError, brief, one_line
 from rov_fmu.files.series import Series
 
@@ -64,6 +65,7 @@ def prove(
     """
     import fmpy
 
+    check_suffix(fmu, FMU)
     carried = Carried(fmu)
     with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
         try:

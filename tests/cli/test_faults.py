@@ -69,7 +69,7 @@ def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(tmp_path: P
 def test_a_killed_identification_leaves_whole_files(tmp_path: Path) -> None:
     def arguments(folder: Path) -> list[str]:
         folder.mkdir()
-        return ["identify", str(TESTS), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
+        return ["identify", str(TESTS), "--force", "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
 
     started = time.monotonic()
     _succeeds(arguments(tmp_path / "reference"))
