@@ -174,7 +174,7 @@ def test_an_identification_that_is_cancelled_as_it_works_loses_nothing(moment: b
         write_log(folder, str(n), clean(rov, HEAVE, plan).noisy(random))
     ours, theirs = os.openpty()
     process = start(
-        ["identify", str(folder), "-o", str(target), "--report", str(report)],
+        ["identify", str(folder), "--force", "-o", str(target), "--report", str(report)],
         environment={"TERM": "xterm", "NO_COLOR": "1"},
         stdout=theirs,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
@@ -304,7 +304,7 @@ def test_a_terminal_that_knows_ascii_alone_gets_every_line(name: str, tmp_path: 
     assert (process.returncode, out) == (2, "")
     assert said.isascii()
     assert said.startswith("rov-fmu: ")
-    assert said.endswith("No such file or directory\n")
+    assert ": there is no such file" in said
     assert said.count("\n") == 1
 
 
