@@ -7,11 +7,13 @@ from pathlib import Path
 from time import perf_counter
 
 from rov_fmu.export.archive import archive, native_content, python_content
-from rov_fmu.export.compile import PLATFORMS, BuildError, OptionError, compile_all, host_platform
+from rov_fmu.export.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError, compile_all, host_platform
 from rov_fmu.export.model_description import NATIVE
 from rov_fmu.export.module import module
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.export.reference_results import reference_results
+from rov_fmu.files.kinds import FMU, check_written
+from rov_fmu.files.messages import did_you_mean
 from rov_fmu.files.output import Output, check_targets, write_whole
 from rov_fmu.pages.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -72,6 +74,7 @@ def build(
         description = osp_model_description(vehicle.layout)
         beside = [Output(osp_path(output, vehicle.identifier), description)]
     check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
+    check_written(output, FMU)
     chosen = chosen_platforms(platforms, fmi) if native else []
     left_out: list[str] = []
     results = reference_results(vehicle, left_out.append)
@@ -104,7 +107,9 @@ def chosen_platforms(names: Sequence[str] | None, fmi: int = 2) -> list[str]:
     if not names:
         return list(PLATFORMS)
     if unknown := set(names) - {"host", *PLATFORMS}:
-        raise BuildError(f"there is no platform {', '.join(sorted(unknown))}, only host, {', '.join(PLATFORMS)}")
+        hint = did_you_mean(min(unknown), ["host", *PLATFORMS], also=OTHER_NAMES)
+        names_of_all = ", ".join(["host", *PLATFORMS])
+        raise BuildError(f"there is no platform {', '.join(sorted(unknown))}, only {names_of_all}{hint}")
     host = host_platform(fmi)
     if "host" in names and host is None:
         raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")

@@ -1,22 +1,23 @@
 """The command rov-fmu: build | fly | prove | study | identify | tune | convert | schema | tables | figures."""
 
 import webbrowser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from math import inf
+from math import inf, isfinite, nan, nextafter
 from pathlib import Path
 from tempfile import mkdtemp
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
-from rov_fmu.export.compile import PLATFORMS, BuildError, OptionError
-from rov_fmu.files.messages import FileError, ProofError, StudyError
+from rov_fmu.export.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
+from rov_fmu.files.kinds import PAGE, VEHICLE_FILE, check_written
+from rov_fmu.files.messages import FileError, ProofError, StudyError, did_you_mean, shown
 from rov_fmu.files.output import check_targets, write_whole
 from rov_fmu.motion.layout import AXES
 from rov_fmu.process import exit_code
@@ -62,10 +63,37 @@ _vehicle = partial(
 )
 
 
-def _finite(_: click.Context, __: click.Parameter, given: float | None) -> float | None:
-    if given is None or 0.0 < given < inf:  # click's range has room for NaN
-        return given
-    raise click.BadParameter(f"{given:g} is not a finite number above 0")
+class _Choice(click.Choice[Any]):
+    """One of several words; a line lists them, and names the one that an unknown word probably means."""
+
+    def __init__(self, choices: Sequence[Any], also: Mapping[str, str] | None = None) -> None:
+        """`also` has other words for the choices."""
+        super().__init__(choices)
+        self._also = also
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:  # noqa: ARG002
+        """What is wrong with a word."""
+        names = [str(choice) for choice in self.choices]
+        return f"{shown(value)} must be one of {', '.join(names)}{did_you_mean(str(value), names, also=self._also)}"
+
+    def get_missing_message(self, param: click.Parameter, ctx: click.Context | None) -> str:  # noqa: ARG002
+        """What there is to choose from."""
+        return f"Choose one of {', '.join(map(str, self.choices))}."
+
+
+def _number(words: str, low: float = -inf, high: float = inf, kind: type[float] = float) -> Callable[[str], float]:
+    """The type of an option that takes a finite number within bounds; `words` say what is allowed."""
+
+    def number(text: str) -> float:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = nan
+        if not (low <= value <= high and isfinite(value)):
+            raise click.BadParameter(f"{shown(text)} must be {words}")
+        return value
+
+    return number
 
 
 _FILE = click.Path(path_type=Path, readable=False)  # what cannot be read is told where it is read
@@ -92,10 +120,21 @@ _commands.command_class = _Parsed
     metavar="FILE.fmu",
     help="Where to write it; <identifier>.fmu by default, of FMI 3.0 <identifier>.fmi3.fmu.",
 )
-@click.option("--backend", type=click.Choice(["native", "pythonfmu"]), default="native", show_default=True,
-              help="Compiled C, or pure Python with PythonFMU (FMI 2.0 alone).")  # fmt: skip
-@click.option("--fmi", type=click.Choice([2, 3]), default=2, show_default=True, help="Version of FMI: 2.0 or 3.0.")
-@click.option("--platform", "platforms", multiple=True, type=click.Choice(["host", *PLATFORMS]), metavar="NAME",
+@click.option(
+    "--backend",
+    type=_Choice(["native", "pythonfmu"], {"python": "pythonfmu", "c": "native"}),
+    default="native",
+    show_default=True,
+    help="Compiled C, or pure Python with PythonFMU (FMI 2.0 alone).",
+)
+@click.option(
+    "--fmi",
+    type=_Choice([2, 3], {"2.0": "2", "3.0": "3"}),
+    default=2,
+    show_default=True,
+    help="Version of FMI: 2.0 or 3.0.",
+)
+@click.option("--platform", "platforms", multiple=True, type=_Choice(["host", *PLATFORMS], OTHER_NAMES), metavar="NAME",
               help=f"host, {', '.join(PLATFORMS)}; may be repeated (default: all).")  # fmt: skip
 @click.option(
     "--osp",
@@ -185,7 +224,7 @@ def _print_built(built: "Built", seconds: float) -> None:
     "--against",
     callback=lambda _, __, given: given and find_vehicle(given),
     metavar="OTHER.toml",
-    help="Another vehicle, which flies the same commands as a ghost.",
+    help="Another vehicle, which flies the same commands as a ghost. A recording is chosen on the page itself.",
     shell_complete=_vehicles,
 )
 @click.option("-o", "--output", type=_FILE, metavar="PAGE.html",
@@ -201,19 +240,26 @@ def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     loaded = [load_vehicle(path) for path in paths]
     if output:
         check_targets([output], [*paths, *(file for one in loaded for file in one.files)])
+        check_written(output, PAGE)
     page = fly_page([Flown(one, module(one.rov)) for one in loaded]).encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
     write_whole(Output(path, page))
     click.echo(path)
-    if output is None:
-        webbrowser.open(path.as_uri())
+    if output is None and not webbrowser.open(path.as_uri()):
+        told = (
+            "no browser could be opened: open this file, which needs no other, in a browser here or on another machine"
+        )
+        click.echo(f"rov-fmu: {told}; -o PAGE.html writes it where you want it", err=True)
 
 
 @_commands.command("prove")
 @click.argument("fmu", type=_FILE)
-@click.option("--interface", type=click.Choice(["co-simulation", "model-exchange"]),
+@click.option("--interface",
+              type=_Choice(["co-simulation", "model-exchange"], {"cs": "co-simulation", "me": "model-exchange"}),
               help="The first of these that it has, by default.")  # fmt: skip
-@click.option("--tolerance", type=float, callback=_finite, help="In place of the experiments' own.")
+@click.option(
+    "--tolerance", type=_number("a number above 0", nextafter(0.0, 1.0)), help="In place of the experiments' own."
+)
 def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     """Run the experiments that an FMU carries (FMI-LS-REF): any FMU that carries some."""
     from rov_fmu.export.proof import prove
@@ -229,7 +275,7 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
 @_commands.command("study")
 @click.argument("plan", type=_FILE)
 @click.option("-o", "--output", type=_FILE, required=True, metavar="RESULTS", help="Folder of the results.")
-@click.option("--workers", type=click.IntRange(1, 1024), metavar="N",
+@click.option("--workers", type=_number("a whole number from 1 to 1024", 1, 1024, int), metavar="N",
               help="Processes on this machine; as many as it has cores by default.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS", help="A scheduler of Dask instead, tcp://host:8786.")
 def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None) -> None:
@@ -294,19 +340,30 @@ def _runs_bar() -> "Iterator[Callable[[StudyProgress], None]]":
 
 @_commands.command("identify")
 @click.argument("folder", type=_FILE)
-@click.option("-o", "--output", type=_FILE, metavar="VEHICLE.toml", help="Vehicle file to write.")
+@click.option("-o", "--output", type=_FILE, metavar="VEHICLE.toml",
+              help="Vehicle file to write.")  # fmt: skip
 @click.option("--report", type=_FILE, metavar="REPORT.html",
               help="Report to write; a build puts it into the FMU of the vehicle file.")  # fmt: skip
-def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
+@click.option("--force", is_flag=True, help="Replace files that identify did not write, or that have changed since.")
+def _identify(folder: Path, output: Path | None, report: Path | None, force: bool) -> None:
     """Identify a vehicle from FOLDER of tank tests: rov.toml and thrust_, steady_, ... .csv."""
+    from rov_fmu.files.seal import check_replaced
     from rov_fmu.identify.identify import identify
     from rov_fmu.pages.console_results import print_identification
     from rov_fmu.tank.tank_tests import load_tank_tests
     from rov_fmu.vehicle.writer import vehicle_output
 
+    targets, replaced = [path for path in (output, report) if path], list[str]()
+
+    def check_outputs(inputs: Sequence[Path]) -> None:
+        check_targets(targets, inputs)
+        for path, kind in ((output, VEHICLE_FILE), (report, PAGE)):
+            if path:
+                check_written(path, kind)
+        replaced.extend(check_replaced(targets, force=force))
+
     with _bar() as done:
-        tests = load_tank_tests(folder)
-        check_targets(filter(None, (output, report)), tests.files)
+        tests = load_tank_tests(folder, check_outputs)
         identification = identify(tests, done)
         done("each recording predicted by the others", 0.97)
         _ = [result.held_out for result in identification.axes]  # now, and not when it is printed
@@ -322,28 +379,37 @@ def _identify(folder: Path, output: Path | None, report: Path | None) -> None:
     if output:
         outputs.append(vehicle_output(identified, output))
     write_whole(*outputs)
+    for told in replaced:
+        click.echo(told)
     print_identification(identification)
 
 
 @_commands.command("tune")
 @_vehicle()
-@click.option("--axis", required=True, type=click.Choice(list(AXES)))
+@click.option("--axis", required=True, type=_Choice(list(AXES), {axis.velocity: name for name, axis in AXES.items()}))
 @click.option(
     "--command",
-    type=float,
+    type=_number("a number within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3"),
     help="Held by every input that drives the axis, positive along it: 30 % of full thrust is 0.3.",
 )
-@click.option("--v-ss", type=float, help="Wanted steady velocity at this command, m/s or rad/s.")
-@click.option("--tau", type=float, help="Wanted time constant at this command, s; without it beta stays.")
+@click.option(
+    "--v-ss",
+    type=_number("a number (V_ss in m/s or rad/s)"),
+    help="Wanted steady velocity at this command, m/s or rad/s.",
+)
+@click.option(
+    "--tau", type=_number("a number (Tau in s)"), help="Wanted time constant at this command, s; without it beta stays."
+)
 @click.option("--points", type=_FILE, metavar="POINTS.csv",
               help="Many wanted points instead: command, velocity, time constant.")  # fmt: skip
-@click.option("-o", "--output", type=_FILE, metavar="TUNED.toml", help="Vehicle file to write.")
+@click.option("-o", "--output", type=_FILE, metavar="TUNED.toml",
+              help="Vehicle file to write.")  # fmt: skip
 def _tune(
     vehicle: Path, axis: str, command: float | None, v_ss: float | None, tau: float | None,
     points: Path | None, output: Path | None,
 ) -> None:  # fmt: skip
     """Find alpha and beta of an axis for a wanted response."""
-    from rov_fmu.identify.tuning import TuningError, read_points, tune, tune_over, tuned_values
+    from rov_fmu.identify.tuning import TuningError, implausible, read_points, tune, tune_over, tuned_values
     from rov_fmu.pages.console_results import print_tuning
     from rov_fmu.vehicle.vehicle import load_vehicle
     from rov_fmu.vehicle.writer import write_tuned
@@ -353,7 +419,9 @@ def _tune(
     loaded, tested = load_vehicle(vehicle), AXES[axis]
     if not loaded.layout.has(tested):
         raise click.UsageError(f"tune: {vehicle}: --axis {axis}: the vehicle has only {', '.join(loaded.layout.kinds)}")
-    check_targets(filter(None, (output,)), filter(None, (points,)))
+    if output:
+        check_targets([output], filter(None, (points,)))
+        check_written(output, VEHICLE_FILE)
     try:
         if points is not None:
             tuning = tune_over(loaded.rov, tested, read_points(points, loaded.rov, tested))
@@ -366,11 +434,14 @@ def _tune(
     if output:
         write_tuned(vehicle, output, *tuned_values(tuning))
     print_tuning(tuning)
+    for told in implausible(tuning):
+        click.echo(f"rov-fmu: warning: {told}", err=True)
 
 
 @_commands.command("convert")
 @_vehicle()
-@click.option("-o", "--output", type=_FILE, required=True, metavar="NEW.toml", help="Vehicle file to write.")
+@click.option("-o", "--output", type=_FILE, required=True, metavar="NEW.toml",
+              help="Vehicle file to write.")  # fmt: skip
 def _convert(vehicle: Path, output: Path) -> None:
     """Write a vehicle file of the first version in the form of today, with its comments."""
     from rov_fmu.vehicle.convert import converted

@@ -45,8 +45,8 @@ COMMANDS = {
         lambda path: ["build", str(BARE), "--platform", "host", "--osp", "-o", str(path.with_name("rov.fmu"))],
     ),
     "the page that flies": Command("fly.html", lambda path: ["fly", str(BARE), "-o", str(path)]),
-    "the vehicle": Command("rov.toml", lambda path: ["identify", str(TESTS), "-o", str(path)]),
-    "the report": Command("report.html", lambda path: ["identify", str(TESTS), "--report", str(path)]),
+    "the vehicle": Command("rov.toml", lambda path: ["identify", str(TESTS), "--force", "-o", str(path)]),
+    "the report": Command("report.html", lambda path: ["identify", str(TESTS), "--force", "--report", str(path)]),
     "the tuned vehicle": Command("tuned.toml", lambda path: [*_TUNE, "-o", str(path)]),
     "the figures": Command("paper_figures.svg", lambda path: ["figures", str(path.parent)]),
 }

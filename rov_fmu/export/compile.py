@@ -76,6 +76,14 @@ PLATFORMS: dict[str, Platform] = {
     "aarch64-darwin": Platform("aarch64-darwin", ".dylib", _APPLE_SILICON),
 }
 
+OTHER_NAMES = {
+    **{platform.folder: name for name, platform in PLATFORMS.items()},
+    **{"linux": "linux64", "arm-linux": "aarch64-linux", "arm64-linux": "aarch64-linux"},
+    **dict.fromkeys(("windows", "win"), "win64"),
+    **dict.fromkeys(("macos", "mac", "osx", "darwin", "apple"), "darwin64 or aarch64-darwin"),
+}
+"""What people call the platforms besides, FMI 3.0 among them, and the names here that this stands for."""
+
 
 def host_platform(fmi: int = 2) -> str | None:
     """The platform that importers of this version look for on this machine; None where there is no binary for it."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from rov_fmu.export.experiments import Carried, Experiment
 from rov_fmu.export.unpacking import unpack_fmu
+from rov_fmu.files.kinds import FMU, check_suffix
 from rov_fmu.files.messages import FileError, ProofError, brief, one_line
 from rov_fmu.files.series import Series
 
@@ -65,6 +66,7 @@ def prove(
     """
     import fmpy
 
+    check_suffix(fmu, FMU)
     carried = Carried(fmu)
     with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
         description = unpack_fmu(fmu, fmu, Path(folder))

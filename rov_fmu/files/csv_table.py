@@ -3,12 +3,12 @@
 import csv
 import io
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite, isnan, nan
 from pathlib import Path
 
-from rov_fmu.files.messages import FileError, brief, shown
+from rov_fmu.files.messages import FileError, brief, did_you_mean, shown, similar
 from rov_fmu.files.reading import read_text
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
@@ -79,17 +79,30 @@ class _Found:
     per: float
 
 
-def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = False, loose: bool = False) -> Columns:
+def read_columns(
+    path: Path,
+    columns: Mapping[str, Column],
+    *,
+    others: bool = False,
+    loose: bool = False,
+    check_header: Callable[[Mapping[str, str], Iterable[str]], Iterable[str]] = lambda _, __: (),
+) -> Columns:
     """Read the columns, in any order, with headers such as `command [%]`. Raises DataFileError with all that is wrong.
 
     `others` lets the file have columns besides, which are not read. `loose` is for logs: a cell that is missing or no
-    number reads as NaN, and a row with too many cells is left out.
+    number reads as NaN, and a row with too many cells is left out. `check_header` is called before any row is read,
+    with the headers that are read, by column, and with all other headers; it yields what is wrong with them.
     """
     text = read_text(path, DataFileError)
     separator = _separator(text)
     lines = _csv_lines(path, text, separator)
     line, header = next(lines, (1, []))
+    if not header:
+        raise DataFileError(f"{path}: the file is empty")
     found = _header(path, line, header, columns, others)
+    headers = {column.name: header[place] for place, column in found.items()}
+    if reasons := [*check_header(headers, [title for n, title in enumerate(header) if n not in found])]:
+        raise DataFileError(*(f"{path}, line {line}: {reason}" for reason in reasons))
     names = [column.name for column in found.values()]
     values: dict[str, list[float]] = {name: [] for name in names}
     texts: dict[str, list[str]] = {name: [] for name in names}
@@ -123,7 +136,6 @@ def read_columns(path: Path, columns: Mapping[str, Column], *, others: bool = Fa
         raise DataFileError(*wrong[:_MOST], *([f"{path}: {len(wrong) - _MOST} more"] if len(wrong) > _MOST else []))
     if not numbers:
         raise DataFileError(f"{path}, line {line}: no rows below the header")
-    headers = {column.name: header[place] for place, column in found.items()}
     units = {column.name: column.unit for column in found.values()}
     return Columns(path, headers, units, texts, values, numbers, unread, len(torn))
 
@@ -184,7 +196,9 @@ def _value(text: str, there: bool, found: _Found, loose: bool) -> float:
         if loose:
             return nan
         commas = "," in text and _NUMBER.fullmatch(text.replace(",", ".", 1))
-        raise ValueError(f"must be a number{' with a decimal point, unless ; parts the columns' if commas else ''}")
+        hint = " with a decimal point, unless ; parts the columns" if commas else ""
+        hint = hint or ("; what separates the cells must be the same as in the header" if set(text) & {*";\t"} else "")
+        raise ValueError(f"must be a number{hint}")
     value = found.convert(number)
     if found.unit in column.conversions:
         return value
@@ -202,6 +216,10 @@ def _value(text: str, there: bool, found: _Found, loose: bool) -> float:
 
 def _header(path: Path, line: int, header: list[str], columns: Mapping[str, Column], others: bool) -> dict[int, _Found]:
     """The columns that are read, by their places."""
+    if not any(_may_be(title, columns) for title in header):
+        needed = ", ".join(_title(name, column) for name, column in columns.items() if not column.optional)
+        reason = f"the first line must be a header that names the columns, such as {needed}"
+        raise DataFileError(f"{path}, line {line} = {shown(', '.join(header))}: {reason}")
     found: dict[int, _Found] = {}
     wrong = []
     for place, title in enumerate(header):
@@ -213,9 +231,13 @@ def _header(path: Path, line: int, header: list[str], columns: Mapping[str, Colu
         except ValueError as error:
             wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}")
     names = {column.name for column in found.values()}
-    missing = [repr(_title(n, c)) for n, c in columns.items() if n not in names and not c.optional]
+    missing = {name: column for name, column in columns.items() if name not in names and not column.optional}
     if missing and not wrong:
-        wrong.append(f"{path}, line {line}, column {len(header) + 1}: {', and so is '.join(_is_missing(missing))}")
+        titles = ", and so is ".join(_is_missing([repr(_title(*of)) for of in missing.items()]))
+        unread = {_name_and_unit(title)[0]: title for place, title in enumerate(header) if place not in found}
+        near = [unread[name] for wanted in missing for name in similar(wanted, unread)]
+        hint = f"; is it the column {' or '.join(map(shown, near))}?" if near else ""
+        wrong.append(f"{path}, line {line}, column {len(header) + 1}: {titles}{hint}")
     if wrong:
         raise DataFileError(*wrong[:_MOST])
     return found
@@ -227,9 +249,8 @@ def _is_missing(titles: list[str]) -> list[str]:
 
 def _column(title: str, columns: Mapping[str, Column], others: bool) -> _Found | None:
     """The column of a header, in any case; None for one that is not read. Raises ValueError with the reason alone."""
-    match = _HEADER.fullmatch(title)
-    name = _folded(match["name"] if match else title)
-    word, *numbers = match["unit"].split() if match else [""]
+    name, unit_words = _name_and_unit(title)
+    word, *numbers = unit_words.split() or [""]
     for key, column in columns.items():
         if name in map(_folded, (key, *column.also)) and (unit := _unit(word, column)):
             return _Found(key, column, unit, *_conversion(unit, numbers, column))
@@ -238,8 +259,22 @@ def _column(title: str, columns: Mapping[str, Column], others: bool) -> _Found |
             raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(column))}")
     if others:
         return None
-    known = ", ".join(_title(n, c) for n, c in columns.items())
-    raise ValueError(f"there is no such column, but {known}")
+    titles = {key: _title(key, column) for key, column in columns.items()}
+    known = ", ".join(titles.values())
+    raise ValueError(f"there is no such column, but {known}{did_you_mean(name, (), also=titles)}")
+
+
+def _name_and_unit(title: str) -> tuple[str, str]:
+    """The name and the unit in a header; the unit is empty where there is none."""
+    match = _HEADER.fullmatch(title)
+    return _folded(match["name"] if match else title), match["unit"] if match else ""
+
+
+def _may_be(title: str, columns: Mapping[str, Column]) -> bool:
+    """Whether a title has the name of a column, or a similar one, or at least the form of a header with a unit."""
+    name, unit = _name_and_unit(title)
+    names = [_folded(known) for key, column in columns.items() for known in (key, *column.also)]
+    return bool(unit) or bool(similar(name, names))
 
 
 def _conversion(unit: str, numbers: list[str], column: Column) -> tuple[Conversion, float]:

@@ -1,6 +1,8 @@
 """Messages to the user: whatever they tell of, one line that can be printed anywhere."""
 
 import reprlib
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 
 
 class FileError(ValueError):
@@ -27,6 +29,25 @@ def brief(text: str, most: int = 80) -> str:
     """On one line, and not endless."""
     clean = one_line(text[: most + 20])
     return clean if len(clean) <= most else f"{clean[: most - 3]}..."
+
+
+def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
+    """The names that are most like an unknown one, whatever their case; the most similar comes first."""
+    by_folded: dict[str, list[str]] = {}
+    for known in names:
+        by_folded.setdefault(known.casefold(), []).append(known)
+    close = get_close_matches(name.casefold(), by_folded, most)
+    return [known for folded in close for known in by_folded[folded]][:most]
+
+
+def did_you_mean(name: str, names: Iterable[str], most: int = 1, also: Mapping[str, str] | None = None) -> str:
+    """The end of a message about an unknown name: `; did you mean ...?`, or nothing where no name is similar.
+
+    `also` has other words that people use, and the name or names that each of them stands for.
+    """
+    words = {**{known: known for known in names}, **(also or {})}
+    found = dict.fromkeys(words[word] for word in similar(name, words, most))
+    return f"; did you mean {' or '.join(found)}?" if found else ""
 
 
 class _Repr(reprlib.Repr):

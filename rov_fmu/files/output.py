@@ -37,12 +37,26 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
             raise WriteError(errno.EINVAL, "is a device or a pipe, which no file can take the place of", str(path))
         if path.exists() and not os.access(path, os.W_OK):
             raise WriteError(errno.EACCES, "is read-only", str(path))
-        if not os.access(path.parent, os.W_OK):
-            raise WriteError(errno.EACCES, "its folder is read-only", str(path))
+        _check_folder(path)
         for other in taken:
             if is_same(path, other):
                 raise WriteError(errno.EEXIST, f"would overwrite {other}, an input or another output", str(path))
         taken.append(path)
+
+
+def _check_folder(path: Path) -> None:
+    """Raise WriteError where the folder of a path takes no new file, which only the attempt can show."""
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        reasons = {
+            errno.EACCES: "its folder is read-only",
+            errno.EROFS: "its folder is read-only",
+            errno.ENOENT: f"the folder {path.parent} takes no new files",
+        }
+        reason = reasons.get(error.errno or 0, f"the folder {path.parent} takes no new files: {error.strerror}")
+        raise WriteError(error.errno, reason, str(path)) from error
 
 
 def write_whole(*outputs: Output) -> None:

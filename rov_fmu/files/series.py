@@ -2,11 +2,13 @@
 
 import csv
 import io
+import re
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite, nan
 
 from rov_fmu.files.messages import FileError, shown
 
+_NUMBER = re.compile(r"[-+0-9.][-+0-9.eE]*")
 _WORDS = {"true": 1.0, "false": 0.0}
 
 Series = Mapping[str, Sequence[float]]
@@ -20,9 +22,13 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
     except csv.Error as wrong:
         raise error(f"not CSV: {wrong}") from wrong
     lines = [line for line in lines if any(map(str.strip, line))]
+    if not lines:
+        raise error("is empty")
     if len(lines) < 2:
         raise error("has no rows below a header")
     header = [name.strip() for name in lines[0]]
+    if all(_NUMBER.fullmatch(name) for name in header):
+        raise error("the first line must be a header that names the columns: the time, and then variables")
     if len(header) == 1 and (mark := next((mark for mark in ";\t" if mark in header[0]), None)):
         raise error(f"columns are parted by commas, and not by {shown(mark)}; numbers have a point")
     if twice := next((name for name in header if header.count(name) > 1), None):

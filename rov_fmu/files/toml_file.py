@@ -4,14 +4,14 @@ import json
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, create_model
 from pydantic_core import ErrorDetails
 
-from rov_fmu.files.messages import FileError, brief, shown
+from rov_fmu.files.kinds import check_keys
+from rov_fmu.files.messages import FileError, brief, did_you_mean, shown, similar
 from rov_fmu.files.reading import read_text
 
 if sys.version_info >= (3, 11):
@@ -43,9 +43,10 @@ Toml = dict[str, Any]
 _Place = Sequence[int | str]
 
 
-def read_checked(path: Path, model: type[Checked], failure: type[FileError], **context: object) -> Checked:
-    """Read a TOML file of the given form; `folder` and what else is given is the context. Raises `failure`."""
+def read_checked(path: Path, kind: str, model: type[Checked], failure: type[FileError], **context: object) -> Checked:
+    """Read a TOML file of the given kind and form; `folder` and what else is given is the context. Raises `failure`."""
     data = read_toml(path, failure)
+    check_keys(path, data, kind, failure)
     checked, problems = check(data, model, folder=path.parent, **context)
     if checked is None:
         raise failure(*(f"{path}: {line}" for line in told(problems, data, model)))
@@ -145,8 +146,8 @@ class _Form:
         return [*self.at(place).get("properties", ())]
 
     def near(self, place: _Place) -> str | None:
-        """The key that one that is none must mean."""
-        return next(iter(get_close_matches(str(place[-1]), self.keys(place[:-1]), 1)), None)
+        """The key that an unknown one probably means."""
+        return next(iter(similar(str(place[-1]), self.keys(place[:-1]))), None)
 
     def written(self, place: _Place) -> str:
         """How a table, or a list of tables, is written."""
@@ -193,9 +194,10 @@ def _told(problem: ErrorDetails, data: Toml, form: _Form) -> str:
         constant = _constant(form.at(place))
         return f"{key}: this key is missing" + (f": write {place[-1]} = {json.dumps(constant)}" if constant else "")
     if kind == "extra_forbidden":
-        allowed, near = form.keys(place[:-1]), form.near(place)
-        many = near and len(allowed) > _MOST
-        return f"{key}: there is no such key" + (f"; did you mean {near}?" if many else f", only {listed(allowed)}")
+        allowed = form.keys(place[:-1])
+        hint = did_you_mean(str(place[-1]), allowed)
+        only = "" if hint and len(allowed) > _MOST else f", only {listed(allowed)}"
+        return f"{key}: there is no such key{only}{hint}"
     reason = _reason(problem, form)
     *above, last = place
     if isinstance(last, int) and not of_table and form.at(place).get("type") != "object":
@@ -215,6 +217,9 @@ def _reason(problem: ErrorDetails, form: _Form) -> str:
         return f"must be {form.written(place)}"
     if kind in ("greater_than_equal", "less_than_equal") and "minimum" in here and "maximum" in here:
         return f"must be within {here['minimum']:g} ... {here['maximum']:g}"
+    if kind == "literal_error":
+        choices = [choice for choice in here.get("enum", ()) if isinstance(choice, str)]
+        return problem["msg"].replace("Input should", "must") + did_you_mean(str(problem["input"]), choices)
     if kind == "float_type" and type(problem["input"]) is int:
         return "must be a number of at most 308 digits"
     if kind in _REASONS:

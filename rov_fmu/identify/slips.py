@@ -92,13 +92,18 @@ def slips(
     return tuple(f for f in found if not (f.words.endswith(_TOO_FAST) and f.file in refused))
 
 
+def beta_range(rov: Rov, axis: Axis) -> tuple[float, float, str]:
+    """The least and the greatest β of vehicles that are known, and in words the inertia that this vehicle's β means."""
+    beta, has_added = axis.coefficient("beta"), "m_a" in rov.layout.kinds[axis.name].keys
+    inertia = f"{1.0 / max(rov[beta], 1e-9):.3g} times {axis.inertia}{' and the added one' if has_added else ''}"
+    return (*(BETA_WITH_ADDED_MASS if has_added else BETA), inertia)
+
+
 def beta_out_of_range(rov: Rov, axis: Axis) -> str | None:
     """Of the final fit: what may cause a β that no vehicle has."""
-    beta, has_added = axis.coefficient("beta"), "m_a" in rov.layout.kinds[axis.name].keys
-    low, high = BETA_WITH_ADDED_MASS if has_added else BETA
+    beta, (low, high, inertia) = axis.coefficient("beta"), beta_range(rov, axis)
     if low <= rov[beta] <= high:
         return None
-    inertia = f"{1.0 / max(rov[beta], 1e-9):.3g} times {axis.inertia}{' and the added one' if has_added else ''}"
     return (
         f"{axis.name}: {beta} = {rov[beta]:.3g} is not within {low:g} ... {high:g}, as of any vehicle known: it moves "
         f"as if its inertia were {inertia}. A wrong unit or scale (of the motion, the commands, the thrust, "

@@ -3,21 +3,26 @@
 Of any vehicle and axis, by direction: thrust curves in reverse and their dead band, drag by direction, constant load.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.files.csv_table import read_columns
+from rov_fmu.files.csv_table import DataFileError, read_columns
 from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.least_squares import Estimate, estimate_alike, fit_named, kind_of
 from rov_fmu.identify.response_fit import holding_force, predict
+from rov_fmu.identify.slips import beta_range
 from rov_fmu.motion.layout import Axis
 from rov_fmu.motion.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
+
+ALPHA = 0.5, 2.0
+"""Of a plausible tuning. Thrust that is measured in a tank is known to better than a factor of 2; the paper's α are
+1.1 to 1.2."""
 
 
 class TuningError(ValueError):
@@ -111,14 +116,34 @@ def read_points(path: Path, rov: Rov, axis: Axis) -> tuple[Point, ...]:
             if reason := _impossible(rov, axis, point):
                 raise table.error(n, column, reason)
             points.append(point)
+    if not any(point.quantity == "V_ss" for point in points):
+        raise DataFileError(f"{path}: no row has a velocity, which alpha is tuned by: there is no V_ss")
     return tuple(points)
+
+
+def implausible(tuning: Tuning) -> Iterator[str]:
+    """A sentence for each of α and β that is found, but that no vehicle is expected to have."""
+    axis, rov = tuning.axis, tuning.rov
+    alpha, beta = map(axis.coefficient, ("alpha", "beta"))
+    if not ALPHA[0] <= rov[alpha] <= ALPHA[1]:
+        yield (
+            f"{alpha} = {rov[alpha]:.3g} is not within the usual {ALPHA[0]:g} ... {ALPHA[1]:g}: the {axis.push} would "
+            f"be {rov[alpha]:.3g} times that of the thrust curves, which tests give to better than a factor of 2. "
+            f"Check the wanted V_ss and its unit ({axis.unit}), the command, and the thrust curves"
+        )
+    low, high, inertia = beta_range(rov, axis)
+    if any(p.quantity == "Tau" for p in tuning.points) and not low <= rov[beta] <= high:
+        yield (
+            f"{beta} = {rov[beta]:.3g} is not within the usual {low:g} ... {high:g}: the vehicle would move as if "
+            f"its inertia were {inertia}, which no known vehicle does. Check the wanted Tau (s) and {axis.inertia}"
+        )
 
 
 def _impossible(rov: Rov, axis: Axis, point: Point) -> str | None:
     """Why no tuning gives the point."""
     command, value = point.command, point.value
     if not 0.0 < abs(command) <= 1.0:
-        return f"a command of {command:g} must be within -1 ... 1 and not 0, a fraction of full thrust"
+        return f"a command of {command:g} must be within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3"
     if not (force := rov.force(axis, command)):
         dead = all("c_0" in rov.layout.curve_of[t.name].keys for t in rov.layout.drivers(axis))
         return f"a command of {command:g} gives no {axis.push}{', it is within the dead band' if dead else ''}"
@@ -126,12 +151,14 @@ def _impossible(rov: Rov, axis: Axis, point: Point) -> str | None:
         return None if 0.0 < value < inf else f"Tau = {value:g} s must be above 0"
     if not 0.0 < abs(value) < inf:
         return f"V_ss = {value:g} {axis.unit} must be a number other than 0"
-    if (needed := holding_force(rov, axis, value)) * force > 0.0:
+    if holding_force(rov, axis, value) * force > 0.0:
         return None
-    form, words = rov.layout.kinds[axis.name], f"V_ss = {value:g} {axis.unit} needs a {axis.push} of {needed:g}"
-    drift = rov.acceleration_of(form, 0.0).steady_velocity()
-    alone = f"; F_0 alone gives {drift:g} {axis.unit}" if "F_0" in form.keys else ""
-    return f"{words} {axis.load}, but a command of {command:g} gives {force:g} {axis.load}{alone}"
+    form, allowed = rov.layout.kinds[axis.name], "positive" if force > 0.0 else "negative"
+    if "F_0" in form.keys:
+        drift = rov.acceleration_of(form, 0.0).steady_velocity()
+        allowed = f"{'above' if force > 0.0 else 'below'} the {drift:g} {axis.unit} that F_0 alone gives"
+    told = f"a command of {command:g} gives a {axis.push} of {force:g} {axis.load}"
+    return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {told}"
 
 
 def _with(rov: Rov, name: str, wanted: Sequence[float]) -> Rov:

@@ -10,6 +10,7 @@ from typing import Any
 from markupsafe import Markup
 
 from rov_fmu.files.output import Output
+from rov_fmu.files.seal import sealed
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.recordings_fit import count
 from rov_fmu.identify.residual_analysis import Simulation
@@ -27,7 +28,7 @@ _WHITE = 1.5  # samples: residuals that are correlated over less are as good as 
 
 def report_output(results: Identification, path: Path) -> Output:
     """The report of an identification, to write."""
-    return Output(path, report_page(results).encode())
+    return Output(path, sealed(report_page(results), "<!-- {} -->").encode())
 
 
 def report_page(results: Identification) -> str:

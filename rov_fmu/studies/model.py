@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu.export.unpacking import unpack_fmu
-from rov_fmu.files.messages import FileError, shown
+from rov_fmu.files.messages import FileError, did_you_mean, shown
 from rov_fmu.files.reading import read_bytes
 
 TYPES = {
@@ -112,11 +112,7 @@ def unsettable(name: str, has: Mapping[str, Variable]) -> str:
 
 def unknown(name: str, names: Mapping[str, object]) -> str:
     """What is wrong with a name that the FMU has not."""
-    from difflib import get_close_matches
-
-    near = get_close_matches(name, names, 3)
-    hint = f"; did you mean {' or '.join(near)}?" if near else ""
-    return f"the FMU has no variable {shown(name)} that is a number{hint}"
+    return f"the FMU has no variable {shown(name)} that is a number{did_you_mean(name, names, 3)}"
 
 
 def _variable(v: Any) -> Variable:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 from typing_extensions import Self
 
+from rov_fmu.files.kinds import PLAN, check_suffix
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.toml_file import Strict, beside, line, pair, read_checked
 from rov_fmu.studies.figures import read_expression
@@ -297,7 +298,8 @@ def _whole(steps: float) -> bool:
 
 def load_plan(path: Path) -> Plan:
     """Read a plan; what does not go together in it is told with what does not fit its FMU. Raises PlanError."""
-    plan = read_checked(path, Plan, PlanError)
+    check_suffix(path, PLAN, PlanError)
+    plan = read_checked(path, PLAN, Plan, PlanError)
     if (plan.fmu is None) == (plan.vehicle is None):
         raise PlanError(*(f"{path}: {words}" for words in ("must have either fmu or vehicle", *nonsense(plan))))
     return plan

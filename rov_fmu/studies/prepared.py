@@ -9,7 +9,7 @@ from uuid import uuid4
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.files.messages import FileError, shown
+from rov_fmu.files.messages import FileError, did_you_mean, shown
 from rov_fmu.files.reading import read_text
 from rov_fmu.files.series import series
 from rov_fmu.files.toml_file import line
@@ -89,7 +89,7 @@ def vehicle_file(key: str, given: str, path: Path) -> Path:
     if given not in SHIPPED:
         ships = ", ".join(SHIPPED)
         told = f"there is no such file, as seen from the plan, and no vehicle of this name ships, only {ships}"
-        raise PlanError(f"{path}: {line(key, told, given)}")
+        raise PlanError(f"{path}: {line(key, told, given)}{did_you_mean(given, SHIPPED)}")
     return SHIPPED[given]
 
 

@@ -7,12 +7,12 @@ without either, the form of the paper. Coefficients that are to be identified ar
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
+from rov_fmu.files.messages import did_you_mean
 from rov_fmu.files.toml_file import Strict, Toml, beside, check, line, listed, pair, read_toml, told
 from rov_fmu.motion.layout import AXES, AXIS, CURVE, REVERSE, Axis, Layout, Meta, VehicleAxis, coefficient_name
 from rov_fmu.vehicle.form import Head, Validity
@@ -44,6 +44,7 @@ def _vehicle(name: str, info: ValidationInfo) -> str:
     if not _vehicle_file(name, beside(name, info)):
         raise ValueError(
             f"must be a vehicle file, seen from this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
+            f"{did_you_mean(name, SHIPPED)}"
         )
     return name
 
@@ -217,7 +218,7 @@ def _mistakes(file: _Readable, lost: set[str], said: Said) -> Iterator[str]:
     layout, everything = said.layout, _everything(said.layout)
     for name in said.named:
         if name not in everything:
-            yield line(f"known.{name}", f"there is no such coefficient of this vehicle{_near(name, everything)}")
+            yield line(f"known.{name}", f"there is no such coefficient of this vehicle{did_you_mean(name, everything)}")
     yield from misgiven("known", {name: q for name, q in file.known.items() if name in everything}, everything)
     tables = dict(where(layout))
     for name in (name for name, q in file.quantities(layout).items() if q and name in file.known):
@@ -227,11 +228,11 @@ def _mistakes(file: _Readable, lost: set[str], said: Said) -> Iterator[str]:
     windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.kinds]
     for name in file.windows:
         if name not in windows:
-            yield line(f"windows.{name}", f"there is no such key, only {listed(windows)}")
+            yield line(f"windows.{name}", f"there is no such key, only {listed(windows)}{did_you_mean(name, windows)}")
     curves = [curve.name for curve in layout.curves]
     for name in said.lag:
         if name not in curves:
-            yield line("fit.lag", f"there is no such curve, only {listed(curves)}", name)
+            yield line("fit.lag", f"there is no such curve, only {listed(curves)}{did_you_mean(name, curves)}", name)
         elif (T := coefficient_name("T", name)) in said.named:
             yield line("fit.lag", f"{T} is given, so it cannot be fitted too", name)
 
@@ -243,10 +244,6 @@ def _everything(layout: Layout) -> dict[str, Meta]:
         axes=tuple(VehicleAxis(form.axis, tuple(AXIS)) for form in layout.axes),
         curves=tuple(replace(curve, keys=tuple(CURVE)) for curve in layout.curves),
     ).coefficients
-
-
-def _near(name: str, names: Iterable[str]) -> str:
-    return f"; did you mean {found[0]}?" if (found := get_close_matches(name, [*names], 1)) else ""
 
 
 def _halves(file: _Readable, said: Said) -> Iterator[str]:

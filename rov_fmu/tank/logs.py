@@ -4,14 +4,15 @@ A CSV log has a column `time`; commands, as `command` of the axis that the log i
 the vehicle (`u_<name>`) or for each thruster; and what was measured. What cannot be used is left out, counted and told.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from rov_fmu.files.csv_table import Column, Columns, DataFileError, read_columns
-from rov_fmu.files.messages import shown
+from rov_fmu.files.messages import did_you_mean, shown, similar
 from rov_fmu.motion.layout import HEAVE, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import (
@@ -51,8 +52,9 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None) -> Log:
     kinds = {"inputs": _inputs(layout), "thrusters": _thrusters(layout), "axis": {_COMMAND: _LOGGED} if axis else {}}
     columns = {"time": TIME, **kinds["axis"], **kinds["inputs"], **kinds["thrusters"]}
     columns |= {name: sensor.column for name, sensor in sensors.items()}
-    table = read_columns(path, columns, others=True, loose=True)
-    kind, commanding = _commanding(table, kinds, sensors)
+    check_header = partial(_wrong_columns, path=path, layout=layout, kinds=kinds, sensors=sensors)
+    table = read_columns(path, columns, others=True, loose=True, check_header=check_header)
+    ((kind, commanding),) = _commanding(table.values, kinds).items()
     refuse_slips(table, commanding)
     time, values, notes = _cleaned(table, commanding)
     signals = _signals(sensors, time, values)
@@ -128,24 +130,46 @@ def _thrusters(layout: Layout) -> dict[str, Column]:
     return {f"thruster {t.name}": replace(_LOGGED, also=(t.name,)) for t in layout.thrusters} if layout.mix else {}
 
 
-def _commanding(
-    table: Columns, kinds: Mapping[str, Mapping[str, Column]], sensors: Mapping[str, _Sensor]
-) -> tuple[str, list[str]]:
-    """The kind of the commands and their columns. Raises DataFileError, for motion too."""
-    found = {kind: names for kind, of in kinds.items() if (names := [name for name in of if name in table.values])}
-    wrong = []
+def _commanding(names: Iterable[str], kinds: Mapping[str, Mapping[str, Column]]) -> dict[str, list[str]]:
+    """The columns of commands that a log has, by the kind of the commands."""
+    has = {*names}
+    return {kind: found for kind, of in kinds.items() if (found := [name for name in of if name in has])}
+
+
+def _wrong_columns(
+    headers: Mapping[str, str],
+    others: Iterable[str],
+    path: Path,
+    layout: Layout,
+    kinds: Mapping[str, Mapping[str, Column]],
+    sensors: Mapping[str, _Sensor],
+) -> Iterator[str]:
+    """What is wrong with the columns of a log, by the headers that are read and the others."""
+    found, others = _commanding(headers, kinds), [*others]
+    of_one = next((title for title in others if title.partition("[")[0].strip().casefold() == _COMMAND), None)
+    if not found and of_one:
+        yield f"column {shown(of_one)} is the command of one axis, but {_of_no_axis(path, layout)}"
+        return
     if not found:
         wanted = " or ".join(", ".join(of) for of in kinds.values() if of)
-        wrong.append(f"no column of commands: {wanted}, each in [%], [1] or [us]")
+        unread = {title.partition("[")[0].strip(): shown(title) for title in others}
+        near = dict.fromkeys(unread[name] for of in kinds.values() for column in of for name in similar(column, unread))
+        hint = f"; is it the column {' or '.join(near)}?" if near else ""
+        yield f"no column of commands: {wanted}, each in [%], [1] or [us]{hint}"
     if len(found) > 1:
-        headers = ", ".join(shown(table.headers[names[0]]) for names in found.values())
-        wrong.append(f"columns {headers}: the commands of the axis, of the inputs or of the thrusters, not several")
-    if not any(name in table.values for name in sensors):
+        titles = ", ".join(shown(headers[names[0]]) for names in found.values())
+        yield f"columns {titles}: the commands of the axis, of the inputs or of the thrusters, not several"
+    if not any(name in headers for name in sensors):
         titles = " or ".join(f"'{name} [{next(iter(s.column.units))}]'" for name, s in sensors.items())
-        wrong.append(f"column {titles} is missing")
-    if wrong:
-        raise DataFileError(*(f"{table.path}, line 1: {reason}" for reason in wrong))
-    return next(iter(found.items()))
+        yield f"column {titles} is missing"
+
+
+def _of_no_axis(path: Path, layout: Layout) -> str:
+    """Why the name of a file does not tell of which axis of the vehicle the log is."""
+    axes, word = [*layout.kinds], path.stem.lower().partition("_")[2].partition("_")[0]
+    names = " or ".join(f"log_{name}*{path.suffix}" for name in axes)
+    hint = did_you_mean(word, axes)
+    return f"{word or repr('')} is not an axis of this vehicle: the name of the file must be {names}{hint}"
 
 
 # ---- Rows ------------------------------------------------------------------------------------------------------------

@@ -13,12 +13,12 @@ Commands are those of an Axis; a command of a thrust curve is that of all thrust
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.files.messages import FileError
+from rov_fmu.files.messages import FileError, did_you_mean
 from rov_fmu.files.reading import read_bytes
 from rov_fmu.motion.layout import AXES, Axis, Layout
 from rov_fmu.tank.given import ROV_FILE, Said, read_said
@@ -28,6 +28,8 @@ from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tables import Row, read_rows
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
+_KINDS = ("thrust", "steady", "time_constant", "log")
+"""What the name of a file begins with."""
 _LOGS = (".bin", ".tlog")
 
 
@@ -48,21 +50,21 @@ class TankTests:
     notes: tuple[str, ...] = ()
     """What was left out of the vehicle and of the files, in sentences."""
 
-    @property
-    def files(self) -> list[Path]:
-        """Every file that the identification reads."""
-        return [*(self.folder / name for name in self.inputs), *filter(None, (self.given.against, self.given.base))]
 
+def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> TankTests:
+    """Read a folder. Raises DataFileError, VehicleFileError with a line for everything that is wrong.
 
-def load_tank_tests(folder: Path) -> TankTests:
-    """Read a folder. Raises DataFileError, VehicleFileError with a line for everything that is wrong."""
+    `check_inputs` is called with every file that the identification reads, before any test is read.
+    """
     if not folder.is_dir():
-        raise DataFileError(f"{folder}: there is no such folder")
+        what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
+        raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
     said, of_vehicle = _said(folder / ROV_FILE)
     found = _Found(folder, said.layout if said else None)
     paths = sorted(path for path in folder.iterdir() if path.name.lower().endswith((".csv", *_LOGS)))
     if not paths:
         raise VehicleFileError(*of_vehicle, f"{folder}: there are no tests (*.csv, *.bin, *.tlog) in this folder")
+    check_inputs([folder / ROV_FILE, *paths, *filter(None, (said.against, said.base) if said else ())])
     for path in paths:
         found.read(path)
     given, missing, notes = None, list[str](), list[str]()
@@ -133,12 +135,21 @@ class _Found:
         kind, of = _parts(path.stem.lower(), curves)
         if path.suffix.lower() in _LOGS:
             kind, of = "log", of if kind == "log" else ""
-        if not (kind and path.name.isprintable()) or (not of and kind != "log"):
-            names = _either(curves or ["the name of a curve"])
+        axes = [*(self.layout.kinds if self.layout else AXES)]
+        known = (curves or []) if kind == "thrust" else axes
+        if not (kind and path.name.isprintable()) or not (of or known):
+            hint = did_you_mean(path.stem.lower().partition("_")[0], _KINDS, also={"time": "time_constant"})
             raise DataFileError(
-                f"{path}: no name of a test; thrust_ begins one, then {names}, or steady_, time_constant_ or log_, "
-                f"then {_either(self.layout.kinds if self.layout else AXES)}, then _ and any printable characters"
+                f"{path}: no name of a test; thrust_ begins one, then {_either(curves or ['the name of a curve'])}, or "
+                f"steady_, time_constant_ or log_, then {_either(axes)}, then _ and any printable characters{hint}"
             )
+        if not of and kind != "log":
+            word = path.stem.lower().removeprefix(f"{kind}_").partition("_")[0]
+            what = (
+                f"{'a thrust curve' if kind == 'thrust' else 'an axis'} of {'this' if self.layout else 'any'} vehicle"
+            )
+            hint = did_you_mean(word, known)
+            raise DataFileError(f"{path}: {word or repr('')} is not {what}, only {_either(known, 'and')}{hint}")
         if self.layout and of in AXES and kind != "thrust" and not self.layout.signs(AXES[of]):
             raise DataFileError(f"{path}: no thruster of the vehicle drives {of}")
         return kind, of
@@ -180,7 +191,7 @@ def _parts(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
 
     Without curves any name may be that of one.
     """
-    for kind in ("thrust", "steady", "time_constant", "log"):
+    for kind in _KINDS:
         if (rest := stem.removeprefix(f"{kind}_")) != stem:
             names = AXES if kind != "thrust" else [rest] if curves is None else curves
             fitting = (name for name in names if f"{rest}_".startswith(f"{name.lower()}_"))
@@ -188,9 +199,9 @@ def _parts(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
     return "", ""
 
 
-def _either(names: Iterable[str]) -> str:
+def _either(names: Iterable[str], last_word: str = "or") -> str:
     *first, last = [*names] or [""]
-    return f"{', '.join(first)} or {last}" if first else last
+    return f"{', '.join(first)} {last_word} {last}" if first else last
 
 
 def _hash(path: Path) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Comment, Item
 
+from rov_fmu.files.kinds import VEHICLE_FILE, check_written
 from rov_fmu.files.output import Output, check_targets
 from rov_fmu.vehicle.schema import FORMAT
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -16,6 +17,7 @@ def converted(source: Path, path: Path) -> Output:
     """The file to write, checked. Raises VehicleFileError, and WriteError where it would overwrite what it reads."""
     vehicle, document = load_vehicle(source), read_document(source)
     check_targets([path], [source, *vehicle.files])
+    check_written(path, VEHICLE_FILE)
     if "format" in document:
         raise VehicleFileError(f"{source}: format = {FORMAT}: needs no conversion; the first version has no format")
     new = tomlkit.document()

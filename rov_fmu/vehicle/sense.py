@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from pydantic_core import ErrorDetails
 
-from rov_fmu.files.messages import shown
+from rov_fmu.files.messages import did_you_mean, shown
 from rov_fmu.files.toml_file import Strict, Toml, check, label, line, listed
 from rov_fmu.motion.layout import (
     ARM,
@@ -95,7 +95,7 @@ def _names(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
     yield from _alike("inputs", [(f".{name}", name) for name in parts.inputs])
     for n, entry in found:
         if curves and isinstance(curve := entry.get("curve"), str) and curve not in curves:
-            reason = f"there is no such curve, only {listed(curves)}"
+            reason = f"there is no such curve, only {listed(curves)}{did_you_mean(curve, curves)}"
             yield line(f"{label('thruster', entries, n)}.curve", reason, curve)
     if "thruster" in lost:
         return
@@ -122,7 +122,8 @@ def _gains(inputs: Mapping[str, Mapping[str, float]], names: Sequence[str]) -> I
     for name, gains in inputs.items():
         for driven in gains:
             if driven not in names:
-                yield line(f"inputs.{name}.{driven}", f"there is no such thruster, only {listed(names)}")
+                reason = f"there is no such thruster, only {listed(names)}{did_you_mean(driven, names)}"
+                yield line(f"inputs.{name}.{driven}", reason)
                 wrong = True
         if not any(gains.values()):
             yield line(f"inputs.{name}", "drives no thruster: give one a gain other than 0")
@@ -224,12 +225,13 @@ def _estimates(parts: Parts, layout: Layout) -> Iterator[str]:
         key, quantity = f"estimates.{name}", found.get(name)
         reasons = []
         if name not in found:
-            reasons.append(line(key, "there is no such coefficient of this vehicle"))
+            reasons.append(line(key, f"there is no such coefficient of this vehicle{did_you_mean(name, found)}"))
         elif not (quantity and quantity.interval):
             reasons.append(line(key, f"{name} has no interval, so it is no estimate"))
         for other, value in row.correlation.items():
             reason = "of a coefficient with itself is 1 and is not given" if other == name else ""
-            reason = reason or ("" if other in rows else "there is no such coefficient in this table")
+            if other not in rows:
+                reason = reason or f"there is no such coefficient in this table{did_you_mean(other, rows)}"
             if reason or (name in rows[other].correlation and list(rows).index(name) > list(rows).index(other)):
                 reason = reason or f"estimates.{other} gives it already"
                 reasons.append(line(f"{key}.correlation.{other}", reason, value))
@@ -247,7 +249,7 @@ def misgiven(table: str, found: Mapping[str, Quantity], metas: Mapping[str, Meta
     for name, quantity in found.items():
         key = f"{table}.{name}"
         if (meta := metas.get(name)) is None:
-            yield line(key, "there is no such coefficient of this vehicle")
+            yield line(key, f"there is no such coefficient of this vehicle{did_you_mean(name, metas)}")
             continue
         if quantity.unit != meta.unit:
             yield line(f"{key}.unit", f"must be {meta.unit!r}", quantity.unit)

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from rov_fmu.files.messages import FileError
+from rov_fmu.files.kinds import VEHICLE_FILE, check_suffix
+from rov_fmu.files.messages import FileError, did_you_mean
 from rov_fmu.files.places import MODELS
 
 SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODELS.iterdir()) if folder.is_dir()}
@@ -15,6 +16,17 @@ def find_vehicle(given: str | Path) -> Path:
     path, name = Path(given), str(given)
     if name in SHIPPED and not (path.exists() and not path.is_dir()):
         return SHIPPED[name]
-    if name.isidentifier() and not path.exists():
-        raise FileError(f"{name}: there is no such file, and no vehicle of this name ships, only {', '.join(SHIPPED)}")
+    if not name:
+        raise FileError("VEHICLE is empty: it must be the path of a vehicle file, or the name of a vehicle that ships")
+    if path.is_dir():
+        raise FileError(f"{path}: cannot be read: is a folder, and must be {VEHICLE_FILE}")
+    check_suffix(path, VEHICLE_FILE)
+    if not path.exists():
+        ships = (
+            ""
+            if path.suffix or path.parent != Path()
+            else f", and no vehicle of this name ships, only {', '.join(SHIPPED)}"
+        )
+        beside = [str(file) for file in sorted(path.parent.glob("*.toml"))]
+        raise FileError(f"{name}: there is no such file{ships}{did_you_mean(name, [*SHIPPED, *beside])}")
     return path

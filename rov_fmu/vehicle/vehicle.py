@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rov_fmu.files.kinds import VEHICLE_FILE, check_keys
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.toml_file import Toml, check, read_toml, told
 from rov_fmu.motion.layout import Layout
@@ -121,6 +122,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
     path = Path(path)
     data = read_toml(path, VehicleFileError)
+    check_keys(path, data, VEHICLE_FILE, VehicleFileError)
     context = {"folder": path.parent, "coming": coming}
     if "format" in data or "coefficients" not in data:
         if not data.keys() & _SECOND:

@@ -12,6 +12,7 @@ from tomlkit.items import Array, InlineTable, Item
 from rov_fmu.files.messages import brief, shown
 from rov_fmu.files.output import Output, write_whole
 from rov_fmu.files.reading import read_text
+from rov_fmu.files.seal import sealed
 from rov_fmu.motion.layout import Curve, Meta, Thruster
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
@@ -49,7 +50,8 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
         report = {"report": _seen_from(folder, made.report)} if made.report else {}
         head = {"tool": made.tool, "method": made.method, **report, **_lines("warnings", made.warnings)}
         document["provenance"] = {**head, "inputs": dict(made.inputs)}
-    return tomlkit.dumps(document)
+    text: str = tomlkit.dumps(document)
+    return sealed(text, "# {}") if vehicle.provenance else text
 
 
 def hardware(vehicle: Vehicle, entries: Mapping[str, Item]) -> dict[str, Any]:

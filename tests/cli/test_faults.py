@@ -69,7 +69,7 @@ def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(tmp_path: P
 def test_a_killed_identification_leaves_whole_files(tmp_path: Path) -> None:
     def arguments(folder: Path) -> list[str]:
         folder.mkdir()
-        return ["identify", str(TESTS), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
+        return ["identify", str(TESTS), "--force", "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
 
     started = time.monotonic()
     _succeeds(arguments(tmp_path / "reference"))
@@ -174,7 +174,7 @@ def test_an_identification_that_is_cancelled_as_it_works_loses_nothing(moment: b
         write_log(folder, str(n), clean(rov, HEAVE, plan).noisy(random))
     ours, theirs = os.openpty()
     process = start(
-        ["identify", str(folder), "-o", str(target), "--report", str(report)],
+        ["identify", str(folder), "--force", "-o", str(target), "--report", str(report)],
         environment={"TERM": "xterm", "NO_COLOR": "1"},
         stdout=theirs,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
@@ -304,7 +304,7 @@ def test_a_terminal_that_knows_ascii_alone_gets_every_line(name: str, tmp_path: 
     assert (process.returncode, out) == (2, "")
     assert said.isascii()
     assert said.startswith("rov-fmu: ")
-    assert said.endswith("No such file or directory\n")
+    assert ": there is no such file" in said
     assert said.count("\n") == 1
 
 

@@ -67,8 +67,8 @@ def test_an_unknown_name_is_one_line_with_those_that_ship(
 ) -> None:
     assert main([*command, "videorey"]) == 2
     ships = ", ".join(SHIPPED)
-    said = f"rov-fmu: videorey: there is no such file, and no vehicle of this name ships, only {ships}\n"
-    assert capsys.readouterr() == ("", said)
+    said = f"rov-fmu: videorey: there is no such file, and no vehicle of this name ships, only {ships}"
+    assert capsys.readouterr() == ("", f"{said}; did you mean videoray?\n")
 
 
 # ---- Quickly ---------------------------------------------------------------------------------------------------------

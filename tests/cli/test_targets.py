@@ -171,7 +171,7 @@ def test_two_files_are_written_both_or_neither(
 
     def run() -> int:
         if command == "identify":
-            return main(["identify", str(TESTS), "-o", str(first), "--report", str(second)])
+            return main(["identify", str(TESTS), "--force", "-o", str(first), "--report", str(second)])
         return main(["build", str(BARE), "--platform", "host", "-o", str(first), "--osp"])
 
     with monkeypatch.context() as patched:

@@ -102,7 +102,9 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
     with pytest.raises(DataFileError) as error:
         _table(tmp_path, "length [ft],tim [s]\n", time=MAYBE)
     assert len(str(error.value).splitlines()) == 2
-    with pytest.raises(DataFileError, match=r"'length \[m\]' is missing, and so is 'time \[s\]'"):
+    with pytest.raises(DataFileError, match=r"column 2: 'length \[m\]' is missing, and so is 'width \[m\]'"):
+        _table(tmp_path, "time [s]\n1\n", time=MAYBE, width=LENGTH)
+    with pytest.raises(DataFileError, match="the file is empty"):
         _table(tmp_path, "", time=MAYBE)
 
 

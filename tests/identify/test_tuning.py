@@ -98,8 +98,9 @@ def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
 @pytest.mark.parametrize(
     ("command", "V_ss", "Tau", "named"),
     [
-        (0.3, -0.2, 2.0, "V_ss = -0.2 m/s needs a thrust of -0.875"), (0.3, 0.0, 2.0, "other than 0"),
-        (-0.3, 0.2, 2.0, "but a command of -0.3 gives -0.59985 N"), (0.0, 0.2, 2.0, "not 0"),
+        (0.3, -0.2, 2.0, "V_ss = -0.2 m/s must be positive"), (0.3, 0.0, 2.0, "other than 0"),
+        (-0.3, 0.2, 2.0, "must be negative, for a command of -0.3 gives a thrust of -0.59985 N"),
+        (0.0, 0.2, 2.0, "not 0"),
         (30, 0.2, 2.0, "of 30 must"),
         (0.3, 0.2, 0.0, "above 0"), (0.3, 0.2, -1.0, "above 0"), (0.3, nan, 2.0, "V_ss"), (0.3, inf, 2.0, "V_ss"),
         (nan, 0.2, 2.0, "command"), (0.3, 0.2, nan, "Tau"), (0.3, 1e5, 2.0, "alpha_w"), (0.3, 0.2, 1e-9, "beta_w"),
@@ -182,9 +183,9 @@ def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
         (HEAVE, 0.08, 0.1, "heave: a command of 0.08 gives no thrust, it is within the dead band"),
         (HEAVE, -0.09, -0.1, "heave: a command of -0.09 gives no thrust, it is within the dead band"),
         (SWAY, -0.07, -0.1, "sway: a command of -0.07 gives no thrust, it is within the dead band"),
-        (HEAVE, -0.5, -0.1, "heave: V_ss = -0.1 m/s needs a thrust of 2 N, but a command of -0.5 gives -27.04 N; "
-                            "F_0 alone gives -0.186697 m/s"),
-        (SWAY, 0.5, -0.1, "sway: V_ss = -0.1 m/s needs a thrust of -0.8 N, but a command of 0.5 gives 13.52 N"),
+        (HEAVE, -0.5, -0.1, "heave: V_ss = -0.1 m/s must be below the -0.186697 m/s that F_0 alone gives, "
+                            "for a command of -0.5 gives a thrust of -27.04 N"),
+        (SWAY, 0.5, -0.1, "sway: V_ss = -0.1 m/s must be positive, for a command of 0.5 gives a thrust of 13.52 N"),
     ],
 )  # fmt: skip
 def test_what_no_tuning_of_a_direction_gives(axis: Axis, command: float, V_ss: float, reason: str) -> None:

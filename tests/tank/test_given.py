@@ -116,7 +116,9 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
         assert tests.given.rov.layout.kinds["sway"].keys == keys
     found = identify(tests).vehicle.rov
     assert found.response(SWAY, 0.5) == pytest.approx(k.response(SWAY, 0.5), rel=1e-3)
-    assert folder / "old.toml" in tests.files
+    inputs: list[Path] = []
+    load_tank_tests(folder, inputs.extend)
+    assert folder / "old.toml" in inputs
 
 
 # ---- Hardware tables -------------------------------------------------------------------------------------------------

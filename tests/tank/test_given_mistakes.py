@@ -199,7 +199,7 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
     starts = [
         "/rov.toml: known.m_rov.unit = 'lb'", "/rov.toml: windows.sway",
         "/log_yaw.csv, line 1", "/steady_heave.csv, line 3, column 'command [1]' = 0", "/steady_heave.csv, line 4",
-        "/steady_surge.csv, line 2", "/stedy_surge.csv: no name of a test", "/thrust_left.csv: no name of a test",
+        "/steady_surge.csv, line 2", "/stedy_surge.csv: no name of a test", "/thrust_left.csv: left is not a thrust c",
         "/thrust_rear.csv, line 3", "/rov.toml: known.I_r", "/rov.toml: known.R", "/rov.toml: known.gamma",
         ": no thrust_top*.csv",
     ]  # fmt: skip
@@ -217,7 +217,7 @@ def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
     assert [line[len(str(folder)) :].split(":")[0] for line in told] == [
         "/rov.toml", "/steady_roll.csv", "/thrust_any.csv, line 2, column 'force [N]' = 'x'",
     ]  # fmt: skip
-    assert "a curve" in told[1]
+    assert "roll is not an axis of any vehicle, only surge, sway, heave and yaw" in told[1]
 
 
 def check_lines(text: str, folder: Path) -> None:

@@ -196,7 +196,7 @@ BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
         "steady_surge.csv", "command [%],velocity [m/s],command [1]\n", ("line 1", "column 3", "[1]'", "before")
     ),
     "column missing": ("steady_surge.csv", "command [%]\n20\n", ("line 1", "'velocity [m/s]' is missing")),
-    "empty": ("steady_surge.csv", "", ("line 1", "'command [%]' is missing")),
+    "empty": ("steady_surge.csv", "", ("the file is empty",)),
     "header alone": ("steady_surge.csv", STEADY, ("line 1", "no rows")),
     "not UTF-8": ("steady_surge.csv", STEADY.encode() + b"20,\xb5\n", ("UTF-8", "byte 30")),
     "open quote": ("steady_surge.csv", STEADY + '20,"0.3\n', ("line 2",)),
@@ -213,8 +213,8 @@ BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
     "heading in heave": ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", ("line 1", "'depth [m]' or")),
     "unknown name": ("stedy_surge.csv", STEADY, ("no name of a test", "steady_")),
     "no axis": ("steady_sway.csv", STEADY, ("no thruster of the vehicle drives sway",)),
-    "unknown axis": ("steady_roll.csv", STEADY, ("no name of a test", "surge, heave or yaw")),
-    "no thruster": ("thrust_left.csv", STEADY, ("no name of a test", "rear or top")),
+    "unknown axis": ("steady_roll.csv", STEADY, ("roll is not an axis", "surge, heave and yaw")),
+    "no thruster": ("thrust_left.csv", STEADY, ("left is not a thrust curve", "rear and top")),
 }  # fmt: skip
 
 
@@ -321,7 +321,7 @@ def refused(folder: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[
     output = folder.parent / "out.toml"
     output.write_text("before", encoding="utf-8")
     there = sorted(folder.parent.rglob("*"))
-    assert main(["identify", str(folder), "-o", str(output)]) == 2
+    assert main(["identify", str(folder), "--force", "-o", str(output)]) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert len(err.splitlines()) == 1

@@ -405,7 +405,7 @@ def test_bad_table_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.C
 @pytest.mark.parametrize(
     ("content", "named"),
     [
-        (b"", ("line 1", "'command [%]'")),
+        (b"", ("the file is empty",)),
         (b"command [%],forward [m/s]\n", ("line 1", "no rows")),
         (b"command [%],forward [m/s]\n20,0.31 \xb5\n", ("UTF-8", "byte 34")),
     ],

@@ -1,0 +1,447 @@
+"""Mistakes of a user: one line that says what is wrong, what is allowed, and what was probably meant."""
+
+import re
+import shutil
+import sys
+import webbrowser
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.build import chosen_platforms
+from rov_fmu.cli import main
+from rov_fmu.export.compile import BuildError
+from rov_fmu.files.messages import did_you_mean, similar
+from rov_fmu.vehicle.shipped import SHIPPED
+from tests.commands import ALONE, BARE, ROOT, TESTS
+
+FIRST = ROOT / "tests" / "vehicle" / "first_version.toml"
+Capsys = pytest.CaptureFixture[str]
+
+
+def said(arguments: list[str], capsys: Capsys) -> str:
+    """The one line on standard error of a command that refuses."""
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1, err
+    return err.rstrip("\n")
+
+
+# ---- One way to guess what was meant ---------------------------------------------------------------------------------
+
+
+def test_names_are_similar_whatever_their_case() -> None:
+    assert similar("BlueROV2", SHIPPED) == ["bluerov2"]
+    assert similar("a_tt", ["b_t", "a_t", "T"]) == ["a_t"]
+    assert similar("unlike", ["a_t"]) == []
+    assert similar("name", ["NAME", "Name", "other"], 3) == ["NAME", "Name"]
+
+
+def test_other_words_stand_for_names() -> None:
+    also = {"macos": "darwin64 or aarch64-darwin"}
+    assert did_you_mean("MacOS", ["win64"], also=also) == "; did you mean darwin64 or aarch64-darwin?"
+    assert did_you_mean("win65", ["win64"], also=also) == "; did you mean win64?"
+    assert did_you_mean("amiga", ["win64"], also=also) == ""
+
+
+# ---- The command line ------------------------------------------------------------------------------------------------
+
+_SHIPS = "there is no such file, and no vehicle of this name ships, only " + ", ".join(SHIPPED)
+_PLATFORMS = "host, linux64, linux32, aarch64-linux, win64, win32, darwin64, aarch64-darwin"
+_COMMAND = "must be a number within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3"
+_HEAVE = ["tune", "videoray", "--axis", "heave"]
+# What is typed in a folder with the files of `FILES`, and what is said.
+TYPED: dict[str, tuple[list[str], str]] = {
+    "a vehicle misspelt": (["build", "videorey"], f"videorey: {_SHIPS}; did you mean videoray?"),
+    "a vehicle in capital letters": (["fly", "BlueROV2"], f"BlueROV2: {_SHIPS}; did you mean bluerov2?"),
+    "a vehicle with a hyphen": (
+        ["tables", "bluerov2-heavy"],
+        f"bluerov2-heavy: {_SHIPS}; did you mean bluerov2_heavy?",
+    ),
+    "a ghost misspelt": (["fly", "--against", "videorey"], f"videorey: {_SHIPS}; did you mean videoray?"),
+    "a file misspelt": (["build", "mime.toml"], "mime.toml: there is no such file; did you mean mine.toml?"),
+    "a file without suffix": (["build", "mine"], f"mine: {_SHIPS}; did you mean mine.toml?"),
+    "no vehicle at all": (["build", ""], "VEHICLE is empty: it must be the path of a vehicle file, or the name of"),
+    "a folder for a vehicle": (["build", "."], ".: cannot be read: is a folder, and must be a vehicle file (TOML)"),
+    "macos": (
+        ["build", "--platform", "macos"],
+        f"'--platform': 'macos' must be one of {_PLATFORMS}; did you mean darwin64 or aarch64-darwin?",
+    ),
+    "windows": (
+        ["build", "--platform", "Windows"],
+        f"'--platform': 'Windows' must be one of {_PLATFORMS}; did you mean win64?",
+    ),
+    "a platform by its name in FMI 3.0": (
+        ["build", "--platform", "x86_64-windows"],
+        f"'x86_64-windows' must be one of {_PLATFORMS}; did you mean win64?",
+    ),
+    "a backend in capital letters": (
+        ["build", "--backend", "PythonFMU"],
+        "'--backend': 'PythonFMU' must be one of native, pythonfmu; did you mean pythonfmu?",
+    ),
+    "FMI 3.0": (["build", "--fmi", "3.0"], "'--fmi': '3.0' must be one of 2, 3; did you mean 3?"),
+    "an interface in short": (
+        ["prove", "x.fmu", "--interface", "cs"],
+        "'cs' must be one of co-simulation, model-exchange; did you mean co-simulation?",
+    ),
+    "an axis in capital letters": (
+        ["tune", "videoray", "--axis", "Heave"],
+        "'--axis': 'Heave' must be one of surge, sway, heave, yaw; did you mean heave?",
+    ),
+    "an axis by its velocity": (["tune", "videoray", "--axis", "w"], "did you mean heave?"),
+    "no axis": (["tune", "videoray"], "Missing option '--axis'. Choose one of surge, sway, heave, yaw."),
+    "workers in words": (
+        ["study", "plan.toml", "-o", "r", "--workers", "x"],
+        "Invalid value for '--workers': 'x' must be a whole number from 1 to 1024",
+    ),
+    "half a worker": (["study", "plan.toml", "-o", "r", "--workers", "2.5"], "'2.5' must be a whole number from 1"),
+    "no workers": (["study", "plan.toml", "-o", "r", "--workers", "0"], "'0' must be a whole number from 1 to 1024"),
+    "very many workers": (["study", "plan.toml", "-o", "r", "--workers", "9" * 400], "must be a whole number from 1"),
+    "a tolerance in words": (["prove", "x.fmu", "--tolerance", "x"], "'--tolerance': 'x' must be a number above 0"),
+    "no tolerance": (["prove", "x.fmu", "--tolerance", "0"], "'--tolerance': '0' must be a number above 0"),
+    "percent": ([*_HEAVE, "--command", "30%", "--v-ss", "0.2"], f"'--command': '30%' {_COMMAND}"),
+    "a decimal comma": ([*_HEAVE, "--command", "0,3", "--v-ss", "0.2"], f"'--command': '0,3' {_COMMAND}"),
+    "percent without a sign": (
+        [*_HEAVE, "--command", "30", "--v-ss", "0.2"],
+        "heave: a command of 30 must be within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3",
+    ),
+    "no number": (
+        [*_HEAVE, "--command", "0.3", "--v-ss", "nan"],
+        "'--v-ss': 'nan' must be a number (V_ss in m/s or rad/s)",
+    ),
+    "a velocity against the command": (
+        ["tune", "videoray", "--axis", "surge", "--command", "-0.5", "--v-ss", "0.6"],
+        "tune: surge: V_ss = 0.6 m/s must be negative, for a command of -0.5 gives a thrust of -12.0805 N",
+    ),
+    "a velocity astern ahead": (
+        ["tune", "videoray", "--axis", "surge", "--command", "0.5", "--v-ss", "-0.6"],
+        "tune: surge: V_ss = -0.6 m/s must be positive, for a command of 0.5 gives a thrust of 12.0805 N",
+    ),
+    "points without a velocity": (
+        [*_HEAVE, "--points", "taus.csv"],
+        "taus.csv: no row has a velocity, which alpha is tuned by: there is no V_ss",
+    ),
+    "a vehicle for the points": ([*_HEAVE, "--points", "mine.toml"], "mine.toml, line 1 = '# VideoRay Pro 4 as "),
+    "a recording for a vehicle": (["fly", "log.csv"], "log.csv: must be a vehicle file (TOML), and not a recording"),
+    "a recording for a ghost": (
+        ["fly", "--against", "log.csv"],
+        "log.csv: must be a vehicle file (TOML), and not a recording or a table (CSV); to see a recording beside a "
+        "vehicle, run `rov-fmu fly VEHICLE` and choose the recording on the page",
+    ),
+    "an autopilot's log for a ghost": (
+        ["fly", "--against", "d.tlog"],
+        "and not an autopilot's log; `rov-fmu identify` reads it in a folder of tank tests, as log_*",
+    ),
+    "an FMU for a vehicle": (["build", "x.fmu"], "x.fmu: must be a vehicle file (TOML), and not an FMU"),
+    "a plan for a vehicle": (
+        ["build", "plan.toml"],
+        "plan.toml: must be a vehicle file (TOML), and not the plan of a study (TOML); `rov-fmu study` carries it out",
+    ),
+    "rov.toml for a vehicle": (
+        ["build", "rov.toml"],
+        "rov.toml: must be a vehicle file (TOML), and not the rov.toml of "
+        "a folder of tank tests; `rov-fmu identify FOLDER -o VEHICLE.toml` makes a vehicle file",
+    ),
+    "a vehicle for a plan": (
+        ["study", "mine.toml", "-o", "r"],
+        "mine.toml: must be the plan of a study (TOML), and not "
+        "a vehicle file (TOML); `rov-fmu build` makes an FMU of it, and a plan names it",
+    ),
+    "an FMU for a plan": (["study", "x.fmu", "-o", "r"], "x.fmu: must be the plan of a study (TOML), and not an FMU"),
+    "a vehicle for an FMU": (
+        ["prove", "mine.toml"],
+        "mine.toml: must be an FMU, and not a TOML file; `rov-fmu build` makes an FMU of a vehicle file",
+    ),
+    "a file for a folder": (["identify", "mine.toml"], "mine.toml: is a file, and must be a folder with rov.toml"),
+    "an FMU written to a vehicle file": (
+        ["build", "-o", "mine.toml"],
+        "mine.toml: would be an FMU, but .toml is the suffix of a TOML file",
+    ),
+    "a vehicle written to an FMU": (
+        ["identify", str(TESTS), "-o", "x.fmu"],
+        "x.fmu: would be a vehicle file (TOML), but .fmu is the suffix of an FMU",
+    ),
+    "a report written to a recording": (
+        ["identify", str(TESTS), "--report", "log.csv"],
+        "log.csv: would be a page (HTML), but",
+    ),
+    "a page written to a vehicle file": (["fly", "-o", "mine.toml"], "mine.toml: would be a page (HTML), but .toml"),
+    "a tuned vehicle written to a table": (
+        [*_HEAVE, "--command", "0.3", "--v-ss", "0.2", "-o", "log.csv"],
+        "log.csv: would be a vehicle file (TOML), but .csv",
+    ),
+    "an old vehicle written to an FMU": (["convert", str(FIRST), "-o", "x.fmu"], "x.fmu: would be a vehicle file"),
+}
+_PLAN = 'vehicle = "{}"\nstop_time = 1.0\nstep = 0.1\nruns = 2\n[figures]\na = "max(u)"\n'
+FILES = {
+    "mine.toml": ALONE,
+    "plan.toml": _PLAN.format("videoray"),
+    "rov.toml": (TESTS / "rov.toml").read_text(encoding="utf-8"),
+    "log.csv": "time [s],command [%],depth [m]\n0,30,0\n",
+    "taus.csv": "command [%],time constant [s]\n20,3\n",
+    "x.fmu": "no archive",
+}
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with FILES."""
+    monkeypatch.chdir(tmp_path)
+    for name, text in FILES.items():
+        Path(name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize("case", TYPED)
+def test_what_is_typed_wrong_is_told_in_a_line(case: str, here: Path, capsys: Capsys) -> None:
+    arguments, told = TYPED[case]
+    assert told in said(arguments, capsys)
+    assert {path.name: path.read_text(encoding="utf-8") for path in here.iterdir()} == FILES
+
+
+def test_platforms_of_a_program_are_guessed_too() -> None:
+    with pytest.raises(BuildError, match=r"^there is no platform macos, only host, .*; did you mean darwin64 or aa"):
+        chosen_platforms(["macos"])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is of Linux")
+@pytest.mark.parametrize("arguments", [["build", str(BARE), "-o"], ["fly", str(BARE), "-o"]])
+def test_a_folder_that_takes_no_files_is_told_before_the_work(arguments: list[str], capsys: Capsys) -> None:
+    told = said([*arguments, "/proc/x"], capsys)
+    assert told == "rov-fmu: /proc/x: cannot be written: the folder /proc takes no new files"
+
+
+def test_without_a_browser_the_page_is_told_and_what_to_do(monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    assert main(["fly", str(BARE)]) == 0
+    out, err = capsys.readouterr()
+    (page,) = map(Path, out.splitlines())
+    assert opened == [page.as_uri()]
+    assert page.is_file()
+    shutil.rmtree(page.parent)
+    assert err.startswith("rov-fmu: no browser could be opened: open this file, ")
+    assert err.count("\n") == 1
+    assert "-o PAGE.html" in err
+
+
+def test_a_browser_that_opens_needs_no_words(monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
+    monkeypatch.setattr(webbrowser, "open", lambda _: True)
+    assert main(["fly", str(BARE)]) == 0
+    out, err = capsys.readouterr()
+    shutil.rmtree(Path(out.strip()).parent)
+    assert err == ""
+
+
+# ---- Vehicle files, rov.toml, plans ----------------------------------------------------------------------------------
+
+# What is replaced in the file, by what, and what the one line says.
+KEYS: dict[str, tuple[str, str, str]] = {
+    "a_tt": (
+        "a_t = ",
+        "a_tt = ",
+        "curves.rear.a_tt: there is no such key, only a_t, b_t, a_t_reverse, b_t_reverse, c_0, "
+        "c_0_reverse, T, description, equation, together; did you mean a_t?",
+    ),
+    "capital letters": (
+        "a_d = ",
+        "A_D = ",
+        "axes.surge.A_D: there is no such key, only m_a, a_d, b_d, a_d_reverse, "
+        "b_d_reverse, F_0, alpha, beta; did you mean a_d?",
+    ),
+    "a curve": (
+        'curve = "rear"',
+        'curve = "Rear"',
+        "thruster.l.curve = 'Rear': there is no such curve, only rear, top; did you mean rear?",
+    ),
+    "an arm": (
+        'arm = "port"',
+        'arm = "prot"',
+        "thruster.l.arm = 'prot': must be 'port' or 'starboard'; did you mean po",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", KEYS)
+def test_keys_of_a_vehicle_file_are_guessed(case: str, here: Path, capsys: Capsys) -> None:
+    old, new, told = KEYS[case]
+    text = ALONE.replace(old, new, 1)
+    assert text != ALONE
+    (here / "mine.toml").write_text(text, encoding="utf-8")
+    assert told in said(["build", "mine.toml", "-o", "new.fmu"], capsys)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('against = "videoray"', 'against = "VideoRay"', "against = 'VideoRay': must be a vehicle file, "),
+        ('against = "videoray"', 'against = "videorey"', "; did you mean videoray?"),
+        (
+            "name = ",
+            "nmae = ",
+            "vehicle.nmae: there is no such key, only name, identifier, version, description, source; "
+            "did you mean name?",
+        ),
+        (
+            "heave = [0.2",
+            "haeve = [0.2",
+            "windows.haeve: there is no such key, only thrust_rear, thrust_top, surge, heave, yaw; did you mean heave?",
+        ),
+    ],
+)
+def test_keys_of_rov_toml_are_guessed(old: str, new: str, told: str, tmp_path: Path, capsys: Capsys) -> None:
+    line = _identified(tmp_path, {"rov.toml": FILES["rov.toml"].replace(old, new, 1)}, capsys)
+    assert told in line
+    assert "did you mean" in line
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('"videoray"', '"BlueROV2"', "vehicle = 'BlueROV2': there is no such file, as seen from the plan, "),
+        ("runs = 2", 'runs = 2\nsampler = "Sobol"', "sampler = 'Sobol': must be 'grid', 'sobol', "),
+        (
+            "[figures]",
+            "[vary]\na_d_u = { unifrom = [1.0, 2.0] }\n[figures]",
+            "vary.a_d_u.unifrom: there is no such key",
+        ),
+    ],
+)
+def test_keys_and_words_of_a_plan_are_guessed(old: str, new: str, told: str, here: Path, capsys: Capsys) -> None:
+    pytest.importorskip("dask")
+    (here / "plan.toml").write_text(FILES["plan.toml"].replace(old, new, 1), encoding="utf-8")
+    line = said(["study", "plan.toml", "-o", "r"], capsys)
+    assert told in line
+    assert re.search(r"; did you mean (bluerov2|sobol|uniform)\?$", line)
+
+
+# ---- Tables and logs -------------------------------------------------------------------------------------------------
+
+_ROWS = "".join(f"{n / 10:.1f},30,{n / 100:.2f}\n" for n in range(50))
+_LOG = "time [s],command [%],depth [m]\n" + _ROWS
+_NAMED = "is not an axis of this vehicle"
+# A file of tank tests, and what the one line says of it.
+TABLES: dict[str, tuple[str, str, str]] = {
+    "a log without a command": (
+        "log_heave.csv",
+        "time [s],depth [m]\n" + _ROWS,
+        "line 1: no column of commands: u_l, u_r, u_t or command, each in [%], [1] or [us]",
+    ),
+    "a command misspelt": (
+        "log_heave.csv",
+        _LOG.replace("command", "comand"),
+        "or command, each in [%], [1] or [us]; is it the column 'comand [%]'?",
+    ),
+    "a time by another name": (
+        "log_heave.csv",
+        _LOG.replace("time", "timestamp"),
+        "column 4: 'time [s]' is missing; is it the column 'timestamp [s]'?",
+    ),
+    "a log of roll": (
+        "log_roll_1.csv",
+        _LOG.replace("depth [m]", "roll [deg]"),
+        f"log_roll_1.csv, line 1: column 'command [%]' is the command of one axis, but roll {_NAMED}: the "
+        "name of the file must be log_surge*.csv or log_heave*.csv or log_yaw*.csv",
+    ),
+    "a log of an axis misspelt": (
+        "log_haeve.csv",
+        _LOG,
+        f"but haeve {_NAMED}: the name of the file must be log_surge*.csv "
+        "or log_heave*.csv or log_yaw*.csv; did you mean heave?",
+    ),
+    "an empty log": ("log_heave.csv", "", "log_heave.csv: the file is empty"),
+    "an empty table": ("steady_surge.csv", "\n \n", "steady_surge.csv: the file is empty"),
+    "a table without a header": (
+        "steady_surge.csv",
+        "20,0.3\n30,0.4\n",
+        "line 1 = '20, 0.3': the first line must be a "
+        "header that names the columns, such as command [%], velocity [m/s]",
+    ),
+    "a log without a header": (
+        "log_heave.csv",
+        _ROWS,
+        "line 1 = '0.0, 30, 0.00': the first line must be a header that",
+    ),
+    "a column misspelt": (
+        "steady_surge.csv",
+        "comand [%],velocity [m/s]\n20,0.3\n",
+        "column 1 = 'comand [%]': there is no such column, but command [%], velocity [m/s]; did you mean command [%]?",
+    ),
+    "semicolons below commas": (
+        "steady_surge.csv",
+        "command [%],velocity [m/s]\n20;30,0.3\n",
+        "= '20;30': must be a number; what separates the cells must be the same as in the header",
+    ),
+    "a table of roll": ("steady_roll.csv", "", f"steady_roll.csv: roll {_NAMED}, only surge, heave and yaw"),
+    "a table of an axis misspelt": (
+        "steady_serge.csv",
+        "",
+        f"serge {_NAMED}, only surge, heave and yaw; did you mean surge?",
+    ),
+    "a curve misspelt": (
+        "thrust_raer.csv",
+        "",
+        "raer is not a thrust curve of this vehicle, only rear and top; did you mean rear?",
+    ),
+    "a kind of test misspelt": ("stedy_surge.csv", "", "then _ and any printable characters; did you mean steady?"),
+}
+
+
+def _identified(folder: Path, files: Mapping[str, str], capsys: Capsys) -> str:
+    """What identification says of the VideoRay's tank tests with other files among them."""
+    tests = Path(shutil.copytree(TESTS, folder / "tests"))
+    for name, text in files.items():
+        (tests / name).write_text(text, encoding="utf-8")
+    return said(["identify", str(tests)], capsys)
+
+
+@pytest.mark.parametrize("case", TABLES)
+def test_a_wrong_table_is_told_in_a_line(case: str, tmp_path: Path, capsys: Capsys) -> None:
+    name, text, told = TABLES[case]
+    assert told in _identified(tmp_path, {name: text}, capsys)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "is empty"),
+        ("0,1\n1,2\n", "the first line must be a header that names the columns: the time, and then var"),
+    ],
+)
+def test_wrong_inputs_of_a_plan_are_told_in_a_line(text: str, told: str, here: Path, capsys: Capsys) -> None:
+    pytest.importorskip("dask")
+    plan = FILES["plan.toml"].replace("runs = 2", 'sampler = "grid"\ninput_file = { path = "in.csv" }')
+    (here / "plan.toml").write_text(plan, encoding="utf-8")
+    (here / "in.csv").write_text(text, encoding="utf-8")
+    assert f"in.csv: {told}" in said(["study", "plan.toml", "-o", "r"], capsys)
+
+
+# ---- Tuning ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ["bluerov2", "--axis", "sway", "--command", "0.15", "--v-ss", "5"],
+            ["alpha_v = 107 is not within the usual 0.5 ... 2: the thrust would be 107 times that of the"],
+        ),
+        (["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.05"], ["alpha_u = 0.102"]),
+        (
+            ["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.5", "--tau", "500"],
+            ["beta_u = 0.00114 is not within the usual 0.05 ... 1.2: the vehicle would move as if its inertia were"],
+        ),
+        (["videoray", "--axis", "heave", "--command", "0.3", "--v-ss", "2", "--tau", "9000"], ["alpha_w", "beta_w"]),
+        (["videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.5", "--tau", "0.6"], []),
+        (["videoray", "--axis", "yaw", "--command", "0.3", "--v-ss", "1.5", "--tau", "2"], []),
+    ],
+)
+def test_an_implausible_tuning_is_told_and_why(arguments: list[str], told: list[str], capsys: Capsys) -> None:
+    assert main(["tune", *arguments]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == len(told)
+    for line, words in zip(lines, told, strict=True):
+        assert line.startswith(f"rov-fmu: warning: {words}")
+        assert "Check the wanted" in line

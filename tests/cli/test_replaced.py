@@ -1,0 +1,136 @@
+"""Files that `identify` replaces: those that it wrote itself and nobody changed, and all others only with --force."""
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.files.output import WriteError
+from rov_fmu.files.seal import check_replaced, sealed
+from rov_fmu.identify import identify as identification
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import REFIT, TESTS
+
+Capsys = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what the command writes."""
+    folder = tmp_path_factory.mktemp("made")
+    assert _identify(folder) == 0
+    return folder
+
+
+def _identify(folder: Path, *options: str) -> int:
+    return main(["identify", str(TESTS), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html"), *options])
+
+
+def _edited(path: Path) -> bytes:
+    """As somebody leaves a file who changes it by hand."""
+    changed = path.read_bytes().replace(b"VideoRay", b"My own VideoRay", 1)
+    path.write_bytes(changed)
+    return changed
+
+
+def test_what_nobody_changed_is_replaced_and_told(made: Path, tmp_path: Path, capsys: Capsys) -> None:
+    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    capsys.readouterr()
+    assert _identify(folder) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert out.splitlines()[:2] == [
+        f"{folder / name}: replaced a file that was as identify wrote it" for name in ("rov.toml", "r.html")
+    ]
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert load_vehicle(folder / "rov.toml").provenance
+
+
+@pytest.mark.parametrize(
+    ("name", "made_by_hand", "reason"),
+    [
+        ("rov.toml", False, "has changed since identify wrote it"),
+        ("r.html", False, "has changed since identify wrote it"),
+        ("rov.toml", True, "does not begin with a digest by identify, so it may be made by hand"),
+        ("r.html", True, "does not begin with a digest by identify, so it may be made by hand"),
+    ],
+)
+def test_the_work_of_others_is_refused_before_anything_is_computed(
+    name: str,
+    made_by_hand: bool,
+    reason: str,
+    made: Path,
+    tmp_path: Path,
+    capsys: Capsys,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+    if made_by_hand:
+        (folder / name).write_bytes(b"\xff my notes")
+    own = _edited(folder / name) if not made_by_hand else b"\xff my notes"
+    monkeypatch.setattr(identification, "identify", lambda *_: pytest.fail("it is computed before it is refused"))
+    monkeypatch.setattr(
+        "rov_fmu.tank.tank_tests.read_rows", lambda *_: pytest.fail("tests are read before it is refused")
+    )
+    capsys.readouterr()
+    assert _identify(folder) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == f"rov-fmu: {folder / name}: cannot be written: the file there {reason}; --force replaces it\n"
+    assert (folder / name).read_bytes() == own
+    assert len([*folder.iterdir()]) == 2
+
+
+def test_force_replaces_the_work_of_others_and_tells(made: Path, tmp_path: Path, capsys: Capsys) -> None:
+    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+    _edited(folder / "rov.toml")
+    (folder / "r.html").write_text("my notes", encoding="utf-8")
+    capsys.readouterr()
+    assert _identify(folder, "--force") == 0
+    assert capsys.readouterr().out.splitlines()[:2] == [
+        f"{folder / 'rov.toml'}: replaced a file that has changed since identify wrote it",
+        f"{folder / 'r.html'}: replaced a file that does not begin with a digest by identify, so it may be made "
+        "by hand",
+    ]
+    assert [path.read_bytes() for path in sorted(folder.iterdir())] == [p.read_bytes() for p in sorted(made.iterdir())]
+
+
+def test_force_is_no_leave_to_overwrite_an_input(tmp_path: Path, capsys: Capsys) -> None:
+    tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
+    before = (tests / "rov.toml").read_bytes()
+    assert main(["identify", str(tests), "--force", "-o", str(tests / "rov.toml")]) == 2
+    assert "would overwrite" in capsys.readouterr().err
+    assert (tests / "rov.toml").read_bytes() == before
+
+
+def test_a_vehicle_that_was_tuned_is_not_replaced(made: Path, tmp_path: Path, capsys: Capsys) -> None:
+    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+    rov = str(folder / "rov.toml")
+    assert main(["tune", rov, "--axis", "heave", "--command", "0.3", "--v-ss", "0.2", "-o", rov]) == 0
+    capsys.readouterr()
+    assert _identify(folder) == 2
+    assert "rov.toml: cannot be written: the file there has changed since identify wrote it" in capsys.readouterr().err
+
+
+def _check(paths: Sequence[Path]) -> list[str]:
+    return check_replaced(paths, force=False)
+
+
+def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "some.toml"
+    assert _check([path]) == []
+    text = sealed("a = 1\nb = 2\n", "# {}")
+    for whole in (text, text.replace("\n", "\r\n"), f"\ufeff{text}"):
+        path.write_bytes(whole.encode())
+        assert _check([path]) == [f"{path}: replaced a file that was as identify wrote it"]
+    for other in (text + "\n", text.replace("a", "c", 1), text.partition("\n")[2], f"\n{text}", "", text[:40]):
+        path.write_bytes(other.encode())
+        with pytest.raises(WriteError):
+            _check([path])
+
+
+def test_the_vehicle_that_ships_is_as_identify_wrote_it() -> None:
+    assert _check([REFIT]) == [f"{REFIT}: replaced a file that was as identify wrote it"]
