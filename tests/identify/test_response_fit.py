@@ -74,7 +74,11 @@ def test_drag_by_direction_where_the_points_tell_it(sway: Rov) -> None:
     assert fit.rms("V_ss") < 0.02
 
 
-@pytest.mark.parametrize("seeds", [range(1, 5), pytest.param(range(100), marks=pytest.mark.long)], ids=len)
+@pytest.mark.parametrize(
+    "seeds",
+    [range(1, 5), pytest.param(range(25), marks=pytest.mark.long), pytest.param(range(100), marks=pytest.mark.weekly)],
+    ids=len,
+)
 def test_drag_alike_both_ways_stays_so(seeds: range, sway: Rov) -> None:
     """3 % scatter: drag by direction in one of ten at most."""
     fits = [fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0), 0.03, seed), sway) for seed in seeds]
