@@ -240,9 +240,8 @@ def _run(binaries: Binaries, name: str, folder: Path) -> np.ndarray:
         pytest.skip(f"{name}: {reason}")
     program = folder / f"host-{name}-{binaries.fmi}{machine.suffix}"
     # With the flags of the binaries, so that the compiler finds the C library that it built for them.
-    flags = ("-target", machine.target, "-g0", "-s", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables")
-    if not machine.suffix:
-        flags += ("-ldl",)
+    of_binaries = ("-g0", "-s", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables")
+    flags = ("-target", machine.target, *of_binaries, *(() if machine.suffix else ("-ldl",)))
     compile_c(Path(__file__).with_name("host.c"), program, binaries.folder / "sources", *flags)
     library = shutil.copy(binaries.of(name), folder / f"{name}-{binaries.fmi}{PLATFORMS[name].suffix}")
     environment = os.environ | {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
