@@ -90,3 +90,18 @@ def start(
         [sys.executable, "-m", "rov_fmu", *arguments],
         cwd=ROOT, env=inherited | dict(environment or {}), stderr=subprocess.PIPE, text=True, **how,
     )  # fmt: skip
+
+
+def endless_compiler(folder: Path) -> dict[str, str]:
+    """The environment in which a build uses a compiler that never ends.
+
+    The compiler has a child of its own, whose process number it writes into the file `number` of this folder.
+    """
+    zig = folder / "endless" / "ziglang" / "zig"
+    zig.parent.mkdir(parents=True)
+    zig.with_name("__init__.py").touch()
+    zig.write_text(
+        f"#!/bin/sh\nsleep 6000 &\necho $! > '{folder}/n'\nmv '{folder}/n' '{folder}/number'\nwait\n", encoding="utf-8"
+    )
+    zig.chmod(0o755)
+    return {"PYTHONPATH": str(zig.parent.parent)}

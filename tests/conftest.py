@@ -19,10 +19,16 @@ from tests.vehicles import EVERYTHING
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Properties: the same examples in every run of the default tests, fresh ones in the long run."""
+    """Let Hypothesis try the same examples in every run of the default tests, and fresh ones in the other runs."""
     settings.register_profile("same", derandomize=True, database=None, deadline=None)
     settings.register_profile("fresh", derandomize=False, database=None, deadline=None, print_blob=True)
-    settings.load_profile("fresh" if config.option.markexpr == "long" else "same")
+    settings.load_profile("fresh" if config.option.markexpr in ("long", "weekly") else "same")
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Take a weekly test out of the long ones, to which another of its parameters may belong."""
+    if item.get_closest_marker("weekly"):
+        item.own_markers = [mark for mark in item.own_markers if mark.name != "long"]
 
 
 @pytest.fixture(scope="session")
@@ -43,7 +49,9 @@ Made = Callable[[str, Callable[[Path], object]], Path]
 def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory) -> Made:
     """A folder that is made once a run, by the worker that needs it first; tests only read it."""
     own = tmp_path_factory.getbasetemp()
-    of_all = own.parent if hasattr(pytestconfig, "workerinput") else own  # a run inside a worker is a run of its own
+    of_run = own.parent if hasattr(pytestconfig, "workerinput") else own  # a run inside a worker is a run of its own
+    of_all = of_run / "made once"  # apart from the folders that mktemp() names
+    of_all.mkdir(exist_ok=True)
 
     def made(name: str, fill: Callable[[Path], object]) -> Path:
         folder, draft = of_all / name, tmp_path_factory.mktemp("draft")

@@ -17,6 +17,7 @@ from math import hypot, pi, sin
 from pathlib import Path
 
 import pytest
+import tomlkit
 
 from docs import reference
 from rov_fmu import __version__
@@ -30,6 +31,7 @@ from tests.vehicles import VEHICLES
 
 State = dict[str, float]
 
+WEEKLY = ".github/workflows/weekly.yml"
 README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
 PAGES = [
     *(README, ROOT / "CONTRIBUTING.md", CHANGELOG),
@@ -308,6 +310,20 @@ def test_workflow_runs_the_two_commands() -> None:
     oldest = re.search(r'requires-python = ">=([\d.]+)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert oldest
     assert f'python: ["{oldest[1]}", ' in workflow
+
+
+def test_every_set_of_tests_is_run_and_told() -> None:
+    """The long tests and the importers on every change, the exhaustive tests every week."""
+    lines_of = {name: (ROOT / name).read_text(encoding="utf-8").splitlines() for name in (".ci/run", WEEKLY)}
+    found = tomlkit.parse((ROOT / "pyproject.toml").read_text(encoding="utf-8")).unwrap()["tool"]["pytest"]
+    markers = {marker.partition(":")[0] for marker in found["ini_options"]["markers"]}
+    assert markers == {"long", "interop", "weekly"}
+    assert found["ini_options"]["addopts"].endswith("-m 'not long and not weekly and not interop'")
+    assert {"pytest -rs -m long", "pytest -rs -m interop"} <= {*lines_of[".ci/run"]}
+    assert not any("-m weekly" in line and not line.startswith("#") for line in lines_of[".ci/run"])
+    assert {"  schedule:", "      - run: pytest -rs -m weekly", "      - run: .ci/run"} <= {*lines_of[WEEKLY]}
+    contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert all(f"`pytest -m {marker}`" in contributing for marker in markers)
 
 
 @pytest.mark.long

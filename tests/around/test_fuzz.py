@@ -257,8 +257,14 @@ def test_every_defect_has_a_place_to_be_planted(vehicle: Vehicle) -> None:
     assert [name for name, (_, fmi, file, line, *_) in every if sources[fmi][file].count(line) != 1] == []
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("name", list(EVERY_PLANTED))
+# Two of each vehicle and version of FMI; all of them in the weekly tests.
+_SOME = {name for planted in (PLANTED, PLANTED_IN_HEAVY, PLANTED_IN_FMI3) for name in (min(planted), max(planted))}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.long if n in _SOME else pytest.mark.weekly) for n in EVERY_PLANTED],
+)
 def test_a_planted_defect_is_found_within_a_minute(corpus: Path, tmp_path: Path, name: str) -> None:
     vehicle, fmi, file, line, planted, told = EVERY_PLANTED[name]
     sources = dict(native_content(load_vehicle(command.VEHICLES[vehicle]), fmi=fmi).sources)

@@ -1,5 +1,7 @@
 """Single changes to operators and constants that the tests must notice. All of them: python -m tests.mutants."""
 
+from collections.abc import Sequence
+
 import pytest
 
 from tests import mutants
@@ -37,8 +39,15 @@ def test_a_mutant_is_one_change(file: str, before: str, after: set[str]) -> None
     }
 
 
-@pytest.mark.long
-def test_most_of_a_sample_are_killed(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("sample", "places"),
+    [
+        pytest.param(6, ["rov_fmu/motion/riccati.py"], marks=pytest.mark.long),
+        pytest.param(16, mutants.PLACES, marks=pytest.mark.weekly),
+    ],
+    ids=["of a file with quick tests", "of all files"],
+)
+def test_most_of_a_sample_are_killed(sample: int, places: Sequence[str], capsys: pytest.CaptureFixture[str]) -> None:
     """Every change of the code draws another sample, and a small one, so the bound leaves room."""
-    arguments = ["--sample", "16", "--seed", "16", "--jobs", "2", "--least", "0.5"]
+    arguments = ["--sample", str(sample), "--seed", "16", "--jobs", "2", "--least", "0.5", *places]
     assert mutants.main(arguments) == 0, capsys.readouterr().out

@@ -10,8 +10,9 @@ from rov_fmu.identify.slips import slips
 from rov_fmu.tank.recording import Recording
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(n, marks=pytest.mark.weekly if n else pytest.mark.long) for n in range(3)]
+)
 def test_nothing_is_said_of_a_dive_by_hand_with_all_axes_at_once(seed: int) -> None:
     swum, k = dive(seed=seed), bluerov2()
     outputs = {name: (output - 1500.0) / 400.0 for name, output in swum.outputs.items()}

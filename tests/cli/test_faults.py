@@ -38,9 +38,15 @@ def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> 
     process.communicate(timeout=300)
 
 
-def _moments(seconds: float) -> list[float | None]:
+def _moments(seconds: float, number: int) -> list[float | None]:
     """When to kill a command that takes so many seconds: as it writes, then more often near its end."""
-    return [None, *(seconds * (n / 20) ** 0.5 for n in range(1, 20))]
+    return [None, *(seconds * (n / number) ** 0.5 for n in range(1, number))]
+
+
+_few_or_many = pytest.mark.parametrize(
+    "number", [pytest.param(5, marks=pytest.mark.long), pytest.param(20, marks=pytest.mark.weekly)]
+)
+"""At how many moments a command is killed."""
 
 
 def _succeeds(arguments: list[str]) -> None:
@@ -49,15 +55,15 @@ def _succeeds(arguments: list[str]) -> None:
     assert process.returncode == 0
 
 
-@pytest.mark.long
-def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(tmp_path: Path) -> None:
+@_few_or_many
+def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(number: int, tmp_path: Path) -> None:
     reference, target = tmp_path / "reference.fmu", tmp_path / "target" / "rov.fmu"
     target.parent.mkdir()
     started = time.monotonic()
     arguments = ["build", str(BARE), "--platform", "host", "-o"]
     _succeeds([*arguments, str(reference)])
     took = time.monotonic() - started
-    for moment in _moments(took):
+    for moment in _moments(took, number):
         target.write_bytes(OLD)
         _kill(start([*arguments, str(target)], stdout=subprocess.DEVNULL), target.parent, moment)
         assert target.read_bytes() in (OLD, reference.read_bytes())
@@ -65,8 +71,8 @@ def test_a_killed_build_leaves_a_whole_fmu_and_the_next_one_is_right(tmp_path: P
     assert target.read_bytes() == reference.read_bytes()
 
 
-@pytest.mark.long
-def test_a_killed_identification_leaves_whole_files(tmp_path: Path) -> None:
+@_few_or_many
+def test_a_killed_identification_leaves_whole_files(number: int, tmp_path: Path) -> None:
     def arguments(folder: Path) -> list[str]:
         folder.mkdir()
         return ["identify", str(TESTS), "--force", "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html")]
@@ -74,7 +80,7 @@ def test_a_killed_identification_leaves_whole_files(tmp_path: Path) -> None:
     started = time.monotonic()
     _succeeds(arguments(tmp_path / "reference"))
     took = time.monotonic() - started
-    for n, moment in enumerate(_moments(took)):
+    for n, moment in enumerate(_moments(took, number)):
         folder = tmp_path / str(n)
         process = start(arguments(folder), stdout=subprocess.DEVNULL)
         for name in ("rov.toml", "r.html"):

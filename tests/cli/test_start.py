@@ -19,7 +19,7 @@ from rov_fmu.export.compile import PLATFORMS
 from rov_fmu.motion.layout import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.commands import BARE, ROOT, TESTS, start
+from tests.commands import BARE, ROOT, TESTS, endless_compiler, start
 
 _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
 _posix = pytest.mark.skipif(os.name != "posix", reason="terminals and signals are POSIX")
@@ -278,22 +278,22 @@ asyncio.new_event_loop().run_until_complete(cell())
 
 @_posix
 def test_an_interrupted_build_in_a_notebook_ends_at_once_and_leaves_nothing(tmp_path: Path) -> None:
+    """Nothing but the interrupt ends the compiler, and the limits are those of a test that hangs."""
     (tmp_path / "tmp").mkdir()
-    # an empty cache makes the compiler work for seconds
-    caches = dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(tmp_path / "cache"))
+    environment = os.environ | endless_compiler(tmp_path) | {"TMPDIR": str(tmp_path / "tmp")}
     process = subprocess.Popen(
         [sys.executable, "-c", _CELL, str(tmp_path / "x.fmu"), str(BARE)],
-        env=os.environ | caches | {"TMPDIR": str(tmp_path / "tmp")}, cwd=ROOT, stdout=subprocess.PIPE, text=True,
+        env=environment, cwd=ROOT, stdout=subprocess.PIPE, text=True,
         # a shell starts what it runs in the background with interrupts ignored, and that is inherited
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
     )  # fmt: skip
     deadline = time.monotonic() + 300.0
-    while not list((tmp_path / "tmp").glob("fmu-*/fmu.c")) or not (tmp_path / "cache").exists():
+    while not (tmp_path / "number").exists():
         assert time.monotonic() < deadline
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    out, _ = process.communicate(timeout=10)
+    out, _ = process.communicate(timeout=300)
     assert (process.returncode, out) == (0, "interrupted\n")
     assert list((tmp_path / "tmp").iterdir()) == []
     assert not (tmp_path / "x.fmu").exists()

@@ -165,15 +165,25 @@ def lowest(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.long
-def test_the_lowest_versions_are_enough(tmp_path: Path) -> None:
+QUICK = ["cli/test_start.py", "export/test_build.py", "pages/test_report.py", "vehicle/test_vehicle.py",
+         "vehicle/test_writer.py", *(f"identify/test_{part}.py" for part in ("refit", "tuning")),
+         "studies/test_kinds.py"]  # fmt: skip
+"""Tests of every part that uses a dependency."""
+MORE = ["cli/test_start.py", "export/test_build.py", "export/test_osp.py", "pages", "vehicle/test_vehicle.py",
+        *(f"vehicle/test_{part}.py" for part in ("writer", "first_version", "json_schema", "bluerov2")),
+        *(f"identify/test_{part}.py" for part in ("identification", "refit", "tuning")), "studies"]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "tests",
+    [pytest.param(QUICK, marks=pytest.mark.long), pytest.param(MORE, marks=pytest.mark.weekly)],
+    ids=["some", "more"],
+)
+def test_the_lowest_versions_are_enough(tests: list[str], tmp_path: Path) -> None:
     python = interpreter("3.10")
     if python is None:
         pytest.skip("there is no Python 3.10 here")
     made = environment(tmp_path / "venv", "-c", lowest(tmp_path), f"{ROOT}[test]", python=python)
-    quick = ("cli/test_start.py", "export/test_build.py", "export/test_osp.py", "pages", "vehicle/test_vehicle.py",
-             *(f"vehicle/test_{part}.py" for part in ("writer", "first_version", "json_schema", "bluerov2")),
-             *(f"identify/test_{part}.py" for part in ("identification", "refit", "tuning")), "studies")  # fmt: skip
-    command = [made.python, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *(f"tests/{part}" for part in quick)]
+    command = [made.python, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *(f"tests/{part}" for part in tests)]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout[-3000:]

@@ -1,6 +1,6 @@
 """Each binary of the archive for all platforms: what it needs, what it exports, and that it runs as the others do.
 
-Of FMI 2.0, and in the long tests of FMI 3.0.
+The first build for all platforms compiles the C libraries of seven targets, which takes minutes: these tests are long.
 """
 
 import os
@@ -64,7 +64,9 @@ class Binaries:
         return self.folder / "binaries" / folder / f"videoray{PLATFORMS[name].suffix}"
 
 
-@pytest.fixture(scope="session", params=[2, pytest.param(3, marks=pytest.mark.long)], ids=["FMI 2.0", "FMI 3.0"])
+@pytest.fixture(
+    scope="session", params=[pytest.param(fmi, marks=pytest.mark.long) for fmi in (2, 3)], ids=["FMI 2.0", "FMI 3.0"]
+)
 def binaries(request: pytest.FixtureRequest, made_once: Made) -> Binaries:
     """The FMU that a build writes by default."""
 
@@ -86,9 +88,11 @@ def test_one_archive_holds_all_platforms(binaries: Binaries) -> None:
     assert set(PLATFORMS) == {*LINUX, *WINDOWS, *DARWIN}
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("vehicle", SHIPPED)
+@pytest.mark.parametrize(
+    "vehicle",
+    [pytest.param(n, marks=pytest.mark.long if n == "bluerov2_heavy" else pytest.mark.weekly) for n in SHIPPED],
+)
 def test_every_vehicle_that_ships_is_built_for_all_platforms(
     vehicle: str, fmi: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -235,7 +239,9 @@ def _run(binaries: Binaries, name: str, folder: Path) -> np.ndarray:
     if reason := machine.missing():
         pytest.skip(f"{name}: {reason}")
     program = folder / f"host-{name}-{binaries.fmi}{machine.suffix}"
-    flags = ("-target", machine.target, *(() if machine.suffix else ("-ldl",)))
+    # With the flags of the binaries, so that the compiler finds the C library that it built for them.
+    of_binaries = ("-g0", "-s", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables")
+    flags = ("-target", machine.target, *of_binaries, *(() if machine.suffix else ("-ldl",)))
     compile_c(Path(__file__).with_name("host.c"), program, binaries.folder / "sources", *flags)
     library = shutil.copy(binaries.of(name), folder / f"{name}-{binaries.fmi}{PLATFORMS[name].suffix}")
     environment = os.environ | {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
@@ -267,11 +273,7 @@ def test_both_versions_of_fmi_fly_the_same_to_the_last_bit(
     assert two.tobytes() == three.tobytes()
 
 
-# The compiler makes Windows' start-up code for a program anew, which takes a minute.
-@pytest.mark.parametrize(
-    "name",
-    [*LINUX[1:], *(pytest.param(name, marks=pytest.mark.long) for name in WINDOWS)],
-)
+@pytest.mark.parametrize("name", [*LINUX[1:], *WINDOWS])
 def test_every_platform_runs_as_linux64_does(
     binaries: Binaries, folder: Path, trajectory: np.ndarray, name: str
 ) -> None:

@@ -7,13 +7,14 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import product
 from pathlib import Path
 
 import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.export import compile as fmu_compile
-from tests.commands import BARE, ROOT
+from tests.commands import BARE, ROOT, endless_compiler
 
 _SCRIPT = str(ROOT / "build_fmu.py")
 _OLD = b"the old one"
@@ -149,18 +150,6 @@ def test_no_room_for_temporary_files(old: Path, tmp_path: Path) -> None:
     assert _untouched(old)
 
 
-def _endless_compiler(folder: Path) -> dict[str, str]:
-    """What makes a build use a compiler that never ends, with a child of its own, whose number it writes."""
-    zig = folder / "endless" / "ziglang" / "zig"
-    zig.parent.mkdir(parents=True)
-    zig.with_name("__init__.py").touch()
-    zig.write_text(
-        f"#!/bin/sh\nsleep 6000 &\necho $! > '{folder}/n'\nmv '{folder}/n' '{folder}/number'\nwait\n", encoding="utf-8"
-    )
-    zig.chmod(0o755)
-    return {"PYTHONPATH": str(zig.parent.parent)}
-
-
 def _is_running(process: int) -> bool:
     """Not gone, and not waiting for init to take note of its end."""
     stat = Path(f"/proc/{process}/stat")
@@ -176,7 +165,7 @@ def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
     old: Path, tmp_path: Path, signal_: signal.Signals
 ) -> None:
     """No clock tells: nothing but the interrupt ends the compiler, and the limits are those of a test that hangs."""
-    process = _run(old, tmp_path, **_endless_compiler(tmp_path))
+    process = _run(old, tmp_path, **endless_compiler(tmp_path))
     deadline = time.monotonic() + 120.0
     while not (number := tmp_path / "number").exists():
         assert time.monotonic() < deadline
@@ -194,10 +183,17 @@ def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
     assert _untouched(old)
 
 
-@pytest.mark.long
+_MOMENTS = list(product([signal.SIGINT, signal.SIGTERM], [0.0, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7]))
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
-@pytest.mark.parametrize("share", [0.0, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7])
-@pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("signal_", "share"),
+    [
+        pytest.param(*moment, marks=pytest.mark.weekly if n % 4 else pytest.mark.long)
+        for n, moment in enumerate(_MOMENTS)
+    ],
+)
 def test_interrupted_at_any_moment_it_leaves_nothing(
     old: Path, tmp_path: Path, signal_: signal.Signals, share: float
 ) -> None:

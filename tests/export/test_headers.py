@@ -133,11 +133,11 @@ def _exports(library: Path) -> set[str]:
     return {name for function in binary.exported_functions if re.search("fmi[23]", name := str(function.name))}
 
 
-# Every header once, every compiler once, both standards; all of them in the long tests.
+# Every header once, every compiler once, both standards; all of them in the weekly tests.
 _STANDARDS, _NAMES = ("c99", "c11"), list(COMPILERS)
 _SOME = {(release, _NAMES[i % len(_NAMES)], _STANDARDS[i % 2]) for i, release in enumerate(RELEASES)}
 _MATRIX = [
-    pytest.param(r, c, s, marks=() if (r, c, s) in _SOME else pytest.mark.long)
+    pytest.param(r, c, s, marks=() if (r, c, s) in _SOME else pytest.mark.weekly)
     for r in RELEASES
     for c in COMPILERS
     for s in _STANDARDS
@@ -161,7 +161,7 @@ def test_a_shared_library_has_plain_names_and_flies_the_same(
     _flies_the_same(fmu, library, shipped)
 
 
-@pytest.mark.parametrize("release", [pytest.param("2.0.0", marks=pytest.mark.long), "3.0"])
+@pytest.mark.parametrize("release", [pytest.param("2.0.0", marks=pytest.mark.weekly), "3.0"])
 def test_as_cpp_they_fly_the_same(
     fmus: dict[int, Fmu], headers: dict[str, Path], shipped: bytes, tmp_path: Path, release: str
 ) -> None:
@@ -173,10 +173,10 @@ def test_as_cpp_they_fly_the_same(
     _flies_the_same(fmu, library, shipped)
 
 
-# Each way that a release has it once; all of them in the long tests.
+# Each way that a release has it once; all of them in the weekly tests.
 _SOME_PREFIXES = {("2.0.0", False), ("2.0.4", False), ("2.0.4", True)}
 _PREFIXES = [
-    pytest.param(r, o, marks=() if (r, o) in _SOME_PREFIXES else pytest.mark.long)
+    pytest.param(r, o, marks=() if (r, o) in _SOME_PREFIXES else pytest.mark.weekly)
     for o in (False, True)
     for r in ("2.0.0", "2.0.1", "2.0.4", "3.0")
 ]
@@ -222,7 +222,7 @@ _DECLARE = {
 @pytest.mark.parametrize(
     ("releases", "sister"),
     [
-        *(pytest.param((release,) * 2, "sister", marks=pytest.mark.long) for release in ("2.0.0", "2.0.4", "3.0")),
+        *(pytest.param((release,) * 2, "sister", marks=pytest.mark.weekly) for release in ("2.0.0", "2.0.4", "3.0")),
         (("2.0.4", "3.0"), "videoray"),
     ],
     ids=["2.0.0", "2.0.4", "3.0", "one model in both versions"],
@@ -258,7 +258,7 @@ def test_two_models_link_into_one_program_under_their_prefixes(
 @pytest.mark.parametrize(
     ("name", "flags"),
     [
-        pytest.param(name, flags, marks=() if name != "zig" and "-O2" in flags else pytest.mark.long)
+        pytest.param(name, flags, marks=() if name != "zig" and "-O2" in flags else pytest.mark.weekly)
         for name in COMPILERS
         for flags in (("-O2", "-march=haswell"), ("-O3", "-mfma", "-std=c99"), ("-O1", "-mfma", "-std=gnu11"))
     ],
@@ -290,7 +290,7 @@ _MICROSOFT = {
 @pytest.mark.parametrize(
     ("release", "standard"),
     [
-        pytest.param(release, standard, marks=() if i % 2 == j else pytest.mark.long)
+        pytest.param(release, standard, marks=() if i % 2 == j else pytest.mark.weekly)
         for i, release in enumerate(RELEASES)
         for j, standard in enumerate(_STANDARDS)
     ],

@@ -47,8 +47,10 @@ def pinned(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return _built(folder, environment(folder / "venv", "-c", CONSTRAINTS, ROOT).python, _CHECKOUT)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("order", [1, -1], ids=["oldest", "newest"])
+@pytest.mark.parametrize(
+    "order",
+    [pytest.param(1, marks=pytest.mark.long, id="oldest"), pytest.param(-1, marks=pytest.mark.weekly, id="newest")],
+)
 def test_built_by_another_python_from_the_wheel(pinned: dict[str, str], tmp_path: Path, order: int) -> None:
     """By the oldest and by the newest Python that is here."""
     others = [f"3.{minor}" for minor in range(_OLDEST, _NEWEST + 1) if minor != sys.version_info.minor]

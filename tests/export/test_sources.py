@@ -27,7 +27,8 @@ def zig_as_cc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CMAKE_GENERATOR", "Ninja")
 
 
-@pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.long)], indirect=True)
+@pytest.mark.long
+@pytest.mark.parametrize("fmi", [3, 2], indirect=True)
 @pytest.mark.usefixtures("zig_as_cc")
 def test_fmpy_compiles_and_runs_them(either_dir: Path, tmp_path: Path) -> None:
     folder = tmp_path / "source fmu"

@@ -136,7 +136,9 @@ def check_slopes(rov: Rov, instance: AnyInstance, point: Values, known: str, sid
         assert d == pytest.approx(expected[name], rel=1e-12, abs=1e-14 * size), (name, known, side, point)
 
 
-@pytest.mark.parametrize("number", [2, pytest.param(60, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "number", [2, pytest.param(15, marks=pytest.mark.long), pytest.param(60, marks=pytest.mark.weekly)]
+)
 def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
     """By every input, state and coefficient, of all that is calculated, in both interfaces."""
     for point, kind in product(points(fmu, number, seed=1), MODES):
@@ -194,7 +196,9 @@ def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
 # ---- Adjoint derivatives ----
 
 
-@pytest.mark.parametrize("number", [2, pytest.param(40, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "number", [2, pytest.param(10, marks=pytest.mark.long), pytest.param(40, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize("kind", MODES)
 def test_adjoint_derivatives_are_the_slopes_of_the_equations(fmu3: fmi3.Fmu, kind: int, number: int) -> None:
     """Of every output and derivative, by every input, state and coefficient."""
@@ -321,7 +325,9 @@ def check_rates(rov: Rov, instance: AnyInstance, point: Values) -> None:
             assert rate == pytest.approx(expected[name], rel=1e-11, abs=1e-13 * size), (name, order, point)
 
 
-@pytest.mark.parametrize("number", [8, pytest.param(300, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "number", [8, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
+)
 def test_output_derivatives_of_every_order_are_those_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
     """From any motion, and from rest."""
     for n, point in enumerate(points(fmu, number, seed=7)):

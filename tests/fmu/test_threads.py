@@ -29,7 +29,9 @@ def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls
     return run_program(sys.executable, "-c", _PLAIN_ADDRESSES, program, str(calls))
 
 
-@pytest.mark.parametrize("calls", [20_000, pytest.param(2_000_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "calls", [20_000, pytest.param(200_000, marks=pytest.mark.long), pytest.param(2_000_000, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize(
     ("fmi", "sanitizers"),
     [

@@ -73,7 +73,7 @@ def refitted(data: dict[str, Array], start: Rov) -> dict[str, float]:
     return found
 
 
-@pytest.mark.parametrize("sets", [150, pytest.param(600, marks=pytest.mark.long)])
+@pytest.mark.parametrize("sets", [150, pytest.param(600, marks=pytest.mark.weekly)])
 def test_drag_and_thrust_scatter_as_the_file_says(sets: int, tmp_path: Path) -> None:
     """Surge and yaw have the rear curve in common: sets of data, fitted by other means, about what was found."""
     found = identified(measured(K, np.random.default_rng(3), 0.2, {"surge": 0.005, "yaw": 0.005}), tmp_path / "tests")
@@ -110,7 +110,9 @@ def spread(vehicle: Vehicle, names: Sequence[str], numbers: Array, axis: Axis) -
     return float(np.std(V_ss) / np.mean(V_ss))
 
 
-@pytest.mark.parametrize("seeds", [1, pytest.param(12, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "seeds", [1, pytest.param(4, marks=pytest.mark.long), pytest.param(12, marks=pytest.mark.weekly)]
+)
 def test_recordings_scatter_as_the_fit_of_all_axes_says(seeds: int) -> None:
     """Surge and yaw by recordings, their thrust curve as its tests left it: the truth is as far off as the covariance
     of all coefficients together has it (χ²), in all directions, of which thrust by drag is known a hundred times

@@ -101,8 +101,10 @@ def unknown() -> Rov:
     return Rov(replace(layout, axes=axes, curves=curves), {**TRUTH.coefficients, **drag})
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize(
+    "seed",
+    [pytest.param(1, marks=pytest.mark.long), *(pytest.param(seed, marks=pytest.mark.weekly) for seed in (0, 2))],
+)
 def test_a_dive_is_identified(seed: int) -> None:
     fits = fit_recordings(dived(240.0, seed).recorded(seed=seed), unknown(), lag=("t200",))
     assert [fit.axis.name for fit in fits] == list(AXES)

@@ -66,7 +66,9 @@ def check_line(text: str, folder: Path) -> None:
         assert len(line.replace(str(folder), "")) < 350
 
 
-@pytest.mark.parametrize("examples", [40, pytest.param(2000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [40, pytest.param(300, marks=pytest.mark.long), pytest.param(2000, marks=pytest.mark.weekly)]
+)
 def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_path: Path) -> None:
     folder = tmp_path / "changed"
 
@@ -86,7 +88,9 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [3, pytest.param(30, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [3, pytest.param(8, marks=pytest.mark.long), pytest.param(30, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize(
     "only",
     [
@@ -171,7 +175,9 @@ def tuned_or_one_line(code: int, tuned: Path, capsys: Capsys) -> tuple[str, str]
     return printed, said
 
 
-@pytest.mark.parametrize("examples", [20, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [20, pytest.param(200, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
+)
 def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     points, tuned = tmp_path / "points.csv", tmp_path / "tuned.toml"
     content = b"command [%],velocity [cm/s],time constant [s]\n20,11,3.2\n30,17.5,2.2\n70,37,1\n"
@@ -188,7 +194,9 @@ def test_any_points_are_tuned_over_or_one_clear_line(examples: int, tmp_path: Pa
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [60, pytest.param(2000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [60, pytest.param(500, marks=pytest.mark.long), pytest.param(2000, marks=pytest.mark.weekly)]
+)
 def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     tuned = tmp_path / "tuned.toml"
     words = st.one_of(NUMBERS.filter(lambda x: abs(x) < 10**400), CELLS, st.floats(0.0, 10.0)).map(str)
@@ -205,7 +213,9 @@ def test_any_options_of_tune_give_a_tuning_or_one_clear_line(examples: int, tmp_
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [20, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [20, pytest.param(200, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
+)
 def test_any_published_tables_are_shown_or_one_clear_line(examples: int, tmp_path: Path, capsys: Capsys) -> None:
     original = VIDEORAY.parent / "tables"
     vehicle = tmp_path / "videoray.toml"

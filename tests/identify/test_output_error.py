@@ -78,12 +78,15 @@ def test_intervals_cover_the_truth(m: Axis, k: Rov) -> None:
     assert min(round_trip(k, m, range(4)).values()) >= 3 / 4
 
 
-@pytest.mark.long
+@pytest.mark.parametrize(
+    ("seeds", "least"),
+    [pytest.param(20, 0.75, marks=pytest.mark.long), pytest.param(100, 0.87, marks=pytest.mark.weekly)],
+)
 @pytest.mark.parametrize("m", AXES, ids=lambda m: m.name)
-def test_intervals_cover_the_truth_of_many_seeds(m: Axis, k: Rov) -> None:
-    """Of 100 a 95 % interval misses more than 13 once in 1,000 cases."""
-    shares = round_trip(k, m, range(100))
-    assert min(shares.values()) >= 0.87, shares
+def test_intervals_cover_the_truth_of_many_seeds(m: Axis, k: Rov, seeds: int, least: float) -> None:
+    """Of 100 seeds a 95 % interval misses more than 13 once in 1,000 cases, of 20 more than 5."""
+    shares = round_trip(k, m, range(seeds))
+    assert min(shares.values()) >= least, shares
 
 
 def turbulence(recording: Recording, random: np.random.Generator) -> Recording:
@@ -98,10 +101,12 @@ def outliers(recording: Recording, random: np.random.Generator) -> Recording:
     return replace(recording, values=recording.values + far)
 
 
-@pytest.mark.long
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(15, marks=pytest.mark.long), pytest.param(40, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize("disturb", [turbulence, outliers])
-def test_intervals_hold_with_coloured_noise_and_outliers(disturb: Disturb, k: Rov) -> None:
-    shares = round_trip(k, HEAVE, range(40), disturb, 100.0)
+def test_intervals_hold_with_coloured_noise_and_outliers(disturb: Disturb, k: Rov, seeds: int) -> None:
+    shares = round_trip(k, HEAVE, range(seeds), disturb, 100.0)
     assert min(shares.values()) >= 0.8, shares
 
 

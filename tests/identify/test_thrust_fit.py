@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, forces, measured
 from rov_fmu.motion.layout import Curve
@@ -188,7 +189,9 @@ def test_intervals_hold_for_weak_reverse_thrust() -> None:
     assert wrong <= 0.15
 
 
-@pytest.mark.long
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(50, marks=pytest.mark.long), pytest.param(200, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize(
     ("c", "noise", "of_truth"),
     [
@@ -199,9 +202,13 @@ def test_intervals_hold_for_weak_reverse_thrust() -> None:
     ],
     ids=["one way", "alike", "weak reverse", "weak reverse and dead band"],
 )
-def test_intervals_cover_the_truth(c: Any, noise: float, of_truth: dict[str, float]) -> None:
-    """200 seeds: 90-99 % of them, and a form that is not the true one in a few of a hundred."""
-    found, bands, wrong = shares(c, 200, noise, **of_truth)
-    assert all(0.9 <= share <= 0.99 for share in found.values()), found
-    assert ((bands >= 0.9) & (bands <= 0.99)).all(), bands
-    assert wrong <= 0.07
+def test_intervals_cover_the_truth(c: Any, noise: float, of_truth: dict[str, float], seeds: int) -> None:
+    """200 seeds: 90-99 % of them, and a form that is not the true one in a few of a hundred.
+
+    Of 50 seeds, an interval that covers in 95 % of all cases may miss more often by chance, or never.
+    """
+    found, bands, wrong = shares(c, seeds, noise, **of_truth)
+    low, high = (0.9, 0.99) if seeds == 200 else (float(binom.ppf(1e-3, seeds, 0.95)) / seeds, 1.0)
+    assert all(low <= share <= high for share in found.values()), found
+    assert ((bands >= low) & (bands <= high)).all(), bands
+    assert wrong <= (0.07 if seeds == 200 else 0.1)

@@ -53,7 +53,10 @@ def case(rov: Rov, rng: random.Random, longest: float = 3.0) -> tuple[Values, Va
     return inputs, state, 10.0 ** rng.uniform(-6.0, longest)
 
 
-@pytest.mark.parametrize(("seed", "cases"), [(1, 60), pytest.param(2, 1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("seed", "cases"),
+    [(1, 60), pytest.param(2, 250, marks=pytest.mark.long), pytest.param(2, 1000, marks=pytest.mark.weekly)],
+)
 def test_a_step_in_c_is_that_in_python(vehicle: tuple[Rov, Step], seed: int, cases: int) -> None:
     rov, step = vehicle
     rng = random.Random(seed)
@@ -67,7 +70,11 @@ def test_a_step_in_c_is_that_in_python(vehicle: tuple[Rov, Step], seed: int, cas
 
 @pytest.mark.parametrize(
     ("seed", "cases", "longest", "velocity", "path"),
-    [(3, 8, 0.3, 1e-14, 1e-13), pytest.param(4, 40, 2.0, 1e-12, 1e-12, marks=pytest.mark.long)],
+    [
+        (3, 8, 0.3, 1e-14, 1e-13),
+        pytest.param(4, 10, 2.0, 1e-12, 1e-12, marks=pytest.mark.long),
+        pytest.param(4, 40, 2.0, 1e-12, 1e-12, marks=pytest.mark.weekly),
+    ],
 )
 def test_a_step_in_c_is_exact(
     vehicle: tuple[Rov, Step], seed: int, cases: int, longest: float, velocity: float, path: float

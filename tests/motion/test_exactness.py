@@ -66,27 +66,39 @@ def every(nth: int, cases: Iterable[Any]) -> list[Any]:
 # ---- Every vehicle, random states, steps of 1 us ... 1,000 s ----
 
 
-@pytest.mark.parametrize(("number", "longest"), [(6, 0.3), pytest.param(15, 2.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("number", "longest"),
+    [(6, 0.3), pytest.param(4, 2.0, marks=pytest.mark.long), pytest.param(15, 2.0, marks=pytest.mark.weekly)],
+)
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_a_step_is_exact_for_vehicles_of_every_kind(vehicle: str, number: int, longest: float) -> None:
     rng = random.Random(vehicle)
     hold(in_python, [random_case(rng, VEHICLES[vehicle], longest=longest) for _ in range(number)])
 
 
-@pytest.mark.parametrize(("number", "longest"), [(50, 0.0), pytest.param(300, 1.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("number", "longest"),
+    [(50, 0.0), pytest.param(75, 1.0, marks=pytest.mark.long), pytest.param(300, 1.0, marks=pytest.mark.weekly)],
+)
 def test_a_step_is_exact_for_random_vehicles(number: int, longest: float) -> None:
     """What is more is of forces that nearly cancel: two thrusters that turn against each other, load and thrust."""
     rng = random.Random(1)
     hold(in_python, [random_case(rng, random_vehicle(rng), longest=longest) for _ in range(number)], 1e-12, 1e-12)
 
 
-@pytest.mark.parametrize(("number", "longest"), [(10, 0.3), pytest.param(30, 2.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("number", "longest"),
+    [(10, 0.3), pytest.param(8, 2.0, marks=pytest.mark.long), pytest.param(30, 2.0, marks=pytest.mark.weekly)],
+)
 def test_a_step_of_the_heavy_is_exact_in_c(heavy: Step, number: int, longest: float) -> None:
     rng = random.Random(2)
     hold(heavy, [random_case(rng, HEAVY, longest=longest) for _ in range(number)])
 
 
-@pytest.mark.parametrize(("number", "longest"), [(30, 1.0), pytest.param(400, 1.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("number", "longest"),
+    [(30, 1.0), pytest.param(100, 1.0, marks=pytest.mark.long), pytest.param(400, 1.0, marks=pytest.mark.weekly)],
+)
 def test_a_step_of_any_vehicle_of_the_paper_is_exact(step: Step, number: int, longest: float) -> None:
     """The VideoRay's numbers replaced by others, as its FMU lets one do."""
     rng = random.Random(3)

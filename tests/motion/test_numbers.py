@@ -21,7 +21,7 @@ def program(videoray_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 @pytest.fixture(
     scope="module",
-    params=[(10_000, 1_000_000, 1_000), pytest.param((50_000, 5_000_000, 5_000), marks=pytest.mark.long)],
+    params=[(10_000, 1_000_000, 1_000), pytest.param((50_000, 5_000_000, 5_000), marks=pytest.mark.weekly)],
     ids="{0[0]} instances, {0[1]} steps, {0[2]} loads".format,
 )
 def numbers(request: pytest.FixtureRequest, program: Path, videoray_dir: Path) -> dict[str, float]:

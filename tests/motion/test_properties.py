@@ -31,10 +31,12 @@ from tests.motions import (
 def for_every(
     *strategies: st.SearchStrategy[Any], at: Sequence[tuple[Any, ...]] = ()
 ) -> Callable[[Callable[..., None]], Callable[[int], None]]:
-    """Make a law a test: at these places, on some hundred motions, and on many more in the long run."""
+    """Make a law a test: at these places, on some hundred motions, and on many more in the long and weekly tests."""
 
     def decorate(law: Callable[..., None]) -> Callable[[int], None]:
-        @pytest.mark.parametrize("motions", [150, pytest.param(3000, marks=pytest.mark.long)])
+        @pytest.mark.parametrize(
+            "motions", [150, pytest.param(750, marks=pytest.mark.long), pytest.param(3000, marks=pytest.mark.weekly)]
+        )
         def test(motions: int) -> None:
             hold(law, motions, *strategies, at=at)
 

@@ -28,7 +28,10 @@ def random_case(rng: random.Random) -> Case:
     return A, B, C, v0, 10.0 ** rng.uniform(-5, 3)
 
 
-@pytest.mark.parametrize(("seed", "cases"), [(1, 3000), pytest.param(2, 60_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("seed", "cases"),
+    [(1, 3000), pytest.param(2, 15_000, marks=pytest.mark.long), pytest.param(2, 60_000, marks=pytest.mark.weekly)],
+)
 def test_velocity_and_distance_are_exact_over_random_motions(seed: int, cases: int) -> None:
     rng = random.Random(seed)
     for _ in range(cases):

@@ -63,9 +63,11 @@ def negated(values: Values, *names: str) -> State:
 
 
 def for_every(law: Callable[[Step, Case], None]) -> Callable[[Step, int], None]:
-    """Make a law a test of some hundred cases, and of many more in the long run."""
+    """Make a law a test of some hundred cases, and of many more in the long and weekly tests."""
 
-    @pytest.mark.parametrize("cases", [50, pytest.param(500, marks=pytest.mark.long)])
+    @pytest.mark.parametrize(
+        "cases", [50, pytest.param(150, marks=pytest.mark.long), pytest.param(500, marks=pytest.mark.weekly)]
+    )
     def test(step: Step, cases: int) -> None:
         hold(lambda case: law(step, case), cases, CASES)
 
@@ -217,7 +219,9 @@ def test_without_quadratic_drag_a_slow_vehicle_draws_the_path_of_a_fast_one(step
 # ---- Semigroup ----
 
 
-@pytest.mark.parametrize("cases", [10, pytest.param(200, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "cases", [10, pytest.param(60, marks=pytest.mark.long), pytest.param(200, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize(("folder", "rov"), [("heavy_dir", HEAVY), ("everything_dir", load_vehicle(EVERYTHING).rov)])
 def test_parts_of_a_step_of_coupled_vehicles_are_the_step(
     request: pytest.FixtureRequest, folder: str, rov: Rov, cases: int

@@ -126,8 +126,15 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield cluster.scheduler_address
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("kind", "vehicles", "width"), [("points", 60, 0.25), ("recordings", 15, 0.02)])
+@pytest.mark.parametrize(
+    ("kind", "vehicles", "width"),
+    [
+        pytest.param("points", 15, 0.25, marks=pytest.mark.long),
+        pytest.param("recordings", 4, 0.02, marks=pytest.mark.long),
+        pytest.param("points", 60, 0.25, marks=pytest.mark.weekly),
+        pytest.param("recordings", 15, 0.02, marks=pytest.mark.weekly),
+    ],
+)
 def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, address: str, tmp_path: Path) -> None:
     """Of fewer than the 200 of which docs/studies.md tells, for their time; `width` is of the stopping distance."""
     fmus, widths = Fmus(tmp_path), list[float]()

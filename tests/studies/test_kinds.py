@@ -85,8 +85,9 @@ def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results
     _close(study(_plan(tmp_path, 'fmu = "python.fmu"'), tmp_path / "results", workers=1), native)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("workers", [1, 2, 4])
+@pytest.mark.parametrize(
+    "workers", [pytest.param(2, marks=pytest.mark.long), *(pytest.param(n, marks=pytest.mark.weekly) for n in (1, 4))]
+)
 def test_any_number_of_workers_gives_the_same_rows(
     tmp_path: Path, videoray_fmu: Path, native: Results, workers: int
 ) -> None:

@@ -225,7 +225,9 @@ def check_lines(text: str, folder: Path) -> None:
     assert all(line.startswith(str(folder)) and line.isprintable() for line in text.splitlines())
 
 
-@pytest.mark.parametrize("examples", [8, pytest.param(2000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [8, pytest.param(200, marks=pytest.mark.long), pytest.param(2000, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize("rov", [BLUEROV2 + '[known]\nm_a_w = { value = 1.0, unit = "kg", source = "s" }\n', VECTORED])
 def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int, tmp_path: Path) -> None:
     tables = {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n", "steady_surge.csv": f"{SPEED}\n0.3,0.2\n"}

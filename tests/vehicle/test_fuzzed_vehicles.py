@@ -68,7 +68,9 @@ def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
     return read_model_description(str(fmu), validate=True)
 
 
-@pytest.mark.parametrize("examples", [30, pytest.param(1000, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [30, pytest.param(200, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
+)
 def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int, path: Path) -> None:
     usable = 0
 
@@ -92,7 +94,9 @@ def test_any_file_is_a_vehicle_to_build_and_step_or_one_clear_line(examples: int
     assert usable > examples / 20, "the changes must leave some files as good as they were"
 
 
-@pytest.mark.parametrize("examples", [20, pytest.param(300, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [20, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
+)
 def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> None:
     tuned = 0
 
@@ -117,7 +121,9 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
     assert tuned > examples / 20, "the changes must leave some files as good as they were"
 
 
-@pytest.mark.parametrize("examples", [20, pytest.param(300, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [20, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
+)
 def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path: Path) -> None:
     written = path.with_name("written.toml")
 
@@ -141,7 +147,9 @@ def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path:
     fuzz(check, examples)
 
 
-@pytest.mark.parametrize("examples", [15, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "examples", [15, pytest.param(40, marks=pytest.mark.long), pytest.param(100, marks=pytest.mark.weekly)]
+)
 def test_every_command_says_the_same_line_and_writes_nothing(
     examples: int, path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
