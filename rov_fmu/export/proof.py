@@ -3,7 +3,6 @@
 import io
 import os
 import signal
-import tempfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.export.experiments import Carried, Experiment
+from rov_fmu.files.interrupts import UNDIVIDED, ctrl_c_withheld, temporary_folder
 from rov_fmu.files.messages import FileError, ProofError, brief, one_line
 from rov_fmu.files.series import Series
 
@@ -65,7 +65,7 @@ def prove(
     import fmpy
 
     carried = Carried(fmu)
-    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder("fmu-") as folder:
         try:
             fmpy.extract(str(fmu), unzipdir=folder)
             description = fmpy.read_model_description(folder, validate=False)
@@ -107,7 +107,8 @@ def _apart(folder: str, interface: str, experiments: Sequence[Experiment]) -> Ge
     spawn = get_context("spawn")
     here, there = spawn.Pipe(duplex=False)
     process = spawn.Process(target=_send_findings, args=(there, folder, interface, experiments), daemon=True)
-    process.start()
+    with UNDIVIDED, ctrl_c_withheld():
+        process.start()
     there.close()
     try:
         for _ in experiments:
