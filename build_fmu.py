@@ -5,4 +5,4 @@ import sys
 from rov_fmu.__main__ import run
 
 if __name__ == "__main__":
-    run(["build", *sys.argv[1:]])
+    sys.exit(run(["build", *sys.argv[1:]]))

@@ -1,5 +1,6 @@
 """Measure what the FMU costs and how exact it is, beside other ways to the same motion, and print one table."""
 
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from checks.fmpy_slave import fmpy_slave
 from rov_fmu.build import build
 from rov_fmu.export.compile import BuildError, host_platform
 from rov_fmu.files.output import Output, check_targets, write_whole
-from rov_fmu.process import exit_code, run_process
+from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -120,4 +121,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_process(main)
+    sys.exit(main())

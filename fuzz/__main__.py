@@ -1,6 +1,7 @@
 """python -m fuzz: random calls of the FMI functions, under sanitizers, until there are enough of them."""
 
 import shutil
+import sys
 import tempfile
 import time
 from base64 import b64encode
@@ -17,7 +18,7 @@ from rov_fmu.export.archive import native_content
 from rov_fmu.export.compile import BuildError
 from rov_fmu.files.messages import FileError
 from rov_fmu.pages.console import console, table
-from rov_fmu.process import exit_code, run_process
+from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -127,4 +128,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    run_process(main)
+    sys.exit(main())

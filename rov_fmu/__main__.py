@@ -2,21 +2,23 @@
 
 import sys
 from collections.abc import Sequence
-from functools import partial
-from typing import NoReturn
 
 from rov_fmu.process import run_process
 
 
-def run(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line as a process of its own."""
-    try:
-        from rov_fmu.cli import main
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line as a process of its own; return its exit code."""
 
-        run_process(partial(main, arguments))
+    def main() -> int:
+        from rov_fmu import cli  # here, where Ctrl-C is handled already
+
+        return cli.main(arguments)
+
+    try:
+        return run_process("rov-fmu", main)
     except ModuleNotFoundError as error:  # a checkout that is not installed
         sys.exit(f"rov-fmu: the package {error.name} is not installed: pip install -e . (in a checkout)")
 
 
 if __name__ == "__main__":
-    run()
+    sys.exit(run())

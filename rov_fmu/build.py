@@ -1,6 +1,5 @@
 """From a vehicle to its FMU: page and content made, compiled, written, validated and run."""
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ from rov_fmu.export.model_description import NATIVE
 from rov_fmu.export.module import module
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.export.reference_results import reference_results
+from rov_fmu.files.interrupts import temporary_folder
 from rov_fmu.files.kinds import FMU, check_written
 from rov_fmu.files.messages import did_you_mean
 from rov_fmu.files.output import Output, check_targets, write_whole
@@ -133,7 +133,7 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
     known = fmpy.platform in fmpy.supported_platforms(str(path))
     if platforms is not None and not (known and loaded in [_folder(name, fmi) for name in platforms]):
         return "valid; not run, for it has no binary that FMPy loads on this machine"
-    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder("fmu-") as folder:
         fmpy.extract(str(path), unzipdir=folder)
         axis = vehicle.layout.axes[0].axis
         start = {name: 0.3 * sign for name, sign in vehicle.layout.signs(axis).items()}

@@ -1,5 +1,6 @@
 """The command rov-fmu: build | fly | prove | study | identify | tune | convert | schema | tables | figures."""
 
+import sys
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
 from rov_fmu.export.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
+from rov_fmu.files.interrupts import cleaned_up
 from rov_fmu.files.kinds import PAGE, VEHICLE_FILE, check_written
 from rov_fmu.files.messages import FileError, ProofError, StudyError, did_you_mean, shown
 from rov_fmu.files.output import check_targets, write_whole
@@ -36,21 +38,7 @@ _EXIT_CODES = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code: 0 done, 1 build, proof or study failed, 2 bad input, 130 interrupted."""
-
-    def action() -> None:
-        chosen = _commands.main(arguments, "rov-fmu", standalone_mode=False)
-        if callable(chosen):  # and not the exit code of --help
-            chosen()
-
-    return exit_code("rov-fmu", action, _EXIT_CODES)
-
-
-class _Parsed(click.Command):
-    """Does nothing yet: errors and interrupts of the work itself are not click's to handle."""
-
-    def invoke(self, ctx: click.Context) -> Callable[[], None]:
-        """What is to be done."""
-        return partial(super().invoke, ctx)
+    return exit_code("rov-fmu", lambda: _commands.main(arguments, "rov-fmu", standalone_mode=False), _EXIT_CODES)
 
 
 def _vehicles(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -106,9 +94,6 @@ def _commands() -> None:
 
     VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships.
     """
-
-
-_commands.command_class = _Parsed
 
 
 @_commands.command("build")
@@ -196,7 +181,9 @@ def _shown(*columns: "ProgressColumn") -> "Iterator[Progress | None]":
     if not out.is_terminal:
         yield None
         return
-    with Progress(*columns, console=out, transient=True) as progress:
+    progress = Progress(*columns, console=out, transient=True)
+    progress.start()
+    with cleaned_up(progress.stop):
         yield progress
 
 
@@ -293,13 +280,8 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
     see_place(output)
-    try:
-        with _runs_bar() as tell:
-            spent, results = run_study(
-                plan, output, workers, scheduler, tell, lambda told: click.echo(f"rov-fmu: warning: {told}", err=True)
-            )
-    except KeyboardInterrupt as interrupt:
-        raise KeyboardInterrupt("what is done is kept; the same command goes on from there") from interrupt
+    with _runs_bar() as (tell, warn):
+        spent, results = run_study(plan, output, workers, scheduler, tell, warn)
     write_whole(page_output(results))
     print_summary(results, spent)
     if len(results.failed) + len(results.incomplete) == len(results.runs):
@@ -307,8 +289,11 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
 
 
 @contextmanager
-def _runs_bar() -> "Iterator[Callable[[StudyProgress], None]]":
-    """A bar of runs with their rate and the time left, on a terminal only; yields what to call with the progress."""
+def _runs_bar() -> "Iterator[tuple[Callable[[StudyProgress], None], Callable[[str], None]]]":
+    """A bar of runs with their rate and the time left, on a terminal only.
+
+    Yields what to call with the progress, and with a warning, which is printed above the bar.
+    """
     from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn, TextColumn, TimeRemainingColumn
 
     columns = (
@@ -319,8 +304,16 @@ def _runs_bar() -> "Iterator[Callable[[StudyProgress], None]]":
         TextColumn("{task.description}"),
     )
     with _shown(*columns) as progress:
+
+        def warn(text: str) -> None:
+            line = f"rov-fmu: warning: {text}"
+            if progress is not None and sys.stderr and sys.stderr.isatty():
+                progress.console.print(line, soft_wrap=True)
+            else:
+                click.echo(line, err=True)
+
         if progress is None:
-            yield lambda _: None
+            yield lambda _: None, warn
             return
         task = progress.add_task("starting the workers", total=None)
         began: list[tuple[float, int]] = []
@@ -335,7 +328,7 @@ def _runs_bar() -> "Iterator[Callable[[StudyProgress], None]]":
             words = f"{rate:.3g} runs/s{f', {now.failed} failed' if now.failed else ''}"
             progress.update(task, total=now.total, completed=now.done, description=words)
 
-        yield tell
+        yield tell, warn
 
 
 @_commands.command("identify")

@@ -1,26 +1,30 @@
-"""How a command line ends: its exit code, and one line on what went wrong."""
+"""How a command line ends: its exit code, and one line about what went wrong.
+
+Little is imported at the top, because Python itself prints a traceback at Ctrl-C until `run_process` is called.
+"""
 
 import os
 import signal
 import sys
-from _thread import interrupt_main
 from collections.abc import Callable, Mapping
-from threading import Timer
-from typing import Any, NoReturn
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from threading import Thread
 
-from rov_fmu.files.messages import one_line
-from rov_fmu.files.output import WriteError
-
-_SOON = 0.01
-"""s, after which a finalizer has ended."""
+_INTERRUPTED = "interrupted, no file is half-written"
+_POLL = 0.5
+"""Seconds after which the main thread looks for signals itself: on Windows they do not end a wait."""
 
 
 def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exception], int]) -> int:
-    """Do what is asked for: 0 done, 130 interrupted, 1 no one reads what is printed, or the code of what is raised.
+    """Do the action and return the exit code: 0 done, 130 interrupted, 1 nobody reads the output, else from `codes`.
 
-    OSError is among the codes. The messages of the others are printed as they are, as is that of an interrupt.
+    OSError is among the codes. The messages of the other exceptions are printed as they are.
     """
-    from click import Abort, ClickException  # late: where it is not installed, the command line can say so
+    from click import Abort, ClickException
+
+    from rov_fmu.files.messages import one_line
+    from rov_fmu.files.output import WriteError
 
     try:
         try:
@@ -29,8 +33,9 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
             if sys.stdout:  # --help leaves by SystemExit
                 sys.stdout.flush()
     except (KeyboardInterrupt, Abort) as interrupt:
-        exec("")  # CPython ends by SIGINT, whatever is asked for, if the last text that was executed was interrupted
-        return _say(program, "\n".join(["interrupted, no file is half-written", *map(str, interrupt.args)]), 130)
+        if isinstance(interrupt.__cause__, EOFError):  # click aborts then, too
+            raise interrupt.__cause__ from None
+        return _say(program, _INTERRUPTED, 130)
     except BrokenPipeError:
         _end_output()
         return 1  # as Rich does
@@ -46,39 +51,72 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
     return 0
 
 
-def run_process(main: Callable[[], int]) -> NoReturn:
-    """Run a command line that is a process of its own."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ended from outside, it cleans up as at Ctrl-C
-    sys.unraisablehook = _interrupt_again
+def run_process(program: str, main: Callable[[], int]) -> int:
+    """Run a command line as a process of its own, in a thread; the main thread waits for its end, Ctrl-C or SIGTERM.
+
+    Python would raise KeyboardInterrupt wherever the main thread happens to be, and drop it where that is a finalizer,
+    for example. So a signal raises nothing here: the main thread cleans up and ends the process.
+    """
+    events: SimpleQueue[int | BaseException | signal.Signals] = SimpleQueue()
+
+    def run() -> None:
+        try:
+            events.put(main())
+        except BaseException as error:  # the main thread raises it
+            events.put(error)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:  # a shell may start a job in the background so
+            signal.signal(number, lambda number, _: events.put(signal.Signals(number)))
     for stream in (sys.stdout, sys.stderr):
         if stream:  # a terminal without Greek letters gets \u03b1
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    sys.exit(main())
+    Thread(target=run, daemon=True).start()
+    while True:
+        try:
+            event = events.get(timeout=_POLL)
+        except Empty:
+            continue
+        if isinstance(event, signal.Signals):
+            _end_interrupted(program)
+        elif isinstance(event, BaseException):
+            raise event
+        else:
+            return event
 
 
-def _interrupt_again(ignored: Any) -> None:
-    """Python ignores what a finalizer raises, an interrupt that comes meanwhile among it: it comes again."""
-    if isinstance(ignored.exc_value, KeyboardInterrupt):
-        Timer(_SOON, _interrupt).start()
-    else:
-        sys.__unraisablehook__(ignored)
+def _end_interrupted(program: str) -> None:
+    """End all child processes, clean up, say so in one line, and end the process without waiting for any thread."""
+    from rov_fmu.files.interrupts import UNDIVIDED, clean_up_everything
+
+    with UNDIVIDED:  # no other thread begins or says anything more
+        try:
+            _kill_children()
+            _say(program, "; ".join([_INTERRUPTED, *clean_up_everything()]), 130)
+            _kill_children()  # Dask starts a worker again that has ended
+        finally:
+            os._exit(130)
 
 
-def _interrupt() -> None:
-    if hasattr(signal, "pthread_kill"):  # which ends a wait, too
-        os.kill(os.getpid(), signal.SIGINT)
-    else:
-        interrupt_main()
+def _kill_children() -> None:
+    from multiprocessing import active_children
+
+    for child in active_children():
+        with suppress(ValueError):  # another thread has just seen it end
+            child.kill()
 
 
 def _say(program: str, message: str, code: int) -> int:
-    for line in message.splitlines():
-        print(f"{program}: {line}", file=sys.stderr)
+    from rov_fmu.files.interrupts import UNDIVIDED
+
+    with UNDIVIDED:
+        for line in message.splitlines():
+            print(f"{program}: {line}", file=sys.stderr)
     return code
 
 
 def _end_output() -> None:
-    """Where what is printed has no place to go, Python shall not try again as it ends."""
+    """Send further output nowhere, since it cannot be written, or Python would try again at its end."""
     try:
         if sys.stdout:
             sys.stdout.flush()

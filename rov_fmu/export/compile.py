@@ -5,19 +5,16 @@ import os
 import platform
 import signal
 import subprocess
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from queue import SimpleQueue
-from threading import Lock
 
 from fat_macho import FatWriter
 
-from rov_fmu.files.interrupts import held_interrupts
+from rov_fmu.files.interrupts import UNDIVIDED, cleaned_up, temporary_folder
 from rov_fmu.files.places import FMU_SRC
 
 C_SOURCES = FMU_SRC / "c"
@@ -138,39 +135,28 @@ def compile_module(sources: Mapping[str, str]) -> bytes:
 def _side_by_side(
     work: Mapping[str, Callable[["_Compilers"], bytes]], on_done: Callable[[str], None] = lambda _: None
 ) -> dict[str, bytes]:
-    ended: SimpleQueue[Future[bytes] | None] = SimpleQueue()
+    compilers = _Compilers()
     try:
-        with (
-            held_interrupts(lambda: ended.put(None)),
-            ThreadPoolExecutor(os.cpu_count()) as pool,
-            _Compilers() as compilers,
-        ):
+        with ThreadPoolExecutor(os.cpu_count()) as pool, cleaned_up(compilers.end):
             jobs = {pool.submit(job, compilers): name for name, job in work.items()}
-            for job in jobs:
-                job.add_done_callback(ended.put)
-            for _ in jobs:
-                if (done := ended.get()) is None:
-                    raise KeyboardInterrupt
-                done.result()
-                on_done(jobs[done])
+            for job in as_completed(jobs):
+                job.result()
+                on_done(jobs[job])
             return {name: job.result() for job, name in jobs.items()}
     except OSError as error:
         raise BuildError(f"cannot compile: {error.strerror or error}") from error
 
 
 class _Compilers:
-    """The compilers that run, each waited for in a thread; they end where the block does."""
+    """The compilers that are running, each of them waited for by a thread."""
 
     def __init__(self) -> None:
-        self._lock = Lock()
         self._running: set[subprocess.Popen[bytes]] = set()
         self._ended = False
 
-    def __enter__(self) -> "_Compilers":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
+    def end(self) -> None:
+        """Kill them, with the processes that they have started, and start no more."""
+        with UNDIVIDED:
             self._ended = True
             for process in self._running:
                 if os.name == "posix":
@@ -180,8 +166,8 @@ class _Compilers:
                     process.kill()
 
     def run(self, command: Sequence[str], folder: str) -> tuple[int, str]:
-        """Exit code and output. Returns when no process of it is left that might write into the folder."""
-        with self._lock:
+        """Return the exit code and the output, when no process is left that might write into the folder."""
+        with UNDIVIDED:
             if self._ended:
                 raise BuildError("interrupted")
             process = subprocess.Popen(
@@ -189,18 +175,18 @@ class _Compilers:
                 cwd=folder,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
-                start_new_session=True,  # the compiler has children of its own, which must end with it
+                start_new_session=True,  # so that the compiler's own child processes can be killed with it
             )
             self._running.add(process)
-        output, _ = process.communicate()  # to the end, which comes when all who can write have ended
-        with self._lock:
+        output, _ = process.communicate()  # until all that can write have ended
+        with UNDIVIDED:
             self._running.remove(process)
         return process.returncode, output.decode(errors="replace").strip()
 
 
 @contextmanager
 def _folder_of(sources: Mapping[str, str]) -> Iterator[str]:
-    with tempfile.TemporaryDirectory(prefix="fmu-") as folder:
+    with temporary_folder("fmu-") as folder:
         for file, text in sources.items():
             Path(folder, file).write_text(text, encoding="utf-8")
         yield folder

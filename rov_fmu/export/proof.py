@@ -3,7 +3,6 @@
 import io
 import os
 import signal
-import tempfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ import numpy as np
 
 from rov_fmu.export.experiments import Carried, Experiment
 from rov_fmu.export.unpacking import unpack_fmu
+from rov_fmu.files.interrupts import UNDIVIDED, ctrl_c_withheld, temporary_folder
 from rov_fmu.files.kinds import FMU, check_suffix
 from rov_fmu.files.messages import FileError, ProofError, brief, one_line
 from rov_fmu.files.series import Series
@@ -68,7 +68,7 @@ def prove(
 
     check_suffix(fmu, FMU)
     carried = Carried(fmu)
-    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder("fmu-") as folder:
         description = unpack_fmu(fmu, fmu, Path(folder))
         platforms = fmpy.supported_platforms(folder)
         experiments = carried.experiments(description)
@@ -106,7 +106,8 @@ def _apart(folder: str, interface: str, experiments: Sequence[Experiment]) -> Ge
     spawn = get_context("spawn")
     here, there = spawn.Pipe(duplex=False)
     process = spawn.Process(target=_send_findings, args=(there, folder, interface, experiments), daemon=True)
-    process.start()
+    with UNDIVIDED, ctrl_c_withheld():
+        process.start()
     there.close()
     try:
         for _ in experiments:

@@ -2,7 +2,6 @@
 
 import json
 import sys
-import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from pathlib import Path
 from pythonfmu import FmuBuilder
 
 from rov_fmu.export.interface import LOG_CATEGORIES, Variable
+from rov_fmu.files.interrupts import temporary_folder
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _HERE = Path(__file__).parent
@@ -40,7 +40,7 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
 
 def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, bytes]:
     """Everything FmuBuilder packs, path in the archive to content, but its modelDescription.xml."""
-    with tempfile.TemporaryDirectory(prefix="fmu-") as folder:
+    with temporary_folder("fmu-") as folder:
         for name, text in sources.items():
             path = Path(folder, "sources", name)
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,31 +1,87 @@
-"""Interrupts that come at a bad moment."""
+"""What Ctrl-C must not cut in two, and what must be cleaned up when it ends the process."""
 
+import shutil
 import signal
+import sys
+import tempfile
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from threading import current_thread, main_thread
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from threading import RLock
+
+UNDIVIDED = RLock()
+"""A thread holds this lock while it does something that an interrupt must not cut in two. See `clean_up_everything`."""
+_PENDING: list[tuple[Callable[[], object], str]] = []
+"""What is still to be cleaned up, in the order in which it began, with what the user should know then."""
+_ATTEMPTS = 50
+"""How often a folder is removed while a thread may still be writing into it."""
+_PAUSE = 0.01
+"""Seconds between two attempts."""
 
 
 @contextmanager
-def held_interrupts(tell: Callable[[], None] = lambda: None) -> Iterator[None]:
-    """Tell of interrupts, and raise KeyboardInterrupt at the end.
+def cleaned_up(clean: Callable[[], object], note: str = "") -> Iterator[None]:
+    """Call `clean` when the block ends, and also when an interrupt ends the process within the block.
 
-    Raised at any moment, one could leave a lock of threads locked, or one of two files in its place.
+    The line about the interrupt ends with the note.
     """
-    came: list[int] = []
-
-    def interrupted(number: int, _: object) -> None:
-        came.append(number)
-        tell()
-
-    here = current_thread() is main_thread()
-    taken = [s for s in (signal.SIGINT, signal.SIGTERM) if here and signal.getsignal(s) is signal.default_int_handler]
+    entry = clean, note
+    with UNDIVIDED:
+        _PENDING.append(entry)
     try:
-        for number in taken:
-            signal.signal(number, interrupted)
         yield
     finally:
-        for number in taken:
-            signal.signal(number, signal.default_int_handler)
-        if came:
-            raise KeyboardInterrupt
+        with UNDIVIDED:
+            _PENDING.remove(entry)
+            clean()
+
+
+@contextmanager
+def temporary_folder(prefix: str) -> Iterator[str]:
+    """Make a folder for temporary files; it is removed when the block ends or an interrupt ends the process."""
+    with ExitStack() as stack:
+        with UNDIVIDED:
+            folder = tempfile.mkdtemp(prefix=prefix)
+            stack.enter_context(cleaned_up(partial(_remove, folder)))
+        yield folder
+
+
+def clean_up_everything() -> list[str]:
+    """Clean up whatever is pending, the latest first, because the process is about to end; return the notes.
+
+    Whoever calls this holds UNDIVIDED until the process has ended. So what another thread does undivided is finished
+    before, and no thread begins anything more that would have to be cleaned up.
+    """
+    for clean, _ in reversed(_PENDING):
+        with suppress(Exception):
+            clean()
+    return [note for _, note in _PENDING if note]
+
+
+@contextmanager
+def ctrl_c_withheld() -> Iterator[None]:
+    """Start processes in this block that Ctrl-C in a terminal does not reach: this process ends them.
+
+    They, and the threads that are started here, inherit that SIGINT is blocked. Windows has no such inheritance.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    from multiprocessing.resource_tracker import ensure_running
+
+    ensure_running()  # Python's own helper process, whose start ends with SIGINT not blocked
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _remove(folder: str) -> None:
+    for _ in range(_ATTEMPTS):
+        shutil.rmtree(folder, ignore_errors=True)
+        if not Path(folder).exists():
+            return
+        time.sleep(_PAUSE)

@@ -6,9 +6,10 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from rov_fmu.files.interrupts import held_interrupts
+from rov_fmu.files.interrupts import UNDIVIDED, cleaned_up
 
 
 class WriteError(OSError):
@@ -68,7 +69,7 @@ def write_whole(*outputs: Output) -> None:
     check_targets(output.path for output in outputs)
     with ExitStack() as drafts:
         ready = [(output.path, _draft(output, drafts)) for output in outputs]
-        with held_interrupts():
+        with UNDIVIDED:
             for path, draft in ready:
                 with _errors_about(path):
                     draft.replace(path)
@@ -78,9 +79,10 @@ def _draft(output: Output, drafts: ExitStack) -> Path:
     """A file beside the target, checked and ready to take its place; gone with the stack."""
     path = output.path
     with _errors_about(path):
-        descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".part", dir=path.parent)
-        draft = Path(name)
-        drafts.callback(draft.unlink, missing_ok=True)
+        with UNDIVIDED:
+            descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".part", dir=path.parent)
+            draft = Path(name)
+            drafts.enter_context(cleaned_up(partial(draft.unlink, missing_ok=True)))
         with os.fdopen(descriptor, "wb") as file:
             file.write(output.content)
             file.flush()

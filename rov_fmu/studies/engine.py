@@ -2,9 +2,7 @@
 
 import asyncio
 import logging
-import signal
 import sys
-import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, ThreadPoolExecutor
@@ -20,6 +18,7 @@ from distributed import Client, KilledWorker, LocalCluster, Security, as_complet
 from distributed.comm.core import CommClosedError
 from distributed.utils import silence_logging_cmgr
 
+from rov_fmu.files.interrupts import ctrl_c_withheld, temporary_folder
 from rov_fmu.files.messages import FileError, StudyError, brief
 from rov_fmu.files.output import WriteError
 from rov_fmu.studies.sampling import Design
@@ -62,9 +61,9 @@ class Spent:
     runs: int = 0
     failed: int = 0
     started: float = 0.0
-    """Seconds until the workers were there."""
+    """Seconds that it took to start the workers."""
     elapsed: float = 0.0
-    """Seconds in all."""
+    """Seconds from then until the last run was done."""
     working: float = 0.0
     """Seconds of all workers together."""
     simulating: float = 0.0
@@ -87,6 +86,7 @@ def execute(
     with _client(workers, scheduler) as client:
         _deliver(client, Delivery(job, own_cluster=scheduler is None))
         spent.started = perf_counter() - begin
+        begin += spent.started
         try:
             _Runs(client, job, design, store, missing, spent, on_progress).do()
         except (FileError, StudyError, WriteError):
@@ -239,11 +239,11 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
         "distributed.worker.profile.enabled": False,  # it takes the interpreter from the steps a hundred times a second
     }
     with (
-        tempfile.TemporaryDirectory(prefix="study-", ignore_cleanup_errors=True) as folder,
-        dask.config.set(settings),
+        temporary_folder("study-") as folder,
+        dask.config.set({**settings, "temporary-directory": folder}),
         _started(
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL, local_directory=folder,
+            silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):  # fmt: skip
@@ -251,19 +251,15 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
 
 
 def _started(**options: Any) -> LocalCluster:
-    """Workers that Ctrl-C does not reach, for it is for this process, which sees it as soon as they are there."""
+    """Start the workers. Raises StudyError."""
     script = getattr(sys.modules["__main__"], "__file__", None)
     if script and not Path(script).exists():
         raise StudyError(f"workers cannot be started of {script}, which is no file; {_GUARD}")
-    can_block = hasattr(signal, "pthread_sigmask")
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if can_block else set()
     try:
-        return LocalCluster(**options)
+        with ctrl_c_withheld():
+            return LocalCluster(**options)
     except RuntimeError:
         raise StudyError(f"the workers do not start; {_GUARD}") from None
-    finally:
-        if can_block:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _see(scheduler: str) -> None:

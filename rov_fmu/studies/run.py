@@ -1,12 +1,12 @@
 """A study from its plan to its results."""
 
 import sys
-import tempfile
 from collections.abc import Callable
 from multiprocessing import current_process
 from pathlib import Path
 
 from rov_fmu.build import build
+from rov_fmu.files.interrupts import temporary_folder
 from rov_fmu.files.output import Output, write_whole
 from rov_fmu.studies.engine import Progress, Spent, execute
 from rov_fmu.studies.model import Model, read_model
@@ -76,6 +76,6 @@ def _model(plan: Plan, path: Path) -> Model:
         return read_model(path.parent / plan.fmu)
     assert plan.vehicle
     vehicle = load_vehicle(vehicle_file("vehicle", plan.vehicle, path))
-    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder("fmu-") as folder:
         built = build(vehicle, Path(folder, f"{vehicle.identifier}.fmu"), platforms=["host"])
         return read_model(built.path)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu import __version__
+from rov_fmu.files.interrupts import cleaned_up
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.output import Output, WriteError, write_whole
 from rov_fmu.files.reading import read_text
@@ -41,12 +42,14 @@ class Store:
                 raise FileError(f"{self.folder}: another study is writing there") from None
         except OSError as error:
             raise WriteError(error.errno, error.strerror, str(error.filename or self.folder)) from error
-        try:
-            yield
-        finally:
+
+        def leave() -> None:
             if is_new and not self.done():
                 shutil.rmtree(self.folder, ignore_errors=True)
             lock.release()
+
+        with cleaned_up(leave, "the same command continues the study"):
+            yield
 
     def belongs_to(
         self,

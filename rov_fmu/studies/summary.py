@@ -20,9 +20,9 @@ def print_summary(results: Results, spent: Spent) -> None:
     counts = f"{len(runs)} runs, {len(results.failed)} failed, {len(results.incomplete)} incomplete"
     out.print(Text.assemble((str(results.folder), "bold"), f"  {counts}"))
     if spent.runs:
-        rate = spent.runs / max(spent.elapsed - spent.started, 1e-3)
+        rate = spent.runs / max(spent.elapsed, 1e-3)
         often = f"{rate:.0f}" if rate >= 10.0 else f"{rate:.2g}"
-        out.print(f"  {spent.runs} of them now, in {spent.elapsed:.1f} s; {often} a second once the workers were there")
+        out.print(f"  {spent.runs} of them now, in {spent.elapsed:.1f} s; {often} a second")
     if results.figures:
         shown = table("", "figure", [*(f"{q:.0%}" for q in _SHOWN), "mean", "runs"])
         for name in results.figures:

@@ -14,11 +14,10 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.export.archive import native_content
-from rov_fmu.files.output import Output, write_whole
 from rov_fmu.motion.layout import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import ALONE, BARE, COMMANDS, TESTS, start
+from tests.commands import ALONE, BARE, COMMANDS, ROOT, TESTS, start
 from tests.recordings import PLANS, clean, write_log
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
@@ -140,31 +139,36 @@ def test_an_interrupted_command_says_so_and_leaves_nothing(
     assert not any(output.parent.iterdir())
 
 
-TEXT = "def action(): exec('raise KeyboardInterrupt')"
-"""As a module that makes a dataclass does; CPython takes it for one that nobody caught."""
-FINALIZER = """
-import os, signal, time
-class Ended:
-    def __del__(self):
-        os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(0.0)
-def action():
-    Ended()
-    time.sleep(60.0)
-"""
+_INTERRUPTING = "os.kill(os.getpid(), signal.SIGINT); time.sleep({})"
+ACTIONS = {
+    "text": f"exec({_INTERRUPTING.format(600.0)!r})",
+    "finalizer": f"type('Ended', (), {{'__del__': lambda _: exec({_INTERRUPTING.format(0.0)!r})}})()",
+    "caught": f"""
+    try:
+        {_INTERRUPTING.format(0.1)}
+    except BaseException:
+        pass""",
+}
+"""Where Python or a library would make something else of a KeyboardInterrupt."""
 
 
-@pytest.mark.parametrize("action", [TEXT, FINALIZER], ids=["text", "finalizer"])
-def test_an_interrupt_is_one_as_any_where_python_makes_less_of_it(action: str, tmp_path: Path) -> None:
-    (tmp_path / "interrupted.py").write_text(
-        f"from rov_fmu.process import exit_code, run_process\n{action}\n"
-        "run_process(lambda: exit_code('rov-fmu', action, {OSError: 2}))\n"
+@pytest.mark.parametrize("action", ACTIONS.values(), ids=ACTIONS)
+def test_no_code_can_make_something_else_of_an_interrupt(action: str, tmp_path: Path) -> None:
+    ran = _interrupted(f"def action():\n    {action}\n    time.sleep(600.0)", tmp_path)
+    assert (ran.returncode, ran.stderr) == (130, "rov-fmu: interrupted, no file is half-written\n")
+
+
+def _interrupted(action: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a function `action` as the process of a command."""
+    (folder / "interrupted.py").write_text(
+        "import os, signal, sys, time\nfrom pathlib import Path\nfrom rov_fmu.process import exit_code, run_process\n"
+        f"{action}\nsys.exit(run_process('rov-fmu', lambda: exit_code('rov-fmu', action, {{OSError: 2}})))\n"
     )
-    ran = subprocess.run(
-        [sys.executable, "-m", "interrupted"], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=50,
+    return subprocess.run(
+        [sys.executable, "-m", "interrupted"], cwd=folder, capture_output=True, text=True, check=False, timeout=300,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},  # this checkout, whichever is installed
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
-    assert (ran.returncode, ran.stderr) == (130, "rov-fmu: interrupted, no file is half-written\n")
 
 
 @pytest.mark.parametrize(
@@ -205,34 +209,42 @@ _DRAWN = [pytest.param(name, marks=pytest.mark.long) for name in ("the report", 
 
 
 @pytest.mark.parametrize("name", ["the vehicle", "the tuned vehicle", *_DRAWN])
-def test_an_interrupt_before_the_last_move_leaves_nothing(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Path, "replace", interrupted)
+def test_an_interrupt_before_the_last_move_leaves_nothing(name: str, tmp_path: Path) -> None:
     command = COMMANDS[name]
-    assert command.run(tmp_path / command.name) == 130
-    assert capsys.readouterr() == ("", "rov-fmu: interrupted, no file is half-written\n")
-    assert not any(tmp_path.iterdir())
+    target = tmp_path / "out" / command.name
+    target.parent.mkdir()
+    action = f"""
+def interrupt(_):
+    assert [*Path({str(target.parent)!r}).iterdir()], "the draft is there"
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(600.0)
+os.fsync = interrupt
+def action():
+    from rov_fmu.cli import main
+    main({list(command.arguments(target))!r})
+"""
+    ran = _interrupted(action, tmp_path)
+    assert (ran.returncode, ran.stderr) == (130, "rov-fmu: interrupted, no file is half-written\n")
+    assert not any(target.parent.iterdir())
 
 
-def test_an_interrupt_between_two_moves_waits_for_the_second(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(self: Path, target: Path) -> Path:
-        os.kill(os.getpid(), signal.SIGINT)
-        self.rename(target)
-        return target
-
-    monkeypatch.setattr(Path, "replace", interrupted)
-    outputs = [Output(tmp_path / name, b"new") for name in ("rov.toml", "report.html")]
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background begins without
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            write_whole(*outputs)
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "rov.toml"]
+def test_an_interrupt_between_two_moves_waits_for_the_second(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    action = f"""
+def replace(self, target):
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(0.5)
+    self.rename(target)
+Path.replace = replace
+def action():
+    from rov_fmu.files.output import Output, write_whole
+    write_whole(*(Output(Path({str(out)!r}, name), b"new") for name in ("rov.toml", "report.html")))
+    time.sleep(600.0)
+"""
+    ran = _interrupted(action, tmp_path)
+    assert (ran.returncode, ran.stderr) == (130, "rov-fmu: interrupted, no file is half-written\n")
+    assert sorted(path.name for path in out.iterdir()) == ["report.html", "rov.toml"]
 
 
 def test_a_vehicle_out_of_a_pipe_is_refused_where_it_must_be_read_twice(
