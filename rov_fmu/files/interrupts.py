@@ -1,5 +1,6 @@
 """What Ctrl-C must not cut in two, and what must be cleaned up when it ends the process."""
 
+import os
 import shutil
 import signal
 import sys
@@ -69,14 +70,30 @@ def ctrl_c_withheld() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
-    from multiprocessing.resource_tracker import ensure_running
-
-    ensure_running()  # Python's own helper process, whose start ends with SIGINT not blocked
+    _start_resource_tracker()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _start_resource_tracker() -> None:
+    """Start Python's helper process that removes the semaphores of a process which has ended.
+
+    Its start ends with SIGINT not blocked, so it comes before SIGINT is blocked. Its warning that it had to remove some
+    is no news after an interrupt.
+    """
+    from multiprocessing.resource_tracker import ensure_running
+
+    given = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = ",".join([*([given] if given else []), "ignore:resource_tracker:UserWarning"])
+    try:
+        ensure_running()
+    finally:
+        del os.environ["PYTHONWARNINGS"]
+        if given is not None:
+            os.environ["PYTHONWARNINGS"] = given
 
 
 def _remove(folder: str) -> None:

@@ -29,7 +29,8 @@ PATIENCE = 300.0
 class Command:
     """A command in a terminal of its own; what it prints to stderr is kept apart."""
 
-    def __init__(self, arguments: list[str], folder: Path, **environment: str) -> None:
+    def __init__(self, arguments: list[str], folder: Path, is_controlled: bool = True, **environment: str) -> None:
+        """Without a terminal that controls it, none of its processes ends just because the first one does."""
         self.temporary = folder / "temporary files"
         self.temporary.mkdir()
         self.shown = b""
@@ -38,7 +39,8 @@ class Command:
         def own_terminal() -> None:
             # a shell starts what it runs in the background with interrupts ignored, and that is inherited
             signal.signal(signal.SIGINT, signal.SIG_DFL)
-            fcntl.ioctl(inside, termios.TIOCSCTTY, 0)
+            if is_controlled:
+                fcntl.ioctl(inside, termios.TIOCSCTTY, 0)
 
         self.process = subprocess.Popen(
             [sys.executable, *arguments], cwd=ROOT, stdin=inside, stdout=inside, stderr=subprocess.PIPE, text=True,
@@ -86,8 +88,8 @@ class Command:
 
 
 @contextmanager
-def command(arguments: list[str], folder: Path, **environment: str) -> Iterator[Command]:
-    begun = Command(arguments, folder, **environment)
+def command(arguments: list[str], folder: Path, is_controlled: bool = True, **environment: str) -> Iterator[Command]:
+    begun = Command(arguments, folder, is_controlled, **environment)
     try:
         yield begun
     finally:
@@ -118,7 +120,7 @@ def test_a_study_that_starts_its_workers_ends_with_one_line(
 ) -> None:
     plan, results = _plan(tmp_path, videoray_fmu), tmp_path / "results"
     arguments = ["-m", "rov_fmu", "study", str(plan), "-o", str(results), "--workers", "2"]
-    with command(arguments, tmp_path) as study:
+    with command(arguments, tmp_path, is_controlled=end is Command.press_ctrl_c) as study:
         study.wait_until(study.workers)
         time.sleep(later)
         assert end(study) == LINE_OF_A_STUDY
@@ -126,13 +128,13 @@ def test_a_study_that_starts_its_workers_ends_with_one_line(
         assert not results.exists()
 
 
-@pytest.mark.parametrize("end", [Command.press_ctrl_c, pytest.param(Command.terminate, marks=pytest.mark.long)])
+@pytest.mark.parametrize("end", [Command.press_ctrl_c, Command.terminate])
 def test_a_study_that_runs_ends_with_one_line(
     end: Callable[[Command], str], videoray_fmu: Path, tmp_path: Path
 ) -> None:
     plan, results = _plan(tmp_path, videoray_fmu), tmp_path / "results"
     arguments = ["-m", "rov_fmu", "study", str(plan), "-o", str(results), "--workers", "2"]
-    with command(arguments, tmp_path) as study:
+    with command(arguments, tmp_path, is_controlled=end is Command.press_ctrl_c) as study:
         study.wait_until(lambda: [*results.glob("runs/part-*.parquet")])
         assert end(study) == LINE_OF_A_STUDY
     assert not [*results.glob("*/.*")]
