@@ -76,9 +76,9 @@ def pair(value: object) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
-def beside(name: str, info: ValidationInfo) -> Path:
-    """A path as seen from the file that names it."""
-    return Path((info.context or {})["folder"], name)
+def folder_of(info: ValidationInfo) -> Path:
+    """The folder of the file that is checked."""
+    return Path((info.context or {})["folder"])
 
 
 # ---- Problems in words -----------------------------------------------------------------------------------------------

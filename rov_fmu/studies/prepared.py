@@ -86,7 +86,7 @@ def vehicle_file(key: str, given: str, path: Path) -> Path:
         return beside
     if given not in SHIPPED:
         ships = ", ".join(SHIPPED)
-        told = f"there is no such file, as seen from the plan, and no vehicle of this name ships, only {ships}"
+        told = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
         raise PlanError(f"{path}: {line(key, told, given)}")
     return SHIPPED[given]
 

@@ -13,7 +13,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.files.toml_file import Strict, Toml, beside, check, line, listed, pair, read_toml, told
+from rov_fmu.files.beside import inside
+from rov_fmu.files.toml_file import Strict, Toml, check, folder_of, line, listed, pair, read_toml, told
 from rov_fmu.motion.layout import AXES, AXIS, CURVE, REVERSE, Axis, Layout, Meta, VehicleAxis, coefficient_name
 from rov_fmu.vehicle.form import Head, Validity
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
@@ -41,9 +42,9 @@ _Window = Annotated[tuple[Finite, Finite], BeforeValidator(pair), AfterValidator
 
 
 def _vehicle(name: str, info: ValidationInfo) -> str:
-    if not _vehicle_file(name, beside(name, info)):
+    if not _vehicle_file(name, inside(folder_of(info), name)):
         raise ValueError(
-            f"must be a vehicle file, seen from this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
+            f"must be a vehicle file in this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
         )
     return name
 

@@ -12,7 +12,8 @@ from pathlib import Path
 from rov_fmu.files.csv_table import Column, DataFileError, read_columns
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.motion.rov import Rov
-from rov_fmu.vehicle.vehicle import TABLES, Vehicle
+from rov_fmu.vehicle.form import TABLES
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Cells = tuple[Decimal | None, ...]
 

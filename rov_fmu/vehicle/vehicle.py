@@ -10,7 +10,7 @@ from rov_fmu.files.toml_file import Toml, check, read_toml, told
 from rov_fmu.motion.layout import Layout
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.first import FirstFile, quantities
-from rov_fmu.vehicle.form import Head
+from rov_fmu.vehicle.form import PICTURES, TABLES, Head
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
@@ -19,14 +19,6 @@ from rov_fmu.vehicle.sense import as_far_as_readable, no_thrust, nonsense
 if TYPE_CHECKING:
     from rov_fmu.vehicle.uncertainty import Uncertainty
 
-TABLES = {
-    "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
-    "yaw": ("table7_yaw_response.csv", "table5_yaw_steady.csv"),
-    "surge": ("table8_surge_response.csv", "table4_surge_steady.csv"),
-}
-"""Files of published tables in the data folder, by axis: responses, and measured steady velocities."""
-PICTURES = ("model.png", "from_above.svg", "from_starboard.svg")
-"""Files in the folder of pictures."""
 _SECOND = {"format", "body", "arm", "curves", "thruster", "axes", "inputs"}
 """Keys that tell the second version of the file."""
 
@@ -171,8 +163,7 @@ def _vehicle(
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,
         alternatives=alternatives,
-        data=path.parent / head.data if head.data else None,
-        pictures=path.parent / head.pictures if head.pictures else None,
+        **head.folders_from(path.parent),
         limits=file.validity.limits,
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=estimates or {},
