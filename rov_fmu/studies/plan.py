@@ -19,6 +19,8 @@ from rov_fmu.vehicle.quantity import Finite
 
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
+_MOST_NAMED = 10_000
+"""Variables that a table of a plan gives something of."""
 _ALWAYS = -1e300
 """A time before any start."""
 
@@ -256,11 +258,11 @@ class Plan(Strict):
     vary_from: _Beside | None = None
     """A vehicle file beside the plan, or the name of a vehicle that ships: its coefficients vary by the errors and
     correlations that identification wrote there, but for those in [vary] and [set]."""
-    vary: dict[str, Varied] = Field({})
+    vary: dict[str, Varied] = Field({}, max_length=_MOST_NAMED)
     """By variable: what differs from run to run. An input that varies is held."""
-    set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({})
+    set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({}, max_length=_MOST_NAMED)
     """By variable: a start value for all runs in place of the FMU's."""
-    inputs: dict[str, Annotated[Signal, BeforeValidator(_held)]] = Field({})
+    inputs: dict[str, Annotated[Signal, BeforeValidator(_held)]] = Field({}, max_length=_MOST_NAMED)
     """By input: a number, steps or ramps."""
     input_file: InputFile | None = None
     """Inputs from a CSV file."""

@@ -9,7 +9,7 @@ from uuid import uuid4
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.files.messages import FileError, shown
+from rov_fmu.files.messages import FileError, lines_on, shown
 from rov_fmu.files.reading import read_text
 from rov_fmu.files.series import series
 from rov_fmu.files.toml_file import line
@@ -50,7 +50,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
         unread = [str(error)]
     times = np.zeros(0) if own else _times(plan)
     words = [*own, *estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file, times)]
-    wrong = [f"{path}: {told}" for told in words] + unread
+    wrong = lines_on(path, words) + unread
     if plan.input_file:
         file = path.parent / plan.input_file.path
         wrong += [f"{file}: {told}" for told in _wrong_rows(plan, model.variables, from_file)]

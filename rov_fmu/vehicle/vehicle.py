@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rov_fmu.files.messages import FileError
+from rov_fmu.files.messages import FileError, lines_on
 from rov_fmu.files.toml_file import Toml, check, read_toml, told
 from rov_fmu.motion.layout import Layout
 from rov_fmu.motion.rov import Rov
@@ -120,7 +120,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         return _second(path, data, context)
     first, problems = check(data, FirstFile, **context)
     if first is None:
-        raise VehicleFileError(*(f"{path}: {mistake}" for mistake in told(problems, data, FirstFile)))
+        raise VehicleFileError(*lines_on(path, told(problems, data, FirstFile)))
     found = quantities(first.coefficients)
     values = {name: q.value for name, q in found.items()}
     if weak := [line for curve in PAPER.curves for line in no_thrust(curve, values, "coefficients")]:
@@ -132,10 +132,9 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
 def _second(path: Path, data: Toml, context: Mapping[str, object]) -> Vehicle:
     """The second version of the file."""
     file, problems = check(data, File, **context)
-    mistakes = told(problems, data, File)
-    mistakes += nonsense(*as_far_as_readable(data, problems, context, Parts), data)
+    mistakes = [*told(problems, data, File), *nonsense(*as_far_as_readable(data, problems, context, Parts), data)]
     if file is None or mistakes:
-        raise VehicleFileError(*(f"{path}: {mistake}" for mistake in mistakes))
+        raise VehicleFileError(*lines_on(path, mistakes))
     alternatives = {name: _alternative(a.description, a.quantities) for name, a in file.alternatives.items()}
     found = file.quantities(file.layout)
     return _vehicle(path, file, file.layout, found, alternatives, file.thruster_sources, file.estimates)
