@@ -5,7 +5,7 @@ from io import BytesIO
 from pathlib import Path
 
 from lxml import etree
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 from rov_fmu.files.messages import FileError
 from rov_fmu.files.reading import read_bytes
@@ -22,7 +22,7 @@ def read_png(path: Path) -> bytes:
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(BytesIO(content), formats=["PNG"]) as picture:
                 picture.load()
-    except Image.UnidentifiedImageError as error:
+    except UnidentifiedImageError as error:
         raise FileError(f"{path}: not a PNG picture") from error
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
         raise FileError(f"{path}: not a PNG picture that can be read: {error}") from error

@@ -71,7 +71,8 @@ class FileHead(Head):
     (`videoray/tables`); its files are named and headed as those of `models/videoray/tables`."""
     pictures: Annotated[str, _folder(PICTURES)] | None = None
     """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, or one that
-    ships (`videoray/pictures`). Drawings are shown on a light ground. The icon and the thrusters are drawn from their geometry in any case."""
+    ships (`videoray/pictures`). Drawings are shown on a light ground. The icon and the thrusters are drawn from their
+    geometry in any case."""
 
     def folders_from(self, folder: Path) -> dict[str, Path | None]:
         """The folders `data` and `pictures` that a file in this folder names."""

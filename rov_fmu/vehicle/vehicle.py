@@ -155,6 +155,7 @@ def _vehicle(
     estimates: Mapping[str, Estimated] | None = None,
 ) -> Vehicle:
     head, made = file.vehicle, file.provenance
+    folders = head.folders_from(path.parent)
     words = {key: getattr(made, key) for key in ("tool", "method", "inputs", "warnings")} if made else {}
     return Vehicle(
         **{key: getattr(head, key) for key in Head.model_fields},
@@ -162,7 +163,8 @@ def _vehicle(
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,
         alternatives=alternatives,
-        **head.folders_from(path.parent),
+        data=folders["data"],
+        pictures=folders["pictures"],
         limits=file.validity.limits,
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=estimates or {},
