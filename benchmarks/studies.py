@@ -1,5 +1,6 @@
 """A study: what the engine adds to the simulation alone, and whether many runs cost as much each as few."""
 
+import shutil
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
@@ -109,7 +110,8 @@ class Study:
 
     def _plan(self, runs: int) -> Path:
         path = self._folder / "plan.toml"
-        path.write_text(_PLAN.format(fmu=self._fmu.as_posix(), stop=STOP, step=STEP, runs=runs))
+        fmu = shutil.copy(self._fmu, self._folder / "study.fmu")
+        path.write_text(_PLAN.format(fmu=fmu.name, stop=STOP, step=STEP, runs=runs))
         return path
 
 

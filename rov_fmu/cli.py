@@ -344,8 +344,10 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
     from rov_fmu.identify.identify import identify
     from rov_fmu.pages.console_results import print_identification
     from rov_fmu.tank.tank_tests import load_tank_tests
-    from rov_fmu.vehicle.writer import vehicle_output
+    from rov_fmu.vehicle.writer import check_report, vehicle_output
 
+    if output and report:
+        check_report(output, report)
     targets, replaced = [path for path in (output, report) if path], list[str]()
 
     def check_outputs(inputs: Sequence[Path]) -> None:

@@ -1,5 +1,6 @@
 """Folders of tank tests of vehicles of any form, small; what rov.toml may say."""
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -70,3 +71,10 @@ def pulled(a: float, b: float) -> str:
 
 def read(folder: Path, rov: str, tables: Mapping[str, str]) -> TankTests:
     return load_tank_tests(folder_of(folder, rov, tables))
+
+
+def beside(file: Path, folder: Path) -> str:
+    """Copy a file into a folder if it is not there already, so that a file there can name it; the name."""
+    if file.parent != folder:
+        shutil.copy(file, folder)
+    return file.name

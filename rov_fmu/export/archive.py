@@ -14,6 +14,7 @@ from rov_fmu.export.interface import interface_header, model_header, variables
 from rov_fmu.export.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
 from rov_fmu.export.python_flavour import python_files, python_sources
 from rov_fmu.export.terminals import FOLDER, ICON, terminals_and_icons
+from rov_fmu.files.picture import read_png
 from rov_fmu.files.places import LICENSE
 from rov_fmu.files.reading import read_bytes
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
@@ -80,14 +81,12 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
 
 def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, bytes]) -> dict[str, bytes]:
     report = vehicle.provenance.report if vehicle.provenance else None
-    files = {
-        "model.png": vehicle.picture("model.png"),
-        "documentation/licenses/license.txt": LICENSE,
-        f"documentation/{REPORT}": report,
-    }
+    files = {"documentation/licenses/license.txt": LICENSE, f"documentation/{REPORT}": report}
     read = {name: read_bytes(path, VehicleFileError) for name, path in files.items() if path}
-    if ICON in pages:
-        read.setdefault("model.png", pages[ICON])
+    if own := vehicle.picture("model.png"):
+        read["model.png"] = read_png(own)
+    elif ICON in pages:
+        read["model.png"] = pages[ICON]
     terminals = {f"{FOLDER}/terminalsAndIcons.xml": terminals_and_icons(vehicle.layout)}
     return {"modelDescription.xml": description, **terminals, **read, **pages}
 

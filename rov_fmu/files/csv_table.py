@@ -1,20 +1,22 @@
 """CSV files of numbers, as spreadsheets and loggers save them; one clear line for whatever is wrong with one."""
 
 import csv
-import io
 import re
+from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from math import isfinite, isnan, nan
 from pathlib import Path
 
-from rov_fmu.files.messages import FileError, brief, did_you_mean, shown, similar
-from rov_fmu.files.reading import read_text
+from rov_fmu.files.messages import MOST, FileError, brief, did_you_mean, shown, similar
+from rov_fmu.files.reading import read_lines
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 _HEADER = re.compile(r"(?P<name>[^\[\]]+?)\s*\[(?P<unit>[^\[\]]+)\]")
 _BLANKS = ("", "-", "nan")
-_MOST = 10  # lines on one file
+LARGEST = 500_000_000
+"""Bytes of a file; numbers and lines take up to a few times its size in memory."""
 
 Conversion = Callable[[float], float]
 
@@ -53,18 +55,23 @@ class Columns:
     """As they stand there, by column."""
     units: Mapping[str, str]
     """By column, without the numbers that may follow one."""
-    texts: Mapping[str, list[str]]
-    """The cells as they stand there, but for decimal commas and blanks, which are empty."""
-    values: Mapping[str, list[float]]
-    lines: list[int]
+    values: Mapping[str, "array[float]"]
+    lines: "array[int]"
     unread: Mapping[str, int]
     """Of a loose reading, by column: how many cells are neither numbers nor blank; they read as NaN."""
     torn: int
     """Of a loose reading: how many rows were left out, as they have more cells than the header."""
+    rows: Callable[[], Iterator[Mapping[str, str]]]
+    """Parses the file once more: the cells of each row by column. To keep these texts would take far more memory."""
+
+    def texts(self, *columns: str) -> Iterator[tuple[str, ...]]:
+        """The cells of some columns, row by row, as they stand there, but with decimal points; blanks are empty."""
+        for cells, *values in zip(self.rows(), *(self.values[column] for column in columns), strict=True):
+            yield tuple("" if isnan(value) else cells[column] for column, value in zip(columns, values, strict=True))
 
     def error(self, row: int, column: str, reason: str) -> DataFileError:
         """The one line for a number that cannot be."""
-        header, text = shown(self.headers[column]), brief(self.texts[column][row])
+        header, text = shown(self.headers[column]), brief(next(islice(self.texts(column), row, None))[0])
         return DataFileError(f"{self.path}, line {self.lines[row]}, column {header} = {text}: {reason}")
 
 
@@ -93,9 +100,9 @@ def read_columns(
     number reads as NaN, and a row with too many cells is left out. `check_header` is called before any row is read,
     with the headers that are read, by column, and with all other headers; it yields what is wrong with them.
     """
-    text = read_text(path, DataFileError)
-    separator = _separator(text)
-    lines = _csv_lines(path, text, separator)
+    opened = read_lines(path, DataFileError, most=LARGEST)
+    separator = _separator(opened())
+    lines = _csv_lines(path, opened(), separator)
     line, header = next(lines, (1, []))
     if not header:
         raise DataFileError(f"{path}: the file is empty")
@@ -103,55 +110,74 @@ def read_columns(
     headers = {column.name: header[place] for place, column in found.items()}
     if reasons := [*check_header(headers, [title for n, title in enumerate(header) if n not in found])]:
         raise DataFileError(*(f"{path}, line {line}: {reason}" for reason in reasons))
+
+    def by_column(cells: list[str]) -> dict[str, str]:
+        plain = (_plain(cells[place], separator) if place < len(cells) else "" for place in found)
+        return dict(zip(names, plain, strict=True))
+
+    def rows() -> Iterator[Mapping[str, str]]:
+        below = islice(_csv_lines(path, opened(), separator), 1, None)
+        return (by_column(cells) for _, cells in below if len(cells) <= len(header))
+
     names = [column.name for column in found.values()]
-    values: dict[str, list[float]] = {name: [] for name in names}
-    texts: dict[str, list[str]] = {name: [] for name in names}
-    numbers: list[int] = []
+    values = {name: array("d") for name in names}
+    numbers = array("L")
     unread = dict.fromkeys(names, 0)
-    torn: list[str] = []
-    wrong: list[str] = []
+    torn, wrong = _Mistakes(), _Mistakes()
     for line, cells in lines:
         if len(cells) > len(header):
             told = (
                 f"{path}, line {line}, column {len(header) + 1} = {shown(cells[len(header)])}: there is no such column"
             )
-            (torn if loose else wrong).append(f"{told}{_comma_hint(cells, separator)}")
+            (torn if loose else wrong).add(f"{told}{_comma_hint(cells, separator)}")
             continue
         numbers.append(line)
-        for place, column in found.items():
-            there = place < len(cells)
-            cell = _plain(cells[place], separator) if there else ""
+        for (place, column), cell in zip(found.items(), by_column(cells).values(), strict=True):
             try:
-                value = _value(cell, there, column, loose)
+                value = _value(cell, place < len(cells), column, loose)
             except ValueError as error:
                 told = f" = {shown(cell)}" if cell else ""
-                wrong.append(f"{path}, line {line}, column {shown(header[place])}{told}: {error}")
+                wrong.add(f"{path}, line {line}, column {shown(header[place])}{told}: {error}")
                 continue
             values[column.name].append(value)
             unread[column.name] += isnan(value) and not _is_blank(cell)
-            texts[column.name].append("" if isnan(value) else cell)
-    if len(torn) > len(numbers):
-        wrong.append(torn[0])
-    if wrong:
-        raise DataFileError(*wrong[:_MOST], *([f"{path}: {len(wrong) - _MOST} more"] if len(wrong) > _MOST else []))
+    if torn.count > len(numbers):
+        wrong.add(torn.first[0])
+    if wrong.count:
+        more = wrong.count - len(wrong.first)
+        raise DataFileError(*wrong.first, *([f"{path}: {more} more"] if more else []))
     if not numbers:
         raise DataFileError(f"{path}, line {line}: no rows below the header")
     units = {column.name: column.unit for column in found.values()}
-    return Columns(path, headers, units, texts, values, numbers, unread, len(torn))
+    return Columns(path, headers, units, values, numbers, unread, torn.count, rows)
+
+
+class _Mistakes:
+    """The first mistakes, and how many there are."""
+
+    def __init__(self) -> None:
+        self.first: list[str] = []
+        self.count = 0
+
+    def add(self, line: str) -> None:
+        """Count one more, and keep the line if it is among the first."""
+        self.count += 1
+        if self.count <= MOST:
+            self.first.append(line)
 
 
 # ---- Cells -----------------------------------------------------------------------------------------------------------
 
 
-def _separator(text: str) -> str:
+def _separator(lines: Iterable[str]) -> str:
     """What parts the cells: whichever of comma, semicolon and tabulator the header has most of."""
-    header = next(filter(str.strip, text.split("\n")), "")
+    header = next(filter(str.strip, lines), "")
     return max(",;\t", key=header.count)
 
 
-def _csv_lines(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
+def _csv_lines(path: Path, lines: Iterable[str], separator: str) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line that is not blank; without blank cells at the end that the header lacks."""
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    reader = csv.reader(lines, delimiter=separator, strict=True)
     width = 0
     try:
         for row in reader:
@@ -239,7 +265,7 @@ def _header(path: Path, line: int, header: list[str], columns: Mapping[str, Colu
         hint = f"; is it the column {' or '.join(map(shown, near))}?" if near else ""
         wrong.append(f"{path}, line {line}, column {len(header) + 1}: {titles}{hint}")
     if wrong:
-        raise DataFileError(*wrong[:_MOST])
+        raise DataFileError(*wrong[:MOST])
     return found
 
 

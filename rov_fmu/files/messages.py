@@ -3,6 +3,10 @@
 import reprlib
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from pathlib import Path
+
+MOST = 10
+"""Mistakes in a file that are told; the others are counted."""
 
 
 class FileError(ValueError):
@@ -18,6 +22,18 @@ class ProofError(Exception):
 
 class StudyError(Exception):
     """A study that cannot go on; what is done is kept."""
+
+
+def lines_on(path: Path, mistakes: Iterable[str]) -> list[str]:
+    """A line for each of the first ten different mistakes in a file, and one that counts the others.
+
+    An empty mistake is only counted.
+    """
+    every = [*mistakes]
+    different = [*dict.fromkeys(filter(None, every))]
+    more = len(different[MOST:]) + every.count("")
+    counted = [f"{more} more mistake{'s' if more > 1 else ''}"] if more else []
+    return [f"{path}: {line}" for line in (*different[:MOST], *counted)]
 
 
 def one_line(text: str) -> str:

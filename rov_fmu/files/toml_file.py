@@ -3,7 +3,7 @@
 import json
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, cre
 from pydantic_core import ErrorDetails
 
 from rov_fmu.files.kinds import check_keys
-from rov_fmu.files.messages import FileError, brief, did_you_mean, shown, similar
+from rov_fmu.files.messages import MOST, FileError, brief, did_you_mean, lines_on, shown, similar
 from rov_fmu.files.reading import read_text
 
 if sys.version_info >= (3, 11):
@@ -38,9 +38,11 @@ def table_of(name: str, base: type[Strict], fields: Mapping[str, Any], words: st
     return create_model(name, __base__=base, __doc__=words, __cls_kwargs__=quick, **fields)
 
 
+_LARGEST = 20_000_000
+"""Bytes of a TOML file."""
 Checked = TypeVar("Checked", bound=Strict)
 Toml = dict[str, Any]
-_Place = Sequence[int | str]
+_Place = tuple[int | str, ...]
 
 
 def read_checked(path: Path, kind: str, model: type[Checked], failure: type[FileError], **context: object) -> Checked:
@@ -49,13 +51,13 @@ def read_checked(path: Path, kind: str, model: type[Checked], failure: type[File
     check_keys(path, data, kind, failure)
     checked, problems = check(data, model, folder=path.parent, **context)
     if checked is None:
-        raise failure(*(f"{path}: {line}" for line in told(problems, data, model)))
+        raise failure(*lines_on(path, told(problems, data, model)))
     return checked
 
 
 def read_toml(path: Path, failure: type[FileError]) -> Toml:
     """Read a TOML file of any form. Raises `failure`."""
-    text = read_text(path, failure)
+    text = read_text(path, failure, most=_LARGEST)
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -69,7 +71,7 @@ def check(data: Toml, model: type[Checked], **context: object) -> tuple[Checked 
     try:
         return model.model_validate(data, context=context), []
     except ValidationError as error:
-        return None, error.errors()
+        return None, error.errors(include_url=False)
 
 
 def pair(value: object) -> object:
@@ -77,9 +79,9 @@ def pair(value: object) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
-def beside(name: str, info: ValidationInfo) -> Path:
-    """A path as seen from the file that names it."""
-    return Path((info.context or {})["folder"], name)
+def folder_of(info: ValidationInfo) -> Path:
+    """The folder of the file that is checked."""
+    return Path((info.context or {})["folder"])
 
 
 # ---- Problems in words -----------------------------------------------------------------------------------------------
@@ -94,23 +96,37 @@ _REASONS = {
     "tuple_type": "must be a list",
 }
 _OF_WHAT = re.compile("^(Input|String|List|Tuple|Dictionary) should ")
-_MOST = 10
+_LISTED = 10
 """Names that a line lists."""
+_COMPARED = 100
+"""Unknown keys of a table that a missing key is compared with."""
 
 
-def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> list[str]:
-    """Problems of the file in a line each: key, value, what is allowed."""
+def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> Iterator[str]:
+    """A line for each problem with the file: key, value, what is allowed.
+
+    After the first ten the lines are empty, for it takes long to find what each of many unknown keys may mean.
+    """
     if not problems:  # the form takes long to write out
-        return []
-    form = _Form(model)
-    to_tell = (p for p in problems if p["type"] != "missing" or not _misspelt(p["loc"], problems, form))
-    return [*dict.fromkeys(_told(p, data, form) for p in to_tell)]
+        return
+    form, unknown = _Form(model), dict[_Place, list[_Place]]()
+    for problem in problems:
+        if problem["type"] == "extra_forbidden":
+            unknown.setdefault(problem["loc"][:-1], []).append(problem["loc"])
+    number = 0
+    for problem in problems:
+        place = problem["loc"]
+        if number == MOST:
+            yield ""
+        elif problem["type"] != "missing" or not _is_misspelt(place, unknown.get(place[:-1], ()), form):
+            number += 1
+            yield _told(problem, data, form)
 
 
 def listed(names: Iterable[str]) -> str:
     """Names in a line, and neither endlessly many nor endless ones."""
     some = [name or repr("") for name in names]
-    return brief(", ".join(some[:_MOST]) + (", ..." if len(some) > _MOST else ""), 200)
+    return brief(", ".join(some[:_LISTED]) + (", ..." if len(some) > _LISTED else ""), 200)
 
 
 def line(key: str, reason: str, *value: object) -> str:
@@ -177,10 +193,9 @@ def _constant(form: dict[str, Any]) -> Any:
     return one[0] if len(one) == 1 else None
 
 
-def _misspelt(place: _Place, problems: Iterable[ErrorDetails], form: _Form) -> bool:
-    """Whether a key is missing because it stands there as another."""
-    unknown = (p["loc"] for p in problems if p["type"] == "extra_forbidden")
-    return any(other[:-1] == place[:-1] and form.near(other) == place[-1] for other in unknown)
+def _is_misspelt(place: _Place, unknown: Sequence[_Place], form: _Form) -> bool:
+    """Whether a missing key is misspelt: one of the unknown keys of its table must mean it."""
+    return any(form.near(other) == place[-1] for other in unknown[:_COMPARED])
 
 
 def _told(problem: ErrorDetails, data: Toml, form: _Form) -> str:
@@ -196,7 +211,7 @@ def _told(problem: ErrorDetails, data: Toml, form: _Form) -> str:
     if kind == "extra_forbidden":
         allowed = form.keys(place[:-1])
         hint = did_you_mean(str(place[-1]), allowed)
-        only = "" if hint and len(allowed) > _MOST else f", only {listed(allowed)}"
+        only = "" if hint and len(allowed) > _LISTED else f", only {listed(allowed)}"
         return f"{key}: there is no such key{only}{hint}"
     reason = _reason(problem, form)
     *above, last = place

@@ -31,7 +31,7 @@ from rov_fmu.pages.plots import (
     measured_step,
     tables_by_axis,
 )
-from rov_fmu.pages.svg import LIGHT, inline_file, inline_svg, svg_file
+from rov_fmu.pages.svg import LIGHT, image, inline_svg, svg_file
 from rov_fmu.pages.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -100,7 +100,7 @@ def documentation_page(
         moves_at_rest=any(rov.derivatives(rest, rest).values()),
         held=held,
         motions=[motion for axis in axes for motion in _motions(rov, axis, held)],
-        frames=[inline_file(label, path) for label, path in own],
+        frames=[image(label, path) for label, path in own],
         thrusters=[
             inline_svg(f"Thrusters {view}", partial(_draw, partial(draw_thrusters, rov=rov, scene=scene)), scene.inches)
             for view, scene in scenes(rov).items()

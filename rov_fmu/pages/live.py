@@ -63,7 +63,7 @@ def live(flown: Sequence[Flown]) -> Live:
     return Live(
         data=Markup(data),
         script=Markup(script),
-        policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'; base-uri 'none'; form-action 'none'",
+        policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
         tests=[{**test, "words": _words(pilot, test)} for test in tests],
         loads=list(_loads(pilot.rov)),
         tunable=list(_tunable(pilot.rov)),

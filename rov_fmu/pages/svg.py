@@ -1,5 +1,6 @@
 """Plots as SVG: the same bytes at every call, in the colours and the type of the page that they stand in."""
 
+import base64
 import re
 from collections.abc import Callable
 from html import escape
@@ -13,8 +14,7 @@ from matplotlib import style
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from rov_fmu.files.messages import FileError
-from rov_fmu.files.reading import read_bytes
+from rov_fmu.files.picture import read_svg
 
 # Role: colour on a light and on a dark page. In a page a plot refers to the role, so it follows the page.
 PALETTE = {
@@ -71,14 +71,13 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
     return inline(label, svg_file(draw, size, salt=label, background="none", margin=0.02))
 
 
-def inline_file(label: str, path: Path) -> Markup:
-    """A picture drawn by hand, as part of a page. Raises FileError."""
-    try:
-        root = etree.fromstring(read_bytes(path), etree.XMLParser(resolve_entities=False, no_network=True))
-    except etree.XMLSyntaxError as error:
-        raise FileError(f"{path}: not an SVG picture: {error.msg}") from error
-    etree.strip_elements(root, f"{_SVG}script", f"{_SVG}foreignObject", with_tail=False)
-    return inline(label, str(etree.tostring(root, encoding="unicode")))
+def image(label: str, path: Path) -> Markup:
+    """An SVG file from elsewhere as an image of a page: there no script runs, and nothing in it leads elsewhere.
+
+    Its place in the page is light, for a file knows nothing of the page's colours. Raises FileError.
+    """
+    data = base64.b64encode(read_svg(path)).decode()
+    return Markup('<img src="data:image/svg+xml;base64,{}" alt="{}">').format(data, label)
 
 
 def inline(label: str, svg: str) -> Markup:

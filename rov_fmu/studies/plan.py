@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator
 from itertools import pairwise
 from math import prod
@@ -11,14 +12,17 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 from typing_extensions import Self
 
+from rov_fmu.files.beside import inside
 from rov_fmu.files.kinds import PLAN, check_suffix
 from rov_fmu.files.messages import FileError
-from rov_fmu.files.toml_file import Strict, beside, line, pair, read_checked
+from rov_fmu.files.toml_file import Strict, folder_of, line, pair, read_checked
 from rov_fmu.studies.figures import read_expression
 from rov_fmu.vehicle.quantity import Finite, not_blank
 
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
+_MOST_NAMED = 10_000
+"""Variables that a table of a plan gives something of."""
 _ALWAYS = -1e300
 """A time before any start."""
 
@@ -171,11 +175,20 @@ class Signal(Strict):
             last = time, value
 
 
+def _beside(name: str, info: ValidationInfo) -> str:
+    inside(folder_of(info), name)
+    return name
+
+
+_Beside = Annotated[str, AfterValidator(_beside)]
+"""A file in the folder of the plan, or in a folder inside it."""
+
+
 class InputFile(Strict):
     """Inputs in a CSV file: the time (s) in a column `time`, a variable of the FMU in each other one."""
 
-    path: str
-    """As seen from the plan."""
+    path: _Beside
+    """A file beside the plan, or in a folder beside it."""
     between: Literal["steps", "ramps"] = "ramps"
     """Whether a row is held until the next one, or is reached on a straight line."""
 
@@ -215,8 +228,8 @@ class Keep(Strict):
 
 
 def _file(name: str, info: ValidationInfo) -> str:
-    if not beside(name, info).is_file():
-        raise ValueError("there is no such file, as seen from the plan")
+    if not os.path.isfile(inside(folder_of(info), name)):  # noqa: PTH113 (Path.is_file raises on names that are too long)
+        raise ValueError("there is no such file beside the plan")
     return name
 
 
@@ -229,9 +242,9 @@ class Plan(Strict):
     """A study: many runs of one FMU."""
 
     fmu: Annotated[str, AfterValidator(_file)] | None = None
-    """An FMU for Co-Simulation, as seen from the plan; or `vehicle`."""
-    vehicle: str | None = None
-    """A vehicle file, as seen from the plan, or the name of one that ships: its FMU is built for this machine."""
+    """An FMU for Co-Simulation beside the plan, or in a folder beside it; or `vehicle`."""
+    vehicle: _Beside | None = None
+    """A vehicle file beside the plan, or the name of one that ships: its FMU is built for this machine."""
     start_time: Finite = 0.0
     """s."""
     stop_time: Finite
@@ -249,14 +262,14 @@ class Plan(Strict):
     """The parameters of a run depend on this and on the run's number alone."""
     sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
     """How the numbers are drawn; saltelli is what Sobol indices are computed from."""
-    vary_from: str | None = None
-    """A vehicle file, or the name of a vehicle that ships: its coefficients vary by the errors and correlations that
-    identification wrote there, but for those in [vary] and [set]."""
-    vary: dict[str, Varied] = Field({})
+    vary_from: _Beside | None = None
+    """A vehicle file beside the plan, or the name of a vehicle that ships: its coefficients vary by the errors and
+    correlations that identification wrote there, but for those in [vary] and [set]."""
+    vary: dict[str, Varied] = Field({}, max_length=_MOST_NAMED)
     """By variable: what differs from run to run. An input that varies is held."""
-    set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({})
+    set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({}, max_length=_MOST_NAMED)
     """By variable: a start value for all runs in place of the FMU's."""
-    inputs: dict[str, Annotated[Signal, BeforeValidator(_held)]] = Field({})
+    inputs: dict[str, Annotated[Signal, BeforeValidator(_held)]] = Field({}, max_length=_MOST_NAMED)
     """By input: a number, steps or ramps."""
     input_file: InputFile | None = None
     """Inputs from a CSV file."""

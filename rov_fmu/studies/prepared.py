@@ -9,7 +9,7 @@ from uuid import uuid4
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.files.messages import FileError, did_you_mean, shown
+from rov_fmu.files.messages import FileError, did_you_mean, lines_on, shown
 from rov_fmu.files.reading import read_text
 from rov_fmu.files.series import series
 from rov_fmu.files.toml_file import line
@@ -52,7 +52,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
         unread = [str(error)]
     times = np.zeros(0) if own else _times(plan)
     words = [*own, *estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file, times)]
-    wrong = [f"{path}: {told}" for told in words] + unread
+    wrong = lines_on(path, words) + unread
     if plan.input_file:
         file = path.parent / plan.input_file.path
         wrong += [f"{file}: {told}" for told in _wrong_rows(plan, model.variables, from_file)]
@@ -88,7 +88,7 @@ def vehicle_file(key: str, given: str, path: Path) -> Path:
         return beside
     if given not in SHIPPED:
         ships = ", ".join(SHIPPED)
-        told = f"there is no such file, as seen from the plan, and no vehicle of this name ships, only {ships}"
+        told = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
         raise PlanError(f"{path}: {line(key, told, given)}{did_you_mean(given, SHIPPED)}")
     return SHIPPED[given]
 

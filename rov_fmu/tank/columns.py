@@ -70,7 +70,7 @@ def refuse_slips(table: Columns, commands: Iterable[str]) -> None:
         (PULSES, 100.0, "no pulse beyond 100 us: percent under [us]? Write [%]"),
     ):
         of = [name for name in names if table.units[name] in units]
-        sizes = [abs(float(text)) for name in of for text in table.texts[name] if text]
-        if any(sizes) and max(sizes) <= most:
+        rows = table.texts(*of) if of else ()
+        if 0.0 < max((abs(float(text)) for row in rows for text in row if text), default=0.0) <= most:
             titles = ", ".join(shown(table.headers[name]) for name in of)
             raise DataFileError(f"{table.path}, column {titles}: {told}")

@@ -12,8 +12,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.files.messages import did_you_mean
-from rov_fmu.files.toml_file import Strict, Toml, beside, check, line, listed, pair, read_toml, told
+from rov_fmu.files.beside import inside
+from rov_fmu.files.messages import MOST, did_you_mean, lines_on
+from rov_fmu.files.toml_file import Strict, Toml, check, folder_of, line, listed, pair, read_toml, told
 from rov_fmu.motion.layout import AXES, AXIS, CURVE, REVERSE, Axis, Layout, Meta, VehicleAxis, coefficient_name
 from rov_fmu.vehicle.form import Head, Validity
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
@@ -41,9 +42,9 @@ _Window = Annotated[tuple[Finite, Finite], BeforeValidator(pair), AfterValidator
 
 
 def _vehicle(name: str, info: ValidationInfo) -> str:
-    if not _vehicle_file(name, beside(name, info)):
+    if not _vehicle_file(name, inside(folder_of(info), name)):
         raise ValueError(
-            f"must be a vehicle file, seen from this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
+            f"must be a vehicle file in this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
             f"{did_you_mean(name, SHIPPED)}"
         )
     return name
@@ -126,10 +127,11 @@ def read_said(path: Path) -> tuple[Said | None, list[str]]:
     said, mistakes = None, of_hardware
     if not (of_base or of_hardware or lost & {"base", "axes", *_OF_BASE}):
         said = _said(path, file, data, base)
-        strange = {("known", name) for name in said.named if name not in _everything(said.layout)}
+        everything = _everything(said.layout)
+        strange = {("known", name) for name in said.named if name not in everything}
         problems = [problem for problem in problems if problem["loc"][:2] not in strange]
         mistakes = [*_mistakes(file, lost, said)]
-    return said, [f"{path}: {mistake}" for mistake in (*told(problems, data, _RovFile), *mistakes)] + of_base
+    return said, lines_on(path, (*told(problems, data, _RovFile), *mistakes)) + of_base
 
 
 def _base(file: _Readable, folder: Path) -> tuple[Vehicle | None, list[str]]:
@@ -216,9 +218,10 @@ def _driven(layout: Layout, also: Iterable[str]) -> Iterator[Axis]:
 def _mistakes(file: _Readable, lost: set[str], said: Said) -> Iterator[str]:
     """A line for every name that the vehicle does not have, number that it cannot have, and half of a pair."""
     layout, everything = said.layout, _everything(said.layout)
-    for name in said.named:
-        if name not in everything:
-            yield line(f"known.{name}", f"there is no such coefficient of this vehicle{did_you_mean(name, everything)}")
+    strange = [name for name in said.named if name not in everything]
+    for name in strange[:MOST]:
+        yield line(f"known.{name}", f"there is no such coefficient of this vehicle{did_you_mean(name, everything)}")
+    yield from ("" for _ in strange[MOST:])
     yield from misgiven("known", {name: q for name, q in file.known.items() if name in everything}, everything)
     tables = dict(where(layout))
     for name in (name for name, q in file.quantities(layout).items() if q and name in file.known):

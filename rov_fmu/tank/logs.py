@@ -4,6 +4,7 @@ A CSV log has a column `time`; commands, as `command` of the axis that the log i
 the vehicle (`u_<name>`) or for each thruster; and what was measured. What cannot be used is left out, counted and told.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -57,12 +58,14 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None) -> Log:
     ((kind, commanding),) = _commanding(table.values, kinds).items()
     refuse_slips(table, commanding)
     time, values, notes = _cleaned(table, commanding)
+    del table  # a long log is large
     signals = _signals(sensors, time, values)
     if kind == "axis":
         return Log((_of_one_command(path, signals[0], values[_COMMAND]),), _named(path, notes))
     notes += tuple(f"no column of {name}, which is taken as 0" for name in kinds[kind] if name not in values)
-    reaching = _reaching(layout, values) if kind == "inputs" else _each(layout, values)
-    return _log(path, layout, Commands(time, reaching), signals, notes)
+    commands = Commands(time, _reaching(layout, values) if kind == "inputs" else _each(layout, values))
+    del values
+    return _log(path, layout, commands, signals, notes)
 
 
 def _log(
@@ -177,7 +180,7 @@ def _of_no_axis(path: Path, layout: Layout) -> str:
 
 def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Array], tuple[str, ...]]:
     """Ascending time (s), columns, commands within ±1, and what was left out or changed. Raises DataFileError."""
-    columns = {name: np.array(values) for name, values in table.values.items()}
+    columns = {name: np.frombuffer(values) for name, values in table.values.items()}
     timed = np.isfinite(columns["time"])
     commanded = np.all([np.isfinite(columns[name]) for name in commanding], axis=0)
     rows = np.flatnonzero(timed & commanded)
@@ -216,14 +219,16 @@ def _merged(values: Array, first: Array, *, commanded: bool) -> Array:
 
 def _on_pulses(table: Columns, commanding: Iterable[str]) -> list[str]:
     """How many were none, and how many are beyond full thrust."""
+    pulsed = [name for name in commanding if table.units[name] in PULSES]
+    none: Counter[str] = Counter()
+    for row in table.texts(*pulsed) if pulsed else ():
+        none.update(name for name, text in zip(pulsed, row, strict=True) if text and float(text) in NO_OUTPUT)
     notes = []
-    for name in commanding:
-        if table.units[name] in PULSES:
-            none = sum(float(text) in NO_OUTPUT for text in table.texts[name] if text)
-            beyond = sum(abs(value) > 1.0 for value in table.values[name])
-            told = [f"{none} of 0 or 65535 us taken as no command"] if none else []
-            told += [f"{beyond} beyond full thrust taken as full thrust"] if beyond else []
-            notes += [f"pulses of {name}: {', '.join(told)}"] if told else []
+    for name in pulsed:
+        beyond = sum(abs(value) > 1.0 for value in table.values[name])
+        told = [f"{none[name]} of 0 or 65535 us taken as no command"] if none[name] else []
+        told += [f"{beyond} beyond full thrust taken as full thrust"] if beyond else []
+        notes += [f"pulses of {name}: {', '.join(told)}"] if told else []
     return notes
 
 

@@ -69,8 +69,10 @@ def _recording(file: str, layout: Layout, commands: Commands, signal: Signal, ot
     time = np.union1d(commands.time, signal.time)
     end = commands.time[-1] + (np.median(np.diff(commands.time)) if len(commands.time) > 1 else 0.0)
     time = time[(commands.time[0] <= time) & (time < end)]
-    held = np.searchsorted(commands.time, time, side="right") - 1
-    thrusters = {name: values[held] for name, values in commands.thrusters.items()}
+    thrusters = dict(commands.thrusters)  # shared by the recordings of a log with one column of time
+    if not np.array_equal(time, commands.time):
+        held = np.searchsorted(commands.time, time, side="right") - 1
+        thrusters = {name: values[held] for name, values in thrusters.items()}
     values = np.full(len(time), np.nan)
     known = np.isin(signal.time, time)
     values[np.searchsorted(time, signal.time[known])] = signal.values[known]

@@ -2,14 +2,17 @@
 
 import os
 import re
+from collections.abc import Iterable
+from itertools import chain
 from math import inf
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
+from rov_fmu.files.beside import inside, inside_or_shipped
 from rov_fmu.files.output import is_same
-from rov_fmu.files.toml_file import Strict, beside, pair
+from rov_fmu.files.toml_file import Strict, folder_of, pair
 from rov_fmu.vehicle.quantity import Name, Text
 
 _RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)
@@ -39,24 +42,47 @@ class Head(Strict):
     """Who identified it, where it is published; the FMU's author."""
 
 
-def _folder(name: str, info: ValidationInfo) -> str:
-    if not os.path.isdir(beside(name, info)):  # noqa: PTH112 (Path.is_dir raises on names that cannot be)
-        raise ValueError("there is no such folder beside the file")
-    return name
+TABLES = {
+    "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
+    "yaw": ("table7_yaw_response.csv", "table5_yaw_steady.csv"),
+    "surge": ("table8_surge_response.csv", "table4_surge_steady.csv"),
+}
+"""Files of published tables in the data folder, by axis: responses, and measured steady velocities."""
+PICTURES = ("model.png", "from_above.svg", "from_starboard.svg")
+"""Files in the folder of pictures."""
 
 
-_Folder = Annotated[str, AfterValidator(_folder)]
+def _folder(files: Iterable[str]) -> AfterValidator:
+    """A folder beside the file. The files in it that are read must not be links that lead elsewhere."""
+
+    def check(name: str, info: ValidationInfo) -> str:
+        if not os.path.isdir(inside_or_shipped(folder_of(info), name)):  # noqa: PTH112 (Path.is_dir raises on names
+            raise ValueError("there is no such folder beside the file")  # that are too long)
+        for file in files:
+            try:
+                inside(folder_of(info), f"{name}/{file}")
+            except ValueError as error:
+                raise ValueError(f"its file {file} {error}") from error
+        return name
+
+    return AfterValidator(check)
 
 
 class FileHead(Head):
     """What a vehicle is called, where it comes from, and the folders beside its file."""
 
-    data: _Folder | None = None
-    """A folder beside the file with the published tables, as `rov-fmu tables` prints them; its files are named and
-    headed as those of `models/videoray/tables`."""
-    pictures: _Folder | None = None
-    """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`; the
-    icon and the thrusters are drawn from their geometry in any case."""
+    data: Annotated[str, _folder([*chain(*TABLES.values())])] | None = None
+    """A folder beside the file with the published tables, as `rov-fmu tables` prints them, or one that ships
+    (`videoray/tables`); its files are named and headed as those of `models/videoray/tables`."""
+    pictures: Annotated[str, _folder(PICTURES)] | None = None
+    """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, or one that
+    ships (`videoray/pictures`). Drawings are shown on a light ground. The icon and the thrusters are drawn from their
+    geometry in any case."""
+
+    def folders_from(self, folder: Path) -> dict[str, Path | None]:
+        """The folders `data` and `pictures` that a file in this folder names."""
+        names = {"data": self.data, "pictures": self.pictures}
+        return {key: inside_or_shipped(folder, name) if name else None for key, name in names.items()}
 
 
 _Command = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -85,7 +111,7 @@ class Validity(Strict):
 
 
 def _report(name: str, info: ValidationInfo) -> str:
-    path, coming = beside(name, info), (info.context or {})["coming"]
+    path, coming = inside(folder_of(info), name), (info.context or {})["coming"]
     if not (os.path.isfile(path) or (coming and is_same(path, coming))):  # noqa: PTH113 (as above)
         raise ValueError("there is no such file beside this one")
     return name

@@ -12,7 +12,8 @@ from pathlib import Path
 from rov_fmu.files.csv_table import Column, DataFileError, read_columns
 from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.motion.rov import Rov
-from rov_fmu.vehicle.vehicle import TABLES, Vehicle
+from rov_fmu.vehicle.form import TABLES
+from rov_fmu.vehicle.vehicle import Vehicle
 
 Cells = tuple[Decimal | None, ...]
 
@@ -119,14 +120,15 @@ def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
     others = {name: Column({unit: 1.0}, blanks=True) for name, unit in units.items()}
     table = read_columns(path, {"command": Column({"%": 1.0}), **others})
     rows: dict[Decimal, Cells] = {}
-    for n, command in enumerate(map(Decimal, table.texts["command"])):
+    for n, (text, *texts) in enumerate(table.texts("command", *units)):
+        command = Decimal(text)
         if not 0 < command <= 100:
             raise table.error(n, "command", "must be above 0 and at most 100")
         if command in rows:
             raise table.error(n, "command", "there is a row of this command above")
         if negative := next((name for name in units if table.values[name][n] < 0.0), None):
             raise table.error(n, negative, "must not be negative")
-        rows[command] = tuple(Decimal(text) if (text := table.texts[name][n]) else None for name in units)
+        rows[command] = tuple(Decimal(text) if text else None for text in texts)
     return rows
 
 

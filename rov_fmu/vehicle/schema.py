@@ -19,6 +19,8 @@ NOT_GIVEN = "not given"
 """Their source then."""
 MOST = 32
 """Thrusters, curves, inputs: more than any vehicle has."""
+_MOST_COEFFICIENTS = 1000
+"""More than a vehicle of so many has."""
 
 
 def _coefficients(
@@ -206,7 +208,7 @@ class Estimated(Strict):
 
     error: Annotated[Finite, Field(ge=0.0)]
     """Standard error, in the unit of the coefficient, as of a normal distribution."""
-    correlation: dict[str, Annotated[Finite, Field(ge=-1.0, le=1.0)]] = Field(default={})
+    correlation: dict[str, Annotated[Finite, Field(ge=-1.0, le=1.0)]] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """With other coefficients of this table, by their names in the FMU; each pair once, and 0 where it is not given."""
 
 
@@ -280,7 +282,7 @@ class Parts(Hardware, _Opening):
 
     alternatives: dict[Annotated[str, AfterValidator(not_blank)], Alternative] = Field(default={})
     """Coefficients published beside the ones used, under a name each."""
-    estimates: dict[str, Estimated] = Field(default={})
+    estimates: dict[str, Estimated] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """Coefficients that tests tell, by their names in the FMU: how far they hang together. Each has an `interval`."""
     provenance: Made | None = None
 

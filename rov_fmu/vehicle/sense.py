@@ -38,10 +38,11 @@ def as_far_as_readable(
 ) -> tuple[_Form, set[str]]:
     """The file without the tables that have a mistake of form, and the names of the top tables that have one."""
     parts: dict[str, Any] = dict(data)
-    lost = {str(problem["loc"][0]) for problem in problems}
-    for name in lost:
-        table, bad = parts.pop(name, None), [p["loc"][1] if len(p["loc"]) > 1 else None for p in problems
-                                             if p["loc"][0] == name]  # fmt: skip
+    wrong: dict[str, set[int | str | None]] = {}
+    for place in (problem["loc"] for problem in problems):
+        wrong.setdefault(str(place[0]), set()).add(place[1] if len(place) > 1 else None)
+    for name, bad in wrong.items():
+        table = parts.pop(name, None)
         if name in _PARTS and None not in bad:
             if isinstance(table, list):
                 parts[name] = [entry for n, entry in enumerate(table) if n not in bad]
@@ -49,7 +50,7 @@ def as_far_as_readable(
                 parts[name] = {key: entry for key, entry in table.items() if key not in bad}
     readable, _ = check(parts, form, **context)
     assert readable is not None, "all that has a mistake is left out"
-    return readable, lost
+    return readable, {*wrong}
 
 
 def nonsense(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:

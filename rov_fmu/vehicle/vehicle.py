@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rov_fmu.files.kinds import VEHICLE_FILE, check_keys
-from rov_fmu.files.messages import FileError
+from rov_fmu.files.messages import FileError, lines_on
 from rov_fmu.files.toml_file import Toml, check, read_toml, told
 from rov_fmu.motion.layout import Layout
 from rov_fmu.motion.rov import Rov
 from rov_fmu.vehicle.first import FirstFile, quantities
-from rov_fmu.vehicle.form import Head
+from rov_fmu.vehicle.form import PICTURES, TABLES, Head
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
@@ -20,14 +20,6 @@ from rov_fmu.vehicle.sense import as_far_as_readable, no_thrust, nonsense
 if TYPE_CHECKING:
     from rov_fmu.vehicle.uncertainty import Uncertainty
 
-TABLES = {
-    "heave": ("table6_heave_response.csv", "table3_heave_steady.csv"),
-    "yaw": ("table7_yaw_response.csv", "table5_yaw_steady.csv"),
-    "surge": ("table8_surge_response.csv", "table4_surge_steady.csv"),
-}
-"""Files of published tables in the data folder, by axis: responses, and measured steady velocities."""
-PICTURES = ("model.png", "from_above.svg", "from_starboard.svg")
-"""Files in the folder of pictures."""
 _SECOND = {"format", "body", "arm", "curves", "thruster", "axes", "inputs"}
 """Keys that tell the second version of the file."""
 
@@ -130,7 +122,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         return _second(path, data, context)
     first, problems = check(data, FirstFile, **context)
     if first is None:
-        raise VehicleFileError(*(f"{path}: {mistake}" for mistake in told(problems, data, FirstFile)))
+        raise VehicleFileError(*lines_on(path, told(problems, data, FirstFile)))
     found = quantities(first.coefficients)
     values = {name: q.value for name, q in found.items()}
     if weak := [line for curve in PAPER.curves for line in no_thrust(curve, values, "coefficients")]:
@@ -142,10 +134,9 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
 def _second(path: Path, data: Toml, context: Mapping[str, object]) -> Vehicle:
     """The second version of the file."""
     file, problems = check(data, File, **context)
-    mistakes = told(problems, data, File)
-    mistakes += nonsense(*as_far_as_readable(data, problems, context, Parts), data)
+    mistakes = [*told(problems, data, File), *nonsense(*as_far_as_readable(data, problems, context, Parts), data)]
     if file is None or mistakes:
-        raise VehicleFileError(*(f"{path}: {mistake}" for mistake in mistakes))
+        raise VehicleFileError(*lines_on(path, mistakes))
     alternatives = {name: _alternative(a.description, a.quantities) for name, a in file.alternatives.items()}
     found = file.quantities(file.layout)
     return _vehicle(path, file, file.layout, found, alternatives, file.thruster_sources, file.estimates)
@@ -166,6 +157,7 @@ def _vehicle(
     estimates: Mapping[str, Estimated] | None = None,
 ) -> Vehicle:
     head, made = file.vehicle, file.provenance
+    folders = head.folders_from(path.parent)
     words = {key: getattr(made, key) for key in ("tool", "method", "inputs", "warnings")} if made else {}
     return Vehicle(
         **{key: getattr(head, key) for key in Head.model_fields},
@@ -173,8 +165,8 @@ def _vehicle(
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,
         alternatives=alternatives,
-        data=path.parent / head.data if head.data else None,
-        pictures=path.parent / head.pictures if head.pictures else None,
+        data=folders["data"],
+        pictures=folders["pictures"],
         limits=file.validity.limits,
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=estimates or {},

@@ -1,6 +1,5 @@
 """`Vehicle` to vehicle file (TOML), whole or not at all."""
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -9,10 +8,12 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Array, InlineTable, Item
 
+from rov_fmu.files.beside import inside_or_shipped, name_of
 from rov_fmu.files.messages import brief, shown
 from rov_fmu.files.output import Output, write_whole
 from rov_fmu.files.reading import read_text
 from rov_fmu.files.seal import sealed
+from rov_fmu.files.toml_file import line
 from rov_fmu.motion.layout import Curve, Meta, Thruster
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
@@ -24,14 +25,14 @@ _DIGITS = 6  # significant ones: more than any tank test has, few enough to be t
 
 
 def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
-    """The vehicle file, in a folder, of a vehicle."""
+    """The vehicle file, in a folder, of a vehicle. Raises ValueError where it cannot name a folder or a report."""
     document = tomlkit.document()
     if vehicle.provenance:
         words = "Made from tank tests: [provenance] tells how, and `interval` is 95 % confidence."
         document.add(tomlkit.comment(words)).add(tomlkit.nl())
     low, high = map(_rounded, vehicle.command_range)
     beside = {key: getattr(vehicle, key) for key in ("data", "pictures")}
-    folders = {key: _seen_from(folder, path) for key, path in beside.items() if path}
+    folders = {key: name_of(path, folder) for key, path in beside.items() if path}
     document["format"] = FORMAT
     document["vehicle"] = {key: getattr(vehicle, key) for key in Head.model_fields} | folders
     document["validity"] = {"command_min": low, "command_max": high, **_lines("limits", vehicle.limits)}
@@ -47,7 +48,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     if vehicle.estimates:
         document["estimates"] = {name: _estimated(row) for name, row in vehicle.estimates.items()}
     if made := vehicle.provenance:
-        report = {"report": _seen_from(folder, made.report)} if made.report else {}
+        report = {"report": name_of(made.report, folder)} if made.report else {}
         head = {"tool": made.tool, "method": made.method, **report, **_lines("warnings", made.warnings)}
         document["provenance"] = {**head, "inputs": dict(made.inputs)}
     text: str = tomlkit.dumps(document)
@@ -77,7 +78,19 @@ def hardware(vehicle: Vehicle, entries: Mapping[str, Item]) -> dict[str, Any]:
 def vehicle_output(vehicle: Vehicle, path: Path) -> Output:
     """The vehicle file to write, perhaps together with its report. Raises VehicleFileError."""
     report = vehicle.provenance.report if vehicle.provenance else None
-    return checked(path, vehicle_text(vehicle, path.parent), coming=report)
+    try:
+        text = vehicle_text(vehicle, path.parent)
+    except ValueError as error:
+        raise VehicleFileError(f"{path}: {error}") from error
+    return checked(path, text, coming=report)
+
+
+def check_report(path: Path, report: Path) -> None:
+    """Raise VehicleFileError where the vehicle file at a path could not name this report."""
+    try:
+        name_of(report, path.parent)
+    except ValueError as error:
+        raise VehicleFileError(f"{report}: must be inside the folder of {path}, which names it") from error
 
 
 def write_vehicle(vehicle: Vehicle, path: Path) -> None:
@@ -132,10 +145,15 @@ def read_document(source: Path) -> Any:
 
 
 def moved(document: Any, source: Path, path: Path) -> Output:
-    """The document to write, what stands beside it as seen from its new place. Raises VehicleFileError."""
+    """The document to write, with what is beside it named from its new place. Raises VehicleFileError."""
     for table, key in (("vehicle", "data"), ("vehicle", "pictures"), ("provenance", "report")):
         if key in document.get(table, {}):
-            document[table][key] = _seen_from(path.parent, source.parent / document[table][key])
+            name = document[table][key]
+            try:
+                document[table][key] = name_of(inside_or_shipped(source.parent, name), path.parent)
+            except ValueError as error:
+                reason = f"must be inside the folder of the new file: write that beside {source}, or leave this key out"
+                raise VehicleFileError(f"{path}: {line(f'{table}.{key}', reason, str(name))}") from error
     return checked(path, tomlkit.dumps(document))
 
 
@@ -203,12 +221,6 @@ def _lines(key: str, texts: Iterable[str]) -> dict[str, Array]:
     lines = tomlkit.array().multiline(True)
     lines.extend(texts)
     return {key: lines} if lines else {}
-
-
-def _seen_from(folder: Path, path: Path) -> str:
-    """The path from a folder; as a whole where they are on two drives of Windows."""
-    path, folder = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
-    return Path(os.path.relpath(path, folder)).as_posix() if path.drive == folder.drive else path.as_posix()
 
 
 def _rounded(value: float) -> float:

@@ -10,6 +10,7 @@ import pytest
 
 from interop.importers import HERE, IMPORTERS
 from rov_fmu.studies import Results, study
+from tests.folders import beside
 
 PLAN = """fmu = "{fmu}"
 stop_time = 4.0
@@ -33,7 +34,7 @@ drift = "mean(out['der(x)'])"
 
 def _done(fmu: Path, folder: Path) -> Results:
     plan = folder / f"{fmu.stem}.toml"
-    plan.write_text(PLAN.format(fmu=fmu), encoding="utf-8")
+    plan.write_text(PLAN.format(fmu=beside(fmu, folder)), encoding="utf-8")
     return study(plan, folder / f"results of {fmu.stem}", workers=1)
 
 

@@ -9,6 +9,8 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.writer import write_vehicle
 from tests.cli.test_targets import bound_by_permissions
 from tests.commands import TESTS, Command, run_elsewhere
 
@@ -31,7 +33,7 @@ READING: dict[str, tuple[str, Callable[[Path], list[str]]]] = {
     "the report": ("report.html", lambda f: _build(f / "refit.toml")),
     "rov.toml": ("tests/rov.toml", lambda f: ["identify", str(f / "tests")]),
     "a tank test": ("tests/steady_surge.csv", lambda f: ["identify", str(f / "tests")]),
-    "the vehicle to set beside": ("beside.toml", lambda f: ["identify", str(f / "tests")]),
+    "the vehicle to compare with": ("tests/beside.toml", lambda f: ["identify", str(f / "tests")]),
 }
 PICTURES = {"a drawing", "a drawing of the FMU in Python", "the icon"}
 """Where there is none, the neutral one stands in."""
@@ -51,14 +53,14 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "inputs"
     shutil.copytree(VIDEORAY.parent, folder)
     shutil.copytree(TESTS, folder / "tests")
-    shutil.copy(VIDEORAY, folder / "beside.toml")
+    write_vehicle(load_vehicle(VIDEORAY), folder / "tests" / "beside.toml")
     (folder / "points.csv").write_text("command [%],velocity [m/s]\n20,0.1\n", encoding="utf-8")
     (folder / "report.html").write_text("a report", encoding="utf-8")
     refit = SHIPPED["videoray_refit"].read_text(encoding="utf-8")
     reported = refit.replace("\n[provenance]", '\n[provenance]\nreport = "report.html"')
     (folder / "refit.toml").write_text(reported, encoding="utf-8")
     rov = (folder / "tests" / "rov.toml").read_text(encoding="utf-8")
-    beside = rov.replace('against = "videoray"', 'against = "../beside.toml"')
+    beside = rov.replace('against = "videoray"', 'against = "beside.toml"')
     assert beside != rov
     (folder / "tests" / "rov.toml").write_text(beside, encoding="utf-8")
     (tmp_path / "here").mkdir()

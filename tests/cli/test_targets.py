@@ -13,6 +13,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import BARE, COMMANDS, REFIT, ROOT, TESTS, Command, run_elsewhere
 
 Capsys = pytest.CaptureFixture[str]
@@ -200,7 +201,8 @@ def test_no_command_writes_over_what_it_reads_or_writes_itself(tmp_path: Path, c
     shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
     tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
     given = (tests / "rov.toml").read_text(encoding="utf-8")
-    (tests / "rov.toml").write_text(given.replace('"videoray"\n', '"../videoray.toml"\n', 1), encoding="utf-8")
+    (tests / "rov.toml").write_text(given.replace('"videoray"\n', '"other.toml"\n', 1), encoding="utf-8")
+    write_vehicle(load_vehicle(VIDEORAY), tests / "other.toml")
     rov, report, points = tmp_path / "videoray.toml", tmp_path / "report.html", tmp_path / "points.csv"
     report.write_text("a report", encoding="utf-8")
     points.write_text("command [%],velocity [m/s]\n20,0.1\n", encoding="utf-8")
@@ -228,7 +230,7 @@ def test_no_command_writes_over_what_it_reads_or_writes_itself(tmp_path: Path, c
         _refused(["fly", str(rov), "--against", str(refit), "-o", str(output)], tmp_path, capsys)
     for options in (
         ["-o", str(tests / "rov.toml")],
-        ["-o", str(rov)],
+        ["-o", str(tests / "other.toml")],
         ["--report", str(tests / "steady_surge.csv")],
         ["-o", str(tmp_path / "new"), "--report", str(tests / ".." / "new")],
     ):

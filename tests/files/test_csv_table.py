@@ -1,12 +1,16 @@
 """What is told of a number is told in the unit of its column, whatever the first unit is; bounds may be touched."""
 
+import tracemalloc
 from collections.abc import Callable
 from math import isnan, pi
 from pathlib import Path
 
 import pytest
 
-from rov_fmu.files.csv_table import Column, Columns, DataFileError, read_columns
+from rov_fmu.files.csv_table import LARGEST, Column, Columns, DataFileError, read_columns
+from rov_fmu.tank.logs import read_log
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 # Of 0.5 to 2 turns, or 0.25 at least where there is no bound.
 TURNS = {"turn": 1.0, "deg": 360.0}
@@ -17,6 +21,10 @@ def _file(folder: Path, *cells: str) -> Path:
     path = folder / "some.csv"
     path.write_text("\n".join(("angle [deg]", *cells)), encoding="utf-8")
     return path
+
+
+def _values(table: Columns) -> dict[str, list[float]]:
+    return {name: [*values] for name, values in table.values.items()}
 
 
 @pytest.mark.parametrize(
@@ -36,8 +44,8 @@ def test_bounds_are_told_in_the_unit_of_the_column(column: Column, cell: str, to
 
 
 def test_a_bound_is_within(tmp_path: Path) -> None:
-    assert read_columns(_file(tmp_path, "180", "720"), {"angle": BOUNDED}).values == {"angle": [0.5, 2.0]}
-    assert read_columns(_file(tmp_path, "-90", "0", "90"), {"angle": LEAST}).values == {"angle": [-0.25, 0.0, 0.25]}
+    assert _values(read_columns(_file(tmp_path, "180", "720"), {"angle": BOUNDED})) == {"angle": [0.5, 2.0]}
+    assert _values(read_columns(_file(tmp_path, "-90", "0", "90"), {"angle": LEAST})) == {"angle": [-0.25, 0.0, 0.25]}
 
 
 def test_a_number_found_wrong_later_is_told_as_it_stands(tmp_path: Path) -> None:
@@ -70,13 +78,13 @@ def _table(folder: Path, text: str, **also: Column) -> Columns:
     ],
 )
 def test_separators_decimal_commas_case_and_spaces(text: str, tmp_path: Path) -> None:
-    assert _table(tmp_path, text, time=MAYBE).values == {"length": [0.5, 1000.0], "time": [1.25, -2.0]}
+    assert _values(_table(tmp_path, text, time=MAYBE)) == {"length": [0.5, 1000.0], "time": [1.25, -2.0]}
 
 
 def test_blanks_where_they_may_be(tmp_path: Path) -> None:
     table = _table(tmp_path, "length [m],time [s]\n1,\n2,-\n3,nan\n4,NaN\n5,0\n", time=MAYBE)
     assert [isnan(value) for value in table.values["time"]] == [True, True, True, True, False]
-    assert table.texts["time"] == ["", "", "", "", "0"]
+    assert [*table.texts("time")] == [("",), ("",), ("",), ("",), ("0",)]
 
 
 @pytest.mark.parametrize("cell", ["-", "nan", "1.234,5", "1,2,3", "inf", "1e400", "٣"])
@@ -121,7 +129,7 @@ def test_a_loose_reading_counts_what_is_no_number(tmp_path: Path) -> None:
     path = tmp_path / "some.csv"
     path.write_text("length [m],time [s],mode\n1,2,a\nx,,b\n,3\n1,2,3,4\n", encoding="utf-8")
     table = read_columns(path, {"length": LENGTH, "time": MAYBE}, others=True, loose=True)
-    assert table.lines == [2, 3, 4]
+    assert [*table.lines] == [2, 3, 4]
     assert [[isnan(value) for value in table.values[name]] for name in ("length", "time")] == [
         [False, True, True],
         [False, True, False],
@@ -139,9 +147,64 @@ def test_other_names_and_units_with_numbers(tmp_path: Path) -> None:
     path = tmp_path / "some.csv"
     path.write_text("L [RAW 10 2.5]\n15\n", encoding="utf-8")
     table = read_columns(path, {"length": column})
-    assert (table.values, table.units) == ({"length": [2.0]}, {"length": "raw"})
+    assert (_values(table), table.units) == ({"length": [2.0]}, {"length": "raw"})
     path.write_text("length [raw 10]\n15\n", encoding="utf-8")
     with pytest.raises(DataFileError, match=r"column 1 = 'length \[raw 10\]': two numbers, please"):
         read_columns(path, {"length": column})
     path.write_text("length [m],l [km]\n1,15\n", encoding="utf-8")
-    assert read_columns(path, {"length": column}, others=True).values == {"length": [1.0]}
+    assert _values(read_columns(path, {"length": column}, others=True)) == {"length": [1.0]}
+
+
+# ---- Large files -----------------------------------------------------------------------------------------------------
+
+
+def _log(path: Path, rows: int) -> int:
+    """Write a log such as autopilots make: eight pulses, depth, heading. Its size in bytes."""
+    names = "time [s]", *(f"u_{n} [us]" for n in range(1, 9)), "depth [m]", "heading [deg]"
+    pulses = "1523,1477,1500,1612,1388,1500,1550,1450", "1420,1477,1560,1612,1450,1550,1550,1480"
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(names) + "\n")
+        file.writelines(
+            f"{0.1 * n:.2f},{pulses[n // 50 % 2]},{1.0 + 1e-5 * n:.3f},{n % 360:.1f}\n" for n in range(rows)
+        )
+    return path.stat().st_size
+
+
+def _peak(action: Callable[[], object]) -> int:
+    """The most bytes that Python and NumPy allocated at once during an action."""
+    tracemalloc.start()
+    try:
+        action()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_log_takes_at_most_six_times_its_size_in_memory(tmp_path: Path) -> None:
+    path, layout = tmp_path / "log_dive.csv", load_vehicle(SHIPPED["bluerov2_heavy"]).layout
+    _log(path, 300)
+    read_log(path, layout)  # imports what it needs
+    size = _log(path, 40_000)
+    columns = {"time": Column({"s": 1.0}), "depth": Column({"m": 1.0})}
+    assert _peak(lambda: read_columns(path, columns, others=True, loose=True)) < 3 * size
+    assert _peak(lambda: read_log(path, layout)) < 6 * size
+
+
+def test_a_log_of_mistakes_alone_takes_no_more(tmp_path: Path) -> None:
+    path = tmp_path / "some.csv"
+    path.write_text("length [m],time [s]\n" + "long,late\n" * 100_000, encoding="utf-8")
+
+    def read() -> None:
+        with pytest.raises(DataFileError, match=r"199990 more$"):
+            read_columns(path, {"length": LENGTH, "time": MAYBE})
+
+    assert _peak(read) < 6 * path.stat().st_size
+
+
+def test_a_file_that_is_too_large_is_told_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "some.csv"
+    with path.open("wb") as file:
+        file.truncate(LARGEST + 1_000_000)  # takes no room on the disk
+    with pytest.raises(DataFileError) as error:
+        read_columns(path, {"length": LENGTH})
+    assert str(error.value) == f"{path}: is too large, with 501 MB: at most 500 MB are read"

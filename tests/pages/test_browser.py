@@ -48,7 +48,7 @@ def test_the_documentation_asks_for_nothing_and_fits(
     assert seen.said == []
     assert seen.asked == [url]
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width  # nothing to scroll sideways for
-    plots = seen.page.locator("svg:not(.live svg)")
+    plots = seen.page.locator("svg:not(.live svg), img")
     assert plots.count() == 12
     for plot in plots.all():
         box = plot.bounding_box()

@@ -59,7 +59,7 @@ def test_page_is_whole_html(page: str) -> None:
     assert page.startswith("<!DOCTYPE html>")
     root = html.document_fromstring(page, ensure_head_body=True)
     assert root.get("lang") == "en"
-    assert len(root.findall(".//svg")) == 12
+    assert (len(root.findall(".//svg")), len(root.findall(".//img"))) == (10, 2)
     links = {a.get("href").removeprefix("#") for a in root.iter("a")}
     ids = [e.get("id") for e in root.iter() if isinstance(e.tag, str) and e.get("id")]
     assert links <= set(ids)
@@ -121,12 +121,12 @@ def test_says_where_it_is_valid(page: str) -> None:
 
 
 def check_refers_to_itself_alone(page: str) -> None:
-    """No element loads anything, and every reference leads to a place in the page."""
+    """No element loads anything, every reference leads to a place in the page, and images are in the page itself."""
     root = html.fromstring(page)
-    assert not list(root.iter("script", "link", "img", "iframe", "object", "embed", "base"))
+    assert not list(root.iter("script", "link", "iframe", "object", "embed", "base"))
     for element in root.iter():
         for name, value in element.items():
-            assert name != "src"
+            assert name != "src" or (element.tag == "img" and value.startswith("data:image/svg+xml;base64,"))
             assert not name.startswith("on")
             assert name not in {"href", "xlink:href"} or value.startswith("#")
 
@@ -168,6 +168,7 @@ def test_what_flies_is_small_allowed_alone_and_the_same_twice(name: str) -> None
     assert allowed == {
         "default-src": "'none'",
         "style-src": "'unsafe-inline'",
+        **({"img-src": "data:"} if flown.pictures else {}),
         "script-src": f"'sha256-{digest}' 'wasm-unsafe-eval'",
         "base-uri": "'none'",
         "form-action": "'none'",
@@ -181,7 +182,7 @@ def test_what_flies_is_small_allowed_alone_and_the_same_twice(name: str) -> None
 def test_goes_without_a_data_folder(bare_page: str) -> None:
     root = html.fromstring(bare_page)
     assert root.get_element_by_id("tables", None) is None
-    assert len(root.findall(".//svg")) == 12
+    assert (len(root.findall(".//svg")), len(root.findall(".//img"))) == (10, 2)
     assert "printed" not in bare_page
 
 

@@ -389,15 +389,32 @@ def test_a_report_that_is_gone(identified: Path, tmp_path: Path, capsys: pytest.
     assert error.count("\n") == 1
 
 
-def test_a_tuned_vehicle_elsewhere_keeps_its_report(identified: Path, tmp_path: Path) -> None:
-    (tmp_path / "tuned").mkdir()
-    path = tmp_path / "tuned" / "tuned.toml"
-    tune = ["tune", str(identified), "--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "-o", str(path)]
-    assert main(tune) == 0
-    provenance = load_vehicle(path).provenance
+def test_a_tuned_vehicle_keeps_its_report_where_that_is_inside_its_folder(
+    with_report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    identified = Path(shutil.copytree(with_report, tmp_path / "found")) / "vehicle.toml"
+    tune = ["tune", str(identified), "--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "-o"]
+    assert main([*tune, str(tmp_path / "tuned.toml")]) == 0
+    provenance = load_vehicle(tmp_path / "tuned.toml").provenance
     assert provenance
     assert provenance.report
-    assert provenance.report.resolve() == tmp_path / "pages" / "report.html"
+    assert provenance.report.samefile(tmp_path / "found" / "pages" / "report.html")
+    (tmp_path / "other").mkdir()
+    capsys.readouterr()
+    assert main([*tune, str(tmp_path / "other" / "tuned.toml")]) == 2
+    error = capsys.readouterr().err
+    assert "provenance.report = 'pages/report.html': must be inside the folder of the new file" in error
+    assert error.count("\n") == 1
+    assert not list((tmp_path / "other").iterdir())
+
+
+def test_a_report_outside_the_folder_of_the_vehicle_file_is_refused_before_the_fit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "other").mkdir()
+    report = tmp_path / "report.html"
+    assert main(["identify", "no/tests", "-o", str(tmp_path / "other" / "v.toml"), "--report", str(report)]) == 2
+    assert capsys.readouterr().err.startswith(f"rov-fmu: {report}: must be inside the folder of ")
 
 
 def test_vehicle_without_a_report(of_tables: Identification) -> None:

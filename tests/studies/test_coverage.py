@@ -23,7 +23,7 @@ from rov_fmu.studies import Results, study
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.vehicle import Vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.folders import FORCE, HEAD, MASS, SPEED, TAU
+from tests.folders import FORCE, HEAD, MASS, SPEED, TAU, beside
 from tests.pool import run
 from tests.recordings import write_log
 from tests.vehicles import VIDEORAY
@@ -148,7 +148,7 @@ def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, address
         KINDS[kind](folder / "tests", k, random)
         found = identify(load_tank_tests(folder / "tests")).vehicle
         write_vehicle(found, folder / "found.toml")
-        (folder / "plan.toml").write_text(PLAN.format(fmu=fmus.of(found), seed=seed), encoding="utf-8")
+        (folder / "plan.toml").write_text(PLAN.format(fmu=beside(fmus.of(found), folder), seed=seed), encoding="utf-8")
         results = study(folder / "plan.toml", folder / "results", scheduler=address)
         assert results.warnings == ()
         for of, true in true_motion(k).items():

@@ -21,6 +21,7 @@ from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT
+from tests.folders import beside
 
 SAMPLERS = ["sobol", "latin-hypercube", "random", "saltelli"]
 REFITTED = load_vehicle(REFIT)
@@ -164,7 +165,7 @@ def done(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path) -> Done:
     folder = tmp_path_factory.mktemp("estimates")
     write_vehicle(MADE, folder / "made.toml")
     plan = folder / "plan.toml"
-    plan.write_text(f"""fmu = "{videoray_fmu}"
+    plan.write_text(f"""fmu = "{beside(videoray_fmu, folder)}"
 vary_from = "made.toml"
 stop_time = 0.1
 step = 0.1

@@ -17,6 +17,7 @@ from rov_fmu.studies import Progress, Results, study
 from rov_fmu.studies.store import Store
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.folders import beside
 
 RUNS = 24
 
@@ -50,7 +51,7 @@ drift = "mean(out['der(x)'])"
 @pytest.fixture(scope="module")
 def native(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, scheduler: str) -> Results:
     folder = tmp_path_factory.mktemp("native")
-    return study(_plan(folder, f'fmu = "{videoray_fmu}"'), folder / "results", scheduler=scheduler)
+    return study(_plan(folder, f'fmu = "{beside(videoray_fmu, folder)}"'), folder / "results", scheduler=scheduler)
 
 
 def _close(one: Results, other: Results) -> None:
@@ -76,7 +77,10 @@ def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
 def test_an_fmu_of_fmi_3_gives_the_same_rows(
     tmp_path: Path, videoray3_fmu: Path, native: Results, scheduler: str
 ) -> None:
-    _close(study(_plan(tmp_path, f'fmu = "{videoray3_fmu}"'), tmp_path / "results", scheduler=scheduler), native)
+    _close(
+        study(_plan(tmp_path, f'fmu = "{beside(videoray3_fmu, tmp_path)}"'), tmp_path / "results", scheduler=scheduler),
+        native,
+    )
 
 
 @pytest.mark.long
@@ -91,7 +95,7 @@ def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results
 def test_any_number_of_workers_gives_the_same_rows(
     tmp_path: Path, videoray_fmu: Path, native: Results, workers: int
 ) -> None:
-    results = study(_plan(tmp_path, f'fmu = "{videoray_fmu}"'), tmp_path / "results", workers=workers)
+    results = study(_plan(tmp_path, f'fmu = "{beside(videoray_fmu, tmp_path)}"'), tmp_path / "results", workers=workers)
     pd.testing.assert_frame_equal(results.runs, native.runs, check_exact=True)
     pd.testing.assert_frame_equal(results.trajectories(), native.trajectories(), check_exact=True)
 
@@ -107,7 +111,7 @@ def test_workers_of_a_scheduler_are_left_as_they_were(
     tmp_path: Path, videoray_fmu: Path, native: Results, cluster: LocalCluster
 ) -> None:
     told: list[Progress] = []
-    plan, address = _plan(tmp_path, f'fmu = "{videoray_fmu}"'), cluster.scheduler_address
+    plan, address = _plan(tmp_path, f'fmu = "{beside(videoray_fmu, tmp_path)}"'), cluster.scheduler_address
     _close(study(plan, tmp_path / "results", scheduler=address, on_progress=told.append), native)
     scheduler: Any = cluster.scheduler
     folders = [Path(worker.local_directory) for worker in scheduler.workers.values()]
@@ -128,7 +132,7 @@ def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
     tmp_path: Path, videoray_fmu: Path, native: Results, monkeypatch: pytest.MonkeyPatch, scheduler: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    plan, folder = _plan(tmp_path, f'fmu = "{videoray_fmu}"'), tmp_path / "results"
+    plan, folder = _plan(tmp_path, f'fmu = "{beside(videoray_fmu, tmp_path)}"'), tmp_path / "results"
     fsync = os.fsync
 
     def full(descriptor: int) -> None:
@@ -167,7 +171,7 @@ def test_without_its_packages_the_command_says_what_to_install(
 def test_a_folder_takes_one_study_at_a_time(
     tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    plan, folder = _plan(tmp_path, f'fmu = "{videoray_fmu}"'), tmp_path / "results"
+    plan, folder = _plan(tmp_path, f'fmu = "{beside(videoray_fmu, tmp_path)}"'), tmp_path / "results"
     with Store(folder).held():
         assert main(["study", str(plan), "-o", str(folder), "--workers", "1"]) == 2
         assert not list((folder / "runs").iterdir())

@@ -9,13 +9,14 @@ from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.studies import Results
+from tests.folders import beside
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path], scheduler: str) -> Path:
     """A study of which some runs fail, and none is done, for `odd` is not there; its page, by the command."""
     folder = tmp_path_factory.mktemp("page")
-    (folder / "plan.toml").write_text(f"""fmu = "{foreign()}"
+    (folder / "plan.toml").write_text(f"""fmu = "{beside(foreign(), folder)}"
 stop_time = 2.0
 step = 0.1
 runs = 600
@@ -67,7 +68,7 @@ def test_the_page_is_the_same_for_the_same_results(done: Path) -> None:
 def test_a_grid_shows_figures_over_what_varies_with_their_units(
     videoray_fmu: Path, tmp_path: Path, scheduler: str
 ) -> None:
-    (tmp_path / "plan.toml").write_text(f"""fmu = "{videoray_fmu}"
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(videoray_fmu, tmp_path)}"
 stop_time = 2.0
 step = 0.1
 sampler = "grid"
@@ -104,7 +105,7 @@ def test_indices_of_few_blocks_are_said_to_tell_nothing(
     """Two terms of the same variance: S1 is 1/2 each, which 3 blocks do not show and 500 do."""
     pages = {}
     for runs in (12, 2000):
-        (tmp_path / f"{runs}.toml").write_text(f"""fmu = "{foreign()}"
+        (tmp_path / f"{runs}.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
 stop_time = 1.0
 step = 0.5
 runs = {runs}
@@ -153,7 +154,7 @@ def test_another_page_of_this_name_is_not_overwritten(
 
 def test_an_index_of_nothing_has_no_sign(foreign: Callable[..., Path], tmp_path: Path, scheduler: str) -> None:
     """What brings a millionth of the variance has an index of 0.000, which chance makes negative as often as not."""
-    (tmp_path / "plan.toml").write_text(f"""fmu = "{foreign()}"
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
 stop_time = 1.0
 step = 0.5
 runs = 200
@@ -177,7 +178,7 @@ def test_reasons_that_are_not_shown_are_counted(
     foreign: Callable[..., Path], tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A reason for each of seven values, of which the command shows five and the page all."""
-    (tmp_path / "plan.toml").write_text(f"""fmu = "{foreign()}"
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
 stop_time = 1.0
 step = 0.5
 sampler = "grid"

@@ -11,6 +11,8 @@ from rov_fmu.studies.model import read_model
 from rov_fmu.studies.plan import load_plan
 from rov_fmu.studies.prepared import prepare
 from rov_fmu.vehicle.shipped import VIDEORAY
+from tests.files.test_beside import WRONG as WRONG_PATHS
+from tests.folders import beside
 
 HEAD = 'fmu = "videoray.fmu"\nstop_time = 1.0\nstep = 0.1\nruns = 4\n'
 TAIL = '[figures]\nend = "u[-1]"\n'
@@ -37,8 +39,8 @@ WRONG = {
         "sampler = 'soboll': must be 'grid', 'sobol', 'latin-hypercube', 'random' or 'saltelli'",
     HEAD + 'vehicle = "videoray"\n' + VARY + TAIL: "must have either fmu or vehicle",
     HEAD.replace('fmu = "videoray.fmu"', 'vehicle = "videory"') + VARY + TAIL:
-        "vehicle = 'videory': there is no such file, as seen from the plan, and no vehicle of this name ships, only bl",
-    HEAD + 'vary_from = "mine.toml"\n' + TAIL: "vary_from = 'mine.toml': there is no such file, as seen from the plan",
+        "vehicle = 'videory': there is no such file beside the plan, and no vehicle of this name ships, only bl",
+    HEAD + 'vary_from = "mine.toml"\n' + TAIL: "vary_from = 'mine.toml': there is no such file beside the plan",
     HEAD + 'vary_from = "videoray"\n' + TAIL: "vary_from = 'videoray': no coefficient of this vehicle has an interval",
     HEAD + "[vary]\nalpha_uu.uniform = [1.0, 1.2]\n" + TAIL:
         "vary.alpha_uu: the FMU has no variable 'alpha_uu' that is a number; did you mean alpha_",
@@ -100,7 +102,7 @@ def test_a_mistake_is_a_line_and_nothing_is_written(
 ) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text(text)
-    (tmp_path / "videoray.fmu").symlink_to(videoray_fmu)
+    shutil.copy(videoray_fmu, tmp_path / "videoray.fmu")
     assert main(["study", str(plan), "-o", str(tmp_path / "results")]) == 2
     told = capsys.readouterr().err
     assert f": {WRONG[text]}" in told
@@ -118,14 +120,38 @@ def test_a_vehicle_file_is_seen_from_the_plan_and_not_from_where_the_command_sta
     plan.write_text(HEAD.replace('fmu = "videoray.fmu"', 'vehicle = "mine.toml"') + VARY + TAIL)
     monkeypatch.chdir(tmp_path)
     assert main(["study", str(plan), "-o", "results"]) == 2
-    assert f"{plan}: vehicle = 'mine.toml': there is no such file, as seen from the plan" in capsys.readouterr().err
+    assert f"{plan}: vehicle = 'mine.toml': there is no such file beside the plan" in capsys.readouterr().err
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize("key", ["fmu", "vehicle", "vary_from", "input_file.path"])
+@pytest.mark.parametrize("case", WRONG_PATHS)
+def test_a_path_that_does_not_stay_in_the_folder_of_the_plan_is_refused(
+    key: str, case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name, told = WRONG_PATHS[case]
+    plan = tmp_path / "here" / "plan.toml"
+    (plan.parent / "tables").mkdir(parents=True)
+    (tmp_path / "secrets").mkdir()
+    for secret in ("secret", "secrets/model.png"):
+        (tmp_path / secret).write_text("time,u_l\n0,0.123\n")
+    (plan.parent / "link").symlink_to(tmp_path / "secret")
+    (plan.parent / "links").symlink_to(tmp_path / "secrets", target_is_directory=True)
+    head = HEAD if key != "fmu" else HEAD.replace('fmu = "videoray.fmu"\n', "")
+    plan.write_text(f'{key} = "{name}"\n{head}' + VARY + TAIL)
+    (plan.parent / "videoray.fmu").touch()
+    assert main(["study", str(plan), "-o", str(tmp_path / "results")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"rov-fmu: {plan}: {key} = ")
+    assert told in said
+    assert said.count("\n") == 1
     assert not (tmp_path / "results").exists()
 
 
 def test_mistakes_of_all_kinds_are_told_at_once(
     tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "videoray.fmu").symlink_to(videoray_fmu)
+    shutil.copy(videoray_fmu, tmp_path / "videoray.fmu")
     (tmp_path / "u.csv").write_text("time,u_r\n0,much\n")
     head = HEAD.replace("1.0", "0.95").replace("runs = 4\n", 'input_file = { path = "u.csv" }\n')
     (tmp_path / "plan.toml").write_text(head + VARY + "[inputs]\nu_l = 1.5\n" + '[figures]\nend = "q[-1]"\n')
@@ -156,7 +182,7 @@ def test_a_mistake_in_a_file_of_inputs_is_told_by_its_row(
     rows: str, told: str, tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "u.csv").write_text(rows)
-    (tmp_path / "videoray.fmu").symlink_to(videoray_fmu)
+    shutil.copy(videoray_fmu, tmp_path / "videoray.fmu")
     file = 'input_file = { path = "u.csv", between = "steps" }\n'
     (tmp_path / "plan.toml").write_text(HEAD + file + VARY + "[inputs]\nu_r = 0.5\n" + TAIL)
     assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results")]) == 2
@@ -169,7 +195,8 @@ def test_inputs_are_held_or_straight_by_the_middle_of_a_step_and_jump_where_two_
     foreign: Callable[..., Path], tmp_path: Path
 ) -> None:
     (tmp_path / "u.csv").write_text("time,u\n0.1,1\n0.3,3\n0.3,-1\n0.5,-1\n")
-    head = f'fmu = "{foreign()}"\nstop_time = 0.7\nstep = 0.1\nsampler = "grid"\n[keep]\noutputs = ["y"]\n'
+    fmu = beside(foreign(), tmp_path)
+    head = f'fmu = "{fmu}"\nstop_time = 0.7\nstep = 0.1\nsampler = "grid"\n[keep]\noutputs = ["y"]\n'
     expected = {
         "[inputs]\nu = 0.5\n": [0.5] * 7,
         "[inputs]\nu.steps = [[0.2, 1.0], [0.3, 2.0], [0.6, 0.0]]\n": [0, 0, 1, 2, 2, 2, 0],

@@ -28,6 +28,7 @@ from rov_fmu.studies.run import run_study
 from rov_fmu.studies.simulator import LoadError, RunError, Simulator
 from rov_fmu.studies.store import Store
 from tests.commands import start
+from tests.folders import beside
 
 Foreign = Callable[..., Path]
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
@@ -37,7 +38,7 @@ def _plan(
     folder: Path, fmu: Path, runs: int = 40, more: str = "", vary: str = "", step: float = 0.1, limit: float = 60.0
 ) -> Path:
     path = folder / "plan.toml"
-    path.write_text(f"""fmu = "{fmu}"
+    path.write_text(f"""fmu = "{beside(fmu, folder)}"
 time_limit = {limit}
 stop_time = 2.0
 step = {step}

@@ -36,7 +36,7 @@ WRONG: dict[str, tuple[str, Mapping[str, str], tuple[str, ...]]] = {
     "no such base": (
         f'base = "bluerov3"\n{HEAD}',
         HEAVE_ALONE,
-        ("/rov.toml: base = 'bluerov3': must be a vehicle file, seen from",),
+        ("/rov.toml: base = 'bluerov3': must be a vehicle file in this folder, or",),
     ),
     "a base beside thrusters": (
         'base = "bluerov2"\n' + VECTORED,

@@ -17,6 +17,7 @@ from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS
 
 
@@ -150,15 +151,15 @@ def test_names_that_differ_by_case_are_two_files(folder: Path) -> None:
     assert sorted(found, key=lambda row: row.file) == [Row("Steady_Surge.CSV", 2, 0.2, 0.3), *before]
 
 
-def test_a_vehicle_to_set_beside_is_seen_from_the_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_vehicle_to_compare_with_is_a_file_in_the_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rov = folder / "rov.toml"
-    text = rov.read_text(encoding="utf-8").replace('against = "videoray"', 'against = "../mine.toml"')
+    text = rov.read_text(encoding="utf-8").replace('against = "videoray"', 'against = "mine.toml"')
     rov.write_text(text, encoding="utf-8")
-    refused(folder, (f"{rov}: against = '../mine.toml': must be a vehicle file", "this folder", "videoray"), capsys)
-    shutil.copy(VIDEORAY, folder.parent / "mine.toml")
+    refused(folder, (f"{rov}: against = 'mine.toml': must be a vehicle file", "this folder", "videoray"), capsys)
+    write_vehicle(load_vehicle(VIDEORAY), folder / "mine.toml")
     against = load_tank_tests(folder).given.against
     assert against
-    assert against.samefile(folder.parent / "mine.toml")
+    assert against.samefile(folder / "mine.toml")
 
 
 # ---- What is refused -------------------------------------------------------------------------------------------------

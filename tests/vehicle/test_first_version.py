@@ -104,13 +104,12 @@ def test_comments_go_with_their_coefficients(tmp_path: Path) -> None:
     assert re.search(r"^b_t = .* # top\n\n\[\[thruster\]\]", converted, re.M)
 
 
-def test_folders_beside_it_are_named_as_seen_from_its_new_place(tmp_path: Path) -> None:
-    (tmp_path / "tables").mkdir()
-    old, new = tmp_path / "old.toml", tmp_path / "deeper" / "new.toml"
-    new.parent.mkdir()
+def test_folders_beside_it_are_named_from_its_new_place(tmp_path: Path) -> None:
+    old, new = tmp_path / "deeper" / "old.toml", tmp_path / "new.toml"
+    (tmp_path / "deeper" / "tables").mkdir(parents=True)
     old.write_text(TEXT.replace("[validity]", 'data = "tables"\n[validity]', 1), encoding="utf-8")
     assert main(["convert", str(old), "-o", str(new)]) == 0
-    assert 'data = "../tables"' in new.read_text(encoding="utf-8")
+    assert 'data = "deeper/tables"' in new.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
