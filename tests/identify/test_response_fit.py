@@ -150,19 +150,28 @@ def test_upward_points_of_the_paper_ask_for_no_direction(vehicle: Vehicle) -> No
     assert next(choice for choice in fit.choices if choice.what == "drag by direction").gain < 0.0
 
 
-@pytest.mark.long
+@pytest.mark.parametrize(
+    ("seeds", "least"),
+    [pytest.param(40, 0.825, marks=pytest.mark.long), pytest.param(200, 0.88, marks=pytest.mark.weekly)],
+)
 @pytest.mark.parametrize("drag", [(15.0, 4.0), (15.0, 0.5), (15.0, 0.0)])
 @pytest.mark.parametrize("reverse", [1.0, 1.5])
-def test_intervals_cover_the_truth(sway: Rov, drag: tuple[float, float], reverse: float) -> None:
-    """200 seeds of 3 % scatter, whether or not linear drag is left out: 88 % at least."""
+def test_intervals_cover_the_truth(
+    sway: Rov, drag: tuple[float, float], reverse: float, seeds: int, least: float
+) -> None:
+    """3 % scatter, whether or not linear drag is left out.
+
+    Of 200 seeds an interval covers in 88 % at least. Of 40 seeds a 95 % interval misses more than 7 once in 1,000
+    cases.
+    """
     back = drag[0] * reverse, drag[1] * reverse
     hits: dict[str, list[bool]] = {}
-    for seed in range(200):
+    for seed in range(seeds):
         fit = fit_response(SWAY, points_of(drag, back, 0.03, seed), sway)
         true = {"a_d_v": drag[0], "b_d_v": drag[1], "beta_v": 0.8, "a_d_v_reverse": back[0], "b_d_v_reverse": back[1]}
         for name, (low, high) in fit.estimate.intervals.items():
             hits.setdefault(name, []).append(low <= true[name] <= high)
-    assert all(np.mean(found) >= 0.88 for found in hits.values() if len(found) > 100), hits
+    assert all(np.mean(found) >= least for found in hits.values() if len(found) > seeds / 2), hits
 
 
 def test_the_band_of_drag_at_its_bound(sway: Rov) -> None:
