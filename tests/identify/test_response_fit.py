@@ -161,8 +161,8 @@ def test_intervals_cover_the_truth(
 ) -> None:
     """3 % scatter, whether or not linear drag is left out.
 
-    With 200 seeds an interval covers in at least 88 %. With 40 seeds, a 95 % interval misses more than 7 times in one
-    of 1,000 cases.
+    Of 200 seeds an interval covers in 88 % at least. Of 40 seeds a 95 % interval misses more than 7 once in 1,000
+    cases.
     """
     back = drag[0] * reverse, drag[1] * reverse
     hits: dict[str, list[bool]] = {}
