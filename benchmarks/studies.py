@@ -110,7 +110,7 @@ class Study:
 
     def _plan(self, runs: int) -> Path:
         path = self._folder / "plan.toml"
-        fmu = shutil.copy(self._fmu, self._folder / "study.fmu")
+        fmu = Path(shutil.copy(self._fmu, self._folder / "study.fmu"))
         path.write_text(_PLAN.format(fmu=fmu.name, stop=STOP, step=STEP, runs=runs))
         return path
 

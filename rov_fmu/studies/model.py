@@ -1,6 +1,5 @@
 """The FMU that a study runs, as its description has it."""
 
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu.export.unpacking import unpack_fmu
+from rov_fmu.files.interrupts import temporary_folder
 from rov_fmu.files.messages import FileError, did_you_mean, shown
 from rov_fmu.files.reading import read_bytes
 
@@ -89,7 +89,7 @@ class Model:
 def read_model(path: Path) -> Model:
     """Read an FMU. Raises FileError if it cannot be unpacked, or is not for Co-Simulation of FMI 2.0 or 3.0."""
     content = read_bytes(path)
-    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder("fmu-") as folder:
         description = unpack_fmu(BytesIO(content), path, Path(folder))
     version = {"2": 2, "3": 3}.get(description.fmiVersion[:1])
     if version is None:
