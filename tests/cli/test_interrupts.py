@@ -98,7 +98,7 @@ def command(arguments: list[str], folder: Path, is_controlled: bool = True, **en
 
 def _plan(folder: Path, fmu: Path) -> Path:
     path = folder / "plan.toml"
-    path.write_text(f"""fmu = "{fmu}"
+    path.write_text(f"""fmu = "{Path(shutil.copy(fmu, folder)).name}"
 stop_time = 20.0
 step = 0.01
 runs = 100000

@@ -276,7 +276,7 @@ def test_keys_of_a_vehicle_file_are_guessed(case: str, here: Path, capsys: Capsy
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('against = "videoray"', 'against = "VideoRay"', "against = 'VideoRay': must be a vehicle file, "),
+        ('against = "videoray"', 'against = "VideoRay"', "against = 'VideoRay': must be a vehicle file in this "),
         ('against = "videoray"', 'against = "videorey"', "; did you mean videoray?"),
         (
             "name = ",
@@ -300,7 +300,7 @@ def test_keys_of_rov_toml_are_guessed(old: str, new: str, told: str, tmp_path: P
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ('"videoray"', '"BlueROV2"', "vehicle = 'BlueROV2': there is no such file, as seen from the plan, "),
+        ('"videoray"', '"BlueROV2"', "vehicle = 'BlueROV2': there is no such file beside the plan, "),
         ("runs = 2", 'runs = 2\nsampler = "Sobol"', "sampler = 'Sobol': must be 'grid', 'sobol', "),
         (
             "[figures]",
