@@ -80,8 +80,8 @@ def pair(value: object) -> object:
 
 
 def folder_of(info: ValidationInfo) -> Path:
-    """The folder of the file that is checked."""
-    return Path((info.context or {})["folder"])
+    """The folder of the file that is checked; the current one where what is checked is in no file."""
+    return Path((info.context or {}).get("folder", ""))
 
 
 # ---- Problems in words -----------------------------------------------------------------------------------------------
