@@ -56,6 +56,7 @@ def _page(folder: Path, picture: str) -> Path:
     return page
 
 
+@pytest.mark.interop
 @pytest.mark.parametrize("case", HOSTILE)
 def test_nothing_in_a_picture_runs_or_navigates(case: str, visit: Callable[..., Visit], tmp_path: Path) -> None:
     path = _page(tmp_path, HOSTILE[case])
@@ -88,6 +89,7 @@ def test_a_picture_stands_in_the_page_as_an_image_alone(tmp_path: Path) -> None:
         assert "script-src" not in policy, "without the live section no script at all"
 
 
+@pytest.mark.interop
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_shipped_pictures_are_seen_on_light_ground(
     scheme: str, visit: Callable[..., Visit], tmp_path: Path
