@@ -1,0 +1,209 @@
+/* Taylor series of the states of equation.h, in time by tau: y(t tau) = sum of c[n] t^n. Every product of two states is a Cauchy
+ * product, so a coefficient follows from those before it. The coefficients tell how far the series may be used (Jorba and
+ * Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005). */
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#if defined __GNUC__
+#define INLINE static inline __attribute__((always_inline)) /* so that loops over constant orders are unrolled */
+#else
+#define INLINE static inline
+#endif
+
+enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save */
+
+typedef struct {
+    int order;                     /* of the highest coefficient that is known */
+    unsigned moving;               /* components whose states are not constant, a bit each */
+    unsigned blocks;               /* the same of the blocks of equation.h */
+    double size[N_SERIES];         /* of each group of states, by its first */
+    double tau;                    /* unit of time, s */
+    double pace[N_SERIES];         /* tau, or 0 for the states that are constant */
+    double c[ORDER + 1][N_SERIES]; /* coefficients */
+} series;
+
+static const double INVERSE[ORDER + 1] = {0.0,        1.0,        1.0 / 2.0,  1.0 / 3.0,  1.0 / 4.0,  1.0 / 5.0,  1.0 / 6.0,
+                                          1.0 / 7.0,  1.0 / 8.0,  1.0 / 9.0,  1.0 / 10.0, 1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0,
+                                          1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0};
+
+/* Coefficient m > 0 of the products of state a with the states from b on; a block that is constant is known by its bit. */
+INLINE void series_products(const double c[ORDER + 1][N_SERIES], unsigned blocks, int a, int b, int lanes, int m,
+                            double product[])
+{
+    const bool first_moves = blocks >> BLOCK_OF[a] & 1U, second_moves = blocks >> BLOCK_OF[b] & 1U;
+    for (int i = 0; i < lanes; i++) {
+        product[i] = 0.0;
+    }
+    if (first_moves && second_moves) {
+        for (int j = m - 1; j > 0; j--) {
+            for (int i = 0; i < lanes; i++) {
+                product[i] += c[j][a] * c[m - j][b + i];
+            }
+        }
+    }
+    if (second_moves) { /* last what is computed last */
+        for (int i = 0; i < lanes; i++) {
+            product[i] += c[0][a] * c[m][b + i];
+        }
+    }
+    if (first_moves) {
+        for (int i = 0; i < lanes; i++) {
+            product[i] += c[m][a] * c[0][b + i];
+        }
+    }
+}
+
+/* Coefficient m > 0 of the squares of the states from a on. */
+INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int m, double square[])
+{
+    for (int i = 0; i < lanes; i++) {
+        square[i] = 0.0;
+    }
+    for (int j = (m - 1) / 2; j > 0; j--) {
+        for (int i = 0; i < lanes; i++) {
+            square[i] += c[j][a + i] * c[m - j][a + i];
+        }
+    }
+    for (int i = 0; i < lanes; i++) {
+        square[i] = 2.0 * (square[i] + c[0][a + i] * c[m][a + i]);
+        square[i] += m % 2 == 0 ? c[m / 2][a + i] * c[m / 2][a + i] : 0.0;
+    }
+}
+
+/* How equation.h writes the coefficients of a block of states, and of all of them. */
+#define SERIES_BLOCK(name)                                                                                    \
+    INLINE void name(const model_numbers *n, const model_held *q, unsigned blocks, const double pace[N_SERIES], \
+                     double c[ORDER + 1][N_SERIES], int m)
+#define SERIES_TERMS INLINE void series_terms(const model_numbers *n, const model_held *q, series *s, int m)
+#define GROW(bit, block, first, size)                       \
+    if (s->blocks >> (bit) & 1U) {                        \
+        block(n, q, s->blocks, s->pace, s->c, m);                      \
+    } else {                                                \
+        for (int i = first; i < (first) + (size); i++) {    \
+            s->c[m + 1][i] = 0.0;                           \
+        }                                                   \
+    }
+
+#include "equation.h"
+
+/* A series of order n may be used where its last two coefficients, against the size of their state, are below the powers n - 1
+ * and n of a ratio of which the power n + 1 is half a rounding: what is left out then falls from there. For n from 4 on. */
+static const double SMALL_BEFORE[] = {1.8e-10, 1.5e-11, 2.4e-12, 6.4e-13, 2.3e-13, 9.9e-14, 5.0e-14, 2.8e-14,
+                                      1.8e-14, 1.2e-14, 8.2e-15, 6.0e-15, 4.5e-15, 3.6e-15, 2.9e-15, 2.3e-15};
+static const double SMALL_LAST[] = {9.9e-14, 2.8e-14, 1.2e-14, 6.0e-15, 3.6e-15, 2.3e-15, 1.7e-15, 1.3e-15,
+                                      9.9e-16, 8.0e-16, 6.7e-16, 5.8e-16, 5.0e-16, 4.4e-16, 4.0e-16, 3.6e-16};
+
+/* The first coefficient that is not 0; order + 1 where there is none. */
+static int series_first(const series *s, int i)
+{
+    int first = 0;
+    while (first <= s->order && s->c[first][i] == 0.0) {
+        first++;
+    }
+    return first;
+}
+
+/* Whether the series may be used up to t = 1. */
+INLINE bool series_converges(const series *s)
+{
+    bool done = true;
+    for (int i = 0; i < N_SERIES; i++) {
+        if (!IS_INTEGRAL[i]) { /* the coefficients of a state that no term contains are those of its rate, one order higher */
+            const int k = IS_USED[i] ? s->order - 4 : s->order - 5;
+            const double size = s->size[GROUP[i]];
+            done &= fabs(s->c[s->order - 1][i]) <= SMALL_BEFORE[k] * size + DBL_MIN;
+            done &= fabs(s->c[s->order][i]) <= SMALL_LAST[k] * size + DBL_MIN;
+        }
+    }
+    return done;
+}
+
+/* How far a coefficient of order n may be followed until it is as large as `size`, at most up to `reach`. */
+static double series_bound(double coefficient, int n, double size, double reach)
+{
+    if (coefficient * pow(reach, n) <= size + DBL_MIN) {
+        return reach;
+    }
+    return pow(size / coefficient, 1.0 / n);
+}
+
+/* How far a series of ORDER may be used, at most up to t = 1; 0 where it overflows. */
+static double series_reach(const series *s, const double scale[N_SERIES])
+{
+    double reach = 1.0;
+    for (int i = 0; i < N_SERIES; i++) {
+        const double last = fabs(s->c[ORDER][i]), before = fabs(s->c[ORDER - 1][i]);
+        if (!(last + before <= DBL_MAX)) {
+            return 0.0;
+        }
+        if (IS_INTEGRAL[i] || last + before == 0.0) {
+            continue;
+        }
+        /* against its size, or against its first coefficient, whichever lets it go further */
+        const int first = s->c[0][i] != 0.0 ? 1 : series_first(s, i);
+        const double size = scale[GROUP[i]], start = fabs(s->c[first][i]);
+        double own = series_bound(last, ORDER, SMALL_LAST[ORDER - 4] * size, reach);
+        own = series_bound(before, ORDER - 1, SMALL_BEFORE[ORDER - 4] * size, own);
+        if (own < reach && first < ORDER - 2) {
+            double other = series_bound(last, ORDER - first, SMALL_LAST[ORDER - 4] * start, reach);
+            other = series_bound(before, ORDER - 1 - first, SMALL_BEFORE[ORDER - 4] * start, other);
+            if (first > 1) { /* it begins as a power of time, of which only every third coefficient may differ from 0 */
+                other = series_bound(fabs(s->c[ORDER - 2][i]), ORDER - 2 - first, SMALL_BEFORE[ORDER - 4] * start, other);
+            }
+            own = fmax(own, other);
+        }
+        reach = own;
+    }
+    return reach;
+}
+
+/* What a state changes by up to t. */
+static double series_change(const series *s, int i, double t)
+{
+    double change = 0.0;
+    for (int n = s->order; n > 0; n--) {
+        change = (change + s->c[n][i]) * t;
+    }
+    return change;
+}
+
+/* The one root of a polynomial whose slope stays within a quarter of its first one, by Newton's method. */
+static double series_root(const series *s, int i)
+{
+    double t = 0.0, next = -s->c[0][i] / s->c[1][i];
+    for (int k = 0; k < 60 && fabs(next - t) > DBL_EPSILON * next; k++) {
+        double slope = 0.0;
+        t = next;
+        for (int n = s->order; n > 0; n--) {
+            slope = slope * t + n * s->c[n][i];
+        }
+        next = t - (s->c[0][i] + series_change(s, i, t)) / slope;
+    }
+    return next;
+}
+
+/* How far a velocity goes before its sign changes, at most up to `length`; *reverses tells whether it is 0 there. */
+static double series_sign_kept(const series *s, int i, double length, bool *reverses)
+{
+    const double shortest = 0x1p-20 * length; /* there the drag of a velocity that just touches zero does not matter */
+    const int k = series_first(s, i);
+    *reverses = false;
+    for (; k <= s->order && length > shortest; length *= 0.5) {
+        double others = 0.0, slopes = 0.0, power = length;
+        for (int n = k + 1; n <= s->order; n++, power *= length) {
+            others += fabs(s->c[n][i]) * power;
+            slopes += n > 1 ? n * fabs(s->c[n][i]) * power : 0.0;
+        }
+        if (fabs(s->c[k][i]) > others) {
+            break;
+        }
+        if (k == 0 && fabs(s->c[1][i]) * length > 4.0 * slopes) { /* it only rises or only falls */
+            const double end = s->c[0][i] + series_change(s, i, length);
+            *reverses = end == 0.0 || (end > 0.0) != (s->c[0][i] > 0.0);
+            return *reverses ? fmin(length, series_root(s, i)) : length;
+        }
+    }
+    return length;
+}
