@@ -76,7 +76,7 @@ def test_drag_by_direction_where_the_points_tell_it(sway: Rov) -> None:
 
 @pytest.mark.parametrize(
     "seeds",
-    [range(1, 5), pytest.param(range(25), marks=pytest.mark.long), pytest.param(range(100), marks=pytest.mark.weekly)],
+    [range(1, 5), pytest.param(range(100), marks=pytest.mark.long)],
     ids=len,
 )
 def test_drag_alike_both_ways_stays_so(seeds: range, sway: Rov) -> None:
