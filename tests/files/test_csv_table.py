@@ -190,6 +190,7 @@ def test_a_log_takes_at_most_six_times_its_size_in_memory(tmp_path: Path) -> Non
     assert _peak(lambda: read_log(path, layout)) < 6 * size
 
 
+@pytest.mark.long
 def test_a_log_of_mistakes_alone_takes_no_more(tmp_path: Path) -> None:
     path = tmp_path / "some.csv"
     path.write_text("length [m],time [s]\n" + "long,late\n" * 100_000, encoding="utf-8")

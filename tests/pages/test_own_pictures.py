@@ -74,6 +74,7 @@ def test_nothing_in_a_picture_runs_or_navigates(case: str, visit: Callable[..., 
     assert seen.problems() == []
 
 
+@pytest.mark.long
 def test_a_picture_stands_in_the_page_as_an_image_alone(tmp_path: Path) -> None:
     for n, picture in enumerate(HOSTILE.values()):
         folder = tmp_path / str(n)
