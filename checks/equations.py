@@ -1,7 +1,7 @@
 """The equations of motion as DESIGN.md has them, written out once more and without rounding (mpmath).
 
 Of a vehicle they take what is declared (its axes, curves, thrusters, inputs) and its numbers, no formula of
-rov_fmu/motion/.
+rov_fmu/model/.
 """
 
 from collections.abc import Mapping
@@ -10,8 +10,8 @@ from typing import Any
 
 from mpmath import mp
 
-from rov_fmu.motion.layout import Curve, Thruster
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Curve, Thruster
+from rov_fmu.model.rov import Rov
 
 Number = Any  # of mpmath
 PLACES = {"u": 0, "v": 1, "w": 2}
@@ -150,3 +150,15 @@ def equations(rov: Rov, inputs: Mapping[str, Number]) -> Equations:
         )
         inertias[velocity] = mass / beta if beta else mp.inf
     return Equations(axes, lags, inertias, rov.layout.coupled)
+
+
+def calculated(rov: Rov, values: Mapping[str, Number]) -> dict[str, Number]:
+    """Return every output and every derivative, for values of all inputs, states and coefficients."""
+    k = Rov(rov.layout, {name: values[name] for name in rov.coefficients})
+    rates = equations(k, values).rates({name: mp.mpf(values[name]) for name in rov.layout.state}, values)
+    forces = steady_forces(k, values) | {n.removeprefix("F_"): mp.mpf(values[n]) for n in rov.layout.lagging}
+    found = {name: mp.mpf(values[name]) for name in rov.layout.state} | {f"F_{n}": F for n, F in forces.items()}
+    for curve in rov.layout.turning_curves:
+        turning = (effect(k, t, "r") * forces[t.name] for t in rov.layout.thrusters if t.curve == curve.name)
+        found[f"tau_{curve.name}"] = mp.fsum(turning)
+    return found | {f"der({name})": rate for name, rate in rates.items()}

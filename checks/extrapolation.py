@@ -1,6 +1,6 @@
 """The motion with lag and coupling to some 30 digits, by extrapolation of the midpoint rule (Gragg, Bulirsch, Stoer).
 
-Nothing of rov_fmu/motion/ is in it, not even its method: no series, no closed form. The equations of
+Nothing of rov_fmu/model/ is in it, not even its method: no series, no closed form. The equations of
 checks/equations.py are stepped with the signs of the velocities held, and cut where one of them reverses, which is
 found by Newton's method.
 """

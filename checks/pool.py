@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rov_fmu.motion.layout import AXES, Thruster
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import AXES, Thruster
+from rov_fmu.model.rov import Rov
 
 Array = NDArray[np.float64]
 

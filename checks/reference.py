@@ -1,4 +1,4 @@
-"""The exact motion to 50 digits, from the textbook solutions of (18), not the formulas of rov_fmu/motion/ (mpmath).
+"""The exact motion to 50 digits, from the textbook solutions of (18), not the formulas of rov_fmu/model/ (mpmath).
 
 While v keeps its sign, v' = C - B v - A v^2 is elementary: through its two equilibria where they are real, a tangent
 where they are not, a hyperbola where they coincide, an exponential or a line without quadratic drag. Every formula
@@ -14,7 +14,7 @@ from typing import Any
 from mpmath import mp
 from mpmath.calculus.quadrature import GaussLegendre
 
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.rov import Rov
 
 from .equations import Axis, Equations, equations
 from .extrapolation import integrate

@@ -251,7 +251,7 @@ static outcome differentiate_adjoint(fmu *f, const unsigned unknowns[], size_t n
         for (size_t k = 0; k < n_knowns; k++) {
             double d[N_VARIABLES] = {0.0}, sum = 0.0;
             d[place_of(knowns[k])] = 1.0;
-            rov_tangent(f->now.values, d);
+            model_tangent(f->now.values, d);
             for (size_t i = 0; i < n_unknowns; i++) {
                 sum += seed[i] * d[place_of(unknowns[i])];
             }

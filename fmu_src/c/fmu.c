@@ -17,11 +17,8 @@
 #include "fmi2_host.h"
 #endif
 
-#include "riccati.c"
-#include "rov.c"
-#include "track.c"
 #include "series.c"
-#include "rov_step.c"
+#include "step.c"
 
 #include "instance.h"
 #include "instance.c"

@@ -29,7 +29,7 @@ static void start(fmu *f)
     for (int i = 0; i < N_LOG_CATEGORIES; i++) {
         f->log_enabled[i] = f->logging_on || (TROUBLE_IS_TOLD && i != logEvents);
     }
-    rov_prepare(f->now.values, &f->gains);
+    model_prepare(f->now.values, &f->numbers);
 }
 
 /* Makes no instance, and says why. */
@@ -128,8 +128,7 @@ static outcome reset(fmu *f)
 /* Thrust and derivatives follow from the rest; only who reads them needs them. */
 static void calculate(fmu *f)
 {
-    rov_thrust_of(f->now.values, &f->gains);
-    rov_derivatives(f->now.values, &f->gains);
+    model_calculate(f->now.values, &f->numbers);
 }
 
 /* The value of a variable by its place, with that of the time where it is a variable; NULL where there is none. */
@@ -224,7 +223,7 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
         }
     }
     if (coefficient) {
-        rov_prepare(f->now.values, &f->gains);
+        model_prepare(f->now.values, &f->numbers);
     }
     return DONE;
 }
@@ -351,7 +350,7 @@ static outcome differentiate(fmu *f, const unsigned unknowns[], size_t n_unknown
     for (size_t i = 0; i < n_knowns; i++) {
         d[place_of(knowns[i])] += seed[i];
     }
-    rov_tangent(f->now.values, d);
+    model_tangent(f->now.values, d);
     for (size_t i = 0; i < n_unknowns; i++) {
         REQUIRE(isfinite(d[place_of(unknowns[i])]), "that of %s is not a finite number.", name_of(unknowns[i]));
     }
@@ -368,25 +367,23 @@ static bool is_output(unsigned reference)
     return is_unknown(reference) && !rate;
 }
 
-/* Time derivatives of outputs, while the inputs are held: as high as the series goes. */
+/* First time derivatives of outputs, while the inputs are held. */
 static outcome get_output_rates(fmu *f, const unsigned vr[], size_t n, const int order[], double value[])
 {
     REQUIRE(n == 0 || (vr != NULL && order != NULL && value != NULL), "vr, order or value is NULL.");
     for (size_t i = 0; i < n; i++) {
         REQUIRE(is_output(vr[i]), "value reference %u is no output.", vr[i]);
-        REQUIRE(order[i] >= 1 && order[i] <= ORDER, "order %d of %s is not available, only 1 to %d.", order[i],
-                name_of(vr[i]), ORDER);
+        REQUIRE(order[i] == 1, "order %d of %s is not available, only 1.", order[i], name_of(vr[i]));
     }
-    for (int pass = 0; pass < 2; pass++) { /* nothing is written unless all are finite */
-        for (size_t i = 0; i < n; i++) {
-            double rates[N_VARIABLES];
-            rov_rates_of_order(f->now.values, &f->gains, order[i], rates);
-            const double rate = rates[place_of(vr[i])];
-            REQUIRE(isfinite(rate), "the derivative of %s overflows.", name_of(vr[i]));
-            if (pass == 1) {
-                value[i] = rate;
-            }
-        }
+    double rates[N_VARIABLES] = {0.0};
+    calculate(f);
+    memcpy(rates + FIRST_STATE, f->now.values + FIRST_CALCULATED, N_STATES * sizeof rates[0]);
+    model_tangent(f->now.values, rates); /* of the thrust, which changes with the forces that lag */
+    for (size_t i = 0; i < n; i++) {
+        REQUIRE(isfinite(rates[place_of(vr[i])]), "the derivative of %s overflows.", name_of(vr[i]));
+    }
+    for (size_t i = 0; i < n; i++) {
+        value[i] = rates[place_of(vr[i])];
     }
     return DONE;
 }
@@ -420,7 +417,7 @@ static void warn_of_jump(fmu *f, double time, double t, double h)
 static outcome advance(fmu *f, double t, double h, int *cuts)
 {
     double next[N_STATES], sum = 0.0; /* not finite if one is not: zero times it is NaN */
-    const int pieces = rov_step(f->now.values, &f->gains, h, next);
+    const int pieces = model_step(f->now.values, &f->numbers, h, next);
     *cuts += pieces - 1;
     if (pieces == 0 || *cuts >= MOST_PIECES) {
         f->now.mode = FAILED;

@@ -79,7 +79,7 @@ typedef struct {
     bool logging_on;      /* as given at instantiation */
     bool log_enabled[N_LOG_CATEGORIES];
     bool warned[N_WARNINGS];
-    rov_gains gains; /* follows the coefficients */
+    model_numbers numbers; /* follow from the coefficients */
     fmu_state now;
     char name[]; /* as given at instantiation */
 } fmu;

@@ -116,7 +116,7 @@ static outcome restore(fmu *f, void *state)
     REQUIRE(saved->state.type == f->now.type, "the state is of the other interface type.");
     TRY(knows_mode_of(f, &saved->state));
     f->now = saved->state;
-    rov_prepare(f->now.values, &f->gains);
+    model_prepare(f->now.values, &f->numbers);
     REPORT(f, "Restored %s at t = %g s.", mode_name(f->now.mode), f->now.time);
     return DONE;
 }

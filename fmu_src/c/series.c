@@ -1,349 +1,255 @@
-/* The motion as Taylor series. Between the reversals of its axes all terms of the motion are polynomials of the state: with v = sum of v_n t^n
- *
- *     v_(n+1) = (C_n - B v_n - A (v^2)_n) / (n + 1),      (v^2)_n = sum of v_j v_(n-j),      A of the direction's sign
- *
- * and likewise the force of a lag, C_n = D (-1/T)^n / n!, and the products of the coupling. The coefficients tell how far they
- * reach (Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
- * 2005). */
+/* Taylor series of the states of equation.h, in time by tau: y(t tau) = sum of c[n] t^n. Every product of two states is a Cauchy
+ * product, so a coefficient follows from those before it. The coefficients tell how far the series may be used (Jorba and
+ * Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005). */
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
 
-enum { ORDER = 19, ORDER_OF_FEW = 11 };
-static const double TURN_OF_FEW = 0.14; /* up to which, and to which order, the rule of four is enough */
-/* How much of that the rate may change by: an angle b t^2 asks for twice the order, the error of four is 1e-6 b^4. */
-static const double BEND_OF_FEW = 0.002;
-static const double INVERSE[ORDER + 2] = {
-    0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0, 1.0 / 8.0, 1.0 / 9.0, 1.0 / 10.0,
-    1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0, 1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0, 1.0 / 20.0};
-/* The last two terms of a series against the first ones: each falls by six at least where ORDER does, by 36 from rest where
- * every other one vanishes, so that what follows is half a rounding. */
-static const double SMALL = 16.0 * DBL_EPSILON;
+#if defined __GNUC__
+#define INLINE static inline __attribute__((always_inline)) /* so that loops over constant orders are unrolled */
+#else
+#define INLINE static inline
+#endif
 
-/* What moves, as acceleration: the force of now, what it is once the lags are over, and what each curve's has left. */
+enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save */
+
 typedef struct {
-    const rov_gains *gains;
-    double C[WIDTH], then[WIDTH], late[N_CURVES][WIDTH];
-} flow;
-
-/* Polynomials of the velocities in time by tau, what their terms come from, and what they add up to. */
-typedef struct {
-    int order;
-    bool decided;                                     /* whether the directions are known */
-    double tau, c[ORDER + 1][WIDTH];
-    double A[WIDTH], D[WIDTH];                        /* drag in the direction of the motion: D = B + 2 A v_0 */
-    double fall[N_CURVES];                            /* of what the lags have left */
-    double change[WIDTH], mean[WIDTH], others[WIDTH]; /* sums beyond v_1 at the end: v, its mean, sizes */
+    int order;                     /* of the highest coefficient that is known */
+    unsigned moving;               /* components whose states are not constant, a bit each */
+    unsigned blocks;               /* the same of the blocks of equation.h */
+    double size[N_SERIES];         /* of each state's group */
+    double tau;                    /* unit of time, s */
+    double pace[N_SERIES];         /* tau, or 0 for the states that are constant */
+    double c[ORDER + 1][N_SERIES]; /* coefficients */
 } series;
 
-static inline void series_add(series *s, int n)
+static const double INVERSE[ORDER + 1] = {0.0,        1.0,        1.0 / 2.0,  1.0 / 3.0,  1.0 / 4.0,  1.0 / 5.0,  1.0 / 6.0,
+                                          1.0 / 7.0,  1.0 / 8.0,  1.0 / 9.0,  1.0 / 10.0, 1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0,
+                                          1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0};
+
+/* Coefficient m > 0 of the products of state a with the states from b on. The bit of a block tells whether its states move. */
+INLINE void series_products(const double c[ORDER + 1][N_SERIES], unsigned blocks, int a, int b, int lanes, int m,
+                            double product[])
 {
-    for (int a = 0; a < WIDTH; a++) {
-        s->change[a] += s->c[n][a];
-        s->mean[a] += s->c[n][a] * INVERSE[n + 1];
-        s->others[a] += fabs(s->c[n][a]);
+    const bool first_moves = blocks >> BLOCK_OF[a] & 1U, second_moves = blocks >> BLOCK_OF[b] & 1U;
+    for (int i = 0; i < lanes; i++) {
+        product[i] = 0.0;
+    }
+    if (first_moves && second_moves) {
+        for (int j = m - 1; j > 0; j--) {
+            for (int i = 0; i < lanes; i++) {
+                product[i] += c[j][a] * c[m - j][b + i];
+            }
+        }
+    }
+    if (second_moves) { /* coefficient m was computed last, so it is needed last */
+        for (int i = 0; i < lanes; i++) {
+            product[i] += c[0][a] * c[m][b + i];
+        }
+    }
+    if (first_moves) {
+        for (int i = 0; i < lanes; i++) {
+            product[i] += c[m][a] * c[0][b + i];
+        }
     }
 }
 
-/* The first term up to n that is not 0; n + 1 where there is none. */
-static inline int series_first(const series *s, int a, int n)
+/* Coefficient m > 0 of the squares of the states from a on. */
+INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int m, double square[])
+{
+    for (int i = 0; i < lanes; i++) {
+        square[i] = 0.0;
+    }
+    for (int j = (m - 1) / 2; j > 0; j--) {
+        for (int i = 0; i < lanes; i++) {
+            square[i] += c[j][a + i] * c[m - j][a + i];
+        }
+    }
+    for (int i = 0; i < lanes; i++) {
+        square[i] = 2.0 * (square[i] + c[0][a + i] * c[m][a + i]);
+        square[i] += m % 2 == 0 ? c[m / 2][a + i] * c[m / 2][a + i] : 0.0;
+    }
+}
+
+/* How equation.h writes the coefficients of a block of states, and of all of them. */
+#define SERIES_BLOCK(name)                                                                                    \
+    INLINE void name(const model_numbers *n, const model_held *q, unsigned blocks, const double pace[N_SERIES], \
+                     double c[ORDER + 1][N_SERIES], int m)
+#define SERIES_TERMS INLINE void series_terms(const model_numbers *n, const model_held *q, series *s, int m)
+#define GROW(bit, block, first, size)                       \
+    if (s->blocks >> (bit) & 1U) {                        \
+        block(n, q, s->blocks, s->pace, s->c, m);                      \
+    } else {                                                \
+        for (int i = first; i < (first) + (size); i++) {    \
+            s->c[m + 1][i] = 0.0;                           \
+        }                                                   \
+    }
+
+#include "equation.h"
+
+/* A series of order n may be used where its last two coefficients, against the size of their state, are below the powers n - 1
+ * and n of a ratio of which the power n + 1 is a quarter of a rounding. What is left out then falls from there, if they
+ * decrease like this, or are rounding themselves. The limits are for n from 4 on. */
+static const double SMALL_BEFORE[] = {1.8e-10, 1.5e-11, 2.4e-12, 6.4e-13, 2.3e-13, 9.9e-14, 5.0e-14, 2.8e-14,
+                                      1.8e-14, 1.2e-14, 8.2e-15, 6.0e-15, 4.5e-15, 3.6e-15, 2.9e-15, 2.3e-15};
+static const double SMALL_LAST[] = {9.9e-14, 2.8e-14, 1.2e-14, 6.0e-15, 3.6e-15, 2.3e-15, 1.7e-15, 1.3e-15,
+                                      9.9e-16, 8.0e-16, 6.7e-16, 5.8e-16, 5.0e-16, 4.4e-16, 4.0e-16, 3.6e-16};
+
+/* The first coefficient that is not 0; order + 1 where there is none. */
+static int series_first(const series *s, int i)
 {
     int first = 0;
-    while (first <= n && s->c[first][a] == 0.0) {
+    while (first <= s->order && s->c[first][i] == 0.0) {
         first++;
     }
     return first;
 }
 
-/* Drag of an axis by its direction, that of the first of the terms up to n that is not 0; false where there is none. */
-static inline bool series_drag(const flow *f, series *s, int a, int n)
+/* Whether the series may be used up to t = 1. States that no term contains are integrals of the others, and converge with them. */
+INLINE bool series_converges(const series *s)
 {
-    const int first = series_first(s, a, n), back = first <= n && s->c[first][a] < 0.0;
-    s->A[a] = (back ? -s->tau : s->tau) * f->gains->axis[a].A[back];
-    s->D[a] = s->tau * f->gains->axis[a].B[back] + 2.0 * s->A[a] * s->c[0][a];
-    return first <= n;
-}
-
-/* The term after n. */
-INLINE void series_term(const flow *f, series *s, int n)
-{
-    double square[WIDTH] = {0.0}, rest[WIDTH] = {0.0}; /* v^2 without v_0; all but the drag of the last term */
-    for (int j = (n - 1) / 2; j > 0; j--) {
-        for (int a = 0; a < WIDTH; a++) {
-            square[a] += s->c[j][a] * s->c[n - j][a];
+    const double before = SMALL_BEFORE[s->order - 4];
+    bool done = true;
+    for (int i = 0; i < N_USED; i++) {
+        const double size = s->size[i], a = fabs(s->c[s->order - 1][i]), b = fabs(s->c[s->order][i]);
+        done &= a + 0.01 * b <= before * size + DBL_MIN; /* b may be infinite */
+        done &= b * b <= 0.25 * DBL_EPSILON * size * (a + 8.0 * b);
+        if (s->order == ORDER) { /* of a motion that begins as a power of time, two coefficients of three may be 0 */
+            done &= fabs(s->c[ORDER - 2][i]) <= 6.0 * before * size + DBL_MIN;
         }
-    }
-    for (int a = 0; a < WIDTH; a++) {
-        const double middle = n % 2 == 0 ? s->c[n / 2][a] : 0.0;
-        rest[a] = -s->A[a] * (2.0 * square[a] + middle * middle);
-    }
-    for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
-        s->fall[c] *= -s->tau * f->gains->rate[c] * INVERSE[n];
-        for (int a = 0; a < WIDTH; a++) {
-            rest[a] += s->fall[c] * f->late[c][a];
-        }
-    }
-    if (IS_COUPLED) {
-        double vr = 0.0, ur = 0.0, uv = 0.0;
-        for (int j = 0; j <= n; j++) {
-            vr += s->c[j][V] * s->c[n - j][R];
-            ur += s->c[j][U] * s->c[n - j][R];
-            uv += s->c[j][U] * s->c[n - j][V];
-        }
-        rest[U] += s->tau * f->gains->c_u * vr;
-        rest[V] -= s->tau * f->gains->c_v * ur;
-        rest[R] -= s->tau * f->gains->c_r * uv;
-    }
-    if (!IS_FREE && !s->decided) {
-        s->decided = true;
-        for (int a = 0; a < N_AXES; a++) {
-            s->decided &= series_drag(f, s, a, n);
-        }
-    }
-    for (int a = 0; a < WIDTH; a++) {
-        s->c[n + 1][a] = INVERSE[n + 1] * rest[a] - INVERSE[n + 1] * s->D[a] * s->c[n][a];
-    }
-    series_add(s, n + 1);
-}
-
-/* How large an axis is by the first three terms that are not 0: from rest, lag and coupling begin as a power of t; and the
- * last terms. Of such a power, only every third may be there. */
-static double series_sizes(const series *s, int a, int n, double *last)
-{
-    const int first = series_first(s, a, n);
-    double size = 0.0;
-    *last = fmax(fabs(s->c[n][a]), fabs(s->c[n - 1][a]));
-    if (first > 1) {
-        *last = fmax(*last, fabs(s->c[n - 2][a]));
-    }
-    for (int k = first; k < first + 3 && k < n - 1; k++) {
-        size = fmax(size, fabs(s->c[k][a]));
-    }
-    return size;
-}
-
-/* Whether an axis that has not moved in n terms may yet do so: where the other two of the coupling move. */
-static inline bool series_waits(const series *s, int n)
-{
-    const int u = series_first(s, U, n) > n, v = series_first(s, V, n) > n, r = series_first(s, R, n) > n;
-    return IS_COUPLED && u + v + r == 1;
-}
-
-/* Whether the last of n terms are small. */
-static inline bool series_is_done(series *s, int n)
-{
-    bool done = IS_FREE || s->decided;
-    s->order = n;
-    for (int a = 0; a < WIDTH; a++) {
-        const double size = fabs(s->c[0][a]) + fabs(s->c[1][a]);
-        done &= fabs(s->c[n][a]) + fabs(s->c[n - 1][a]) <= SMALL * size + DBL_MIN;
-    }
-    for (int a = 0; a < N_AXES && !done; a++) {
-        double last;
-        const double size = series_sizes(s, a, n, &last);
-        if (!(last <= 0.5 * SMALL * size + DBL_MIN)) {
-            return false;
-        }
-    }
-    return done || !series_waits(s, n);
-}
-
-/* The same, not inline: a tenth of the library less. */
-static void series_next(const flow *f, series *s, int n)
-{
-    series_term(f, s, n);
-}
-
-/* The first two terms of polynomials from v on over tau seconds. */
-static inline void series_begin(const flow *f, const double v[WIDTH], double tau, series *s)
-{
-    double couple[WIDTH] = {0.0};
-    s->tau = tau;
-    for (int c = 0; c < N_CURVES; c++) {
-        s->fall[c] = tau;
-    }
-    rov_couple(f->gains, v, couple);
-    for (int a = 0; a < WIDTH; a++) {
-        s->c[0][a] = v[a];
-        s->c[1][a] = tau * (f->C[a] + couple[a] - riccati_drag(&f->gains->axis[a], v[a]));
-        s->change[a] = s->mean[a] = s->others[a] = 0.0;
-        const double way = v[a] != 0.0 ? v[a] : s->c[1][a];
-        const int back = way < 0.0;
-        s->A[a] = copysign(tau * f->gains->axis[a].A[back], way);
-        s->D[a] = tau * f->gains->axis[a].B[back] + 2.0 * s->A[a] * v[a];
-    }
-    s->decided = false;
-}
-
-/* Polynomials from v on over tau seconds, of so many terms that the next ones would be rounding; false where ORDER does not
- * do. */
-static inline bool series_grow(const flow *f, const double v[WIDTH], double tau, series *s)
-{
-    series_begin(f, v, tau, s);
-    series_term(f, s, 1); /* by hand, for what is not a loop takes a third less time */
-    series_term(f, s, 2);
-    series_term(f, s, 3);
-    series_term(f, s, 4);
-    series_term(f, s, 5);
-    series_term(f, s, 6);
-    if (series_is_done(s, 7)) {
-        return true;
-    }
-    series_term(f, s, 7);
-    series_term(f, s, 8);
-    bool done = series_is_done(s, 9);
-    for (int n = 9; !done && n < ORDER; n += 2) {
-        series_next(f, s, n);
-        series_next(f, s, n + 1);
-        done = series_is_done(s, n + 2);
     }
     return done;
 }
 
-/* How far the last terms stay below rounding of the first ones, up to 1; 0 where they overflow. */
-static double series_reach(const series *s)
+/* The largest power of two that is not above x > 0, as its exponent; subnormal numbers count as 0. */
+INLINE int exponent_of(double x)
 {
-    double reach = 1.0;
-    for (int a = 0; a < N_AXES; a++) {
-        double last;
-        const double size = series_sizes(s, a, s->order, &last), share = 0.5 * SMALL * size / last;
-        if (!isfinite(last)) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (int)(bits >> 52 & 0x7ff) - 1023;
+}
+
+/* The logarithm to base 2 of how far the last three coefficients may be followed, from order `first` on, until they are as
+ * large as a size allows. */
+static double series_bound(const series *s, int i, int first, double size)
+{
+    const double a = fabs(s->c[ORDER - 1][i]), b = fabs(s->c[ORDER][i]);
+    const int before = exponent_of(SMALL_BEFORE[ORDER - 4] * size / a), last = exponent_of(SMALL_LAST[ORDER - 4] * size / b);
+    const int third = exponent_of(6.0 * SMALL_BEFORE[ORDER - 4] * size / fabs(s->c[ORDER - 2][i]));
+    const int decrease = exponent_of(DBL_EPSILON * size / b * (a / b)), rounding = exponent_of(2.0 * DBL_EPSILON * size / b);
+    const double least = fmin((double)before / (ORDER - 1 - first), (double)last / (ORDER - first));
+    return fmin(fmin(least, (double)third / (ORDER - 2 - first)),
+                fmax((double)decrease / (ORDER + 1 - first), (double)rounding / (ORDER - first)));
+}
+
+/* How far a series of ORDER may be used, at most up to t = 1; 0 where its unit of time is so long that coefficients overflow
+ * or quotients of them underflow. */
+static double series_reach(const series *s, const double scale[N_SERIES])
+{
+    double reach = 0.0; /* as its logarithm to base 2 */
+    for (int i = 0; i < N_USED; i++) {
+        const double sum = fabs(s->c[ORDER][i]) + fabs(s->c[ORDER - 1][i]) + fabs(s->c[ORDER - 2][i]);
+        if (!(sum <= DBL_MAX)) {
             return 0.0;
         }
-        if (share < 1.0) {
-            reach = fmin(reach, pow(share, 1.0 / (s->order - 4)));
+        if (sum == 0.0) {
+            continue;
         }
+        /* against its size, or against its first coefficient, whichever lets it go further */
+        double own = series_bound(s, i, 0, scale[GROUP[i]]);
+        const int first = s->c[0][i] != 0.0 ? 1 : series_first(s, i);
+        if (own < reach && first < ORDER - 2) {
+            own = fmax(own, series_bound(s, i, first, fabs(s->c[first][i])));
+        }
+        reach = fmin(reach, own);
     }
-    return reach;
+    if (reach < -50.0) { /* 2^-53 to the power ORDER is near the smallest double, so a quotient may have underflowed */
+        return 0.0;
+    }
+    return pow(2.0, reach);
 }
 
-/* Make t tau the unit of time. */
-static void series_shorten(series *s, double t)
-{
-    double power = 1.0;
-    for (int n = 0; n <= s->order; n++, power *= t) {
-        for (int a = 0; a < WIDTH; a++) {
-            s->c[n][a] *= power;
-            s->change[a] = n > 1 ? s->change[a] : 0.0;
-            s->mean[a] = n > 1 ? s->mean[a] : 0.0;
-            s->others[a] = n > 1 ? s->others[a] : 0.0;
-        }
-        if (n > 1) {
-            series_add(s, n);
-        }
-    }
-    s->tau *= t;
-}
-
-/* A polynomial at t, as what is added to its start. */
-static double series_value(const series *s, int a, double t)
+/* What a state changes by up to t. */
+static double series_change(const series *s, int i, double t)
 {
     double change = 0.0;
     for (int n = s->order; n > 0; n--) {
-        change = (change + s->c[n][a]) * t;
+        change = (change + s->c[n][i]) * t;
     }
-    return s->c[0][a] + change;
+    return change;
 }
 
 /* The one root of a polynomial whose slope stays within a quarter of its first one, by Newton's method. */
-static double series_root(const series *s, int a)
+static double series_root(const series *s, int i)
 {
-    double t = 0.0, next = -s->c[0][a] / s->c[1][a];
-    for (int i = 0; i < 60 && fabs(next - t) > DBL_EPSILON * next; i++) {
+    double t = 0.0, next = -s->c[0][i] / s->c[1][i];
+    for (int k = 0; k < 60 && fabs(next - t) > DBL_EPSILON * next; k++) {
         double slope = 0.0;
         t = next;
         for (int n = s->order; n > 0; n--) {
-            slope = slope * t + n * s->c[n][a];
+            slope = slope * t + n * s->c[n][i];
         }
-        next = t - series_value(s, a, t) / slope;
+        next = t - (s->c[0][i] + series_change(s, i, t)) / slope;
     }
     return next;
 }
 
-/* How far a velocity goes before its sign changes, at most the length; whether it is zero there. */
-static inline double series_sign_kept(const series *s, int a, double length, bool *reverses)
+/* How long a velocity keeps its sign, at most `length`; *reverses tells whether it is 0 at the end of that time. */
+static double series_sign_kept(const series *s, int i, double length, bool *reverses)
 {
-    const double shortest = 0x1p-20 * length; /* there a velocity that just touches zero has no drag worth a sign */
-    int k = series_first(s, a, s->order);
+    const double shortest = 0x1p-20 * length; /* there the drag of a velocity that just touches zero does not matter */
+    const int k = series_first(s, i);
     *reverses = false;
     for (; k <= s->order && length > shortest; length *= 0.5) {
         double others = 0.0, slopes = 0.0, power = length;
         for (int n = k + 1; n <= s->order; n++, power *= length) {
-            others += fabs(s->c[n][a]) * power;
-            slopes += n > 1 ? n * fabs(s->c[n][a]) * power : 0.0;
+            others += fabs(s->c[n][i]) * power;
+            slopes += n > 1 ? n * fabs(s->c[n][i]) * power : 0.0;
         }
-        if (fabs(s->c[k][a]) > others) {
+        if (fabs(s->c[k][i]) > others) {
             break;
         }
-        if (k == 0 && fabs(s->c[1][a]) * length > 4.0 * slopes) { /* it only rises or only falls */
-            const double end = series_value(s, a, length);
-            *reverses = end == 0.0 || (end > 0.0) != (s->c[0][a] > 0.0);
-            return *reverses ? fmin(length, series_root(s, a)) : length;
+        if (k == 0 && fabs(s->c[1][i]) * length > 4.0 * slopes) { /* it only rises or only falls */
+            const double end = s->c[0][i] + series_change(s, i, length);
+            *reverses = end == 0.0 || (end > 0.0) != (s->c[0][i] > 0.0);
+            return *reverses ? fmin(length, series_root(s, i)) : length;
         }
     }
     return length;
 }
 
-/* What the rule of eight must follow over a piece of t tau: the turn by its power t^n weighs as much as the order that it asks
- * for, up to 4: LONGEST_TURN at a steady rate, half a radian of a turn that begins at rest. */
-static inline double series_turn(const series *s, double t)
+/* Whether the sizes of the coefficients show that no velocity reverses before t = 1. */
+INLINE bool series_keeps_directions(const series *s)
 {
-    double rate = 0.0;
+    double others[N_MONITORED] = {0.0};
+    bool keeps = true;
     for (int n = s->order; n > 1; n--) {
-        rate = (rate + fabs(s->c[n][R])) * t;
-    }
-    return s->tau * t * (fabs(s->c[0][R]) + t * (2.0 * fabs(s->c[1][R]) + 4.0 * rate));
-}
-
-/* The track of a piece by a rule of n places. */
-static inline void series_places(const series *s, int n, double turned, double turn, planar *sum)
-{
-    const double *const places = n == FEW ? PLACES : PLACES + FEW;
-    track_places p;
-    double power[MANY];
-    for (int i = 0; i < n; i++) {
-        p.ahead[i] = s->c[0][U];
-        p.aside[i] = s->c[0][V];
-        p.turn[i] = s->tau * s->c[0][R] * places[i];
-        power[i] = places[i];
-    }
-    for (int k = 1; k <= s->order - 2; k++) { /* the last two are small */
-        const double angle = s->tau * INVERSE[k + 1] * s->c[k][R];
-        for (int i = 0; i < n; i++) {
-            p.ahead[i] += s->c[k][U] * power[i];
-            p.aside[i] += SWAY == NONE ? 0.0 : s->c[k][V] * power[i];
-            power[i] *= places[i];
-            p.turn[i] += angle * power[i];
+        for (int i = 0; i < N_MONITORED; i++) {
+            others[i] += fabs(s->c[n][i]);
         }
     }
-    track_add(sum, &p, n == FEW, s->tau, turned, turn);
-}
-
-static inline void series_track(const series *s, double turned, const double way[WIDTH], planar *sum)
-{
-    if (POSE_x == NONE) {
-        return;
-    }
-    if (YAW == NONE || (way[R] == 0.0 && s->c[0][R] == 0.0)) { /* r keeps its sign: it is 0 all along */
-        const planar straight = {way[U], way[V]};
-        track_add_arc(sum, straight, turned, 0.0);
-    } else if (fabs(way[R]) < TURN_OF_FEW && s->order <= ORDER_OF_FEW
-               && s->tau * (fabs(s->c[1][R]) + s->others[R]) <= BEND_OF_FEW) {
-        series_places(s, FEW, turned, way[R], sum);
-    } else {
-        series_places(s, MANY, turned, way[R], sum);
-    }
-}
-
-/* The end of a piece as the change of the velocities and the distances; whether it is plain by the sizes of the terms that no
- * velocity changes its sign on the way, and that it does not turn too much. */
-static inline bool series_end(const series *s, double change[WIDTH], double way[WIDTH])
-{
-    bool plain = true;
-    for (int a = 0; a < WIDTH; a++) {
-        const double c0 = s->c[0][a], c1 = s->c[1][a];
+    for (int i = 0; i < N_MONITORED; i++) {
+        const double c0 = s->c[0][i], c1 = s->c[1][i];
         const bool against = (c0 > 0.0 && c1 < 0.0) || (c0 < 0.0 && c1 > 0.0); /* a product would underflow */
-        const double kept = against ? fabs(c0) - fabs(c1) : fabs(c0) + fabs(c1); /* of the first two, at the end */
-        plain &= kept >= s->others[a];
-        change[a] = s->change[a] + c1;
-        way[a] = s->tau * (c0 + (0.5 * c1 + s->mean[a]));
+        keeps &= (against ? fabs(c0) - fabs(c1) : fabs(c0) + fabs(c1)) >= others[i];
     }
-    return plain && series_turn(s, 1.0) <= LONGEST_TURN;
+    return keeps;
+}
+
+/* Shorten a piece to the first reversal. Returns the velocity that reverses, or NONE. */
+static int series_cut(const series *s, double *length)
+{
+    int reversed = NONE;
+    for (int k = 0; k < N_MONITORED; k++) {
+        bool reverses;
+        if (!(s->moving >> COMPONENT_OF[k] & 1U)) {
+            continue;
+        }
+        const double end = series_sign_kept(s, k, *length, &reverses);
+        reversed = reverses ? k : end < *length ? NONE : reversed;
+        *length = end;
+    }
+    return reversed;
 }

@@ -6,21 +6,14 @@
 
 IMPORTED(sin) double sin(double x);
 IMPORTED(cos) double cos(double x);
-IMPORTED(exp) double exp(double x);
 IMPORTED(expm1) double expm1(double x);
-IMPORTED(log) double log(double x);
-IMPORTED(log1p) double log1p(double x);
-IMPORTED(atan) double atan(double x);
 IMPORTED(atanh) double atanh(double x);
-IMPORTED(hypot) double hypot(double x, double y);
 IMPORTED(pow) double pow(double x, double y);
-IMPORTED(remainder) double remainder(double x, double y); /* which the page adds */
 
 #define INFINITY __builtin_inf()
 #define isfinite(x) __builtin_isfinite(x)
 #define fabs(x) __builtin_fabs(x)
 #define sqrt(x) __builtin_sqrt(x)
-#define copysign(x, y) __builtin_copysign(x, y)
 
 /* As ISO C has them, a number rather than NaN: those of WebAssembly are NaN then. */
 static inline double fmin(double x, double y)

@@ -3,17 +3,14 @@
 
 #include "model.h"
 
-#include "riccati.c"
-#include "rov.c"
-#include "track.c"
 #include "series.c"
-#include "rov_step.c"
+#include "step.c"
 
 #define EXPORT(name) __attribute__((export_name(name)))
 
-static double at[N_VARIABLES];  /* by place */
-static double marks[N_AXES][2]; /* V_ss and Tau of each axis */
-static rov_gains gains;         /* follows the coefficients */
+static double at[N_VARIABLES];       /* by place */
+static double marks[N_MONITORED][2]; /* V_ss and Tau of each velocity */
+static model_numbers numbers;        /* follow from the coefficients */
 
 EXPORT("variables") double *variables_start(void);
 EXPORT("marks") double *marks_start(void);
@@ -34,14 +31,14 @@ double *marks_start(void)
 /* To be called after a change of coefficients. */
 void tune(void)
 {
-    rov_prepare(at, &gains);
+    model_prepare(at, &numbers);
 }
 
 /* h > 0 seconds with the inputs held; 0, with all as it was, where the step is refused or its result overflows. */
 int step(double h)
 {
     double next[N_STATES];
-    bool done = rov_step(at, &gains, h, next);
+    bool done = model_step(at, &numbers, h, next);
     for (int i = 0; i < N_STATES; i++) {
         done &= isfinite(next[i]) != 0;
     }
@@ -55,17 +52,13 @@ int step(double h)
  * by C = B V + A V^2 and Tau (17), the time from rest to p V, p = 1 - 1/e. */
 void observe(void)
 {
-    rov_held held;
-    double C[WIDTH];
-    rov_thrust_of(at, &gains);
-    rov_derivatives(at, &gains);
-    rov_hold(at, &gains, &held);
-    rov_push(at, &gains, held.steady, C);
-    for (int a = 0; a < N_AXES; a++) {
-        const int back = C[a] < 0.0;
-        const double A = gains.axis[a].A[back], B = gains.axis[a].B[back], force = fabs(C[a]), p = -expm1(-1.0);
-        const double D = sqrt(B * B + 4.0 * A * force), V = 2.0 * force / (B + D);
-        marks[a][0] = force == 0.0 ? 0.0 : back ? -V : V;
-        marks[a][1] = 2.0 * atanh(D * p * V / (2.0 * force - B * p * V)) / D;
+    double C[N_MONITORED], A[N_MONITORED], B[N_MONITORED];
+    model_calculate(at, &numbers);
+    model_alone(at, &numbers, C, A, B);
+    for (int a = 0; a < N_MONITORED; a++) {
+        const double force = fabs(C[a]), p = -expm1(-1.0);
+        const double D = sqrt(B[a] * B[a] + 4.0 * A[a] * force), V = 2.0 * force / (B[a] + D);
+        marks[a][0] = force == 0.0 ? 0.0 : C[a] < 0.0 ? -V : V;
+        marks[a][1] = 2.0 * atanh(D * p * V / (2.0 * force - B[a] * p * V)) / D;
     }
 }

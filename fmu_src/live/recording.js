@@ -178,12 +178,14 @@ function saturated(command) {
   return Math.max(-1, Math.min(1, command));
 }
 
+const TURN = 2 * Math.PI;
+
 /** Angles without jumps of a turn. @param {number[]} angles */
 function unwrapped(angles) {
   let last = Number.NaN;
   return angles.map((angle) => {
     if (!Number.isFinite(angle)) return angle;
-    last = Number.isFinite(last) ? last + remainder(angle - last, 2 * Math.PI) : angle;
+    last = Number.isFinite(last) ? last + (angle - last - TURN * Math.round((angle - last) / TURN)) : angle;
     return last;
   });
 }

@@ -9,8 +9,9 @@ from io import BytesIO
 from types import MappingProxyType
 from uuid import UUID
 
-from rov_fmu.export.compile import C_SOURCES, UNITY_FILE, fmi_headers
-from rov_fmu.export.interface import interface_header, model_header, variables
+from rov_fmu.engine.compile import C_SOURCES, UNITY_FILE, fmi_headers
+from rov_fmu.engine.source import generated_sources
+from rov_fmu.export.interface import interface_header, variables
 from rov_fmu.export.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
 from rov_fmu.export.python_flavour import python_files, python_sources
 from rov_fmu.export.terminals import FOLDER, ICON, terminals_and_icons
@@ -48,7 +49,7 @@ def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     others = f"fmi{5 - fmi}_"
     paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(others)]
     sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
-    sources["model.h"] = model_header(vehicle.rov)
+    sources |= generated_sources(vehicle.layout)
     named = (UNITY_FILE,) if fmi == 2 else ()
     describe = partial(model_description, vehicle, declared, interfaces=NATIVE[fmi], source_files=named, fmi=fmi)
     guid = _guid(describe(guid=""), sources)

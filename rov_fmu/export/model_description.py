@@ -3,14 +3,12 @@
 from collections.abc import Mapping
 
 from rov_fmu import __version__
-from rov_fmu.export.compile import UNITY_FILE
-from rov_fmu.export.interface import LOG_CATEGORIES, UNITS, Variable, parameters_of
+from rov_fmu.engine.compile import UNITY_FILE
+from rov_fmu.export.interface import LOG_CATEGORIES, UNITS, Variable
 from rov_fmu.files.templates import render
-from rov_fmu.motion.layout import Layout
+from rov_fmu.model.dependencies import parameters_of
+from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
-
-OUTPUT_ORDER = 19
-"""Time derivatives of the outputs that are given: ORDER of series.c."""
 
 # What is false is written out too, for FMI++ ends where it is absent.
 _COMMON = {
@@ -39,7 +37,7 @@ NATIVE = {
         "ModelExchange": {**_COMMON, "providesDirectionalDerivative": "true"},
         "CoSimulation": {
             **_CO_SIMULATION,
-            "maxOutputDerivativeOrder": "1",  # OUTPUT_ORDER are given, but fmu-runner takes this for a Boolean
+            "maxOutputDerivativeOrder": "1",  # fmu-runner takes this for a Boolean, and OMSimulator reads only order 1
             "providesDirectionalDerivative": "true",
         },
     },
@@ -48,7 +46,7 @@ NATIVE = {
         "CoSimulation": {
             **_COMMON_3,
             "canHandleVariableCommunicationStepSize": "true",
-            "maxOutputDerivativeOrder": str(OUTPUT_ORDER),
+            "maxOutputDerivativeOrder": "1",
             "providesIntermediateUpdate": "true",
             "mightReturnEarlyFromDoStep": "true",
             "canReturnEarlyAfterIntermediateUpdate": "true",
@@ -85,7 +83,7 @@ def model_description(
         "fmiVersion": f"{fmi}.0",
         "modelName": vehicle.identifier,
         "guid" if fmi == 2 else "instantiationToken": guid,
-        "description": f"{vehicle.description}. {note}" if note else vehicle.description,
+        "description": f"{vehicle.summary}. {note}" if note else vehicle.summary,
         "author": vehicle.source,
         "version": vehicle.version,
         "license": "MIT, see documentation/licenses/license.txt",

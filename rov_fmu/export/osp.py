@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from rov_fmu.files.templates import render
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, Layout
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, Layout
 
 # The element of a group by the unit of its variables, in the order that the schema prescribes.
 _ELEMENTS = {

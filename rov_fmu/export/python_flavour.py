@@ -15,7 +15,7 @@ from rov_fmu.files.interrupts import temporary_folder
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _HERE = Path(__file__).parent
-_MODEL = _HERE.parent / "motion"
+_MODEL = _HERE.parent / "model"
 
 
 def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping[str, str]:
@@ -32,7 +32,7 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
         "variables": [asdict(v) for v in variables],
     }
     return {
-        f"{vehicle.identifier}_slave.py": slave.replace("rov_fmu.motion", package),
+        f"{vehicle.identifier}_slave.py": slave.replace("rov_fmu.model", package),
         "variables.json": json.dumps(declaration, ensure_ascii=False, indent=1) + "\n",
         **{f"{package}/{path.name}": path.read_text(encoding="utf-8") for path in sorted(_MODEL.glob("*.py"))},
     }

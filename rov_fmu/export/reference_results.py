@@ -1,19 +1,18 @@
 """Reference results inside the FMU, by the layered standard FMI-LS-REF: experiments, and what they must come to.
 
 The experiments follow from the vehicle: steps of each axis from rest, by the published tables where it has them, with
-and without its tuning; and a manoeuvre of all axes. What they come to is found by extrapolation, not by the C
-that is to be proved.
+and without its tuning; and a manoeuvre of all axes. The expected results come from the step in plain Python, and not
+from the C code that they are to prove.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, sqrt
 
 from rov_fmu.export.experiments import FOLDER, NAME
-from rov_fmu.export.extrapolation import TooFastError, states
 from rov_fmu.files.templates import render
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Axis, Meta
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Meta
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -55,18 +54,13 @@ class Experiment:
     references: str
 
 
-def reference_results(vehicle: Vehicle, on_left_out: Callable[[str], None] = lambda _: None) -> dict[str, bytes]:
-    """The files, by their path in the FMU. Raises DataFileError.
-
-    `on_left_out` is told the name of an experiment that is not among them, for its motion is too fast to be resolved.
-    """
+def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
+    """Return the files by their path in the FMU. Raises DataFileError."""
     sets = {"tuned": vehicle.rov}
     if any(vehicle.rov[name] != 1.0 for name in _tunable(vehicle.rov)):
         sets["untuned"] = untuned(vehicle.rov)
     files: dict[str, str] = {}
-    experiments = [*_step_responses(vehicle, sets, files, on_left_out), *_manoeuvre(vehicle, files, on_left_out)]
-    if not experiments:
-        return {}
+    experiments = [*_step_responses(vehicle, sets, files), *_manoeuvre(vehicle, files)]
     words = {"tuned": "alpha and beta as identified", "untuned": "alpha = beta = 1: without tuning"}
     related = []
     if len(sets) > 1:
@@ -104,9 +98,7 @@ def _tunable(rov: Rov) -> list[str]:
 # ---- Steps from rest -------------------------------------------------------------------------------------------------
 
 
-def _step_responses(
-    vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str], on_left_out: Callable[[str], None]
-) -> Iterator[Experiment]:
+def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str]) -> Iterator[Experiment]:
     """A step of each axis to some commands."""
     tables = {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
     for form in vehicle.layout.axes:
@@ -123,11 +115,7 @@ def _step_responses(
                 experiment = f"{stem}_{name}" if len(sets) > 1 else stem
                 references = f"{experiment}_expected.csv"
                 marks = [units[name] * n for n in _MULTIPLES]
-                try:
-                    trajectory = _trajectory(rov, [(inputs, marks)])
-                except TooFastError:
-                    on_left_out(experiment)
-                    continue
+                trajectory = _trajectory(rov, [(inputs, marks)])
                 files[f"{stem}.csv"] = _csv([(t, _commanded(vehicle, inputs)) for t in (0.0, longest)])
                 files[references] = _csv(_moving(trajectory, rov.layout.velocities | rov.layout.pose))
                 yield Experiment(
@@ -157,15 +145,15 @@ def _unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
 def _horizon(rov: Rov, inputs: Values) -> float:
     """Some forty of the fastest time constants of the vehicle, and not many more radians of a turn (s)."""
     rates = [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
-    for form, motion in zip(rov.layout.axes, rov.axes(inputs, rov.commanded(inputs)), strict=True):
+    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
         A, B = motion.drag(motion.C)
         turning = sqrt(abs(motion.C)) if form.axis is YAW else 0.0
         rates.append(B + 2.0 * sqrt(A * abs(motion.C)) + turning)
         V = motion.steady_velocity()
         if form.axis is YAW and isfinite(V):
             rates.append(abs(V))
-        if (k := rov.coupling) and isfinite(V):
-            rates.append(_OF_COUPLING * (abs(k.c_u) + abs(k.c_v) + abs(k.c_r)) * abs(V))
+        if rov.layout.coupled and isfinite(V):
+            rates.append(_OF_COUPLING * sum(abs(rov.parameters[f"coupling_{v}"]) for v in "uvr") * abs(V))
     return 40.0 / max(rates) if any(rates) else _LONGEST
 
 
@@ -200,7 +188,7 @@ _PHASES: tuple[tuple[Mapping[Axis, float], float], ...] = (
 )
 
 
-def _manoeuvre(vehicle: Vehicle, files: dict[str, str], on_left_out: Callable[[str], None]) -> Iterator[Experiment]:
+def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[Experiment]:
     """All axes at once, with loads, a current and reversals, and what is left when all is off; all outputs."""
     rov, layout = vehicle.rov, vehicle.layout
     phases = []
@@ -216,11 +204,7 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str], on_left_out: Callable[[s
     ends = [length * n for n in range(len(phases) + 1)]
     stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
     held = [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
-    try:
-        trajectory = _trajectory(rov, held)
-    except TooFastError:
-        on_left_out("manoeuvre")
-        return
+    trajectory = _trajectory(rov, held)
     files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
     files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.state))
     yield Experiment(
@@ -238,11 +222,12 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str], on_left_out: Callable[[s
 
 
 def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
-    """The state from rest, at the times of each phase, in which the inputs are held. Raises TooFastError."""
+    """Return the states from rest at the times of each phase, during which the inputs are held."""
     found: list[_Row] = [(0.0, dict.fromkeys(rov.layout.state, 0.0))]
     for inputs, times in phases:
-        start, state = found[-1]
-        found += zip(times, states(rov, inputs, state, [t - start for t in times]), strict=True)
+        for t in times:
+            before, state = found[-1]
+            found.append((t, rov.step(inputs, state, t - before)))
     return found
 
 

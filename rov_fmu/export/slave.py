@@ -1,4 +1,4 @@
-"""The FMU in pure Python: rov_fmu/motion/rov.py behind PythonFMU's Fmi2Slave.
+"""The FMU in pure Python: rov_fmu/model/rov.py behind PythonFMU's Fmi2Slave.
 
 In the FMU this file is the slave module, beside variables.json (the declaration) and its copy of the model. PythonFMU
 knows no fmi2Discard: a value that is refused is logged so, the old one is kept, and the call returns fmi2OK.
@@ -12,7 +12,7 @@ from typing import Any
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.motion import layout, rov
+from rov_fmu.model import layout, rov
 
 
 def layout_of(given: Any) -> layout.Layout:

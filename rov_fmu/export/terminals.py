@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rov_fmu.files.templates import render
-from rov_fmu.motion.layout import Layout
+from rov_fmu.model.layout import Layout
 
 FOLDER = "terminalsAndIcons"
 ICON = f"{FOLDER}/icon.png"

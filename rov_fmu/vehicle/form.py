@@ -1,4 +1,4 @@
-"""The tables that are the same in every version of the vehicle file: [vehicle], [validity], [provenance]."""
+"""The tables of the vehicle file that describe it: [vehicle], [validity], [provenance]."""
 
 import os
 import re

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from math import hypot
 
 from rov_fmu.files.toml_file import line, listed
-from rov_fmu.motion.layout import YAW, Layout
+from rov_fmu.model.layout import YAW, Layout
 from rov_fmu.vehicle.schema import where
 
 _PARALLEL = 1e-6

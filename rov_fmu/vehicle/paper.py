@@ -1,6 +1,6 @@
 """What a vehicle of the paper has: surge, heave and yaw, a pair of rear thrusters and one on top."""
 
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Curve, Layout, Thruster, VehicleAxis
 
 PAPER = Layout(
     axes=(VehicleAxis(SURGE), VehicleAxis(HEAVE), VehicleAxis(YAW)),

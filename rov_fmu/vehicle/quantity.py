@@ -1,4 +1,4 @@
-"""What tables of every version are made of: words, names, and values with their unit and source."""
+"""The parts that the tables of a vehicle file consist of: texts, names, and values with their unit and source."""
 
 import re
 from typing import Annotated, Any, Literal
@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from rov_fmu.files.toml_file import Strict, pair, table_of
-from rov_fmu.motion.layout import Meta
+from rov_fmu.model.layout import Meta
 
 
 def _printable(text: str) -> str:

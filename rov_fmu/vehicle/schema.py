@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from rov_fmu.files.toml_file import DOCUMENTED, Strict, pair, table_of
-from rov_fmu.motion import layout
-from rov_fmu.motion.layout import ARM, AXES, AXIS, BODY, CURVE, TUNING, Axis, Kind, Layout, Meta, VehicleAxis
+from rov_fmu.model import layout
+from rov_fmu.model.layout import ARM, AXES, AXIS, BODY, CURVE, TUNING, Axis, Kind, Layout, Meta, VehicleAxis
 from rov_fmu.vehicle.form import FileHead, Made, Validity
 from rov_fmu.vehicle.quantity import Finite, Name, Quantity, Symbol, Text, not_blank, quantity
 

@@ -8,7 +8,7 @@ from pydantic_core import ErrorDetails
 
 from rov_fmu.files.messages import did_you_mean, shown
 from rov_fmu.files.toml_file import Strict, Toml, check, label, line, listed
-from rov_fmu.motion.layout import (
+from rov_fmu.model.layout import (
     ARM,
     AXIS,
     BODY,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.special import ndtri, stdtrit
 
-from rov_fmu.motion.layout import TUNING, Meta
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import TUNING, Meta
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.schema import Estimated
 
 Array = NDArray[np.float64]

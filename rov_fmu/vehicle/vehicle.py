@@ -1,27 +1,29 @@
 """Vehicle file (TOML) to `Vehicle`, checked: every number has its unit and source, and lies within its bounds."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from math import isfinite, sin
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from typing_extensions import Self
+
 from rov_fmu.files.kinds import VEHICLE_FILE, check_keys
-from rov_fmu.files.messages import FileError, lines_on
-from rov_fmu.files.toml_file import Toml, check, read_toml, told
-from rov_fmu.motion.layout import Layout
-from rov_fmu.motion.rov import Rov
-from rov_fmu.vehicle.first import FirstFile, quantities
+from rov_fmu.files.messages import FileError, InputError, did_you_mean, lines_on, shown
+from rov_fmu.files.toml_file import check, line, read_toml, told
+from rov_fmu.model.layout import Layout
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.form import PICTURES, TABLES, Head
-from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
-from rov_fmu.vehicle.quantity import Quantity
+from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
 from rov_fmu.vehicle.sense import as_far_as_readable, no_thrust, nonsense
 
 if TYPE_CHECKING:
     from rov_fmu.vehicle.uncertainty import Uncertainty
 
-_SECOND = {"format", "body", "arm", "curves", "thruster", "axes", "inputs"}
-"""Keys that tell the second version of the file."""
+BY_HAND = "set by hand"
+"""The source of a coefficient that a program has set."""
 
 
 class VehicleFileError(FileError):
@@ -52,7 +54,7 @@ class Alternative:
     sources: Mapping[str, str]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Vehicle:
     """An identified ROV."""
 
@@ -81,8 +83,56 @@ class Vehicle:
     estimates: Mapping[str, Estimated] = field(default_factory=dict)
     """How far those that tests tell hang together, by name."""
     provenance: Provenance | None = None
-    thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=lambda: PAPER_SOURCES)
+    thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """Where `direction` and `position` of each thruster come from, by its name."""
+
+    def __repr__(self) -> str:
+        """Name the vehicle, its axes, its inputs, and the coefficients that were set by hand."""
+        axes, inputs = ", ".join(self.layout.kinds), ", ".join(self.layout.commands)
+        return (
+            f"<{type(self).__name__} {self.identifier}: {self.name}; axes {axes}; inputs {inputs}{self._by_hand('; ')}>"
+        )
+
+    def with_(self, **coefficients: float) -> Self:
+        """Return this vehicle with other values of some coefficients, in SI units: `vehicle.with_(a_d_u=10)`.
+
+        Their source is then "set by hand", which the FMU and its page say, too; they have no confidence interval any
+        more. `vehicle.layout.coefficients` has the names, units and bounds.
+
+        Raises InputError where the vehicle has no such coefficient, or cannot have the value.
+        """
+        values = {name: _number(name, value) for name, value in coefficients.items()}
+        check_coefficients(self.layout, values)
+        rov = self.rov.replaced(values)
+        if reason := next(_senseless(rov), None):
+            raise InputError(reason)
+        return replace(
+            self,
+            rov=rov,
+            sources={**self.sources, **dict.fromkeys(values, BY_HAND)},
+            intervals={name: interval for name, interval in self.intervals.items() if name not in values},
+            estimates={
+                name: estimated.model_copy(
+                    update={
+                        "correlation": {other: r for other, r in estimated.correlation.items() if other not in values}
+                    }
+                )
+                for name, estimated in self.estimates.items()
+                if name not in values
+            },
+        )
+
+    @property
+    def summary(self) -> str:
+        """The description, with the coefficients that were set by hand."""
+        return f"{self.description}{self._by_hand(' (', ')')}"
+
+    def _by_hand(self, before: str, after: str = "") -> str:
+        """Name the coefficients that were set by hand, if there are any."""
+        metas = self.layout.coefficients
+        units = {name: "" if metas[name].unit == "1" else f" {metas[name].unit}" for name in metas}
+        told = [f"{name} = {self.rov[name]:.12g}{units[name]}" for name in metas if self.sources[name] == BY_HAND]
+        return f"{before}{BY_HAND}: {', '.join(told)}{after}" if told else ""
 
     @property
     def layout(self) -> Layout:
@@ -110,66 +160,69 @@ class Vehicle:
         return own if own and own.is_file() else None
 
 
+def check_coefficients(layout: Layout, values: Mapping[str, float]) -> None:
+    """Raise InputError about the first value that belongs to no coefficient of the vehicle, or is out of its bounds."""
+    for name, value in values.items():
+        if name not in layout.coefficients:
+            hint = did_you_mean(name, layout.coefficients)
+            raise InputError(f"{name}: there is no such coefficient of this vehicle{hint}")
+        try:
+            within(value, layout.coefficients[name])
+        except ValueError as error:
+            raise InputError(f"{name} = {shown(value)}: {error}") from error
+
+
+def _number(name: str, value: object) -> float:
+    """Return a finite number as a float. Raises InputError."""
+    if not isinstance(value, Real) or isinstance(value, bool) or not isfinite(value):
+        raise InputError(f"{name} = {shown(value)}: must be a finite number")
+    return float(value)
+
+
+def _senseless(rov: Rov) -> Iterator[str]:
+    """Say which coefficients together make no vehicle, although each is within its bounds."""
+    for curve in rov.layout.curves:
+        yield from no_thrust(curve, rov.coefficients, f"curve {curve.name}")
+    if rov.layout.has_arm and rov["R"] * sin(rov["gamma"]) == 0.0:
+        yield "R, gamma: must both be more than 0, because R sin γ is the arm of the thrusters"
+
+
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
     path = Path(path)
     data = read_toml(path, VehicleFileError)
     check_keys(path, data, VEHICLE_FILE, VehicleFileError)
+    if "format" not in data:
+        raise VehicleFileError(f"{path}: format: this key is missing: write format = {FORMAT}")
+    if data["format"] != FORMAT:  # all else in the file may then have another meaning
+        reason = f"must be {FORMAT}, the only version of the vehicle file"
+        raise VehicleFileError(f"{path}: {line('format', reason, data['format'])}")
     context = {"folder": path.parent, "coming": coming}
-    if "format" in data or "coefficients" not in data:
-        if not data.keys() & _SECOND:
-            raise VehicleFileError(f"{path}: format: this key is missing: write format = {FORMAT}")
-        return _second(path, data, context)
-    first, problems = check(data, FirstFile, **context)
-    if first is None:
-        raise VehicleFileError(*lines_on(path, told(problems, data, FirstFile)))
-    found = quantities(first.coefficients)
-    values = {name: q.value for name, q in found.items()}
-    if weak := [line for curve in PAPER.curves for line in no_thrust(curve, values, "coefficients")]:
-        raise VehicleFileError(*(f"{path}: {line}" for line in weak))
-    alternatives = {name: _alternative(a.description, quantities(a)) for name, a in first.alternatives.items()}
-    return _vehicle(path, first, PAPER, found, alternatives)
-
-
-def _second(path: Path, data: Toml, context: Mapping[str, object]) -> Vehicle:
-    """The second version of the file."""
     file, problems = check(data, File, **context)
     mistakes = [*told(problems, data, File), *nonsense(*as_far_as_readable(data, problems, context, Parts), data)]
     if file is None or mistakes:
         raise VehicleFileError(*lines_on(path, mistakes))
-    alternatives = {name: _alternative(a.description, a.quantities) for name, a in file.alternatives.items()}
-    found = file.quantities(file.layout)
-    return _vehicle(path, file, file.layout, found, alternatives, file.thruster_sources, file.estimates)
-
-
-def _alternative(description: str, found: Mapping[str, Quantity]) -> Alternative:
-    values = {name: q.value for name, q in found.items()}
-    return Alternative(description, values, {name: q.source for name, q in found.items()})
-
-
-def _vehicle(
-    path: Path,
-    file: FirstFile | File,
-    layout: Layout,
-    found: Mapping[str, Quantity | None],
-    alternatives: Mapping[str, Alternative],
-    thruster_sources: Mapping[str, Mapping[str, str]] = PAPER_SOURCES,
-    estimates: Mapping[str, Estimated] | None = None,
-) -> Vehicle:
-    head, made = file.vehicle, file.provenance
-    folders = head.folders_from(path.parent)
+    head, made, layout = file.vehicle, file.provenance, file.layout
+    folders, found = head.folders_from(path.parent), file.quantities(layout)
     words = {key: getattr(made, key) for key in ("tool", "method", "inputs", "warnings")} if made else {}
     return Vehicle(
         **{key: getattr(head, key) for key in Head.model_fields},
         rov=Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()}),
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,
-        alternatives=alternatives,
+        alternatives={
+            name: Alternative(
+                alternative.description,
+                {coefficient: q.value for coefficient, q in alternative.quantities.items()},
+                {coefficient: q.source for coefficient, q in alternative.quantities.items()},
+            )
+            for name, alternative in file.alternatives.items()
+        },
         data=folders["data"],
         pictures=folders["pictures"],
         limits=file.validity.limits,
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
-        estimates=estimates or {},
+        estimates=file.estimates,
         provenance=Provenance(**words, report=made.report_in(path.parent)) if made else None,
-        thruster_sources=thruster_sources,
+        thruster_sources=file.thruster_sources,
     )

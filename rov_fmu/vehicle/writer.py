@@ -14,7 +14,7 @@ from rov_fmu.files.output import Output, write_whole
 from rov_fmu.files.reading import read_text
 from rov_fmu.files.seal import sealed
 from rov_fmu.files.toml_file import line
-from rov_fmu.motion.layout import Curve, Meta, Thruster
+from rov_fmu.model.layout import Curve, Meta, Thruster
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -37,7 +37,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     document["vehicle"] = {key: getattr(vehicle, key) for key in Head.model_fields} | folders
     document["validity"] = {"command_min": low, "command_max": high, **_lines("limits", vehicle.limits)}
     entries = {name: _quantity(vehicle, name) for name, source in vehicle.sources.items() if source != NOT_GIVEN}
-    for key, table in hardware(vehicle, entries).items():
+    for key, table in _hardware(vehicle, entries).items():
         document[key] = table
     if vehicle.alternatives:
         document["alternatives"] = {
@@ -55,7 +55,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     return sealed(text, "# {}") if vehicle.provenance else text
 
 
-def hardware(vehicle: Vehicle, entries: Mapping[str, Item]) -> dict[str, Any]:
+def _hardware(vehicle: Vehicle, entries: Mapping[str, Item]) -> dict[str, Any]:
     """The tables that say what the vehicle has, with the entries of its coefficients."""
     layout = vehicle.layout
     tables: dict[str, Any] = {"body": {"coupling": True} if layout.coupled else {}}
@@ -82,7 +82,7 @@ def vehicle_output(vehicle: Vehicle, path: Path) -> Output:
         text = vehicle_text(vehicle, path.parent)
     except ValueError as error:
         raise VehicleFileError(f"{path}: {error}") from error
-    return checked(path, text, coming=report)
+    return _checked(path, text, coming=report)
 
 
 def check_report(path: Path, report: Path) -> None:
@@ -103,12 +103,12 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
 
     `reason` is the source of those that change. Raises as write_vehicle.
     """
-    document, vehicle = read_document(source), load_vehicle(source)
+    document, vehicle = _read_document(source), load_vehicle(source)
     places = dict(where(vehicle.layout))
     for name, exact in values.items():
         if (value := _rounded(exact)) == _rounded(vehicle.rov[name]):
             continue
-        *above, key = places[name] if "format" in document else ("coefficients", name)
+        *above, key = places[name]
         table = document
         for step in above:
             table = table[step]
@@ -118,7 +118,7 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
         else:
             table[key] = _inline(value, vehicle.layout.coefficients[name], reason)
         _forget(document, name)
-    write_whole(moved(document, source, path))
+    write_whole(_moved(document, source, path))
 
 
 def _forget(document: Any, name: str) -> None:
@@ -133,7 +133,7 @@ def _forget(document: Any, name: str) -> None:
         del document["estimates"]
 
 
-def read_document(source: Path) -> Any:
+def _read_document(source: Path) -> Any:
     """The vehicle file with its comments, to write it otherwise. Raises VehicleFileError."""
     try:
         document: Any = tomlkit.parse(read_text(source, VehicleFileError))
@@ -144,7 +144,7 @@ def read_document(source: Path) -> Any:
     return document
 
 
-def moved(document: Any, source: Path, path: Path) -> Output:
+def _moved(document: Any, source: Path, path: Path) -> Output:
     """The document to write, with what is beside it named from its new place. Raises VehicleFileError."""
     for table, key in (("vehicle", "data"), ("vehicle", "pictures"), ("provenance", "report")):
         if key in document.get(table, {}):
@@ -154,10 +154,10 @@ def moved(document: Any, source: Path, path: Path) -> Output:
             except ValueError as error:
                 reason = f"must be inside the folder of the new file: write that beside {source}, or leave this key out"
                 raise VehicleFileError(f"{path}: {line(f'{table}.{key}', reason, str(name))}") from error
-    return checked(path, tomlkit.dumps(document))
+    return _checked(path, tomlkit.dumps(document))
 
 
-def checked(path: Path, text: str, coming: Path | None = None) -> Output:
+def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
     """The text of a vehicle file, to write once it has proved to be one. Raises VehicleFileError."""
 
     def check(draft: Path) -> None:

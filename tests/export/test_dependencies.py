@@ -1,4 +1,4 @@
-"""What modelDescription.xml declares of dependencies, against slopes of the model: of vehicles of every kind."""
+"""The dependencies in modelDescription.xml of vehicles of every kind, against slopes of the equations in `checks`."""
 
 import random
 from collections.abc import Mapping, Sequence
@@ -6,20 +6,15 @@ from collections.abc import Mapping, Sequence
 import pytest
 from lxml import etree
 
+from checks.equations import calculated
 from rov_fmu.export.interface import Variable, variables
 from rov_fmu.export.model_description import NATIVE, model_description
-from rov_fmu.motion.layout import Layout
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Layout
+from rov_fmu.model.rov import Rov
 from tests.vehicles import VEHICLES, a_vehicle, numbered
 
 Point = dict[str, float]
 Slopes = dict[tuple[str, str], float]
-
-
-def computed(rov: Rov, point: Point) -> Point:
-    """Every variable that has dependencies."""
-    rates, thrust = rov.derivatives(point, point), rov.thrust(point, point)
-    return {name: point[name] for name in rov.layout.state} | {f"der({n})": x for n, x in rates.items()} | thrust
 
 
 def slopes(rov: Rov, point: Point, knowns: Sequence[str]) -> Slopes:
@@ -29,8 +24,7 @@ def slopes(rov: Rov, point: Point, knowns: Sequence[str]) -> Slopes:
         step = 1e-6 * max(1.0, abs(point[known]))
         ends = []
         for x in (point[known] + step, point[known] - step):
-            moved = point | {known: x}
-            ends.append(computed(Rov(rov.layout, {k: moved[k] for k in rov.coefficients}), moved))
+            ends.append({name: float(y) for name, y in calculated(rov, point | {known: x}).items()})
         for name, above in ends[0].items():
             slope = (above - ends[1][name]) / (2.0 * step)
             found[name, known] = 0.0 if abs(slope) < 1e-7 else slope

@@ -18,8 +18,8 @@ from pathlib import Path
 import lief
 import pytest
 
+from rov_fmu.engine.compile import compiler, fmi_headers
 from rov_fmu.export.archive import native_content
-from rov_fmu.export.compile import compiler, fmi_headers
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests import fmi2, fmi3
 from tests.fmi import OK, Fmu, reals

@@ -8,7 +8,7 @@ from lxml import etree
 from rov_fmu.cli import main
 from rov_fmu.export.interface import UNITS, variables
 from rov_fmu.export.osp import osp_model_description, osp_path
-from rov_fmu.motion.layout import Layout
+from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
 from tests.vehicles import VEHICLES

@@ -16,6 +16,7 @@ from checks.c_programs import Ended, compile_c, run_program
 from checks.fmpy_slave import fmpy_slave, keep_loaded
 from rov_fmu.cli import main
 from rov_fmu.export.interface import Variable, variables
+from rov_fmu.export.python_flavour import python_sources
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.conftest import Made
 from tests.fmi import WARNING, Message
@@ -63,8 +64,18 @@ def test_its_modules_bear_the_name_of_the_vehicle(python_fmu: Path) -> None:
         "resources/slavemodule.txt",
         "resources/variables.json",
         "resources/videoray_slave.py",
-        *(f"resources/videoray_model/{name}.py" for name in ("__init__", "layout", "riccati", "rov", "series")),
+        *(
+            f"resources/videoray_model/{name}.py"
+            for name in ("__init__", "dependencies", "equation", "formula", "layout", "riccati", "rov", "step")
+        ),
     }
+
+
+def test_its_modules_import_nothing_of_the_package(vehicle: Vehicle) -> None:
+    for name, text in python_sources(vehicle, variables(vehicle.rov)).items():
+        lines = [line.split() for line in text.splitlines()]
+        imported = [words[1] for words in lines if words[:1] in (["from"], ["import"]) and len(words) > 1]
+        assert not [module for module in imported if module.startswith("rov_fmu")], name
 
 
 def _by_kind(declared: tuple[Variable, ...], **wanted: str) -> list[Variable]:

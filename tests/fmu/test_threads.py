@@ -57,9 +57,9 @@ def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
     [
         (
             "thread",
-            "rov_step.c",
-            "    rov_held held;\n    flow f;\n    flow_begin",
-            "static rov_held held; flow f; flow_begin",
+            "step.c",
+            "    motion m;\n",
+            "    static motion m;\n",
             "data race",
         ),
         pytest.param(

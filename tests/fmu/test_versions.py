@@ -42,7 +42,7 @@ def run(rov: AnyInstance, steps: int) -> list[bytes]:
         assert rov.step(t, h) == OK
         t += h
         read = rov.get([name for name in rov.fmu.variables if name != "time"])
-        read += [rate for order in (1, 7, 19) for rate in rov.rates(rov.fmu.outputs, order)]
+        read += rov.rates(rov.fmu.outputs)
         seen.append(bytes(reals(*read, rov.time())))
     return seen
 

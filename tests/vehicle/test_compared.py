@@ -68,7 +68,7 @@ def test_what_is_left_out_is_left_out() -> None:
     rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
     bare = without(rov, coupling=True, lag=True, shape=True)
     assert sum(seconds for seconds, _ in MANOEUVRE) == 30.0
-    assert (rov.coupling is None, bool(rov.layout.lagging), rov["c_0_t200"]) == (False, True, 0.0872)
-    assert (bare.coupling is None, bool(bare.layout.lagging), "c_0_t200" in bare.coefficients) == (True, False, False)
+    assert (not rov.layout.coupled, bool(rov.layout.lagging), rov["c_0_t200"]) == (False, True, 0.0872)
+    assert (not bare.layout.coupled, bool(bare.layout.lagging), "c_0_t200" in bare.coefficients) == (True, False, False)
     assert bare.curve_force(bare.layout.curves[0], -0.5) == -bare.curve_force(bare.layout.curves[0], 0.5)
     assert fly(without(rov)) == fly(rov)

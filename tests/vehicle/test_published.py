@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import STEP_TESTS, Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import tomlkit
 
-from rov_fmu.motion.layout import AXIS, CURVE, HEAVE, SURGE, SWAY, YAW
+from rov_fmu.model.layout import AXIS, CURVE, HEAVE, SURGE, SWAY, YAW
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 EVERYTHING = Path(__file__).with_name("everything.toml")

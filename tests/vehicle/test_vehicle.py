@@ -71,6 +71,8 @@ def value(name: str, text: str) -> Callable[[str], str]:
     return edit(rf"(?<=^{name} = {{ value = )[^,]*", text)
 
 
+_COEFFICIENTS_OF_VERSION_1 = '[coefficients]\nm_rov = { value = 6.57, unit = "kg", source = "Table 9" }\n'
+
 # What is done to the file, and all that the one line must name: key, value, what is allowed.
 BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "unknown coefficient": (
@@ -167,8 +169,12 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "a key twice": (edit(r"(?=^R = )", "R = 1.0\n"), ("not TOML", "line ", ": R = {")),
     "another format": (edit("^format = 2$", "format = 3"), ("format = 3", "must be 2")),
     "no format": (edit("^format = 2$", ""), ("format: this key is missing: write format = 2",)),
-    "half a file of the first version": (
-        lambda text: text.split("[body]")[0].replace("format = 2", ""),
+    "version 1 of the file": (
+        lambda text: "format = 1\n" + text.split("[body]")[0].replace("format = 2", "") + _COEFFICIENTS_OF_VERSION_1,
+        ("format = 1: must be 2, the only version of the vehicle file",),
+    ),
+    "version 1 of the file, without a format": (
+        lambda text: text.split("[body]")[0].replace("format = 2", "") + _COEFFICIENTS_OF_VERSION_1,
         ("format: this key is missing: write format = 2",),
     ),
     "nothing": (lambda _: "", ("format: this key is missing: write format = 2",)),

@@ -1,0 +1,328 @@
+/* The step: from piece to piece, each a Taylor series (series.c) up to the first reversal of a velocity. */
+
+enum { MOST_PIECES = 10000 }; /* of a step */
+
+typedef struct {
+    const model_numbers *n;
+    model_held q;
+    double y[N_SERIES];       /* the states at the start of a piece */
+    double lost[N_SERIES];    /* what rounding has taken from each of them */
+    double gone[N_SERIES];    /* what the states that no term contains have changed by */
+    double scale[N_SERIES];   /* of each group of states: its size, or what is left of a larger size in earlier pieces */
+    double largest[N_SERIES]; /* the largest size so far */
+    double covered[N_USED];   /* an integral over time of each state's size, to within a factor of two */
+    unsigned settled;         /* components that have settled, a bit each */
+    int reverse[N_MONITORED]; /* whether the coefficients are those of a negative velocity */
+} motion;
+
+static inline double group_size(const double x[N_SERIES], int group)
+{
+    double size = 0.0;
+    for (int i = 0; i < N_SERIES; i++) {
+        size += GROUP[i] == group ? fabs(x[i]) : 0.0;
+    }
+    return size;
+}
+
+/* Whether a velocity that is 0, and whose acceleration is 0, may begin to move: through a term that is not 0 once all states
+ * in it move. */
+static bool motion_may_begin(const motion *m, const series *s)
+{
+    double moves[N_SERIES], size[N_SERIES];
+    bool found = false, again = true;
+    for (int i = 0; i < N_SERIES; i++) {
+        moves[i] = s->c[0][i] != 0.0 || s->c[1][i] != 0.0 ? 1.0 : 0.0;
+    }
+    while (again) {
+        again = false;
+        model_sizes(m->n, &m->q, moves, size);
+        for (int i = 0; i < N_SERIES; i++) {
+            if (moves[i] == 0.0 && size[i] != 0.0) {
+                moves[i] = 1.0;
+                again = true;
+                found |= i < N_MONITORED;
+            }
+        }
+    }
+    return found;
+}
+
+/* Grow the series one coefficient at a time, and give each velocity that begins to move its direction. */
+static void motion_grow_slowly(motion *m, series *s)
+{
+    for (int n = 1; n < ORDER; n++) {
+        bool turned = false;
+        s->order = n - 1;
+        for (int i = 0; i < N_MONITORED; i++) {
+            const int reverse = s->c[series_first(s, i)][i] < 0.0; /* coefficient n where all before it are 0 */
+            turned |= reverse != m->reverse[i];
+            m->reverse[i] = reverse;
+        }
+        if (turned) {
+            model_direct(m->n, m->reverse, &m->q);
+        }
+        series_terms(m->n, &m->q, s, n);
+    }
+    s->order = ORDER;
+}
+
+/* Begin a series at the states of now: its first two coefficients, the directions, and which components move. */
+INLINE void motion_begin(motion *m, double tau, series *s)
+{
+    double rate[N_SERIES];
+    bool turned = false;
+    s->tau = tau;
+    s->moving = s->blocks = 0;
+    for (int i = 0; i < N_MONITORED; i++) {
+        m->reverse[i] = m->y[i] < 0.0;
+    }
+    model_direct(m->n, m->reverse, &m->q);
+    model_rates(m->n, &m->q, m->y, rate);
+    for (int i = 0; i < N_SERIES; i++) {
+        const unsigned bit = 1U << COMPONENT_OF[i];
+        s->c[0][i] = m->y[i];
+        s->c[1][i] = m->settled & bit ? 0.0 : tau * rate[i];
+        s->moving |= s->c[1][i] != 0.0 ? bit : 0U;
+    }
+    for (int k = 0; k < N_COMPONENTS; k++) {
+        s->moving |= COMPONENT_INPUTS[k] & s->moving ? 1U << k : 0U;
+    }
+    if (N_DYNAMIC < N_COMPONENTS) { /* what has no effect does not have to move */
+        unsigned still = 0U; /* states that stay 0 */
+        for (int i = 0; i < N_MONITORED; i++) {
+            still |= m->y[i] == 0.0 && !(s->moving >> COMPONENT_OF[i] & 1U) ? 1U << i : 0U;
+        }
+        for (int k = N_DYNAMIC; k < N_COMPONENTS; k++) {
+            s->moving &= NEEDED_WITH[k] & ~still ? ~0U : ~(1U << k);
+        }
+    }
+    for (int i = 0; i < N_SERIES; i++) {
+        const bool moves = s->moving >> COMPONENT_OF[i] & 1U;
+        s->c[1][i] = moves ? s->c[1][i] : 0.0;
+        s->pace[i] = moves ? tau : 0.0;
+        s->blocks |= moves ? 1U << BLOCK_OF[i] : 0U;
+        s->size[i] = m->scale[GROUP[i]] + group_size(s->c[1], GROUP[i]);
+    }
+    for (int i = 0; i < N_MONITORED; i++) {
+        const bool back = m->y[i] == 0.0 && s->c[1][i] < 0.0;
+        m->reverse[i] |= back;
+        turned |= back;
+    }
+    if (turned) {
+        model_direct(m->n, m->reverse, &m->q);
+    }
+}
+
+/* Grow the series until it reaches t = 1, but not beyond a low order. Returns whether it does. */
+INLINE bool motion_grow_short(motion *m, series *s)
+{
+    bool waits = false;
+    for (int i = 0; i < N_MONITORED; i++) {
+        waits |= s->c[0][i] == 0.0 && s->c[1][i] == 0.0 && s->moving >> COMPONENT_OF[i] & 1U;
+    }
+    if (waits && motion_may_begin(m, s)) {
+        motion_grow_slowly(m, s);
+        return series_converges(s);
+    }
+    series_terms(m->n, &m->q, s, 1); /* constant orders, so that their loops are unrolled */
+    series_terms(m->n, &m->q, s, 2);
+    series_terms(m->n, &m->q, s, 3);
+    series_terms(m->n, &m->q, s, 4);
+    s->order = 5;
+    if (series_converges(s)) {
+        return true;
+    }
+    series_terms(m->n, &m->q, s, 5);
+    series_terms(m->n, &m->q, s, 6);
+    s->order = 7;
+    if (series_converges(s)) {
+        return true;
+    }
+    series_terms(m->n, &m->q, s, 7);
+    series_terms(m->n, &m->q, s, 8);
+    s->order = 9;
+    return series_converges(s);
+}
+
+/* Grow the series to t = 1, or to ORDER. Returns how far it may be used; 0 where it overflows. */
+static double motion_grow_long(const motion *m, series *s)
+{
+    while (s->order < ORDER) {
+        series_terms(m->n, &m->q, s, s->order);
+        series_terms(m->n, &m->q, s, s->order + 1);
+        s->order += 2;
+        if (series_converges(s)) {
+            return 1.0;
+        }
+    }
+    return series_reach(s, m->scale);
+}
+
+/* Add to a state, and what rounding took from it before. */
+static inline void motion_add(double *to, double change, double *lost)
+{
+    const double whole = change + *lost, sum = *to + whole;
+    *lost = whole - (sum - *to);
+    *to = sum;
+}
+
+/* Move to the end of a piece, t = length. */
+INLINE void motion_move(motion *m, const series *s, double length, double change[N_SERIES])
+{
+    memset(change, 0, sizeof(double[N_SERIES]));
+    for (int n = s->order; n > 0; n--) {
+        for (int i = 0; i < N_SERIES; i++) {
+            change[i] = (change[i] + s->c[n][i]) * length;
+        }
+    }
+    for (int i = 0; i < N_USED; i++) {
+        m->covered[i] += fabs(m->y[i]) * length * s->tau;
+        motion_add(&m->y[i], change[i], &m->lost[i]);
+    }
+    for (int i = N_USED; i < N_SERIES; i++) {
+        motion_add(&m->gone[i], change[i], &m->lost[i]);
+    }
+}
+
+/* Whether all states of a component have faded to nothing, and nothing drives them: then they come to rest. In the rest of the
+ * step they would change neither themselves nor their integrals. */
+static bool motion_fades(motion *m, int component, double rest)
+{
+    double y[N_SERIES], lost[N_SERIES], rate[N_SERIES];
+    for (int i = 0; i < N_SERIES; i++) {
+        const bool own = COMPONENT_OF[i] == component;
+        if (own && fmax(fabs(m->y[i]) / m->largest[GROUP[i]], fabs(m->y[i]) * rest / m->covered[i]) > 0.0625 * DBL_EPSILON) {
+            return false;
+        }
+        y[i] = own ? 0.0 : m->y[i];
+        lost[i] = own ? 0.0 : m->lost[i];
+    }
+    model_rates(m->n, &m->q, y, rate);
+    for (int i = 0; i < N_SERIES; i++) {
+        if (COMPONENT_OF[i] == component && rate[i] != 0.0) {
+            return false;
+        }
+    }
+    memcpy(m->y, y, sizeof y);
+    memcpy(m->lost, lost, sizeof lost);
+    return true;
+}
+
+/* Find the components that have settled: those that they depend on have, and each rate is a rounding error of its terms. */
+static void motion_settle(motion *m, double rest)
+{
+    double rate[N_SERIES], size[N_SERIES];
+    m->settled = 0;
+    for (int i = 0; i < N_MONITORED; i++) { /* the direction of a velocity that is 0 does not matter, and stays */
+        m->reverse[i] = m->y[i] != 0.0 ? m->y[i] < 0.0 : m->reverse[i];
+    }
+    model_direct(m->n, m->reverse, &m->q);
+    model_rates(m->n, &m->q, m->y, rate);
+    model_sizes(m->n, &m->q, m->y, size);
+    for (int k = 0; k < N_DYNAMIC; k++) {
+        if ((COMPONENT_INPUTS[k] & ~m->settled) != 0) {
+            continue;
+        }
+        bool still = true;
+        for (int i = 0; i < N_SERIES; i++) {
+            still &= COMPONENT_OF[i] != k || fabs(rate[i]) <= 8.0 * DBL_EPSILON * size[i] + DBL_MIN;
+        }
+        m->settled |= still || motion_fades(m, k, rest) ? 1U << k : 0U;
+    }
+}
+
+/* Whether a dynamic component moved so little in a piece that it may have settled. */
+static bool motion_is_slow(const motion *m, const series *s, const double change[N_SERIES])
+{
+    bool moves[N_COMPONENTS] = {false}, all = true;
+    for (int i = 0; i < N_SERIES; i++) {
+        moves[COMPONENT_OF[i]] |= fabs(change[i]) > 0.001 * m->largest[GROUP[i]];
+    }
+    for (int k = 0; k < N_DYNAMIC; k++) {
+        all &= moves[k] || !(s->moving >> k & 1U);
+    }
+    return !all;
+}
+
+/* The states after h > 0 seconds with the inputs held; not finite only where a result overflows. Returns the number of
+ * pieces, or 0 where they would be more than MOST_PIECES. */
+static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES])
+{
+    const double *const state = at + FIRST_STATE;
+    double done = 0.0, tau = h, change[N_SERIES];
+    int pieces = 0;
+    motion m;
+    series s;
+    memset(&m, 0, sizeof m);
+    m.n = n;
+    model_start(at, n, &m.q, m.y, m.scale);
+    while (++pieces <= MOST_PIECES && tau > 0.0) {
+        const double rest = h - done;
+        for (int i = 0; i < N_USED; i++) {
+            if (GROUP[i] == i) {
+                const double size = group_size(m.y, i);
+                m.scale[i] = fmax(m.scale[i], size);
+                m.largest[i] = fmax(m.largest[i], size);
+            }
+        }
+        motion_begin(&m, fmin(rest, tau), &s);
+        double reach = 1.0;
+        if (!motion_grow_short(&m, &s)) {
+            if (pieces == 1) { /* the step is long, and some of the states may have settled before it */
+                motion_settle(&m, h);
+                if (m.settled == (1U << N_DYNAMIC) - 1U) {
+                    model_coast(n, &m.q, h, m.y, m.gone);
+                    break;
+                }
+                if (m.settled != 0U) {
+                    motion_begin(&m, s.tau, &s);
+                    motion_grow_short(&m, &s);
+                }
+            }
+            reach = motion_grow_long(&m, &s);
+        }
+        if (reach == 0.0) {
+            tau = 1e-3 * s.tau;
+            continue;
+        }
+        double length = reach;
+        int reversed = NONE;
+        if (reach < 1.0 || !series_keeps_directions(&s)) {
+            reversed = series_cut(&s, &length);
+        }
+        if (length == 1.0) { /* a constant, which leaves out the multiplications */
+            motion_move(&m, &s, 1.0, change);
+        } else {
+            motion_move(&m, &s, length, change);
+        }
+        if (reversed != NONE) { /* at rest to the last digit, so that the next piece has the other direction */
+            m.y[reversed] = m.lost[reversed] = 0.0;
+        }
+        for (int i = 0; i < N_USED; i++) {
+            m.scale[i] *= 0.25;
+        }
+        if (HAS_LAG) {
+            model_arrive(at, n, &m.q, m.y, m.scale);
+        }
+        done += length * s.tau;
+        if (length * s.tau >= rest) {
+            break;
+        }
+        tau = 2.0 * s.tau * reach;
+        if (motion_is_slow(&m, &s, change)) {
+            motion_settle(&m, h - done);
+        }
+        if (m.settled == (1U << N_DYNAMIC) - 1U) {
+            model_coast(n, &m.q, h - done, m.y, m.gone);
+            break;
+        }
+    }
+    if (!(tau > 0.0)) { /* it overflows however short the piece is */
+        for (int i = 0; i < N_STATES; i++) {
+            next[i] = INFINITY;
+        }
+        return pieces;
+    }
+    model_finish(state, &m.q, m.y, m.gone, next);
+    return pieces <= MOST_PIECES ? pieces : 0;
+}

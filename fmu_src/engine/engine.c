@@ -1,0 +1,80 @@
+/* Simulates vehicles for Python (rov_fmu/engine/): many of one layout at once, each over the same table of times. */
+#include <stddef.h>
+
+#include "model.h"
+
+#include "series.c"
+
+#include "step.c"
+
+#if defined _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+/* A table of numbers by vehicle and by time, with its strides; a stride is 0 where the numbers do not depend on it. */
+typedef struct {
+    const double *at;
+    ptrdiff_t per_vehicle, per_time;
+} table;
+
+EXPORT void simulate(const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,
+                     ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,
+                     const volatile int *stop);
+
+static inline double number(const table *t, ptrdiff_t vehicle, ptrdiff_t time)
+{
+    return t->at[vehicle * t->per_vehicle + time * t->per_time];
+}
+
+/* Simulate the vehicles from `first` to `last` - 1, until *stop is not 0.
+ *
+ * `given` holds the inputs, held from each time to the next, the states at the first time, and the coefficients, each at the
+ * place of its variable. `recorded` has the places of the variables to record at every time, in result[record][vehicle][time].
+ * failed[vehicle] becomes the number of the first time that cannot be computed, or `times`; records stay as they are from there. */
+void simulate(const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,
+              ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,
+              const volatile int *stop)
+{
+    bool calculates = false;
+    for (ptrdiff_t k = 0; k < records; k++) {
+        calculates |= recorded[k] >= FIRST_CALCULATED && recorded[k] < FIRST_COEFFICIENT;
+    }
+    for (ptrdiff_t vehicle = first; vehicle < last; vehicle++) {
+        double at[N_VARIABLES] = {0.0}, next[N_STATES];
+        model_numbers numbers;
+        for (int i = 0; i < FIRST_CALCULATED; i++) {
+            at[i] = number(&given[i], vehicle, 0);
+        }
+        for (int i = FIRST_COEFFICIENT; i < N_VARIABLES; i++) {
+            at[i] = number(&given[i], vehicle, 0);
+        }
+        model_prepare(at, &numbers);
+        failed[vehicle] = times;
+        for (ptrdiff_t n = 0; n < times && *stop == 0; n++) {
+            for (int i = 0; i < N_INPUTS; i++) {
+                at[i] = number(&given[i], vehicle, n);
+            }
+            if (calculates) {
+                model_calculate(at, &numbers);
+            }
+            double *to = result + vehicle * times + n;
+            for (ptrdiff_t k = 0; k < records; k++) {
+                to[k * vehicles * times] = at[recorded[k]];
+            }
+            if (n + 1 == times) {
+                break;
+            }
+            bool finite = model_step(at, &numbers, time[n + 1] - time[n], next) > 0;
+            for (int i = 0; i < N_STATES; i++) {
+                finite &= isfinite(next[i]) != 0;
+            }
+            if (!finite) {
+                failed[vehicle] = n + 1;
+                break;
+            }
+            memcpy(at + FIRST_STATE, next, sizeof next);
+        }
+    }
+}

@@ -1,0 +1,85 @@
+"""The compiled engine of a vehicle: loaded from the user's cache folder, and compiled where it is not there yet."""
+
+import ctypes
+import hashlib
+import json
+import platform
+import sys
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from threading import Lock
+
+from platformdirs import user_cache_path
+
+from rov_fmu.engine.compile import ENGINE_FILE, BuildError, compile_engine, engine_flags
+from rov_fmu.engine.source import sources
+from rov_fmu.files.interrupts import temporary_folder
+from rov_fmu.files.output import Output, write_whole
+from rov_fmu.model.rov import Rov
+
+_LOADED: dict[str, ctypes.CDLL] = {}
+"""The libraries that this process has loaded, by the layout of the vehicle."""
+_LOADING = Lock()
+
+
+def load_library(rov: Rov) -> ctypes.CDLL:
+    """Return the library of a vehicle. It depends on what the vehicle has, and not on its numbers.
+
+    Raises BuildError where it cannot be compiled or loaded.
+    """
+    layout = repr(rov.layout)
+    with _LOADING:
+        if layout not in _LOADED:
+            texts = {**sources(rov), ENGINE_FILE.name: ENGINE_FILE.read_text(encoding="utf-8")}
+            try:
+                _LOADED[layout] = _load(texts)
+            except OSError as error:
+                raise BuildError(f"the engine cannot be loaded: {error}") from error
+        return _LOADED[layout]
+
+
+def _load(texts: dict[str, str]) -> ctypes.CDLL:
+    """Load the library of these sources from the cache folder, or from a temporary one where that fails."""
+    key = _key(texts)
+    content = None
+    with suppress(OSError):
+        folder = user_cache_path("rov-fmu", appauthor=False) / "engine"
+        folder.mkdir(parents=True, exist_ok=True)
+        if found := _find(folder, key):
+            return ctypes.CDLL(str(found))
+        content = compile_engine(texts)
+        return ctypes.CDLL(str(_write(folder, key, content)))
+    with temporary_folder("rov-fmu-") as temporary:
+        return ctypes.CDLL(str(_write(Path(temporary), key, content or compile_engine(texts))))
+
+
+def _key(texts: dict[str, str]) -> str:
+    """Return a digest of all that the library depends on."""
+    try:
+        compiler = version("ziglang")
+    except PackageNotFoundError:
+        compiler = ""  # then only a compiler that is not installed as a package can be there
+    machine = sys.platform, platform.machine(), ctypes.sizeof(ctypes.c_void_p)
+    made_of = json.dumps([texts, engine_flags(), compiler, machine], sort_keys=True)
+    return hashlib.sha256(made_of.encode()).hexdigest()[:32]
+
+
+def _find(folder: Path, key: str) -> Path | None:
+    """Return the library in a folder whose content is still what its name says."""
+    for path in folder.glob(f"{key}-*"):
+        if path.name == _name(key, path.read_bytes()):
+            return path
+    return None
+
+
+def _write(folder: Path, key: str, content: bytes) -> Path:
+    """Write a library, whole or not at all; another process may write the same one at the same time."""
+    path = folder / _name(key, content)
+    write_whole(Output(path, content))
+    return path
+
+
+def _name(key: str, content: bytes) -> str:
+    """Return the name of a library, which tells whether its content is damaged."""
+    return f"{key}-{hashlib.sha256(content).hexdigest()[:32]}"

@@ -1,0 +1,283 @@
+"""The equation of motion of a vehicle in C: model.h and equation.h, generated from its table of terms."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from rov_fmu.engine.compile import C_SOURCES
+from rov_fmu.files.templates import render
+from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
+from rov_fmu.model.formula import names, tangent, to_c
+from rov_fmu.model.layout import Layout
+from rov_fmu.model.rov import Rov
+
+
+class EquationSource:
+    """The parts of equation.h in C. `variables` are the names of the variables in the array `at`."""
+
+    def __init__(self, layout: Layout, variables: Iterable[str]) -> None:
+        self.layout = layout
+        self.equation: Equation = equation_of(layout)
+        self.variables = frozenset(variables)
+
+    # ---- Names ----
+
+    def _in_c(self, local: Iterable[str] = ()) -> dict[str, str]:
+        """Return the C expression of every name that a formula may contain, with names of local constants."""
+        equation = self.equation
+        found = {name: f"at[REF_{name}]" for name in self.variables}
+        found |= {name: f"n->{name}" for name in equation.parameters}
+        found |= {name: f"q->{name}" for name in self.held_names()}
+        found |= {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
+        return found | {name: name for name in local}
+
+    def _c(self, formula: str, local: Iterable[str] = ()) -> str:
+        known = self._in_c(local)
+        return to_c(formula, lambda name: known[name])
+
+    def held_names(self) -> list[str]:
+        """Return the names of the values that are held during a piece of a step."""
+        equation = self.equation
+        later = [*equation.forces.values(), *(formula for both in equation.lagging.values() for formula in both)]
+        used = {name for formula in later for name in names(formula)} | {*self.layout.thrust}
+        lasting = [name for name in equation.thrust if name in used]
+        return [*equation.directed, *lasting, *equation.lagging, *equation.forces]
+
+    # ---- Coefficients ----
+
+    def parameters(self) -> list[str]:
+        """Return statements that assign what follows from the parameters."""
+        lines = [f"n->{name} = {self._c(formula)};" for name, formula in self.equation.parameters.items()]
+        for name, directed in self.equation.directed.items():
+            lines += [f"n->{name}[0] = {self._c(directed.forward)};", f"n->{name}[1] = {self._c(directed.reverse)};"]
+        return lines
+
+    def thrust(self) -> list[str]:
+        """Return statements that compute the steady thrust."""
+        lines: list[str] = []
+        local: list[str] = []
+        held = self.held_names()
+        for name, formula in self.equation.thrust.items():
+            text = self._c(formula, local)
+            if name in held:
+                lines.append(f"q->{name} = {text};")
+            else:
+                local.append(name)
+                lines.append(f"const double {name} = {text};")
+        return lines
+
+    def forces(self) -> list[str]:
+        """Return statements that compute what is held for the forces of the thrusters."""
+        return [f"q->{name} = {self._c(formula)};" for name, formula in self.equation.forces.items()]
+
+    def directions(self) -> list[tuple[str, int]]:
+        """Return each coefficient that depends on a direction, with the place of its velocity among the monitored."""
+        return [(name, self.equation.monitored.index(d.velocity)) for name, d in self.equation.directed.items()]
+
+    def starts(self) -> list[str]:
+        """Return statements that set the states of the table at the start of a step."""
+        starts = self.equation.starts
+        return [f"y[Y_{name}] = {self._c(starts[name]) if name in starts else '0.0'};" for name in self.equation.states]
+
+    def lag_settled(self) -> list[tuple[str, list[str]]]:
+        """Return each curve with lag, and the names of its thrusters."""
+        return [
+            (c.name, [t.name for t in self.layout.thrusters if t.curve == c.name])
+            for c in self.layout.curves
+            if c.has_lag
+        ]
+
+    def coasting(self) -> list[str]:
+        """Return the integrals whose rates are constant while all velocities are steady: all but x and y of a turn."""
+        return [name for name in self.equation.states if not self.used(name) and not self.turns(name)]
+
+    def turns(self, name: str) -> bool:
+        """Tell whether the rate of a state depends on the heading."""
+        return "cos_psi" in self.equation.inputs_of[name] or "sin_psi" in self.equation.inputs_of[name]
+
+    def group(self, name: str) -> str:
+        """Return the first state of a group whose sizes count together: the heading, the horizontal position."""
+        return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
+
+    def dynamic(self) -> int:
+        """Return the number of components that are not kinematic; they come first."""
+        kinematic = {"cos_psi", "sin_psi", "x", "y", "z", "psi"}
+        return sum(not kinematic & set(group) for group in self.equation.components)
+
+    def finish(self) -> list[str]:
+        """Return statements that assign the states of the vehicle after a step."""
+        lines = []
+        for name in self.layout.state:
+            if name in self.equation.lagging:
+                end = f"q->{name}"
+            elif self.used(name):
+                end = f"y[Y_{name}]"
+            else:
+                end = f"state[REF_{name} - FIRST_STATE] + gone[Y_{name}]"
+            lines.append(f"next[REF_{name} - FIRST_STATE] = {end};")
+        return lines
+
+    # ---- Rates and terms ----
+
+    def rate(self, name: str) -> str:
+        """Write the rate of a state of the table in terms of the states y."""
+        return self._rate(self.equation.rows[name])
+
+    def size(self, name: str) -> str:
+        """Write the sum of the sizes of the terms in the rate of a state."""
+        return " + ".join(f"fabs({self._rate([term])})" for term in self.equation.rows[name])
+
+    def _rate(self, terms: Sequence[Term]) -> str:
+        return self._by_states(rate_formula(terms))
+
+    def _by_states(self, formula: str) -> str:
+        """Write a formula in C in which every state of the table is that of y, and not that of `at`."""
+        known = {**self._in_c(), **{state: f"y[Y_{state}]" for state in self.equation.states}}
+        return to_c(formula, lambda name: known[name])
+
+    def blocks(self) -> list[tuple[str, ...]]:
+        """Return the states in groups whose coefficients are computed together: none depends on a later group."""
+        depth: dict[str, int] = {}
+        for group in self.equation.components:
+            level = 1 + max((depth[name] for name in self._inputs(group)), default=0)
+            last = 1 + len(self.equation.components)
+            depth |= dict.fromkeys(group, level if any(map(self.used, group)) else last)
+        levels = sorted(set(depth.values()))
+        return [tuple(name for name in self.equation.states if depth[name] == level) for level in levels]
+
+    def block_of(self, name: str) -> int:
+        """Return the place of a state's block."""
+        return next(i for i, block in enumerate(self.blocks()) if name in block)
+
+    def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, str], str]]:
+        """Return the products of a block as runs over neighbouring states, and where each product stands in C.
+
+        A run is (first factor, first of the second factors, length); the first factor is "" for squares.
+        """
+        states = self.equation.states
+        pairs = {term.factors for name in block for term in self.equation.rows[name] if len(term.factors) == 2}
+        wanted = {("", a) if a == b else (a, b) for a, b in pairs}
+        runs: list[tuple[str, str, int]] = []
+        places: dict[tuple[str, str], str] = {}
+        while wanted:
+            candidates = {*wanted, *((b, a) for a, b in wanted if a)}
+            best: tuple[str, str, int] = ("", "", 0)
+            for first, second in sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))):
+                place, length = states.index(second), 0
+                while place + length < len(states) and (first, states[place + length]) in candidates:
+                    length += 1
+                if length > best[2]:
+                    best = first, second, length
+            first, second, length = best
+            for lane in range(length):
+                other = states[states.index(second) + lane]
+                places[first or other, other] = places[other, first or other] = f"p{len(runs)}[{lane}]"
+                wanted -= {(first, other), (other, first)}
+            runs.append(best)
+        return runs, places
+
+    def next_term(self, name: str, places: Mapping[tuple[str, str], str]) -> str:
+        """Write coefficient m > 0 of the rate of a state."""
+        parts = []
+        for term in self.equation.rows[name]:
+            if not term.factors:
+                continue
+            factors = (
+                f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors[0], term.factors[1]]
+            )
+            sign, coefficient = (
+                ("-", term.coefficient[1:]) if term.coefficient.startswith("-") else ("", term.coefficient)
+            )
+            parts.append((sign, factors if coefficient == "1" else f"{self._c(coefficient)} * {factors}"))
+        if not parts:
+            return "0.0"
+        first = parts[0][0] + parts[0][1]
+        return first + "".join(f" {sign or '+'} {text}" for sign, text in parts[1:])
+
+    def component_of(self, name: str) -> int:
+        """Return the place of a state's component."""
+        return next(i for i, group in enumerate(self.equation.components) if name in group)
+
+    def _inputs(self, group: Sequence[str]) -> set[str]:
+        """Return the states outside a group that the rates of its states depend on."""
+        return {other for name in group for other in self.equation.inputs_of[name]} - set(group)
+
+    def input_bits(self, group: Sequence[str]) -> int:
+        """Return the other components that a component depends on, a bit each."""
+        return sum(1 << other for other in {self.component_of(name) for name in self._inputs(group)})
+
+    def used(self, name: str) -> bool:
+        """Tell whether a term contains a state."""
+        return any(name in inputs for inputs in self.equation.inputs_of.values())
+
+    def needed_with(self, group: Sequence[str]) -> int:
+        """Return the states that make a component matter to others, a bit each; all bits if it always matters."""
+        always, partners = 2**32 - 1, 0
+        if not any(map(self.used, group)) or set(group) & set(self.equation.monitored):
+            return always
+        for name in set(self.equation.states) - set(group):
+            for factors in (term.factors for term in self.equation.rows[name] if set(term.factors) & set(group)):
+                others = set(factors) - set(group)
+                if not others:
+                    return always
+                partners |= sum(1 << self.equation.states.index(other) for other in others)
+        return partners
+
+    def n_used(self) -> int:
+        """Return the number of states that a term contains; they come first."""
+        return sum(map(self.used, self.equation.states))
+
+    def lagging_ends(self) -> list[tuple[str, str]]:
+        """Return each force that lags, and its formula in C after a piece that ends at y."""
+        return [(name, self._by_states(end)) for name, (_, end) in self.equation.lagging.items()]
+
+    # ---- Derivatives of the vehicle's states ----
+
+    def derivative_lines(self) -> list[str]:
+        """Return statements that assign the derivatives; `q` holds the coefficients for the directions."""
+        equation = self.equation
+        known = self._in_c(equation.heading)
+        lines = [f"const double {name} = {self._c(formula)};" for name, formula in equation.heading.items()]
+        for name in self.layout.state:
+            lines.append(f"at[REF_{name} + N_STATES] = {to_c(equation.rates[name], lambda n: known[n])};")
+        return lines
+
+    def tangent_lines(self) -> list[str]:
+        """Return statements that write into d the changes of what is calculated, from those of what it depends on."""
+        equation = self.equation
+        given = self.variables - {*self.layout.thrust}
+        text = {name: f"at[REF_{name}]" for name in given}
+        text |= {f"d_{name}": f"d[REF_{name}]" for name in given}
+        steps: dict[str, str] = {}
+
+        def change_of(name: str) -> str | None:
+            return f"d_{name}" if name in given or f"d_{name}" in steps else None
+
+        for name, formula in equation.program.items():
+            steps[name] = formula
+            if change := tangent(formula, change_of):
+                steps[f"d_{name}"] = change
+        results = {f"d[REF_{name}]": f"d_{name}" for name in self.layout.thrust if f"d_{name}" in steps}
+        for name in self.layout.state:
+            results[f"d[REF_{name} + N_STATES]"] = tangent(equation.rates[name], change_of) or "0"
+        needed = {name for formula in results.values() for name in names(formula)}
+        for name in reversed(steps):
+            if name in needed:
+                needed |= {*names(steps[name])}
+        text |= {name: name for name in steps}
+        lines = [f"const double {name} = {to_c(steps[name], lambda n: text[n])};" for name in steps if name in needed]
+        return lines + [f"{place} = {to_c(formula, lambda n: text[n])};" for place, formula in results.items()]
+
+
+def generated_sources(layout: Layout) -> dict[str, str]:
+    """Return model.h and equation.h, the files that are generated for a vehicle, by their names."""
+    source = EquationSource(layout, layout.places)
+    formulas = {name: rate_formula(terms) for name, terms in source.equation.rows.items()}
+    sizes = {"inputs": len(layout.inputs), "states": len(layout.state), "thrust": len(layout.thrust),
+             "commands": len(layout.commands), "coefficients": len(layout.coefficients)}  # fmt: skip
+    given = {"names": layout.places, "source": source, "equation": source.equation, "formulas": formulas, "n": sizes}
+    return {name: render(f"{name}.j2", **given) for name in ("model.h", "equation.h")}
+
+
+def sources(rov: Rov) -> dict[str, str]:
+    """Return the C files of a vehicle's motion, by their names: those generated for it, and those that all share."""
+    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in ("series.c", "step.c")}
+    return generated_sources(rov.layout) | shared

@@ -1,0 +1,63 @@
+"""What the rates and calculated variables of a vehicle depend on, derived from its equation (standard library only).
+
+FMI asks for each output and each derivative of a state: on which inputs and states it depends, and in which way
+(dependenciesKind). The formulas of the equation are differentiated symbolically, one after the other. The names that
+remain in a derivative tell the kind: no name at all means that the factor is constant.
+"""
+
+from collections.abc import Mapping
+
+from .equation import equation_of
+from .formula import names, tangent
+from .layout import Layout
+
+KINDS = ("constant", "fixed", "tunable", "dependent")
+"""Kinds of factors (FMI 2.0, section 2.2.8), from the most to the least that an importer knows about the factor."""
+
+
+def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
+    """Return for each rate and calculated variable the inputs and states that it depends on, and in which way.
+
+    The rate of a state is called `der(<state>)`. An input or state that has no influence is left out.
+    """
+    formulas = _formulas(layout)
+    slopes: dict[str, dict[str, int]] = {name: {} for name in formulas}
+    kinds = _kinds(layout, formulas)
+    for known in (*layout.inputs, *layout.state):
+        kind_of_slope = {known: 0}  # the derivative of the known itself is 1
+        for name, formula in formulas.items():
+            changing = {other: f"slope_{other}" for other in names(formula) if other in kind_of_slope}
+            slope = tangent(formula, changing.get) if changing else None
+            if slope is not None:
+                inner = kinds | {word: kind_of_slope[other] for other, word in changing.items()}
+                kind_of_slope[name] = slopes[name][known] = max(inner[word] for word in names(slope))
+    return {name: {known: KINDS[kind] for known, kind in slopes[name].items()} for name in _calculated(layout)}
+
+
+def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
+    """Return for each rate and calculated variable the parameters that it depends on, in the order of the FMU."""
+    formulas = _formulas(layout)
+    found: dict[str, set[str]] = {}
+    for name, formula in formulas.items():
+        found[name] = set().union(*(found.get(other, {other}) for other in names(formula)))
+    return {name: tuple(p for p in layout.coefficients if p in found[name]) for name in _calculated(layout)}
+
+
+def _calculated(layout: Layout) -> tuple[str, ...]:
+    return (*(f"der({name})" for name in layout.state), *layout.thrust)
+
+
+def _formulas(layout: Layout) -> dict[str, str]:
+    """All formulas of a vehicle; each uses only inputs, states, parameters and formulas before it."""
+    equation = equation_of(layout)
+    return equation.program | {f"der({name})": equation.rates[name] for name in layout.state}
+
+
+def _kinds(layout: Layout, formulas: Mapping[str, str]) -> dict[str, int]:
+    """The kind of each name as a factor, as an index of KINDS."""
+    found = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
+    for name, meta in layout.coefficients.items():
+        found[name] = KINDS.index("tunable" if meta.tunable else "fixed")
+    for name, formula in formulas.items():
+        found[name] = max((found[other] for other in names(formula)), default=0)
+    return found

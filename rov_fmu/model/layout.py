@@ -1,0 +1,417 @@
+"""What a vehicle has, and every coefficient and variable that follows from it, declared once (standard library only).
+
+Signs and symbols follow Fossen/SNAME and the paper: body frame x forward, y starboard, z down; earth frame
+north-east-down; u, v, w, r are surge, sway, heave and yaw velocity through the water. Heave is positive down.
+
+A coefficient is declared by its key in the vehicle file; its name in the FMU is the key with what it belongs to: a_d of
+surge is a_d_u, a_t_reverse of the curve t200 is a_t_t200_reverse.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf, pi, sin
+
+# ---- Axes ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One kind of axis: the single declaration of its symbols, units and words."""
+
+    name: str
+    velocity: str
+    """Symbol: u, v, w or r. The coefficients of the axis are a_d_<velocity> ... beta_<velocity>."""
+    unit: str
+    """Of the velocity."""
+    positive: str
+    """Direction of a positive velocity, force or torque."""
+    negative: str
+    position: str
+    """What a sensor measures along the axis; its rate is the velocity."""
+    position_unit: str
+    load: str
+    """Unit of force or torque."""
+    external: str
+    """The input that acts on it beside the thrust."""
+    inertia: str
+    """The coefficient that resists acceleration, beside the added mass: m_rov or I_r."""
+    equations: tuple[str, str]
+    """Of the paper: drag, motion."""
+
+    def coefficient(self, key: str) -> str:
+        """Name of a coefficient of the axis, by its key: a_d, b_d_reverse, alpha ..."""
+        return coefficient_name(key, self.velocity)
+
+    @property
+    def push(self) -> str:
+        """What its thrusters give."""
+        return "thrust" if self.load == "N" else "torque"
+
+
+SURGE = Axis("surge", "u", "m/s", "forward", "astern", "distance", "m", "N", "X_ext", "m_rov", ("(14)", "(18a)"))
+SWAY = Axis("sway", "v", "m/s", "to starboard", "to port", "distance", "m", "N", "Y_ext", "m_rov", ("(18)", "(18)"))
+HEAVE = Axis("heave", "w", "m/s", "down", "up", "depth", "m", "N", "Z_ext", "m_rov", ("(15)", "(18b)"))
+YAW = Axis("yaw", "r", "rad/s", "bow to starboard", "bow to port", "heading", "rad", "N.m", "N_ext", "I_r",
+           ("(16)", "(18c)"))  # fmt: skip
+AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, YAW)}
+"""All kinds, in the order of their states."""
+
+
+# ---- Kinds of coefficients -------------------------------------------------------------------------------------------
+
+REVERSE = "_reverse"
+"""End of the key of what holds for commands or velocities below zero."""
+
+
+def coefficient_name(key: str, of: str) -> str:
+    """Name in the FMU of a coefficient of a curve or of an axis."""
+    stem = key.removesuffix(REVERSE)
+    return f"{stem}_{of}{key[len(stem) :]}"
+
+
+@dataclass(frozen=True)
+class Meta:
+    """What a coefficient or a variable is: SI unit, words, the values allowed (both ends included), a typical size."""
+
+    unit: str
+    description: str
+    minimum: float = -inf
+    maximum: float = inf
+    nominal: float = 1.0
+    tunable: bool = False
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of coefficient. In `unit` and `words` stands {...} for what it belongs to."""
+
+    unit: str
+    words: str
+    minimum: float
+    maximum: float
+    needed: bool = True
+    tunable: bool = False
+
+    def meta(self, **of: str) -> Meta:
+        """Of one curve or axis."""
+        words = self.words.format(**of)
+        return Meta(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
+
+
+BODY = {
+    "m_rov": Kind("kg", "Mass m_rov, (3a), (3b)", 1e-3, 1e6),
+    "I_r": Kind("kg.m2", "Moment of inertia about the vertical axis I_r, (3c)", 1e-6, 1e6),
+}
+ARM = {
+    "R": Kind("m", "Distance from the centre of mass to a rear thruster R, (4)", 0.0, 100.0),
+    "gamma": Kind("rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, pi / 2),
+}
+CURVE = {
+    "a_t": Kind("N", "Quadratic thrust coefficient a_t of the {curve}, {equation}", -1e6, 1e6),
+    "b_t": Kind("N", "Linear thrust coefficient b_t of the {curve}, {equation}", -1e6, 1e6),
+    "a_t_reverse": Kind("N", "Quadratic thrust coefficient a_t of the {curve} in reverse", -1e6, 1e6, needed=False),
+    "b_t_reverse": Kind("N", "Linear thrust coefficient b_t of the {curve} in reverse", -1e6, 1e6, needed=False),
+    "c_0": Kind("1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False),
+    "c_0_reverse": Kind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, needed=False),
+    "T": Kind("s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False),
+}
+AXIS = {
+    "m_a": Kind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
+    "a_d": Kind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}, {drag}", 0.0, 1e6),
+    "b_d": Kind("{load}.s/{length}", "Linear drag coefficient b_d of {axis}, {drag}", 0.0, 1e6),
+    "a_d_reverse": Kind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis} {negative}", 0.0, 1e6,
+                        needed=False),
+    "b_d_reverse": Kind("{load}.s/{length}", "Linear drag coefficient b_d of {axis} {negative}", 0.0, 1e6,
+                        needed=False),
+    "F_0": Kind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
+}  # fmt: skip
+TUNING = {
+    "alpha": Kind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
+    "beta": Kind("1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}", 0.0, 1e3, False, True),
+}
+"""1 where the file does not give it."""
+LEAST_BETA = 1e-3
+"""Of axes that are coupled."""
+
+
+# ---- What a vehicle has ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A thrust curve: F(c) = a_t (c - c_0)^2 + b_t (c - c_0) of `together` thrusters at once, mirrored for c < 0."""
+
+    name: str
+    keys: tuple[str, ...] = ("a_t", "b_t")
+    """Of CURVE, those that the vehicle has."""
+    together: int = 1
+    description: str = ""
+    equation: str = "(2)"
+
+    def coefficient(self, key: str) -> str:
+        """Name of one of its coefficients; forward's where there is none for reverse."""
+        return coefficient_name(key if key in self.keys else key.removesuffix(REVERSE), self.name)
+
+    @property
+    def has_lag(self) -> bool:
+        """Whether the force follows the command late."""
+        return "T" in self.keys
+
+
+@dataclass(frozen=True)
+class Thruster:
+    """A thruster and its place. The torque about z is that of its position, or ±R sin γ F by the arm, (4)."""
+
+    name: str
+    curve: str
+    direction: tuple[float, float, float]
+    """Of a positive force, a unit vector in the body frame."""
+    position: tuple[float, float, float] | None = None
+    """From the centre of mass, m."""
+    arm: int = 0
+    """1 on the port side, where a force ahead turns the bow to starboard, -1 on the starboard side; 0 without."""
+    description: str = ""
+
+    def effect(self, axis: Axis) -> float:
+        """Force along an axis, or torque, of a force of 1 N; that of an arm by R sin γ."""
+        if axis is not YAW:
+            return self.direction[(SURGE, SWAY, HEAVE).index(axis)]
+        if self.position is None:
+            return float(self.arm)
+        x, y, _ = self.position
+        return x * self.direction[1] - y * self.direction[0]
+
+
+@dataclass(frozen=True)
+class VehicleAxis:
+    """An axis that a vehicle has."""
+
+    axis: Axis
+    keys: tuple[str, ...] = ("a_d", "b_d")
+    """Of AXIS, those that the vehicle has; α and β it always has."""
+
+    def coefficient(self, key: str) -> str:
+        """Name of one of its coefficients; forward's where there is none for reverse."""
+        return self.axis.coefficient(key if key in self.keys else key.removesuffix(REVERSE))
+
+
+_FAINT = 1e-9  # m, or per newton: an effect below is rounding of a direction
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a vehicle has, but for the numbers."""
+
+    axes: tuple[VehicleAxis, ...]
+    """In the order of AXES."""
+    curves: tuple[Curve, ...]
+    thrusters: tuple[Thruster, ...]
+    mix: Mapping[str, Mapping[str, float]] = field(default_factory=dict, hash=False)
+    """Input to the thrusters that it drives, with gains; each thruster has an input of its own where this is empty."""
+    coupled: bool = False
+    """Whether surge, sway and yaw are coupled: Coriolis and Munk terms of a diagonal mass matrix."""
+
+    def extended(self, names: Iterable[str]) -> "Layout":
+        """With these coefficients besides, of its curves and axes."""
+        wanted = set(names)
+
+        def keys(kinds: Iterable[str], has: tuple[str, ...], of: str) -> tuple[str, ...]:
+            return tuple(key for key in kinds if key in has or coefficient_name(key, of) in wanted)
+
+        return replace(
+            self,
+            axes=tuple(replace(form, keys=keys(AXIS, form.keys, form.axis.velocity)) for form in self.axes),
+            curves=tuple(replace(curve, keys=keys(CURVE, curve.keys, curve.name)) for curve in self.curves),
+        )
+
+    # -- looked up --
+
+    @cached_property
+    def kinds(self) -> dict[str, VehicleAxis]:
+        """The axes by name."""
+        return {form.axis.name: form for form in self.axes}
+
+    @cached_property
+    def curve_of(self) -> dict[str, Curve]:
+        """The curve of each thruster, by its name."""
+        curves = {curve.name: curve for curve in self.curves}
+        return {thruster.name: curves[thruster.curve] for thruster in self.thrusters}
+
+    def has(self, *axes: Axis) -> bool:
+        """Whether it has one of the axes."""
+        return any(axis.name in self.kinds for axis in axes)
+
+    @cached_property
+    def has_arm(self) -> bool:
+        """Whether R and γ are among its coefficients."""
+        return self.has(YAW) and any(t.position is None and t.arm for t in self.thrusters)
+
+    @cached_property
+    def gains(self) -> dict[str, dict[str, float]]:
+        """Of each thruster, the inputs that drive it, with gains."""
+        if not self.mix:
+            return {t.name: {f"u_{t.name}": 1.0} for t in self.thrusters}
+        return {t.name: {f"u_{name}": gains[t.name] for name, gains in self.mix.items() if gains.get(t.name)}
+                for t in self.thrusters}  # fmt: skip
+
+    def drivers(self, axis: Axis) -> list[Thruster]:
+        """The thrusters that act on an axis."""
+        return [t for t in self.thrusters if abs(t.effect(axis)) > _FAINT]
+
+    def signs(self, axis: Axis) -> dict[str, float]:
+        """The commands that drive an axis: every input that acts on it, to its positive side.
+
+        Other axes stay at rest where the thrusters are symmetric.
+        """
+        effects: dict[str, float] = {}
+        for thruster in self.drivers(axis):
+            for name, gain in self.gains[thruster.name].items():
+                effects[name] = effects.get(name, 0.0) + gain * thruster.effect(axis)
+        return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > _FAINT}
+
+    # -- declared --
+
+    @cached_property
+    def coefficients(self) -> dict[str, Meta]:
+        """Name to what it is, in the order of the FMU's variables."""
+        found: dict[str, Meta] = {}
+        if self.has(SURGE, SWAY, HEAVE):
+            found["m_rov"] = BODY["m_rov"].meta()
+        if self.has(YAW):
+            found["I_r"] = BODY["I_r"].meta()
+        if self.has_arm:
+            found |= {key: kind.meta() for key, kind in ARM.items()}
+        for curve in self.curves:
+            words = {"curve": curve.description or f"curve {curve.name}", "equation": curve.equation}
+            found |= {curve.coefficient(key): kind.meta(**words) for key, kind in CURVE.items() if key in curve.keys}
+        for form in self.axes:
+            metas = metas_of(form.axis)
+            found |= {form.coefficient(key): metas[key] for key in AXIS if key in form.keys}
+        for form in self.axes:
+            metas = metas_of(form.axis)
+            found |= {form.axis.coefficient(key): metas[key] for key in TUNING}
+        if self.coupled:  # the effective inertia m/β of each must be finite
+            for beta in (axis.coefficient("beta") for axis in (SURGE, SWAY, YAW)):
+                found[beta] = replace(found[beta], minimum=LEAST_BETA)
+        return found
+
+    @cached_property
+    def commands(self) -> dict[str, Meta]:
+        """The inputs that drive the thrusters: fractions of full thrust."""
+        if not self.mix:
+            return {f"u_{t.name}": _command(t) for t in self.thrusters}
+        return {f"u_{name}": Meta("1", f"Command u_{name} of {_listed(gains)}; saturates at ±1", -1.0, 1.0)
+                for name, gains in self.mix.items()}  # fmt: skip
+
+    @cached_property
+    def inputs(self) -> dict[str, Meta]:
+        """Commands, loads from outside, current."""
+        found = dict(self.commands)
+        for form in self.axes:
+            axis = form.axis
+            example = "ballast" if axis is HEAVE else "contact"
+            words = f"Load from outside in {axis.name} (tether, {example}), positive {axis.positive}"
+            found[axis.external] = Meta(axis.load, words, nominal=1.0 if axis is YAW else 10.0)
+        if self.has(SURGE, SWAY):
+            for name, way in (("V_N", "northward"), ("V_E", "eastward")):
+                found[name] = Meta("m/s", f"Velocity of a steady horizontal current, {way}")
+        return found
+
+    @cached_property
+    def velocities(self) -> dict[str, Meta]:
+        """The first states: velocities through the water."""
+        found = {}
+        for axis in (form.axis for form in self.axes):
+            through = "" if axis is YAW else " through the water"
+            words = f"{axis.name.capitalize()} velocity {axis.velocity}{through}, positive {axis.positive}"
+            found[axis.velocity] = Meta(axis.unit, words)
+        return found
+
+    @cached_property
+    def pose(self) -> dict[str, Meta]:
+        """The states that follow: position and heading, as far as the axes move them."""
+        found = {}
+        if self.has(SURGE, SWAY):
+            found["x"] = Meta("m", "Position north x", nominal=10.0)
+            found["y"] = Meta("m", "Position east y", nominal=10.0)
+        if self.has(HEAVE):
+            found["z"] = Meta("m", "Depth z, positive down", nominal=10.0)
+        if self.has(YAW):
+            found["psi"] = Meta("rad", "Heading ψ, positive north to east, not wrapped")
+        return found
+
+    @cached_property
+    def lagging(self) -> dict[str, Meta]:
+        """The last states: forces that follow the commands late."""
+        return {f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters
+                if self.curve_of[t.name].has_lag}  # fmt: skip
+
+    @cached_property
+    def state(self) -> dict[str, Meta]:
+        """All states."""
+        return self.velocities | self.pose | self.lagging
+
+    @cached_property
+    def thrust(self) -> dict[str, Meta]:
+        """What is calculated of the thrusters, before the tuning α: their forces, unless they are states, and the
+        torque of the thrusters of each curve."""
+        found = {f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters
+                 if not self.curve_of[t.name].has_lag}  # fmt: skip
+        for curve in self.turning_curves:
+            of = f"of the {curve.description}" if curve.description else curve.name
+            by_arm = any(t.curve == curve.name and t.position is None for t in self.drivers(YAW))
+            words = f"Torque τ_{curve.name} of the thrusters with the curve {of}{', (4)' if by_arm else ''}"
+            found[f"tau_{curve.name}"] = Meta("N.m", f"{words}, positive bow to starboard")
+        return found
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """Where each variable stands in the arrays of the C code, by name; der(x) stands len(state) after x."""
+        found = {name: place for place, name in enumerate([*self.inputs, *self.state])}
+        first = len(found) + len(self.state)
+        return found | {name: first + place for place, name in enumerate([*self.thrust, *self.coefficients])}
+
+    @cached_property
+    def turning_curves(self) -> tuple[Curve, ...]:
+        """The curves whose thrusters turn the vehicle."""
+        driving = {t.curve for t in self.drivers(YAW)} if self.has(YAW) else set()
+        return tuple(curve for curve in self.curves if curve.name in driving)
+
+
+def metas_of(axis: Axis) -> dict[str, Meta]:
+    """Every coefficient that an axis can have, by its key."""
+    drag, motion = axis.equations
+    words = {"axis": axis.name, "velocity": axis.velocity, "push": axis.push, "drag": drag, "motion": motion,
+            "load": axis.load, "length": axis.position_unit, "inertia": BODY[axis.inertia].unit,
+            "what": "moment of inertia" if axis is YAW else "mass",
+            "positive": axis.positive, "negative": axis.negative}  # fmt: skip
+    return {key: kind.meta(**words) for key, kind in (AXIS | TUNING).items()}
+
+
+def _listed(names: Iterable[str]) -> str:
+    *first, last = names
+    return f"thrusters {', '.join(first)} and {last}" if first else f"thruster {last}"
+
+
+def _pushes(direction: tuple[float, float, float]) -> str:
+    """The direction of a positive force in words."""
+    words = [axis.positive if part > 0.0 else axis.negative
+             for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True) if abs(part) > _FAINT]  # fmt: skip
+    return " and ".join(words)
+
+
+def _command(thruster: Thruster) -> Meta:
+    words = f"Command u_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
+    return Meta("1", f"{words}, positive {_pushes(thruster.direction)}; saturates at ±1", -1.0, 1.0)
+
+
+def _thrust(thruster: Thruster, curve: Curve) -> Meta:
+    words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
+    share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
+    return Meta("N", f"{words}, {curve.equation}{share}, positive {_pushes(thruster.direction)}")
+
+
+def arm(R: float, gamma: float) -> float:
+    """R sin γ: torque per difference of thrust (m), (4)."""
+    return R * sin(gamma)

@@ -1,0 +1,176 @@
+"""A vehicle in motion: thrust, derivatives and the exact step by its table of terms; the closed form of one axis.
+
+Values are known by name, as rov_fmu/model/layout.py declares them: inputs, states, coefficients. Standard library only.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property, lru_cache
+from math import inf
+
+from .equation import curve_formulas, equation_of
+from .formula import compiled
+from .layout import ARM, YAW, Axis, Curve, Layout, Thruster, VehicleAxis, arm
+from .riccati import Riccati
+from .step import Table, step
+
+Values = Mapping[str, float]
+
+
+class _Formulas:
+    """The equation of a layout, compiled."""
+
+    def __init__(self, layout: Layout) -> None:
+        equation = equation_of(layout)
+        rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
+        self.table = Table(equation)
+        self.parameters = compiled(equation.parameters)
+        self.thrust = compiled(equation.thrust)
+        self.calculate = compiled({**equation.program, **rates})
+
+
+_formulas_of = lru_cache(maxsize=100)(_Formulas)
+_thrust_of = cache(lambda curve: compiled(curve_formulas(curve)))
+
+
+@dataclass(frozen=True)
+class Rov:
+    """A vehicle: its layout, and the value of every coefficient of the layout by name."""
+
+    layout: Layout
+    coefficients: Values
+
+    def __getitem__(self, name: str) -> float:
+        """Return a coefficient."""
+        return self.coefficients[name]
+
+    def replaced(self, values: Values) -> "Rov":
+        """Return the vehicle with other values of some coefficients."""
+        return Rov(self.layout, {**self.coefficients, **values})
+
+    def extended(self, values: Values) -> "Rov":
+        """Return the vehicle with these coefficients, which its layout may not have yet."""
+        return Rov(self.layout.extended(values), {**self.coefficients, **values})
+
+    @cached_property
+    def _formulas(self) -> _Formulas:
+        return _formulas_of(self.layout)
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """What follows from the coefficients, by the names of rov_fmu/model/equation.py: gain_u, coupling_u ..."""
+        return self._formulas.parameters(self.coefficients)
+
+    # ---- Thrust ----
+
+    def curve_force(self, curve: Curve, command: float) -> float:
+        """Return the steady thrust (2) of one thruster (N) for a command."""
+        *_, force = _thrust_of(curve)({**self.coefficients, "u_one": command}).values()
+        return force
+
+    def commanded(self, inputs: Values) -> dict[str, float]:
+        """Return the steady thrust of every thruster (N), by its name, for the commands."""
+        found, lagging = self._formulas.thrust({**self.coefficients, **inputs}), self.layout.lagging
+        return {
+            t.name: found[f"steady_{t.name}" if f"F_{t.name}" in lagging else f"F_{t.name}"]
+            for t in self.layout.thrusters
+        }
+
+    def _values(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the coefficients, the inputs and the states by name; either mapping may have other names, too."""
+        return {
+            **self.coefficients,
+            **{name: inputs[name] for name in self.layout.inputs},
+            **{name: state[name] for name in self.layout.state},
+        }
+
+    def thrust(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the calculated variables of the thrusters by name."""
+        found = self._formulas.calculate(self._values(inputs, state))
+        return {name: found[name] for name in self.layout.thrust}
+
+    def effect(self, thruster: Thruster, axis: Axis) -> float:
+        """Return the force along an axis, or the torque (m), of 1 N of a thruster."""
+        found = thruster.effect(axis)
+        by_arm = axis is YAW and thruster.position is None and thruster.arm
+        return found * arm(*(self[name] for name in ARM)) if by_arm else found
+
+    # ---- Motion ----
+
+    def derivatives(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the time derivatives of the states by their names."""
+        found = self._formulas.calculate(self._values(inputs, state))
+        return {name: found[f"der_{name}"] for name in self.layout.state}
+
+    def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
+        """Return the states after h > 0 seconds with the inputs held, exact up to rounding however long that is.
+
+        They are not finite where the motion overflows or takes too many pieces (rov_fmu/model/step.py).
+        """
+        after = step(self._formulas.table, self._values(inputs, state), h)
+        return {name: after[name] for name in self.layout.state}
+
+    # ---- One axis alone ----
+
+    def inertia(self, form: VehicleAxis) -> float:
+        """Return the mass or moment of inertia, with the added mass."""
+        added = self[form.coefficient("m_a")] if "m_a" in form.keys else 0.0
+        return self[form.axis.inertia] + added
+
+    def gain(self, form: VehicleAxis) -> float:
+        """Return β/m: acceleration by force."""
+        return self[form.axis.coefficient("beta")] / self.inertia(form)
+
+    def effective_inertia(self, form: VehicleAxis) -> float:
+        """Return m/β, which resists acceleration."""
+        beta = self[form.axis.coefficient("beta")]
+        return self.inertia(form) / beta if beta > 0.0 else inf
+
+    def load(self, form: VehicleAxis) -> float:
+        """Return the constant load F_0 (N, N.m), where the axis has one."""
+        return self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0
+
+    def acceleration_of(self, form: VehicleAxis, thrust: float, load: float = 0.0) -> Riccati:
+        """Return the equation of an axis under a held thrust (before α) and load, without coupling, (18).
+
+        It is m v' = β (α F + F_ext + F_0 - a_d |v| v - b_d v).
+        """
+        gain = self.gain(form)
+        A, B = (gain * self[form.coefficient(key)] for key in ("a_d", "b_d"))
+        reverse = None
+        if not {"a_d_reverse", "b_d_reverse"}.isdisjoint(form.keys):
+            reverse = gain * self[form.coefficient("a_d_reverse")], gain * self[form.coefficient("b_d_reverse")]
+        return Riccati(A, B, gain * (self[form.axis.coefficient("alpha")] * thrust + load + self.load(form)), reverse)
+
+    def axes(self, inputs: Values) -> tuple[Riccati, ...]:
+        """Return the equation of every axis under held inputs once the thrust is steady, without coupling."""
+        F = self.commanded(inputs)
+        return tuple(
+            self.acceleration_of(form, self._along(form.axis, F), inputs[form.axis.external])
+            for form in self.layout.axes
+        )
+
+    def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
+        """Return all inputs, with the commands that drive an axis at a fraction of full thrust."""
+        signs = self.layout.signs(axis)
+        return {name: command * signs.get(name, 0.0) for name in self.layout.inputs}
+
+    def force(self, axis: Axis, command: float) -> float:
+        """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α, by (9), (10) and (4)."""
+        return self._along(axis, self.commanded(self.held_inputs(axis, command)))
+
+    def _along(self, axis: Axis, F: Values) -> float:
+        return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
+
+    def strongest(self, axis: Axis) -> float:
+        """Return the strongest thrust or torque along an axis, before the tuning α, in either direction."""
+        return max(abs(self.force(axis, c)) for c in (1.0, -1.0))
+
+    def held(self, axis: Axis, command: float) -> Riccati:
+        """Return the equation of an axis under a held command, (18), once the thrust is steady."""
+        return self.acceleration_of(self.layout.kinds[axis.name], self.force(axis, command))
+
+    def response(self, axis: Axis, command: float) -> tuple[float, float]:
+        """Return the signed V_ss, and Tau (17) in s from rest, in closed form."""
+        motion = self.held(axis, command)
+        return motion.steady_velocity(), motion.time_constant()

@@ -1,0 +1,311 @@
+"""A step with a table of terms by Taylor series, exact up to rounding however long it is (standard library only).
+
+Between reversals the motion is y_i' = k_i + sum of L_ij y_j + sum of Q_ijk y_j y_k (equation.py). In the series
+y(t) = sum of c_n t^n, a product of two states is a Cauchy product. So each coefficient follows from those before it:
+
+    (n + 1) c_i,n+1 = k_i (for n = 0) + sum of L_ij c_j,n + sum of Q_ijk (c_j,0 c_k,n + ... + c_j,n c_k,0)
+
+A step consists of pieces, and each piece has its own series. A piece is as long as its last coefficients allow (Jorba
+and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005), and it
+ends at the first reversal of a monitored velocity. States that have settled are constant in the series. Once all of
+them have settled, the rest of the step is straight or circular motion.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import copysign, hypot, inf, isfinite, nan, prod, sin
+from operator import mul
+
+from .equation import Equation
+from .formula import compiled, names
+
+ORDER = 20
+"""The order of the series: a higher one costs more than its longer pieces save."""
+MOST_PIECES = 10_000
+"""The most pieces of a step, enough for 1,000 s at rates of 10/s that never settle. A longer step is not computed."""
+
+_EPSILON = 2.0**-53  # half a unit in the last place of 1
+_FADED = 1e-40  # of the largest size of a state: whatever the drag, what is left of its distance does not matter
+_RATIO = 2.0 ** (-57 / (ORDER + 1))  # its powers after ORDER are below rounding
+_SMALLEST = 1e-322  # rounding keeps numbers below it from fading any further
+_SHORTEST = 2.0**-20  # of a piece: within it, the drag of a velocity that just touches 0 does not matter
+
+Series = Sequence[Sequence[float]]  # the coefficients of each state
+
+
+class Table:
+    """An equation in the form that a step computes with: states and coefficients are known by their places."""
+
+    def __init__(self, equation: Equation) -> None:
+        self.equation, self.states = equation, equation.states
+        self.place = place = {name: n for n, name in enumerate(self.states)}
+        self.monitored = [place[name] for name in equation.monitored]
+        self.rows: list[list[tuple[int, tuple[int, ...]]]] = []
+        """For each state, the terms of its rate: the place of the coefficient, and the places of the factors."""
+        self.velocities: list[int | None] = []
+        """For each coefficient, the place of the velocity on whose direction it depends."""
+        formulas: dict[str, str] = {}
+        for terms in equation.rows.values():
+            self.rows.append([])
+            for term in terms:
+                self.rows[-1].append((len(formulas), tuple(place[name] for name in term.factors)))
+                directed = [equation.directed[name] for name in names(term.coefficient) if name in equation.directed]
+                self.velocities.append(place[directed[0].velocity] if directed else None)
+                formulas[f"coefficient_{len(formulas)}"] = term.coefficient
+        self.coefficients = list(formulas)
+        self.hold = compiled({**equation.program, **equation.forces, **formulas})
+        self.arrive = compiled({force: after for force, (_, after) in equation.lagging.items()})
+        factors = [factors for row in self.rows for _, factors in row]
+        self.products = sorted({pair for pair in factors if len(pair) == 2})
+        self.used = {state for pair in factors for state in pair}
+        """The states that a term contains. The others are integrals of them."""
+        self.heading = {place[name] for name in equation.heading}
+        self.dynamic: list[tuple[set[int], set[int]]] = []
+        """The components that may settle, in their order: the states of each, and those that it depends on."""
+        for component in equation.components:
+            group = {place[name] for name in component}
+            if group & (self.used - self.heading):
+                inputs = {place[name] for state in component for name in equation.inputs_of[state]}
+                self.dynamic.append((group, inputs - group))
+
+
+def step(table: Table, values: Mapping[str, float], h: float) -> dict[str, float]:
+    """Return the states after h > 0 seconds with the inputs held.
+
+    `values` are the parameters, inputs and states by their names. The result is not finite where the motion overflows
+    or would take more than MOST_PIECES pieces.
+    """
+    motion = _Motion(table, values)
+    done, lost, unit = 0.0, 0.0, h  # seconds, what rounding has left out of them, and the unit of time of the series
+    for _ in range(MOST_PIECES):
+        motion.settle()
+        if motion.has_settled():
+            motion.coast(h - done)
+            return motion.end()
+        unit = min(unit, h - done)
+        series = motion.series(unit)
+        reach = motion.reach(series)
+        if reach == 0.0:
+            unit *= 1e-3
+            if unit == 0.0:
+                break
+            continue
+        length = motion.move(series, reach)
+        if length * unit >= h - done:
+            return motion.end()
+        before, elapsed = done, length * unit + lost
+        done += elapsed
+        lost = elapsed - (done - before)
+        unit *= 2.0 * reach
+    return dict.fromkeys(motion.end(), nan)
+
+
+class _Motion:
+    """The states of a table during a step, and what is held until its next piece. `series` are in units of time."""
+
+    def __init__(self, table: Table, values: Mapping[str, float]) -> None:
+        self.table, self.values = table, dict(values)
+        found = table.hold(values)
+        self.steady = {name: found[name] for forces in table.equation.lags.values() for name in forces.values()}
+        starts = {**found, **values}
+        self.y = [float(starts[name]) if name in table.equation.starts else 0.0 for name in table.states]
+        self.rest = [0.0] * len(self.y)  # what rounding has left out of each state: it would add up over many pieces
+        self.scale = [0.0] * len(self.y)  # the largest size of each state so far
+        self.start = dict(self.values)
+        self.still: set[int] = set()  # states that have settled
+        self.hold()
+
+    def hold(self) -> None:
+        """Compute the coefficients, for either direction of the velocities. A force that has arrived is steady."""
+        table, values = self.table, self.values
+        for progress, forces in table.equation.lags.items():
+            gaps = {force: abs(self.steady[steady] - values[force]) for force, steady in forces.items()}
+            sizes = {force: abs(self.steady[steady]) + abs(self.start[force]) for force, steady in forces.items()}
+            has_arrived = all(gaps[force] <= _EPSILON * sizes[force] for force in forces)
+            if has_arrived:
+                values.update({force: self.steady[steady] for force, steady in forces.items()})
+            self.put(table.place[progress], 1.0 if has_arrived else 0.0)
+        ways = (table.hold({**values, **dict.fromkeys(table.equation.monitored, sign)}) for sign in (1.0, -1.0))
+        self.forward, self.reverse = ([found[name] for name in table.coefficients] for found in ways)
+        self.direct(self.y)
+
+    def put(self, state: int, value: float) -> None:
+        """Give a state an exact value."""
+        self.y[state], self.rest[state] = value, 0.0
+
+    def direct(self, signs: Sequence[float]) -> None:
+        """Choose the coefficients for the directions of the velocities, of which the signs count."""
+        both = zip(self.table.velocities, self.forward, self.reverse, strict=True)
+        self.k = [back if v is not None and signs[v] < 0.0 else ahead for v, ahead, back in both]
+
+    def rates(self, y: Sequence[float]) -> tuple[list[float], list[float]]:
+        """Return the rate of each state, and the sum of the sizes of its terms."""
+        rows = [[self.k[n] * prod(y[i] for i in factors) for n, factors in row] for row in self.table.rows]
+        return [_sum(row) for row in rows], [_sum(map(abs, row)) for row in rows]
+
+    # ---- What has settled ----
+
+    def settle(self) -> None:
+        """Find the components that have settled: those that they depend on have, and their rates are rounding errors.
+
+        A component that has faded to nothing, and that nothing drives, comes to rest.
+        """
+        y = self.y
+        self.direct(y)
+        self.scale = [max(size, abs(x)) for size, x in zip(self.scale, y, strict=True)]
+        rates, sizes = self.rates(y)
+        self.still = set()
+        for group, inputs in self.table.dynamic:
+            if inputs <= self.still:
+                if all(abs(rates[i]) <= 8.0 * _EPSILON * sizes[i] for i in group):
+                    self.still |= group
+                elif all(abs(y[i]) <= _FADED * self.scale[i] + _SMALLEST for i in group):
+                    at_rest, _ = self.rates([0.0 if i in group else x for i, x in enumerate(y)])
+                    if not any(at_rest[i] for i in group):
+                        self.still |= group
+                        for i in group:
+                            self.put(i, 0.0)
+
+    def has_settled(self) -> bool:
+        """Tell whether all states are constant, but for the heading and the integrals."""
+        return self.table.used - self.table.heading <= self.still
+
+    def coast(self, h: float) -> None:
+        """Move on for h seconds once all has settled.
+
+        Only the heading still moves, by a rotation y' = L y with L^3 = -w^2 L. The integrals rise by h times their
+        rates at the mean of y, which is y + (1 - cos wh)/(w^2 h) L y + (1 - sin(wh)/(wh))/w^2 L^2 y.
+        """
+        table, mean = self.table, list(self.y)
+        first = self.rates(mean)[0]
+        second = self.rates([first[i] if i in table.heading else x for i, x in enumerate(mean)])[0]
+        slope, bend = (hypot(*(rates[i] for i in table.heading)) for rates in (first, second))
+        if slope and bend:
+            w = bend / slope
+            angle = w * h
+            half, whole = (sin(0.5 * angle), sin(angle)) if isfinite(angle) else (nan, nan)
+            for i in table.heading:
+                mean[i] += 2.0 * half * half / angle * (first[i] / w) + (1.0 - whole / angle) * (second[i] / w / w)
+        rates, _ = self.rates(mean)
+        self.y = [x if i in table.used else x + h * rates[i] for i, x in enumerate(self.y)]
+
+    # ---- A piece ----
+
+    def series(self, unit: float) -> Series:
+        """Grow the series of all states in time by `unit`.
+
+        A velocity that is 0 has the direction of its first coefficient that is not; until then its terms are 0.
+        """
+        table, c = self.table, [[x] for x in self.y]
+        signs = [0.0] * len(c)
+        for n in range(ORDER):
+            begins = [v for v in table.monitored if signs[v] == 0.0 and c[v][n] != 0.0]
+            if begins:
+                for v in begins:
+                    signs[v] = copysign(1.0, c[v][n])
+                self.direct(signs)
+            factor: dict[tuple[int, ...], float] = {
+                (a, b): _sum(map(mul, c[a], reversed(c[b]))) for a, b in table.products
+            }
+            factor.update({(i,): x[n] for i, x in enumerate(c)})
+            factor[()] = 1.0 if n == 0 else 0.0
+            for i, row in enumerate(table.rows):
+                rate = 0.0
+                for place, factors in row if i not in self.still else ():
+                    rate += self.k[place] * factor[factors]
+                c[i].append(unit * rate / (n + 1))
+        return c
+
+    def reach(self, series: Series) -> float:
+        """Return how far the series hold, at most 1; 0 where they overflow."""
+        if not all(isfinite(x) for c in series for x in c[-3:]):
+            return 0.0
+        return min(1.0, *(_reach(series[i]) for i in self.table.used))
+
+    def move(self, series: Series, length: float) -> float:
+        """Move to the end of a piece, `length` or the first reversal, and return how long it is."""
+        turned = None
+        for v in self.table.monitored:
+            end, is_reversal = _sign_kept(series[v], length)
+            if is_reversal or end < length:
+                length, turned = end, v if is_reversal else None
+        changes = [_change(c, length) + rest for c, rest in zip(series, self.rest, strict=True)]
+        before, self.y = self.y, [x + change for x, change in zip(self.y, changes, strict=True)]
+        self.rest = [change - (x - y) for change, x, y in zip(changes, self.y, before, strict=True)]
+        if turned is not None:
+            self.put(turned, 0.0)  # so that the next piece has the other direction
+        if self.steady:
+            progress = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
+            found = self.table.arrive({**self.values, **self.steady, **progress})
+            self.values.update({force: found[force] for force in self.table.equation.lagging})
+            self.hold()
+        return length
+
+    def end(self) -> dict[str, float]:
+        """Return the vehicle's states by their names. Those of the integrals are changes until here."""
+        equation, found = self.table.equation, {force: self.values[force] for force in self.table.equation.lagging}
+        for name, x in zip(self.table.states, self.y, strict=True):
+            if name in self.start:
+                found[name] = x if name in equation.starts else self.start[name] + x
+        return found
+
+
+# ---- Numbers ---------------------------------------------------------------------------------------------------------
+
+
+def _sum(terms: Iterable[float]) -> float:
+    """Return a sum that is the same in all versions of Python, unlike that of sum()."""
+    total = 0.0
+    for x in terms:
+        total += x
+    return total
+
+
+def _change(c: Sequence[float], t: float) -> float:
+    """Return the change up to t."""
+    change = 0.0
+    for x in c[:0:-1]:
+        change = (change + x) * t
+    return change
+
+
+def _reach(c: Sequence[float]) -> float:
+    """Return how far the terms fall like the powers of _RATIO, from the largest of the first three to the last three.
+
+    Every second or third coefficient of a series may be 0.
+    """
+    first = next((n for n, x in enumerate(c) if x != 0.0), len(c))
+    reach = inf
+    for n in range(max(first + 1, len(c) - 3), len(c)):
+        if c[n] != 0.0:
+            terms = range(first, min(first + 3, n))
+            reach = min(reach, _RATIO * max(abs(c[k] / c[n]) ** (1.0 / (n - k)) for k in terms))
+    return reach
+
+
+def _sign_kept(c: Sequence[float], length: float) -> tuple[float, bool]:
+    """Return how far a velocity goes before its sign changes, at most `length`, and whether it is 0 there."""
+    first = next((n for n, x in enumerate(c) if x != 0.0), None)
+    shortest = _SHORTEST * length
+    while first is not None and length > shortest:
+        sizes = [abs(x) * length**n for n, x in enumerate(c)]
+        if sizes[first] >= sum(sizes[first + 1 :]):
+            break
+        if first == 0 and sizes[1] > 4.0 * sum(n * size for n, size in enumerate(sizes[2:], 2)):  # one way only
+            end = c[0] + _change(c, length)
+            is_reversal = end == 0.0 or (end > 0.0) != (c[0] > 0.0)  # a product could underflow
+            return (min(length, _root(c)), True) if is_reversal else (length, False)
+        length *= 0.5
+    return length, False
+
+
+def _root(c: Sequence[float]) -> float:
+    """Return the root of a series whose slope stays within a quarter of its first one, by Newton's method."""
+    t, following = 0.0, -c[0] / c[1]
+    for _ in range(60):
+        if abs(following - t) <= 2.0 * _EPSILON * following:
+            break
+        t, slope = following, 0.0
+        for n in range(len(c) - 1, 0, -1):
+            slope = slope * t + n * c[n]
+        following = t - (c[0] + _change(c, t)) / slope
+    return following

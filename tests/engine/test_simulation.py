@@ -1,0 +1,157 @@
+"""The engine computes what the FMU computes, to the last bit, for any number of vehicles and threads."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from numpy.typing import NDArray
+
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import ROOT
+from tests.vehicles import EVERYTHING, HEAVY, VIDEORAY, random_inputs, random_state
+
+Array = NDArray[np.float64]
+
+
+def fmu_states(folder: Path, rov: Rov, times: Array, inputs: dict[str, Array], start: dict[str, float]) -> Array:
+    """The states of an FMU that FMPy steps, and its thrust, by the variable and the time."""
+    description = fmpy.read_model_description(str(folder))
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    outputs = [references[name] for name in (*rov.layout.state, *rov.layout.thrust)]
+    fmu = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=str(folder),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="rov",
+    )
+    fmu.instantiate()
+    fmu.setupExperiment(startTime=times[0])
+    fmu.setReal([references[name] for name in start], list(start.values()))
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    rows = []
+    for n in range(len(times)):
+        fmu.setReal([references[name] for name in inputs], [values[n] for values in inputs.values()])
+        rows.append(fmu.getReal(outputs))
+        if n + 1 < len(times):
+            fmu.doStep(times[n], times[n + 1] - times[n])
+    fmu.terminate()
+    fmu.freeInstance()
+    return np.array(rows).T
+
+
+@pytest.mark.parametrize("name", ["videoray", "heavy", "everything"])
+def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureRequest) -> None:
+    rov = {"videoray": VIDEORAY, "heavy": HEAVY, "everything": load_vehicle(EVERYTHING).rov}[name]
+    folder = request.getfixturevalue(f"{name}_dir")
+    rng = random.Random(7)
+    lengths = [rng.choice([2.0**-10, 2.0**-6, 2.0**-3, 1.0, 16.0]) for _ in range(200)]
+    times = np.cumsum([0.0, *lengths])  # without rounding
+    drawn = [random_inputs(rng, rov) for _ in times]
+    inputs = {name: np.array([each[name] for each in drawn]) for name in rov.layout.inputs}
+    start = random_state(rng, rov)
+    found = simulate(rov, times, {**inputs, **start}, [*rov.layout.state, *rov.layout.thrust])
+    assert found.failed == len(times)
+    np.testing.assert_array_equal(found.values[:, 0], fmu_states(folder, rov, times, inputs, start))
+
+
+def _variations(vehicles: int, times: int) -> dict[str, Array]:
+    rng = np.random.default_rng(3)
+    return {
+        "u_l": rng.uniform(-1.0, 1.0, times),  # one for all
+        "u_r": rng.uniform(-1.0, 1.0, (vehicles, times))[:, ::-1],  # with strides of its own
+        "u_t": rng.uniform(-1.0, 1.0, (times, vehicles)).T,
+        "a_d_u": rng.uniform(5.0, 20.0, (vehicles, 1)),
+        "psi": rng.uniform(-3.0, 3.0, (vehicles, 1)),
+    }
+
+
+def test_the_number_of_threads_and_vehicles_changes_no_bit() -> None:
+    vehicles, times = 37, np.linspace(0.0, 3.0, 31)
+    values = _variations(vehicles, len(times))
+    expected = simulate(VIDEORAY, times, values, vehicles=vehicles, workers=1).values
+    for workers in (2, 3, 64, None):
+        found = simulate(VIDEORAY, times, values, vehicles=vehicles, workers=workers).values
+        np.testing.assert_array_equal(found, expected)
+    for vehicle in (0, 17, 36):
+        alone = {name: np.broadcast_to(value, (vehicles, len(times)))[vehicle] for name, value in values.items()}
+        np.testing.assert_array_equal(simulate(VIDEORAY, times, alone).values[:, 0], expected[:, vehicle])
+
+
+def test_what_is_calculated_is_that_of_python() -> None:
+    times = np.linspace(0.0, 2.0, 5)
+    record = [*VIDEORAY.layout.inputs, "der(u)", "der(psi)", *VIDEORAY.layout.thrust]
+    values = {"u_l": np.linspace(0.1, 0.9, 5), "u_r": 0.4, "X_ext": -1.0}
+    record += VIDEORAY.layout.state
+    found = dict(zip(record, simulate(VIDEORAY, times, values, record).values[:, 0, 3].tolist(), strict=True))
+    inputs = {name: found[name] for name in VIDEORAY.layout.inputs}
+    state = {name: found[name] for name in VIDEORAY.layout.state}
+    assert (inputs["u_l"], inputs["u_r"], inputs["X_ext"]) == pytest.approx((0.7, 0.4, -1.0), rel=1e-15)
+    rates, thrust = VIDEORAY.derivatives(inputs, state), VIDEORAY.thrust(inputs, state)
+    expected = {"der(u)": rates["u"], "der(psi)": rates["psi"], **thrust}
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-12, abs=1e-14)
+
+
+def test_a_motion_that_cannot_be_computed_ends_with_nan_and_spoils_no_other() -> None:
+    times = np.array([0.0, 1.0, 2.0])
+    found = simulate(VIDEORAY, times, {"u": 1.0, "r": [[0.1], [1e300], [0.1]]}, ["u", "psi"], vehicles=3)
+    assert found.failed.tolist() == [3, 1, 3]
+    assert np.isnan(found.values[:, 1]).tolist() == [[False, True, True]] * 2
+    np.testing.assert_array_equal(found.values[:, 0], found.values[:, 2])
+
+
+_ENDLESS = """
+import sys, time
+import numpy as np
+import rov_fmu
+rov = rov_fmu.load("videoray")
+rov.simulate([0, 1])
+print("begins", flush=True)
+try:
+    rov.simulate_many(np.arange(1000.0), {"u_l": 0.5}, coefficients={"a_d_u": np.full(1_000_000, 10.0)}, record="u")
+except KeyboardInterrupt:
+    print("interrupted", time.time(), flush=True)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+def test_ctrl_c_ends_it() -> None:
+    """The simulation would take minutes."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", _ENDLESS], cwd=ROOT, stdout=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
+    )  # fmt: skip
+    with process:
+        assert process.stdout
+        assert process.stdout.readline() == "begins\n"
+        time.sleep(0.3)
+        sent = time.time()
+        process.send_signal(signal.SIGINT)
+        word, ended = process.stdout.read().split()
+    assert (process.returncode, word) == (0, "interrupted")
+    assert float(ended) - sent < 5.0
+
+
+@pytest.mark.long
+def test_threads_cost_no_processor_time() -> None:
+    """So two cores are nearly twice as fast as one; their wall time depends on what else runs on them."""
+    times, vehicles = np.arange(1001.0) / 10.0, 200
+    values = {"u_l": 0.5, "u_r": 0.3, "a_d_u": np.linspace(5.0, 20.0, vehicles)[:, np.newaxis]}
+
+    def seconds(workers: int) -> float:
+        start = time.process_time()
+        simulate(VIDEORAY, times, values, vehicles=vehicles, workers=workers)
+        return time.process_time() - start
+
+    one, two = (min(seconds(workers) for _ in range(20)) for workers in (1, 2))
+    assert two < 1.1 * one

@@ -1,0 +1,84 @@
+"""A step of a vehicle in Python and in C, and how far it is from the exact one."""
+
+import ctypes
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from checks import reference
+from checks.c_programs import compile_c
+from rov_fmu.engine.source import sources
+from rov_fmu.export.interface import variables
+from rov_fmu.model.rov import Rov
+from tests.fmi import OK
+from tests.fmi2 import Fmu
+from tests.vehicles import State, Values
+
+Step = Callable[[Rov, Values, Values, float], State]
+POSE = ("x", "y", "z", "psi")
+ROUNDING = 2.0**-52
+
+
+class Motion:
+    """The generated C of a vehicle, without FMI."""
+
+    def __init__(self, rov: Rov, folder: Path) -> None:
+        self.rov = rov
+        self.names = [variable.name for variable in variables(rov)]
+        program = Path(__file__).with_name("program.c")
+        output = compile_c(program, folder / "terms.so", sources(rov), "-shared", "-fPIC")
+        self._library = ctypes.CDLL(str(output))
+        self._library.step.argtypes = (ctypes.c_void_p, ctypes.c_double)
+
+    def values(self, values: Values) -> "ctypes.Array[ctypes.c_double]":
+        return (ctypes.c_double * len(self.names))(*(values.get(name, 0.0) for name in self.names))
+
+    def step(self, rov: Rov, inputs: Values, state: Values, h: float) -> dict[str, float]:
+        at = self.values({**rov.coefficients, **inputs, **state})
+        assert self._library.step(at, h) > 0
+        return {name: at[self.names.index(name)] for name in state}
+
+    def calculate(self, values: Values) -> dict[str, float]:
+        at = self.values(values)
+        self._library.calculate(at)
+        return dict(zip(self.names, at, strict=True))
+
+    def tangent(self, values: Values, changes: Values) -> dict[str, float]:
+        d = self.values(changes)
+        self._library.tangent(self.values(values), d)
+        return dict(zip(self.names, d, strict=True))
+
+
+def in_python(rov: Rov, inputs: Values, state: Values, h: float, steps: int = 1) -> State:
+    """The state after equal steps that last h together."""
+    for _ in range(steps):
+        state = rov.step(inputs, state, h / steps)
+    return dict(state)
+
+
+def in_fmu(fmu: Fmu, rov: Rov, inputs: Values, state: Values, h: float, steps: int = 1) -> State:
+    """The state of a new instance after equal steps that last h together."""
+    with fmu.instance() as instance:
+        instance.start({**rov.coefficients, **inputs, **state})
+        for n in range(steps):
+            assert instance.step(n * h / steps, h / steps) == OK, instance.log
+        return dict(zip(state, instance.get(list(state)), strict=True))
+
+
+def errors(found: Values, exact: Mapping[str, Any], scale: Mapping[str, Any], before: Values) -> tuple[float, float]:
+    """Largest error of velocities and forces, and of the pose beyond the rounding of a pose that is far from zero."""
+    largest = [0.0, 0.0]
+    for name, value in found.items():
+        error = abs(value - exact[name])
+        assert error == error, name  # noqa: PLR0124 (NaN)
+        if name in POSE:
+            error = max(0.0, error - 2.0 * ROUNDING * abs(before[name]))
+        relative = float(error / scale[name]) if scale[name] else float(error)
+        largest[name in POSE] = max(largest[name in POSE], relative)
+    return largest[0], largest[1]
+
+
+def worst(step: Step, rov: Rov, inputs: Values, state: Values, h: float) -> tuple[float, float]:
+    """Errors of a step against the exact one, by the largest velocity on the way and by the length of the path."""
+    exact = reference.step(rov, inputs, state, h)
+    return errors(step(rov, inputs, state, h), exact.state, exact.scale, state)

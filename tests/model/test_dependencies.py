@@ -1,0 +1,54 @@
+"""Dependencies follow from the equation alone: a term that is added to it appears in them, with the right kind."""
+
+from dataclasses import replace
+
+import pytest
+
+from rov_fmu.model import dependencies
+from rov_fmu.model.dependencies import dependencies_of, parameters_of
+from rov_fmu.model.equation import Equation, Term, equation_of
+from rov_fmu.model.layout import Layout
+from tests.vehicles import HEAVY, VIDEORAY
+
+ADDED = {
+    "a number": (Term("-2.5", ("z",)), "constant", ()),
+    "a formula of numbers": (Term("(3 - 1) / 4", ("z",)), "constant", ()),
+    "a fixed parameter": (Term("R", ("z",)), "fixed", ("R",)),
+    "a formula of fixed parameters": (Term("arm", ("z",)), "fixed", ("R", "gamma")),
+    "a tunable parameter": (Term("alpha_w", ("z",)), "tunable", ("alpha_w",)),
+    "a formula of fixed and tunable parameters": (Term("gain_w", ("z",)), "tunable", ("m_rov", "beta_w")),
+    "another state": (Term("1", ("z", "psi")), "dependent", ()),
+    "itself": (Term("1", ("z", "z")), "dependent", ()),
+    "an input": (Term("Z_ext", ("z",)), "dependent", ()),
+    "a formula of inputs": (Term("F_t", ("z",)), "dependent", ("a_t_top", "b_t_top")),
+    "a choice by a state": (Term("(2 if psi < 0 else 1)", ("z",)), "dependent", ()),
+    "a coefficient of zero": (Term("0", ()), None, ()),
+}
+"""A term that is added to the rate of u, the kind of the dependency on z, and the parameters that it brings."""
+
+
+@pytest.mark.parametrize("case", ADDED)
+def test_a_term_that_is_added_to_the_equation_is_found(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    term, kind, brought = ADDED[case]
+
+    def changed(layout: Layout) -> Equation:
+        equation = equation_of(layout)
+        return replace(equation, rows={**equation.rows, "u": (*equation.rows["u"], term)})
+
+    layout = VIDEORAY.layout
+    before, parameters = dependencies_of(layout), parameters_of(layout)
+    monkeypatch.setattr(dependencies, "equation_of", changed)
+    assert dependencies_of(layout)["der(u)"].get("z") == kind
+    assert {*parameters_of(layout)["der(u)"]} == {*parameters["der(u)"], *brought}
+    assert {name: known for name, known in dependencies_of(layout).items() if name != "der(u)"} == {
+        name: known for name, known in before.items() if name != "der(u)"
+    }
+
+
+def test_every_kind_of_dependency_of_a_vehicle_with_lag() -> None:
+    """As one reads them off the equations of the BlueROV2 Heavy."""
+    found = dependencies_of(HEAVY.layout)
+    assert found["der(z)"] == {"w": "constant"}
+    assert found["der(F_1)"]["F_1"] == "fixed"
+    assert found["der(w)"] == {"Z_ext": "tunable", "w": "dependent"} | {f"F_{n}": "tunable" for n in "5678"}
+    assert found["der(x)"] == {"V_N": "constant", "u": "dependent", "v": "dependent", "psi": "dependent"}

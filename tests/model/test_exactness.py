@@ -1,0 +1,354 @@
+"""Steps are exact, in Python and in C: against 50 digits, SciPy's integration of the equations, and themselves."""
+
+import random
+from collections.abc import Iterable, Sequence
+from functools import partial
+from itertools import count, product
+from math import copysign, cos, hypot, isfinite, sin
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import pytest
+from mpmath import mp
+from scipy.integrate import solve_ivp
+
+from checks import reference
+from checks.closed_form import Axis, axes
+from rov_fmu.model.rov import Rov
+from tests.fmi import ERROR
+from tests.fmi2 import Fmu
+from tests.model.steps import Step, errors, in_fmu, in_python, worst
+from tests.motions import path_of
+from tests.vehicles import (
+    HEAVY,
+    VEHICLES,
+    VIDEORAY,
+    Case,
+    State,
+    Values,
+    at_rest,
+    random_case,
+    random_vehicle,
+    still,
+)
+
+VELOCITY, PATH = 1e-14, 1e-13
+"""Of the largest velocity on the way, and of the length of the path."""
+
+
+@pytest.fixture(params=["Python", "C"])
+def step(request: pytest.FixtureRequest) -> Step:
+    """A step of the VideoRay."""
+    return in_python if request.param == "Python" else partial(in_fmu, request.getfixturevalue("fmu"))
+
+
+@pytest.fixture
+def heavy(heavy_dir: Path) -> Step:
+    """A step of the Heavy in C."""
+    return partial(in_fmu, Fmu(heavy_dir))
+
+
+def hold(step: Step, cases: Sequence[Case], velocity: float = VELOCITY, path: float = PATH) -> None:
+    for case in cases:
+        found = worst(step, *case)
+        assert found[0] <= velocity, (found, case)
+        assert found[1] <= path, (found, case)
+
+
+def every(nth: int, cases: Iterable[Any]) -> list[Any]:
+    """All cases, of which some run by default and all in the long run."""
+    marks = ([pytest.mark.long] if n % nth else [] for n in count())
+    return [pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=marks_of)
+            for case, marks_of in zip(cases, marks, strict=False)]  # fmt: skip
+
+
+# ---- Every vehicle, random states, steps of 1 us ... 1,000 s ----
+
+
+@pytest.mark.parametrize(
+    ("number", "longest"),
+    [(6, 0.3), pytest.param(4, 2.0, marks=pytest.mark.long), pytest.param(15, 2.0, marks=pytest.mark.weekly)],
+)
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_a_step_is_exact_for_vehicles_of_every_kind(vehicle: str, number: int, longest: float) -> None:
+    rng = random.Random(vehicle)
+    hold(in_python, [random_case(rng, VEHICLES[vehicle], longest=longest) for _ in range(number)])
+
+
+@pytest.mark.parametrize(
+    ("number", "longest"),
+    [(50, 0.0), pytest.param(75, 1.0, marks=pytest.mark.long), pytest.param(300, 1.0, marks=pytest.mark.weekly)],
+)
+def test_a_step_is_exact_for_random_vehicles(number: int, longest: float) -> None:
+    """What is more is of forces that nearly cancel: two thrusters that turn against each other, load and thrust."""
+    rng = random.Random(1)
+    hold(in_python, [random_case(rng, random_vehicle(rng), longest=longest) for _ in range(number)], 1e-12, 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("number", "longest"),
+    [(10, 0.3), pytest.param(8, 2.0, marks=pytest.mark.long), pytest.param(30, 2.0, marks=pytest.mark.weekly)],
+)
+def test_a_step_of_the_heavy_is_exact_in_c(heavy: Step, number: int, longest: float) -> None:
+    rng = random.Random(2)
+    hold(heavy, [random_case(rng, HEAVY, longest=longest) for _ in range(number)])
+
+
+@pytest.mark.parametrize(
+    ("number", "longest"),
+    [(30, 1.0), pytest.param(100, 1.0, marks=pytest.mark.long), pytest.param(400, 1.0, marks=pytest.mark.weekly)],
+)
+def test_a_step_of_any_vehicle_of_the_paper_is_exact(step: Step, number: int, longest: float) -> None:
+    """The VideoRay's numbers replaced by others, as its FMU lets one do."""
+    rng = random.Random(3)
+    vehicles = (random_vehicle(rng, VIDEORAY.layout) for _ in range(number))
+    hold(step, [random_case(rng, rov, longest=longest) for rov in vehicles], 1e-12, 1e-12)
+
+
+@pytest.mark.parametrize(("number", "layout"), [(300, VIDEORAY.layout), (100, HEAVY.layout)], ids=["VideoRay", "Heavy"])
+def test_the_fmu_steps_as_the_python_model_does(request: pytest.FixtureRequest, number: int, layout: Any) -> None:
+    """What differs is the order of sums, and the libraries' exp, sin and the like."""
+    fmu = Fmu(request.getfixturevalue("videoray_dir" if layout is VIDEORAY.layout else "heavy_dir"))
+    rng = random.Random(4)
+    for _ in range(number):
+        rov, inputs, before, h = random_case(rng, random_vehicle(rng, layout), longest=1.0)
+        expected = rov.step(inputs, before, h)
+        scale = {name: max(abs(value - before[name] * (name in "xyzpsi")), 1e-3) for name, value in expected.items()}
+        assert max(errors(in_fmu(fmu, rov, inputs, before, h), expected, scale, before)) <= 1e-11
+
+
+def test_extreme_vehicles_are_exact(step: Step) -> None:
+    """A gram of mass and as much drag as a vehicle file may hold: up to 1e12/m and 1e12/s."""
+    light = VIDEORAY.replaced({"m_rov": 1e-3, "beta_w": 1e3})
+    drags, loads = (0.0, 1.0, 1e6), (-1e12, -1.0, 0.0, 1e9)
+    for a_d, b_d, Z_ext, w, h in product(drags, drags, loads, (0.0, 1.0, 1e6), (1e-5, 1.0, 1e3)):
+        rov, inputs = light.replaced({"a_d_w": a_d, "b_d_w": b_d}), {**still(light), "Z_ext": Z_ext}
+        found, heave = step(rov, inputs, {**at_rest(rov), "w": w}, h), axes(rov, inputs)[1]
+        exact = reference.axis(heave.A, heave.B, heave.C, w, h)
+        assert abs(found["w"] - exact.velocity) <= 2e-15 * exact.scale, (heave, w, h)
+        assert abs(found["z"] - exact.distance) <= 4e-15 * exact.path, (heave, w, h)
+
+
+# ---- Reversals and spins ----
+
+# Axes of surge and yaw, u, r: surge reverses, where its third derivative jumps, while the vehicle spins.
+REVERSALS = [
+    *((Axis(1.0, 0.0, 0.01), Axis(0.0, 1.0, r), -0.01, r) for r in (20.0, 50.0, 70.0, 100.0, 150.0, 300.0)),
+    (Axis(0.144, 1e-4, 0.39), Axis(0.104, 0.0, -9173.0), -2.16, -0.87),
+    (Axis(0.122, 0.15, 0.11), Axis(0.085, 0.074, 7886.0), -1.07, 80.9),
+    (Axis(1.35, 0.3, 0.11), Axis(0.0079, 0.9, 2407.0), -5.84, 10.7),
+    (Axis(4.16, 0.09, 0.425), Axis(8.7e-4, 1.3, 9785.0), -1.11, 6.9),
+]
+
+
+def of_axes(surge: Axis, yaw: Axis, u: float, r: float, h: float) -> Case:
+    """A vehicle of the paper with these axes, driven by loads alone."""
+    ones = dict.fromkeys(VIDEORAY.coefficients, 1.0)
+    rov = Rov(VIDEORAY.layout, {**ones, "a_d_u": surge.A, "b_d_u": surge.B, "a_d_r": yaw.A, "b_d_r": yaw.B})
+    return rov, {**still(rov), "X_ext": surge.C, "N_ext": yaw.C}, {**at_rest(rov), "u": u, "r": r}, h
+
+
+@pytest.mark.parametrize("after", [1.0, 1.3, *(pytest.param(later, marks=pytest.mark.long) for later in (0.9, 2.5))])
+@pytest.mark.parametrize(("surge", "yaw", "u", "r"), every(5, REVERSALS))
+def test_a_reversal_while_spinning_is_exact(
+    step: Step, surge: Axis, yaw: Axis, u: float, r: float, after: float
+) -> None:
+    hold(step, [of_axes(surge, yaw, u, r, after * surge.reversal_time(u))], 3e-14, 3e-13)  # of many pieces
+
+
+@pytest.mark.parametrize("A", [4.9e-3, 0.01, 0.3, 3.0])
+@pytest.mark.parametrize("r", [-1.0, 1e3, 1e6])
+@pytest.mark.parametrize("h", [0.01, 1e3])
+def test_a_spin_that_drag_slows_down_is_exact(step: Step, A: float, r: float, h: float) -> None:
+    """With a steady u, and A alone in yaw: x + iy = u ((1 + A r h)^(1 + i/A) - 1)/(r (A + i)), whatever it turns."""
+    case = of_axes(Axis(0.0, 2.0, 1.0), Axis(A, 0.0, 0.0), 0.5, r, h)
+    with mp.workdps(60):
+        growth = 1 + mp.mpf(A) * abs(r) * h
+        turn = mp.log(growth) / A
+        exact = (growth * mp.expj(turn) - 1) / (2 * abs(r) * mp.mpc(A, 1))
+        size = min(h, growth / abs(r)) / 2
+        found = step(*case)
+        # the direction cannot be better than the rounding of the turn
+        assert abs(mp.mpc(found["x"], copysign(found["y"], r * found["y"])) - exact) <= size * 2e-15 * (1 + turn)
+        assert abs(abs(found["psi"]) - turn) <= 1e-15 * turn
+
+
+def spin_up(turn: float, h: float) -> float:
+    """The angular acceleration of a turn from rest: its angle goes with the square of the time."""
+    return 2.0 * turn / h**2
+
+
+@pytest.mark.parametrize("turn", [0.01, 0.05, 0.12, 0.7, 2.0, 4.0])
+@pytest.mark.parametrize("h", [1e-3, 0.1])
+def test_a_turn_that_begins_at_rest_is_exact(step: Step, turn: float, h: float) -> None:
+    C = spin_up(turn, h)
+    hold(step, [of_axes(Axis(0.1, 0.2, 0.0), Axis(0.0, B, C), 0.5, r, h)
+                for B in (0.0, 0.3) for r in (0.0, 0.1 * C * h)])  # fmt: skip
+
+
+@pytest.mark.parametrize("turn", [0.05, 0.12, 2.0])
+def test_a_turn_of_the_heavy_that_begins_at_rest_is_exact(heavy: Step, turn: float) -> None:
+    """By a load, and by thrust that has still to end or to begin."""
+    inputs, before, h = still(HEAVY), {**at_rest(HEAVY), "u": 0.5, "v": -0.2}, 0.01
+    load = spin_up(turn, h) * (HEAVY["I_r"] + HEAVY["m_a_r"])
+    late = {name: load for name in before if name.startswith("F_")}
+    hold(heavy, [(HEAVY, {**inputs, "N_ext": load}, before, h), (HEAVY, inputs, {**before, **late}, h)])
+
+
+# As above, and h: turns in which something is huge, next to nothing, or both.
+FAR = {
+    "a steady turn longer than the age of the universe": (
+        Axis(0.5, 1.4, 0.27), Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1e24,
+    ),
+    "no surge but the smallest number": (Axis(0.5, 1.4, 0.0), Axis(0.14, 0.12, 1e-3), -5e-324, 0.0, 1e9),
+    "a subnormal force": (Axis(0.5, 15.0, -1e-311), Axis(0.14, 0.12, -1e-12), 0.0, 0.0, 500.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAR)
+def test_no_turn_goes_too_far(step: Step, name: str) -> None:
+    rov, inputs, before, h = case = of_axes(*FAR[name])
+    found = step(*case)
+    assert all(map(isfinite, found.values()))
+    surge, _, yaw = axes(rov, inputs)
+    expected = [surge.advance(before["u"], h)[0], yaw.advance(before["r"], h)[0]]
+    assert [found["u"], found["r"]] == pytest.approx(expected, rel=1e-14, abs=1e-300)  # subnormal forces do not move it
+    way = path_of(surge, before["u"], h)
+    assert hypot(found["x"], found["y"]) <= way * (1.0 + 1e-14) + 1e-320
+
+
+CALM = Axis(0.5, 1.4, 0.27)
+OVERFLOWING = [  # turns of more than 1e308 rad, and ways of more than 1e308 m
+    of_axes(CALM, Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1.79e308),
+    of_axes(CALM, Axis(0.0055, 0.0, 0.0), 0.0, 1.7e308, 1e308),
+    of_axes(Axis(0.0, 0.0, 1e300), CALM, 0.0, 1.0, 1e8),
+    of_axes(Axis(0.0, 0.0, -1.0), Axis(0.0, 0.0, 0.0), 1e10, 1e300, 1e10 + 10.0),
+]
+
+
+@pytest.mark.parametrize("case", [OVERFLOWING[0], *OVERFLOWING[2:]], ids=["turn", "way", "both"])
+def test_what_overflows_is_not_finite_at_once(case: Case) -> None:
+    start = process_time()
+    assert not all(map(isfinite, in_python(*case).values()))
+    assert process_time() - start < 1.0
+
+
+@pytest.mark.parametrize("case", OVERFLOWING, ids=["turn", "spin", "way", "both"])
+def test_what_overflows_is_said_at_once(fmu: Fmu, case: Case) -> None:
+    rov, inputs, before, h = case
+    with fmu.instance() as instance:
+        instance.start({**rov.coefficients, **inputs, **before})
+        start = process_time()
+        assert instance.step(0.0, h) == ERROR
+        assert process_time() - start < 0.5
+        assert any(word in instance.log[-1].text for word in ("overflows", "MOST_PIECES"))
+
+
+# ---- The VideoRay, against an integration of the equations as the paper prints them ----
+
+AHEAD = {"u_l": 0.5, "u_r": 0.5}
+MANOEUVRES: dict[str, tuple[Values, Values]] = {
+    "ahead": (AHEAD, {}),
+    "astern": ({"u_l": -0.7, "u_r": -0.7}, {}),
+    "reversing": ({"u_l": -0.5, "u_r": -0.5}, {"u": 1.2}),
+    "turning": ({"u_l": 0.6, "u_r": 0.3}, {"psi": 1.0}),
+    "turning back": ({"u_l": 0.3, "u_r": 0.6}, {"u": 0.8, "r": 1.5}),
+    "spinning": ({"u_l": 0.7, "u_r": -0.7}, {"u": 0.5}),
+    "diving": ({"u_t": 0.7}, {"w": -0.3, "z": 5.0}),
+    "against loads": (
+        {"u_l": 0.4, "u_r": 0.2, "u_t": -0.3, "X_ext": -3.0, "Z_ext": 1.5, "N_ext": 0.1},
+        {"u": 0.5, "w": 0.2, "r": -1.0},
+    ),
+    "in a current": ({**AHEAD, "u_r": 0.45, "V_N": 0.3, "V_E": -0.8}, {"x": 10.0, "y": -20.0, "psi": -2.0}),
+    "coasting": ({}, {"u": 1.5, "w": -0.4, "r": 3.0}),
+}
+
+
+def manoeuvre(name: str) -> tuple[State, State]:
+    inputs, state = MANOEUVRES[name]
+    return {**still(VIDEORAY), **inputs}, {**at_rest(VIDEORAY), **state}
+
+
+def integrated(k: Values, i: Values, before: Values, h: float) -> State:
+    """(18), (2), (4) and the kinematics by DOP853."""
+    F_l, F_r = ((k["a_t_rear"] * abs(c) * c + k["b_t_rear"] * c) / 2.0 for c in (i["u_l"], i["u_r"]))  # half of (9)
+    F_t = k["a_t_top"] * abs(i["u_t"]) * i["u_t"] + k["b_t_top"] * i["u_t"]
+    torque = F_l * k["R"] * sin(k["gamma"]) + F_r * k["R"] * sin(-k["gamma"])
+    X, Z, N = (k["alpha_u"] * (F_r + F_l) + i["X_ext"], k["alpha_w"] * F_t + i["Z_ext"],
+               k["alpha_r"] * torque + i["N_ext"])  # fmt: skip
+
+    def rates(_t: float, state: Any) -> list[float]:
+        u, w, r, _x, _y, _z, psi = state
+        return [
+            k["beta_u"] * (X - (k["a_d_u"] * u * abs(u) + k["b_d_u"] * u)) / k["m_rov"],
+            k["beta_w"] * (Z - (k["a_d_w"] * w * abs(w) + k["b_d_w"] * w)) / k["m_rov"],
+            k["beta_r"] * (N - (k["a_d_r"] * r * abs(r) + k["b_d_r"] * r)) / k["I_r"],
+            u * cos(psi) + i["V_N"],
+            u * sin(psi) + i["V_E"],
+            w,
+            r,
+        ]
+
+    solution = solve_ivp(rates, (0.0, h), list(before.values()), method="DOP853", rtol=1e-12, atol=1e-12)
+    return dict(zip(before, solution.y[:, -1], strict=True))
+
+
+@pytest.mark.parametrize("h", [0.1, 1.0, 20.0])
+@pytest.mark.parametrize("name", MANOEUVRES)
+def test_a_step_solves_the_equations_of_the_paper(step: Step, name: str, h: float) -> None:
+    inputs, before = manoeuvre(name)
+    expected = integrated(VIDEORAY.coefficients, inputs, before, h)
+    assert step(VIDEORAY, inputs, before, h) == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+# ---- Many steps, long steps and far headings ----
+
+
+@pytest.mark.parametrize("name", every(3, MANOEUVRES))
+def test_one_step_of_ten_seconds_is_a_thousand_of_ten_milliseconds(step: Any, name: str) -> None:
+    inputs, before = manoeuvre(name)
+    once, often = (step(VIDEORAY, inputs, before, 10.0, steps=steps) for steps in (1, 1000))
+    assert [often[v] for v in "uwr"] == pytest.approx([once[v] for v in "uwr"], rel=1e-13, abs=1e-15)
+    assert often == pytest.approx(once, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_one_step_of_a_second_is_a_hundred_of_ten_milliseconds(vehicle: str) -> None:
+    rng = random.Random(f"{vehicle} in parts")
+    for _ in range(3):
+        rov, inputs, before, _ = random_case(rng, VEHICLES[vehicle])
+        once, often = (in_python(rov, inputs, before, 1.0, steps) for steps in (1, 100))
+        assert often == pytest.approx(once, rel=2e-13, abs=2e-13)
+
+
+@pytest.mark.parametrize("name", every(3, MANOEUVRES))
+def test_a_step_of_a_thousand_seconds_is_exact_and_takes_no_time(step: Step, name: str) -> None:
+    inputs, before = manoeuvre(name)
+    exact = reference.step(VIDEORAY, inputs, before, 1000.0)
+    started = process_time()
+    found = step(VIDEORAY, inputs, before, 1000.0)
+    assert process_time() - started < (1.0 if step is in_python else 0.1)
+    assert max(errors(found, exact.state, exact.scale, before)) <= 1e-14
+
+
+@pytest.mark.parametrize("psi", [1e3, -1e6, 1e9])
+def test_a_heading_far_from_zero_is_as_good_as_one_near_it(step: Step, psi: float) -> None:
+    inputs, before = {**still(VIDEORAY), "u_l": 0.6, "u_r": 0.3}, {**at_rest(VIDEORAY), "u": 0.5}
+    near, far = (step(VIDEORAY, inputs, {**before, "psi": start}, 10.0) for start in (0.0, psi))
+    assert (far["u"], far["r"]) == pytest.approx((near["u"], near["r"]), rel=1e-14)
+    c, d, x, y = cos(psi), sin(psi), near["x"], near["y"]
+    assert (far["x"], far["y"]) == pytest.approx((x * c - y * d, x * d + y * c), rel=1e-13, abs=1e-15)
+    assert far["psi"] == pytest.approx(psi + near["psi"], rel=1e-15)
+
+
+@pytest.mark.parametrize(("h", "steps"), [(1e6, 1), (1e6, 1000)])
+def test_a_steady_turn_stays_on_its_circle(step: Any, h: float, steps: int) -> None:
+    inputs = {**still(VIDEORAY), "u_l": 0.6, "u_r": 0.3}
+    start = step(VIDEORAY, inputs, at_rest(VIDEORAY), 100.0)
+    end = step(VIDEORAY, inputs, start, h, steps)
+    assert (end["u"], end["r"]) == pytest.approx((start["u"], start["r"]), rel=1e-15)
+    assert end["psi"] - start["psi"] == pytest.approx(start["r"] * h, rel=1e-13)
+    radius = start["u"] / start["r"]
+    centres = [(s["x"] - radius * sin(s["psi"]), s["y"] + radius * cos(s["psi"])) for s in (start, end)]
+    assert centres[1] == pytest.approx(centres[0], abs=1e-9 * radius)  # psi of 1e6 rad has 1e-10 rad of rounding

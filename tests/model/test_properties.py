@@ -1,0 +1,254 @@
+"""Laws of the step of one axis, for every drag, force, velocity and time: the step in Python judged by itself."""
+
+from collections.abc import Callable, Sequence
+from math import e, inf
+from typing import Any
+
+import pytest
+from hypothesis import assume
+from hypothesis import strategies as st
+from mpmath import mp
+
+from checks.closed_form import time_to_rest
+from rov_fmu.model.riccati import steady_velocity, time_constant
+from tests.motions import (
+    BOUNDARIES,
+    CASES,
+    OFFSET,
+    SMALLEST,
+    TINY,
+    Case,
+    hold,
+    memory,
+    path,
+    power,
+    rounding_of_distance,
+    rounding_of_velocity,
+    signed,
+    similar,
+    step_alone,
+)
+
+
+def for_every(
+    *strategies: st.SearchStrategy[Any], at: Sequence[tuple[Any, ...]] = ()
+) -> Callable[[Callable[..., None]], Callable[[int], None]]:
+    """Make a law a test: at these places, on some hundred motions, and on many more in the long and weekly tests."""
+
+    def decorate(law: Callable[..., None]) -> Callable[[int], None]:
+        @pytest.mark.parametrize(
+            "motions", [150, pytest.param(750, marks=pytest.mark.long), pytest.param(3000, marks=pytest.mark.weekly)]
+        )
+        def test(motions: int) -> None:
+            hold(law, motions, *strategies, at=at)
+
+        test.__doc__ = law.__doc__
+        return test
+
+    return decorate
+
+
+# ---- Symmetry and semigroup ----
+
+
+@for_every(CASES, at=[(case,) for case in BOUNDARIES])
+def test_left_and_right_are_mirror_images_to_the_last_bit(case: Case) -> None:
+    A, B, C, v0, h = case
+    velocity, distance = step_alone(*case)
+    assert step_alone(A, B, -C, -v0, h) == (-velocity, -distance)
+
+
+@for_every(similar(), st.integers(-20, 20), st.integers(-20, 20), at=[(case, 3, -5) for case in BOUNDARIES[:8]])
+def test_units_of_powers_of_two_change_no_bit(case: Case, metres: int, seconds: int) -> None:
+    A, B, C, v0, h = case
+    m, s = 2.0**metres, 2.0**seconds
+    velocity, distance = step_alone(*case)
+    assume(abs(velocity) > 1e-290 or C == v0 == 0.0)  # not what has died out to some last digits
+    assert step_alone(A / m, B / s, C * m / s / s, v0 * m / s, h * s) == (velocity * m / s, distance * m)
+
+
+@for_every(CASES, st.just(0.5) | st.floats(0.5, 1.0), st.booleans(), at=[(case, 0.5, True) for case in BOUNDARIES])
+def test_two_parts_of_a_step_are_the_step(case: Case, fraction: float, longer_first: bool) -> None:
+    """Half steps above all. The second part takes the first one's rounding on: never enlarged, for drag only damps."""
+    A, B, C, v0, h = case
+    parts = [fraction * h, h - fraction * h]  # the difference is exact
+    assume(parts[1] > 0.0)
+    t1, t2 = parts if longer_first else parts[::-1]
+    velocity, distance = step_alone(*case)
+    middle, first = step_alone(A, B, C, v0, t1)
+    end, second = step_alone(A, B, C, middle, t2)
+    rounding = rounding_of_velocity(v0, velocity)
+    assert abs(end - velocity) <= 3.0 * rounding
+    # Where the force does not brake, nothing cancels, and a velocity is good to its own last digits.
+    passed_on = rounding if C < 0.0 < v0 or v0 < 0.0 < C else rounding_of_velocity(middle)
+    slowest = min(abs(middle), abs(end)) if middle * end > 0.0 else 0.0
+    allowed = 2.0 * rounding_of_distance(case) + passed_on * memory(A, B, t2, slowest)
+    assert abs(first + second - distance) <= allowed + 2.0**-52 * (abs(first) + abs(second))
+
+
+# ---- Approach to equilibrium ----
+
+
+@for_every(CASES, st.floats(1.0, 10.0), at=[(case, 2.0) for case in BOUNDARIES])
+def test_the_velocity_approaches_the_steady_one_and_never_passes_it(case: Case, longer: float) -> None:
+    A, B, C, v0, h = case
+    V = steady_velocity(A, B, C)
+    early, late = (step_alone(A, B, C, v0, time)[0] for time in (h, h * longer))
+    rounding = 2.0 * rounding_of_velocity(v0, early, late)
+    low, high = min(v0, V) - rounding, max(v0, V) + rounding
+    assert low <= early <= high
+    assert low <= late <= high
+    assert early <= late + rounding if v0 < V else late <= early + rounding
+
+
+@for_every(CASES, at=[(case,) for case in BOUNDARIES])
+def test_without_force_no_motion_gains_one_bit_of_speed_or_turns(case: Case) -> None:
+    A, B, _, v0, h = case
+    velocity, distance = step_alone(A, B, 0.0, v0, h)
+    assert 0.0 <= velocity <= v0 or v0 <= velocity <= 0.0
+    assert abs(distance) <= abs(v0) * h
+    assert distance * v0 >= 0.0
+
+
+@for_every(signed(-323.0, 18.0), power(-9.0, 9.0))
+def test_without_force_and_drag_no_bit_of_the_velocity_changes(v0: float, h: float) -> None:
+    assert step_alone(0.0, 0.0, 0.0, v0, h) == (v0, v0 * h)
+
+
+@for_every(CASES, at=[(case,) for case in [*BOUNDARIES, (0.0, 1e-280, 1e-280, 0.0, 1.0)]])
+def test_after_the_time_constant_a_start_from_rest_has_63_percent_of_the_steady_velocity(case: Case) -> None:
+    """Rounding of Tau counts by the acceleration, C at most, and C Tau is V_ss at most."""
+    A, B, C, _, _ = case
+    V, Tau = steady_velocity(A, B, C), time_constant(A, B, C)
+    assume(0.0 < abs(V) < inf and 0.0 < Tau < inf)
+    assume(abs(C) > 1e-290 and abs(V) < 1e150)  # what is subnormal has fewer digits; the square of V must not overflow
+    assume(abs(V) * Tau < inf)  # nor the distance: such a step is refused
+    velocity = step_alone(A, B, C, 0.0, Tau)[0]
+    assert abs(velocity - (1.0 - 1.0 / e) * V) <= 2.0 * rounding_of_velocity(V)
+
+
+@for_every(CASES, at=[((0.0, 1e-170, -1e-300, 1.0, 1.0),), ((1e-200, 0.0, -1e-200, 1.0, 1.0),)])
+def test_a_motion_against_the_force_is_at_rest_after_the_time_to_rest(case: Case) -> None:
+    """Rounding of that time counts by the force alone, and |C| times the time is |v0| at most: drag brakes, too.
+
+    An acceleration that is subnormal is off by its last digit all that time.
+    """
+    A, B, C, v0, _ = case
+    assume(C != 0.0 != v0)
+    C, v0 = -abs(C), abs(v0)
+    rest = time_to_rest(A, B, C, v0)
+    assume(0.0 < rest < inf and v0 * rest < inf)
+    assert abs(step_alone(A, B, C, v0, rest)[0]) <= 2.0 * rounding_of_velocity(v0) + SMALLEST * (rest - C)
+
+
+# ---- Energy ----
+
+
+@for_every(CASES, at=[(case,) for case in BOUNDARIES])
+def test_drag_takes_no_less_energy_than_at_an_even_speed_and_gives_none(case: Case) -> None:
+    """Of the work C s what v^2/2 did not gain: integral of B v^2 + A |v|^3.
+
+    Over a given path that is least at an even speed (Jensen) and most at the largest; without drag it is zero.
+    """
+    A, B, C, v0, h = case
+    velocity, distance = step_alone(*case)
+    fastest, way = max(abs(v0), abs(velocity)), path(*case)
+    lost = C * distance - 0.5 * (velocity - v0) * (velocity + v0)
+    even, most = (B * way / h + A * (way / h) ** 2) * way, (B + A * fastest) * fastest * way
+    rounding = 2.0 * fastest * rounding_of_velocity(fastest) + abs(C) * rounding_of_distance(case)
+    rounding += 4.0 * (B * way / h + A * (way / h) ** 2) * rounding_of_distance(case) + 1e-15 * most + TINY
+    assert even - rounding <= lost <= most + rounding
+
+
+# ---- Continuity ----
+
+
+@for_every(CASES, st.tuples(*[OFFSET] * 5), at=[(case, (1e-9, -1e-9, 1e-9, -1e-9, 1e-9)) for case in BOUNDARIES])
+def test_motions_that_begin_alike_stay_alike(case: Case, offsets: tuple[float, float, float, float, float]) -> None:
+    """Across a change of sign, of D^2, of formula, across the turn: by how much follows from the equation.
+
+    The difference of two motions grows by the difference of their accelerations at one velocity, and drag only damps
+    it. Acceleration is largest at the start.
+    """
+    A, B, C, v0, h = case
+    velocity, distance = step_alone(*case)
+    fastest = max(abs(v0), abs(velocity))
+    assume(fastest > 1e-140)  # its square, a product of the table of terms, is not subnormal
+    # relative, and relative to what matters within the time, so that zeros are crossed, too
+    units = (1.0 / (fastest * h), 1.0 / h, fastest / h, fastest, 0.0)
+    A2, B2, C2, v2, h2 = (
+        number + offset * (abs(number) + unit) for number, offset, unit in zip(case, offsets, units, strict=True)
+    )
+    A2, B2 = max(A2, 0.0), max(B2, 0.0)
+    near: Case = (A2, B2, C2, v2, h2)
+    other, way = step_alone(*near)
+    apart = abs(C2 - C) + (abs(B2 - B) + abs(A2 - A) * fastest) * fastest
+    felt = memory(A2, B2, h)
+    difference = abs(v2 - v0) + apart * felt
+    later = abs(C2 - (B2 + A2 * abs(v2)) * v2) * abs(h2 - h)
+    assert abs(other - velocity) <= difference + later + 2.0 * rounding_of_velocity(fastest, v2, other)
+    along = abs(v2 - v0) * felt + apart * felt * h + max(abs(v2), abs(other), fastest + difference) * abs(h2 - h)
+    assert abs(way - distance) <= along + rounding_of_distance(case) + rounding_of_distance(near)
+
+
+# ---- Limits ----
+
+
+def agree(case: Case, exact: tuple[Any, Any], apart: float) -> None:
+    """The motion and an elementary one, whose accelerations are `apart` at most."""
+    velocity, distance = step_alone(*case)
+    A, B, _, v0, h = case
+    assert abs(velocity - exact[0]) <= apart * memory(A, B, h) + rounding_of_velocity(v0, velocity)
+    assert abs(distance - exact[1]) <= apart * memory(A, B, h) * h + rounding_of_distance(case)
+
+
+FAINT = st.just(0.0) | st.just(SMALLEST) | power(-300.0, -6.0)
+
+
+@for_every(similar(), FAINT, FAINT)
+def test_without_drag_the_motion_is_uniformly_accelerated(case: Case, a: float, b: float) -> None:
+    _, _, C, v0, h = case
+    fastest = abs(v0) + abs(C) * h
+    assume(fastest > 0.0)
+    A, B = a / (fastest * h), b / h
+    with mp.workdps(50):
+        exact = v0 + mp.mpf(C) * h, (v0 + mp.mpf(C) * h / 2) * h
+        agree((A, B, C, v0, h), exact, (B + A * fastest) * fastest)
+
+
+@for_every(similar(), FAINT)
+def test_without_quadratic_drag_the_velocity_decays_exponentially(case: Case, a: float) -> None:
+    _, B, C, v0, h = case
+    fastest = abs(v0) + abs(C) * h
+    assume(B > 0.0 and fastest > 0.0)
+    A = a / (fastest * h)
+    with mp.workdps(50):
+        V = mp.mpf(C) / B
+        exact = V + (v0 - V) * mp.exp(-mp.mpf(B) * h), V * h - (v0 - V) * mp.expm1(-mp.mpf(B) * h) / B
+        agree((A, B, C, v0, h), exact, A * fastest**2)
+
+
+@for_every(similar(), FAINT)
+def test_without_linear_drag_the_velocity_is_a_tanh_a_hyperbola_or_a_tan(case: Case, b: float) -> None:
+    A, _, C, v0, h = case
+    v0 = abs(v0)
+    assume(A > 0.0 and (C >= 0.0 or v0 > 0.0))
+    B = b / h
+    with mp.workdps(50):
+        V = mp.sqrt(abs(mp.mpf(C)) / A)
+        if C == 0.0:
+            exact = v0 / (1 + mp.mpf(A) * v0 * h), mp.log1p(mp.mpf(A) * v0 * h) / A
+        elif C > 0.0:
+            c, s = mp.cosh(A * V * h), mp.sinh(A * V * h)
+            exact = V * (v0 * c + V * s) / (V * c + v0 * s), mp.log(c + v0 / V * s) / A
+        else:
+            phase, angle = mp.atan(v0 / V), A * V * h
+            forth = -mp.log(mp.cos(phase)) / A
+            back = angle - phase
+            exact = (
+                (V * mp.tan(-back), mp.log(mp.cos(back) / mp.cos(phase)) / A)
+                if back < 0
+                else (-V * mp.tanh(back), forth - mp.log(mp.cosh(back)) / A)
+            )
+        fastest = max(v0, float(abs(exact[0])))
+        agree((A, B, C, v0, h), exact, B * fastest)

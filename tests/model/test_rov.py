@@ -1,0 +1,165 @@
+"""The ROV's mathematics in motion.rov: thrust, signs, rates."""
+
+import random
+from math import copysign, cos, pi, sin
+
+import pytest
+from mpmath import mp
+
+from checks.equations import equations, steady_forces
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.vehicles import HEAVY, VEHICLES, State, Values, at_rest, random_case, random_inputs, random_vehicle, still
+
+COMMANDS = [-1.0, -0.7, -0.2, 0.0, 0.1, 0.27, 0.5, 1.0]
+
+
+@pytest.fixture(scope="module")
+def k(vehicle: Vehicle) -> Rov:
+    return vehicle.rov
+
+
+def held(rov: Rov, **values: float) -> State:
+    """Inputs, zero but for these."""
+    return {**still(rov), **values}
+
+
+def thrust(rov: Rov, **commands: float) -> Values:
+    return rov.thrust(held(rov, **commands), at_rest(rov))
+
+
+# ---- Thrust ----
+
+
+@pytest.mark.parametrize("c", COMMANDS)
+def test_thrust_is_that_of_2_9_and_10(k: Rov, c: float) -> None:
+    F = thrust(k, u_l=c, u_r=c, u_t=c)
+    assert pytest.approx(42.9 * abs(c) * c + 2.711 * c, rel=1e-15) == F["F_l"] + F["F_r"]
+    assert pytest.approx(6.494 * abs(c) * c + 0.0513 * c, rel=1e-15) == F["F_t"]
+    assert F["F_l"] == F["F_r"]
+    assert F["tau_rear"] == 0.0
+
+
+@pytest.mark.parametrize("c", COMMANDS)
+def test_the_unweighted_rear_thrust_is_that_of_8_negative_below_27_percent(vehicle: Vehicle, c: float) -> None:
+    unweighted = vehicle.rov.replaced(vehicle.alternatives["unweighted_rear_thrust"].values)
+    F = thrust(unweighted, u_l=c, u_r=c)
+    assert pytest.approx(100.3 * abs(c) * c - 27.09 * c, rel=1e-14) == F["F_l"] + F["F_r"]
+    assert (F["F_l"] * c < 0.0) == (0.0 < abs(c) <= 0.27)
+
+
+def test_each_rear_thruster_has_half_the_pair_and_the_torque_of_4(k: Rov) -> None:
+    F = thrust(k, u_l=0.6, u_r=-0.3)
+    assert pytest.approx((42.9 * 0.36 + 2.711 * 0.6) / 2.0, rel=1e-15) == F["F_l"]
+    assert pytest.approx(-(42.9 * 0.09 + 2.711 * 0.3) / 2.0, rel=1e-15) == F["F_r"]
+    assert pytest.approx(0.22 * sin(0.423) * F["F_l"] + 0.22 * sin(-0.423) * F["F_r"], rel=1e-15) == F["tau_rear"]
+
+
+@pytest.mark.parametrize("beyond", [1.0 + 1e-15, 1.5, 1e300])
+def test_commands_beyond_full_thrust_saturate(k: Rov, beyond: float) -> None:
+    full, more = held(k, u_l=1.0, u_r=-1.0, u_t=1.0), held(k, u_l=beyond, u_r=-beyond, u_t=beyond)
+    assert k.thrust(more, at_rest(k)) == k.thrust(full, at_rest(k))
+    assert k.step(more, at_rest(k), 1.0) == k.step(full, at_rest(k), 1.0)
+
+
+def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations() -> None:
+    """Within rounding of the largest term; at rest and on the edges of the dead band, too."""
+    rng = random.Random(6)
+    for _ in range(300):
+        rov, inputs, state, _ = random_case(rng, random_vehicle(rng))
+        with mp.workdps(50):
+            exact = steady_forces(rov, inputs)
+            assert rov.commanded(inputs) == pytest.approx({n: float(F) for n, F in exact.items()}, rel=1e-13, abs=1e-13)
+            rates = equations(rov, inputs).rates({name: mp.mpf(value) for name, value in state.items()}, inputs)
+            size = 1.0 + sum(abs(float(rate)) for rate in rates.values())
+            expected = {name: float(rate) for name, rate in rates.items()}
+        assert rov.derivatives(inputs, state) == pytest.approx(expected, rel=1e-13, abs=1e-13 * size)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_within_the_dead_band_and_on_its_edge_there_is_no_thrust(sign: float) -> None:
+    c_0 = HEAVY["c_0_t200"]
+    for command in (0.0, 0.5 * c_0, c_0):
+        assert set(HEAVY.commanded(held(HEAVY, u_1=sign * command)).values()) == {0.0}
+    assert HEAVY.commanded(held(HEAVY, u_1=sign * (c_0 + 1e-6)))["1"] * sign > 0.0
+
+
+def test_one_input_drives_several_thrusters_and_each_of_them_saturates() -> None:
+    rov = VEHICLES["with an input mix"]
+    both, ahead = (rov.commanded(held(rov, **inputs)) for inputs in ({"u_ahead": 1.0, "u_turn": 1.0}, {"u_ahead": 1.0}))
+    assert both["2"] == ahead["2"] == rov.curve_force(rov.layout.curves[0], 1.0)
+    assert both["1"] == rov.curve_force(rov.layout.curves[0], 0.5)
+
+
+# ---- Signs ----
+
+
+@pytest.mark.parametrize(
+    ("inputs", "signs"),
+    [
+        ({"u_l": 0.3, "u_r": 0.3}, {"u": 1, "x": 1}),
+        ({"u_l": -0.3, "u_r": -0.3}, {"u": -1, "x": -1}),
+        ({"u_l": 0.3, "u_r": -0.3}, {"r": 1, "psi": 1}),
+        ({"u_l": -0.3, "u_r": 0.3}, {"r": -1, "psi": -1}),
+        ({"u_l": 0.5, "u_r": 0.3}, {"u": 1, "x": 1, "y": 1, "r": 1, "psi": 1}),  # ahead, and to starboard of it
+        ({"u_t": 0.3}, {"w": 1, "z": 1}),
+        ({"u_t": -0.3}, {"w": -1, "z": -1}),
+        ({"X_ext": 1.0}, {"u": 1, "x": 1}),
+        ({"Z_ext": 1.0}, {"w": 1, "z": 1}),
+        ({"N_ext": 0.1}, {"r": 1, "psi": 1}),
+        ({"V_N": 1.0}, {"x": 1}),
+        ({"V_E": 1.0}, {"y": 1}),
+    ],
+)
+def test_the_signs_are_those_of_the_body_and_earth_frames(k: Rov, inputs: Values, signs: dict[str, int]) -> None:
+    after = k.step({**still(k), **inputs}, at_rest(k), 0.5)
+    assert {name: copysign(1, value) for name, value in after.items() if value != 0.0} == signs
+
+
+def test_north_is_ahead_at_heading_zero_and_east_at_a_quarter_turn(k: Rov) -> None:
+    ahead = held(k, u_l=0.5, u_r=0.5)
+    distance = k.step(ahead, at_rest(k), 2.0)["x"]
+    for psi in (0.0, 0.5 * pi, pi, -0.5 * pi, 2.0):
+        after = k.step(ahead, {**at_rest(k), "psi": psi}, 2.0)
+        assert (after["x"], after["y"]) == pytest.approx(
+            (distance * cos(psi), distance * sin(psi)), rel=1e-15, abs=1e-15
+        )
+        assert after["psi"] == psi
+
+
+def test_a_current_displaces_and_does_nothing_else(k: Rov) -> None:
+    calm = held(k, u_l=0.5, u_r=0.2, u_t=-0.4)
+    before = {**at_rest(k), "u": 0.3, "w": 0.1, "r": -1.0, "psi": 0.7}
+    a, b = (k.step(inputs, before, 3.0) for inputs in (calm, {**calm, "V_N": 0.5, "V_E": -0.25}))
+    assert {**b, "x": a["x"], "y": a["y"]} == a
+    assert (b["x"] - a["x"], b["y"] - a["y"]) == pytest.approx((1.5, -0.75), rel=1e-14)
+
+
+# ---- Rates and steps ----
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_derivatives_are_the_rates_at_which_a_step_begins(vehicle: str) -> None:
+    rng = random.Random(vehicle)
+    for _ in range(10):
+        rov, inputs, before, _ = random_case(rng, VEHICLES[vehicle])
+
+        def rates(h: float, rov: Rov = rov, inputs: Values = inputs, before: Values = before) -> list[float]:
+            after = rov.step(inputs, before, h)
+            return [(after[name] - before[name]) / h for name in before]
+
+        # the error of the first order in h cancels; yaw bends at 10/s, its third derivative is some 1e3
+        found = [2.0 * b - a for a, b in zip(rates(1e-5), rates(0.5e-5), strict=True)]
+        expected = rov.derivatives(inputs, before)
+        assert list(expected) == list(before)
+        assert found == pytest.approx(list(expected.values()), rel=3e-7, abs=3e-7)
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES)
+def test_a_step_leaves_what_it_is_given(vehicle: str) -> None:
+    rov = VEHICLES[vehicle]
+    rng = random.Random(8)
+    inputs, before = random_inputs(rng, rov), at_rest(rov)
+    copies = dict(inputs), dict(before)
+    assert rov.step(inputs, before, 0.1).keys() == before.keys()
+    assert (inputs, before) == copies
