@@ -1,3 +1,27 @@
-"""An identified underwater vehicle (ROV) as an FMU: tank tests to vehicle file, vehicle file to FMU."""
+"""An identified underwater vehicle (ROV) as an FMU: tank tests to vehicle file, vehicle file to FMU.
 
+import rov_fmu
+
+vehicle = rov_fmu.load("videoray")
+run = vehicle.simulate([0.0, 5.0, 10.0], {"u_l": 0.3, "u_r": 0.3})
+print(run["u"])
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rov_fmu.interface.model import VehicleModel
+
+__all__ = ["load"]
 __version__ = "0.2.0"
+
+
+def load(vehicle: str | Path) -> "VehicleModel":
+    """Load a vehicle that ships, by its name, or a vehicle file, by its path.
+
+    Raises FileError, a ValueError, with one line for each mistake.
+    """
+    from rov_fmu.interface.model import load as load_model  # late, so that `import rov_fmu` is quick
+
+    return load_model(vehicle)

@@ -5,18 +5,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
+from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError, compile_all, host_platform
 from rov_fmu.export.archive import archive, native_content, python_content
-from rov_fmu.export.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError, compile_all, host_platform
 from rov_fmu.export.model_description import NATIVE
 from rov_fmu.export.module import module
 from rov_fmu.export.osp import osp_model_description, osp_path
 from rov_fmu.export.reference_results import reference_results
 from rov_fmu.files.interrupts import temporary_folder
 from rov_fmu.files.kinds import FMU, check_written
-from rov_fmu.files.messages import did_you_mean
+from rov_fmu.files.messages import InputError, did_you_mean, shown
 from rov_fmu.files.output import Output, check_targets, write_whole
 from rov_fmu.pages.fmu_page import documentation
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
+
+BACKENDS = ("native", "pythonfmu")
 
 
 @dataclass(frozen=True)
@@ -35,15 +37,13 @@ class Built:
     """What was found when the FMU was validated and run."""
     beside: Sequence[Path]
     """What was written beside it."""
-    left_out: Sequence[str] = ()
-    """Experiments that it has no expected results of, for their motion is too fast to be resolved."""
 
 
 def build(
     vehicle: Vehicle,
-    output: Path | None = None,
+    output: str | Path | None = None,
     *,
-    platforms: Sequence[str] | None = None,
+    platforms: str | Sequence[str] | None = None,
     backend: str = "native",
     fmi: int = 2,
     osp: bool = False,
@@ -52,15 +52,22 @@ def build(
 ) -> Built:
     """Build the FMU of a vehicle, validate it and run it; it is written whole or not at all.
 
-    `output` is <identifier>.fmu in this folder by default, of FMI 3.0 (`fmi` = 3) <identifier>.fmi3.fmu; `platforms`
-    all of PLATFORMS; `host` is this machine's. The backend `pythonfmu` makes the flavour in pure Python, for all
-    platforms at once. `osp` also writes <identifier>_OspModelDescription.xml beside it. Both are of FMI 2.0 alone.
-    `inputs` are files that it must not overwrite, besides those that the vehicle names. `on_compiled` is told of every
-    platform that is done.
+    `output` is the file to write: by default <identifier>.fmu in this folder, for FMI 3.0 <identifier>.fmi3.fmu.
+    `platforms` names one or several of PLATFORMS, or `host`, which is this machine; all by default. `backend` is
+    `native`, or `pythonfmu` for the flavour in pure Python, which is the same for all platforms. `fmi` is the version
+    of FMI, 2 or 3. `osp` also writes <identifier>_OspModelDescription.xml beside the FMU. `pythonfmu` and `osp` need
+    FMI 2.0. `inputs` are files that must not be overwritten, besides those that the vehicle names. `on_compiled` is
+    called with the name of each platform when it is done.
 
-    Raises BuildError; VehicleFileError where a file of the vehicle cannot be read; OSError about a path that cannot be
-    written.
+    Raises InputError where `vehicle` is not a vehicle, or has coefficients that it cannot have; OptionError about the
+    other arguments; BuildError where the build fails; VehicleFileError where a file of the vehicle cannot be read;
+    WriteError, an OSError, about a path that cannot be written.
     """
+    if not isinstance(vehicle, Vehicle):
+        raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
+    check_coefficients(vehicle.layout, vehicle.rov.coefficients)
+    if backend not in BACKENDS:
+        raise OptionError(f"there is no backend {shown(backend)}, only {', '.join(BACKENDS)}")
     native = backend == "native"
     if fmi not in NATIVE:
         raise OptionError(f"there is no FMI version {fmi!r}, only {', '.join(map(str, NATIVE))}")
@@ -76,10 +83,9 @@ def build(
     check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
     check_written(output, FMU)
     chosen = chosen_platforms(platforms, fmi) if native else []
-    left_out: list[str] = []
-    results = reference_results(vehicle, left_out.append)
+    results = reference_results(vehicle)
     flown = module(vehicle.rov)
-    pages = {**documentation(vehicle, native=native, fmi=fmi, proves=bool(results), module=flown), **results}
+    pages = {**documentation(vehicle, native=native, fmi=fmi, module=flown), **results}
     content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
     start = perf_counter()
     seconds: dict[str, float] = {}
@@ -99,13 +105,14 @@ def build(
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
     written = [other.path for other in beside]
-    return Built(output, len(packed), content.guid, sizes, seconds, notes[0], written, left_out)
+    return Built(output, len(packed), content.guid, sizes, seconds, notes[0], written)
 
 
-def chosen_platforms(names: Sequence[str] | None, fmi: int = 2) -> list[str]:
+def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[str]:
     """Platforms by name, `host` resolved for this version of FMI; all where none is named. Raises BuildError."""
     if not names:
         return list(PLATFORMS)
+    names = [names] if isinstance(names, str) else names
     if unknown := set(names) - {"host", *PLATFORMS}:
         hint = did_you_mean(min(unknown), ["host", *PLATFORMS], also=OTHER_NAMES)
         names_of_all = ", ".join(["host", *PLATFORMS])

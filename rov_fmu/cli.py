@@ -1,6 +1,7 @@
-"""The command rov-fmu: build | fly | prove | study | identify | tune | convert | schema | tables | figures."""
+"""The command rov-fmu: build, simulate, fly, prove, study, identify, tune, schema, tables, figures."""
 
 import sys
+import warnings
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,12 +17,12 @@ import click
 from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
-from rov_fmu.export.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
+from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.files.interrupts import cleaned_up
 from rov_fmu.files.kinds import PAGE, VEHICLE_FILE, check_written
-from rov_fmu.files.messages import FileError, ProofError, StudyError, did_you_mean, shown
+from rov_fmu.files.messages import FileError, InputError, ProofError, StudyError, did_you_mean, shown
 from rov_fmu.files.output import check_targets, write_whole
-from rov_fmu.motion.layout import AXES
+from rov_fmu.model.layout import AXES
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
 
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
     from rov_fmu.studies.engine import Progress as StudyProgress
 
 _EXIT_CODES = {
-    FileError: 2, OSError: 2, click.ClickException: 2, OptionError: 2, BuildError: 1, ProofError: 1, StudyError: 1,
+    FileError: 2, InputError: 2, OSError: 2, click.ClickException: 2, OptionError: 2,
+    BuildError: 1, ProofError: 1, StudyError: 1,
 }  # fmt: skip
 
 
@@ -198,11 +200,72 @@ def _print_built(built: "Built", seconds: float) -> None:
     for name, size in built.binaries.items():
         out.print(f"  {name:<14}{size / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
     out.print(f"  {built.note}")
-    if built.left_out:
-        out.print(f"  no expected results, for it moves too fast: {', '.join(built.left_out)}", soft_wrap=True)
     for path in built.beside:
         out.print(Text(str(path), "bold"), soft_wrap=True)
     out.print(f"  built in {seconds:.1f} s")
+
+
+@_commands.command("simulate")
+@_vehicle(default=str(VIDEORAY))
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="An input that is held, a coefficient, or a state at the start, in SI units; may be repeated.",
+)
+@click.option(
+    "--input",
+    "commands",
+    type=_FILE,
+    metavar="COMMANDS.csv",
+    help="Inputs over time: the time (s) in the first column; each row is held up to the next one.",
+)
+@click.option(
+    "--stop",
+    type=_number("a number from 1e-6 (s)", 1e-6),
+    help="The end, s; by default the last time of COMMANDS.csv, or 10.",
+)
+@click.option(
+    "--step",
+    type=_number("a number from 1e-6 (s)", 1e-6),
+    help="The time between two results, s; 0.01 by default. It does not change the motion.",
+)
+@click.option("-o", "--output", type=_FILE, metavar="RESULT.csv", help="Table of the results to write, or .parquet.")
+@click.option(
+    "--plot",
+    is_flag=False,
+    flag_value=Path(),
+    type=_FILE,
+    metavar="[FILE.png]",
+    help="Plot to write (.png, .svg, .pdf), after VEHICLE; without FILE it opens in a browser.",
+)
+def _simulate(
+    vehicle: Path, settings: tuple[str, ...], commands: Path | None, stop: float | None, step: float | None,
+    output: Path | None, plot: Path | None,
+) -> None:  # fmt: skip
+    """Simulate a vehicle without an FMU: the VideoRay Pro 4 by default.
+
+    Inputs and states that are not set are 0. Without -o and --plot the values at the end are printed.
+    """
+    from rov_fmu.interface.command import check_targets_of, plot_output, print_final, run, table_output
+    from rov_fmu.interface.model import load
+
+    opens = plot == Path()
+    check_targets_of(output, None if opens else plot, [path for path in (vehicle, commands) if path])
+    loaded = load(vehicle)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        result = run(loaded, settings, commands, stop, step)
+    for warning in caught:
+        click.echo(f"rov-fmu: warning: {warning.message}", err=True)
+    picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
+    outputs = [table_output(result, output)] if output else []
+    write_whole(*outputs, *([plot_output(result, picture)] if picture else []))
+    if opens and picture:
+        _open(picture)
+    if not (output or picture):
+        print_final(loaded, result)
 
 
 @_commands.command("fly")
@@ -231,8 +294,16 @@ def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     page = fly_page([Flown(one, module(one.rov)) for one in loaded]).encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
     write_whole(Output(path, page))
+    if output:
+        click.echo(path)
+    else:
+        _open(path)
+
+
+def _open(path: Path) -> None:
+    """Print the path of a file, and open it in a browser."""
     click.echo(path)
-    if output is None and not webbrowser.open(path.as_uri()):
+    if not webbrowser.open(path.as_uri()):
         told = (
             "no browser could be opened: open this file, which needs no other, in a browser here or on another machine"
         )
@@ -431,17 +502,6 @@ def _tune(
     print_tuning(tuning)
     for told in implausible(tuning):
         click.echo(f"rov-fmu: warning: {told}", err=True)
-
-
-@_commands.command("convert")
-@_vehicle()
-@click.option("-o", "--output", type=_FILE, required=True, metavar="NEW.toml",
-              help="Vehicle file to write.")  # fmt: skip
-def _convert(vehicle: Path, output: Path) -> None:
-    """Write a vehicle file of the first version in the form of today, with its comments."""
-    from rov_fmu.vehicle.convert import converted
-
-    write_whole(converted(vehicle, output))
 
 
 @_commands.command("schema")

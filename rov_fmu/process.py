@@ -99,11 +99,23 @@ def _end_interrupted(program: str) -> None:
 
 
 def _kill_children() -> None:
+    """Kill the worker processes.
+
+    While a thread of Dask starts a worker, multiprocessing does not list it yet. Such a worker would print a traceback
+    when this process ends, so psutil, which Dask imports, finds it.
+    """
     from multiprocessing import active_children
 
     for child in active_children():
         with suppress(ValueError):  # another thread has just seen it end
             child.kill()
+    if "psutil" in sys.modules:
+        import psutil
+
+        for process in psutil.Process().children():
+            with suppress(psutil.Error):  # it has ended
+                if any("spawn_main" in part for part in process.cmdline()):
+                    process.kill()
 
 
 def _say(program: str, message: str, code: int) -> int:

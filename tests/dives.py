@@ -6,8 +6,8 @@ from math import radians
 import numpy as np
 
 from checks.pool import Array, swim
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.signals import Commands, Signal, recordings_of
 from rov_fmu.vehicle.shipped import SHIPPED

@@ -302,10 +302,10 @@ class Instance(ABC, Generic[Of]):
     def rates_by(self, vr: Any, orders: Any, values: Any) -> int:
         """Time derivatives of references to outputs."""
 
-    def rates(self, names: Sequence[str], order: int = 1) -> list[float]:
-        """Time derivatives of outputs."""
+    def rates(self, names: Sequence[str]) -> list[float]:
+        """First time derivatives of outputs."""
         values = room(len(names))
-        assert self.rates_by(self.fmu.references(names), integers(*[order] * len(names)), values) == OK, self.log
+        assert self.rates_by(self.fmu.references(names), integers(*[1] * len(names)), values) == OK, self.log
         return list(values)
 
     # ---- State ----

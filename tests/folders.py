@@ -4,8 +4,8 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
-from rov_fmu.motion.layout import YAW, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import YAW, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.given import ROV_FILE
 from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 

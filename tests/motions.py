@@ -1,4 +1,4 @@
-"""Motions to try laws on, over all that motion.riccati takes and where its formulas change; what rounding may do."""
+"""Motions of one axis to try laws on, over the whole range of doubles; and what rounding may do."""
 
 from collections.abc import Callable, Sequence
 from math import copysign, inf
@@ -7,7 +7,8 @@ from typing import Any
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from rov_fmu.motion.riccati import Riccati, advance, time_to_rest
+from checks.closed_form import Axis, advance, time_to_rest
+from tests.vehicles import VEHICLES, still
 
 Case = tuple[float, float, float, float, float]
 """A, B, C, v0, h of an axis."""
@@ -122,6 +123,19 @@ BOUNDARIES: list[Case] = [
 ]
 
 
+# ---- The step of a vehicle ----
+
+
+def step_alone(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
+    """Return the velocity after h seconds and the distance covered, from the step of a vehicle of this axis alone."""
+    rov = VEHICLES["heave only"]
+    rov = rov.replaced(
+        dict.fromkeys(rov.coefficients, 1.0) | {"a_d_w": A, "b_d_w": B, "a_d_w_reverse": A, "b_d_w_reverse": B}
+    )
+    after = rov.step(still(rov) | {"Z_ext": C}, {"w": v0, "z": 0.0}, h)
+    return after["w"], after["z"]
+
+
 # ---- What rounding may do ----
 
 
@@ -133,7 +147,7 @@ def path(A: float, B: float, C: float, v0: float, h: float) -> float:
     return abs(forth) + abs(advance(A, B, C, v0, h)[1] - forth)
 
 
-def path_of(axis: Riccati, v0: float, h: float) -> float:
+def path_of(axis: Axis, v0: float, h: float) -> float:
     """There and back on one axis of the vehicle."""
     return path(axis.A, axis.B, axis.C, v0, h)
 

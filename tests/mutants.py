@@ -35,14 +35,15 @@ PLACES = ("rov_fmu", "fmu_src/c")
 # By file, the first pattern that fits: the default tests that hold it, quick ones first.
 _TESTS = {
     "fmu_src/c/saved.c": "fmu/test_state fmu/test_state_bytes around/test_fuzz",
-    "fmu_src/c/[rst]*.c": "motion/test_c_step motion/test_exactness fmu/test_values fmu/test_derivatives "
-    "motion/test_time_to_rest motion/test_extremes motion/test_rov around/test_fuzz",
+    "fmu_src/c/[rst]*.c": "model/test_c_step model/test_exactness fmu/test_values fmu/test_derivatives "
+    "model/test_extremes model/test_rov around/test_fuzz",
     "fmu_src/c/*": "fmu/test_values fmu/test_lifecycle fmu/test_arguments fmu/test_instantiation fmu/test_state "
     "fmu/test_state_bytes fmu/test_model_exchange fmu/test_event_mode fmu/test_intermediate_update "
     "fmu/test_derivatives around/test_fuzz",
-    "rov_fmu/motion/riccati.py": "motion/test_time_to_rest motion/test_riccati motion/test_properties",
-    "rov_fmu/motion/series.py": "motion/test_series motion/test_symmetries motion/test_exactness",
-    "rov_fmu/motion/*": "motion/test_rov export/test_declared_numbers motion/test_symmetries motion/test_exactness",
+    "rov_fmu/model/riccati.py": "model/test_riccati model/test_rov",
+    "rov_fmu/model/step.py": "model/test_step model/test_symmetries model/test_exactness",
+    "rov_fmu/model/dependencies.py": "model/test_dependencies export/test_dependencies",
+    "rov_fmu/model/*": "model/test_rov export/test_declared_numbers model/test_symmetries model/test_exactness",
     "rov_fmu/identify/tuning.py": "identify/test_tuning identify/test_fuzzed_tables",
     "rov_fmu/identify/step_responses.py": "identify/test_step_responses identify/test_output_error",
     "rov_fmu/identify/*": "identify pages/test_report",

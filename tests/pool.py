@@ -8,8 +8,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from checks.pool import Array, swim
-from rov_fmu.motion.layout import AXIS, CURVE, Axis, coefficient_name
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import AXIS, CURVE, Axis, coefficient_name
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 
 Plan = Sequence[tuple[float, float]]

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.motion.rov import Rov
+from checks.closed_form import axis_of
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 
@@ -76,7 +77,7 @@ def clean(k: Rov, axis: Axis, plan: Sequence[tuple[float, float]], rate: float =
     command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
     v, s = 0.0, 0.0
     velocity, position = [], []
-    axes = {c: k.held(axis, c) for c, _ in plan}
+    axes = {c: axis_of(k.held(axis, c)) for c, _ in plan}
     for c in command.tolist():
         velocity.append(v)
         position.append(s)

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from math import sqrt
 from pathlib import Path
 
-from rov_fmu.motion.layout import AXES, CURVE, Curve, Layout, Thruster, VehicleAxis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import AXES, CURVE, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -16,7 +16,7 @@ _BY_SUFFIX = {
 _BY_KEY = {
     **dict.fromkeys(("stop_time", "vary", "figures"), PLAN),
     **dict.fromkeys(("known", "windows", "against", "base"), TESTS_FILE),
-    **dict.fromkeys(("thruster", "axes", "coefficients"), VEHICLE_FILE),
+    **dict.fromkeys(("thruster", "axes"), VEHICLE_FILE),
 }
 """Keys at the top of a TOML file, each of which only one kind of file can have, or is most likely to have."""
 _HINTS = {

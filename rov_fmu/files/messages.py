@@ -16,6 +16,19 @@ class FileError(ValueError):
         super().__init__("\n".join(map(one_line, reasons)))
 
 
+class InputError(ValueError):
+    """An argument of a function that cannot be used: one line with its name, its value and what is allowed."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(one_line(reason))
+
+
+class UnknownNameError(InputError, KeyError):
+    """A name that a result does not have."""
+
+    __str__ = ValueError.__str__
+
+
 class ProofError(Exception):
     """An FMU that does not come to the results that it carries."""
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from rov_fmu.identify.runs import PreparedRecording, push
 from rov_fmu.identify.step_responses import correlation_time
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 
 _DELAYS = (0.0, 0.1, 0.2, 0.4, 0.8)  # s, from the commands to the motion

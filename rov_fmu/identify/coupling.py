@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from rov_fmu.motion.layout import SURGE, SWAY, YAW, Axis, Layout
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import SURGE, SWAY, YAW, Axis, Layout
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 

@@ -12,8 +12,8 @@ from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.identify.thrust_fit import ThrustFit
 from rov_fmu.identify.usable import is_pushed
-from rov_fmu.motion.layout import REVERSE
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import REVERSE
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 
 

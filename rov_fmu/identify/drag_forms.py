@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from rov_fmu.identify.forms import widened
-from rov_fmu.motion.layout import REVERSE, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import REVERSE, Axis
+from rov_fmu.model.rov import Rov
 
 LEFT_OUT = "Left at 0: neither the information criterion (AICc) nor leave-one-thrust-out misses it"
 

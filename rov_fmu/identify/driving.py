@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from rov_fmu.motion.layout import Axis, Curve, Layout
+from rov_fmu.model.layout import Axis, Curve, Layout
 
 _KEYS = ("a_t", "b_t", "a_t_reverse", "b_t_reverse")
 """Thrust is linear in these."""

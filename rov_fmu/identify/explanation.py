@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite, log10, pi, sqrt
 
 from rov_fmu.identify.alone import Alone
-from rov_fmu.motion.layout import YAW, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import YAW, Axis
+from rov_fmu.model.rov import Rov
 
 FASTEST = {"m/s": 4.0, "rad/s": 8.0}
 """No ROV is faster."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rov_fmu.identify.coupling import EAST, NORTH
-from rov_fmu.motion.layout import AXES, HEAVE, REVERSE, Axis, coefficient_name
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import AXES, HEAVE, REVERSE, Axis, coefficient_name
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 
 Kind = Literal[

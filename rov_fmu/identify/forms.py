@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from dataclasses import replace
 
-from rov_fmu.motion.layout import AXIS, CURVE, Curve, Layout, VehicleAxis
+from rov_fmu.model.layout import AXIS, CURVE, Curve, Layout, VehicleAxis
 
 
 def with_keys(form: Curve, keys: Collection[str]) -> Curve:

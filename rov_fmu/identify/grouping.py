@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 
-from rov_fmu.motion.layout import AXES
+from rov_fmu.model.layout import AXES
 
 _NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _AXIS = re.compile(rf"({'|'.join(AXES)}): ")

@@ -16,7 +16,7 @@ from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.identify.step_responses import StepResponse
 from rov_fmu.identify.thrust_fit import ThrustFit
 from rov_fmu.identify.trajectory import MotionError
-from rov_fmu.motion.layout import Axis
+from rov_fmu.model.layout import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.tank_tests import TankTests
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -31,8 +31,8 @@ from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, measured
 from rov_fmu.identify.together import Together
 from rov_fmu.identify.trajectory import MotionError
 from rov_fmu.identify.usable import check_push, check_recording, check_slips, is_pushed
-from rov_fmu.motion.layout import Axis, Curve
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Axis, Curve
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import TankTests
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import least_squares
 
-from rov_fmu.motion.layout import AXIS, CURVE, TUNING, Kind
+from rov_fmu.model.layout import AXIS, CURVE, TUNING, Kind
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 

@@ -8,8 +8,8 @@ import numpy as np
 from rov_fmu.identify.extras import Extra, Kind
 from rov_fmu.identify.least_squares import bounds
 from rov_fmu.identify.runs import PreparedRecording, axes_of
-from rov_fmu.motion.layout import REVERSE, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import REVERSE, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 

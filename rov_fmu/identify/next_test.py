@@ -10,8 +10,8 @@ from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.runs import prepare
 from rov_fmu.identify.simulator import Simulator
 from rov_fmu.identify.trajectory import MotionError
-from rov_fmu.motion.layout import Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.uncertainty import is_factor

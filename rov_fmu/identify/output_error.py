@@ -26,8 +26,8 @@ from rov_fmu.identify.runs import PreparedRecording, axes_of, prepare
 from rov_fmu.identify.selection import candidates, earn_their_place, likely
 from rov_fmu.identify.simulator import Simulator, solve
 from rov_fmu.identify.trajectory import MotionError
-from rov_fmu.motion.layout import YAW, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import YAW, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation, white_noise

@@ -12,8 +12,8 @@ from rov_fmu.identify.held_out import HeldOut
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.residual_analysis import ResidualAnalysis, Simulation
 from rov_fmu.identify.response_fit import response_band
-from rov_fmu.motion.layout import Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 

@@ -19,8 +19,8 @@ from rov_fmu.identify.least_squares import (
     leave_one_out,
     rms,
 )
-from rov_fmu.motion.layout import Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.uncertainty import is_factor
 

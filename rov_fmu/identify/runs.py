@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rov_fmu.identify.coupling import Coupling, Current, carried, coupling
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.trajectory import REACH, ROUGH, Steps, recursion
-from rov_fmu.motion.layout import REVERSE, Axis, Curve, VehicleAxis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import REVERSE, Axis, Curve, VehicleAxis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import velocity, without_spikes

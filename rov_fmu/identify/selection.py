@@ -11,8 +11,8 @@ from rov_fmu.identify.extras import Extra, Kind
 from rov_fmu.identify.least_squares import covariance
 from rov_fmu.identify.residual_analysis import ResidualAnalysis
 from rov_fmu.identify.runs import PreparedRecording, axes_of
-from rov_fmu.motion.layout import AXES, REVERSE, SURGE, SWAY, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import AXES, REVERSE, SURGE, SWAY, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 
 _SIGNIFICANT = 6.63

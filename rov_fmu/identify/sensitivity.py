@@ -9,8 +9,8 @@ from rov_fmu.identify.coupling import EAST, NORTH
 from rov_fmu.identify.extras import Extra
 from rov_fmu.identify.runs import ForcedRun, PreparedRecording, at_samples, lagging
 from rov_fmu.identify.trajectory import Slopes, Steps, recursion
-from rov_fmu.motion.layout import REVERSE, Curve
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import REVERSE, Curve
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import is_factor
 

@@ -14,7 +14,7 @@ from rov_fmu.identify.limits import limits
 from rov_fmu.identify.runs import ForcedRun, PreparedRecording, at_samples, forced_run, joined, steps_of
 from rov_fmu.identify.sensitivity import Sensitivity
 from rov_fmu.identify.trajectory import REACH, Motion, MotionError, motion
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 

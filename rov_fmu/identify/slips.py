@@ -14,8 +14,8 @@ from scipy.optimize import nnls
 from rov_fmu.identify.alone import Alone, alone
 from rov_fmu.identify.explanation import CERTAIN, FASTEST, LIKELY, Evidence, Explanation, Files, contradict
 from rov_fmu.identify.runs import prepare
-from rov_fmu.motion.layout import Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 
 Tables = Mapping[str, Sequence[tuple[float, float]]]

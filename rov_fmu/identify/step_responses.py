@@ -12,7 +12,7 @@ from math import hypot, isnan, nan, sqrt
 
 import numpy as np
 
-from rov_fmu.motion.riccati import RISE
+from rov_fmu.model.riccati import RISE
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import WINDOW, kernel, robust_deviation, velocity, without_spikes

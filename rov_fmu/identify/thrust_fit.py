@@ -20,7 +20,7 @@ from rov_fmu.identify.least_squares import (
     leave_one_out,
     minimize,
 )
-from rov_fmu.motion.layout import REVERSE, Curve
+from rov_fmu.model.layout import REVERSE, Curve
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.sense import no_thrust
 from rov_fmu.vehicle.uncertainty import quantile

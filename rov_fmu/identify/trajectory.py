@@ -1,7 +1,7 @@
 """The exact motion of axes over many short steps at once, and its derivatives (NumPy).
 
 Within a step v' = C + sum of D_k e^(-κ_k t) - B v - A |v| v: drag on a constant inertia, a held force, and what lagging
-thrusters still have to give. Each step is a Taylor series, as in rov_fmu/motion/series.py, and so are its derivatives
+thrusters still have to give. Each step is a Taylor series, as in rov_fmu/model/step.py, and so are its derivatives
 by the velocity at its start and by A, B, C, D_k and κ_k. A reversal is a root of the series, and the step goes on from
 there with the drag of the other direction.
 

@@ -15,8 +15,8 @@ from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.least_squares import Estimate, estimate_alike, fit_named, kind_of
 from rov_fmu.identify.response_fit import holding_force, predict
 from rov_fmu.identify.slips import beta_range
-from rov_fmu.motion.layout import Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
 

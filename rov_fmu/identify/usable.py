@@ -10,8 +10,8 @@ from rov_fmu.files.toml_file import listed
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.runs import prepare
 from rov_fmu.identify.slips import slips
-from rov_fmu.motion.layout import Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.columns import VELOCITIES
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tables import Row

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Arc, Circle, PathPatch, Wedge
 from matplotlib.path import Path
 
-from rov_fmu.motion.layout import AXES, HEAVE, SURGE, SWAY, YAW, Axis, Thruster
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import AXES, HEAVE, SURGE, SWAY, YAW, Axis, Thruster
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.labels import AROUND, Place, Space
 from rov_fmu.pages.svg import LIGHT
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification
 from rov_fmu.identify.recordings_fit import Effect, count
-from rov_fmu.motion.layout import Axis
+from rov_fmu.model.layout import Axis
 
 _ACTS = {
     "load": "constant load",

@@ -8,16 +8,17 @@ from itertools import chain, groupby
 from math import isclose, isfinite
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.engine.simulation import simulate
 from rov_fmu.export.archive import REPORT
 from rov_fmu.export.interface import variables
-from rov_fmu.export.model_description import OUTPUT_ORDER
 from rov_fmu.export.reference_results import TOLERANCE
-from rov_fmu.motion.layout import ARM, Axis, Layout
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import ARM, Axis, Layout
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages import equations
 from rov_fmu.pages.drawing import draw_thrusters, scenes
 from rov_fmu.pages.live import Flown, live
@@ -46,20 +47,16 @@ _FRAMES = {
 # ---- The page ------------------------------------------------------------------------------------------------------
 
 
-def documentation(
-    vehicle: Vehicle, *, native: bool, fmi: int = 2, proves: bool = True, module: bytes | None = None
-) -> dict[str, bytes]:
+def documentation(vehicle: Vehicle, *, native: bool, fmi: int = 2, module: bytes | None = None) -> dict[str, bytes]:
     """The page and the pictures by their path in the FMU. Raises FileError."""
-    text = documentation_page(vehicle, native=native, fmi=fmi, proves=proves, module=module)
+    text = documentation_page(vehicle, native=native, fmi=fmi, module=module)
     return {"documentation/index.html": text.encode(), **pictures(vehicle.rov)}
 
 
-def documentation_page(
-    vehicle: Vehicle, *, native: bool = True, fmi: int = 2, proves: bool = True, module: bytes | None = None
-) -> str:
+def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, module: bytes | None = None) -> str:
     """The page of a vehicle as HTML, of the native FMU in a version of FMI or the one in pure Python.
 
-    `proves`: the FMU carries reference results. `module`: the model as WebAssembly; without it nothing flies.
+    `module`: the model as WebAssembly; without it nothing flies.
 
     Without a data folder it goes without tables and measurements.
     """
@@ -75,18 +72,17 @@ def documentation_page(
         "index.html.j2",
         vehicle=vehicle,
         layout=layout,
-        is_free=not layout.coupled and not layout.lagging,
         is_tuned=_is_tuned(rov),
         native=native,
         fmi=fmi,
-        proves=proves,
-        output_order=OUTPUT_ORDER,
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
         groups=[
             list(group) for _, group in groupby(variables(rov), lambda v: (v.causality, v.variability, v.initial))
         ],
         reversing=_reversing,
         equations=equations.of(layout),
+        mathml=equations.MathML(layout),
+        choices=equations.choices,
         mirrored=_mirrored(layout),
         has={*chain(*(form.keys for form in layout.axes), *(curve.keys for curve in layout.curves))},
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
@@ -96,7 +92,7 @@ def documentation_page(
         start=start,
         tolerance=f"{TOLERANCE:g}",
         first=first,
-        moved=rov.step(rest | start, rest, 10.0)[first.velocity],
+        moved=float(simulate(rov, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
         moves_at_rest=any(rov.derivatives(rest, rest).values()),
         held=held,
         motions=[motion for axis in axes for motion in _motions(rov, axis, held)],

@@ -12,10 +12,10 @@ from typing import Any
 
 from markupsafe import Markup
 
-from rov_fmu.export.compile import MODULE_SOURCES
+from rov_fmu.engine.compile import MODULE_SOURCES
 from rov_fmu.export.interface import variables
-from rov_fmu.motion.layout import Thruster, VehicleAxis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Thruster, VehicleAxis
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.drawing import place, size_of
 from rov_fmu.pages.plots import held_commands, measured_step, tables_by_axis
 from rov_fmu.pages.templates import number, page, pretty_unit

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 
 from rov_fmu.files.output import Output, write_whole
 from rov_fmu.identify.quadratic_fit import fit_quadratic, quadratic
-from rov_fmu.motion.layout import SURGE
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import SURGE
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.fmu_page import steady_picture
 from rov_fmu.pages.plots import draw_steps, finish, measured_step, tables_by_axis
 from rov_fmu.pages.svg import LIGHT, svg_file

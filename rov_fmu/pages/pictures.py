@@ -6,7 +6,7 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from rov_fmu.export.terminals import FOLDER, ICON, SIGNAL
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.drawing import Scene, draw_icon, draw_thrusters, scenes
 from rov_fmu.pages.png import png_file
 from rov_fmu.pages.svg import LIGHT, svg_file

@@ -1,17 +1,18 @@
 """The plot that all pages share: steps of the command from rest, modelled and measured."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
-from itertools import pairwise
 from math import ceil, isfinite
 from typing import Literal, TypeVar
 
+import numpy as np
 from matplotlib.axes import Axes
 
-from rov_fmu.motion.layout import Axis, Curve
-from rov_fmu.motion.riccati import RISE
-from rov_fmu.motion.rov import Rov
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.layout import Axis, Curve
+from rov_fmu.model.riccati import RISE
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.svg import LIGHT
 from rov_fmu.vehicle.published import ResponseTable, load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -90,16 +91,20 @@ def draw_curve(ax: Axes, rov: Rov, curve: Curve) -> None:
 
 
 def after_step(rov: Rov, axis: Axis, command: float, times: Sequence[float]) -> list[float]:
-    """Velocity along an axis at each time, the first 0, under a held command from rest; other axes are left out."""
-    if not any(rov.layout.curve_of[thruster.name].has_lag for thruster in rov.layout.drivers(axis)):
-        motion = rov.held(axis, command)
-        return [0.0, *(motion.velocity(0.0, t) for t in times[1:])]
-    alone = Rov(replace(rov.layout, axes=(rov.layout.kinds[axis.name],), coupled=False), rov.coefficients)
-    state, v = dict.fromkeys(alone.layout.state, 0.0), [0.0]
-    for before, t in pairwise(times):
-        state = alone.step(alone.held_inputs(axis, command), state, t - before)
-        v.append(state[axis.velocity])
-    return v
+    """Return the velocity along an axis at each time, the first 0, under a held command from rest.
+
+    The other axes are left without a force, so that they stay at rest and do not act on this one.
+    """
+    others = {
+        name: 0.0
+        for form in rov.layout.axes
+        if form.axis is not axis
+        for name in (form.axis.coefficient("alpha"), form.coefficient("F_0"))
+        if name in rov.coefficients
+    }
+    values = {**rov.held_inputs(axis, command), **others}
+    velocity: list[float] = simulate(rov, np.array(times), values, [axis.velocity]).values[0, 0].tolist()
+    return velocity
 
 
 def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Rov, str]]) -> None:

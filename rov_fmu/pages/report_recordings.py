@@ -11,7 +11,7 @@ from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.recordings_fit import RecordingsFit
 from rov_fmu.identify.residual_analysis import Simulation
 from rov_fmu.identify.runs import prepare, push
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.svg import LIGHT
 from rov_fmu.pages.templates import text
 from rov_fmu.tank.arrays import Array

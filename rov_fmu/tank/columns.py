@@ -10,7 +10,7 @@ from math import pi
 
 from rov_fmu.files.csv_table import Column, Columns, DataFileError
 from rov_fmu.files.messages import shown
-from rov_fmu.motion.layout import Axis
+from rov_fmu.model.layout import Axis
 
 NEUTRAL, SPAN = 1500.0, 400.0
 """µs: the pulse that stops a thruster, and how far from it is full thrust (ArduSub, T200)."""

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 from rov_fmu.files.beside import inside
 from rov_fmu.files.messages import MOST, did_you_mean, lines_on
 from rov_fmu.files.toml_file import Strict, Toml, check, folder_of, line, listed, pair, read_toml, told
-from rov_fmu.motion.layout import AXES, AXIS, CURVE, REVERSE, Axis, Layout, Meta, VehicleAxis, coefficient_name
+from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Axis, Layout, Meta, VehicleAxis, coefficient_name
 from rov_fmu.vehicle.form import Head, Validity
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Finite, Quantity

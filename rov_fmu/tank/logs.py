@@ -14,7 +14,7 @@ import numpy as np
 
 from rov_fmu.files.csv_table import Column, Columns, DataFileError, read_columns
 from rov_fmu.files.messages import did_you_mean, shown, similar
-from rov_fmu.motion.layout import HEAVE, YAW, Axis, Layout
+from rov_fmu.model.layout import HEAVE, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import (
     LOGGED_COMMAND,

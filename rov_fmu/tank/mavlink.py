@@ -25,7 +25,7 @@ import numpy as np
 
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.files.reading import read_bytes
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Layout
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Layout
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.columns import NO_OUTPUT, pulses
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rov_fmu.files.toml_file import line, listed
-from rov_fmu.motion.layout import (
+from rov_fmu.model.layout import (
     ARM,
     AXES,
     AXIS,
@@ -19,7 +19,7 @@ from rov_fmu.motion.layout import (
     Layout,
     coefficient_name,
 )
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.given import Said
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.geometry import impossible, places

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rov_fmu.motion.layout import Axis, Layout
+from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.arrays import Array
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rov_fmu.motion.layout import SURGE, SWAY, YAW, Axis, Layout
+from rov_fmu.model.layout import SURGE, SWAY, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import velocity, without_spikes

@@ -20,7 +20,7 @@ from pathlib import Path
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.files.messages import FileError, did_you_mean
 from rov_fmu.files.reading import read_bytes
-from rov_fmu.motion.layout import AXES, Axis, Layout
+from rov_fmu.model.layout import AXES, Axis, Layout
 from rov_fmu.tank.given import ROV_FILE, Said, read_said
 from rov_fmu.tank.logs import read_log
 from rov_fmu.tank.narrowing import Given, Tested, narrowed

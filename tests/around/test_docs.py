@@ -22,8 +22,8 @@ import tomlkit
 from docs import reference
 from rov_fmu import __version__
 from rov_fmu.cli import main
-from rov_fmu.motion.layout import ARM, AXIS, BODY, CURVE, TUNING
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import ARM, AXIS, BODY, CURVE, TUNING
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
@@ -133,7 +133,7 @@ def test_commands_and_options_exist(page: Path) -> None:
 
 def test_there_are_commands_to_look_at() -> None:
     said = {" ".join(module_of(words)[0]) for page in PAGES for words in commands(page)}
-    wanted = [f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "convert", "tables", "figures")]
+    wanted = [f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "tables", "figures")]
     assert {*wanted, "build_fmu.py", "-m interop", "-m fuzz", "-m benchmarks"} <= said
 
 

@@ -42,7 +42,7 @@ def test_a_mutant_is_one_change(file: str, before: str, after: set[str]) -> None
 @pytest.mark.parametrize(
     ("sample", "places"),
     [
-        pytest.param(6, ["rov_fmu/motion/riccati.py"], marks=pytest.mark.long),
+        pytest.param(6, ["rov_fmu/model/riccati.py"], marks=pytest.mark.long),
         pytest.param(16, mutants.PLACES, marks=pytest.mark.weekly),
     ],
     ids=["of a file with quick tests", "of all files"],

@@ -27,8 +27,8 @@ from examples.station_keeping.system import (
     system_files,
 )
 from examples.systems import PARAMETER_SET
-from rov_fmu.motion.layout import Curve, Layout
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Curve, Layout
+from rov_fmu.model.rov import Rov
 
 SETS = tuple(parameter_sets())
 

@@ -15,8 +15,8 @@ from examples.tank_tests import DELAY, OTTER, write_tests
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.recordings_fit import Effect
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.model.rov import Rov
 from rov_fmu.studies import Results, study
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.vehicle import load_vehicle

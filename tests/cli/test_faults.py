@@ -14,7 +14,7 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.export.archive import native_content
-from rov_fmu.motion.layout import HEAVE
+from rov_fmu.model.layout import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE, BARE, COMMANDS, ROOT, TESTS, start
@@ -155,6 +155,19 @@ ACTIONS = {
 @pytest.mark.parametrize("action", ACTIONS.values(), ids=ACTIONS)
 def test_no_code_can_make_something_else_of_an_interrupt(action: str, tmp_path: Path) -> None:
     ran = _interrupted(f"def action():\n    {action}\n    time.sleep(600.0)", tmp_path)
+    assert (ran.returncode, ran.stderr) == (130, "rov-fmu: interrupted, no file is half-written\n")
+
+
+def test_a_worker_that_is_just_starting_is_ended_too(tmp_path: Path) -> None:
+    """Multiprocessing does not list a worker that a thread is starting, and such a worker would print a traceback."""
+    pytest.importorskip("psutil")
+    worker = "import sys, time\ntime.sleep(2.0)\nsys.exit('spawn_main')"
+    ran = _interrupted(
+        "def action():\n    import psutil, subprocess\n"
+        f"    subprocess.Popen([sys.executable, '-c', {worker!r}])\n    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    time.sleep(600.0)",
+        tmp_path,
+    )
     assert (ran.returncode, ran.stderr) == (130, "rov-fmu: interrupted, no file is half-written\n")
 
 

@@ -11,12 +11,11 @@ import pytest
 
 from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
-from rov_fmu.export.compile import BuildError
+from rov_fmu.engine.compile import BuildError
 from rov_fmu.files.messages import did_you_mean, similar
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests.commands import ALONE, BARE, ROOT, TESTS
+from tests.commands import ALONE, BARE, TESTS
 
-FIRST = ROOT / "tests" / "vehicle" / "first_version.toml"
 Capsys = pytest.CaptureFixture[str]
 
 
@@ -172,7 +171,6 @@ TYPED: dict[str, tuple[list[str], str]] = {
         [*_HEAVE, "--command", "0.3", "--v-ss", "0.2", "-o", "log.csv"],
         "log.csv: would be a vehicle file (TOML), but .csv",
     ),
-    "an old vehicle written to an FMU": (["convert", str(FIRST), "-o", "x.fmu"], "x.fmu: would be a vehicle file"),
 }
 _PLAN = 'vehicle = "{}"\nstop_time = 1.0\nstep = 0.1\nruns = 2\n[figures]\na = "max(u)"\n'
 FILES = {

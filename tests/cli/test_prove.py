@@ -16,8 +16,8 @@ from pythonfmu import FmuBuilder
 
 from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
+from rov_fmu.engine.compile import compile_all
 from rov_fmu.export.archive import native_content
-from rov_fmu.export.compile import compile_all
 from rov_fmu.export.experiments import FOLDER, MANIFEST
 from rov_fmu.export.proof import prove
 from rov_fmu.export.reference_results import reference_results

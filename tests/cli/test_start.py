@@ -15,8 +15,8 @@ from fmpy import read_model_description
 
 from rov_fmu.build import build
 from rov_fmu.cli import main
-from rov_fmu.export.compile import PLATFORMS
-from rov_fmu.motion.layout import AXES
+from rov_fmu.engine.compile import PLATFORMS
+from rov_fmu.model.layout import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import BARE, ROOT, TESTS, endless_compiler, start
@@ -117,7 +117,9 @@ def _completed(*words: str, shell: str = "bash") -> list[str]:
 
 
 def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
-    commands = ("build", "convert", "figures", "fly", "identify", "prove", "schema", "study", "tables", "tune")
+    commands = (
+        "build", "figures", "fly", "identify", "prove", "schema", "simulate", "study", "tables", "tune",
+    )  # fmt: skip
     assert _completed("") == [f"plain,{name}" for name in commands]
     assert _completed("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
     assert _completed("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]

@@ -14,7 +14,7 @@ from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import BARE, COMMANDS, REFIT, ROOT, TESTS, Command, run_elsewhere
+from tests.commands import BARE, COMMANDS, REFIT, TESTS, Command, run_elsewhere
 
 Capsys = pytest.CaptureFixture[str]
 OLD = b"the old one"
@@ -235,11 +235,6 @@ def test_no_command_writes_over_what_it_reads_or_writes_itself(tmp_path: Path, c
         ["-o", str(tmp_path / "new"), "--report", str(tests / ".." / "new")],
     ):
         _refused(["identify", str(tests), *options], tmp_path, capsys)
-    first = Path(shutil.copy(ROOT / "tests" / "vehicle" / "first_version.toml", tmp_path))
-    given = first.read_text(encoding="utf-8")
-    first.write_text(given.replace("[validity]", 'data = "tables"\n[validity]', 1), encoding="utf-8")
-    for output in (first, tmp_path / "tables" / "table3_heave_steady.csv"):
-        _refused(["convert", str(first), "-o", str(output)], tmp_path, capsys)
     tune = ["tune", str(rov), "--axis", "heave", "--points", str(points), "-o"]
     _refused([*tune, str(points)], tmp_path, capsys)
     assert main([*tune, str(rov)]) == 0, "a vehicle may be tuned in its place"

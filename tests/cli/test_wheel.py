@@ -170,7 +170,7 @@ QUICK = ["cli/test_start.py", "export/test_build.py", "pages/test_report.py", "v
          "studies/test_kinds.py"]  # fmt: skip
 """Tests of every part that uses a dependency."""
 MORE = ["cli/test_start.py", "export/test_build.py", "export/test_osp.py", "pages", "vehicle/test_vehicle.py",
-        *(f"vehicle/test_{part}.py" for part in ("writer", "first_version", "json_schema", "bluerov2")),
+        *(f"vehicle/test_{part}.py" for part in ("writer", "json_schema", "bluerov2")),
         *(f"identify/test_{part}.py" for part in ("identification", "refit", "tuning")), "studies"]  # fmt: skip
 
 

@@ -14,8 +14,8 @@ from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.output_error import fit_recordings
-from rov_fmu.motion.layout import SURGE, YAW, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import SURGE, YAW, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.published import untuned
 from rov_fmu.vehicle.shipped import VIDEORAY

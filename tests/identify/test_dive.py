@@ -14,8 +14,8 @@ from rov_fmu.identify.output_error import fit_recordings
 from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.runs import prepare
 from rov_fmu.identify.simulator import Simulator, solve
-from rov_fmu.motion.layout import AXES, HEAVE, YAW
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import AXES, HEAVE, YAW
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.findings import acting
 from rov_fmu.tank.recording import Recording
 from tests.dives import CURRENT, LAG, TRUTH, Dive, dive

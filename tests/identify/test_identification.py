@@ -17,8 +17,8 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.quadratic_fit import fit_quadratic
 from rov_fmu.identify.response_fit import fit_response
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.report import report_page
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.tank_tests import load_tank_tests

@@ -13,8 +13,8 @@ from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.output_error import fit_recordings
 from rov_fmu.identify.quadratic_fit import fit_quadratic
 from rov_fmu.identify.recordings_fit import RecordingsFit
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import AXES, NOISE, PLANS, clean

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from checks.pool import Array, swim
-from rov_fmu.motion.layout import HEAVE
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.rov import Rov
 from tests.pool import run, with_more
 from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
 

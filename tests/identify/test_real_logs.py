@@ -14,8 +14,8 @@ from scipy.stats import binom
 
 from rov_fmu.identify.output_error import fit_recordings
 from rov_fmu.identify.recordings_fit import RecordingsFit
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.rov import Rov
 from tests.pool import Plan, Run, run, with_more
 from tests.recordings import PLANS
 from tests.vehicles import VIDEORAY

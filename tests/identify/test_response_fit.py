@@ -9,8 +9,8 @@ import pytest
 from rov_fmu.identify.drag_forms import LEFT_OUT, Point
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.response_fit import ResponseFit, fit_response, response_band
-from rov_fmu.motion.layout import HEAVE, SWAY, Curve, Layout, Thruster, VehicleAxis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SWAY, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 

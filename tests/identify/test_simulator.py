@@ -8,8 +8,8 @@ import pytest
 from rov_fmu.identify.extras import Extra
 from rov_fmu.identify.runs import prepare
 from rov_fmu.identify.simulator import Simulator
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Axis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.model.rov import Rov
 from tests.pool import run
 from tests.vehicles import VIDEORAY
 

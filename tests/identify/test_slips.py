@@ -14,7 +14,7 @@ from rov_fmu.cli import main
 from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.slips import Tables, beta_out_of_range, slips
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from rov_fmu.identify.step_responses import StepResponse, correlation_time, steps
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.recordings import AXES, PLANS, clean

@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import binom
 
 from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, forces, measured
-from rov_fmu.motion.layout import Curve
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import Curve
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import SHIPPED
 

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from rov_fmu.cli import main
 from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.tuning import TuningError, tune, tune_over
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

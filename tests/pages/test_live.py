@@ -13,7 +13,7 @@ from checks.fmpy_slave import fmpy_slave
 from rov_fmu.cli import main
 from rov_fmu.export.interface import variables
 from rov_fmu.export.module import module
-from rov_fmu.motion.layout import HEAVE
+from rov_fmu.model.layout import HEAVE
 from rov_fmu.pages.live import Flown, fly_page
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED

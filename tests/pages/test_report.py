@@ -17,8 +17,8 @@ from rov_fmu.identify.identification import Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.next_test import NextTest
 from rov_fmu.identify.recordings_fit import Effect
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.console_results import print_identification
 from rov_fmu.pages.report import report_output, report_page
 from rov_fmu.pages.templates import number

@@ -11,8 +11,8 @@ from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.residual_analysis import Simulation
-from rov_fmu.motion.layout import HEAVE
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.rov import Rov
 from rov_fmu.pages.findings import Known, acting, effects, verdict
 from rov_fmu.pages.report import scatter
 from rov_fmu.pages.report_plots import plot_known

@@ -17,8 +17,8 @@ from distributed import LocalCluster
 from checks.pool import Array
 from rov_fmu.build import build
 from rov_fmu.identify.identify import identify
-from rov_fmu.motion.layout import SURGE
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import SURGE
+from rov_fmu.model.rov import Rov
 from rov_fmu.studies import Results, study
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -9,8 +9,8 @@ import pytest
 
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
-from rov_fmu.motion.layout import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.model.rov import Rov
 from rov_fmu.tank.given import ROV_FILE
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY

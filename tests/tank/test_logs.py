@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.logs import Log, read_log
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.paper import PAPER

@@ -12,7 +12,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.motion.layout import HEAVE, SWAY, Layout
+from rov_fmu.model.layout import HEAVE, SWAY, Layout
 from rov_fmu.tank.logs import Log, read_log
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import SHIPPED

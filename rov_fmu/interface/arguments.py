@@ -1,0 +1,162 @@
+"""The arguments of a simulation, checked and as arrays: one clear line for each that cannot be used."""
+
+import warnings
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rov_fmu.files.messages import InputError, brief, did_you_mean, shown
+from rov_fmu.model.layout import Layout, Meta
+from rov_fmu.vehicle.quantity import within
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Inputs: TypeAlias = "Mapping[str, Any] | pd.DataFrame"
+"""Values of inputs by name: numbers, arrays, functions of time."""
+
+TIME = "time"
+"""The column of inputs that have times of their own."""
+_ONE_LINE = 60  # characters of a value in a message
+
+
+def checked_times(key: str, given: ArrayLike, least: int = 2, *, may_stand: bool = False) -> Array:
+    """Return times (s) as an array, if there are enough of them and they rise, or at least do not fall."""
+    times = _numbers(key, given)
+    if times.ndim != 1 or len(times) < least:
+        raise InputError(f"{key}: must be a sequence of {least} or more times (s), and has the shape {times.shape}")
+    steps = np.diff(times)
+    if len(wrong := np.flatnonzero(steps < 0.0 if may_stand else steps <= 0.0)):
+        n = int(wrong[0]) + 1
+        allowed = "not be less" if may_stand else "be greater"
+        raise InputError(f"{key}[{n}] = {times[n]:.15g}: must {allowed} than the time before it, {times[n - 1]:.15g}")
+    return times
+
+
+def checked_values(what: str, given: Mapping[str, Any], metas: Mapping[str, Meta], *, many: bool) -> dict[str, Array]:
+    """Return values by name as arrays, if each name is known and each value is within its bounds.
+
+    For many vehicles each value is a number, or an array of one number for each vehicle, which becomes a column.
+    """
+    found = {}
+    for name in _names(what, given):
+        _check_name(what, name, metas)
+        key = f"{what}[{name!r}]"
+        values = _numbers(key, given[name])
+        if values.ndim > many:
+            allowed = "a number, or a sequence of one number for each vehicle" if many else "one number"
+            raise InputError(f"{key}: must be {allowed}, and has the shape {values.shape}")
+        found[name] = values[:, np.newaxis] if values.ndim else values
+        meta = metas[name]
+        outside = np.flatnonzero((values < meta.minimum) | (values > meta.maximum))
+        if len(outside):
+            wrong = values.flat[outside[0]]
+            try:
+                within(float(wrong), meta)
+            except ValueError as error:
+                raise InputError(f"{key} = {wrong:.12g}: {error}") from error
+    return found
+
+
+class Commands:
+    """The inputs of a simulation, and the times at which they may change."""
+
+    def __init__(self, layout: Layout, time: Array, inputs: Inputs, *, many: bool) -> None:
+        names = _names("inputs", inputs)
+        own = checked_times("inputs['time']", inputs[TIME], 1, may_stand=True) if TIME in names else None
+        self.time = time
+        """The times of the steps: those of the results, and those between them at which an input changes."""
+        if own is not None:
+            self.time = np.union1d(time, own[(own > time[0]) & (own < time[-1])])
+        middles = np.append(0.5 * (self.time[:-1] + self.time[1:]), self.time[-1])
+        self.values: dict[str, Array] = {}
+        """By name: numbers, or arrays whose last axis is that of the times; held from each time to the next."""
+        for name in names:
+            if name == TIME:
+                continue
+            _check_name("inputs", name, layout.inputs)
+            value = inputs[name]
+            key = f"inputs[{name!r}]"
+            if callable(value):
+                found = _numbers(f"{key}(t)", value(middles))
+                _check_shape(f"{key}(t)", found, len(middles), many)
+            else:
+                found = _numbers(key, value)
+                _check_shape(key, found, len(time if own is None else own), many)
+                if own is not None and found.ndim and found.shape[-1] == len(own):
+                    place = np.searchsorted(own, self.time, side="right") - 1
+                    found = np.where(place >= 0, found[..., np.maximum(place, 0)], 0.0)
+            self.values[name] = found
+            if name in layout.commands and (most := float(np.max(np.abs(found), initial=0.0))) > 1.0:
+                warnings.warn(f"{name} reaches ±{most:.6g}: commands saturate at ±1", UserWarning, stacklevel=4)
+
+
+def _names(what: str, given: Any) -> list[str]:
+    """Return the names of a mapping or of a data frame."""
+    if not hasattr(given, "keys"):
+        raise InputError(
+            f"{what} = {brief(shown(given), _ONE_LINE)}: must be a mapping from names to values, or a data frame"
+        )
+    return list(given.keys())
+
+
+def _check_name(what: str, name: str, metas: Mapping[str, Meta]) -> None:
+    if name not in metas:
+        kind = {"inputs": "input", "start": "state", "coefficients": "coefficient"}[what]
+        only = f", only {', '.join(metas)}" if len(metas) < 20 else ""
+        raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{only}{did_you_mean(str(name), metas)}")
+
+
+def _check_shape(key: str, values: Array, times: int, many: bool) -> None:
+    """See that values are a number, or an array by vehicle and time."""
+    if values.ndim > 1 + many or (values.ndim and values.shape[-1] not in ((1, times) if many else (times,))):
+        allowed = f"a number, or an array of the shape ({times},), one value for each time"
+        allowed += f", or (vehicles, 1), or (vehicles, {times})" if many else ""
+        raise InputError(f"{key}: must be {allowed}, and has the shape {values.shape}")
+
+
+def _numbers(key: str, given: ArrayLike) -> Array:
+    """Return finite numbers as an array."""
+    try:
+        found = np.asarray(given)
+        if found.dtype.kind not in "biufO":
+            raise TypeError
+        values = found.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"{key} = {brief(shown(given), _ONE_LINE)}: must be a number, or an array of numbers"
+        ) from error
+    if len(wrong := np.argwhere(~np.isfinite(values))):
+        place = f"[{', '.join(map(str, wrong[0]))}]" if values.ndim else ""
+        raise InputError(f"{key}{place} = {values[tuple(wrong[0])]}: must be a finite number")
+    return values
+
+
+def number_of_vehicles(values: Mapping[str, Array]) -> int:
+    """Return for how many vehicles there are values; those of one hold for all."""
+    sizes = {name: len(array) for name, array in values.items() if array.ndim == 2 and len(array) != 1}
+    for name, size in sizes.items():
+        first, vehicles = next(iter(sizes.items()))
+        if size != vehicles or size == 0:
+            raise InputError(f"{name}: has values for {size} vehicles, and {first} for {vehicles}")
+    return next(iter(sizes.values()), 1)
+
+
+def checked_workers(workers: object) -> int | None:
+    """Return a number of threads."""
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        raise InputError(f"workers = {shown(workers)}: must be a whole number from 1 on")
+    return workers
+
+
+def checked_record(record: Sequence[str] | None, layout: Layout, names: Collection[str]) -> list[str]:
+    """Return the names of the variables to record: by default the outputs of the FMU, which are states and thrust."""
+    if record is None:
+        return [*layout.state, *layout.thrust]
+    for name in [record] if isinstance(record, str) else record:
+        if name not in names:
+            raise InputError(f"record: the vehicle has no variable {shown(name)}{did_you_mean(str(name), names)}")
+    return [record] if isinstance(record, str) else list(record)

@@ -1,0 +1,162 @@
+"""The vehicle of the Python interface: loaded by name, changed, simulated, built."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rov_fmu.engine.simulation import Array, simulate, usable_cores
+from rov_fmu.export.interface import variables
+from rov_fmu.files.messages import InputError, shown
+from rov_fmu.interface.arguments import (
+    Commands,
+    Inputs,
+    checked_record,
+    checked_times,
+    checked_values,
+    checked_workers,
+    number_of_vehicles,
+)
+from rov_fmu.interface.result import Result
+from rov_fmu.vehicle.shipped import find_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
+
+if TYPE_CHECKING:
+    from rov_fmu.build import Built
+
+_NONE: Mapping[str, float] = MappingProxyType({})
+
+
+def load(vehicle: str | Path) -> "VehicleModel":
+    """Load a vehicle that ships, by its name, or a vehicle file, by its path. Raises FileError, a ValueError."""
+    if not isinstance(vehicle, str | Path):
+        raise InputError(f"vehicle = {shown(vehicle)}: must be the name of a vehicle that ships, or the path of a file")
+    loaded = load_vehicle(find_vehicle(vehicle))
+    return VehicleModel(**{field.name: getattr(loaded, field.name) for field in fields(loaded)})
+
+
+class VehicleModel(Vehicle):
+    """A vehicle that can be simulated, changed and built. `rov_fmu.load` returns one.
+
+    All values are in SI units, angles in rad, and commands are fractions of full thrust from -1 to 1. The variables are
+    those of the FMU.
+    """
+
+    def simulate(
+        self,
+        time: ArrayLike,
+        inputs: Inputs = _NONE,
+        *,
+        start: Mapping[str, Any] = _NONE,
+        record: str | Sequence[str] | None = None,
+    ) -> Result:
+        """Simulate the vehicle, with the C code of the FMU and its results to the last bit.
+
+        `time` are the output times (s), which rise. Each step from one to the next is exact, whatever its length.
+
+        `inputs` are the inputs by name, and 0 for all others: a number; an array of a value for each time, which is
+        held up to the next one; or a function of an array of times, which is evaluated in the middle of each step and
+        held over it. Beyond ±1 a command saturates, with a warning. A data frame is possible, too. If there is a column
+        `time` among the inputs, the other arrays have a value for each of these times instead; each is held from its
+        time up to the next, also between output times, and the inputs are 0 before the first.
+
+        `start` are states at the first time by name, 0 for all others. `record` names the variables to return: inputs,
+        states, derivatives such as `der(u)`, thrust. By default these are the outputs of the FMU: states and thrust.
+
+        The first simulation of a kind of vehicle compiles the engine, which takes seconds, and keeps it in the user's
+        cache folder.
+
+        Raises InputError about an argument that cannot be used, and where the motion cannot be computed, because it
+        overflows or takes too many steps; BuildError where the engine cannot be compiled.
+        """
+        result = self._simulated(time, inputs, start, _NONE, record, workers=1, many=False)
+        if len(result.failed):
+            first = int(np.argmax(np.isnan(next(iter(result.values())))))
+            reason = "it overflows, or changes too fast for its step: check the inputs, the start and the coefficients"
+            raise InputError(f"the motion cannot be computed up to time[{first}] = {result.time[first]:g} s: {reason}")
+        return result
+
+    def simulate_many(
+        self,
+        time: ArrayLike,
+        inputs: Inputs = _NONE,
+        *,
+        start: Mapping[str, Any] = _NONE,
+        coefficients: Mapping[str, Any] = _NONE,
+        record: str | Sequence[str] | None = None,
+        workers: int | None = None,
+    ) -> Result:
+        """Simulate many variations of the vehicle at once, on all cores. The arguments are those of `simulate`, but:
+
+        An array among the `inputs` has the shape (times,), which holds for all vehicles, (vehicles, 1), or
+        (vehicles, times). Each value of `start` and of `coefficients` is a number, or an array of one number for each
+        vehicle. Coefficients that are not given are those of this vehicle.
+
+        `workers` is the number of threads, by default that of the usable cores; the results do not depend on it.
+
+        The arrays of the result have the shape (vehicles, times). Where the motion of a vehicle cannot be computed, its
+        values are NaN from there on, and `result.failed` has its number.
+
+        Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
+        """
+        workers = checked_workers(workers) or usable_cores()
+        return self._simulated(time, inputs, start, coefficients, record, workers=workers, many=True)
+
+    def build(
+        self,
+        output: str | Path | None = None,
+        *,
+        platforms: str | Sequence[str] | None = None,
+        backend: str = "native",
+        fmi: int = 2,
+        osp: bool = False,
+    ) -> "Built":
+        """Build the FMU of the vehicle. The arguments, the result and the errors are those of `rov_fmu.build.build`."""
+        from rov_fmu.build import build
+
+        return build(self, output, platforms=platforms, backend=backend, fmi=fmi, osp=osp)
+
+    def _simulated(
+        self,
+        time: ArrayLike,
+        inputs: Inputs,
+        start: Mapping[str, Any],
+        coefficients: Mapping[str, Any],
+        record: str | Sequence[str] | None,
+        *,
+        workers: int,
+        many: bool,
+    ) -> Result:
+        layout = self.layout
+        check_coefficients(layout, self.rov.coefficients)  # those of `replace` were never checked
+        times = checked_times("time", time)
+        commands = Commands(layout, times, inputs, many=many)
+        values: dict[str, Array] = {
+            **commands.values,
+            **checked_values("start", start, layout.state, many=many),
+            **checked_values("coefficients", coefficients, layout.coefficients, many=many),
+        }
+        units = {v.name: v.unit for v in variables(self.rov) if v.causality != "parameter"}
+        recorded = checked_record(record, layout, units)
+        vehicles = number_of_vehicles(values)
+        try:
+            found = simulate(self.rov, commands.time, values, recorded, vehicles=vehicles, workers=workers)
+        except MemoryError as error:
+            size = 8e-9 * vehicles * len(commands.time) * len(recorded)
+            raise InputError(
+                f"time, record: the result takes {size:.3g} GB, more than there is: record less"
+            ) from error
+        rows = found.values
+        if len(commands.time) > len(times):
+            rows = rows[..., np.searchsorted(commands.time, times)]
+        return Result(
+            times,
+            {name: row if many else row[0] for name, row in zip(recorded, rows, strict=True)},
+            {name: units[name] for name in recorded},
+            tuple(name for name in recorded if name in layout.state),
+            np.flatnonzero(found.failed < len(commands.time)),
+        )

@@ -1,0 +1,232 @@
+"""Formulas arranged as a person writes them: sums of products, with fractions, common factors and absolute values.
+
+`Reader` turns a formula of rov_fmu/model/equation.py into a `Sum` of the same value. Only that a command saturates is
+left out, because the text beside the equations says it.
+"""
+
+import ast
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+from rov_fmu.model.formula import parsed
+
+
+@dataclass(frozen=True)
+class Product:
+    """A sign, the factors above the fraction bar, and those below it."""
+
+    sign: int = 1
+    above: "tuple[Factor, ...]" = ()
+    below: "tuple[Factor, ...]" = ()
+
+
+Sum: TypeAlias = tuple[Product, ...]
+"""The sum of its products; 0 without any."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """A sum in brackets."""
+
+    of: Sum
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function of a sum: sin, cos, abs, or sgn, the sign."""
+
+    function: str
+    of: Sum
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A parameter that depends on the sign of a name."""
+
+    forward: str
+    reverse: str
+    subject: str
+
+
+@dataclass(frozen=True)
+class Cases:
+    """One value where a name is at most 0, and another one elsewhere."""
+
+    name: str
+    at_most_zero: Sum
+    otherwise: Sum
+
+
+Factor: TypeAlias = "str | float | Group | Call | Choice | Cases"
+
+
+class Reader:
+    """Read formulas; the names that `inlined` has are replaced by their formulas."""
+
+    def __init__(self, inlined: Mapping[str, str]) -> None:
+        self._inlined = inlined
+
+    def read(self, formula: str) -> Sum:
+        """Return a formula as a sum. Raises ValueError where it has a form that is not known here."""
+        return self._read(parsed(formula))
+
+    def _read(self, node: ast.expr) -> Sum:  # noqa: PLR0911 - a case for each syntax
+        match node:
+            case ast.Constant(value=float() | int() as value):
+                return (
+                    (Product(1 if value > 0 else -1, () if abs(value) == 1 else (abs(float(value)),)),) if value else ()
+                )
+            case ast.Name(id=name):
+                return self._read(parsed(self._inlined[name])) if name in self._inlined else (Product(1, (name,)),)
+            case ast.UnaryOp(op=ast.USub()):
+                return negative(self._read(node.operand))
+            case ast.BinOp(op=ast.Add()):
+                return self._read(node.left) + self._read(node.right)
+            case ast.BinOp(op=ast.Sub()):
+                return self._read(node.left) + negative(self._read(node.right))
+            case ast.BinOp(op=ast.Mult()):
+                return times(self._read(node.left), self._read(node.right))
+            case ast.BinOp(op=ast.Div()):
+                return times(self._read(node.left), inverse(self._read(node.right)))
+            case ast.Call(func=ast.Name(id=function), args=[argument]):
+                return (Product(1, (Call(function, self._read(argument)),)),)
+            case ast.IfExp():
+                return self._choice(node)
+        raise ValueError(f"{ast.unparse(node)}: there is no way to show this")
+
+    def _choice(self, node: ast.IfExp) -> Sum:
+        test, body, otherwise = ast.unparse(node.test), node.body, node.orelse
+        name, _, condition = test.partition(" ")
+        if condition == "> 1.0" and ast.unparse(otherwise) == f"-1.0 if {name} < -1.0 else {name}":
+            return self._read(parsed(name))
+        if condition == "< 0.0":
+            (subject,) = self._read(parsed(name))
+            return _directed(subject, self._read(otherwise), self._read(body))
+        if condition.startswith(f"< 0.0 or ({name} == 0.0 and ") and ast.unparse(body) == "0.0":
+            return (Product(1, (Cases(name, (), self._read(otherwise)),)),)
+        raise ValueError(f"{ast.unparse(node)}: there is no way to show this")
+
+
+# ---- Sums and products -----------------------------------------------------------------------------------------------
+
+
+def negative(of: Sum) -> Sum:
+    """Return the sum with the other sign."""
+    return tuple(replace(product, sign=-product.sign) for product in of)
+
+
+def inverse(of: Sum) -> Sum:
+    """Return 1 over the sum."""
+    single = _single(of)
+    return (Product(single.sign, single.below, single.above),)
+
+
+def times(left: Sum, right: Sum) -> Sum:
+    """Return the product of two sums. A sum before names is multiplied out: (a x + b) x is a x x + b x."""
+    if not left or not right:
+        return ()
+    by = _single(right)
+    if len(left) > 1 and not by.below and all(isinstance(factor, str | Call) for factor in by.above):
+        return tuple(product for term in left for product in times((term,), right))
+    of = _single(left)
+    above, below = [*of.above, *by.above], [*of.below, *by.below]
+    for factor in [*above]:
+        if factor in below:
+            above.remove(factor)
+            below.remove(factor)
+    return (Product(of.sign * by.sign, _signs_absorbed(tuple(above)), tuple(below)),)
+
+
+def _single(of: Sum) -> Product:
+    return of[0] if len(of) == 1 else Product(1, (Group(of),))
+
+
+def _signs_absorbed(factors: tuple[Factor, ...]) -> tuple[Factor, ...]:
+    """Write sgn(x) x as |x| and sgn(x) |x| as x, also where each term of a sum in brackets has this factor."""
+    for sign in (f for f in factors if isinstance(f, Call) and f.function == "sgn"):
+        rest = list(factors)
+        rest.remove(sign)
+        x, size = _single(sign.of).above[0], Call("abs", sign.of)
+        for place, factor in enumerate(rest):
+            inner = [_replaced(product, size, x) for product in factor.of] if isinstance(factor, Group) else [None]
+            if None not in inner:
+                return (*rest[:place], Group(tuple(p for p in inner if p)), *rest[place + 1 :])
+        for old, new in ((size, x), (x, size)):
+            if old in rest:
+                rest[rest.index(old)] = new
+                return tuple(rest)
+    return factors
+
+
+def _replaced(product: Product, old: Factor, new: Factor) -> Product | None:
+    """The product with the last of some equal factors replaced, if it has one."""
+    if old not in product.above:
+        return None
+    place = len(product.above) - 1 - product.above[::-1].index(old)
+    return replace(product, above=(*product.above[:place], new, *product.above[place + 1 :]))
+
+
+def _directed(subject: Product, forward: Sum, reverse: Sum) -> Sum:
+    """Two values by the sign of a name, in one: parameters that differ become a `Choice`, other signs a sgn."""
+    sign = Product(1, (Call("sgn", (subject,)),))
+    if forward == negative(reverse):
+        return times((sign,), (_single(forward),))
+    (one,), (other,) = forward, reverse
+    (name,) = subject.above
+    above: list[Factor] = []
+    for a, b in zip(one.above, other.above, strict=True):
+        if a == b:
+            above.append(a)
+        elif isinstance(a, str) and isinstance(b, str) and isinstance(name, str):
+            above.append(Choice(a, b, name))
+        else:
+            raise ValueError(f"{a} and {b}: there is no way to show this choice")
+    both = Product(one.sign, tuple(above), one.below)
+    return (both,) if one.sign == other.sign else times((both,), (sign,))
+
+
+def arranged(of: Sum) -> Sum:
+    """Return the sum with numbers first, common first factors before brackets, and no brackets without need."""
+    flat: list[Product] = []
+    for product in of:
+        above = sorted((_tidied(factor) for factor in product.above), key=lambda f: not isinstance(f, float))
+        if above and isinstance(above[0], Group) and len(above) == 1 and not product.below:
+            flat += [replace(p, sign=p.sign * product.sign) for p in above[0].of]
+            continue
+        sign, factors = product.sign, list[Factor]()
+        for factor in above:
+            if isinstance(factor, Group) and all(p.sign < 0 for p in factor.of):
+                sign, factor = -sign, Group(negative(factor.of))  # noqa: PLW2901
+            if isinstance(factor, Group) and len(factor.of) == 1 and not factor.of[0].below:
+                sign *= factor.of[0].sign
+                factors += factor.of[0].above
+            else:
+                factors.append(factor)
+        flat.append(Product(sign, tuple(sorted(factors, key=lambda f: not isinstance(f, float))), product.below))
+    return _with_common_factors(tuple(flat))
+
+
+def _tidied(factor: Factor) -> Factor:
+    if isinstance(factor, Group):
+        return Group(arranged(factor.of))
+    if isinstance(factor, Cases):
+        return replace(factor, at_most_zero=arranged(factor.at_most_zero), otherwise=arranged(factor.otherwise))
+    return factor
+
+
+def _with_common_factors(of: Sum) -> Sum:
+    """Products that begin with the same factor, to four digits if it is a number, are put together: a (x - y)."""
+    together: dict[object, list[Product]] = {}
+    for place, product in enumerate(of):
+        head = product.above[0] if len(product.above) > 1 else None
+        key = (f"{head:.4g}" if isinstance(head, float) else head) if head is not None else place
+        together.setdefault(key, []).append(product)
+    found: list[Product] = []
+    for first, *others in together.values():
+        if not others:
+            found.append(first)
+            continue
+        rest = tuple(Product(p.sign * first.sign, p.above[1:], p.below) for p in (first, *others))
+        found += arranged((Product(first.sign, (first.above[0], Group(arranged(rest)))),))
+    return tuple(found)

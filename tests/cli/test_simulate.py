@@ -1,0 +1,126 @@
+"""`rov-fmu simulate`: the model without an FMU, from the command line."""
+
+import csv
+import sys
+import webbrowser
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import rov_fmu
+from rov_fmu.cli import main
+from tests.commands import BARE
+from tests.vehicles import VIDEORAY
+
+Capsys = pytest.CaptureFixture[str]
+COMMANDS = "time,u_l,u_r\n0,0.3,0.3\n2.25,0.5,0.2\n5,0,0\n"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with a table of commands."""
+    monkeypatch.chdir(tmp_path)
+    Path("commands.csv").write_text(COMMANDS, encoding="utf-8")
+    return tmp_path
+
+
+def test_the_values_at_the_end_are_printed(capsys: Capsys) -> None:
+    assert main(["simulate", "--set", "u_l=0.3", "--set", "u_r = 0.3", "--set", "a_d_u=10", "--set", "z=2"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    expected = rov_fmu.load("videoray").with_(a_d_u=10).simulate([0, 10], {"u_l": 0.3, "u_r": 0.3}, start={"z": 2})
+    lines = [line.split() for line in out.splitlines()]
+    assert lines[0] == ["VideoRay", "Pro", "4", "after", "10", "s"]
+    assert lines[3:] == [
+        [name, f"{expected[name][-1]:.6g}", expected.units[name]]
+        for name in (*VIDEORAY.layout.state, *VIDEORAY.layout.thrust)
+    ]
+
+
+def test_a_table_of_commands_gives_a_table_of_results(here: Path) -> None:
+    """Up to its last time; a command holds from its own time, also between two results."""
+    assert main(["simulate", "--input", "commands.csv", "--step", "0.5", "-o", "result.csv"]) == 0
+    rows = list(csv.reader((here / "result.csv").read_text(encoding="utf-8").splitlines()))
+    result = rov_fmu.load("videoray").simulate(
+        [0.5 * n for n in range(11)], {"time": [0, 2.25, 5], "u_l": [0.3, 0.5, 0], "u_r": [0.3, 0.2, 0]}
+    )
+    assert rows[0] == ["time", *result.names]
+    found = [[float(cell) for cell in row] for row in rows[1:]]
+    assert found == [list(row) for row in zip(result.time, *result.values(), strict=True)]
+
+
+def test_results_have_round_times_and_the_end_is_one_of_them(here: Path) -> None:
+    assert main(["simulate", str(BARE), "--stop", "0.75", "--step", "0.1", "-o", "result.parquet"]) == 0
+    frame = pd.read_parquet(here / "result.parquet")
+    assert frame["time"].tolist() == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75]
+    assert frame.columns.tolist()[:3] == ["time", "w", "z"]
+
+
+@pytest.mark.parametrize(("name", "begins"), [("plot.png", b"\x89PNG"), ("plot.svg", b"<?xml"), ("plot.pdf", b"%PDF")])
+def test_a_plot_is_written(name: str, begins: bytes, here: Path, capsys: Capsys) -> None:
+    assert main(["simulate", str(BARE), "--plot", name]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert (here / name).read_bytes().startswith(begins)
+
+
+def test_a_plot_opens_in_a_browser(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", lambda uri: opened.append(uri) or True)  # type: ignore[func-returns-value]
+    monkeypatch.setattr("tempfile.tempdir", str(here))
+    assert main(["simulate", str(BARE), "--plot"]) == 0
+    path = Path(capsys.readouterr().out.strip())
+    assert opened == [path.as_uri()]
+    assert path.read_bytes().startswith(b"<?xml")
+
+
+def test_a_command_beyond_full_is_a_warning(capsys: Capsys) -> None:
+    assert main(["simulate", str(BARE), "--set", "u_t=1.5"]) == 0
+    assert capsys.readouterr().err == "rov-fmu: warning: u_t reaches ±1.5: commands saturate at ±1\n"
+
+
+WRONG = {
+    "unknown vehicle": (["videorey"], "videorey: there is no such file, "),
+    "unknown name": (["--set", "ul=1"], "--set ul=1: the vehicle has no such input, state or coefficient; did you"),
+    "no value": (["--set", "u_l"], "--set u_l: must be NAME=VALUE, such as u_l=0.3"),
+    "a word": (["--set", "u_l=a"], "--set u_l=a: 'a' must be a finite number"),
+    "NaN": (["--set", "u_l=nan"], "--set u_l=nan: 'nan' must be a finite number"),
+    "twice": (["--set", "u_l=1", "--set", "u_l=2"], "--set u_l=2: u_l is set before"),
+    "out of bounds": (["--set", "a_d_u=-1"], "a_d_u = -1.0: must be within 0 ... 1000000 N.s2/m2"),
+    "no table": (["--input", "none.csv"], "none.csv: cannot be read: No such file or directory"),
+    "a column of no input": (["--input", "wrong.csv"], "wrong.csv: column 'ul': there is no such input, only u_l"),
+    "a cell that is no number": (["--input", "cell.csv"], "cell.csv: row 2, column 'u_l' = 'x': must be a number"),
+    "an input twice": (["--input", "commands.csv", "--set", "u_l=1"], "--set u_l: commands.csv has this input, too"),
+    "no time": (["--input", "short.csv"], "short.csv: the last time is 0 s, and must be at least 1e-06"),
+    "no duration": (["--stop", "0"], "'--stop': '0' must be a number from 1e-6 (s)"),
+    "too many results": (["--step", "1e-6"], "--step 1e-06: gives more than 1000000 results up to 10 s"),
+    "another table": (["-o", "result.txt"], "--output result.txt: the name must end with .csv or .parquet"),
+    "another picture": (["--plot", "videoray"], "--plot videoray: the name must end with .png, .svg or .pdf"),
+    "no folder": (["-o", "none/result.csv"], "none/result.csv: cannot be written: there is no folder none"),
+    "its own input": (["--input", "commands.csv", "-o", "commands.csv"], "commands.csv: cannot be written: would"),
+    "too fast": (["-o", "a.csv", "--plot", "a.png", "--set", "r=1e300", "--set", "u=1"], "the motion cannot be"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_mistake_is_one_line_and_writes_nothing(case: str, here: Path, capsys: Capsys) -> None:
+    (here / "wrong.csv").write_text("time,ul\n0,1\n1,1\n", encoding="utf-8")
+    (here / "cell.csv").write_text("time,u_l\n0,1\n1,x\n", encoding="utf-8")
+    (here / "short.csv").write_text("time,u_l\n0,1\n", encoding="utf-8")
+    before = {path.name: path.read_bytes() for path in here.iterdir()}
+    arguments, told = WRONG[case]
+    assert main(["simulate", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert told in err
+    assert err.startswith("rov-fmu: ")
+    assert err.count("\n") == 1
+    assert {path.name: path.read_bytes() for path in here.iterdir()} == before
+
+
+def test_parquet_that_is_not_installed_is_named(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert main(["simulate", str(BARE), "-o", "result.parquet"]) == 2
+    told = "rov-fmu: --output result.parquet: Parquet needs pandas and pyarrow: pip install pandas pyarrow\n"
+    assert capsys.readouterr() == ("", told)
+    assert not (here / "result.parquet").exists()

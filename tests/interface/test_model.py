@@ -1,0 +1,277 @@
+"""The Python interface: what it returns, and one clear line for whatever cannot be."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+import rov_fmu
+from rov_fmu.build import build
+from rov_fmu.engine.compile import OptionError
+from rov_fmu.export.archive import native_content
+from rov_fmu.files.messages import FileError, InputError
+from rov_fmu.interface.model import VehicleModel
+from rov_fmu.interface.result import Result
+from rov_fmu.pages.fmu_page import documentation_page
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import BY_HAND
+from tests.commands import BARE, REFIT, ROOT
+
+TIMES = [0.0, 1.0, 2.0]
+AHEAD = {"u_l": 0.3, "u_r": 0.3}
+
+
+@pytest.fixture(scope="module")
+def videoray() -> VehicleModel:
+    return rov_fmu.load("videoray")
+
+
+# ---- Load and change -------------------------------------------------------------------------------------------------
+
+
+def test_importing_the_package_imports_little() -> None:
+    program = "import rov_fmu, sys; print(len({'numpy', 'pydantic', 'jinja2', 'matplotlib'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, check=True).stdout == b"0\n"
+
+
+def test_a_vehicle_is_loaded_by_its_name_or_path(videoray: VehicleModel) -> None:
+    assert rov_fmu.load(str(SHIPPED["videoray"])) == rov_fmu.load(SHIPPED["videoray"]) == videoray
+    assert repr(videoray) == "<VehicleModel videoray: VideoRay Pro 4; axes surge, heave, yaw; inputs u_l, u_r, u_t>"
+
+
+def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleModel) -> None:
+    changed = videoray.with_(a_d_u=10, beta_w=np.float64(0.5))
+    assert (changed.rov["a_d_u"], changed.rov["beta_w"]) == (10.0, 0.5)
+    assert {name for name, source in changed.sources.items() if source == BY_HAND} == {"a_d_u", "beta_w"}
+    told = "set by hand: a_d_u = 10 N.s2/m2, beta_w = 0.5"
+    assert repr(changed).endswith(f"; {told}>")
+    described = native_content(changed).files["modelDescription.xml"].decode()
+    assert f'description="{videoray.description} ({told})"' in described
+    page = documentation_page(changed)
+    assert page.count(told) == 2
+    assert page.count("<td>set by hand</td>") == 2
+    assert videoray.rov["a_d_u"] != 10.0
+    assert "set by hand" not in videoray.summary
+
+
+def test_a_coefficient_that_is_set_by_hand_is_no_estimate() -> None:
+    refit = rov_fmu.load(REFIT)
+    name, other = next((n, o) for n, e in refit.estimates.items() for o in e.correlation)
+    changed = refit.with_(**{other: refit.rov[other] * 1.01})
+    assert other in refit.uncertainty.names
+    assert other not in {*changed.intervals, *changed.estimates, *changed.uncertainty.names}
+    assert other not in changed.estimates[name].correlation
+
+
+def test_the_vehicle_builds_itself(tmp_path: Path) -> None:
+    built = rov_fmu.load(BARE).with_(m_rov=12).build(tmp_path / "x.fmu", platforms="host")
+    assert built.path == tmp_path / "x.fmu"
+    assert "set by hand: m_rov = 12 kg" in documentation_page(rov_fmu.load(BARE).with_(m_rov=12))
+    assert built.note.startswith("valid; runs")
+
+
+# ---- Simulate --------------------------------------------------------------------------------------------------------
+
+
+def test_a_result_is_a_mapping_of_arrays(videoray: VehicleModel) -> None:
+    result = videoray.simulate(TIMES, AHEAD)
+    assert result.names == tuple(result) == tuple(result.keys())
+    assert result.names == ("u", "w", "r", "x", "y", "z", "psi", "F_l", "F_r", "F_t", "tau_rear")
+    assert result["u"].shape == (3,)
+    at_rest, inputs = (dict.fromkeys(names, 0.0) for names in (videoray.layout.state, videoray.layout.inputs))
+    assert result["u"][-1] == pytest.approx(videoray.rov.step({**inputs, **AHEAD}, at_rest, 2.0)["u"], rel=1e-12)
+    assert result.units["r"] == "rad/s"
+    assert repr(result) == f"<Result: 3 times from 0 to 2 s; {', '.join(result.names)}>"
+    with pytest.raises(KeyError) as error:
+        result["U"]
+    assert str(error.value).endswith("; did you mean u?")
+    assert result.get("U") is None
+
+
+def test_a_data_frame_has_a_column_for_each_variable(videoray: VehicleModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = videoray.simulate(TIMES, AHEAD)
+    frame = result.to_dataframe()
+    assert frame.index.name == "time"
+    assert frame["u"].tolist() == result["u"].tolist()
+    assert frame.columns.tolist() == list(result.names)
+    many = videoray.simulate_many(TIMES, AHEAD, coefficients={"a_d_u": [8.0, 10.0]})
+    assert many.to_dataframe()["u"].tolist() == many["u"].ravel().tolist()
+    assert many.to_dataframe().index[4] == (1, 1.0)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match=r"^to_dataframe\(\) needs pandas: pip install pandas$"):
+        result.to_dataframe()
+
+
+@pytest.mark.parametrize("figure", [None, Figure()])
+def test_a_plot_has_a_panel_for_each_unit(
+    videoray: VehicleModel, figure: Figure | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plt, "figure", lambda **_: Figure())
+    result = videoray.simulate_many(TIMES, AHEAD, coefficients={"a_d_u": [8.0, 10.0]})
+    drawn = result.plot(["u", "w", "x", "u"], figure)
+    assert figure is None or drawn is figure
+    assert [(axes.get_ylabel(), len(axes.lines)) for axes in drawn.axes] == [("m/s", 4), ("m", 2)]
+    np.testing.assert_array_equal(np.asarray(drawn.axes[0].lines[1].get_ydata()), result["u"][1])
+
+
+def test_many_vehicles_are_each_like_one(videoray: VehicleModel) -> None:
+    drag, start = np.array([6.0, 8.0, 10.0]), np.array([0.0, 0.2, -0.4])
+    commands = np.array([[0.1, 0.5, 0.0], [0.2, 0.3, 0.0], [-0.3, 0.3, 0.0]])
+    inputs = {"u_l": commands, "u_r": [0.3, 0.4, 0.0], "u_t": [[0.1], [0.2], [0.3]]}
+    many = videoray.simulate_many(TIMES, inputs, start={"u": start, "z": 2}, coefficients={"a_d_u": drag})
+    assert many["u"].shape == (3, 3)
+    assert repr(many).startswith("<Result: 3 vehicles, 3 times from 0 to 2 s; u, ")
+    for n in range(3):
+        own = {"u_l": commands[n], "u_r": [0.3, 0.4, 0.0], "u_t": [0.1, 0.2, 0.3][n]}
+        one = videoray.with_(a_d_u=drag[n]).simulate(TIMES, own, start={"u": start[n], "z": 2})
+        assert {name: values.tolist() for name, values in one.items()} == {
+            name: values[n].tolist() for name, values in many.items()
+        }
+
+
+def test_a_simulation_goes_on_where_another_one_ended(videoray: VehicleModel) -> None:
+    whole = videoray.simulate([0.0, 1.0, 2.0, 3.0], {"u_l": [0.5, -0.2, 0.3, 0.0]})
+    first = videoray.simulate([0.0, 1.0], {"u_l": 0.5})
+    then = videoray.simulate([1.0, 2.0, 3.0], {"u_l": [-0.2, 0.3, 0.0]}, start=first.final)
+    assert {name: values[1:].tolist() for name, values in whole.items()} == {n: v.tolist() for n, v in then.items()}
+
+
+@pytest.mark.parametrize("make", [dict, pd.DataFrame])
+def test_inputs_have_times_of_their_own(videoray: VehicleModel, make: Callable[[Any], Any]) -> None:
+    """They change between the output times, and are 0 before the first of their own; the last of equal times counts."""
+    table = make({"time": [0.5, 1.25, 1.25, 9.0], "u_l": [0.3, 7.0, 0.5, 1.0], "u_r": [0.3, 0.3, 0.2, 1.0]})
+    found = videoray.simulate(TIMES, table, record=["u", "psi", "u_l"])
+    every = videoray.simulate([0.0, 0.5, 1.0, 1.25, 2.0], {"u_l": [0, 0.3, 0.3, 0.5, 0], "u_r": [0, 0.3, 0.3, 0.2, 0]})
+    assert found["u"].tolist() == every["u"][[0, 2, 4]].tolist()
+    assert found["psi"].tolist() == every["psi"][[0, 2, 4]].tolist()
+    assert found["u_l"].tolist() == [0.0, 0.3, 0.5]
+
+
+def test_a_function_of_time_is_held_at_the_middle_of_each_step(videoray: VehicleModel) -> None:
+    found = videoray.simulate(TIMES, {"u_l": lambda t: 0.1 * t, "u_r": 0.3}, record="u")
+    expected = videoray.simulate(TIMES, {"u_l": 0.1 * np.array([0.5, 1.5, 2.0]), "u_r": 0.3}, record="u")
+    assert found.names == ("u",)
+    assert found["u"].tolist() == expected["u"].tolist()
+
+
+def test_a_command_beyond_full_saturates_with_a_warning(videoray: VehicleModel) -> None:
+    with pytest.warns(UserWarning, match=r"^u_l reaches ±1\.5: commands saturate at ±1$") as caught:
+        found = videoray.simulate(TIMES, {"u_l": [-1.5, 0.0, 1.2]})
+    assert caught[0].filename == __file__
+    assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-1.0, 0.0, 1.0]})["u"].tolist()
+
+
+# ---- Mistakes --------------------------------------------------------------------------------------------------------
+
+Call = Callable[[VehicleModel], object]
+WRONG: dict[str, tuple[Call, str]] = {
+    "unknown vehicle": (
+        lambda _: rov_fmu.load("videorey"),
+        "videorey: there is no such file, .*; did you mean videoray?",
+    ),
+    "no name": (lambda _: rov_fmu.load(5), "vehicle = 5: must be the name of a vehicle"),  # type: ignore[arg-type]
+    "name for a vehicle": (
+        lambda _: build("videoray", "x.fmu"),  # type: ignore[arg-type]
+        r"vehicle = 'videoray': must be a vehicle, as rov_fmu\.load\('videoray'\) returns it",
+    ),
+    "unknown coefficient": (
+        lambda v: v.with_(a_du=1),
+        "a_du: there is no such coefficient of this .*; did you mean a_d_u?",
+    ),
+    "out of bounds": (lambda v: v.with_(a_d_u=-1), r"a_d_u = -1\.0: must be within 0 \.\.\. 1000000 N\.s2/m2"),
+    "NaN": (lambda v: v.with_(a_d_u=float("nan")), "a_d_u = nan: must be a finite number"),
+    "text": (lambda v: v.with_(a_d_u="3"), "a_d_u = '3': must be a finite number"),  # type: ignore[arg-type]
+    "no thrust": (lambda v: v.with_(a_t_rear=-100), "curve rear: must give a force above 0 at full command, "),
+    "no arm": (lambda v: v.with_(gamma=0), "R, gamma: must both be more than 0"),
+    "time stands": (lambda v: v.simulate([0, 1, 1]), r"time\[2\] = 1: must be greater than the time before it, 1"),
+    "one time": (lambda v: v.simulate(3), r"time: must be a sequence of 2 or more times \(s\), .* shape \(\)"),
+    "times in words": (lambda v: v.simulate(["a"]), r"time = \['a'\]: must be a number, or an array of numbers"),
+    "endless time": (lambda v: v.simulate([0, np.inf]), r"time\[1\] = inf: must be a finite number"),
+    "unknown input": (
+        lambda v: v.simulate(TIMES, {"ul": 1}),
+        r"inputs\['ul'\]: .* no such input, .*; did you mean u_l?",
+    ),
+    "input by number": (lambda v: v.simulate(TIMES, {3: 1}), r"inputs\[3\]: the vehicle has no such input"),  # type: ignore[dict-item]
+    "wrong length": (
+        lambda v: v.simulate(TIMES, {"u_l": [1, 2]}),
+        r"inputs\['u_l'\]: must be a number, or an array of the shape \(3,\), .* and has the shape \(2,\)",
+    ),
+    "wrong length of a function": (
+        lambda v: v.simulate(TIMES, {"u_l": lambda _: [1.0, 2.0]}),
+        r"inputs\['u_l'\]\(t\): must be a number, or an array of the shape \(3,\), .* \(2,\)",
+    ),
+    "two axes for one": (lambda v: v.simulate(TIMES, {"u_l": [[1, 1, 1]]}), r"inputs\['u_l'\]: .* the shape \(1, 3\)"),
+    "a value is missing": (
+        lambda v: v.simulate(TIMES, {"u_l": [0, None, 1]}),
+        r"inputs\['u_l'\]\[1\] = nan: must be a finite",
+    ),
+    "an input in words": (lambda v: v.simulate(TIMES, {"u_l": "a"}), r"inputs\['u_l'\] = 'a': must be a number, or"),
+    "a list of inputs": (lambda v: v.simulate(TIMES, [1]), r"inputs = \[1\]: must be a mapping from names"),  # type: ignore[arg-type]
+    "own times fall": (
+        lambda v: v.simulate(TIMES, {"time": [0, 2, 1], "u_l": [0, 0, 0]}),
+        r"inputs\['time'\]\[2\] = 1: must not be less than the time before it, 2",
+    ),
+    "an input at the start": (
+        lambda v: v.simulate(TIMES, start={"u_l": 1}),
+        r"start\['u_l'\]: .* no such state, only u, w",
+    ),
+    "two starts": (lambda v: v.simulate(TIMES, start={"u": [1, 2]}), r"start\['u'\]: must be one number, .* \(2,\)"),
+    "unknown record": (
+        lambda v: v.simulate(TIMES, record=["U"]),
+        "record: the vehicle has no variable 'U'; did you mean u?",
+    ),
+    "too fast": (
+        lambda v: v.simulate(TIMES, start={"r": 1e300, "u": 1}),
+        r"the motion cannot be computed up to time\[1\] = 1 s: ",
+    ),
+    "unequal numbers": (
+        lambda v: v.simulate_many(TIMES, {"u_l": [[1], [0.5]]}, coefficients={"a_d_u": [1, 2, 3]}),
+        "a_d_u: has values for 3 vehicles, and u_l for 2",
+    ),
+    "none at all": (lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": []}), "a_d_u: has values for 0 vehicles"),
+    "one out of bounds": (
+        lambda v: v.simulate_many(TIMES, coefficients={"a_d_u": [1, -3]}),
+        r"coefficients\['a_d_u'\] = -3: must be within 0 \.\.\. 1000000 N\.s2/m2",
+    ),
+    "no workers": (lambda v: v.simulate_many(TIMES, workers=0), "workers = 0: must be a whole number from 1 on"),
+    "per vehicle and not per time": (
+        lambda v: v.simulate_many(TIMES, {"u_l": np.full(1000, 0.1)}),
+        r"inputs\['u_l'\]: .* or \(vehicles, 1\), or \(vehicles, 3\), and has the shape \(1000,\)",
+    ),
+    "too large": (
+        lambda v: v.simulate_many(np.arange(1e6), coefficients={"a_d_u": np.full(10_000_000, 1.0)}),
+        "time, record: the result takes 8.8e.05 GB, more than there is",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_mistake_is_one_line(case: str, videoray: VehicleModel) -> None:
+    call, told = WRONG[case]
+    with pytest.raises((InputError, FileError), match=f"^{told}") as error:
+        call(videoray)
+    assert isinstance(error.value, ValueError)
+    assert "\n" not in str(error.value)
+
+
+def test_a_vehicle_that_cannot_be_is_neither_built_nor_simulated(videoray: VehicleModel, tmp_path: Path) -> None:
+    """However it came about."""
+    for name, value in (("a_du", 1.0), ("a_d_u", float("nan"))):
+        rov = videoray.rov.replaced({name: value})
+        wrong = VehicleModel(**{**vars(videoray), "rov": rov})
+        with pytest.raises(InputError, match=rf"^{name}( = nan)?: "):
+            build(wrong, tmp_path / "x.fmu")
+        with pytest.raises(InputError, match=rf"^{name}( = nan)?: "):
+            wrong.simulate(TIMES)
+    with pytest.raises(OptionError, match=r"^there is no backend 'nativ', only native, pythonfmu$"):
+        build(videoray, tmp_path / "x.fmu", backend="nativ")
+    with pytest.raises(InputError, match=r"^names: must name a variable$"):
+        Result(np.zeros(2), {}, {}, (), np.zeros(0, np.intp)).plot()
+    assert not list(tmp_path.iterdir())
