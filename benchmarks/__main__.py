@@ -12,7 +12,7 @@ from rich.console import Console
 
 from checks.fmpy_slave import fmpy_slave
 from rov_fmu.build import build
-from rov_fmu.export.compile import BuildError, host_platform
+from rov_fmu.engine.compile import BuildError, host_platform
 from rov_fmu.files.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
@@ -21,7 +21,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from . import archive, fleet, importer, picture, sections
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
-from .steps import HeavyPlan, Measured, Plan
+from .steps import HeavyPlan, Measured, Plan, TaylorPlan
 from .studies import Study
 from .work import Work
 
@@ -52,7 +52,7 @@ _QUICK = Effort(3, 1024, 8, 1, 1000, 100, 3, (200, 100, 400), all_platforms=Fals
 @click.command(help=__doc__)
 @click.option("--quick", is_flag=True, help="Few repetitions, only this machine's binary: to see that all of it runs.")
 @click.option("--picture", "picture_file", type=click.Path(path_type=Path), metavar="FILE.svg",
-              help="Also draw cost against error there (docs/cost_error.svg is the README's).")  # fmt: skip
+              help="Also draw cost against error there (docs/cost_error.svg is one).")  # fmt: skip
 def _command(quick: bool, picture_file: Path | None) -> None:
     check_targets(filter(None, (picture_file,)))
     if host_platform() is None:
@@ -81,6 +81,9 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
             heavy_c = PlainC(heavy, Path(tempfile.mkdtemp(dir=folder)))
             measured_heavy = Measured(heavy_c, heavier.jobs, effort.repetitions)
             yield sections.heavy(heavier, measured_heavy)
+        with say("heyoka beside it"):
+            series = TaylorPlan(rov, effort.commands, effort.known)
+            yield sections.taylor(series, measured_series := Measured(plain_c, series.jobs, effort.repetitions))
     else:
         yield [["Plain C: not measured, the programs are written for Linux on x86-64"]]
     with say("building"):
@@ -111,7 +114,7 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
         yield sections.studies(pairs, [study.cost(count, workers=2) for count in sorted([beside, *others])])
     yield from sections.archive(builds, loaded)
     if plain_c:
-        yield sections.promises(plan, measured, heavier, measured_heavy)
+        yield sections.promises(plan, measured, heavier, measured_heavy, series, measured_series)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,47 +1,40 @@
-"""The picture of the README: cost against error of a held command, on logarithmic axes."""
+"""The picture of docs/accuracy.md: cost against error of a held command, on logarithmic axes."""
 
 from functools import partial
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.pages.svg import LIGHT, svg_file
 
 from .page import digits, duration
-from .plain_c import BDF, CLOSED, EULER, FIXED_POINT, RK4
+from .plain_c import ADAMS, BDF, CORE, EULER, RK4
 from .steps import NAMES, TARGET, Measured, Plan, compared
 
 NAME = "cost_error.svg"
-_SIZE = (9.4, 4.7)  # inches
-_CURVES = {EULER: ("forward Euler", "grey"), RK4: ("RK4", "blue"), FIXED_POINT: (NAMES[FIXED_POINT], "violet"),
+_SIZE = (7.2, 4.7)  # inches
+_CURVES = {EULER: ("forward Euler", "grey"), RK4: ("RK4", "blue"), ADAMS: (NAMES[ADAMS], "violet"),
            BDF: (NAMES[BDF], "teal")}  # fmt: skip
 
 
 def cost_error_picture(plan: Plan, measured: Measured) -> str:
-    """Two panels as SVG: the velocities, and the whole state while turning."""
+    """Draw the cost of a held command over its error while turning, as SVG."""
     return svg_file(partial(_draw, plan, measured), _SIZE, salt=NAME) + "\n"
 
 
 def _draw(plan: Plan, measured: Measured, figure: Figure) -> None:
-    left, right = figure.subplots(1, 2, sharey=True)
-    _panel(left, plan, measured, 3, "Velocities")
-    _panel(right, plan, measured, 7, "Velocities and pose, turning")
-    left.set_ylabel("processor time of a command of 1 s")
-    left.set_ylim(3e-8, 2e-2)
-    left.set_yticks([1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2], ["100 ns", "1 µs", "10 µs", "100 µs", "1 ms", "10 ms"])
-
-
-def _panel(ax: Axes, plan: Plan, measured: Measured, states: int, title: str) -> None:
-    unit = "m/s, rad/s" if states == 3 else "m/s, rad/s, m, rad"
-    ax.set(xscale="log", yscale="log", xlabel=f"error after a command of 1 s ({unit})")
+    ax = figure.subplots()
+    ax.set(xscale="log", yscale="log", xlabel="error after a command of 1 s (m/s, rad/s, m, rad)",
+           ylabel="processor time of a command of 1 s")  # fmt: skip
+    ax.set_ylim(3e-7, 2e-2)
+    ax.set_yticks([1e-6, 1e-5, 1e-4, 1e-3, 1e-2], ["1 µs", "10 µs", "100 µs", "1 ms", "10 ms"])
     ax.set_xlim(3e-17, 3.0)
     ax.set_xticks([1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1.0])
     ax.minorticks_off()
-    ax.set_title(title, loc="left")
-    ours, top = plan.job(CLOSED, states, 1.0), 0.0
+    ax.set_title("Velocities and pose, turning", loc="left")
+    ours, top = plan.job(CORE, 1.0), 0.0
     cost = measured.cost(ours)
     for method, (name, role) in _CURVES.items():
-        jobs, color = plan.sweeps[states, method], LIGHT[role]
+        jobs, color = plan.sweeps[method], LIGHT[role]
         errors, costs = [measured.error(job) for job in jobs], [measured.cost(job) for job in jobs]
         times = ""
         if min(errors) < TARGET:

@@ -1,7 +1,7 @@
 """What is measured in plain C: built with the compiler of the FMU, and called in this process (Linux on x86-64)."""
 
 import ctypes
-from ctypes import POINTER, byref, c_double, c_int, c_long, c_size_t, c_void_p
+from ctypes import POINTER, byref, c_double, c_long, c_size_t, c_void_p
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,21 +12,24 @@ from fmpy.sundials.libraries import sundials_core, sundials_cvode
 from numpy.typing import NDArray
 
 from checks.c_programs import compile_c
+from rov_fmu.engine.compile import PLATFORMS, compile_all, host_platform
 from rov_fmu.export.archive import native_content
-from rov_fmu.export.compile import PLATFORMS, compile_all, host_platform
 from rov_fmu.vehicle.vehicle import Vehicle
 
+from .taylor import Heyoka
+
 PLATFORM = "linux64"
-# as steps.py names them: the FMU, the same with its commands set before every step, both of FMI 3.0 too, the formulas
+# as steps.py names them: the FMU, the same with its commands set before every step, both of FMI 3.0 too, its step
 # without FMI, the explicit methods, CVODE's
 FMU, FMU_SET, FMU_3, FMU_3_SET = FMUS = ("fmu", "fmu-set", "fmu-3", "fmu-3-set")
-CLOSED, EULER, RK4 = "closed", "euler", "rk4"
-BDF, ADAMS, FIXED_POINT = CVODE = ("bdf", "adams", "adams-fixed")
+CORE, EULER, RK4 = "core", "euler", "rk4"
+HEYOKA = "heyoka"
+BDF, ADAMS = CVODE = ("bdf", "adams")
 _SOURCES = Path(__file__).with_name("c")
 # a library needs but a part of the FMU's sources; what replaces mallinfo came after the GLIBC that is linked here
 _FLAGS = ("-target", PLATFORMS[PLATFORM].target, "-shared", "-g0", "-fno-asynchronous-unwind-tables", "-Wshadow",
           "-Wno-unused-function", "-Wno-deprecated-declarations")  # fmt: skip
-# The explicit methods with what is best for them: packed into pairs, RK4 of three axes takes a third longer.
+# Packed into pairs, RK4 takes a fifteenth longer for the VideoRay, and a tenth less for the Heavy.
 _FASTEST = ("-O3", "-fno-slp-vectorize")
 _SUNDIALS = (sundials_core._name, sundials_cvode._name)
 _REALS, _REFERENCES = np.ctypeslib.ndpointer(float, flags="C"), np.ctypeslib.ndpointer(np.uint32, flags="C")
@@ -55,7 +58,7 @@ class PlainC:
             fmu = folder / f"{vehicle.identifier}-{fmi}{PLATFORMS[PLATFORM].suffix}"
             fmu.write_bytes(compile_all([PLATFORM], content[fmi].sources, vehicle.identifier)[PLATFORM])
             m = load("measure", fmi, "-ldl", *_SUNDIALS)
-            m.hold.argtypes = (c_void_p, c_void_p, c_void_p, c_int, c_double, c_long, c_long, c_long, _REALS, _REALS)
+            m.hold.argtypes = (c_void_p, c_void_p, c_void_p, c_double, c_long, c_long, c_long, _REALS, _REALS)
             m.step_in_turn.argtypes = (c_size_t, c_size_t, POINTER(c_double))
             m.run_each.argtypes = (c_size_t, _REFERENCES, c_size_t, _REALS, _REALS, _REALS)
             m.hold.restype = m.step_in_turn.restype = m.run_each.restype = c_double
@@ -65,49 +68,49 @@ class PlainC:
         self._explicit = load("explicit", 2, *_FASTEST)
         self._measure, self._measure_3 = measure(2), measure(3)
         self._solver = cache(self._new_solver)
+        self._heyoka = cache(lambda: Heyoka(vehicle.rov))
 
-    def _new_solver(self, states: int, method: str, tolerance: float) -> tuple[Any, Any]:
+    def _new_solver(self, method: str, tolerance: float) -> tuple[Any, Any]:
         """CVODE with the same relative and absolute tolerance, and its vector.
 
-        BDF: Newton's method with a dense matrix, as FMPy sets it up.
+        BDF: Newton's method with a dense matrix, as FMPy sets it up. Adams: fixed-point iteration.
         """
         context = sundials.SUNContext()
         flags = [sundials.SUNContext_Create(sundials.SUN_COMM_NULL, byref(context))]
-        y = sundials.N_VNew_Serial(states, context)
-        rates = sundials.CVRhsFn((f"rates_{self._which(states)}", self._measure))
+        y = sundials.N_VNew_Serial(self._states, context)
+        rates = sundials.CVRhsFn(("cvode_rates", self._measure))
         solver = sundials.CVodeCreate(2 if method == BDF else 1, context)
         flags += [sundials.CVodeInit(solver, rates, 0.0, y), sundials.CVodeSetMaxNumSteps(solver, 1_000_000)]
         flags += [sundials_cvode.CVodeSStolerances(c_void_p(solver), c_double(tolerance), c_double(tolerance))]
-        if method == FIXED_POINT:
+        if method == ADAMS:
             sundials_cvode.SUNNonlinSol_FixedPoint.restype = c_void_p
             iteration = c_void_p(sundials_cvode.SUNNonlinSol_FixedPoint(y, 0, context))
             flags += [sundials_cvode.CVodeSetNonlinearSolver(c_void_p(solver), iteration)]
         else:
-            matrix = sundials.SUNDenseMatrix(states, states, context)
+            matrix = sundials.SUNDenseMatrix(self._states, self._states, context)
             flags += [sundials.CVodeSetLinearSolver(solver, sundials.SUNLinSol_Dense(y, matrix, context), matrix)]
         if any(flags):
             raise RuntimeError(f"CVODE cannot be set up: {flags}")
         return solver, ctypes.cast(y, c_void_p)
 
-    def _which(self, states: int) -> str:
-        return "all" if states == self._states else "velocities"
-
     def hold(
-        self, method: str, states: int, setting: float, h: float, steps: int, commands: Reals, start: Reals
+        self, method: str, setting: float, h: float, steps: int, commands: Reals, start: Reals
     ) -> tuple[float, Reals]:
         """Hold commands in turn, each for so many steps of h: seconds a step, and the end (all states).
 
         `setting`: sub-steps, or the tolerance of CVODE.
         """
+        if method == HEYOKA:
+            return self._heyoka().hold(h, steps, commands, start)
         function, solver, end = None, (None, None), start.copy()
         if method in CVODE:
-            solver = self._solver(states, method, setting)
+            solver = self._solver(method, setting)
         elif method not in FMUS:
-            library = self._measure if method == CLOSED else self._explicit
-            function = ctypes.cast(getattr(library, f"{method}_{self._which(states)}"), c_void_p)
+            library = self._measure if method == CORE else self._explicit
+            function = ctypes.cast(getattr(library, method), c_void_p)
         substeps = 0 if method in (FMU_SET, FMU_3_SET) else 1 if method in CVODE else round(setting)
         measure = self._measure_3 if method in (FMU_3, FMU_3_SET) else self._measure
-        each = measure.hold(function, *solver, states, h, substeps, steps, len(commands), commands, end)
+        each = measure.hold(function, *solver, h, substeps, steps, len(commands), commands, end)
         return 1e-9 * each, end
 
     def step_in_turn(self, instances: int, steps: int) -> tuple[float, float]:

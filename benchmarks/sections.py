@@ -7,12 +7,13 @@ import numpy as np
 from .fleet import INSTANCES, Runs
 from .importer import INTERVAL, NATIVE, STOP
 from .page import Section, digits, duration, error
-from .plain_c import BDF, CLOSED, CVODE, EULER, FMU, FMU_3, FMU_3_SET, FMU_SET, RK4, Reals
-from .steps import KINDS, NAMES, SUBSTEP, TARGET, H, HeavyPlan, Job, Measured, Plan, compared, methods
+from .plain_c import ADAMS, BDF, CORE, EULER, FMU, FMU_3, FMU_3_SET, FMU_SET, HEYOKA, RK4, Reals
+from .steps import METHODS, NAMES, SUBSTEP, TARGET, H, HeavyPlan, Job, Measured, Plan, TaylorPlan, compared
 from .studies import Cost, overhead
+from .taylor import NOT_INSTALLED
 
 _STEPS = [f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H]
-_OURS = {FMU: "ours, fmi2DoStep", CLOSED: "ours, without FMI"}
+_OURS = {FMU: "ours, fmi2DoStep", CORE: "ours, without FMI"}
 _MORE = {
     FMU_SET: "ours, fmi2SetReal and fmi2DoStep",
     FMU_3: "ours, fmi3DoStep",
@@ -23,29 +24,27 @@ _NAMES = {**_MORE, **_OURS, RK4: f"RK4, {_SUBSTEPS}", EULER: f"forward Euler, {_
 
 
 def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
-    """What a communication step costs (velocities, and the whole state turning, straight, and straight ahead), and a
-    held command of 1 s where all have the same error."""
-    titles = ("Velocities u, w, r", "Velocities and pose, turning", "Velocities and pose, straight")
-    for title, (states, straight) in zip(titles, KINDS, strict=True):
-        section = [[title, *_STEPS]]
-        for method, tolerance in methods(states):
+    """What a communication step costs (turning, straight, and straight ahead), and a held command of 1 s where all have
+    the same error."""
+    for straight in (False, True):
+        section = [[f"Velocities and pose, {_way(straight)}", *_STEPS]]
+        for method, tolerance in METHODS:
             name = _NAMES.get(method) or f"{NAMES[method]}, tolerance {error(tolerance)}"
-            jobs = [plan.job(method, states, h, straight, tolerance) for h in H]
+            jobs = [plan.job(method, h, straight, tolerance) for h in H]
             section.append([name, *(f"{duration(measured.cost(j))}  {error(measured.error(j)):>5}" for j in jobs)])
         yield section
-    ahead = {name: [duration(measured.cost(plan.job(m, 7, h, ahead=True))) for h in H] for m, name in _OURS.items()}
+    ahead = {name: [duration(measured.cost(plan.job(m, h, ahead=True))) for h in H] for m, name in _OURS.items()}
     yield [["The same, nothing turns back", *_STEPS], *([name, *costs] for name, costs in ahead.items())]
-    ours = {states: plan.job(CLOSED, states, 1.0) for states in (3, 7)}
-    cells = [cell for job in ours.values() for cell in (duration(measured.cost(job)), "1")]
-    section = [["ours, to rounding", *cells]]
+    ours = plan.job(CORE, 1.0)
+    section = [["ours, to rounding", duration(measured.cost(ours)), "1"]]
     for method, name in NAMES.items():
-        section.append([name])
-        for states, job in ours.items():
-            if (states, method) in plan.sweeps:
-                cost, times = compared(measured, plan.sweeps[states, method], job)
-                section[-1] += [duration(cost), digits(times)]
-    headings = ["velocities", "times ours", "and pose, turning", "times ours"]
-    yield [[f"A command of 1 s to {error(TARGET)}", *headings], *section]
+        cost, times = compared(measured, plan.sweeps[method], ours)
+        section.append([name, duration(cost), digits(times)])
+    yield [[f"A command of 1 s to {error(TARGET)}", "turning", "times ours"], *section]
+
+
+def _way(straight: bool) -> str:
+    return "straight" if straight else "turning"
 
 
 def heavy(plan: HeavyPlan, measured: Measured) -> Section:
@@ -56,6 +55,19 @@ def heavy(plan: HeavyPlan, measured: Measured) -> Section:
         *([name, *(f"{duration(measured.cost(job))}  {error(measured.error(job)):>5}" for job in jobs.values())]
           for name, jobs in rows.items()),
     ]  # fmt: skip
+
+
+def taylor(plan: TaylorPlan, measured: Measured) -> Section:
+    """heyoka on the same system, and how many times the cost of ours its steps have."""
+    names = {CORE: _OURS[CORE], RK4: _NAMES[RK4], HEYOKA: "heyoka, loop in C++, thrust ahead and not timed"}
+    section: list[list[str]] = [["Velocities and pose, turning one way", *_STEPS]]
+    for method, jobs in plan.rows.items():
+        cells = (f"{duration(measured.cost(job))}  {error(measured.error(job)):>5}" for job in jobs.values())
+        section.append([names[method], *cells])
+    if HEYOKA not in plan.rows:
+        return [*section, [f"heyoka: {NOT_INSTALLED}"]]
+    ratios = (digits(_ratio(measured, plan.rows[HEYOKA][h], plan.rows[CORE][h])) for h in H)
+    return [*section, ["heyoka / ours", *ratios]]
 
 
 def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[str, Reals]) -> Section:
@@ -121,54 +133,59 @@ def archive(builds: Mapping[str, tuple[int, float, float]], loaded: Sequence[flo
 
 FINE = 1e-10
 """The error at which the Heavy is compared with RK4."""
+_SHORT = (0.001, SUBSTEP)
+_TO_RK4 = {(0.001, False): 1.5, (SUBSTEP, False): 1.7, (0.001, True): 2.2, (SUBSTEP, True): 2.2}
+"""Promised of a step, by its length and whether it is straight: its cost in steps of RK4."""
+_TO_OURS = {RK4: 5.0, ADAMS: 8.0, BDF: 18.0}
+"""Promised of a command of 1 s that each method simulates to TARGET: its cost in commands of ours, at least."""
 
 
 def _ratio(measured: Measured, ours: Job, other: Job) -> float:
     return float(np.median(measured.seconds[ours] / measured.seconds[other]))
 
 
-def promises(plan: Plan, measured: Measured, heavier: HeavyPlan, measured_heavy: Measured) -> Section:
+def promises(
+    plan: Plan,
+    measured: Measured,
+    heavier: HeavyPlan,
+    measured_heavy: Measured,
+    series: TaylorPlan,
+    measured_series: Measured,
+) -> Section:
     """What was promised of the cost of a step. Ratios and differences are the medians of those in each repetition."""
-    velocity, held = plan.job(CLOSED, 3, SUBSTEP), plan.job(CLOSED, 3, 1.0)
-    step = _ratio(measured, velocity, plan.job(RK4, 3, SUBSTEP))
-    to_rk4 = {(h, straight): _ratio(measured, plan.job(CLOSED, 7, h, straight), plan.job(RK4, 7, h, straight))
-              for h in (0.001, SUBSTEP) for straight in (False, True)}  # fmt: skip
-    set_too = _ratio(measured, plan.job(FMU_SET, 7, SUBSTEP), plan.job(RK4, 7, SUBSTEP))
-    coupled = _ratio(measured_heavy, heavier.ours[SUBSTEP], heavier.rk4[SUBSTEP])
+    made: list[tuple[str, str, str, bool]] = []
+
+    def at_most(what: str, ratio: float, limit: float) -> None:
+        made.append((what, digits(ratio), f"≤ {limit:g}", ratio <= limit))
+
+    def at_least(what: str, ratio: float, limit: float) -> None:
+        made.append((what, digits(ratio), f"≥ {limit:g}", ratio >= limit))
+
+    for (h, straight), limit in _TO_RK4.items():
+        ratio = _ratio(measured, plan.job(CORE, h, straight), plan.job(RK4, h, straight))
+        at_most(f"{_way(straight)} step to one of RK4, {1000 * h:g} ms", ratio, limit)
+    set_too = _ratio(measured, plan.job(FMU_SET, SUBSTEP), plan.job(RK4, SUBSTEP))
+    at_most("turning, with fmi2SetReal and fmi2DoStep, 10 ms", set_too, 2.0)
+    for h in _SHORT:
+        ratio = _ratio(measured_heavy, heavier.ours[h], heavier.rk4[h])
+        at_most(f"Heavy, coupling and lag, to one of RK4, {1000 * h:g} ms", ratio, 2.5)
+    worst = max(measured.error(plan.job(CORE, h, straight)) for h in (SUBSTEP, 1.0) for straight in (False, True))
+    made.append(("its error after 1 s, in steps of 10 ms and 1 s", error(worst), "≤ 1e-13", worst <= 1e-13))
+    longest = measured.cost(plan.job(CORE, H[-1], straight=True))
+    made.append(("straight step of 100 s", duration(longest), "≤ 2 µs", longest <= 2e-6))
+    for method, limit in _TO_OURS.items():
+        times = compared(measured, plan.sweeps[method], plan.job(CORE, 1.0))[1]
+        at_least(f"{NAMES[method]} to ours, at {error(TARGET)} a command of 1 s", times, limit)
     finer = compared(measured_heavy, heavier.sweep, heavier.ours[SUBSTEP], FINE)[1]
-    worst = max(measured.error(job) for job in (velocity, held))
-    times = {method: compared(measured, plan.sweeps[3, method], held)[1] for method in (RK4, *CVODE)}
-    best = min(CVODE, key=lambda method: times[method])
-    spread = _spread(measured, [plan.job(CLOSED, 7, h, ahead=True) for h in H])
-    turning_back = _spread(measured, [plan.job(CLOSED, 7, h, straight=True) for h in H])
-    fmu, bare = (measured.seconds[plan.job(method, 7, SUBSTEP, straight=True)] for method in (FMU, CLOSED))
+    at_least(f"RK4 to ours of the Heavy, to {error(FINE)}", finer, 5.0)
+    fmu, bare = (measured.seconds[plan.job(method, SUBSTEP, straight=True)] for method in (FMU, CORE))
     layer = max(0.0, float(np.median(fmu - bare)))
-    versions = {h: _ratio(measured, plan.job(FMU_3_SET, 7, h), plan.job(FMU_SET, 7, h)) for h in H}
-    per = f"at {error(TARGET)} a command of 1 s"
-    steps = [(f"{'straight' if straight else 'turning'} step of all states to one of RK4, {1000 * h:g} ms", found)
-             for (h, straight), found in to_rk4.items()]  # fmt: skip
-    made = [
-        *((what, digits(found), "≤ 1.5", found <= 1.5) for what, found in steps),
-        ("turning, with fmi2SetReal and fmi2DoStep, 10 ms", digits(set_too), "≤ 2", set_too <= 2.0),
-        ("Heavy, coupling and lag, to one of RK4, 10 ms", digits(coupled), "≤ 5", coupled <= 5.0),
-        (f"RK4 to ours of the Heavy, to {error(FINE)}", digits(finer), "≥ 5", finer >= 5.0),
-        ("velocity step of 3 axes to one of RK4, 10 ms", digits(step), "≤ 1", step <= 1.0),
-        ("its error, m/s, rad/s", error(worst), "≤ 1e-14", worst <= 1e-14),
-        (f"RK4 to ours, {per}", digits(times[RK4]), "≥ 20", times[RK4] >= 20.0),
-        (f"{NAMES[best]} to ours, {per}", digits(times[best]), "≥ 500", times[best] >= 500.0),
-        (f"{NAMES[BDF]}, as FMPy uses it, to ours", digits(times[BDF]), "≥ 500", times[BDF] >= 500.0),
-        ("dearest to cheapest step, 1 ms to 100 s, ahead", digits(spread), "≤ 1.5", spread <= 1.5),
-        ("the same, straight but turning back", digits(turning_back), "≤ 1.5", turning_back <= 1.5),
-        ("what FMI adds to a step of 10 ms", duration(layer), "≤ 20 ns", layer <= 20e-9),
-        *(
-            (f"turning, set and step, FMI 3.0 to FMI 2.0, {step}", digits(found), "≤ 1.05", found <= 1.05)
-            for step, found in zip(_STEPS, versions.values(), strict=True)
-        ),
-    ]
+    made.append(("what FMI adds to a step of 10 ms", duration(layer), "≤ 20 ns", layer <= 20e-9))
+    for step, h in zip(_STEPS, H, strict=True):
+        ratio = _ratio(measured, plan.job(FMU_3_SET, h), plan.job(FMU_SET, h))
+        at_most(f"turning, set and step, FMI 3.0 to FMI 2.0, {step}", ratio, 1.05)
+    for h in _SHORT if HEYOKA in series.rows else ():
+        times = _ratio(measured_series, series.rows[HEYOKA][h], series.rows[CORE][h])
+        at_least(f"heyoka to ours, turning, {1000 * h:g} ms", times, 4.0)
     rows = [(what, found, promised, "kept" if kept else "NOT KEPT") for what, found, promised, kept in made]
     return [("Promised", "measured", "promised", ""), *rows]
-
-
-def _spread(measured: Measured, jobs: Sequence[Job]) -> float:
-    costs = np.array([measured.seconds[job] for job in jobs])
-    return float(np.median(costs.max(axis=0) / costs.min(axis=0)))

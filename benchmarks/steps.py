@@ -7,22 +7,22 @@ from itertools import chain
 
 import numpy as np
 
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.rov import Rov
 
-from .plain_c import ADAMS, BDF, CLOSED, CVODE, EULER, FIXED_POINT, FMU, FMUS, RK4, PlainC, Reals
+from .plain_c import ADAMS, BDF, CORE, CVODE, EULER, FMU, FMUS, HEYOKA, RK4, PlainC, Reals
+from .taylor import installed
 from .work import Work
 
 TARGET = 1e-9
-"""The error of a held command of 1 s at which costs are compared, m/s."""
+"""The error of a held command of 1 s at which costs are compared (SI units)."""
 SUBSTEP = 0.01
 """Of the explicit methods, at most, s."""
 H = (0.001, 0.01, 1.0, 100.0)
 TOLERANCES = (1e-6, 1e-9)
-KINDS = ((3, False), (7, False), (7, True))
-"""States, and whether straight, of the table."""
-NAMES = {RK4: "RK4", BDF: "CVODE BDF", ADAMS: "CVODE Adams, Newton", FIXED_POINT: "CVODE Adams"}
-_METHODS = [*((method, 0.0) for method in (*FMUS, CLOSED, RK4, EULER)),
-            *((method, tolerance) for method in (BDF, FIXED_POINT) for tolerance in TOLERANCES)]  # fmt: skip
+NAMES = {RK4: "RK4", BDF: "CVODE BDF", ADAMS: "CVODE Adams"}
+METHODS = [*((method, 0.0) for method in (*FMUS, CORE, RK4, EULER)),
+           *((method, tolerance) for method in CVODE for tolerance in TOLERANCES)]  # fmt: skip
+"""The rows of the table, with the solvers' tolerances."""
 _SWEEP = {
     EULER: [10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4, 1e5],
     RK4: [3.0, 5.0, *(10.0 * 2**n for n in range(9))],
@@ -33,17 +33,11 @@ _PASS = 4e-3
 """Seconds to measure at a time: short, so that all are measured in the same minute, again and again."""
 
 
-def methods(states: int) -> list[tuple[str, float]]:
-    """Of the table, with the solvers' tolerances. The FMU steps all states."""
-    return _METHODS[len(FMUS) * (states == 3) :]
-
-
 @dataclass(frozen=True)
 class Job:
-    """A method on 3 or 7 states, with sub-steps or a tolerance, in communication steps of h s."""
+    """A method with sub-steps or a tolerance, in communication steps of h s."""
 
     method: str
-    states: int
     setting: float
     work: Work
     h: float
@@ -52,8 +46,7 @@ class Job:
         """Hold so many commands, from the known start of the first on: seconds a step, and the end."""
         held, state = self.work.array[start : start + commands], self.work.states[start]
         steps = round(self.work.hold / self.h)
-        seconds, end = plain_c.hold(self.method, self.states, self.setting, self.h, steps, held, state)
-        return seconds, end[: self.states]
+        return plain_c.hold(self.method, self.setting, self.h, steps, held, state)
 
     def commands(self, plain_c: PlainC) -> int:
         """How many to time: where they are cheap so many that no branch is known by heart."""
@@ -91,35 +84,45 @@ class Plan:
 
         self._work = work
         self.sweeps = {
-            (states, method): [self.job(method, states, 1.0, setting=setting) for setting in settings]
-            for states in (3, 7)
+            method: [self.job(method, 1.0, setting=setting) for setting in settings]
             for method, settings in _SWEEP.items()
-            if states == 3 or method != ADAMS
         }
-        rows = [self.job(method, states, h, straight, setting)
-                for states, straight in KINDS for method, setting in methods(states) for h in H]  # fmt: skip
-        ahead = [self.job(method, 7, h, ahead=True) for method in (FMU, CLOSED) for h in H]
+        rows = [self.job(method, h, straight, setting)
+                for straight in (False, True) for method, setting in METHODS for h in H]  # fmt: skip
+        ahead = [self.job(method, h, ahead=True) for method in (FMU, CORE) for h in H]
         self.jobs = list(dict.fromkeys([*rows, *ahead, *chain.from_iterable(self.sweeps.values())]))
 
-    def job(
-        self, method: str, states: int, h: float, straight: bool = False, setting: float = 0.0, ahead: bool = False
-    ) -> Job:
+    def job(self, method: str, h: float, straight: bool = False, setting: float = 0.0, ahead: bool = False) -> Job:
         """A cell of the table. `ahead`: straight ahead and down, nothing turns back."""
         setting = setting or (max(1.0, round(h / SUBSTEP)) if method in (EULER, RK4) else 1.0)
-        return Job(method, states, setting, self._work(straight or ahead, h > 1.0, ahead), h)
+        return Job(method, setting, self._work(straight or ahead, h > 1.0, ahead), h)
 
 
 class HeavyPlan:
     """What is measured of a vehicle with coupling and lag, of all states: its steps, and RK4 ever finer."""
 
     def __init__(self, rov: Rov, commands: int, starts: int) -> None:
-        states = len(rov.layout.state)
         short, long = (Work(rov, False, hold, commands, known) for hold, known in ((1.0, starts), (100.0, starts // 4)))
         works = {h: long if h > 1.0 else short for h in H}
-        self.ours = {h: Job(CLOSED, states, 1.0, work, h) for h, work in works.items()}
-        self.rk4 = {h: Job(RK4, states, max(1.0, round(h / SUBSTEP)), work, h) for h, work in works.items()}
-        self.sweep = [Job(RK4, states, float(2**n), short, SUBSTEP) for n in range(8)]
+        self.ours = {h: Job(CORE, 1.0, work, h) for h, work in works.items()}
+        self.rk4 = {h: Job(RK4, max(1.0, round(h / SUBSTEP)), work, h) for h, work in works.items()}
+        self.sweep = [Job(RK4, float(2**n), short, SUBSTEP) for n in range(8)]
         self.jobs = list(dict.fromkeys([*self.ours.values(), *self.rk4.values(), *self.sweep]))
+
+
+class TaylorPlan:
+    """What is measured beside heyoka, where it is installed: steps of all states while the vehicle turns one way."""
+
+    def __init__(self, rov: Rov, commands: int, starts: int) -> None:
+        def job(method: str, h: float) -> Job:
+            hold, known = (100.0, starts // 4) if h > 1.0 else (1.0, starts)
+            setting = max(1.0, round(h / SUBSTEP)) if method == RK4 else 1.0
+            work = Work(rov, False, hold, commands, known, one_way=True)
+            return Job(method, setting, work, h)
+
+        methods = (CORE, RK4, *((HEYOKA,) if installed() else ()))
+        self.rows = {method: {h: job(method, h) for h in H} for method in methods}
+        self.jobs = [job for row in self.rows.values() for job in row.values()]
 
 
 def cost_at(measured: Measured, jobs: Sequence[Job], target: float = TARGET) -> Reals:

@@ -4,22 +4,24 @@ import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
 from checks import reference
-from rov_fmu.motion.rov import Rov
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.rov import Rov
 
 SEED = 1
 Values = Mapping[str, float]
 
 
 def flight(rov: Rov, commands: Sequence[Values], hold: float) -> list[Values]:
-    """From rest, and after each command, held for so many s."""
-    rest: Values = dict.fromkeys(rov.layout.state, 0.0)
-    return list(accumulate(commands, lambda state, command: rov.step(command, state, hold), initial=rest))
+    """Return the state at rest, and after each command, held for so many s."""
+    times = hold * np.arange(len(commands) + 1.0)
+    inputs = {name: [*(command[name] for command in commands), 0.0] for name in rov.layout.inputs}
+    states = simulate(rov, times, inputs).values[:, 0]
+    return [dict(zip(rov.layout.state, row, strict=True)) for row in states.T.tolist()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +36,8 @@ class Work:
     starts: int
     ahead: bool = False
     """All commands positive, so that nothing turns back."""
+    one_way: bool = False
+    """All commands positive and the first at least the second: the VideoRay turns, and no velocity turns back."""
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -47,6 +51,9 @@ class Work:
         drawn = np.array([[rng.uniform(-1.0, 1.0) for _ in self.names] for _ in range(self.commands)])
         if self.straight:
             drawn[:, 1] = drawn[:, 0]
+        if self.one_way:
+            drawn = np.abs(drawn)
+            drawn[:, :2] = -np.sort(-drawn[:, :2])
         return np.abs(drawn) if self.ahead else drawn
 
     @cached_property

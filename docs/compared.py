@@ -10,8 +10,9 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, step
 
-from rov_fmu.motion.layout import AXES, SURGE, Layout
-from rov_fmu.motion.rov import Rov
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.layout import AXES, SURGE, Layout
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Response, load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -156,20 +157,20 @@ MANOEUVRE = [
 
 
 def fly(rov: Rov) -> tuple[dict[str, float], float]:
-    """Where the manoeuvre ends, and the length of the track in the plane (m)."""
+    """Return where the manoeuvre ends, and the length of the track in the plane (m)."""
     layout = rov.layout
-    state, way = dict.fromkeys(layout.state, 0.0), 0.0
     sticks = [layout.signs(AXES[name]) for name in ("surge", "sway", "yaw", "heave")]
+    inputs: dict[str, list[float]] = {name: [] for name in layout.commands}
     for seconds, held in MANOEUVRE:
-        inputs = dict.fromkeys(layout.inputs, 0.0)
-        for signs, stick in zip(sticks, held, strict=True):
-            for name, sign in signs.items():
-                inputs[name] += sign * stick
-        for _ in range(round(seconds * 10.0)):
-            after = rov.step(inputs, state, 0.1)
-            way += hypot(after["x"] - state["x"], after["y"] - state["y"])
-            state = after
-    return state, way
+        for name in inputs:
+            value = sum(signs.get(name, 0.0) * stick for signs, stick in zip(sticks, held, strict=True))
+            inputs[name] += round(seconds * 10.0) * [value]
+    steps = len(inputs[next(iter(inputs))])
+    times = 0.1 * np.arange(steps + 1)
+    states = simulate(rov, times, {name: [*command, 0.0] for name, command in inputs.items()}).values[:, 0]
+    found = dict(zip(layout.state, states, strict=True))
+    way = np.sum(np.hypot(np.diff(found["x"]), np.diff(found["y"])))
+    return {name: float(values[-1]) for name, values in found.items()}, float(way)
 
 
 def without(rov: Rov, *, coupling: bool = False, lag: bool = False, shape: bool = False) -> Rov:

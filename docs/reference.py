@@ -1,4 +1,4 @@
-"""Tables of the pages that follow from the code; `python -m docs.reference` writes them anew.
+"""Tables and equations in the pages that follow from the code; `python -m docs.reference` writes them anew.
 
 They stand in the pages, so that these can be read in a checkout, each between its name and an end, in comments.
 """
@@ -10,15 +10,17 @@ from typing import Any
 from rov_fmu.export.interface import LOG_CATEGORIES
 from rov_fmu.export.terminals import terminals
 from rov_fmu.files.toml_file import Strict
-from rov_fmu.motion.layout import AXES
+from rov_fmu.model.layout import AXES
+from rov_fmu.pages import equations
+from rov_fmu.pages.equations import Text
 from rov_fmu.pages.templates import number
 from rov_fmu.studies.plan import InputFile, Keep, Plan, Signal, Varied
 from rov_fmu.vehicle.json_schema import json_schema
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 Table = list[tuple[str, ...]]
-PAGES = [Path(__file__).with_name(name) for name in ("vehicle-file.md", "variables.md", "studies.md")]
+PAGES = [Path(__file__).with_name(name) for name in ("model.md", "vehicle-file.md", "variables.md", "studies.md")]
 
 _TYPES = {"string": "text", "boolean": "true, false", "integer": "whole number", "object": "table", "array": "list"}
 
@@ -43,13 +45,24 @@ def markdown(table: Table) -> str:
 
 
 def filled(page: str) -> str:
-    """The text of a page with its tables as they are to be."""
+    """The text of a page with its tables and equations as they are to be."""
     found = tables()
 
     def text(match: re.Match[str]) -> str:
         return f"{match[1]}\n\n{markdown(found[match[2]])}\n\n"
 
+    def block(match: re.Match[str]) -> str:
+        return f"{match[1]}\n\n```text\n{_equations(match[2])}\n```\n\n"
+
+    page = re.sub(r"(<!-- equations: (\w+) -->)\n.*?(?=<!-- end -->)", block, page, flags=re.DOTALL)
     return re.sub(r"(<!-- table: (\w+) -->)\n.*?(?=<!-- end -->)", text, page, flags=re.DOTALL)
+
+
+def _equations(name: str) -> str:
+    """The equations of a vehicle that ships, a line each; the number of the paper's equation behind."""
+    layout = load_vehicle(SHIPPED[name]).layout
+    write = Text(layout).line
+    return "\n".join(f"{write(line):<96} {line.reference}".rstrip() for line in equations.of(layout))
 
 
 def _terminals() -> Table:

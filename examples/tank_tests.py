@@ -13,8 +13,8 @@ import click
 import numpy as np
 
 from checks.pool import Array, swim
-from rov_fmu.motion.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.rov import Rov
 
 _CURVE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0")
 _LAYOUT = Layout(

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import click
 
+from rov_fmu.engine.compile import BuildError
 from rov_fmu.export.archive import native_content
-from rov_fmu.export.compile import BuildError
 from rov_fmu.files.messages import FileError
 from rov_fmu.pages.console import console, table
 from rov_fmu.process import exit_code

@@ -1,4 +1,4 @@
-"""Fly vehicles in independent importers, a manoeuvre each, and compare them with rov_fmu.motion.rov."""
+"""Fly vehicles in independent importers, a manoeuvre each, and compare them with rov_fmu.model.rov."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""The manoeuvres that every importer flies, one of each vehicle, and what `rov_fmu.motion.rov` makes of them.
+"""The manoeuvres that every importer flies, one of each vehicle, and what `rov_fmu.model.rov` makes of them.
 
 Inputs are held over each communication step. A runner finds the FMU as `rov.fmu`, and beside it:
 
@@ -21,8 +21,8 @@ from itertools import cycle
 from math import isfinite
 from pathlib import Path
 
-from rov_fmu.motion.layout import AXES
-from rov_fmu.motion.rov import Rov
+from rov_fmu.model.layout import AXES
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -86,7 +86,7 @@ class Manoeuvre:
 
     @cached_property
     def reference(self) -> list[dict[str, float]]:
-        """Time and outputs at each communication point by `rov_fmu.motion.rov`."""
+        """Time and outputs at each communication point by `rov_fmu.model.rov`."""
         rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
         state, rows = dict.fromkeys(rov.layout.state, 0.0), []
         for time in TIMES:

@@ -1,37 +1,35 @@
 /* Forward Euler and the classical Runge-Kutta method, with the flags that are best for them: see plain_c.py. */
 #include "motion.h"
 
-/* All but `steps` are constants where this is called, so that all is unrolled; the state stays in registers. */
-static inline __attribute__((always_inline)) void runge_kutta(int stages, int n, const motion *at, double s[], double h,
+/* `stages` is constant where this is called, so that all is unrolled; the state stays in registers. */
+static inline __attribute__((always_inline)) void runge_kutta(int stages, const vehicle *from, double s[N_STATES], double h,
                                                               long steps)
 {
-    const motion m = *at;
+    vehicle v = *from;
     const double ahead[4] = {0.0, 0.5 * h, 0.5 * h, h}, sixth = h / 6.0, third = h / 3.0;
     double now[N_STATES], to[N_STATES], k[4][N_STATES];
-    memcpy(now, s, (size_t)n * sizeof now[0]);
+    hold_commands(&v);
+    memcpy(now, s, sizeof now);
     for (; steps > 0; steps--) {
         for (int stage = 0; stage < stages; stage++) {
-            for (int i = 0; i < n; i++) {
+            for (int i = 0; i < N_STATES; i++) {
                 to[i] = stage == 0 ? now[i] : now[i] + ahead[stage] * k[stage - 1][i];
             }
-            rates(&m, n, to, k[stage]);
+            rates(&v, to, k[stage]);
         }
-        for (int i = 0; i < n; i++) {
+        for (int i = 0; i < N_STATES; i++) {
             now[i] += stages == 1 ? h * k[0][i] : sixth * (k[0][i] + k[3][i]) + third * (k[1][i] + k[2][i]);
         }
     }
-    memcpy(s, now, (size_t)n * sizeof now[0]);
+    memcpy(s, now, sizeof now);
 }
 
-#define METHOD(name, stages)                                               \
-    void name##_velocities(motion *m, double *s, double h, long steps)     \
-    {                                                                      \
-        runge_kutta(stages, N_AXES, m, s, h, steps);                       \
-    }                                                                      \
-    void name##_all(motion *m, double *s, double h, long steps)            \
-    {                                                                      \
-        rov_hold(m->at, &m->gains, &m->held);                              \
-        runge_kutta(stages, N_STATES, m, s, h, steps);                     \
-    }
-METHOD(euler, 1)
-METHOD(rk4, 4)
+void euler(vehicle *v, double *s, double h, long steps)
+{
+    runge_kutta(1, v, s, h, steps);
+}
+
+void rk4(vehicle *v, double *s, double h, long steps)
+{
+    runge_kutta(4, v, s, h, steps);
+}

@@ -12,7 +12,7 @@ enum { HELD = 10 };
 /* All value references; the commands come first. */
 static unsigned reference[N_VARIABLES];
 static const unsigned *const COMMANDS = reference, *const STATES = reference + FIRST_STATE;
-static motion m;
+static vehicle v;
 static fmu_instance rov;
 static const fmu_host CALLBACKS;
 
@@ -34,10 +34,10 @@ static void start_instance(fmu_instance c, const unsigned vr[], size_t n, const 
 void begin(const char *path)
 {
     for (int i = 0; i < N_VARIABLES; i++) {
-        m.at[i] = VARIABLES[i].start;
+        v.at[i] = VARIABLES[i].start;
         reference[i] = FIRST_REFERENCE + (unsigned)i;
     }
-    rov_prepare(m.at, &m.gains);
+    model_prepare(v.at, &v.numbers);
     load_fmu(path);
     rov = new_instance("rov", &CALLBACKS);
 }
@@ -45,22 +45,12 @@ void begin(const char *path)
 /* ---- Methods ---- */
 
 /* Ours: one step, however long. */
-void closed_velocities(motion *at, double state[N_STATES], double h, long steps)
-{
-    (void)steps;
-    for (int a = 0; a < N_AXES; a++) {
-        riccati axis = at->gains.axis[a];
-        axis.C = at->held.C[a];
-        state[a] = riccati_advance(&axis, state[a], h).v;
-    }
-}
-
-void closed_all(motion *at, double state[N_STATES], double h, long steps)
+void core(vehicle *at, double state[N_STATES], double h, long steps)
 {
     (void)steps;
     double next[N_STATES];
     memcpy(&at->at[FIRST_STATE], state, sizeof next);
-    CHECK(rov_step(at->at, &at->gains, h, next) > 0);
+    CHECK(model_step(at->at, &at->numbers, h, next) > 0);
     memcpy(state, next, sizeof next);
 }
 
@@ -72,21 +62,19 @@ int CVodeReInit(handle solver, double t, handle y);
 int CVodeSetStopTime(handle solver, double t);
 int CVode(handle solver, double t, handle y, double *reached, int task);
 
-#define RATES(name, n)                                                   \
-    int rates_##name(double t, handle y, handle rate, void *user)           \
-    {                                                                    \
-        (void)t, (void)user;                                             \
-        rates(&m, n, N_VGetArrayPointer(y), N_VGetArrayPointer(rate));   \
-        return 0;                                                        \
-    }
-RATES(velocities, N_AXES)
-RATES(all, N_STATES)
+int cvode_rates(double t, handle y, handle rate, void *user)
+{
+    (void)t, (void)user;
+    rates(&v, N_VGetArrayPointer(y), N_VGetArrayPointer(rate));
+    return 0;
+}
 
 /* A held command begins anew, for the right side has a jump there, and ends at a stop time. */
-static __attribute__((noinline)) void solve(handle solver, handle y, int states, double *s, double h, long steps)
+static __attribute__((noinline)) void solve(handle solver, handle y, double s[N_STATES], double h, long steps)
 {
-    const size_t size = (size_t)states * sizeof(double);
+    const size_t size = N_STATES * sizeof s[0];
     double *const now = N_VGetArrayPointer(y), reached, t = 0.0;
+    hold_commands(&v);
     memcpy(now, s, size);
     CHECK((CVodeReInit(solver, 0.0, y) | CVodeSetStopTime(solver, h * (double)steps)) == 0);
     for (long i = 0; i < steps; i++) {
@@ -98,30 +86,23 @@ static __attribute__((noinline)) void solve(handle solver, handle y, int states,
 
 /* Hold n commands in turn from the state s on, each for `steps` communication steps of h, by a method in so many
  * sub-steps, by a solver, or, with neither, in the FMU; there, without sub-steps, the commands are set before every step.
- * Nanoseconds a communication step; s becomes the end. */
-double hold(advance *method, handle solver, handle y, int states, double h, long substeps, long steps, long n,
+ * Returns the nanoseconds of a communication step; s becomes the end. */
+double hold(advance *method, handle solver, handle y, double h, long substeps, long steps, long n,
             const double command[][N_COMMANDS], double s[N_STATES])
 {
-    rov_held *const held = malloc((size_t)n * sizeof *held);
-    CHECK(held != NULL);
-    for (long i = 0; i < n; i++) {
-        memcpy(m.at, command[i], sizeof command[i]);
-        rov_hold(m.at, &m.gains, &held[i]);
-    }
     const bool in_fmu = method == NULL && solver == NULL;
     if (in_fmu) {
         start_instance(rov, STATES, N_STATES, s);
     }
     const double start = nanoseconds();
     for (long i = 0; i < n; i++) {
-        memcpy(m.at, command[i], sizeof command[i]);
-        m.held = held[i];
+        memcpy(v.at, command[i], sizeof command[i]);
         if (method != NULL) {
             for (long step = 0; step < steps; step++) {
-                method(&m, s, h / (double)substeps, substeps);
+                method(&v, s, h / (double)substeps, substeps);
             }
         } else if (solver != NULL) {
-            solve(solver, y, states, s, h, steps);
+            solve(solver, y, s, h, steps);
         } else {
             double t = 0.0;
             for (long step = 0; step < steps; step++, t += h) {
@@ -134,7 +115,6 @@ double hold(advance *method, handle solver, handle y, int states, double h, long
     if (in_fmu) {
         CHECK(get_values(rov, STATES, N_STATES, s));
     }
-    free(held);
     return each;
 }
 

@@ -1,28 +1,33 @@
-/* What all methods work on: the velocities alone, or all states. One call advances the state by `steps` steps of h seconds, as
- * an importer's communication step does, and is not inlined into the loop that measures it. */
+/* What all methods work on: all states of a vehicle. One call advances the state by `steps` steps of h seconds, as an
+ * importer's communication step does, and is not inlined into the loop that measures it. */
 #pragma once
 
-#include "riccati.c"
-#include "rov.c"
-#include "track.c"
+#include "model.h"
+
 #include "series.c"
-#include "rov_step.c"
+#include "step.c"
 
 typedef struct {
-    double at[N_VARIABLES]; /* inputs and coefficients */
-    rov_gains gains;
-    rov_held held; /* the forces of the command: prepared once a communication step, ahead of it for velocities */
-} motion;
+    double at[N_VARIABLES];
+    model_numbers numbers;
+    model_held held; /* what holds while the commands do */
+} vehicle;
 
-typedef void advance(motion *m, double state[N_STATES], double h, long steps);
+typedef void advance(vehicle *v, double state[N_STATES], double h, long steps);
 
-/* Time derivatives of n states. */
-static inline void rates(const motion *m, int n, const double s[N_STATES], double rate[N_STATES])
+/* Compute what does not change while the commands are held. With lag, the forces of the thrusters are states. */
+static inline void hold_commands(vehicle *v)
 {
-    if (n == N_STATES) {
-        rov_rates(&m->gains, &m->held, s, rate);
+    model_thrust(v->at, &v->held);
+    if (!HAS_LAG) {
+        model_hold(v->at, &v->numbers, &v->held);
     }
-    for (int a = 0; a < N_AXES && n == N_AXES; a++) {
-        rate[a] = m->held.C[a] - riccati_drag(&m->gains.axis[a], s[a]);
-    }
+}
+
+/* Compute the time derivatives of the states. */
+static inline void rates(vehicle *v, const double state[N_STATES], double rate[N_STATES])
+{
+    memcpy(&v->at[FIRST_STATE], state, N_STATES * sizeof state[0]);
+    model_derive(v->at, &v->numbers, &v->held);
+    memcpy(rate, &v->at[FIRST_CALCULATED], N_STATES * sizeof rate[0]);
 }

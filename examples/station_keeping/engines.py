@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from examples.systems import PARAMETER_SET
+from rov_fmu.engine.simulation import simulate
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -27,7 +28,7 @@ NAMES = [(component, name) for component, names in OUTPUTS.items() for name in n
 
 
 def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
-    """`rov_fmu.motion.rov` and the autopilot's class in a loop; sequential: the ROV gets the commands without delay."""
+    """The engine and the autopilot's class in a loop; sequential: the ROV gets the commands without delay."""
     values = parameter_sets()[parameters]
     rov = load_vehicle(VIDEORAY).rov
     layout, given = rov.layout, values["rov"]
@@ -42,11 +43,13 @@ def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
         return inputs | {name: getattr(autopilot, name) for name in layout.commands}
 
     rows = []
+    step = np.array([0.0, STEP])
     for n in range(STEPS):
         autopilot.z, autopilot.psi = state["z"], state["psi"]
         before = commands()
         autopilot.do_step(n * STEP, STEP)
-        state = rov.step(commands() if sequential else before, state, STEP)
+        after = simulate(rov, step, {**(commands() if sequential else before), **state}).values[:, 0, -1]
+        state = dict(zip(layout.state, after.tolist(), strict=True))
         now = {"rov": state, "autopilot": vars(autopilot)}
         rows.append([now[component][name] for component, name in NAMES])
     return _trajectory(rows)

@@ -1,94 +1,169 @@
-/* What holds whatever was called: finite outputs, motion that obeys its equation, derivatives that are the motion's. */
+/* What holds whatever was called: finite outputs, motion that obeys its equation, derivatives that are the motion's. The
+ * velocities are the first states, and the load along velocity a is input N_COMMANDS + a. */
 #pragma once
 
 #include "world.h"
 
-/* What the forces of the moment, and those that the lags leave, can accelerate each axis by. */
-static void strongest(const fmu *f, double C[N_AXES])
+enum { N_VELOCITIES = N_MONITORED };
+
+/* The place of a state by its name among the states, or of an input among the inputs; NONE where the vehicle lacks it. */
+static int named(const char *name, int first, int end)
 {
-    rov_held held;
-    rov_hold(f->now.values, &f->gains, &held);
-    for (int a = 0; a < N_AXES; a++) {
-        C[a] = held.C[a];
-        for (int t = 0; t < N_THRUSTERS && N_LAGGING > 0; t++) {
-            const double late = rov_lags(t) ? f->now.values[THRUSTERS[t].force] - held.steady[t] : 0.0;
-            C[a] = fabs(C[a]) + fabs(f->gains.push[t][a] * late);
+    for (int i = first; i < end; i++) {
+        if (strcmp(VARIABLES[i].name, name) == 0) {
+            return i - first;
         }
     }
+    return NONE;
+}
+
+static double state_of(const double values[], const char *name)
+{
+    const int place = named(name, FIRST_STATE, FIRST_CALCULATED);
+    return place == NONE ? 0.0 : values[FIRST_STATE + place];
+}
+
+static double input_of(const double values[], const char *name)
+{
+    const int place = named(name, 0, N_INPUTS);
+    return place == NONE ? 0.0 : values[place];
+}
+
+static double of_velocity(const double v[N_VELOCITIES], const char *name)
+{
+    const int place = named(name, FIRST_STATE, FIRST_STATE + N_VELOCITIES);
+    return place == NONE ? 0.0 : v[place];
+}
+
+static bool is_coupled(int a)
+{
+    for (int b = 0; b < N_VELOCITIES; b++) {
+        if (b != a && COMPONENT_OF[a] == COMPONENT_OF[b]) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether a velocity has a closed form: nothing but its own drag and a constant force acts on it. */
+static bool is_free(int a)
+{
+    return !HAS_LAG && !is_coupled(a);
+}
+
+/* The sums of the sizes of the terms of each row at y, with the drag of one direction of all velocities or the other. */
+static void sizes_at(const fmu *f, const double y[N_SERIES], int back, double size[N_SERIES])
+{
+    model_held held;
+    double start[N_SERIES], scale[N_SERIES];
+    int reverse[N_VELOCITIES];
+    for (int a = 0; a < N_VELOCITIES; a++) {
+        reverse[a] = back;
+    }
+    model_start(f->now.values, &f->numbers, &held, start, scale);
+    model_direct(&f->numbers, reverse, &held);
+    model_sizes(&f->numbers, &held, y, size);
+}
+
+/* What the forces of the moment, and those that the lags leave, can accelerate each axis by. */
+static void strongest(const fmu *f, double C[N_VELOCITIES])
+{
+    double y[N_SERIES] = {0.0}, size[N_SERIES];
+    for (int i = N_VELOCITIES; i < N_USED; i++) { /* what is left of a lag acts as the progress 1 */
+        y[i] = COMPONENT_OF[i] < N_DYNAMIC ? 1.0 : 0.0;
+    }
+    sizes_at(f, y, 0, size);
+    memcpy(C, size, sizeof(double[N_VELOCITIES]));
+}
+
+/* Acceleration per load of an axis: beta/m. */
+static double gain_of(const fmu *f, int a)
+{
+    double d[N_VARIABLES] = {0.0};
+    d[N_COMMANDS + a] = 1.0;
+    model_tangent(f->now.values, d);
+    return d[FIRST_CALCULATED + a];
 }
 
 /* The fastest that a motion can get along each axis within h. Drag only brakes, and the coupling does no work: the root n of
  * the sum of M v^2, twice the kinetic energy, grows by no more than that of the sum of F^2/M in a second. */
-static void fastest(const fmu *f, double h, double v[N_AXES])
+static void fastest(const fmu *f, double h, double v[N_VELOCITIES])
 {
-    double C[N_AXES], energy = 0.0, power = 0.0;
+    double C[N_VELOCITIES], energy = 0.0, power = 0.0;
     strongest(f, C);
-    for (int a = 0; a < N_AXES; a++) {
-        energy = hypot(energy, f->now.values[FIRST_STATE + a] / sqrt(f->gains.gain[a]));
-        power = hypot(power, C[a] / sqrt(f->gains.gain[a]));
+    for (int a = 0; a < N_VELOCITIES; a++) {
+        energy = hypot(energy, f->now.values[FIRST_STATE + a] / sqrt(gain_of(f, a)));
+        power = hypot(power, C[a] / sqrt(gain_of(f, a)));
     }
-    for (int a = 0; a < N_AXES; a++) {
+    for (int a = 0; a < N_VELOCITIES; a++) {
         const double alone = fabs(f->now.values[FIRST_STATE + a]) + fabs(C[a]) * h;
-        v[a] = IS_COUPLED ? sqrt(f->gains.gain[a]) * (energy + power * h) : alone;
+        v[a] = is_coupled(a) ? sqrt(gain_of(f, a)) * (energy + power * h) : alone;
     }
 }
 
 /* The rates, together, at which drag and coupling change velocities up to v. */
-static double rates_up_to(const fmu *f, const double v[N_AXES])
+static double rates_up_to(const fmu *f, const double v[N_VELOCITIES])
 {
-    const double coupling = fabs(f->gains.c_u) + fabs(f->gains.c_v) + fabs(f->gains.c_r);
-    double rates = 0.0;
-    for (int a = 0; a < N_AXES; a++) {
-        for (int back = 0; back < 2; back++) {
-            rates += f->gains.axis[a].B[back] + f->gains.axis[a].A[back] * v[a];
+    double y[N_SERIES] = {0.0}, size[N_SERIES], still[N_SERIES], rates = 0.0;
+    const double rest[N_SERIES] = {0.0};
+    memcpy(y, v, sizeof(double[N_VELOCITIES]));
+    for (int back = 0; back < 2; back++) {
+        sizes_at(f, y, back, size);
+        sizes_at(f, rest, back, still);
+        for (int a = 0; a < N_VELOCITIES; a++) {
+            rates += v[a] > 0.0 ? (size[a] - still[a]) / v[a] : 0.0;
         }
-        rates += coupling * v[a];
     }
     return rates;
-}
-
-/* Whether a step takes few enough pieces in any case: its rates come to no more than 1,000 over it. */
-static bool is_calm(const fmu *f, double h)
-{
-    double v[N_AXES];
-    fastest(f, h, v);
-    return h <= 1e30 && (rov_value(v, YAW) + (IS_FREE ? 0.0 : rates_up_to(f, v))) * h <= 1e3;
 }
 
 /* How far anything changes within h, together. */
 static double changes_of(const fmu *f, double h)
 {
-    double v[N_AXES], rates;
+    double v[N_VELOCITIES], y[N_SERIES] = {0.0}, size[N_SERIES], rates;
     fastest(f, h, v);
-    rates = rov_value(v, YAW) + rates_up_to(f, v);
-    for (int c = 0; c < N_CURVES && N_LAGGING > 0; c++) {
-        rates += f->gains.rate[c];
+    rates = of_velocity(v, "r") + rates_up_to(f, v);
+    sizes_at(f, y, 0, size);
+    for (int i = N_VELOCITIES; i < N_USED; i++) {
+        rates += COMPONENT_OF[i] < N_DYNAMIC ? size[i] : 0.0; /* of the lags */
     }
     return rates * h;
+}
+
+/* Whether a step takes few enough pieces in any case: its rates come to no more than 1,000 over it. */
+static bool is_calm(const fmu *f, double h)
+{
+    return h <= 1e30 && changes_of(f, h) <= 1e3;
 }
 
 /* ---- Axes alone ---- */
 
 /* Where drag balances the force. */
-static double equilibrium(const riccati *axis, double C)
+static double equilibrium(double A, double B, double C)
 {
-    const double A = axis->A[C < 0.0], B = axis->B[C < 0.0];
     const double root = hypot(B, 2.0 * sqrt(A) * sqrt(fabs(C)));
     return C == 0.0 ? 0.0 : 2.0 * C / (B + root);
 }
 
-/* A velocity has gone from where it was towards its equilibrium and not beyond; without force, to the last bit. */
-static void check_velocity(const char *name, const riccati *axis, double C, double v0, double v)
+/* The velocity of an axis alone has gone from where it was towards its equilibrium and not beyond; without force and drag, it
+ * stays to the last bit. */
+static void check_velocity(const fmu *start, int a, double v)
 {
-    const double limit = equilibrium(axis, C);
+    const char *const name = VARIABLES[FIRST_STATE + a].name;
+    const double v0 = start->now.values[FIRST_STATE + a];
+    double C[N_VELOCITIES], A[N_VELOCITIES], B[N_VELOCITIES], y[N_SERIES] = {0.0}, drag[N_SERIES];
+    model_alone(start->now.values, &start->numbers, C, A, B);
+    const double limit = equilibrium(A[a], B[a], C[a]);
     PROPERTY(isfinite(v), "%s is %g", name, v);
-    if (C == 0.0) {
-        const int back = v0 < 0.0;
+    if (C[a] == 0.0) {
+        y[a] = 1.0;
+        sizes_at(start, y, v0 < 0.0, drag);
         PROPERTY(fabs(v) <= fabs(v0) && v * v0 >= 0.0, "%s without force: from %a to %a", name, v0, v);
-        PROPERTY(v == v0 || axis->A[back] > 0.0 || axis->B[back] > 0.0, "%s without drag: from %a to %a", name, v0, v);
+        PROPERTY(v == v0 || drag[a] > 0.0, "%s without drag: from %a to %a", name, v0, v);
     }
     if (isfinite(limit)) {
-        const double rounding = 8.0 * DBL_EPSILON * fmax(fabs(v0), fabs(limit)) + DBL_MIN;
+        /* at velocities below 1e-150 m/s, squares of coefficients underflow where the step tests convergence */
+        const double rounding = 16.0 * DBL_EPSILON * fmax(fabs(v0), fabs(limit)) + 1e-150;
         PROPERTY(v >= fmin(v0, limit) - rounding && v <= fmax(v0, limit) + rounding,
                  "%s: from %a to %a, beyond its equilibrium %a", name, v0, v, limit);
     }
@@ -112,54 +187,69 @@ static void check_way(const char *name, double low, double high, double h, doubl
 /* A turn does not make the way longer. */
 static void check_track(const double before[], const double after[], double fastest_way, double h)
 {
-    const double *const from = before + FIRST_STATE, *const to = after + FIRST_STATE;
-    const double current[] = {rov_value(before, MAYBE_V_N), rov_value(before, MAYBE_V_E)};
-    const double x = rov_value(from, POSE_x), y = rov_value(from, POSE_y);
-    const double north = rov_value(to, POSE_x), east = rov_value(to, POSE_y);
+    const double current[] = {input_of(before, "V_N"), input_of(before, "V_E")};
+    const double x = state_of(before, "x"), y = state_of(before, "y");
+    const double north = state_of(after, "x"), east = state_of(after, "y");
     const double way = hypot(north - x - current[0] * h, east - y - current[1] * h);
     const double rounding = rounding_of_way(fastest_way, h, hypot(x, y), hypot(north, east))
                             + rounding_of_way(hypot(current[0], current[1]), h, 0.0, 0.0);
     PROPERTY(!isfinite(rounding) || way <= fastest_way * h + rounding, "%a at no more than %a for %a", way, fastest_way, h);
 }
 
+/* A force that lags goes towards what the commands lead to, and not beyond: its rate keeps its sign. */
+static void check_lag(const fmu *start, const fmu *end)
+{
+    double before[N_VARIABLES], after[N_VARIABLES];
+    memcpy(before, start->now.values, sizeof before);
+    memcpy(after, end->now.values, sizeof after);
+    memcpy(after, before, N_INPUTS * sizeof after[0]);
+    model_calculate(before, &start->numbers);
+    model_calculate(after, &start->numbers);
+    for (int i = N_VELOCITIES; i < N_STATES; i++) {
+        const char *const name = VARIABLES[FIRST_STATE + i].name;
+        if (name[0] == 'F') {
+            double d[N_VARIABLES] = {0.0};
+            d[FIRST_STATE + i] = 1.0;
+            model_tangent(before, d);
+            const double from = before[FIRST_STATE + i], to = after[FIRST_STATE + i], rate = -d[FIRST_CALCULATED + i];
+            const double steady = from + before[FIRST_CALCULATED + i] / rate;
+            const double rounding = 8.0 * DBL_EPSILON * (fabs(from) + fabs(steady));
+            PROPERTY(to >= fmin(from, steady) - rounding && to <= fmax(from, steady) + rounding, "%s: from %a to %a, beyond %a",
+                     name, from, to, steady);
+        }
+    }
+}
+
 static void check_step(const fmu *start, const fmu *end, double h)
 {
-    const double *const from = start->now.values + FIRST_STATE, *const to = end->now.values + FIRST_STATE;
-    double C[N_AXES], most[N_AXES], low[N_AXES], high[N_AXES];
-    rov_held held;
-    rov_hold(start->now.values, &start->gains, &held);
-    strongest(start, C);
+    const double *const from = start->now.values, *const to = end->now.values;
+    double most[N_VELOCITIES], low[N_VELOCITIES], high[N_VELOCITIES];
     fastest(start, h, most);
-    for (int a = 0; a < N_AXES; a++) {
-        const char *const name = VARIABLES[FIRST_STATE + a].name;
+    for (int a = 0; a < N_VELOCITIES; a++) {
+        const double v0 = from[FIRST_STATE + a], v = to[FIRST_STATE + a];
         const double room = most[a] + 1e-9 * most[a]; /* of thousands of pieces, rounded */
-        if (IS_FREE) {
-            check_velocity(name, &start->gains.axis[a], held.C[a], from[a], to[a]);
+        if (is_free(a)) {
+            check_velocity(start, a, v);
         } else {
-            PROPERTY(isfinite(to[a]) && !(fabs(to[a]) > room + DBL_MIN), "%s: from %a to %a, at most %a", name, from[a], to[a],
-                     most[a]);
+            PROPERTY(isfinite(v) && !(fabs(v) > room + DBL_MIN), "%s: from %a to %a, at most %a",
+                     VARIABLES[FIRST_STATE + a].name, v0, v, most[a]);
         }
-        low[a] = IS_FREE ? fmin(from[a], to[a]) : -room;
-        high[a] = IS_FREE ? fmax(from[a], to[a]) : room;
+        low[a] = is_free(a) ? fmin(v0, v) : -room;
+        high[a] = is_free(a) ? fmax(v0, v) : room;
     }
-    for (int t = 0; t < N_THRUSTERS; t++) {
-        if (rov_lags(t)) {
-            const int F = THRUSTERS[t].force - FIRST_STATE;
-            const double rounding = 4.0 * DBL_EPSILON * (fabs(from[F]) + fabs(held.steady[t]));
-            PROPERTY(to[F] >= fmin(from[F], held.steady[t]) - rounding && to[F] <= fmax(from[F], held.steady[t]) + rounding,
-                     "F of thruster %d: from %a to %a, beyond %a", t, from[F], to[F], held.steady[t]);
-        }
+    if (HAS_LAG) {
+        check_lag(start, end);
     }
-    if (POSE_z != NONE) {
-        check_way("z", rov_value(low, HEAVE), rov_value(high, HEAVE), h, rov_value(from, POSE_z), rov_value(to, POSE_z));
+    if (named("z", FIRST_STATE, FIRST_CALCULATED) != NONE) {
+        check_way("z", of_velocity(low, "w"), of_velocity(high, "w"), h, state_of(from, "z"), state_of(to, "z"));
     }
-    if (POSE_psi != NONE) {
-        check_way("psi", rov_value(low, YAW), rov_value(high, YAW), h, rov_value(from, POSE_psi), rov_value(to, POSE_psi));
+    if (named("psi", FIRST_STATE, FIRST_CALCULATED) != NONE) {
+        check_way("psi", of_velocity(low, "r"), of_velocity(high, "r"), h, state_of(from, "psi"), state_of(to, "psi"));
     }
-    if (POSE_x != NONE) {
-        const double ahead = fmax(fabs(rov_value(low, SURGE)), fabs(rov_value(high, SURGE)));
-        const double aside = fmax(fabs(rov_value(low, SWAY)), fabs(rov_value(high, SWAY)));
-        check_track(start->now.values, end->now.values, hypot(ahead, aside), h);
+    if (named("x", FIRST_STATE, FIRST_CALCULATED) != NONE) {
+        const double ahead = fmax(fabs(of_velocity(low, "u")), fabs(of_velocity(high, "u")));
+        const double aside = fmax(fabs(of_velocity(low, "v")), fabs(of_velocity(high, "v")));
+        check_track(from, to, hypot(ahead, aside), h);
     }
 }
 
@@ -169,21 +259,24 @@ static void check_step(const fmu *start, const fmu *end, double h)
 static void sizes_of(const fmu *f, double h, double size[N_STATES])
 {
     const double *const state = f->now.values + FIRST_STATE;
-    const double turned = POSE_psi == NONE ? 0.0 : fabs(rov_value(state, POSE_psi));
-    double most[N_AXES], way = h * (fabs(rov_value(f->now.values, MAYBE_V_N)) + fabs(rov_value(f->now.values, MAYBE_V_E)));
-    rov_held held;
-    rov_hold(f->now.values, &f->gains, &held);
+    const double turned = fabs(state_of(f->now.values, "psi"));
+    double most[N_VELOCITIES], way = h * (fabs(input_of(f->now.values, "V_N")) + fabs(input_of(f->now.values, "V_E")));
+    double calculated[N_VARIABLES];
+    memcpy(calculated, f->now.values, sizeof calculated);
+    model_calculate(calculated, &f->numbers);
     fastest(f, h, most);
-    for (int a = 0; a < N_AXES; a++) {
+    for (int a = 0; a < N_VELOCITIES; a++) {
         size[a] = most[a];
         way += h * most[a];
     }
-    for (int i = N_AXES; i < N_STATES; i++) {
-        size[i] = fabs(state[i]) + way * (1.0 + turned); /* a large heading has fewer digits for its sine */
-    }
-    for (int t = 0; t < N_THRUSTERS; t++) {
-        if (rov_lags(t)) {
-            size[THRUSTERS[t].force - FIRST_STATE] = fabs(held.F[t]) + fabs(held.steady[t]);
+    for (int i = N_VELOCITIES; i < N_STATES; i++) {
+        if (VARIABLES[FIRST_STATE + i].name[0] == 'F') {
+            double d[N_VARIABLES] = {0.0};
+            d[FIRST_STATE + i] = 1.0;
+            model_tangent(f->now.values, d);
+            size[i] = 2.0 * fabs(state[i]) + fabs(calculated[FIRST_CALCULATED + i] / d[FIRST_CALCULATED + i]);
+        } else {
+            size[i] = fabs(state[i]) + way * (1.0 + turned); /* a large heading has fewer digits for its sine */
         }
     }
 }
@@ -208,7 +301,7 @@ static void check_parts(const fmu *start, const fmu *end, double h, int parts)
     }
     for (int i = 0; i < parts; i++) {
         double next[N_STATES];
-        PROPERTY(rov_step(values, &start->gains, h / parts, next) > 0, "a part of a step takes too many pieces");
+        PROPERTY(model_step(values, &start->numbers, h / parts, next) > 0, "a part of a step takes too many pieces");
         memcpy(values + FIRST_STATE, next, sizeof next);
     }
     check_same("a step and its parts", start, h, end->now.values + FIRST_STATE, values + FIRST_STATE, 1e-9);
@@ -222,29 +315,6 @@ static void check_whole_step(const fmu *start, const fmu *end, double t, double 
     PROPERTY(end->now.time == t + h, "a step to t = %a ends at %a", t + h, end->now.time);
 }
 
-/* The derivatives of all orders are those of the motion: their series leads where a short step leads. */
-static void check_taylor(const fmu *f)
-{
-    const double *const from = f->now.values + FIRST_STATE, h = 0.005 / (1.0 + changes_of(f, 1.0));
-    double d[N_VARIABLES], sum[N_STATES], next[N_STATES], factor = 1.0;
-    bool plain = changes_of(f, h) <= 0.01 && rov_step(f->now.values, &f->gains, h, next) > 0;
-    memcpy(sum, from, sizeof sum);
-    for (int n = 1; n <= ORDER && plain; n++) {
-        rov_rates_of_order(f->now.values, &f->gains, n, d);
-        factor *= h / n;
-        for (int i = 0; i < N_STATES; i++) {
-            sum[i] += factor * d[FIRST_STATE + i];
-            plain = plain && isfinite(sum[i]);
-        }
-    }
-    for (int a = 0; a < N_AXES; a++) { /* beyond a reversal there is another series */
-        plain = plain && (from[a] == 0.0 || next[a] / from[a] > 0.5);
-    }
-    if (plain) {
-        check_same("a series of derivatives", f, h, next, sum, 1e-11);
-    }
-}
-
 /* The first time derivative of a state is what the model says that it is. */
 static void check_first_derivative(fmu *f, unsigned state, double derivative)
 {
@@ -256,7 +326,7 @@ static void check_first_derivative(fmu *f, unsigned state, double derivative)
              VARIABLES[FIRST_STATE + state].name, derivative, rate);
 }
 
-/* The gains and the mode are the expected ones; states and thrust can be read and are finite. */
+/* The numbers and the mode are the expected ones; states and thrust can be read and are finite. */
 static void check_instance(const slot *s)
 {
     unsigned vr[N_STATES + N_THRUST];
@@ -267,12 +337,12 @@ static void check_instance(const slot *s)
     if (s->f == NULL) {
         return;
     }
-    rov_gains gains;
-    rov_prepare(s->f->now.values, &gains);
-    PROPERTY(memcmp(&gains, &s->f->gains, sizeof gains) == 0, "the gains are those of other coefficients");
+    model_numbers numbers;
+    model_prepare(s->f->now.values, &numbers);
+    PROPERTY(memcmp(&numbers, &s->f->numbers, sizeof numbers) == 0, "the numbers are those of other coefficients");
     PROPERTY(s->f->now.mode == s->at.mode && s->f->now.type == s->at.type, "in %s instead of %s",
              mode_name(s->f->now.mode), mode_name(s->at.mode));
-    const unsigned n = N_LAGGING > 0 && !is_moderate(s->f) ? N_STATES : N_STATES + N_THRUST; /* a torque may overflow */
+    const unsigned n = HAS_LAG && !is_moderate(s->f) ? N_STATES : N_STATES + N_THRUST; /* a torque may overflow */
     before_call();
     PROPERTY(FMI(GetReal)(s->f, vr, n, values AND(n)) == 0, "the outputs cannot be read");
     PROPERTY(is_same(s, true), "to read changes the instance");

@@ -267,13 +267,14 @@ static bool after_call(const slot *s, call which, verdict wanted, int status, bo
 /* Far from where a result can overflow. */
 static bool is_moderate(const fmu *f)
 {
-    const double coupling[] = {f->gains.c_u, f->gains.c_v, f->gains.c_r};
+    double numbers[sizeof f->numbers / sizeof(double)];
     bool moderate = true;
+    memcpy(numbers, &f->numbers, sizeof numbers);
     for (int i = 0; i < FIRST_CALCULATED; i++) {
         moderate = moderate && fabs(f->now.values[i]) <= 1e30;
     }
-    for (int i = 0; i < 3; i++) {
-        moderate = moderate && fabs(coupling[i]) <= 1e30; /* nor is a NaN, of beta = 0 */
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        moderate = moderate && fabs(numbers[i]) <= 1e30; /* nor is a NaN */
     }
     return moderate;
 }

@@ -1,0 +1,79 @@
+"""heyoka on the vehicle's equation, beside our steps and RK4: an integrator by Taylor series, compiled by LLVM.
+
+It gets the table of terms of rov_fmu/model/equation.py, so it has the same states as ours, with the cosine and sine of
+the heading. It is compiled once. The forces of a held command and the direction of each drag are runtime parameters, so
+commands must not turn any velocity back. It computes no thrust and looks for no reversal, which favours it.
+"""
+
+import time
+from importlib.util import find_spec
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rov_fmu.model.equation import Term, equation_of
+from rov_fmu.model.rov import Rov
+
+NOT_INSTALLED = 'not measured: it is not installed (pip install "rov-fmu[benchmarks]")'
+_FUNCTIONS = {"sin": sin, "cos": cos, "abs": abs}
+Reals = NDArray[np.float64]
+
+
+def installed() -> bool:
+    """Whether heyoka can be imported."""
+    return find_spec("heyoka") is not None
+
+
+class Heyoka:
+    """The integrator of a vehicle, with a tolerance of rounding, which is heyoka's default."""
+
+    def __init__(self, rov: Rov) -> None:
+        import heyoka
+
+        self._rov, self._equation = rov, equation_of(rov.layout)
+        rows = self._equation.rows
+        coefficients = dict.fromkeys(term.coefficient for terms in rows.values() for term in terms)
+        self._parameters = [text for text in coefficients if text not in ("1", "-1")]
+        parameter = {text: heyoka.par[n] for n, text in enumerate(self._parameters)}
+        symbols = dict(zip(rows, heyoka.make_vars(*rows), strict=True))
+
+        def product(term: Term) -> object:
+            coefficient = parameter.get(term.coefficient)
+            first = heyoka.expression(float(term.coefficient)) if coefficient is None else coefficient
+            return heyoka.prod([first, *(symbols[name] for name in term.factors)])
+
+        system = [(symbols[name], heyoka.sum([product(term) for term in terms])) for name, terms in rows.items()]
+        self._integrator = heyoka.taylor_adaptive(system, np.zeros(len(rows)), pars=np.zeros(len(self._parameters)))
+        self._places = [self._equation.states.index(name) for name in rov.layout.state]
+
+    def hold(self, h: float, steps: int, commands: Reals, start: Reals) -> tuple[float, Reals]:
+        """Hold commands in turn, each for so many steps of h: seconds a step, and the end (all states of the vehicle).
+
+        The steps run in a loop in C++: propagate_for takes none that is longer than h. Each command begins with a call
+        from Python, which is timed too.
+        """
+        integrator, end, seconds = self._integrator, start.copy(), 0
+        for command in commands:
+            values, initial = self._values(command, end)
+            integrator.time = 0.0
+            integrator.state[:], integrator.pars[:] = initial, values
+            began = time.thread_time_ns()
+            _, _, _, taken, *_ = integrator.propagate_for(h * steps, max_delta_t=h)
+            seconds += time.thread_time_ns() - began
+            assert taken >= steps
+            end = integrator.state[self._places]
+        return 1e-9 * seconds / (len(commands) * steps), end
+
+    def _values(self, command: Reals, state: Reals) -> tuple[list[float], list[float]]:
+        """The runtime parameters, and the states of the table, at the beginning of a held command."""
+        layout, equation = self._rov.layout, self._equation
+        at = dict.fromkeys(layout.inputs, 0.0) | dict(zip(layout.commands, command.tolist(), strict=True))
+        at |= {**self._rov.coefficients, **dict(zip(layout.state, state.tolist(), strict=True))}
+        for name, formula in equation.program.items():
+            at[name] = eval(formula, _FUNCTIONS, at)
+        for name, directed in equation.directed.items():  # a velocity at rest goes where its force pushes it
+            v = directed.velocity
+            is_reverse = at[v] < 0.0 or (at[v] == 0.0 and at[f"held_{v}"] < 0.0)
+            at[name] = eval(directed.reverse if is_reverse else directed.forward, _FUNCTIONS, at)
+        return [eval(text, _FUNCTIONS, at) for text in self._parameters], [at.get(n, 0.0) for n in equation.states]
