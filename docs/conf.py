@@ -12,9 +12,9 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 
 from docs import compared, reference  # noqa: E402 (they stand beside this file)
-from rov_fmu.export.module import module  # noqa: E402
-from rov_fmu.files.output import Output, write_whole  # noqa: E402
-from rov_fmu.pages.live import Flown, fly_page  # noqa: E402
+from rov_fmu.fmu.module import module  # noqa: E402
+from rov_fmu.io.output import Output, write_whole  # noqa: E402
+from rov_fmu.report.page.live import Flown, fly_page  # noqa: E402
 from rov_fmu.vehicle.shipped import SHIPPED  # noqa: E402
 from rov_fmu.vehicle.vehicle import load_vehicle  # noqa: E402
 

@@ -7,14 +7,14 @@ import re
 from pathlib import Path
 from typing import Any
 
-from rov_fmu.export.interface import LOG_CATEGORIES
-from rov_fmu.export.terminals import terminals
-from rov_fmu.files.toml_file import Strict
+from rov_fmu.fmu.terminals import terminals
+from rov_fmu.fmu.variables import LOG_CATEGORIES
+from rov_fmu.io.toml_file import Strict
 from rov_fmu.model.layout import AXES
-from rov_fmu.pages import equations
-from rov_fmu.pages.equations import Text
-from rov_fmu.pages.templates import number
-from rov_fmu.studies.plan import InputFile, Keep, Plan, Signal, Varied
+from rov_fmu.report.page import equations
+from rov_fmu.report.page.equations import Text
+from rov_fmu.report.templates import number
+from rov_fmu.study.plan.plan import InputFile, Keep, Plan, Signal, Varied
 from rov_fmu.vehicle.json_schema import json_schema
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -16,10 +16,10 @@ import click
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from checks.pool import Array, swim
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.references.pool import Array, swim
 
 LAG = 0.15
 """s, of the thrusters."""

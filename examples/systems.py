@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from zipfile import ZipFile
 
-from rov_fmu.files.templates import render
+from rov_fmu.io.templates import render
 
 PARAMETER_SET = "initial_values"
 """The name of every component's parameter set: Ecos takes those of one name."""

@@ -12,9 +12,9 @@ from pathlib import Path
 import click
 import numpy as np
 
-from checks.pool import Array, swim
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
+from verification.references.pool import Array, swim
 
 _CURVE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0")
 _LAYOUT = Layout(
@@ -29,13 +29,35 @@ _LAYOUT = Layout(
 OTTER = Rov(
     _LAYOUT,
     {
-        "m_rov": 8.2, "I_r": 0.16, "R": 0.24, "gamma": 0.45,
-        "a_t_rear": 38.0, "b_t_rear": 4.5, "a_t_rear_reverse": 24.0, "b_t_rear_reverse": 3.0, "c_0_rear": 0.05,
-        "a_t_top": 9.5, "b_t_top": 0.6, "a_t_top_reverse": 7.0, "b_t_top_reverse": 0.5, "c_0_top": 0.06,
-        "a_d_u": 6.5, "b_d_u": 6.0, "a_d_w": 24.0, "b_d_w": 2.2, "a_d_r": 0.21, "b_d_r": 0.09, "F_0_w": 0.15,
-        "alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0, "beta_u": 0.72, "beta_w": 0.55, "beta_r": 0.45,
+        "m_rov": 8.2,
+        "I_r": 0.16,
+        "R": 0.24,
+        "gamma": 0.45,
+        "a_t_rear": 38.0,
+        "b_t_rear": 4.5,
+        "a_t_rear_reverse": 24.0,
+        "b_t_rear_reverse": 3.0,
+        "c_0_rear": 0.05,
+        "a_t_top": 9.5,
+        "b_t_top": 0.6,
+        "a_t_top_reverse": 7.0,
+        "b_t_top_reverse": 0.5,
+        "c_0_top": 0.06,
+        "a_d_u": 6.5,
+        "b_d_u": 6.0,
+        "a_d_w": 24.0,
+        "b_d_w": 2.2,
+        "a_d_r": 0.21,
+        "b_d_r": 0.09,
+        "F_0_w": 0.15,
+        "alpha_u": 1.0,
+        "alpha_w": 1.0,
+        "alpha_r": 1.0,
+        "beta_u": 0.72,
+        "beta_w": 0.55,
+        "beta_r": 0.45,
     },
-)  # fmt: skip
+)
 """What the tests are made of, and what an identification is to find."""
 DELAY = 0.12
 """s, from a command to the thrust."""

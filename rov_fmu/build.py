@@ -6,16 +6,16 @@ from pathlib import Path
 from time import perf_counter
 
 from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError, compile_all, host_platform
-from rov_fmu.export.archive import archive, native_content, python_content
-from rov_fmu.export.model_description import NATIVE
-from rov_fmu.export.module import module
-from rov_fmu.export.osp import osp_model_description, osp_path
-from rov_fmu.export.reference_results import reference_results
-from rov_fmu.files.interrupts import temporary_folder
-from rov_fmu.files.kinds import FMU, check_written
-from rov_fmu.files.messages import InputError, did_you_mean, shown
-from rov_fmu.files.output import Output, check_targets, write_whole
-from rov_fmu.pages.fmu_page import documentation
+from rov_fmu.fmu.archive import archive, native_content, python_content
+from rov_fmu.fmu.model_description import NATIVE
+from rov_fmu.fmu.module import module
+from rov_fmu.fmu.osp import osp_model_description, osp_path
+from rov_fmu.fmu.reference_results import reference_results
+from rov_fmu.io.file_kinds import FMU, check_written
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import InputError, did_you_mean, shown
+from rov_fmu.io.output import Output, check_targets, write_whole
+from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
 BACKENDS = ("native", "pythonfmu")

@@ -18,10 +18,10 @@ from click.shell_completion import CompletionItem
 
 from rov_fmu import __version__
 from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
-from rov_fmu.files.interrupts import cleaned_up
-from rov_fmu.files.kinds import PAGE, VEHICLE_FILE, check_written
-from rov_fmu.files.messages import FileError, InputError, ProofError, StudyError, did_you_mean, shown
-from rov_fmu.files.output import check_targets, write_whole
+from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
+from rov_fmu.io.interrupts import cleaned_up
+from rov_fmu.io.messages import FileError, InputError, ProofError, StudyError, did_you_mean, shown
+from rov_fmu.io.output import check_targets, write_whole
 from rov_fmu.model.layout import AXES
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle
@@ -30,12 +30,18 @@ if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
     from rov_fmu.build import Built
-    from rov_fmu.studies.engine import Progress as StudyProgress
+    from rov_fmu.study.run.cluster import Progress as StudyProgress
 
 _EXIT_CODES = {
-    FileError: 2, InputError: 2, OSError: 2, click.ClickException: 2, OptionError: 2,
-    BuildError: 1, ProofError: 1, StudyError: 1,
-}  # fmt: skip
+    FileError: 2,
+    InputError: 2,
+    OSError: 2,
+    click.ClickException: 2,
+    OptionError: 2,
+    BuildError: 1,
+    ProofError: 1,
+    StudyError: 1,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -121,8 +127,14 @@ def _commands() -> None:
     show_default=True,
     help="Version of FMI: 2.0 or 3.0.",
 )
-@click.option("--platform", "platforms", multiple=True, type=_Choice(["host", *PLATFORMS], OTHER_NAMES), metavar="NAME",
-              help=f"host, {', '.join(PLATFORMS)}; may be repeated (default: all).")  # fmt: skip
+@click.option(
+    "--platform",
+    "platforms",
+    multiple=True,
+    type=_Choice(["host", *PLATFORMS], OTHER_NAMES),
+    metavar="NAME",
+    help=f"host, {', '.join(PLATFORMS)}; may be repeated (default: all).",
+)
 @click.option(
     "--osp",
     is_flag=True,
@@ -177,7 +189,7 @@ def _shown(*columns: "ProgressColumn") -> "Iterator[Progress | None]":
     """Progress on a terminal, gone when it ends, however that is; None where there is none."""
     from rich.progress import Progress
 
-    from rov_fmu.pages.console import console
+    from rov_fmu.report.console import console
 
     out = console()
     if not out.is_terminal:
@@ -193,7 +205,7 @@ def _print_built(built: "Built", seconds: float) -> None:
     """Files, sizes, times, and what the FMU showed when it was run."""
     from rich.text import Text
 
-    from rov_fmu.pages.console import console
+    from rov_fmu.report.console import console
 
     out = console()
     out.print(Text.assemble((str(built.path), "bold"), f"  {built.size / 1000:.0f} kB  {built.guid}"), soft_wrap=True)
@@ -241,9 +253,14 @@ def _print_built(built: "Built", seconds: float) -> None:
     help="Plot to write (.png, .svg, .pdf), after VEHICLE; without FILE it opens in a browser.",
 )
 def _simulate(
-    vehicle: Path, settings: tuple[str, ...], commands: Path | None, stop: float | None, step: float | None,
-    output: Path | None, plot: Path | None,
-) -> None:  # fmt: skip
+    vehicle: Path,
+    settings: tuple[str, ...],
+    commands: Path | None,
+    stop: float | None,
+    step: float | None,
+    output: Path | None,
+    plot: Path | None,
+) -> None:
     """Simulate a vehicle without an FMU: the VideoRay Pro 4 by default.
 
     Inputs and states that are not set are 0. Without -o and --plot the values at the end are printed.
@@ -277,13 +294,18 @@ def _simulate(
     help="Another vehicle, which flies the same commands as a ghost. A recording is chosen on the page itself.",
     shell_complete=_vehicles,
 )
-@click.option("-o", "--output", type=_FILE, metavar="PAGE.html",
-              help="Where to write the page, in place of opening it in a browser.")  # fmt: skip
+@click.option(
+    "-o",
+    "--output",
+    type=_FILE,
+    metavar="PAGE.html",
+    help="Where to write the page, in place of opening it in a browser.",
+)
 def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     """Fly a vehicle in a browser, without building an FMU: the VideoRay Pro 4 by default."""
-    from rov_fmu.export.module import module
-    from rov_fmu.files.output import Output
-    from rov_fmu.pages.live import Flown, fly_page
+    from rov_fmu.fmu.module import module
+    from rov_fmu.io.output import Output
+    from rov_fmu.report.page.live import Flown, fly_page
     from rov_fmu.vehicle.vehicle import load_vehicle
 
     paths = [vehicle, *([against] if against else [])]
@@ -312,16 +334,18 @@ def _open(path: Path) -> None:
 
 @_commands.command("prove")
 @click.argument("fmu", type=_FILE)
-@click.option("--interface",
-              type=_Choice(["co-simulation", "model-exchange"], {"cs": "co-simulation", "me": "model-exchange"}),
-              help="The first of these that it has, by default.")  # fmt: skip
+@click.option(
+    "--interface",
+    type=_Choice(["co-simulation", "model-exchange"], {"cs": "co-simulation", "me": "model-exchange"}),
+    help="The first of these that it has, by default.",
+)
 @click.option(
     "--tolerance", type=_number("a number above 0", nextafter(0.0, 1.0)), help="In place of the experiments' own."
 )
 def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     """Run the experiments that an FMU carries (FMI-LS-REF): any FMU that carries some."""
-    from rov_fmu.export.proof import prove
-    from rov_fmu.pages.console import print_proof
+    from rov_fmu.fmu.proof import prove
+    from rov_fmu.report.console import print_proof
 
     with _bar() as done:
         findings = prove(fmu, interface, tolerance, done)
@@ -333,8 +357,12 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
 @_commands.command("study")
 @click.argument("plan", type=_FILE)
 @click.option("-o", "--output", type=_FILE, required=True, metavar="RESULTS", help="Folder of the results.")
-@click.option("--workers", type=_number("a whole number from 1 to 1024", 1, 1024, int), metavar="N",
-              help="Processes on this machine; as many as it has cores by default.")  # fmt: skip
+@click.option(
+    "--workers",
+    type=_number("a whole number from 1 to 1024", 1, 1024, int),
+    metavar="N",
+    help="Processes on this machine; as many as it has cores by default.",
+)
 @click.option("--scheduler", metavar="ADDRESS", help="A scheduler of Dask instead, tcp://host:8786.")
 def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None) -> None:
     """Do the runs of PLAN (TOML): a sweep, or what is uncertain, over any FMU for Co-Simulation.
@@ -345,9 +373,9 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     if workers and scheduler is not None:
         raise click.UsageError("study: --scheduler has the workers that it has: leave --workers out")
     try:
-        from rov_fmu.studies.page import page_output, see_place
-        from rov_fmu.studies.run import run_study
-        from rov_fmu.studies.summary import print_summary
+        from rov_fmu.study.results.page import page_output, see_place
+        from rov_fmu.study.results.summary import print_summary
+        from rov_fmu.study.run.run_study import run_study
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
     see_place(output)
@@ -404,16 +432,19 @@ def _runs_bar() -> "Iterator[tuple[Callable[[StudyProgress], None], Callable[[st
 
 @_commands.command("identify")
 @click.argument("folder", type=_FILE)
-@click.option("-o", "--output", type=_FILE, metavar="VEHICLE.toml",
-              help="Vehicle file to write.")  # fmt: skip
-@click.option("--report", type=_FILE, metavar="REPORT.html",
-              help="Report to write; a build puts it into the FMU of the vehicle file.")  # fmt: skip
+@click.option("-o", "--output", type=_FILE, metavar="VEHICLE.toml", help="Vehicle file to write.")
+@click.option(
+    "--report",
+    type=_FILE,
+    metavar="REPORT.html",
+    help="Report to write; a build puts it into the FMU of the vehicle file.",
+)
 @click.option("--force", is_flag=True, help="Replace files that identify did not write, or that have changed since.")
 def _identify(folder: Path, output: Path | None, report: Path | None, force: bool) -> None:
     """Identify a vehicle from FOLDER of tank tests: rov.toml and thrust_, steady_, ... .csv."""
-    from rov_fmu.files.seal import check_replaced
     from rov_fmu.identify.identify import identify
-    from rov_fmu.pages.console_results import print_identification
+    from rov_fmu.io.seal import check_replaced
+    from rov_fmu.report.console_results import print_identification
     from rov_fmu.tank.tank_tests import load_tank_tests
     from rov_fmu.vehicle.writer import check_report, vehicle_output
 
@@ -435,7 +466,7 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
         _ = [result.held_out for result in identification.axes]  # now, and not when it is printed
         identified, outputs = identification.vehicle, []
         if report:
-            from rov_fmu.pages.report import report_output
+            from rov_fmu.report.report import report_output
 
             done("drawing the report", 1.0)
             outputs.append(report_output(identification, report))
@@ -466,17 +497,22 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
 @click.option(
     "--tau", type=_number("a number (Tau in s)"), help="Wanted time constant at this command, s; without it beta stays."
 )
-@click.option("--points", type=_FILE, metavar="POINTS.csv",
-              help="Many wanted points instead: command, velocity, time constant.")  # fmt: skip
-@click.option("-o", "--output", type=_FILE, metavar="TUNED.toml",
-              help="Vehicle file to write.")  # fmt: skip
+@click.option(
+    "--points", type=_FILE, metavar="POINTS.csv", help="Many wanted points instead: command, velocity, time constant."
+)
+@click.option("-o", "--output", type=_FILE, metavar="TUNED.toml", help="Vehicle file to write.")
 def _tune(
-    vehicle: Path, axis: str, command: float | None, v_ss: float | None, tau: float | None,
-    points: Path | None, output: Path | None,
-) -> None:  # fmt: skip
+    vehicle: Path,
+    axis: str,
+    command: float | None,
+    v_ss: float | None,
+    tau: float | None,
+    points: Path | None,
+    output: Path | None,
+) -> None:
     """Find alpha and beta of an axis for a wanted response."""
     from rov_fmu.identify.tuning import TuningError, implausible, read_points, tune, tune_over, tuned_values
-    from rov_fmu.pages.console_results import print_tuning
+    from rov_fmu.report.console_results import print_tuning
     from rov_fmu.vehicle.vehicle import load_vehicle
     from rov_fmu.vehicle.writer import write_tuned
 
@@ -516,7 +552,7 @@ def _schema() -> None:
 @_vehicle(default=str(VIDEORAY))
 def _tables(vehicle: Path) -> None:
     """Print Tables 6-8 of the paper: printed, computed, measured."""
-    from rov_fmu.pages.console import print_tables
+    from rov_fmu.report.console import print_tables
     from rov_fmu.vehicle.published import load_tables
     from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -528,6 +564,6 @@ def _tables(vehicle: Path) -> None:
 @click.argument("folder", type=_FILE)
 def _figures(folder: Path) -> None:
     """Redraw the paper's figures, as far as it prints their data, into FOLDER, which is there already."""
-    from rov_fmu.pages.paper_figures import write_figures
+    from rov_fmu.report.plots.paper_figures import write_figures
 
     print(*write_figures(folder), sep="\n")

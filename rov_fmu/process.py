@@ -23,8 +23,8 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
     """
     from click import Abort, ClickException
 
-    from rov_fmu.files.messages import one_line
-    from rov_fmu.files.output import WriteError
+    from rov_fmu.io.messages import one_line
+    from rov_fmu.io.output import WriteError
 
     try:
         try:
@@ -87,7 +87,7 @@ def run_process(program: str, main: Callable[[], int]) -> int:
 
 def _end_interrupted(program: str) -> None:
     """End all child processes, clean up, say so in one line, and end the process without waiting for any thread."""
-    from rov_fmu.files.interrupts import UNDIVIDED, clean_up_everything
+    from rov_fmu.io.interrupts import UNDIVIDED, clean_up_everything
 
     with UNDIVIDED:  # no other thread begins or says anything more
         try:
@@ -119,7 +119,7 @@ def _kill_children() -> None:
 
 
 def _say(program: str, message: str, code: int) -> int:
-    from rov_fmu.files.interrupts import UNDIVIDED
+    from rov_fmu.io.interrupts import UNDIVIDED
 
     with UNDIVIDED:
         for line in message.splitlines():

@@ -88,8 +88,12 @@ def start(
     inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.Popen(
         [sys.executable, "-m", "rov_fmu", *arguments],
-        cwd=ROOT, env=inherited | dict(environment or {}), stderr=subprocess.PIPE, text=True, **how,
-    )  # fmt: skip
+        cwd=ROOT,
+        env=inherited | dict(environment or {}),
+        stderr=subprocess.PIPE,
+        text=True,
+        **how,
+    )
 
 
 def endless_compiler(folder: Path) -> dict[str, str]:

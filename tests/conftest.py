@@ -11,7 +11,7 @@ from hypothesis import settings
 from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
 from rov_fmu.engine.compile import compile_all
-from rov_fmu.export.archive import native_content
+from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi2 import Fmu

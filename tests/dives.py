@@ -1,17 +1,17 @@
-"""A BlueROV2 on a dive: surge, sway, heave and yaw at once, coupled, lagging and in a current (checks/pool.py)."""
+"""A BlueROV2 on a dive: surge, sway, heave and yaw at once, coupled, lagging and in a current."""
 
 from dataclasses import dataclass
 from math import radians
 
 import numpy as np
 
-from checks.pool import Array, swim
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.signals import Commands, Signal, recordings_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.references.pool import Array, swim
 
 LAG = 0.15
 """s, of the thrusters."""

@@ -70,11 +70,14 @@ _NONE_OF = {
 _BINARY = (REFERENCES, c_size_t, SIZES, POINTER(c_void_p), c_size_t)
 _PARTIAL = (REFERENCES, c_size_t, REFERENCES, c_size_t, REALS, c_size_t, REALS, c_size_t)
 TYPES: Signatures = {
-    **{f"fmi3{do}{name}": (REFERENCES, c_size_t, POINTER(of), c_size_t)
-       for do in ("Get", "Set") for name, of in _NONE_OF.items()},
+    **{
+        f"fmi3{do}{name}": (REFERENCES, c_size_t, POINTER(of), c_size_t)
+        for do in ("Get", "Set")
+        for name, of in _NONE_OF.items()
+    },
     "fmi3GetBinary": _BINARY,
     "fmi3SetBinary": _BINARY,
-}  # fmt: skip
+}
 """Getters and setters of the types of which there are no variables."""
 CLOCKS: Signatures = {
     "fmi3GetClock": (REFERENCES, c_size_t, FLAGS),
@@ -189,9 +192,15 @@ class Instance(fmi.Instance[Fmu]):
     """`on_update` is called in intermediate update, where variables are registered for it or a step may end early."""
 
     def __init__(
-        self, fmu: Fmu, kind: int, name: str, logging: bool | None, on_update: OnUpdate | None,
-        intermediate: Sequence[str], early: bool
-    ) -> None:  # fmt: skip
+        self,
+        fmu: Fmu,
+        kind: int,
+        name: str,
+        logging: bool | None,
+        on_update: OnUpdate | None,
+        intermediate: Sequence[str],
+        early: bool,
+    ) -> None:
         super().__init__(fmu, kind)
         self.stepped: Stepped | None = None
         self.on_update = on_update

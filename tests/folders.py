@@ -60,8 +60,10 @@ def responses(k: Rov, axis: Axis) -> dict[str, str]:
     rows = [(c, *k.response(axis, c)) for c in COMMANDS]
     steady = "".join(f"{c},{V:.6f}\n" for c, V, _ in rows)
     taus = "".join(f"{c},{T:.6f}\n" for c, _, T in rows)
-    return {f"steady_{axis.name}.csv": f"{RATE if axis is YAW else SPEED}\n{steady}",
-            f"time_constant_{axis.name}.csv": f"{TAU}\n{taus}"}  # fmt: skip
+    return {
+        f"steady_{axis.name}.csv": f"{RATE if axis is YAW else SPEED}\n{steady}",
+        f"time_constant_{axis.name}.csv": f"{TAU}\n{taus}",
+    }
 
 
 def pulled(a: float, b: float) -> str:

@@ -7,8 +7,8 @@ from typing import Any
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from checks.closed_form import Axis, advance, time_to_rest
 from tests.vehicles import VEHICLES, still
+from verification.references.closed_form import Axis, advance, time_to_rest
 
 Case = tuple[float, float, float, float, float]
 """A, B, C, v0, h of an axis."""

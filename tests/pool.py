@@ -1,4 +1,4 @@
-"""Tank tests in a pool that is not ideal: what is recorded there, by an integrator of its own (checks/pool.py)."""
+"""Tank tests in a pool that is not ideal, simulated by the integrator in verification/references/pool.py."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,10 +7,10 @@ from math import radians
 import numpy as np
 from scipy.signal import lfilter
 
-from checks.pool import Array, swim
 from rov_fmu.model.layout import AXIS, CURVE, Axis, coefficient_name
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
+from verification.references.pool import Array, swim
 
 Plan = Sequence[tuple[float, float]]
 """Commands and how long each is held, s."""

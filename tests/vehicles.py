@@ -41,14 +41,44 @@ _MIX = {
     "turn": {"1": -0.5, "2": 0.5, "3": 0.5, "4": -0.5},
 }
 _NUMBERS = {  # of a BlueROV2 Heavy, and what it has not
-    "m_rov": 13.5, "I_r": 0.37, "R": 0.2, "gamma": 0.5, "m_a_u": 6.3567, "m_a_v": 7.1206, "m_a_w": 18.6863,
-    "m_a_r": 0.2215, "a_d_u": 141.0, "b_d_u": 13.7, "a_d_v": 217.0, "b_d_v": 0.0, "a_d_w": 190.0, "b_d_w": 33.0,
-    "a_d_r": 1.5, "b_d_r": 0.0, "a_d_u_reverse": 190.0, "b_d_u_reverse": 4.0, "a_d_v_reverse": 100.0,
-    "b_d_v_reverse": 3.0, "a_d_w_reverse": 150.0, "b_d_w_reverse": 20.0, "a_d_r_reverse": 0.7, "b_d_r_reverse": 0.2,
-    "F_0_u": 0.1, "F_0_v": 0.3, "F_0_w": -1.5, "F_0_r": 0.01,
-}  # fmt: skip
-_OF_A_CURVE = {"a_t": 29.33, "b_t": 31.48, "a_t_reverse": 21.74, "b_t_reverse": 25.54, "c_0": 0.087,
-               "c_0_reverse": 0.1, "T": 0.15}  # fmt: skip
+    "m_rov": 13.5,
+    "I_r": 0.37,
+    "R": 0.2,
+    "gamma": 0.5,
+    "m_a_u": 6.3567,
+    "m_a_v": 7.1206,
+    "m_a_w": 18.6863,
+    "m_a_r": 0.2215,
+    "a_d_u": 141.0,
+    "b_d_u": 13.7,
+    "a_d_v": 217.0,
+    "b_d_v": 0.0,
+    "a_d_w": 190.0,
+    "b_d_w": 33.0,
+    "a_d_r": 1.5,
+    "b_d_r": 0.0,
+    "a_d_u_reverse": 190.0,
+    "b_d_u_reverse": 4.0,
+    "a_d_v_reverse": 100.0,
+    "b_d_v_reverse": 3.0,
+    "a_d_w_reverse": 150.0,
+    "b_d_w_reverse": 20.0,
+    "a_d_r_reverse": 0.7,
+    "b_d_r_reverse": 0.2,
+    "F_0_u": 0.1,
+    "F_0_v": 0.3,
+    "F_0_w": -1.5,
+    "F_0_r": 0.01,
+}
+_OF_A_CURVE = {
+    "a_t": 29.33,
+    "b_t": 31.48,
+    "a_t_reverse": 21.74,
+    "b_t_reverse": 25.54,
+    "c_0": 0.087,
+    "c_0_reverse": 0.1,
+    "T": 0.15,
+}
 assert _OF_A_CURVE.keys() == CURVE.keys()
 
 
@@ -63,8 +93,14 @@ def _axes(names: str, keys: tuple[str, ...] = _DRAG) -> tuple[VehicleAxis, ...]:
     return tuple(VehicleAxis(axis, keys) for axis in AXES.values() if axis.velocity in names)
 
 
-def _rov(axes: str, curve: Curve, thrusters: tuple[Thruster, ...], keys: tuple[str, ...] = _DRAG,
-         coupled: bool = False, mix: Mapping[str, Mapping[str, float]] | None = None) -> Rov:  # fmt: skip
+def _rov(
+    axes: str,
+    curve: Curve,
+    thrusters: tuple[Thruster, ...],
+    keys: tuple[str, ...] = _DRAG,
+    coupled: bool = False,
+    mix: Mapping[str, Mapping[str, float]] | None = None,
+) -> Rov:
     return numbered(Layout(_axes(axes, keys), (curve,), thrusters, mix or {}, coupled))
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rov_fmu.pages.svg import LIGHT, svg_file
+from rov_fmu.report.plots.svg import LIGHT, svg_file
 
 from .engines import ENGINES, Trajectory, plain
 from .system import DEFAULT, MISSION, STEP, STEPS, build_system, parameter_sets
@@ -28,8 +28,13 @@ TIME = STEP * np.arange(1, STEPS + 1)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code."""
     parser = argparse.ArgumentParser(prog="python -m examples.station_keeping.run", description=__doc__)
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("build/station_keeping"),
-                        help="where the files of the system go (default: %(default)s)")  # fmt: skip
+    parser.add_argument(
+        "folder",
+        nargs="?",
+        type=Path,
+        default=Path("build/station_keeping"),
+        help="where the files of the system go (default: %(default)s)",
+    )
     parser.add_argument("--figure", type=Path, metavar="FILE.svg", help="the picture (default: in that folder)")
     options = parser.parse_args(arguments)
     folder: Path = options.folder
@@ -45,8 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 continue
             good &= report(name, engine.run(folder, parameters), expected)
         hasty = difference(plain(parameters, sequential=True), expected)
-        print("  a master that steps one after the other would differ by up to "
-              f"{1000 * hasty['rov.z']:.1f} mm and {degrees(hasty['rov.psi']):.2f} deg")  # fmt: skip
+        print(
+            "  a master that steps one after the other would differ by up to "
+            f"{1000 * hasty['rov.z']:.1f} mm and {degrees(hasty['rov.psi']):.2f} deg"
+        )
     figure = options.figure or folder / "station_keeping.svg"
     draw(drawn, figure)
     print(f"\n{figure}")
@@ -58,8 +65,10 @@ def report(name: str, result: Trajectory, expected: Trajectory) -> bool:
     largest = max(difference(result, expected).values())
     depth, heading = held(result)
     good = bool(largest <= SAME and depth <= DEPTH and heading <= HEADING)
-    print(f"  {name:<16}depth within {1000 * depth:.2f} mm, heading within {heading:.4f} deg from {HELD_FROM:g} s on; "
-          f"difference {largest:.1e}  {'ok' if good else 'FAILED'}")  # fmt: skip
+    print(
+        f"  {name:<16}depth within {1000 * depth:.2f} mm, heading within {heading:.4f} deg from {HELD_FROM:g} s on; "
+        f"difference {largest:.1e}  {'ok' if good else 'FAILED'}"
+    )
     return good
 
 

@@ -14,9 +14,9 @@ from pathlib import Path
 
 from fat_macho import FatWriter
 
-from rov_fmu.files.interrupts import UNDIVIDED, cleaned_up, temporary_folder
-from rov_fmu.files.messages import brief
-from rov_fmu.files.places import FMU_SRC
+from rov_fmu.io.interrupts import UNDIVIDED, cleaned_up, temporary_folder
+from rov_fmu.io.messages import brief
+from rov_fmu.io.paths import FMU_SRC
 
 C_SOURCES = FMU_SRC / "c"
 UNITY_FILE = "fmu.c"

@@ -14,8 +14,8 @@ from platformdirs import user_cache_path
 
 from rov_fmu.engine.compile import ENGINE_FILE, BuildError, compile_engine, engine_flags
 from rov_fmu.engine.source import sources
-from rov_fmu.files.interrupts import temporary_folder
-from rov_fmu.files.output import Output, write_whole
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.output import Output, write_whole
 from rov_fmu.model.rov import Rov
 
 _LOADED: dict[str, ctypes.CDLL] = {}

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from rov_fmu.engine.compile import C_SOURCES
-from rov_fmu.files.templates import render
+from rov_fmu.io.templates import render
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
 from rov_fmu.model.formula import names, tangent, to_c
 from rov_fmu.model.layout import Layout
@@ -271,8 +271,13 @@ def generated_sources(layout: Layout) -> dict[str, str]:
     """Return model.h and equation.h, the files that are generated for a vehicle, by their names."""
     source = EquationSource(layout, layout.places)
     formulas = {name: rate_formula(terms) for name, terms in source.equation.rows.items()}
-    sizes = {"inputs": len(layout.inputs), "states": len(layout.state), "thrust": len(layout.thrust),
-             "commands": len(layout.commands), "coefficients": len(layout.coefficients)}  # fmt: skip
+    sizes = {
+        "inputs": len(layout.inputs),
+        "states": len(layout.state),
+        "thrust": len(layout.thrust),
+        "commands": len(layout.commands),
+        "coefficients": len(layout.coefficients),
+    }
     given = {"names": layout.places, "source": source, "equation": source.equation, "formulas": formulas, "n": sizes}
     return {name: render(f"{name}.j2", **given) for name in ("model.h", "equation.h")}
 

@@ -4,14 +4,14 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from rov_fmu.files.toml_file import listed
-from rov_fmu.identify.coupling import is_coupled, is_told
+from rov_fmu.identify.effects.coupling import is_coupled, is_told
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
-from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
-from rov_fmu.identify.thrust_fit import ThrustFit
+from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_rms
+from rov_fmu.identify.points.thrust_fit import ThrustFit
+from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.usable import is_pushed
+from rov_fmu.io.toml_file import listed
 from rov_fmu.model.layout import REVERSE
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array

@@ -6,16 +6,16 @@ from typing import Literal
 
 import numpy as np
 
-from rov_fmu.identify.drag_forms import Point
-from rov_fmu.identify.held_out import HeldOut
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import NextTest
-from rov_fmu.identify.quadratic_fit import QuadraticFit
-from rov_fmu.identify.recordings_fit import RecordingsFit
-from rov_fmu.identify.response_fit import ResponseFit, predict, relative_rms
-from rov_fmu.identify.step_responses import StepResponse
-from rov_fmu.identify.thrust_fit import ThrustFit
-from rov_fmu.identify.trajectory import MotionError
+from rov_fmu.identify.points.drag_forms import Point
+from rov_fmu.identify.points.quadratic_fit import QuadraticFit
+from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_rms
+from rov_fmu.identify.points.step_responses import StepResponse
+from rov_fmu.identify.points.thrust_fit import ThrustFit
+from rov_fmu.identify.recordings.held_out import HeldOut
+from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
+from rov_fmu.identify.recordings.trajectory import MotionError
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.tank_tests import TankTests

@@ -11,26 +11,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rov_fmu import __version__
-from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.files.toml_file import listed
 from rov_fmu.identify import diagnostics
-from rov_fmu.identify.drag_forms import Point, drag_and_beta, free_coefficients
 from rov_fmu.identify.driving import connected, curves_of
 from rov_fmu.identify.grouping import grouped
 from rov_fmu.identify.identification import AxisResult, Identification
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.limits import NoFitError
 from rov_fmu.identify.next_test import NOISE, NextTest, Sensor, next_test
-from rov_fmu.identify.output_error import fit_recordings
-from rov_fmu.identify.quadratic_fit import fit_quadratic
-from rov_fmu.identify.recordings_fit import RecordingsFit, count
-from rov_fmu.identify.response_fit import ResponseFit, fit_response
-from rov_fmu.identify.slips import beta_out_of_range
-from rov_fmu.identify.step_responses import StepResponse, steps
-from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, measured
+from rov_fmu.identify.points.drag_forms import Point, drag_and_beta, free_coefficients
+from rov_fmu.identify.points.quadratic_fit import fit_quadratic
+from rov_fmu.identify.points.response_fit import ResponseFit, fit_response
+from rov_fmu.identify.points.step_responses import StepResponse, steps
+from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, measured
+from rov_fmu.identify.recordings.limits import NoFitError
+from rov_fmu.identify.recordings.output_error import fit_recordings
+from rov_fmu.identify.recordings.recordings_fit import RecordingsFit, count
+from rov_fmu.identify.recordings.trajectory import MotionError
+from rov_fmu.identify.slips.search import beta_out_of_range
 from rov_fmu.identify.together import Together
-from rov_fmu.identify.trajectory import MotionError
 from rov_fmu.identify.usable import check_push, check_recording, check_slips, is_pushed
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.toml_file import listed
 from rov_fmu.model.layout import Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
@@ -135,9 +135,10 @@ class _Found:
         base = load_vehicle(given.base) if given.base else None
         rows = base.estimates if base else {}
         kept = {
-            name for name in rows
+            name
+            for name in rows
             if base and (q := given.known.get(name)) and (q.value, q.interval) == (base.rov[name], base.intervals[name])
-        }  # fmt: skip
+        }
         found: dict[str, Estimated] = {}
         for name in self.rov.layout.coefficients:
             if name in kept:

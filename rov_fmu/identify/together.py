@@ -8,7 +8,7 @@ import numpy as np
 
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.thrust_fit import ThrustFit
+from rov_fmu.identify.points.thrust_fit import ThrustFit
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import quantile
 
@@ -39,8 +39,9 @@ class Together:
 
     def _add(self, found: Estimate, by: Mapping[str, Array] | None = None) -> None:
         """An estimate of its own, but for how it moves with numbers that are there already."""
-        places = [n for n, (name, error) in enumerate(found.errors.items())
-                  if np.isfinite(error) and name not in self.names]  # fmt: skip
+        places = [
+            n for n, (name, error) in enumerate(found.errors.items()) if np.isfinite(error) and name not in self.names
+        ]
         if not places:
             return
         none = np.zeros(len(places))

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.files.csv_table import DataFileError, read_columns
-from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.least_squares import Estimate, estimate_alike, fit_named, kind_of
-from rov_fmu.identify.response_fit import holding_force, predict
-from rov_fmu.identify.slips import beta_range
+from rov_fmu.identify.points.drag_forms import Point
+from rov_fmu.identify.points.response_fit import holding_force, predict
+from rov_fmu.identify.slips.search import beta_range
+from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array

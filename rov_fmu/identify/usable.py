@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.files.toml_file import listed
 from rov_fmu.identify.driving import curves_of
-from rov_fmu.identify.runs import prepare
-from rov_fmu.identify.slips import slips
+from rov_fmu.identify.recordings.runs import prepare
+from rov_fmu.identify.slips.search import slips
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.toml_file import listed
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.columns import VELOCITIES

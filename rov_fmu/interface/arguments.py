@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rov_fmu.files.messages import InputError, brief, did_you_mean, shown
+from rov_fmu.io.messages import InputError, brief, did_you_mean, shown
 from rov_fmu.model.layout import Layout, Meta
 from rov_fmu.vehicle.quantity import within
 

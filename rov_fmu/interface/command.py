@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.files.messages import FileError, InputError, did_you_mean, shown
-from rov_fmu.files.output import Output, check_targets
-from rov_fmu.files.reading import read_text
-from rov_fmu.files.series import Series, series
 from rov_fmu.interface.arguments import TIME
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
-from rov_fmu.pages.console import console, table
+from rov_fmu.io.messages import FileError, InputError, did_you_mean, shown
+from rov_fmu.io.output import Output, check_targets
+from rov_fmu.io.reading import read_text
+from rov_fmu.io.time_series import Series, series
+from rov_fmu.report.console import console, table
 
 STOP, STEP = 10.0, 0.01
 """The default end of a simulation and the time between two results, s: those of the FMU's default experiment."""

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rov_fmu.engine.simulation import Array, simulate, usable_cores
-from rov_fmu.export.interface import variables
-from rov_fmu.files.messages import InputError, shown
+from rov_fmu.fmu.variables import variables
 from rov_fmu.interface.arguments import (
     Commands,
     Inputs,
@@ -22,6 +21,7 @@ from rov_fmu.interface.arguments import (
     number_of_vehicles,
 )
 from rov_fmu.interface.result import Result
+from rov_fmu.io.messages import InputError, shown
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.files.messages import InputError, UnknownNameError, did_you_mean
+from rov_fmu.io.messages import InputError, UnknownNameError, did_you_mean
 
 if TYPE_CHECKING:
     import pandas as pd

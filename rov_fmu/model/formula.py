@@ -11,9 +11,18 @@ from functools import cache
 
 FUNCTIONS = {"sin": "sin", "cos": "cos", "abs": "fabs"}
 _OPERATORS: Mapping[type[ast.AST], str] = {
-    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
-    ast.Eq: "==", ast.And: "&&", ast.Or: "||",
-}  # fmt: skip
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.And: "&&",
+    ast.Or: "||",
+}
 _STRENGTH: Mapping[str, int] = {
     "||": 1,
     "&&": 2,

@@ -52,8 +52,9 @@ class Axis:
 SURGE = Axis("surge", "u", "m/s", "forward", "astern", "distance", "m", "N", "X_ext", "m_rov", ("(14)", "(18a)"))
 SWAY = Axis("sway", "v", "m/s", "to starboard", "to port", "distance", "m", "N", "Y_ext", "m_rov", ("(18)", "(18)"))
 HEAVE = Axis("heave", "w", "m/s", "down", "up", "depth", "m", "N", "Z_ext", "m_rov", ("(15)", "(18b)"))
-YAW = Axis("yaw", "r", "rad/s", "bow to starboard", "bow to port", "heading", "rad", "N.m", "N_ext", "I_r",
-           ("(16)", "(18c)"))  # fmt: skip
+YAW = Axis(
+    "yaw", "r", "rad/s", "bow to starboard", "bow to port", "heading", "rad", "N.m", "N_ext", "I_r", ("(16)", "(18c)")
+)
 AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, YAW)}
 """All kinds, in the order of their states."""
 
@@ -120,12 +121,14 @@ AXIS = {
     "m_a": Kind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
     "a_d": Kind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}, {drag}", 0.0, 1e6),
     "b_d": Kind("{load}.s/{length}", "Linear drag coefficient b_d of {axis}, {drag}", 0.0, 1e6),
-    "a_d_reverse": Kind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis} {negative}", 0.0, 1e6,
-                        needed=False),
-    "b_d_reverse": Kind("{load}.s/{length}", "Linear drag coefficient b_d of {axis} {negative}", 0.0, 1e6,
-                        needed=False),
+    "a_d_reverse": Kind(
+        "{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis} {negative}", 0.0, 1e6, needed=False
+    ),
+    "b_d_reverse": Kind(
+        "{load}.s/{length}", "Linear drag coefficient b_d of {axis} {negative}", 0.0, 1e6, needed=False
+    ),
     "F_0": Kind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
-}  # fmt: skip
+}
 TUNING = {
     "alpha": Kind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
     "beta": Kind("1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}", 0.0, 1e3, False, True),
@@ -252,8 +255,10 @@ class Layout:
         """Of each thruster, the inputs that drive it, with gains."""
         if not self.mix:
             return {t.name: {f"u_{t.name}": 1.0} for t in self.thrusters}
-        return {t.name: {f"u_{name}": gains[t.name] for name, gains in self.mix.items() if gains.get(t.name)}
-                for t in self.thrusters}  # fmt: skip
+        return {
+            t.name: {f"u_{name}": gains[t.name] for name, gains in self.mix.items() if gains.get(t.name)}
+            for t in self.thrusters
+        }
 
     def drivers(self, axis: Axis) -> list[Thruster]:
         """The thrusters that act on an axis."""
@@ -301,8 +306,10 @@ class Layout:
         """The inputs that drive the thrusters: fractions of full thrust."""
         if not self.mix:
             return {f"u_{t.name}": _command(t) for t in self.thrusters}
-        return {f"u_{name}": Meta("1", f"Command u_{name} of {_listed(gains)}; saturates at ±1", -1.0, 1.0)
-                for name, gains in self.mix.items()}  # fmt: skip
+        return {
+            f"u_{name}": Meta("1", f"Command u_{name} of {_listed(gains)}; saturates at ±1", -1.0, 1.0)
+            for name, gains in self.mix.items()
+        }
 
     @cached_property
     def inputs(self) -> dict[str, Meta]:
@@ -344,8 +351,9 @@ class Layout:
     @cached_property
     def lagging(self) -> dict[str, Meta]:
         """The last states: forces that follow the commands late."""
-        return {f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters
-                if self.curve_of[t.name].has_lag}  # fmt: skip
+        return {
+            f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters if self.curve_of[t.name].has_lag
+        }
 
     @cached_property
     def state(self) -> dict[str, Meta]:
@@ -356,8 +364,11 @@ class Layout:
     def thrust(self) -> dict[str, Meta]:
         """What is calculated of the thrusters, before the tuning α: their forces, unless they are states, and the
         torque of the thrusters of each curve."""
-        found = {f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters
-                 if not self.curve_of[t.name].has_lag}  # fmt: skip
+        found = {
+            f"F_{t.name}": _thrust(t, self.curve_of[t.name])
+            for t in self.thrusters
+            if not self.curve_of[t.name].has_lag
+        }
         for curve in self.turning_curves:
             of = f"of the {curve.description}" if curve.description else curve.name
             by_arm = any(t.curve == curve.name and t.position is None for t in self.drivers(YAW))
@@ -382,10 +393,19 @@ class Layout:
 def metas_of(axis: Axis) -> dict[str, Meta]:
     """Every coefficient that an axis can have, by its key."""
     drag, motion = axis.equations
-    words = {"axis": axis.name, "velocity": axis.velocity, "push": axis.push, "drag": drag, "motion": motion,
-            "load": axis.load, "length": axis.position_unit, "inertia": BODY[axis.inertia].unit,
-            "what": "moment of inertia" if axis is YAW else "mass",
-            "positive": axis.positive, "negative": axis.negative}  # fmt: skip
+    words = {
+        "axis": axis.name,
+        "velocity": axis.velocity,
+        "push": axis.push,
+        "drag": drag,
+        "motion": motion,
+        "load": axis.load,
+        "length": axis.position_unit,
+        "inertia": BODY[axis.inertia].unit,
+        "what": "moment of inertia" if axis is YAW else "mass",
+        "positive": axis.positive,
+        "negative": axis.negative,
+    }
     return {key: kind.meta(**words) for key, kind in (AXIS | TUNING).items()}
 
 
@@ -396,8 +416,11 @@ def _listed(names: Iterable[str]) -> str:
 
 def _pushes(direction: tuple[float, float, float]) -> str:
     """The direction of a positive force in words."""
-    words = [axis.positive if part > 0.0 else axis.negative
-             for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True) if abs(part) > _FAINT]  # fmt: skip
+    words = [
+        axis.positive if part > 0.0 else axis.negative
+        for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True)
+        if abs(part) > _FAINT
+    ]
     return " and ".join(words)
 
 

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import pi
 
-from rov_fmu.files.csv_table import Column, Columns, DataFileError
-from rov_fmu.files.messages import shown
+from rov_fmu.io.csv_table import Column, Columns, DataFileError
+from rov_fmu.io.messages import shown
 from rov_fmu.model.layout import Axis
 
 NEUTRAL, SPAN = 1500.0, 400.0

@@ -12,9 +12,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.files.beside import inside
-from rov_fmu.files.messages import MOST, did_you_mean, lines_on
-from rov_fmu.files.toml_file import Strict, Toml, check, folder_of, line, listed, pair, read_toml, told
+from rov_fmu.io.messages import MOST, did_you_mean, lines_on
+from rov_fmu.io.paths import inside
+from rov_fmu.io.toml_file import Strict, Toml, check, folder_of, line, listed, pair, read_toml, told
 from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Axis, Layout, Meta, VehicleAxis, coefficient_name
 from rov_fmu.vehicle.form import Head, Validity
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
@@ -190,10 +190,12 @@ def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
     """The coefficients of a vehicle that its file gives."""
     metas = vehicle.layout.coefficients
     return {
-        name: Quantity(value=vehicle.rov[name], unit=metas[name].unit, source=source,
-                       interval=vehicle.intervals.get(name))
-        for name, source in vehicle.sources.items() if source != NOT_GIVEN
-    }  # fmt: skip
+        name: Quantity(
+            value=vehicle.rov[name], unit=metas[name].unit, source=source, interval=vehicle.intervals.get(name)
+        )
+        for name, source in vehicle.sources.items()
+        if source != NOT_GIVEN
+    }
 
 
 def _widened(layout: Layout, tables: Mapping[str, tuple[str, ...]], known: Iterable[str]) -> Layout:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.files.csv_table import Column, Columns, DataFileError, read_columns
-from rov_fmu.files.messages import did_you_mean, shown, similar
+from rov_fmu.io.csv_table import Column, Columns, DataFileError, read_columns
+from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.model.layout import HEAVE, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import (
@@ -200,9 +200,12 @@ def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Ar
         (int((~timed).sum()), "row", "without a time left out"),
         (int((timed & ~commanded).sum()), "row", "without a command left out"),
         (table.torn, "row", "with more cells than the header left out"),
-        *((n, "cell", f"of {name} without a number taken as blank")
-          for name, n in table.unread.items() if name != "time" and name not in commanding),
-    )  # fmt: skip
+        *(
+            (n, "cell", f"of {name} without a number taken as blank")
+            for name, n in table.unread.items()
+            if name != "time" and name not in commanding
+        ),
+    )
     notes = [", ".join(f"{n} {what}{'s' if n > 1 else ''} {done}" for n, what, done in told if n)]
     notes += _on_pulses(table, commanding)
     return time[first], columns, tuple(filter(None, notes))

@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.files.reading import read_bytes
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.reading import read_bytes
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Layout
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.columns import NO_OUTPUT, pulses
@@ -64,8 +64,15 @@ _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
 _PARAMETERS = {"PARAM_VALUE": ("param_id", "param_value"), "PARM": ("Name", "Value")}
 # Message, and the first of its numbers that is meant.
 _SERVOS = (("SERVO_OUTPUT_RAW", 0), ("RCOU", 0))
-_DEPTHS = (("GLOBAL_POSITION_INT", 0), ("VFR_HUD", 0), ("SCALED_PRESSURE2", 0), ("CTUN", 0), ("BARO", 0), ("XKF1", 0),
-           ("NKF1", 0))  # fmt: skip
+_DEPTHS = (
+    ("GLOBAL_POSITION_INT", 0),
+    ("VFR_HUD", 0),
+    ("SCALED_PRESSURE2", 0),
+    ("CTUN", 0),
+    ("BARO", 0),
+    ("XKF1", 0),
+    ("NKF1", 0),
+)
 _HEADINGS = (("ATTITUDE", 0), ("ATT", 0), ("XKF1", 1), ("NKF1", 1))
 _VELOCITIES = (("LOCAL_POSITION_NED", 0), ("XKF1", 2), ("NKF1", 2))
 _STATUS = (("EKF_STATUS_REPORT", 0), ("XKF4", 0), ("NKF4", 0))

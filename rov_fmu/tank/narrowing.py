@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rov_fmu.files.toml_file import line, listed
+from rov_fmu.io.toml_file import line, listed
 from rov_fmu.model.layout import (
     ARM,
     AXES,
@@ -159,8 +159,9 @@ def _narrow(layout: Layout, axes: Collection[Axis]) -> Layout:
     layout = _with(layout, axes)
     thrusters = tuple(t for t in layout.thrusters if any(t in layout.drivers(axis) for axis in axes))
     names, curves = {t.name for t in thrusters}, {t.curve for t in thrusters}
-    mix = {name: {driven: gain for driven, gain in gains.items() if driven in names}
-           for name, gains in layout.mix.items()}  # fmt: skip
+    mix = {
+        name: {driven: gain for driven, gain in gains.items() if driven in names} for name, gains in layout.mix.items()
+    }
     layout = replace(
         layout,
         curves=tuple(curve for curve in layout.curves if curve.name in curves),

@@ -46,6 +46,8 @@ class Recording:
             return np.column_stack([self.thrusters.get(thruster.name, still) for thruster in layout.thrusters])
         assert self.command is not None
         signs = layout.signs(self.axis)
-        gains = [sum(gain * signs.get(name, 0.0) for name, gain in layout.gains[thruster.name].items())
-                 for thruster in layout.thrusters]  # fmt: skip
+        gains = [
+            sum(gain * signs.get(name, 0.0) for name, gain in layout.gains[thruster.name].items())
+            for thruster in layout.thrusters
+        ]
         return np.asarray(np.clip(np.outer(self.command, gains), -1.0, 1.0))

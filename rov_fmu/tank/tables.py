@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from rov_fmu.files.csv_table import DataFileError, read_columns
+from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.columns import FORCE, HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
 

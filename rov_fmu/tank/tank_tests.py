@@ -17,9 +17,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rov_fmu.files.csv_table import DataFileError
-from rov_fmu.files.messages import FileError, did_you_mean
-from rov_fmu.files.reading import read_bytes
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import FileError, did_you_mean
+from rov_fmu.io.reading import read_bytes
 from rov_fmu.model.layout import AXES, Axis, Layout
 from rov_fmu.tank.given import ROV_FILE, Said, read_said
 from rov_fmu.tank.logs import read_log
@@ -176,8 +176,11 @@ class _Found:
         curves = {curve.name for curve in given.rov.layout.curves}
 
         def rows(kind: str) -> dict[str, tuple[Row, ...]]:
-            return {of: tuple(found) for (which, of), found in self.rows.items()
-                    if which == kind and (kind != "thrust" or of in curves)}  # fmt: skip
+            return {
+                of: tuple(found)
+                for (which, of), found in self.rows.items()
+                if which == kind and (kind != "thrust" or of in curves)
+            }
 
         recordings = {name: tuple(found) for name, found in self.recordings.items()}
         inputs = {ROV_FILE: _hash(self.folder / ROV_FILE)}

@@ -10,9 +10,9 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.files.beside import inside, inside_or_shipped
-from rov_fmu.files.output import is_same
-from rov_fmu.files.toml_file import Strict, folder_of, pair
+from rov_fmu.io.output import is_same
+from rov_fmu.io.paths import inside, inside_or_shipped
+from rov_fmu.io.toml_file import Strict, folder_of, pair
 from rov_fmu.vehicle.quantity import Name, Text
 
 _RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from math import hypot
 
-from rov_fmu.files.toml_file import line, listed
+from rov_fmu.io.toml_file import line, listed
 from rov_fmu.model.layout import YAW, Layout
 from rov_fmu.vehicle.schema import where
 

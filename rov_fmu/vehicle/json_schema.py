@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from rov_fmu.files.toml_file import Strict
+from rov_fmu.io.toml_file import Strict
 from rov_fmu.vehicle.schema import File
 
 _NULL = {"type": "null"}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
 
-from rov_fmu.files.csv_table import Column, DataFileError, read_columns
+from rov_fmu.io.csv_table import Column, DataFileError, read_columns
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.form import TABLES

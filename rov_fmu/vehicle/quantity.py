@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
-from rov_fmu.files.toml_file import Strict, pair, table_of
+from rov_fmu.io.toml_file import Strict, pair, table_of
 from rov_fmu.model.layout import Meta
 
 
@@ -24,9 +24,11 @@ def not_blank(text: str) -> str:
 
 Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(_printable), AfterValidator(not_blank)]
 Name = Annotated[
-    str, Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"), AfterValidator(_printable),
+    str,
+    Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"),
+    AfterValidator(_printable),
     AfterValidator(not_blank),
-]  # fmt: skip
+]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from rov_fmu.files.toml_file import DOCUMENTED, Strict, pair, table_of
+from rov_fmu.io.toml_file import DOCUMENTED, Strict, pair, table_of
 from rov_fmu.model import layout
 from rov_fmu.model.layout import ARM, AXES, AXIS, BODY, CURVE, TUNING, Axis, Kind, Layout, Meta, VehicleAxis
 from rov_fmu.vehicle.form import FileHead, Made, Validity
@@ -52,8 +52,9 @@ def _opened(table: Any, kinds: Mapping[str, Kind]) -> Any:
     """A table none of whose coefficients is needed."""
     fields: dict[str, Any] = {
         key: (field.annotation | None, Field(None, description=field.description))
-        for key, field in table.model_fields.items() if key in kinds and field.is_required()
-    }  # fmt: skip
+        for key, field in table.model_fields.items()
+        if key in kinds and field.is_required()
+    }
     return table_of(f"_Open{table.__name__}", table, fields, table.__doc__)
 
 
@@ -265,8 +266,10 @@ class Hardware(Strict):
     @property
     def thruster_sources(self) -> dict[str, dict[str, str]]:
         """Where `direction` and `position` of each thruster come from, by its name."""
-        return {t.name: {"direction": t.direction.source} | ({"position": t.position.source} if t.position else {})
-                for t in self.thruster}  # fmt: skip
+        return {
+            t.name: {"direction": t.direction.source} | ({"position": t.position.source} if t.position else {})
+            for t in self.thruster
+        }
 
 
 class OpenHardware(Hardware):

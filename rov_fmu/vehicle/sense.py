@@ -6,8 +6,8 @@ from typing import Any, TypeVar
 
 from pydantic_core import ErrorDetails
 
-from rov_fmu.files.messages import did_you_mean, shown
-from rov_fmu.files.toml_file import Strict, Toml, check, label, line, listed
+from rov_fmu.io.messages import did_you_mean, shown
+from rov_fmu.io.toml_file import Strict, Toml, check, label, line, listed
 from rov_fmu.model.layout import (
     ARM,
     AXIS,

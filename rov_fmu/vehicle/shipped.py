@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from rov_fmu.files.kinds import VEHICLE_FILE, check_suffix
-from rov_fmu.files.messages import FileError, did_you_mean
-from rov_fmu.files.places import MODELS
+from rov_fmu.io.file_kinds import VEHICLE_FILE, check_suffix
+from rov_fmu.io.messages import FileError, did_you_mean
+from rov_fmu.io.paths import MODELS
 
 SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODELS.iterdir()) if folder.is_dir()}
 """Name to vehicle file."""

@@ -67,9 +67,12 @@ class Uncertainty:
         """Of some of them; of the others nothing is known then."""
         place = [self.names.index(name) for name in names]
         return Uncertainty(
-            tuple(names), self.values[place], self.errors[place], self.correlation[np.ix_(place, place)],
+            tuple(names),
+            self.values[place],
+            self.errors[place],
+            self.correlation[np.ix_(place, place)],
             self.bounds[place],
-        )  # fmt: skip
+        )
 
     @property
     def _is_factor(self) -> NDArray[np.bool_]:

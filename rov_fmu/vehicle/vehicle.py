@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from typing_extensions import Self
 
-from rov_fmu.files.kinds import VEHICLE_FILE, check_keys
-from rov_fmu.files.messages import FileError, InputError, did_you_mean, lines_on, shown
-from rov_fmu.files.toml_file import check, line, read_toml, told
+from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
+from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, shown
+from rov_fmu.io.toml_file import check, line, read_toml, told
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.form import PICTURES, TABLES, Head

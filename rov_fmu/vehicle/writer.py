@@ -8,12 +8,12 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Array, InlineTable, Item
 
-from rov_fmu.files.beside import inside_or_shipped, name_of
-from rov_fmu.files.messages import brief, shown
-from rov_fmu.files.output import Output, write_whole
-from rov_fmu.files.reading import read_text
-from rov_fmu.files.seal import sealed
-from rov_fmu.files.toml_file import line
+from rov_fmu.io.messages import brief, shown
+from rov_fmu.io.output import Output, write_whole
+from rov_fmu.io.paths import inside_or_shipped, name_of
+from rov_fmu.io.reading import read_text
+from rov_fmu.io.seal import sealed
+from rov_fmu.io.toml_file import line
 from rov_fmu.model.layout import Curve, Meta, Thruster
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where

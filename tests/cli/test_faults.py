@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.export.archive import native_content
+from rov_fmu.fmu.archive import native_content
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -178,10 +178,15 @@ def _interrupted(action: str, folder: Path) -> subprocess.CompletedProcess[str]:
         f"{action}\nsys.exit(run_process('rov-fmu', lambda: exit_code('rov-fmu', action, {{OSError: 2}})))\n"
     )
     return subprocess.run(
-        [sys.executable, "-m", "interrupted"], cwd=folder, capture_output=True, text=True, check=False, timeout=300,
+        [sys.executable, "-m", "interrupted"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
         env=os.environ | {"PYTHONPATH": str(ROOT)},  # this checkout, whichever is installed
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(
@@ -251,7 +256,7 @@ def replace(self, target):
     self.rename(target)
 Path.replace = replace
 def action():
-    from rov_fmu.files.output import Output, write_whole
+    from rov_fmu.io.output import Output, write_whole
     write_whole(*(Output(Path({str(out)!r}, name), b"new") for name in ("rov.toml", "report.html")))
     time.sleep(600.0)
 """

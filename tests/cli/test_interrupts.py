@@ -43,10 +43,16 @@ class Command:
                 fcntl.ioctl(inside, termios.TIOCSCTTY, 0)
 
         self.process = subprocess.Popen(
-            [sys.executable, *arguments], cwd=ROOT, stdin=inside, stdout=inside, stderr=subprocess.PIPE, text=True,
+            [sys.executable, *arguments],
+            cwd=ROOT,
+            stdin=inside,
+            stdout=inside,
+            stderr=subprocess.PIPE,
+            text=True,
             env=os.environ | {"TERM": "xterm", "TMPDIR": str(self.temporary)} | environment,
-            start_new_session=True, preexec_fn=own_terminal,  # noqa: PLW1509
-        )  # fmt: skip
+            start_new_session=True,
+            preexec_fn=own_terminal,  # noqa: PLW1509
+        )
         os.close(inside)
         Thread(target=self._read, daemon=True).start()
 
@@ -192,9 +198,9 @@ def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
 
 _WARNING = """
 import sys, time
-import rov_fmu.studies.run as run
+import rov_fmu.study.run.run_study as run
 from rov_fmu.cli import main
-from rov_fmu.files.messages import FileError
+from rov_fmu.io.messages import FileError
 def warns(plan, output, workers, scheduler, tell, warn):
     time.sleep(0.5)  # until the bar is there
     warn("the plan is odd")

@@ -12,7 +12,7 @@ import pytest
 from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
 from rov_fmu.engine.compile import BuildError
-from rov_fmu.files.messages import did_you_mean, similar
+from rov_fmu.io.messages import did_you_mean, similar
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import ALONE, BARE, TESTS
 

@@ -17,10 +17,10 @@ from pythonfmu import FmuBuilder
 from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
 from rov_fmu.engine.compile import compile_all
-from rov_fmu.export.archive import native_content
-from rov_fmu.export.experiments import FOLDER, MANIFEST
-from rov_fmu.export.proof import prove
-from rov_fmu.export.reference_results import reference_results
+from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.experiments import FOLDER, MANIFEST
+from rov_fmu.fmu.proof import prove
+from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE, start
@@ -131,7 +131,7 @@ _FOREIGN: Files = {
     </ssv:ParameterSet>""",
     f"{FOLDER}/my tests/u.csv": '"time","u"\r\n0,1\r\n1,1\r\n1,-1\r\n2,-1\r\n',
     f"{FOLDER}/my tests/y.csv": "time,y,on\n0,0,false\n0.5,1,false\n1,2,true\n",
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +157,7 @@ def test_an_fmu_of_another_exporter_is_proved(foreign: Path, capsys: Capsys) -> 
         ("k.ssv", _FOREIGN[f"{FOLDER}/k.ssv"].replace('"2"', '"2.1"'), "step y 5.0e-02 1.0e-06 FAIL"),  # type: ignore[union-attr]
         ("my tests/u.csv", "time,u\n0,10\n", "step - inf 1.0e-06 FAIL fmi2DoStep failed with status"),
     ],
-)  # fmt: skip
+)
 def test_what_deviates_or_fails_is_told(
     name: str, text: str, line: str, foreign: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
@@ -180,14 +180,16 @@ def _changed(fmu: Path, begin: str, change: Callable[[bytes], bytes], path: Path
 
 WHY: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
     "out of bounds": (
-        f"{FOLDER}/tuned.ssv", lambda old: re.sub(b'value="[^"]*"', b'value="-5"', old, count=1),
+        f"{FOLDER}/tuned.ssv",
+        lambda old: re.sub(b'value="[^"]*"', b'value="-5"', old, count=1),
         r"fmi\dSet\w+ failed with status 2 \(discard\); the FMU: fmi\dSet\w+: alpha_u = -5 is not within 0 ",
     ),
     "a wrong token": (
-        "modelDescription.xml", lambda old: re.sub(b'(guid|Token)="[^"]*"', b'\\1="wrong"', old),
+        "modelDescription.xml",
+        lambda old: re.sub(b'(guid|Token)="[^"]*"', b'\\1="wrong"', old),
         r"Failed to instantiate \w+; the FMU: fmi\dInstantiate\w*: the (GUID|instantiation token) wrong is not that ",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("version", ["videoray_fmu", "videoray3_fmu"])
@@ -311,7 +313,8 @@ BAD: dict[str, tuple[Files, str]] = {
         f"{FOLDER}/k.ssv: the FMU has no variable 'q'",
     ),
     "a parameter without value": (
-        {"k.ssv": '<ParameterSet><Parameter name="k"/></ParameterSet>'}, f"{FOLDER}/k.ssv: parameter 'k': has no value",
+        {"k.ssv": '<ParameterSet><Parameter name="k"/></ParameterSet>'},
+        f"{FOLDER}/k.ssv: parameter 'k': has no value",
     ),
     "a parameter in another unit": (
         {"k.ssv": '<ParameterSet><Parameter name="k"><Real value="1" unit="N"/></Parameter></ParameterSet>'},
@@ -326,7 +329,7 @@ BAD: dict[str, tuple[Files, str]] = {
         {_EXP: _exp('startTime="-1e308" stopTime="1e308" stepSize="1">')},
         f"{_EXP}: experiment 'a': stepSize = 1 s takes inf steps from -1e+308 to 1e+308 s; at most 1000000 are run\n",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BAD)

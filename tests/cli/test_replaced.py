@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.files.output import WriteError
-from rov_fmu.files.seal import check_replaced, sealed
 from rov_fmu.identify import identify as identification
+from rov_fmu.io.output import WriteError
+from rov_fmu.io.seal import check_replaced, sealed
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import REFIT, TESTS
 

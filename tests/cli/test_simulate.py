@@ -99,7 +99,7 @@ WRONG = {
     "no folder": (["-o", "none/result.csv"], "none/result.csv: cannot be written: there is no folder none"),
     "its own input": (["--input", "commands.csv", "-o", "commands.csv"], "commands.csv: cannot be written: would"),
     "too fast": (["-o", "a.csv", "--plot", "a.png", "--set", "r=1e300", "--set", "u=1"], "the motion cannot be"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG)

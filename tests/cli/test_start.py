@@ -118,8 +118,17 @@ def _completed(*words: str, shell: str = "bash") -> list[str]:
 
 def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
     commands = (
-        "build", "figures", "fly", "identify", "prove", "schema", "simulate", "study", "tables", "tune",
-    )  # fmt: skip
+        "build",
+        "figures",
+        "fly",
+        "identify",
+        "prove",
+        "schema",
+        "simulate",
+        "study",
+        "tables",
+        "tune",
+    )
     assert _completed("") == [f"plain,{name}" for name in commands]
     assert _completed("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
     assert _completed("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
@@ -228,8 +237,12 @@ def _checkout(folder: Path, missing: str) -> subprocess.CompletedProcess[str]:
     hidden.write_text(_HIDES.format(missing), encoding="utf-8")
     return subprocess.run(
         [sys.executable, str(copy / "build_fmu.py"), "--platform=host", "-o", str(folder / "x.fmu")],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 @pytest.mark.long
@@ -285,10 +298,13 @@ def test_an_interrupted_build_in_a_notebook_ends_at_once_and_leaves_nothing(tmp_
     environment = os.environ | endless_compiler(tmp_path) | {"TMPDIR": str(tmp_path / "tmp")}
     process = subprocess.Popen(
         [sys.executable, "-c", _CELL, str(tmp_path / "x.fmu"), str(BARE)],
-        env=environment, cwd=ROOT, stdout=subprocess.PIPE, text=True,
+        env=environment,
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
         # a shell starts what it runs in the background with interrupts ignored, and that is inherited
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
-    )  # fmt: skip
+    )
     deadline = time.monotonic() + 300.0
     while not (tmp_path / "number").exists():
         assert time.monotonic() < deadline

@@ -165,13 +165,26 @@ def lowest(folder: Path) -> Path:
     return path
 
 
-QUICK = ["cli/test_start.py", "export/test_build.py", "pages/test_report.py", "vehicle/test_vehicle.py",
-         "vehicle/test_writer.py", *(f"identify/test_{part}.py" for part in ("refit", "tuning")),
-         "studies/test_kinds.py"]  # fmt: skip
+QUICK = [
+    "cli/test_start.py",
+    "fmu/test_build.py",
+    "report/test_report.py",
+    "vehicle/test_vehicle.py",
+    "vehicle/test_writer.py",
+    *(f"identify/test_{part}.py" for part in ("refit", "tuning")),
+    "study/test_kinds.py",
+]
 """Tests of every part that uses a dependency."""
-MORE = ["cli/test_start.py", "export/test_build.py", "export/test_osp.py", "pages", "vehicle/test_vehicle.py",
-        *(f"vehicle/test_{part}.py" for part in ("writer", "json_schema", "bluerov2")),
-        *(f"identify/test_{part}.py" for part in ("identification", "refit", "tuning")), "studies"]  # fmt: skip
+MORE = [
+    "cli/test_start.py",
+    "fmu/test_build.py",
+    "fmu/test_osp.py",
+    "report",
+    "vehicle/test_vehicle.py",
+    *(f"vehicle/test_{part}.py" for part in ("writer", "json_schema", "bluerov2")),
+    *(f"identify/test_{part}.py" for part in ("identification", "refit", "tuning")),
+    "study",
+]
 
 
 @pytest.mark.parametrize(

@@ -128,9 +128,12 @@ except KeyboardInterrupt:
 def test_ctrl_c_ends_it() -> None:
     """The simulation would take minutes."""
     process = subprocess.Popen(
-        [sys.executable, "-c", _ENDLESS], cwd=ROOT, stdout=subprocess.PIPE, text=True,
+        [sys.executable, "-c", _ENDLESS],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
-    )  # fmt: skip
+    )
     with process:
         assert process.stdout
         assert process.stdout.readline() == "begins\n"

@@ -1,75 +1,188 @@
-"""The FMU of FMI 3.0 gives what that of FMI 2.0 gives, to the bit, whatever is asked of both."""
+"""One declaration, two versions of FMI: both descriptions are valid, and say the same of the same vehicle.
 
-import random
+They differ in how they number variables, and in where the unit and the bounds of a variable stand.
+"""
+
 from pathlib import Path
+from typing import Any
 
+import fmpy
 import pytest
+from lxml import etree
 
+from rov_fmu.fmu.model_description import NATIVE, build_description, model_description
+from rov_fmu.fmu.variables import variables
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
-from tests import fmi2, fmi3
-from tests.conftest import unzipped
-from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, AnyInstance, reals
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.vehicles import VEHICLES, a_vehicle
 
-BUILT = {"videoray": ("videoray_dir", "videoray3_dir"), "bluerov2_heavy": ("heavy_dir", "heavy3_dir")}
-"""By other tests, too."""
-_NAMES = [name if name in BUILT else pytest.param(name, marks=pytest.mark.long) for name in SHIPPED]
-
-
-@pytest.fixture(scope="module", params=_NAMES)
-def both(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[fmi2.Fmu, fmi3.Fmu]:
-    """Both FMUs of a vehicle that ships."""
-    name: str = request.param
-
-    def folder(version: int) -> Path:
-        if name in BUILT:
-            found: Path = request.getfixturevalue(BUILT[name][version - 2])
-            return found
-        return unzipped(SHIPPED[name], tmp_path_factory.mktemp(f"{name}{version}"), version)
-
-    return fmi2.Fmu(folder(2)), fmi3.Fmu(folder(3))
+SCHEMAS = Path(fmpy.__file__).with_name("schema")
+TIME = {
+    "name": "time",
+    "description": "Time",
+    "causality": "independent",
+    "variability": "continuous",
+    "unit": "s",
+}
+_OF_A_VARIABLE = ("name", "description", "causality", "variability", "initial")
+_OF_A_NUMBER = ("unit", "displayUnit", "min", "max", "nominal", "start")
+_LISTS = {
+    "Outputs": "Output",
+    "Derivatives": "ContinuousStateDerivative",
+    "InitialUnknowns": "InitialUnknown",
+}
 
 
-def inputs(rov: AnyInstance, rng: random.Random) -> dict[str, float]:
-    return {name: rng.choice([0.0, rng.uniform(-1.2, 1.2), rng.uniform(-1.2, 1.2)]) for name in rov.fmu.inputs}
+def described(rov: Rov, fmi: int) -> etree._Element:
+    description = model_description(a_vehicle(rov), variables(rov), guid="{1}", interfaces=NATIVE[fmi], fmi=fmi)
+    return etree.fromstring(description)
 
 
-def run(rov: AnyInstance, steps: int) -> list[bytes]:
-    """All that can be read after each of random steps of random commands, with tuning on the way."""
-    rng, t, seen = random.Random(6), 0.0, []
-    for _ in range(steps):
-        h = 10.0 ** rng.uniform(-4.0, 0.8)
-        assert rov.set({**inputs(rov, rng), f"beta_{rov.fmu.states[0]}": rng.uniform(0.5, 1.0)}) == OK
-        assert rov.step(t, h) == OK
-        t += h
-        read = rov.get([name for name in rov.fmu.variables if name != "time"])
-        read += rov.rates(rov.fmu.outputs)
-        seen.append(bytes(reals(*read, rov.time())))
-    return seen
+def check_schema(document: etree._Element, name: str) -> None:
+    etree.XMLSchema(file=str(SCHEMAS / name)).assertValid(document)
 
 
-@pytest.mark.parametrize("steps", [300, pytest.param(30_000, marks=pytest.mark.long)])
-def test_co_simulation_gives_the_same_bits(both: tuple[fmi2.Fmu, fmi3.Fmu], steps: int) -> None:
-    runs = []
-    for fmu in both:
-        with fmu.instance() as rov:
-            rov.start({"psi": 0.5})
-            runs.append(run(rov, steps))
-    assert runs[0] == runs[1]
-    assert len(set(runs[0])) == steps
+def declared(root: etree._Element) -> dict[str, dict[str, Any]]:
+    """Every variable by name, with what FMI 2.0 says in a child and FMI 3.0 in a type; references by name."""
+    types = {of.get("name"): of for of in root.iter("Float64Type")}
+    found = {}
+    numbers = list(root.find("ModelVariables"))
+    by_reference = {v.get("valueReference"): v.get("name") for v in numbers}
+    for v in numbers:
+        attributes = {key: v.get(key) for key in _OF_A_VARIABLE}
+        parts = [v, types[v.get("declaredType")]] if types else list(v)
+        attributes |= {key: x for key in _OF_A_NUMBER for of in parts if (x := of.get(key)) is not None}
+        if (of := parts[0].get("derivative")) is not None:
+            attributes["derivative"] = by_reference[of] if types else numbers[int(of) - 1].get("name")
+        found[v.get("name")] = {key: x for key, x in attributes.items() if x is not None}
+    return found
 
 
-def test_model_exchange_gives_the_same_bits(both: tuple[fmi2.Fmu, fmi3.Fmu]) -> None:
-    assert both[0].states == both[1].states
-    n, seen = len(both[0].states), []
-    for fmu in both:
-        rng = random.Random(8)
-        with fmu.instance(MODEL_EXCHANGE) as rov:
-            rov.reach(CONTINUOUS)
-            for _ in range(300):
-                assert rov.set(inputs(rov, rng)) == OK
-                rov.expect("SetContinuousStates", reals(*(rng.uniform(-2.0, 2.0) for _ in range(n))), n)
-                rates = reals(*[0.0] * n)
-                rov.expect("GetContinuousStateDerivatives", rates, n)
-                seen.append(bytes(rates))
-    assert seen[:300] == seen[300:]
-    assert len(set(seen)) == 300
+def structure(root: etree._Element, fmi: int) -> dict[str, list[tuple[str, list[str], str]]]:
+    """The lists of <ModelStructure>, in order: the unknown, what it depends on and how, by name."""
+    numbers = list(root.find("ModelVariables"))
+    name = {str(n): v.get("name") for n, v in enumerate(numbers, 1)}
+    if fmi == 3:
+        name = {v.get("valueReference"): v.get("name") for v in numbers}
+    found = {}
+    for of_2, of_3 in _LISTS.items():
+        unknowns = root.findall(f"ModelStructure/{of_3}" if fmi == 3 else f"ModelStructure/{of_2}/Unknown")
+        found[of_2] = [
+            (
+                name[u.get("valueReference" if fmi == 3 else "index")],
+                [name[known] for known in u.get("dependencies").split()],
+                u.get("dependenciesKind"),
+            )
+            for u in unknowns
+        ]
+    return found
+
+
+def units(root: etree._Element) -> dict[str, bytes]:
+    return {unit.get("name"): etree.tostring(unit, method="c14n").strip() for unit in root.iter("Unit")}
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_both_versions_declare_the_same(kind: str) -> None:
+    two, three = (described(VEHICLES[kind], fmi) for fmi in (2, 3))
+    variables_2, variables_3 = declared(two), declared(three)
+    assert variables_3.pop("time") == TIME
+    assert list(variables_3) == list(variables_2)
+    assert variables_3 == variables_2
+    assert structure(three, 3) == structure(two, 2)
+    units_3 = units(three)
+    assert b'<BaseUnit s="1">' in units_3["s"]  # that of the time
+    assert units_3 == units(two) | {"s": units_3["s"]}
+    same = ("Category", "DefaultExperiment")
+    assert [dict(e.attrib) for e in three.iter(*same)] == [dict(e.attrib) for e in two.iter(*same)]
+
+
+def value_references(root: etree._Element) -> list[int]:
+    """In the order of ModelVariables."""
+    return [int(v.get("valueReference")) for v in root.find("ModelVariables")]
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_fmi_2_numbers_variables_from_0_and_fmi_3_from_1(kind: str) -> None:
+    two, three = (value_references(described(VEHICLES[kind], fmi)) for fmi in (2, 3))
+    assert two == [*range(len(two))]
+    assert three == [*range(1, len(two) + 2)]  # FMI 3.0 has the time besides
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_omsimulator_resolves_every_dependency_to_the_variable_that_is_meant(name: str) -> None:
+    """OMSimulator takes the references of ModelStructure for positions in ModelVariables, from 1.
+
+    It ends with "bad dependency on variable with index 0" where there is no such position, and else takes the variable
+    at that position for the one that is meant.
+    """
+    root = described(load_vehicle(SHIPPED[name]).rov, 3)
+    at = value_references(root)
+    entries = list(root.find("ModelStructure"))
+    taken = [int(n) for entry in entries for n in (entry.get("valueReference"), *entry.get("dependencies").split())]
+    assert taken
+    for n in taken:
+        assert 1 <= n <= len(at), f"bad dependency on variable with index {n}"
+        assert at[n - 1] == n
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_fmi_3_says_all_of_a_number_in_its_type_and_nothing_in_the_variable(kind: str) -> None:
+    """FMI Library loses the unit of a variable with bounds of its own; fmi-sim refuses a unit on a variable."""
+    root = described(VEHICLES[kind], 3)
+    types = {of.get("name"): of for of in root.iter("Float64Type")}
+    variables_of = list(root.find("ModelVariables"))
+    for v in variables_of:
+        assert not {"unit", "displayUnit", "quantity", "min", "max", "nominal"} & {*v.attrib}, v.get("name")
+        assert types[v.get("declaredType")].get("unit"), v.get("name")
+    said = [tuple(sorted((key, x) for key, x in of.attrib.items() if key != "name")) for of in types.values()]
+    assert len({*said}) == len(said) == len(root.findall("TypeDefinitions/*")), "one type per unit, range and nominal"
+    assert {*types} == {v.get("declaredType") for v in variables_of}
+    assert not {*types} & {v.get("name") for v in variables_of}, "the names of types and variables differ"
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_the_description_follows_its_schema(kind: str, fmi: int) -> None:
+    check_schema(described(VEHICLES[kind], fmi), f"fmi{fmi}/fmi{fmi}ModelDescription.xsd")
+
+
+def test_the_build_description_follows_its_schema_and_names_the_file_to_compile() -> None:
+    document = etree.fromstring(build_description("a_rov"))
+    check_schema(document, "fmi3/fmi3BuildDescription.xsd")
+    (configuration,) = document
+    assert configuration.get("modelIdentifier") == "a_rov"
+    assert [file.get("name") for file in document.iter("SourceFile")] == ["fmu.c"]
+
+
+def test_fmi_3_says_what_it_can_do() -> None:
+    """And nothing else: what is absent is false."""
+    root = described(VEHICLES["VideoRay"], 3)
+    assert root.get("fmiVersion") == "3.0"
+    assert root.get("instantiationToken") == "{1}"
+    both = {
+        "modelIdentifier": "an_rov",
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true",
+        "providesAdjointDerivatives": "true",
+    }
+    stepped = {
+        "canHandleVariableCommunicationStepSize": "true",
+        "maxOutputDerivativeOrder": "1",
+        "providesIntermediateUpdate": "true",
+        "mightReturnEarlyFromDoStep": "true",
+        "canReturnEarlyAfterIntermediateUpdate": "true",
+        "hasEventMode": "true",
+    }
+    for interface, can in {"ModelExchange": both, "CoSimulation": both | stepped}.items():
+        said = {key: x for key, x in root.find(interface).attrib.items() if x != "false"}
+        assert said == can
+    assert root.find("ScheduledExecution") is None
+
+
+def test_inputs_and_outputs_alone_are_of_intermediate_update() -> None:
+    root = described(VEHICLES["Heavy"], 3)
+    updated = {v.get("name") for v in root.iter("Float64") if v.get("intermediateUpdate") == "true"}
+    assert updated == {v.name for v in variables(VEHICLES["Heavy"]) if v.causality in ("input", "output")}

@@ -13,7 +13,7 @@ from scipy.stats import binom, chi2
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.output_error import fit_recordings
+from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.model.layout import SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array

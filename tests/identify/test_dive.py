@@ -7,16 +7,16 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from rov_fmu.identify.coupling import EAST, NORTH
-from rov_fmu.identify.extras import Extra, Kind
-from rov_fmu.identify.limits import NoFitError, limits, refuse_nonsense
-from rov_fmu.identify.output_error import fit_recordings
-from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
-from rov_fmu.identify.runs import prepare
-from rov_fmu.identify.simulator import Simulator, solve
+from rov_fmu.identify.effects.coupling import EAST, NORTH
+from rov_fmu.identify.effects.extras import Extra, Kind
+from rov_fmu.identify.recordings.limits import NoFitError, limits, refuse_nonsense
+from rov_fmu.identify.recordings.output_error import fit_recordings
+from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
+from rov_fmu.identify.recordings.runs import prepare
+from rov_fmu.identify.recordings.simulator import Simulator, solve
 from rov_fmu.model.layout import AXES, HEAVE, YAW
 from rov_fmu.model.rov import Rov
-from rov_fmu.pages.findings import acting
+from rov_fmu.report.findings import acting
 from rov_fmu.tank.recording import Recording
 from tests.dives import CURRENT, LAG, TRUTH, Dive, dive
 

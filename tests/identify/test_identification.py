@@ -11,15 +11,15 @@ import pytest
 from scipy.stats import linregress
 
 from rov_fmu.cli import main
-from rov_fmu.identify.drag_forms import Point
 from rov_fmu.identify.identification import AxisResult, Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.quadratic_fit import fit_quadratic
-from rov_fmu.identify.response_fit import fit_response
+from rov_fmu.identify.points.drag_forms import Point
+from rov_fmu.identify.points.quadratic_fit import fit_quadratic
+from rov_fmu.identify.points.response_fit import fit_response
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
-from rov_fmu.pages.report import report_page
+from rov_fmu.report.report import report_page
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.paper import PAPER

@@ -10,9 +10,9 @@ import pytest
 from scipy.signal import lfilter
 
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.output_error import fit_recordings
-from rov_fmu.identify.quadratic_fit import fit_quadratic
-from rov_fmu.identify.recordings_fit import RecordingsFit
+from rov_fmu.identify.points.quadratic_fit import fit_quadratic
+from rov_fmu.identify.recordings.output_error import fit_recordings
+from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
@@ -188,8 +188,12 @@ def test_sensors_of_two_kinds_weigh_by_their_noise(k: Rov) -> None:
     random = np.random.default_rng(4)
     depth = clean(k, HEAVE, PLANS["heave"][0]).noisy(random)
     other = clean(k, HEAVE, PLANS["heave"][1])
-    camera = replace(depth, quantity="velocity", command=other.command,
-                     values=other.velocity + 0.2 * random.standard_normal(len(other.velocity)))  # fmt: skip
+    camera = replace(
+        depth,
+        quantity="velocity",
+        command=other.command,
+        values=other.velocity + 0.2 * random.standard_normal(len(other.velocity)),
+    )
     alone, both = (only(r, unknowing(k, HEAVE)) for r in ([depth], [depth, camera]))
     assert both.simulations[1].noise == pytest.approx(0.2, rel=0.05)
     assert both.simulations[0].noise == pytest.approx(0.005, rel=0.05)

@@ -1,15 +1,15 @@
-"""The pool of the tests (checks/pool.py) against the exact step: two ways to one motion, each the other's truth."""
+"""The pool's own integrator against the exact step. Each is computed in its own way, so each checks the other."""
 
 import random
 
 import numpy as np
 import pytest
 
-from checks.pool import Array, swim
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
 from tests.pool import run, with_more
 from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
+from verification.references.pool import Array, swim
 
 STEP, PLAN = 0.25, ((0.0, 1.0), (0.6, 2.0), (-0.4, 2.0))
 

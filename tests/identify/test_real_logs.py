@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from rov_fmu.identify.output_error import fit_recordings
-from rov_fmu.identify.recordings_fit import RecordingsFit
+from rov_fmu.identify.recordings.output_error import fit_recordings
+from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from tests.pool import Plan, Run, run, with_more

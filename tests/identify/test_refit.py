@@ -9,7 +9,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.response_fit import fit_response
+from rov_fmu.identify.points.response_fit import fit_response
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables
@@ -74,8 +74,10 @@ def test_refit_is_better_than_the_scaled_model_where_that_was_asked() -> None:
     assert RMS["yaw", "Tau"][0] <= 0.07
     assert RMS["heave", "V_ss"][0] <= 0.085
     assert [round(RMS[column][2], 3) for column in (("surge", "V_ss"), ("yaw", "Tau"), ("heave", "V_ss"))] == [
-        0.166, 0.113, 0.099,
-    ]  # fmt: skip
+        0.166,
+        0.113,
+        0.099,
+    ]
     assert all(refit <= 1.01 * paper for refit, _, paper in RMS.values())
 
 

@@ -6,9 +6,9 @@ from math import atanh, exp, inf, sqrt
 import numpy as np
 import pytest
 
-from rov_fmu.identify.drag_forms import LEFT_OUT, Point
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.response_fit import ResponseFit, fit_response, response_band
+from rov_fmu.identify.points.drag_forms import LEFT_OUT, Point
+from rov_fmu.identify.points.response_fit import ResponseFit, fit_response, response_band
 from rov_fmu.model.layout import HEAVE, SWAY, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -19,9 +19,14 @@ RISE = 1.0 - exp(-1.0)
 
 
 def points_of(
-    drag: tuple[float, float], reverse: tuple[float, float], scatter: float = 0.0, seed: int = 0,
-    commands: tuple[float, ...] = BOTH_WAYS, mass: float = 10.0, beta: float = 0.8,
-) -> list[Point]:  # fmt: skip
+    drag: tuple[float, float],
+    reverse: tuple[float, float],
+    scatter: float = 0.0,
+    seed: int = 0,
+    commands: tuple[float, ...] = BOTH_WAYS,
+    mass: float = 10.0,
+    beta: float = 0.8,
+) -> list[Point]:
     """V_ss and Tau of one thruster of 20 c^2 + 5 c N that moves 10 kg, written out; with relative errors."""
     random, found = np.random.default_rng(seed), []
     for c in commands:

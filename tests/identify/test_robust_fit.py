@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify.least_squares import Loss
-from rov_fmu.identify.output_error import fit_recordings
-from rov_fmu.identify.recordings_fit import Effect, RecordingsFit
+from rov_fmu.identify.recordings.output_error import fit_recordings
+from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rov_fmu.identify.extras import Extra
-from rov_fmu.identify.runs import prepare
-from rov_fmu.identify.simulator import Simulator
+from rov_fmu.identify.effects.extras import Extra
+from rov_fmu.identify.recordings.runs import prepare
+from rov_fmu.identify.recordings.simulator import Simulator
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.model.rov import Rov
 from tests.pool import run

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.files.csv_table import DataFileError
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.slips import Tables, beta_out_of_range, slips
+from rov_fmu.identify.slips.search import Tables, beta_out_of_range, slips
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import load_tank_tests

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from rov_fmu.identify.step_responses import StepResponse, correlation_time, steps
+from rov_fmu.identify.points.step_responses import StepResponse, correlation_time, steps
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -48,11 +48,17 @@ def test_standard_errors_tell_the_scatter(vehicle: Vehicle) -> None:
             random = np.random.default_rng(seed)
             found += [step for recording in recordings for step in steps(recording.noisy(random))]
         for deviations in (
-            [(s.V_ss - vehicle.rov.response(axis, s.command)[0]) / s.V_ss_error
-             for s in found if s.V_ss is not None and s.V_ss_error],
-            [(s.Tau - vehicle.rov.response(axis, s.command)[1]) / s.Tau_error
-             for s in found if s.Tau is not None and s.Tau_error],
-        ):  # fmt: skip
+            [
+                (s.V_ss - vehicle.rov.response(axis, s.command)[0]) / s.V_ss_error
+                for s in found
+                if s.V_ss is not None and s.V_ss_error
+            ],
+            [
+                (s.Tau - vehicle.rov.response(axis, s.command)[1]) / s.Tau_error
+                for s in found
+                if s.Tau is not None and s.Tau_error
+            ],
+        ):
             assert len(deviations) >= 15
             assert np.mean(np.abs(deviations) < 2.0) > 0.85
             assert 0.4 < np.std(deviations) < 1.3

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from rov_fmu.identify.thrust_fit import ThrustFit, fit_thrust, forces, measured
+from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, forces, measured
 from rov_fmu.model.layout import Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.paper import PAPER

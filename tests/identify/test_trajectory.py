@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rov_fmu.identify.trajectory import MotionError, Slopes, Steps, motion
+from rov_fmu.identify.recordings.trajectory import MotionError, Slopes, Steps, motion
 from rov_fmu.tank.arrays import Array
 
 LENGTHS = (1e-4, 0.005, 0.02)
@@ -88,9 +88,14 @@ def slope(slopes: Slopes, key: str, line: int) -> Array:
 
 def test_a_step_that_begins_at_rest_goes_where_the_force_pushes() -> None:
     steps = Steps(
-        np.full(3, 0.02), np.array([0, 1, 2]), np.array([[1.0] * 3, [9.0] * 3]), np.array([[0.5] * 3, [2.0] * 3]),
-        np.array([1.0, -1.0, 0.0]), np.zeros((0, 3)), np.zeros((0, 3)),
-    )  # fmt: skip
+        np.full(3, 0.02),
+        np.array([0, 1, 2]),
+        np.array([[1.0] * 3, [9.0] * 3]),
+        np.array([[0.5] * 3, [2.0] * 3]),
+        np.array([1.0, -1.0, 0.0]),
+        np.zeros((0, 3)),
+        np.zeros((0, 3)),
+    )
     end = motion(steps, np.zeros(3), np.zeros(3)).end
     assert end[0] == pytest.approx(by_dop853(steps, 0, 0.0)[0], rel=1e-10)
     assert end[1] == pytest.approx(by_dop853(steps, 1, -1e-300)[0], rel=1e-10)

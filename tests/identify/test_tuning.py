@@ -9,11 +9,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rov_fmu.cli import main
-from rov_fmu.identify.drag_forms import Point
+from rov_fmu.identify.points.drag_forms import Point
 from rov_fmu.identify.tuning import TuningError, tune, tune_over
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
-from rov_fmu.pages.console_results import print_tuning
+from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.recordings import AXES
@@ -98,14 +98,21 @@ def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
 @pytest.mark.parametrize(
     ("command", "V_ss", "Tau", "named"),
     [
-        (0.3, -0.2, 2.0, "V_ss = -0.2 m/s must be positive"), (0.3, 0.0, 2.0, "other than 0"),
+        (0.3, -0.2, 2.0, "V_ss = -0.2 m/s must be positive"),
+        (0.3, 0.0, 2.0, "other than 0"),
         (-0.3, 0.2, 2.0, "must be negative, for a command of -0.3 gives a thrust of -0.59985 N"),
         (0.0, 0.2, 2.0, "not 0"),
         (30, 0.2, 2.0, "of 30 must"),
-        (0.3, 0.2, 0.0, "above 0"), (0.3, 0.2, -1.0, "above 0"), (0.3, nan, 2.0, "V_ss"), (0.3, inf, 2.0, "V_ss"),
-        (nan, 0.2, 2.0, "command"), (0.3, 0.2, nan, "Tau"), (0.3, 1e5, 2.0, "alpha_w"), (0.3, 0.2, 1e-9, "beta_w"),
+        (0.3, 0.2, 0.0, "above 0"),
+        (0.3, 0.2, -1.0, "above 0"),
+        (0.3, nan, 2.0, "V_ss"),
+        (0.3, inf, 2.0, "V_ss"),
+        (nan, 0.2, 2.0, "command"),
+        (0.3, 0.2, nan, "Tau"),
+        (0.3, 1e5, 2.0, "alpha_w"),
+        (0.3, 0.2, 1e-9, "beta_w"),
     ],
-)  # fmt: skip
+)
 def test_what_no_tuning_gives(
     command: float, V_ss: float, Tau: float, named: str, k: Rov, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -127,11 +134,28 @@ BUOYANT = Rov(
             Thruster("aside", "prop", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
         ),
     ),
-    {"m_rov": 11.0, "m_a_w": 14.0, "a_d_v": 60.0, "b_d_v": 2.0, "alpha_v": 0.9, "beta_v": 0.8,
-     "a_d_w": 40.0, "b_d_w": 5.0, "a_d_w_reverse": 70.0, "b_d_w_reverse": 3.0, "F_0_w": -3.0, "alpha_w": 1.1,
-     "beta_w": 0.7, "a_t_prop": 30.0, "b_t_prop": 31.0, "a_t_prop_reverse": 22.0, "b_t_prop_reverse": 25.0,
-     "c_0_prop": 0.08, "c_0_prop_reverse": 0.1},
-)  # fmt: skip
+    {
+        "m_rov": 11.0,
+        "m_a_w": 14.0,
+        "a_d_v": 60.0,
+        "b_d_v": 2.0,
+        "alpha_v": 0.9,
+        "beta_v": 0.8,
+        "a_d_w": 40.0,
+        "b_d_w": 5.0,
+        "a_d_w_reverse": 70.0,
+        "b_d_w_reverse": 3.0,
+        "F_0_w": -3.0,
+        "alpha_w": 1.1,
+        "beta_w": 0.7,
+        "a_t_prop": 30.0,
+        "b_t_prop": 31.0,
+        "a_t_prop_reverse": 22.0,
+        "b_t_prop_reverse": 25.0,
+        "c_0_prop": 0.08,
+        "c_0_prop_reverse": 0.1,
+    },
+)
 
 
 def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
@@ -183,11 +207,16 @@ def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
         (HEAVE, 0.08, 0.1, "heave: a command of 0.08 gives no thrust, it is within the dead band"),
         (HEAVE, -0.09, -0.1, "heave: a command of -0.09 gives no thrust, it is within the dead band"),
         (SWAY, -0.07, -0.1, "sway: a command of -0.07 gives no thrust, it is within the dead band"),
-        (HEAVE, -0.5, -0.1, "heave: V_ss = -0.1 m/s must be below the -0.186697 m/s that F_0 alone gives, "
-                            "for a command of -0.5 gives a thrust of -27.04 N"),
+        (
+            HEAVE,
+            -0.5,
+            -0.1,
+            "heave: V_ss = -0.1 m/s must be below the -0.186697 m/s that F_0 alone gives, "
+            "for a command of -0.5 gives a thrust of -27.04 N",
+        ),
         (SWAY, 0.5, -0.1, "sway: V_ss = -0.1 m/s must be positive, for a command of 0.5 gives a thrust of 13.52 N"),
     ],
-)  # fmt: skip
+)
 def test_what_no_tuning_of_a_direction_gives(axis: Axis, command: float, V_ss: float, reason: str) -> None:
     with pytest.raises(TuningError, match=f"^{re.escape(reason)}$"):
         tune(BUOYANT, axis, command, V_ss)
@@ -256,12 +285,14 @@ def test_bad_points(content: str, named: str, tmp_path: Path, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        ([], "--points"), (["--command", "0.3"], "--v-ss"), (["--points", "a.csv", "--tau", "3"], "instead"),
+        ([], "--points"),
+        (["--command", "0.3"], "--v-ss"),
+        (["--points", "a.csv", "--tau", "3"], "instead"),
         (["--axis", "sway", *HEAVE_AT_30[2:]], "sway: the vehicle has only surge, heave, yaw"),
         (["--points", "nowhere.csv"], "nowhere.csv: cannot be read: No such file"),
         ([*HEAVE_AT_30[2:], "-o", "nowhere/tuned.toml"], "no folder"),
     ],
-)  # fmt: skip
+)
 def test_bad_options(options: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
     check_refused(["tune", str(VIDEORAY), "--axis", "heave", *options], named, capsys)
 

@@ -5,14 +5,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from checks import reference
-from checks.c_programs import compile_c
 from rov_fmu.engine.source import sources
-from rov_fmu.export.interface import variables
+from rov_fmu.fmu.variables import variables
 from rov_fmu.model.rov import Rov
 from tests.fmi import OK
 from tests.fmi2 import Fmu
 from tests.vehicles import State, Values
+from verification.references import reference
+from verification.references.c_programs import compile_c
 
 Step = Callable[[Rov, Values, Values, float], State]
 POSE = ("x", "y", "z", "psi")

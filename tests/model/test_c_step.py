@@ -5,11 +5,11 @@ from collections.abc import Callable
 
 import pytest
 
-from checks import reference
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.model.steps import Motion
+from verification.references import reference
 
 Values = dict[str, float]
 Step = Callable[[Rov, Values, Values, float], Values]

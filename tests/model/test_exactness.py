@@ -13,8 +13,6 @@ import pytest
 from mpmath import mp
 from scipy.integrate import solve_ivp
 
-from checks import reference
-from checks.closed_form import Axis, axes
 from rov_fmu.model.rov import Rov
 from tests.fmi import ERROR
 from tests.fmi2 import Fmu
@@ -32,6 +30,8 @@ from tests.vehicles import (
     random_vehicle,
     still,
 )
+from verification.references import reference
+from verification.references.closed_form import Axis, axes
 
 VELOCITY, PATH = 1e-14, 1e-13
 """Of the largest velocity on the way, and of the length of the path."""
@@ -59,8 +59,10 @@ def hold(step: Step, cases: Sequence[Case], velocity: float = VELOCITY, path: fl
 def every(nth: int, cases: Iterable[Any]) -> list[Any]:
     """All cases, of which some run by default and all in the long run."""
     marks = ([pytest.mark.long] if n % nth else [] for n in count())
-    return [pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=marks_of)
-            for case, marks_of in zip(cases, marks, strict=False)]  # fmt: skip
+    return [
+        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=marks_of)
+        for case, marks_of in zip(cases, marks, strict=False)
+    ]
 
 
 # ---- Every vehicle, random states, steps of 1 us ... 1,000 s ----
@@ -183,8 +185,9 @@ def spin_up(turn: float, h: float) -> float:
 @pytest.mark.parametrize("h", [1e-3, 0.1])
 def test_a_turn_that_begins_at_rest_is_exact(step: Step, turn: float, h: float) -> None:
     C = spin_up(turn, h)
-    hold(step, [of_axes(Axis(0.1, 0.2, 0.0), Axis(0.0, B, C), 0.5, r, h)
-                for B in (0.0, 0.3) for r in (0.0, 0.1 * C * h)])  # fmt: skip
+    hold(
+        step, [of_axes(Axis(0.1, 0.2, 0.0), Axis(0.0, B, C), 0.5, r, h) for B in (0.0, 0.3) for r in (0.0, 0.1 * C * h)]
+    )
 
 
 @pytest.mark.parametrize("turn", [0.05, 0.12, 2.0])
@@ -199,11 +202,15 @@ def test_a_turn_of_the_heavy_that_begins_at_rest_is_exact(heavy: Step, turn: flo
 # As above, and h: turns in which something is huge, next to nothing, or both.
 FAR = {
     "a steady turn longer than the age of the universe": (
-        Axis(0.5, 1.4, 0.27), Axis(0.14, 0.12, 5.2), 0.0, 1e9, 1e24,
+        Axis(0.5, 1.4, 0.27),
+        Axis(0.14, 0.12, 5.2),
+        0.0,
+        1e9,
+        1e24,
     ),
     "no surge but the smallest number": (Axis(0.5, 1.4, 0.0), Axis(0.14, 0.12, 1e-3), -5e-324, 0.0, 1e9),
     "a subnormal force": (Axis(0.5, 15.0, -1e-311), Axis(0.14, 0.12, -1e-12), 0.0, 0.0, 500.0),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", FAR)
@@ -275,8 +282,11 @@ def integrated(k: Values, i: Values, before: Values, h: float) -> State:
     F_l, F_r = ((k["a_t_rear"] * abs(c) * c + k["b_t_rear"] * c) / 2.0 for c in (i["u_l"], i["u_r"]))  # half of (9)
     F_t = k["a_t_top"] * abs(i["u_t"]) * i["u_t"] + k["b_t_top"] * i["u_t"]
     torque = F_l * k["R"] * sin(k["gamma"]) + F_r * k["R"] * sin(-k["gamma"])
-    X, Z, N = (k["alpha_u"] * (F_r + F_l) + i["X_ext"], k["alpha_w"] * F_t + i["Z_ext"],
-               k["alpha_r"] * torque + i["N_ext"])  # fmt: skip
+    X, Z, N = (
+        k["alpha_u"] * (F_r + F_l) + i["X_ext"],
+        k["alpha_w"] * F_t + i["Z_ext"],
+        k["alpha_r"] * torque + i["N_ext"],
+    )
 
     def rates(_t: float, state: Any) -> list[float]:
         u, w, r, _x, _y, _z, psi = state

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from checks.c_programs import compile_c, run_program
 from tests.fmi2 import Fmu
+from verification.references.c_programs import compile_c, run_program
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is counted by glibc and /proc")
 

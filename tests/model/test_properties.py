@@ -9,7 +9,6 @@ from hypothesis import assume
 from hypothesis import strategies as st
 from mpmath import mp
 
-from checks.closed_form import time_to_rest
 from rov_fmu.model.riccati import steady_velocity, time_constant
 from tests.motions import (
     BOUNDARIES,
@@ -28,6 +27,7 @@ from tests.motions import (
     similar,
     step_alone,
 )
+from verification.references.closed_form import time_to_rest
 
 
 def for_every(

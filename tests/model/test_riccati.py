@@ -8,10 +8,10 @@ import pytest
 from mpmath import mp
 from scipy.optimize import brentq
 
-from checks.closed_form import advance, time_to_rest
-from checks.reference import axis
 from rov_fmu.model.riccati import steady_velocity, time_constant
 from tests.motions import DISTANCE, SMALLEST, TINY, VELOCITY, Case, step_alone
+from verification.references.closed_form import advance, time_to_rest
+from verification.references.reference import axis
 
 
 def check(case: Case) -> None:

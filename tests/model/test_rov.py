@@ -6,10 +6,10 @@ from math import copysign, cos, pi, sin
 import pytest
 from mpmath import mp
 
-from checks.equations import equations, steady_forces
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import HEAVY, VEHICLES, State, Values, at_rest, random_case, random_inputs, random_vehicle, still
+from verification.references.equations import equations, steady_forces
 
 COMMANDS = [-1.0, -0.7, -0.2, 0.0, 0.1, 0.27, 0.5, 1.0]
 

@@ -36,19 +36,27 @@ CASES: dict[str, tuple[Rov, Values, Values, tuple[float, ...]]] = {
     "a lag of a minute": (LATE.replaced({"T_t200": 60.0}), {"u_l": 0.3}, {"u": 1.0, "r": 0.3, "F_l": 1.0}, (1.0,)),
     "a lag of a millisecond": (LATE.replaced({"T_t200": 1e-3}), {"u_l": 0.3}, {"u": 1.0, "F_l": 1.0}, (1e-3, 0.3)),
     "there and back with a turn there and back": (
-        FREE, {"X_ext": -M, "N_ext": -I_R}, {"u": 1.0, "r": 1.0}, (1.0, 2.0, 3.0),
+        FREE,
+        {"X_ext": -M, "N_ext": -I_R},
+        {"u": 1.0, "r": 1.0},
+        (1.0, 2.0, 3.0),
     ),
     "there and back in a steady turn": (FREE, {"X_ext": -M}, {"u": 1.0, "r": 1.0}, (1.0, 2.0, 3.0, 100.0)),
     "a fast axis beside slow ones": (
-        VIDEORAY.replaced({"b_d_w": 1e4}), {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5}, {"w": 0.3}, (0.1, 10.0, 100.0, 1000.0),
+        VIDEORAY.replaced({"b_d_w": 1e4}),
+        {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5},
+        {"w": 0.3},
+        (0.1, 10.0, 100.0, 1000.0),
     ),
     "a fast axis that nothing drives": (VIDEORAY.replaced({"b_d_w": 1e6}), {"u_l": 0.6}, {"w": 0.3}, (10.0, 1000.0)),
     "almost no drag": (
-        VIDEORAY.replaced({f"{key}_d_{v}": 1e-6 for key in "ab" for v in "uwr"}), {}, {"u": 1.0, "r": 0.5},
+        VIDEORAY.replaced({f"{key}_d_{v}": 1e-6 for key in "ab" for v in "uwr"}),
+        {},
+        {"u": 1.0, "r": 0.5},
         (1.0, 100.0),
     ),
     "within the dead band": (HEAVY, {"u_1": 0.05, "u_2": -0.05}, {"u": 0.5, "r": 1.0}, (0.1, 2.0)),
-}  # fmt: skip
+}
 
 
 def case(rov: Rov, inputs: Values, state: Values) -> tuple[Rov, State, State]:

@@ -8,13 +8,13 @@ from math import cos, hypot, sin, ulp
 import pytest
 from hypothesis import strategies as st
 
-from checks.closed_form import axes
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.fmi2 import Fmu
 from tests.model.steps import Step, in_fmu, in_python
 from tests.motions import DISTANCE, TINY, VELOCITY, hold, memory, path_of, power, signed, size
 from tests.vehicles import EVERYTHING, HEAVY, VEHICLES, VIDEORAY, Case, State, Values, at_rest, random_case, still
+from verification.references.closed_form import axes
 
 POSITION = 1e-14  # of the path: what test_exactness.py promises
 

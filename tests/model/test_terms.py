@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from checks import reference
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.model.steps import Motion
 from tests.model.test_c_step import case
+from verification.references import reference
 
 pytestmark = pytest.mark.long
 
@@ -34,8 +34,11 @@ def test_a_step_is_exact(motion: Motion, reverse: float, tmp_path: Path) -> None
     """Also where drag in reverse is 30 times that ahead, or a 30th of it."""
     rov = motion.rov
     if reverse != 1.0:
-        drag = {f"{key}_{form.axis.velocity}_reverse": reverse * rov[f"{key}_{form.axis.velocity}"]
-                for form in rov.layout.axes for key in ("a_d", "b_d")}  # fmt: skip
+        drag = {
+            f"{key}_{form.axis.velocity}_reverse": reverse * rov[f"{key}_{form.axis.velocity}"]
+            for form in rov.layout.axes
+            for key in ("a_d", "b_d")
+        }
         motion = Motion(rov.extended(drag), tmp_path)
         rov = motion.rov
     rng = random.Random(2)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.tank_tests import load_tank_tests
 from tests.commands import TESTS
 

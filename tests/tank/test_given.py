@@ -54,8 +54,10 @@ def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
     tests = read(tmp_path / "tests", BLUEROV2, responses(k, SWAY))
     assert tests.given.rov.layout == base.layout
     assert {*base.layout.coefficients} - {*tests.given.known} == {
-        "a_d_v", "b_d_v", *(f"{kind}_{v}" for kind in ("alpha", "beta") for v in "uvwr"),
-    }  # fmt: skip
+        "a_d_v",
+        "b_d_v",
+        *(f"{kind}_{v}" for kind in ("alpha", "beta") for v in "uvwr"),
+    }
     assert tests.inputs.keys() == {ROV_FILE, "bluerov2", "steady_sway.csv", "time_constant_sway.csv"}
     found = identify(tests)
     assert [found.vehicle.rov[name] for name in ("a_d_v", "b_d_v", "beta_v")] == pytest.approx(
@@ -128,9 +130,16 @@ def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
     tables = {"thrust_t200.csv": pulled(30.0, 20.0)}
     known = {"m_rov": 6.57, "I_r": 0.105, "m_a_v": 7.1, "a_t_t200": 30.0, "b_t_t200": 20.0}
     drag = {"a_d_u": 18.0, "b_d_u": 4.0, "a_d_v": 22.0, "b_d_v": 6.0, "a_d_r": 1.5, "b_d_r": 0.1}
-    placeholder = read(tmp_path / "all", VECTORED, tables | {
-        "steady_surge.csv": f"{SPEED}\n0.1,0.1\n", "steady_sway.csv": f"{SPEED}\n0.1,0.1\n",
-        "steady_yaw.csv": f"{RATE}\n0.1,0.1\n"})  # fmt: skip
+    placeholder = read(
+        tmp_path / "all",
+        VECTORED,
+        tables
+        | {
+            "steady_surge.csv": f"{SPEED}\n0.1,0.1\n",
+            "steady_sway.csv": f"{SPEED}\n0.1,0.1\n",
+            "steady_yaw.csv": f"{RATE}\n0.1,0.1\n",
+        },
+    )
     layout = placeholder.given.rov.layout
     true = Rov(layout, dict.fromkeys(layout.coefficients, 1.0) | known | drag)
     for axis in (SURGE, SWAY, YAW):
@@ -200,8 +209,11 @@ def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
 
 
 def test_what_no_axis_needs_is_not_used(tmp_path: Path) -> None:
-    tests = read(tmp_path, f"{HEAD}[known]\n{MASS}{TOP}{TURNS}", {
-        "steady_heave.csv": f"{SPEED}\n0.3,0.2\n", "thrust_rear.csv": pulled(40.0, 2.0)})  # fmt: skip
+    tests = read(
+        tmp_path,
+        f"{HEAD}[known]\n{MASS}{TOP}{TURNS}",
+        {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n", "thrust_rear.csv": pulled(40.0, 2.0)},
+    )
     assert tests.given.known.keys() == {"m_rov", "a_t_top", "b_t_top"}
     assert tests.thrust == {}
     assert tests.notes[1].startswith("thrust_rear.csv: the thrusters of curve rear act on no axis")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import strategies as st
 
-from rov_fmu.files.messages import FileError
+from rov_fmu.io.messages import FileError
 from rov_fmu.tank.given import ROV_FILE
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.geometry import impossible
@@ -197,12 +197,20 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
     with pytest.raises(FileError) as caught:
         load_tank_tests(folder)
     starts = [
-        "/rov.toml: known.m_rov.unit = 'lb'", "/rov.toml: windows.sway",
-        "/log_yaw.csv, line 1", "/steady_heave.csv, line 3, column 'command [1]' = 0", "/steady_heave.csv, line 4",
-        "/steady_surge.csv, line 2", "/stedy_surge.csv: no name of a test", "/thrust_left.csv: left is not a thrust c",
-        "/thrust_rear.csv, line 3", "/rov.toml: known.I_r", "/rov.toml: known.R", "/rov.toml: known.gamma",
+        "/rov.toml: known.m_rov.unit = 'lb'",
+        "/rov.toml: windows.sway",
+        "/log_yaw.csv, line 1",
+        "/steady_heave.csv, line 3, column 'command [1]' = 0",
+        "/steady_heave.csv, line 4",
+        "/steady_surge.csv, line 2",
+        "/stedy_surge.csv: no name of a test",
+        "/thrust_left.csv: left is not a thrust c",
+        "/thrust_rear.csv, line 3",
+        "/rov.toml: known.I_r",
+        "/rov.toml: known.R",
+        "/rov.toml: known.gamma",
         ": no thrust_top*.csv",
-    ]  # fmt: skip
+    ]
     lines = str(caught.value).splitlines()
     assert [line[: len(str(folder)) + len(start)] for line, start in zip(lines, starts, strict=True)] == [
         f"{folder}{start}" for start in starts
@@ -215,8 +223,10 @@ def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
         load_tank_tests(folder)
     told = str(caught.value).splitlines()
     assert [line[len(str(folder)) :].split(":")[0] for line in told] == [
-        "/rov.toml", "/steady_roll.csv", "/thrust_any.csv, line 2, column 'force [N]' = 'x'",
-    ]  # fmt: skip
+        "/rov.toml",
+        "/steady_roll.csv",
+        "/thrust_any.csv, line 2, column 'force [N]' = 'x'",
+    ]
     assert "roll is not an axis of any vehicle, only surge, sway, heave and yaw" in told[1]
 
 

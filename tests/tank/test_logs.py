@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.logs import Log, read_log
 from rov_fmu.tank.recording import Recording
@@ -81,7 +81,7 @@ def test_two_logs_in_one_file_are_refused(tmp_path: Path) -> None:
         ([f"{n / 10:.1f},30,1".replace(".", ",") for n in range(N)], "decimal commas"),
         ([f"{n},{0.3 * (n > 9)},1" for n in range(N)], r"command \[%\]': no command beyond 1 %: fractions"),
     ],
-)  # fmt: skip
+)
 def test_logs_of_which_nothing_is_left_are_refused(rows: list[str], told: str, tmp_path: Path) -> None:
     with pytest.raises(DataFileError, match=told):
         read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
@@ -205,7 +205,7 @@ REFUSED = {
     "percent as fractions": ("time [s],u_t [1],depth [m]", "0,30,1", "line 2, column 'u_t [1]' = '30': must be at"),
     "fractions as pulses": ("time [s],u_t [us],depth [m]", "0,0.5,1", "no pulse beyond 1 us: fractions under [us]?"),
     "percent as pulses": ("time [s],u_t [us],depth [m]", "0,50,1", "no pulse beyond 100 us: percent under [us]?"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", REFUSED)

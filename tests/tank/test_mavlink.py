@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SWAY, Layout
 from rov_fmu.tank.logs import Log, read_log
 from rov_fmu.tank.recording import Recording

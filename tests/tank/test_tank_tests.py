@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.tables import Row
 from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 from rov_fmu.vehicle.published import load_tables
@@ -38,9 +38,8 @@ def test_the_folder_of_the_videoray_holds_the_measurements_of_tables_3_to_7(vehi
         assert forward == {float(c) / 100.0: float(V) for c, V in table.steady.items()}
         Taus = {row.command: row.value for row in found.time_constants.get(axis, ())}
         assert Taus == {
-            float(row.command) / 100.0: float(Tau)
-            for row in table.rows if (Tau := row.scaled.Tau.measured) is not None
-        }  # fmt: skip
+            float(row.command) / 100.0: float(Tau) for row in table.rows if (Tau := row.scaled.Tau.measured) is not None
+        }
     upward = [(row.command, row.value) for row in found.steady["heave"] if row.command < 0.0]
     assert upward == [(-0.7, -0.37), (-0.5, -0.25), (-0.3, -0.17), (-0.2, -0.13)][::-1]
 
@@ -57,8 +56,9 @@ def test_every_input_has_its_hash() -> None:
     inputs = load_tank_tests(TESTS).inputs
     assert inputs == {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in TESTS.iterdir() if path.suffix == ".csv" or path.name == "rov.toml"
-    }  # fmt: skip
+        for path in TESTS.iterdir()
+        if path.suffix == ".csv" or path.name == "rov.toml"
+    }
 
 
 def test_columns_in_any_order_and_unit(folder: Path) -> None:
@@ -178,23 +178,35 @@ BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
     "no command": ("steady_surge.csv", STEADY + "0,0.1\n", ("line 2", "'command [%]' = 0", "zero")),
     "beyond full thrust": ("steady_surge.csv", STEADY + "120,0.3\n", ("line 2", "[%]' = '120'", "at most 100")),
     "beyond full thrust, fraction": (
-        "steady_surge.csv", "command [1],velocity [m/s]\n-1.2,-0.3\n", ("line 2", "'-1.2'", "at least -1")
+        "steady_surge.csv",
+        "command [1],velocity [m/s]\n-1.2,-0.3\n",
+        ("line 2", "'-1.2'", "at least -1"),
     ),
     "percent as fraction": (
-        "steady_surge.csv", "command [1],velocity [m/s]\n20,0.3\n", ("line 2", "'command [1]' = '20'", "at most 1")
+        "steady_surge.csv",
+        "command [1],velocity [m/s]\n20,0.3\n",
+        ("line 2", "'command [1]' = '20'", "at most 1"),
     ),
     "no unit": ("steady_surge.csv", "command [%],velocity\n20,0.3\n", ("line 1", "column 2 = 'velocity'", "[m/s]")),
     "other unit": (
-        "steady_surge.csv", "command [%],velocity [knot]\n20,1\n", ("line 1", "column 2", "'velocity [knot]'", "[cm/s]")
+        "steady_surge.csv",
+        "command [%],velocity [knot]\n20,1\n",
+        ("line 1", "column 2", "'velocity [knot]'", "[cm/s]"),
     ),
     "yaw in m/s": (
-        "steady_yaw.csv", STEADY + "20,1\n", ("line 1", "column 2", "'velocity [rad/s]' or 'velocity [deg/s]'")
+        "steady_yaw.csv",
+        STEADY + "20,1\n",
+        ("line 1", "column 2", "'velocity [rad/s]' or 'velocity [deg/s]'"),
     ),
     "other column": (
-        "steady_surge.csv", "command [%],velocity [m/s],roll [deg]\n", ("line 1", "column 3", "'roll [deg]'", "no such")
+        "steady_surge.csv",
+        "command [%],velocity [m/s],roll [deg]\n",
+        ("line 1", "column 3", "'roll [deg]'", "no such"),
     ),
     "column twice": (
-        "steady_surge.csv", "command [%],velocity [m/s],command [1]\n", ("line 1", "column 3", "[1]'", "before")
+        "steady_surge.csv",
+        "command [%],velocity [m/s],command [1]\n",
+        ("line 1", "column 3", "[1]'", "before"),
     ),
     "column missing": ("steady_surge.csv", "command [%]\n20\n", ("line 1", "'velocity [m/s]' is missing")),
     "empty": ("steady_surge.csv", "", ("the file is empty",)),
@@ -204,7 +216,9 @@ BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
     "negative Tau": ("time_constant_yaw.csv", TAU + "20,-3\n", ("line 2", "'time constant [s]' = -3", "above 0")),
     "Tau without command": ("time_constant_yaw.csv", TAU + "0,3\n", ("line 2", "'command [%]' = 0", "zero")),
     "reverse thrust as magnitude": (
-        "thrust_rear.csv", "command [%],force [N]\n50,9\n-50,6\n", ("line 3", "'force [N]' = 6", "sign of the command")
+        "thrust_rear.csv",
+        "command [%],force [N]\n50,9\n-50,6\n",
+        ("line 3", "'force [N]' = 6", "sign of the command"),
     ),
     "time goes back": ("log_heave.csv", LOG + "0,30,0\n0.1,30,0\n0,30,0\n", ("line 4", "'time [s]' = 0:", "goes back")),
     "too few samples": ("log_heave.csv", LOG + "0,30,0\n0.1,30,\n0.2,30,\n", ("1 samples of depth", "20")),
@@ -216,7 +230,7 @@ BAD: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
     "no axis": ("steady_sway.csv", STEADY, ("no thruster of the vehicle drives sway",)),
     "unknown axis": ("steady_roll.csv", STEADY, ("roll is not an axis", "surge, heave and yaw")),
     "no thruster": ("thrust_left.csv", STEADY, ("left is not a thrust curve", "rear and top")),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BAD)
@@ -276,9 +290,13 @@ def test_every_mistake_of_a_rov_file_is_told(folder: Path) -> None:
     path.write_text(text + "\n[validity]\ncommand_min = 0.7\ncommand_max = 0.2\n", encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
         load_tank_tests(folder)
-    wrong = ("against = 'nowhere.toml'", "vehicle.identifier = 'video ray'",
-             "validity.command_min = 0.7: must be less than command_max = 0.2",
-             "known.m_rov.unit = 'lb': must be 'kg'", "windows.sway: there is no such key")  # fmt: skip
+    wrong = (
+        "against = 'nowhere.toml'",
+        "vehicle.identifier = 'video ray'",
+        "validity.command_min = 0.7: must be less than command_max = 0.2",
+        "known.m_rov.unit = 'lb': must be 'kg'",
+        "windows.sway: there is no such key",
+    )
     lines = str(caught.value).splitlines()
     assert len(lines) == len(wrong)
     for line, words in zip(lines, wrong, strict=True):

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from checks.fmpy_slave import fmpy_slave
-from rov_fmu.files.toml_file import read_toml
+from rov_fmu.io.toml_file import read_toml
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+from verification.references.fmpy_slave import fmpy_slave
 
 HEAVY = SHIPPED["bluerov2_heavy"]
 

@@ -9,8 +9,8 @@ from fmpy.model_description import ModelDescription, read_model_description
 from hypothesis import strategies as st
 
 from rov_fmu.cli import main
-from rov_fmu.export.archive import archive, native_content
-from rov_fmu.export.osp import osp_model_description
+from rov_fmu.fmu.archive import archive, native_content
+from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.identify.tuning import tune, tuned_values
 from rov_fmu.model.layout import YAW
 from rov_fmu.vehicle.shipped import VIDEORAY

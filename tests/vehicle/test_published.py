@@ -18,7 +18,7 @@ import pytest
 from scipy.optimize import brentq
 
 from rov_fmu.cli import main
-from rov_fmu.files.csv_table import DataFileError
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import STEP_TESTS, Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
@@ -296,9 +296,18 @@ def test_cell_deviations() -> None:
 
 @pytest.mark.parametrize(
     ("printed", "computed", "rounds"),
-    [("0.50", 0.5049, True), ("0.50", 0.4951, True), ("0.50", 0.5051, False), ("0.50", 0.4949, False),
-     ("0.5", 0.549, True), ("12", 12.49, True), ("12", 12.51, False), ("1.2e2", 124.0, True), ("0.50", inf, False)],
-)  # fmt: skip
+    [
+        ("0.50", 0.5049, True),
+        ("0.50", 0.4951, True),
+        ("0.50", 0.5051, False),
+        ("0.50", 0.4949, False),
+        ("0.5", 0.549, True),
+        ("12", 12.49, True),
+        ("12", 12.51, False),
+        ("1.2e2", 124.0, True),
+        ("0.50", inf, False),
+    ],
+)
 def test_rounds_to_printed_digits(printed: str, computed: float, rounds: bool) -> None:
     assert Cell(Decimal(printed), computed, None).rounds_to_printed is rounds
 
@@ -309,9 +318,13 @@ def test_rounds_to_printed_digits(printed: str, computed: float, rounds: bool) -
 def test_command_prints_the_tables_side_by_side(tables: Mapping[str, ResponseTable]) -> None:
     run = subprocess.run(
         [sys.executable, "-m", "rov_fmu", "tables"],
-        cwd=VIDEORAY.parent.parent, capture_output=True, text=True, encoding="utf-8", check=True,
+        cwd=VIDEORAY.parent.parent,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        check=True,
         env={**os.environ, "PYTHONUTF8": "1", "COLUMNS": "80", "FORCE_COLOR": ""},
-    )  # fmt: skip
+    )
     assert run.stderr == ""
     assert max(map(len, run.stdout.splitlines())) <= 110
     for table in tables.values():

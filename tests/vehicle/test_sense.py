@@ -35,7 +35,11 @@ def test_what_it_says_is_what_the_vehicle_has(everything: Vehicle) -> None:
     assert layout.kinds["heave"].keys == ("m_a", "a_d", "b_d", "a_d_reverse", "b_d_reverse", "F_0")
     frame, boost = layout.curves
     assert (frame.name, frame.description, frame.equation, frame.together) == (
-        "frame", "thrusters of the frame", "the maker's table", 1)  # fmt: skip
+        "frame",
+        "thrusters of the frame",
+        "the maker's table",
+        1,
+    )
     assert (boost.keys, boost.description, boost.equation, boost.together) == (("a_t", "b_t"), "", "(2)", 2)
     assert set(frame.keys) == set(CURVE)
     assert (rov["F_0_w"], rov["a_d_w"], rov["a_d_w_reverse"], rov["T_frame"]) == (-1.0, 190.0, 210.0, 0.15)
@@ -101,38 +105,65 @@ _NO_BOOST: dict[str, Any] = {**_ALONE, "thruster.l": GONE, "thruster.r": GONE, "
 # What is done to the file, and what each of the lines must name, in their order.
 NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     # names
-    "a name twice": ({**_ALONE, "thruster.2.name": "1"}, [
-        ("thruster#2.name = '1': thruster#1 has this name",)]),
-    "a name and a curve that is not there twice": ({**_ALONE, "thruster.2.curve": "T200", "thruster.2.name": "1"}, [
-        ("thruster#2.name = '1'",), ("thruster#2.curve = 'T200'", "no such curve")]),
-    "names of thrusters that differ in case": ({**_ALONE, "thruster.l.name": "R"}, [
-        ("thruster#7.name = 'r': thruster#6 has the name 'R': they differ only in case",)]),
-    "names of curves that differ in case": ({"curves.Frame": _CURVE, "thruster.5.curve": "Frame"}, [
-        ("curves.Frame = 'Frame': curves.frame has the name 'frame'", "only in case")]),
-    "names of inputs that differ in case": ({"inputs.Yaw": {"l": 1.0}}, [
-        ("inputs.Yaw = 'Yaw': inputs.yaw has the name 'yaw'", "only in case")]),
-    "a name with a space": ({**_ALONE, "thruster.5.name": "top 5"}, [
-        ("thruster.top 5.name = 'top 5'", "at most 30 letters, digits and underscores")]),
+    "a name twice": ({**_ALONE, "thruster.2.name": "1"}, [("thruster#2.name = '1': thruster#1 has this name",)]),
+    "a name and a curve that is not there twice": (
+        {**_ALONE, "thruster.2.curve": "T200", "thruster.2.name": "1"},
+        [("thruster#2.name = '1'",), ("thruster#2.curve = 'T200'", "no such curve")],
+    ),
+    "names of thrusters that differ in case": (
+        {**_ALONE, "thruster.l.name": "R"},
+        [("thruster#7.name = 'r': thruster#6 has the name 'R': they differ only in case",)],
+    ),
+    "names of curves that differ in case": (
+        {"curves.Frame": _CURVE, "thruster.5.curve": "Frame"},
+        [("curves.Frame = 'Frame': curves.frame has the name 'frame'", "only in case")],
+    ),
+    "names of inputs that differ in case": (
+        {"inputs.Yaw": {"l": 1.0}},
+        [("inputs.Yaw = 'Yaw': inputs.yaw has the name 'yaw'", "only in case")],
+    ),
+    "a name with a space": (
+        {**_ALONE, "thruster.5.name": "top 5"},
+        [("thruster.top 5.name = 'top 5'", "at most 30 letters, digits and underscores")],
+    ),
     "no name": ({**_ALONE, "thruster.5.name": GONE}, [("thruster#5.name", "missing")]),
-    "a curve with a dot": ({"curves": {"frame": _CURVE, "boo.st": _CURVE}, "alternatives": GONE}, [
-        ("curves.boo.st = 'boo.st'", "letters, digits"), ("thruster.l.curve = 'boost'", "no such curve, only frame"),
-        ("thruster.r.curve = 'boost'", "no such curve")]),
-    "a curve without a name and one with an endless one": ({**_ALONE, "curves": {"": _CURVE, "x" * 300: _CURVE}}, [
-        ("curves.'' = ''", "letters"), (f"curves.{'x' * 70}... = 'xxx", "letters"),
-        *[(f"thruster.{name}.curve", f"there is no such curve, only '', {'x' * 193}...") for name in "12345lr"]]),
-    "an unknown curve": ({"thruster.5.curve": "T200"}, [
-        ("thruster.5.curve = 'T200'", "no such curve, only frame, boost")]),
+    "a curve with a dot": (
+        {"curves": {"frame": _CURVE, "boo.st": _CURVE}, "alternatives": GONE},
+        [
+            ("curves.boo.st = 'boo.st'", "letters, digits"),
+            ("thruster.l.curve = 'boost'", "no such curve, only frame"),
+            ("thruster.r.curve = 'boost'", "no such curve"),
+        ],
+    ),
+    "a curve without a name and one with an endless one": (
+        {**_ALONE, "curves": {"": _CURVE, "x" * 300: _CURVE}},
+        [
+            ("curves.'' = ''", "letters"),
+            (f"curves.{'x' * 70}... = 'xxx", "letters"),
+            *[(f"thruster.{name}.curve", f"there is no such curve, only '', {'x' * 193}...") for name in "12345lr"],
+        ],
+    ),
+    "an unknown curve": (
+        {"thruster.5.curve": "T200"},
+        [("thruster.5.curve = 'T200'", "no such curve, only frame, boost")],
+    ),
     "a curve of no thruster": ({"curves.spare": _CURVE}, [("curves.spare: no thruster has this curve",)]),
     "no curves": ({"curves": {}}, [("curves = {}", "must have at least 1 item")]),
     "no thrusters": ({"thruster": []}, [("thruster = []", "must have at least 1 item")]),
-    "coefficients that coincide": ({"curves.frame_reverse": _CURVE, "thruster.5.curve": "frame_reverse"}, [
-        ("a_t_frame_reverse", "two variables"), ("b_t_frame_reverse", "two variables")]),
+    "coefficients that coincide": (
+        {"curves.frame_reverse": _CURVE, "thruster.5.curve": "frame_reverse"},
+        [("a_t_frame_reverse", "two variables"), ("b_t_frame_reverse", "two variables")],
+    ),
     "a force called as a load": ({**_ALONE, "thruster.5.name": "0_w"}, [("F_0_w", "two variables of the FMU")]),
     # keys that need others, or have no use
-    "half a curve in reverse": ({"curves.frame.b_t_reverse": GONE}, [
-        ("curves.frame.b_t_reverse", "missing", "a_t_reverse is there")]),
-    "half a drag in reverse": ({"axes.heave.a_d_reverse": GONE}, [
-        ("axes.heave.a_d_reverse", "missing", "b_d_reverse is there")]),
+    "half a curve in reverse": (
+        {"curves.frame.b_t_reverse": GONE},
+        [("curves.frame.b_t_reverse", "missing", "a_t_reverse is there")],
+    ),
+    "half a drag in reverse": (
+        {"axes.heave.a_d_reverse": GONE},
+        [("axes.heave.a_d_reverse", "missing", "b_d_reverse is there")],
+    ),
     "a dead band in reverse only": ({"curves.frame.c_0": GONE}, [("curves.frame.c_0", "missing", "c_0_reverse")]),
     "no drag": ({"axes.sway.b_d": GONE}, [("axes.sway.b_d", "missing")]),
     "no mass": ({"body.m_rov": GONE}, [("body.m_rov", "missing", "surge")]),
@@ -140,100 +171,170 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "an inertia for nothing": ({**_NO_BOOST, "axes.yaw": GONE}, [("body.I_r", "nothing of this vehicle needs it")]),
     "no arm": ({"arm": GONE}, [("arm", "R and gamma", "missing", "a thruster says arm")]),
     "half an arm": ({"arm.gamma": GONE}, [("arm.gamma", "missing")]),
-    "an arm for nothing": ({f"thruster.{n}.{key}": v for n in "lr" for key, v in
-                            (("arm", GONE), ("position", place(0.0, 0.1, 0.0)))}, [
-        ("arm.R", "nothing of this vehicle needs it"), ("arm.gamma", "nothing of this vehicle needs it")]),
+    "an arm for nothing": (
+        {f"thruster.{n}.{key}": v for n in "lr" for key, v in (("arm", GONE), ("position", place(0.0, 0.1, 0.0)))},
+        [("arm.R", "nothing of this vehicle needs it"), ("arm.gamma", "nothing of this vehicle needs it")],
+    ),
     "an arm of no length": ({"arm.R.value": 0.0}, [("arm.R.value = 0.0", "more than 0")]),
-    "two places": ({"thruster.l.position": place(0.0, 0.1, 0.0)}, [
-        ("thruster.l.arm", "must not stand beside position")]),
-    "an arm of a thruster astern": ({"thruster.l.direction.value": [-1.0, 0.0, 0.0]}, [
-        ("thruster.l.arm", "pushes ahead", "position instead")]),
+    "two places": (
+        {"thruster.l.position": place(0.0, 0.1, 0.0)},
+        [("thruster.l.arm", "must not stand beside position")],
+    ),
+    "an arm of a thruster astern": (
+        {"thruster.l.direction.value": [-1.0, 0.0, 0.0]},
+        [("thruster.l.arm", "pushes ahead", "position instead")],
+    ),
     "an arm on top": ({"thruster.l.arm": "top"}, [("thruster.l.arm = 'top'", "'port' or 'starboard'")]),
     "no place": ({"thruster.1.position": GONE}, [("thruster.1.position", "or arm", "missing", "yaw")]),
     # numbers
-    "a place beyond any vehicle": ({"thruster.1.position.value": [156, 111, 0.0]}, [
-        ("thruster.1.position.value = [156, 111, 0.0]", "-100 ... 100 m")]),
-    "a place on a plane": ({"thruster.1.position.value": [0.156, 0.111]}, [
-        ("thruster.1.position.value = [0.156, 0.111]", "three numbers")]),
+    "a place beyond any vehicle": (
+        {"thruster.1.position.value": [156, 111, 0.0]},
+        [("thruster.1.position.value = [156, 111, 0.0]", "-100 ... 100 m")],
+    ),
+    "a place on a plane": (
+        {"thruster.1.position.value": [0.156, 0.111]},
+        [("thruster.1.position.value = [0.156, 0.111]", "three numbers")],
+    ),
     "a place in millimetres": ({"thruster.1.position.unit": "mm"}, [("thruster.1.position.unit = 'mm'", "'m'")]),
-    "a direction of no length": ({"thruster.5.direction.value": [0, 0, 0]}, [
-        ("thruster.5.direction.value = [0, 0, 0]", "must have a length")]),
-    "a direction that is no number": ({"thruster.5.direction.value": [0.0, float("nan"), 1.0]}, [
-        ("thruster.5.direction.value = [0.0, nan, 1.0]: entry 2 must be a finite number",)]),
-    "a direction without its source": ({"thruster.5.direction": [0, 0, 1]}, [
-        ("thruster.5.direction = [0, 0, 1]: must be { value = ..., source = ... }",)]),
-    "a thruster without its key": ({"thruster": {"name": "1"}}, [
-        ("thruster: must be a list of tables: write [[thruster]]",)]),
-    "a direction in words": ({"thruster.5.direction.value": "up"}, [
-        ("thruster.5.direction.value = 'up'", "three numbers")]),
-    "no thrusters together": ({"curves.boost.together": 0}, [
-        ("curves.boost.together = 0", "must be within 1 ... 32")]),
+    "a direction of no length": (
+        {"thruster.5.direction.value": [0, 0, 0]},
+        [("thruster.5.direction.value = [0, 0, 0]", "must have a length")],
+    ),
+    "a direction that is no number": (
+        {"thruster.5.direction.value": [0.0, float("nan"), 1.0]},
+        [("thruster.5.direction.value = [0.0, nan, 1.0]: entry 2 must be a finite number",)],
+    ),
+    "a direction without its source": (
+        {"thruster.5.direction": [0, 0, 1]},
+        [("thruster.5.direction = [0, 0, 1]: must be { value = ..., source = ... }",)],
+    ),
+    "a thruster without its key": (
+        {"thruster": {"name": "1"}},
+        [("thruster: must be a list of tables: write [[thruster]]",)],
+    ),
+    "a direction in words": (
+        {"thruster.5.direction.value": "up"},
+        [("thruster.5.direction.value = 'up'", "three numbers")],
+    ),
+    "no thrusters together": ({"curves.boost.together": 0}, [("curves.boost.together = 0", "must be within 1 ... 32")]),
     "half a thruster": ({"curves.boost.together": 1.5}, [("curves.boost.together = 1.5", "must be a whole number")]),
     "a dead band in percent": ({"curves.frame.c_0.value": 8.7}, [("curves.frame.c_0.value = 8.7", "0 ... 0.9")]),
     "no lag": ({"curves.frame.T.value": 0.0}, [("curves.frame.T.value = 0.0", "0.001 ... 60 s")]),
-    "drag in another unit": ({"axes.yaw.a_d.unit": "N.s2/m2"}, [
-        ("axes.yaw.a_d.unit = 'N.s2/m2'", "'N.m.s2/rad2'")]),
-    "an unknown axis": ({"axes.roll": {"a_d": quantity(1.0, "N.m.s2/rad2")}}, [
-        ("axes.roll: there is no such key, only surge, sway, heave, yaw",)]),
+    "drag in another unit": ({"axes.yaw.a_d.unit": "N.s2/m2"}, [("axes.yaw.a_d.unit = 'N.s2/m2'", "'N.m.s2/rad2'")]),
+    "an unknown axis": (
+        {"axes.roll": {"a_d": quantity(1.0, "N.m.s2/rad2")}},
+        [("axes.roll: there is no such key, only surge, sway, heave, yaw",)],
+    ),
     "a gain beyond sense": ({"inputs.heave.5": 1e3}, [("inputs.heave.5 = 1000.0", "must be within -100 ... 100")]),
     # thrust
-    "thrust of the wrong sign": ({"curves.boost.a_t.value": -200.0, "curves.boost.b_t.value": 10.0}, [
-        ("curves.boost: must give a force above 0 at full command, but a_t_boost and b_t_boost give -190 N",)]),
-    "no thrust": ({"curves.boost.a_t.value": 0.0, "curves.boost.b_t.value": 0.0}, [
-        ("curves.boost: must give a force above 0", "give 0 N")]),
-    "thrust in reverse of the wrong sign": ({"curves.frame.a_t_reverse.value": -100.0}, [
-        ("curves.frame: must give a force above 0 at full command in reverse", "a_t_frame_reverse")]),
-    "no thrust beyond a dead band": ({"curves.boost.a_t.value": 100.0, "curves.boost.b_t.value": -27.0,
-                                      "curves.boost.c_0": quantity(0.8, "1")}, [("curves.boost: must give a force",)]),
+    "thrust of the wrong sign": (
+        {"curves.boost.a_t.value": -200.0, "curves.boost.b_t.value": 10.0},
+        [("curves.boost: must give a force above 0 at full command, but a_t_boost and b_t_boost give -190 N",)],
+    ),
+    "no thrust": (
+        {"curves.boost.a_t.value": 0.0, "curves.boost.b_t.value": 0.0},
+        [("curves.boost: must give a force above 0", "give 0 N")],
+    ),
+    "thrust in reverse of the wrong sign": (
+        {"curves.frame.a_t_reverse.value": -100.0},
+        [("curves.frame: must give a force above 0 at full command in reverse", "a_t_frame_reverse")],
+    ),
+    "no thrust beyond a dead band": (
+        {"curves.boost.a_t.value": 100.0, "curves.boost.b_t.value": -27.0, "curves.boost.c_0": quantity(0.8, "1")},
+        [("curves.boost: must give a force",)],
+    ),
     # geometry
-    "no axes": ({**_NO_BOOST, "axes": {}}, [
-        ("axes", "at least one of surge, sway, heave, yaw")]),
-    "an axis that no thruster drives": ({**_ALONE, "thruster.5.direction.value": [1, 0, 0],
-                                         "thruster.5.position": place(0.0, 0.0, 0.0)}, [
-        ("axes.heave", "no thruster drives it")]),
-    "a thruster that drives no axis": ({**_ALONE, "axes.heave": GONE}, [
-        ("thruster.5", "acts on no axis of the vehicle, which are surge, sway, yaw")]),
-    "a yaw without an arm": ({**_NO_BOOST, **{f"thruster.{n}.position.value": [0, 0, 0] for n in "1234"}}, [
-        ("axes.yaw", "no thruster has an arm about the vertical axis")]),
-    "thrusters that cancel": ({**_NO_BOOST, **{f"thruster.{n}.position.value": [x, 0.0, 0.0] for n, x in
-                               (("1", 1), ("2", 1), ("3", 1), ("4", 1))}}, [
-        ("axes.yaw", "the thrusters cancel", "sway")]),
-    "surge and sway in one": ({**_NO_BOOST, **{f"thruster.{n}.direction.value": [1, 1, 0] for n in "1234"}}, [
-        ("axes.sway", "the thrusters cancel", "surge")]),
+    "no axes": ({**_NO_BOOST, "axes": {}}, [("axes", "at least one of surge, sway, heave, yaw")]),
+    "an axis that no thruster drives": (
+        {**_ALONE, "thruster.5.direction.value": [1, 0, 0], "thruster.5.position": place(0.0, 0.0, 0.0)},
+        [("axes.heave", "no thruster drives it")],
+    ),
+    "a thruster that drives no axis": (
+        {**_ALONE, "axes.heave": GONE},
+        [("thruster.5", "acts on no axis of the vehicle, which are surge, sway, yaw")],
+    ),
+    "a yaw without an arm": (
+        {**_NO_BOOST, **{f"thruster.{n}.position.value": [0, 0, 0] for n in "1234"}},
+        [("axes.yaw", "no thruster has an arm about the vertical axis")],
+    ),
+    "thrusters that cancel": (
+        {
+            **_NO_BOOST,
+            **{f"thruster.{n}.position.value": [x, 0.0, 0.0] for n, x in (("1", 1), ("2", 1), ("3", 1), ("4", 1))},
+        },
+        [("axes.yaw", "the thrusters cancel", "sway")],
+    ),
+    "surge and sway in one": (
+        {**_NO_BOOST, **{f"thruster.{n}.direction.value": [1, 1, 0] for n in "1234"}},
+        [("axes.sway", "the thrusters cancel", "surge")],
+    ),
     # coupling
-    "coupling without sway": ({**_NO_BOOST, "body.coupling": True, "axes.sway": GONE}, [
-        ("body.coupling", "needs surge, sway and yaw; there is no sway")]),
-    "coupling in heave": ({**_NO_BOOST, "body.coupling": True, "axes.sway": GONE, "axes.yaw": GONE, "body.I_r": GONE}, [
-        ("body.coupling", "no sway and no yaw")]),
+    "coupling without sway": (
+        {**_NO_BOOST, "body.coupling": True, "axes.sway": GONE},
+        [("body.coupling", "needs surge, sway and yaw; there is no sway")],
+    ),
+    "coupling in heave": (
+        {**_NO_BOOST, "body.coupling": True, "axes.sway": GONE, "axes.yaw": GONE, "body.I_r": GONE},
+        [("body.coupling", "no sway and no yaw")],
+    ),
     "coupling of an endless inertia": ({"axes.yaw.beta.value": 0.0}, [("axes.yaw.beta.value = 0.0", "at least 0.001")]),
     # inputs
-    "an input for a thruster that is not there": ({"inputs.heave.6": 1.0}, [
-        ("inputs.heave.6", "no such thruster, only 1, 2, 3, 4, 5, l, r")]),
+    "an input for a thruster that is not there": (
+        {"inputs.heave.6": 1.0},
+        [("inputs.heave.6", "no such thruster, only 1, 2, 3, 4, 5, l, r")],
+    ),
     "a thruster no input drives": ({"inputs.boost.r": 0.0}, [("inputs", "no input drives the thruster r")]),
-    "an input that drives nothing": ({"inputs.idle": {"5": 0.0}}, [
-        ("inputs.idle: drives no thruster: give one a gain other than 0",)]),
+    "an input that drives nothing": (
+        {"inputs.idle": {"5": 0.0}},
+        [("inputs.idle: drives no thruster: give one a gain other than 0",)],
+    ),
     "the only input of a thruster empty": ({"inputs.heave": {}}, [("inputs.heave: drives no thruster",)]),
     "the only input of a thruster misspelt": ({"inputs.heave": {"6": 1.0}}, [("inputs.heave.6", "no such thruster")]),
-    "a list for an input": ({"inputs.heave": ["5"]}, [
-        ("inputs.heave = ['5']: must be a table: write [inputs.heave]",)]),
-    "an input whose thrusters cancel": ({"inputs.spin": {"1": 1.0, "2": 1.0, "3": 1.0, "4": 1.0}}, [
-        ("inputs.spin", "drives no axis", "cancel")]),
+    "a list for an input": (
+        {"inputs.heave": ["5"]},
+        [("inputs.heave = ['5']: must be a table: write [inputs.heave]",)],
+    ),
+    "an input whose thrusters cancel": (
+        {"inputs.spin": {"1": 1.0, "2": 1.0, "3": 1.0, "4": 1.0}},
+        [("inputs.spin", "drives no axis", "cancel")],
+    ),
     "an axis no input drives": ({"inputs.yaw": GONE, "inputs.boost.r": 1.0}, [("axes.yaw", "no input drives it")]),
     # alternatives
-    "an alternative for what is not there": ({"alternatives.other.a_d_p": quantity(1.0, "N")}, [
-        ("alternatives.other.a_d_p", "no such coefficient of this vehicle")]),
-    "an alternative out of bounds": ({"alternatives.other.a_d_u.value": -1.0}, [
-        ("alternatives.other.a_d_u.value = -1.0", "0 ... 1000000 N.s2/m2")]),
-    "an alternative in another unit": ({"alternatives.other.a_d_u.unit": "N"}, [
-        ("alternatives.other.a_d_u.unit = 'N'", "'N.s2/m2'")]),
-    "an alternative without a description": ({"alternatives.other.description": GONE}, [
-        ("alternatives.other.description", "missing")]),
+    "an alternative for what is not there": (
+        {"alternatives.other.a_d_p": quantity(1.0, "N")},
+        [("alternatives.other.a_d_p", "no such coefficient of this vehicle")],
+    ),
+    "an alternative out of bounds": (
+        {"alternatives.other.a_d_u.value": -1.0},
+        [("alternatives.other.a_d_u.value = -1.0", "0 ... 1000000 N.s2/m2")],
+    ),
+    "an alternative in another unit": (
+        {"alternatives.other.a_d_u.unit": "N"},
+        [("alternatives.other.a_d_u.unit = 'N'", "'N.s2/m2'")],
+    ),
+    "an alternative without a description": (
+        {"alternatives.other.description": GONE},
+        [("alternatives.other.description", "missing")],
+    ),
     # several at once, of form and of sense
-    "many": ({"validity.command_max": 7.0, "curves.frame.b_t_reverse": GONE, "thruster.5.curve": "T200",
-              "axes.yaw.beta.value": 0.0, "inputs.idle": {"5": 0.0}, "alternatives.other.a_d_u.unit": "lb"}, [
-        ("validity.command_max",), ("thruster.5.curve",), ("inputs.idle",), ("curves.frame.b_t_reverse",),
-        ("axes.yaw.beta",)]),
-}  # fmt: skip
+    "many": (
+        {
+            "validity.command_max": 7.0,
+            "curves.frame.b_t_reverse": GONE,
+            "thruster.5.curve": "T200",
+            "axes.yaw.beta.value": 0.0,
+            "inputs.idle": {"5": 0.0},
+            "alternatives.other.a_d_u.unit": "lb",
+        },
+        [
+            ("validity.command_max",),
+            ("thruster.5.curve",),
+            ("inputs.idle",),
+            ("curves.frame.b_t_reverse",),
+            ("axes.yaw.beta",),
+        ],
+    ),
+}
 
 
 @pytest.mark.parametrize("case", NONSENSE)
@@ -261,11 +362,23 @@ SENSE: dict[str, dict[str, Any]] = {
     "an axis that does not accelerate by itself": {"axes.heave.beta": quantity(0.0, "1")},
     "a dead band for both directions": {"curves.frame.c_0_reverse": GONE},
     "without yaw": {**_NO_BOOST, "axes.yaw": GONE, "body.I_r": GONE},
-    "only yaw": {**_NO_BOOST, "axes.surge": GONE, "axes.sway": GONE, "axes.heave": GONE, "body.m_rov": GONE,
-                 "thruster.5": GONE},
-    "only heave": {**_NO_BOOST, "axes.surge": GONE, "axes.sway": GONE, "axes.yaw": GONE, "body.I_r": GONE,
-                   **{f"thruster.{n}": GONE for n in "1234"}},
-}  # fmt: skip
+    "only yaw": {
+        **_NO_BOOST,
+        "axes.surge": GONE,
+        "axes.sway": GONE,
+        "axes.heave": GONE,
+        "body.m_rov": GONE,
+        "thruster.5": GONE,
+    },
+    "only heave": {
+        **_NO_BOOST,
+        "axes.surge": GONE,
+        "axes.sway": GONE,
+        "axes.yaw": GONE,
+        "body.I_r": GONE,
+        **{f"thruster.{n}": GONE for n in "1234"},
+    },
+}
 
 
 @pytest.mark.parametrize("case", SENSE)

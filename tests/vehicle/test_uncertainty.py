@@ -125,7 +125,7 @@ BAD: dict[str, tuple[Callable[[str], str], str]] = {
         lambda text: text.replace("a_d_w = -0.652272", "a_d_w = 0.9"),
         "estimates: no numbers have these correlations: the least eigenvalue is -0.441, not 0",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BAD)

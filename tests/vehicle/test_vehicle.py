@@ -17,11 +17,27 @@ TEXT = VIDEORAY.read_text(encoding="utf-8")
 
 # Stated again as an independent witness of the vehicle file.
 TABLE_9 = {
-    "m_rov": 6.57, "I_r": 0.105, "R": 0.22, "gamma": 0.423,
-    "a_t_rear": 42.9, "b_t_rear": 2.711, "a_t_top": 6.494, "b_t_top": 0.0513,
-    "a_d_u": 3.159, "b_d_u": 9.379, "a_d_w": 18.72, "b_d_w": 0.6324, "a_d_r": 0.1246, "b_d_r": 0.103,
-    "alpha_u": 1.1, "beta_u": 1.0, "alpha_w": 1.14, "beta_w": 0.59, "alpha_r": 1.2, "beta_r": 0.12,
-}  # fmt: skip
+    "m_rov": 6.57,
+    "I_r": 0.105,
+    "R": 0.22,
+    "gamma": 0.423,
+    "a_t_rear": 42.9,
+    "b_t_rear": 2.711,
+    "a_t_top": 6.494,
+    "b_t_top": 0.0513,
+    "a_d_u": 3.159,
+    "b_d_u": 9.379,
+    "a_d_w": 18.72,
+    "b_d_w": 0.6324,
+    "a_d_r": 0.1246,
+    "b_d_r": 0.103,
+    "alpha_u": 1.1,
+    "beta_u": 1.0,
+    "alpha_w": 1.14,
+    "beta_w": 0.59,
+    "alpha_r": 1.2,
+    "beta_r": 0.12,
+}
 
 
 def test_videoray_holds_table_9(vehicle: Vehicle) -> None:
@@ -210,8 +226,16 @@ def test_every_mistake_of_a_file_is_told(tmp_path: Path) -> None:
     with pytest.raises(VehicleFileError) as caught:
         load_vehicle(path)
     lines = str(caught.value).splitlines()
-    wrong = ("vehicle.data = 'nowhere'", "validity.command_min = 20", "body.m_rov.value = -1.0", "body.I_r.unit = 'lb'",
-             "arm.R: ", "arm.radius", "thruster.t.curve = 'bottom'", "curves.top: no thruster")  # fmt: skip
+    wrong = (
+        "vehicle.data = 'nowhere'",
+        "validity.command_min = 20",
+        "body.m_rov.value = -1.0",
+        "body.I_r.unit = 'lb'",
+        "arm.R: ",
+        "arm.radius",
+        "thruster.t.curve = 'bottom'",
+        "curves.top: no thruster",
+    )
     assert len(lines) == len(wrong)
     for line, words in zip(lines, wrong, strict=True):
         assert line.startswith(f"{path}: {words}")

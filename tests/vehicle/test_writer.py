@@ -117,7 +117,7 @@ BAD: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "no hash": (edit(r'^"rov.toml" = ".*"', '"rov.toml" = "abc"'), ("provenance.inputs.rov.toml", "'abc'")),
     "no method": (edit(r"^method = .*$", ""), ("provenance.method", "missing")),
     "unknown key": (edit(r"^method = ", "author = 'me'\nmethod = "), ("provenance.author", "no such key")),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BAD)

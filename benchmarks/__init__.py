@@ -1,1 +1,0 @@
-"""What is measured, with one command: python -m benchmarks."""

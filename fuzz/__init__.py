@@ -1,1 +1,0 @@
-"""The C of the FMU under clang's sanitizers and its fuzzer: python -m fuzz."""

@@ -1,1 +1,0 @@
-"""The FMU in independent importers: python -m interop."""

@@ -1,0 +1,113 @@
+"""Everything that goes into the FMU, and the archive: the same bytes for the same inputs."""
+
+import hashlib
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from io import BytesIO
+from types import MappingProxyType
+from uuid import UUID
+
+from rov_fmu.engine.compile import C_SOURCES, UNITY_FILE, fmi_headers
+from rov_fmu.engine.source import generated_sources
+from rov_fmu.fmu.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
+from rov_fmu.fmu.python_flavour import python_files, python_sources
+from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
+from rov_fmu.fmu.variables import interface_header, variables
+from rov_fmu.io.paths import LICENSE
+from rov_fmu.io.picture import read_png
+from rov_fmu.io.reading import read_bytes
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+REPORT = "identification.html"
+"""The report in documentation/, where the vehicle file names one."""
+_NEEDED = """What the binaries need of the system, and nothing else:
+
+Linux    GLIBC 2.17 or newer (libc.so.6, libm.so.6)
+Windows  the Universal C Runtime, which is part of Windows since 10
+macOS    11 or newer
+"""
+
+
+@dataclass(frozen=True)
+class Content:
+    """What an FMU is made of but its compiled binaries."""
+
+    identifier: str
+    guid: str
+    files: Mapping[str, bytes]
+    """Path in the archive to content."""
+    sources: Mapping[str, str]
+    """The C files to compile; none in pure Python."""
+
+
+def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2) -> Content:
+    """The FMU in C, for Co-Simulation and Model Exchange, of FMI 2.0 or 3.0; `pages` go into it by their path."""
+    declared = variables(vehicle.rov)
+    others = f"fmi{5 - fmi}_"
+    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(others)]
+    sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
+    sources |= generated_sources(vehicle.layout)
+    named = (UNITY_FILE,) if fmi == 2 else ()
+    describe = partial(model_description, vehicle, declared, interfaces=NATIVE[fmi], source_files=named, fmi=fmi)
+    guid = _guid(describe(guid=""), sources)
+    sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid, fmi)
+    files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
+    files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
+    if fmi == 3:
+        files["sources/buildDescription.xml"] = build_description(vehicle.identifier)
+        files["documentation/externalDependencies.txt"] = _NEEDED.encode()
+    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, sources)
+
+
+def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
+    """The FMU in pure Python, for Co-Simulation."""
+    declared = variables(vehicle.rov)
+    sources = python_sources(vehicle, declared)
+    describe = partial(model_description, vehicle, declared, interfaces=PYTHON, note=PYTHON_NOTE)
+    guid = _guid(describe(guid=""), sources)
+    files = python_files(vehicle, sources)
+    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})
+
+
+def _guid(description: bytes, sources: Mapping[str, str]) -> str:
+    """A GUID that stands for the interface and the code behind it, so a binary refuses another one's description."""
+    digest = hashlib.sha256(description)
+    for name, text in sorted(sources.items()):
+        digest.update(name.encode() + b"\0" + text.encode() + b"\0")
+    return f"{{{UUID(digest.hexdigest()[:32])}}}"
+
+
+def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, bytes]) -> dict[str, bytes]:
+    report = vehicle.provenance.report if vehicle.provenance else None
+    files = {"documentation/licenses/license.txt": LICENSE, f"documentation/{REPORT}": report}
+    read = {name: read_bytes(path, VehicleFileError) for name, path in files.items() if path}
+    if own := vehicle.picture("model.png"):
+        read["model.png"] = read_png(own)
+    elif ICON in pages:
+        read["model.png"] = pages[ICON]
+    terminals = {f"{FOLDER}/terminalsAndIcons.xml": terminals_and_icons(vehicle.layout)}
+    return {"modelDescription.xml": description, **terminals, **read, **pages}
+
+
+def _fmi_license(fmi: int) -> bytes:
+    """The licence in the comment of the FMI headers that the binaries are compiled with."""
+    text = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
+    start = text.index("Copyright (C)")
+    lines = text[start : text.index("*/", start)].splitlines()
+    return ("\n".join(line.strip() for line in lines).strip() + "\n").encode()
+
+
+def archive(files: Mapping[str, bytes]) -> bytes:
+    """The FMU: path in the archive to content, zipped, the same bytes for the same files."""
+    packed = BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as zipped:
+        # the description comes first, so that importers which stream find it at once
+        for member in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
+            entry = zipfile.ZipInfo(member, _EPOCH)
+            entry.create_system = 3  # the same on Windows
+            entry.external_attr = 0o644 << 16
+            zipped.writestr(entry, files[member], zipfile.ZIP_DEFLATED, compresslevel=9)
+    return packed.getvalue()

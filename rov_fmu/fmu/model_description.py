@@ -1,0 +1,171 @@
+"""modelDescription.xml from the variables (FMI 2.0, section 2.2; FMI 3.0, section 2.4)."""
+
+from collections.abc import Mapping
+
+from rov_fmu import __version__
+from rov_fmu.engine.compile import UNITY_FILE
+from rov_fmu.fmu.variables import LOG_CATEGORIES, UNITS, Variable
+from rov_fmu.io.templates import render
+from rov_fmu.model.dependencies import parameters_of
+from rov_fmu.model.layout import Layout
+from rov_fmu.vehicle.vehicle import Vehicle
+
+# What is false is written out too, for FMI++ ends where it is absent.
+_COMMON = {
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+}
+_CO_SIMULATION = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "canRunAsynchronuously": "false",
+    **_COMMON,
+}
+_COMMON_3 = {
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "providesDirectionalDerivatives": "true",
+    "providesAdjointDerivatives": "true",
+}
+
+# The interfaces of each flavour and what they can do, as it really is.
+NATIVE = {
+    2: {
+        "ModelExchange": {**_COMMON, "providesDirectionalDerivative": "true"},
+        "CoSimulation": {
+            **_CO_SIMULATION,
+            "maxOutputDerivativeOrder": "1",  # fmu-runner takes this for a Boolean, and OMSimulator reads only order 1
+            "providesDirectionalDerivative": "true",
+        },
+    },
+    3: {
+        "ModelExchange": {**_COMMON_3, "needsCompletedIntegratorStep": "false"},
+        "CoSimulation": {
+            **_COMMON_3,
+            "canHandleVariableCommunicationStepSize": "true",
+            "maxOutputDerivativeOrder": "1",
+            "providesIntermediateUpdate": "true",
+            "mightReturnEarlyFromDoStep": "true",
+            "canReturnEarlyAfterIntermediateUpdate": "true",
+            "hasEventMode": "true",
+        },
+    },
+}
+"""By version of FMI."""
+PYTHON = {"CoSimulation": {"needsExecutionTool": "true", **_CO_SIMULATION}}
+PYTHON_NOTE = (
+    "Needs a Python on this machine. On Linux an importer that is not itself a Python process must be started with "
+    "LD_PRELOAD=/path/to/libpython3.x.so, or it cannot load the library (undefined symbol: _Py_NoneStruct)."
+)
+"""What the description of the Python flavour says beside what the vehicle is."""
+
+_EXPERIMENT = {"startTime": 0.0, "stopTime": 10.0, "tolerance": 1e-6, "stepSize": 0.01}
+
+
+def model_description(
+    vehicle: Vehicle,
+    variables: tuple[Variable, ...],
+    *,
+    guid: str,
+    interfaces: Mapping[str, Mapping[str, str]],
+    source_files: tuple[str, ...] = (),
+    fmi: int = 2,
+    note: str = "",
+) -> bytes:
+    """The XML document of a version of FMI, UTF-8, indented, the same bytes for the same arguments.
+
+    The description of the model is that of the vehicle, and then the note.
+    """
+    head = {
+        "fmiVersion": f"{fmi}.0",
+        "modelName": vehicle.identifier,
+        "guid" if fmi == 2 else "instantiationToken": guid,
+        "description": f"{vehicle.summary}. {note}" if note else vehicle.summary,
+        "author": vehicle.source,
+        "version": vehicle.version,
+        "license": "MIT, see documentation/licenses/license.txt",
+        "generationTool": f"rov-fmu {__version__}",
+        "variableNamingConvention": "structured",
+        "numberOfEventIndicators": "0" if fmi == 2 else None,
+    }
+    if fmi == 3:
+        variables = (*variables, Variable("time", len(variables), "Time", "s", "independent", "continuous"))
+    number = {v.name: v.index for v in variables}
+    return render(
+        "modelDescription.xml.j2",
+        head=head,
+        interfaces={name: {"modelIdentifier": vehicle.identifier, **can} for name, can in interfaces.items()},
+        source_files=source_files,
+        units={name: UNITS[name] for name in dict.fromkeys(v.unit for v in variables)},
+        types={_type_name(v): _type(v) for v in variables} if fmi == 3 else {},
+        type_name=_type_name,
+        log_categories=LOG_CATEGORIES,
+        experiment=_EXPERIMENT,
+        variables=variables,
+        number=number,
+        numbers=lambda names: " ".join(str(number[name]) for name in names),
+        structure=_structure(variables, vehicle.layout, _LISTS[fmi]),
+    ).encode()
+
+
+def build_description(identifier: str) -> bytes:
+    """sources/buildDescription.xml (FMI 3.0, section 2.5.1.3.1): how the sources become the library."""
+    return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
+
+
+# In FMI 3.0 a variable has its unit, nominal value and bounds from its declared type and has none of its own. FMI
+# Library loses the unit of a variable that has bounds of its own beside a type; fmi-sim refuses a unit on a variable.
+
+
+def _type(variable: Variable) -> dict[str, str | float | None]:
+    return {
+        "unit": variable.unit,
+        "displayUnit": variable.display_unit,
+        "min": variable.minimum,
+        "max": variable.maximum,
+        "nominal": variable.nominal,
+    }
+
+
+def _type_name(variable: Variable) -> str:
+    parts = {
+        "shown in {}": variable.display_unit,
+        "at least {:g}": variable.minimum,
+        "at most {:g}": variable.maximum,
+        "about {:g}": variable.nominal,
+    }
+    return ", ".join([variable.unit, *(words.format(value) for words, value in parts.items() if value is not None)])
+
+
+_LISTS = {
+    2: ("Outputs", "Derivatives", "InitialUnknowns"),
+    3: ("Output", "ContinuousStateDerivative", "InitialUnknown"),
+}
+
+
+def _structure(
+    variables: tuple[Variable, ...], layout: Layout, names: tuple[str, str, str]
+) -> dict[str, dict[str, dict[str, str]]]:
+    """The lists of <ModelStructure>: by name of an unknown, the kinds of the knowns it depends on, by name."""
+    parameters, order = parameters_of(layout), {v.name: v.index for v in variables}
+    lists: dict[str, dict[str, dict[str, str]]] = {name: {} for name in names}
+    outputs, derivatives, initial = lists.values()
+
+    def add(to: dict[str, dict[str, str]], variable: Variable, known: Mapping[str, str]) -> None:
+        to[variable.name] = dict(sorted(known.items(), key=lambda item: order[item[0]]))
+
+    for v in variables:
+        if v.dependencies is None:
+            continue
+        if v.causality == "output":
+            add(outputs, v, v.dependencies)
+        if v.derivative_of:
+            add(derivatives, v, v.dependencies)
+        if v.initial == "calculated":
+            # Initialization knows no parameters that are fixed: a factor is constant or not (2.2.8).
+            at_start = {n: "constant" if kind == "constant" else "dependent" for n, kind in v.dependencies.items()}
+            add(initial, v, at_start | dict.fromkeys(parameters.get(v.name, ()), "dependent"))
+    return lists

@@ -1,0 +1,70 @@
+"""The files of the FMU in pure Python, as pythonfmu's FmuBuilder packs them, with our modelDescription.xml."""
+
+import json
+import sys
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+from pythonfmu import FmuBuilder
+
+from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.vehicle.vehicle import Vehicle
+
+_HERE = Path(__file__).parent
+_MODEL = _HERE.parent / "model"
+
+
+def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping[str, str]:
+    """What is ours in resources/, name to text: the slave, the declaration, the model.
+
+    The modules bear the vehicle's name, because those of all FMUs and of the user share one interpreter.
+    """
+    package = f"{vehicle.identifier}_model"
+    slave = (_HERE / "slave.py").read_text(encoding="utf-8")
+    declaration = {
+        "identifier": vehicle.identifier,
+        "log_categories": LOG_CATEGORIES,
+        "layout": asdict(vehicle.layout),
+        "variables": [asdict(v) for v in variables],
+    }
+    return {
+        f"{vehicle.identifier}_slave.py": slave.replace("rov_fmu.model", package),
+        "variables.json": json.dumps(declaration, ensure_ascii=False, indent=1) + "\n",
+        **{f"{package}/{path.name}": path.read_text(encoding="utf-8") for path in sorted(_MODEL.glob("*.py"))},
+    }
+
+
+def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, bytes]:
+    """Everything FmuBuilder packs, path in the archive to content, but its modelDescription.xml."""
+    with temporary_folder("fmu-") as folder:
+        for name, text in sources.items():
+            path = Path(folder, "sources", name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        script = Path(folder, "sources", f"{vehicle.identifier}_slave.py")
+        project = [path for path in script.parent.iterdir() if path != script and path.name != "__pycache__"]
+        with _imports_restored():
+            built = FmuBuilder.build_FMU(script, dest=Path(folder, "built.fmu"), project_files=project)
+        with zipfile.ZipFile(built) as archive:
+            return {
+                name.replace("\\", "/"): archive.read(name)
+                for name in archive.namelist()
+                if name != "modelDescription.xml" and "__pycache__" not in name
+            }
+
+
+@contextmanager
+def _imports_restored() -> Iterator[None]:
+    """FmuBuilder imports the slave, and leaves it on sys.path and in sys.modules."""
+    path, modules, bytecode = list(sys.path), set(sys.modules), sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
+    try:
+        yield
+    finally:
+        sys.path[:], sys.dont_write_bytecode = path, bytecode
+        for name in set(sys.modules) - modules:
+            del sys.modules[name]

@@ -1,0 +1,258 @@
+"""Reference results inside the FMU, by the layered standard FMI-LS-REF: experiments, and what they must come to.
+
+The experiments follow from the vehicle: steps of each axis from rest, by the published tables where it has them, with
+and without its tuning; and a manoeuvre of all axes. The expected results come from the step in plain Python, and not
+from the C code that they are to prove.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, sqrt
+
+from rov_fmu.fmu.experiments import FOLDER, NAME
+from rov_fmu.io.templates import render
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Meta
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
+from rov_fmu.vehicle.vehicle import Vehicle
+
+NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
+VERSION = "1.0.0-beta.1"
+EXPERIMENTS = "application/x-ma-hs-experiments"
+PARAMETERS = "application/x-ssp-parameter-set"
+TOLERANCE = 1e-9
+"""Of the largest value of a variable in an experiment; the expected values have some 11 digits."""
+
+_DIGITS = ".11g"
+_MULTIPLES = (1, 2, 4, 8)
+"""Of Tau: where a step response is looked at."""
+_STEPS = 10
+"""Communication steps of a Tau, and of a phase of the manoeuvre."""
+_LONGEST = 10.0
+"""s, of a Tau."""
+_OF_COUPLING = 4.0
+"""How much sooner a coupled motion is out of sight: small differences grow in it."""
+_NEGLIGIBLE = 1e-8
+"""Of its nominal value: a variable that stays below does not move."""
+_PHASE = 2.0
+"""s, of the manoeuvre."""
+
+Values = Mapping[str, float]
+_Row = tuple[float, Values]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is done and what it must come to: the names of its files."""
+
+    name: str
+    description: str
+    stop: str
+    step: str
+    parameters: str | None
+    stimuli: str
+    references: str
+
+
+def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
+    """Return the files by their path in the FMU. Raises DataFileError."""
+    sets = {"tuned": vehicle.rov}
+    if any(vehicle.rov[name] != 1.0 for name in _tunable(vehicle.rov)):
+        sets["untuned"] = untuned(vehicle.rov)
+    files: dict[str, str] = {}
+    experiments = [*_step_responses(vehicle, sets, files), *_manoeuvre(vehicle, files)]
+    words = {"tuned": "alpha and beta as identified", "untuned": "alpha = beta = 1: without tuning"}
+    related = []
+    if len(sets) > 1:
+        for name, rov in sets.items():
+            files[f"{name}.ssv"] = render(
+                "parameters.ssv.j2", name=name, values={key: repr(rov[key]) for key in _tunable(rov)}
+            )
+            related.append(_related(f"{name}.ssv", PARAMETERS, "parameter", words[name]))
+    files["experiments.exp"] = render(
+        "experiments.exp.j2",
+        experiments=experiments,
+        tolerance=f"{TOLERANCE:g}",
+        description=f"{vehicle.name}: velocities and pose that the FMU must come to, "
+        f"within {TOLERANCE:g} of the largest value of each variable",
+    )
+    related.append(_related("experiments.exp", EXPERIMENTS, "experiment", "Expected results"))
+    related.append(_related("../../documentation/index.html", "text/html", "document", "Documentation"))
+    files["fmi-ls-manifest.xml"] = render(
+        "fmi-ls-manifest.xml.j2",
+        namespace=NAMESPACE,
+        related=related,
+        manifest={
+            "fmi-ls:fmi-ls-name": NAME,
+            "fmi-ls:fmi-ls-version": VERSION,
+            "fmi-ls:fmi-ls-description": "Layered Standard providing information on related files included in an FMU.",
+        },
+    )
+    return {f"{FOLDER}/{name}": text.encode() for name, text in files.items()}
+
+
+def _related(source: str, kind: str, role: str, description: str) -> dict[str, str]:
+    return {"type": kind, "source": source, "role": role, "description": description}
+
+
+def _tunable(rov: Rov) -> list[str]:
+    return [name for name, meta in rov.layout.coefficients.items() if meta.tunable]
+
+
+# ---- Steps from rest -------------------------------------------------------------------------------------------------
+
+
+def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str]) -> Iterator[Experiment]:
+    """A step of each axis to some commands."""
+    tables = {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
+    for form in vehicle.layout.axes:
+        axis, table = form.axis, tables.get(form.axis.name)
+        rows: Mapping[float, ResponseRow | None] = dict.fromkeys(_commands(vehicle))
+        if table:
+            rows = {float(row.command): row for row in table.rows}
+        for percent, row in rows.items() if vehicle.layout.signs(axis) else ():
+            stem = f"{axis.name}_{percent:g}".replace("-", "minus_")
+            inputs = vehicle.rov.held_inputs(axis, percent / 100.0)
+            units = {name: _unit(rov, axis, percent / 100.0, inputs) for name, rov in sets.items()}
+            longest = max(units.values()) * _MULTIPLES[-1]
+            for name, rov in sets.items():
+                experiment = f"{stem}_{name}" if len(sets) > 1 else stem
+                references = f"{experiment}_expected.csv"
+                marks = [units[name] * n for n in _MULTIPLES]
+                trajectory = _trajectory(rov, [(inputs, marks)])
+                files[f"{stem}.csv"] = _csv([(t, _commanded(vehicle, inputs)) for t in (0.0, longest)])
+                files[references] = _csv(_moving(trajectory, rov.layout.velocities | rov.layout.pose))
+                yield Experiment(
+                    experiment,
+                    _words(rov, axis, percent, name if len(sets) > 1 else "", table, row),
+                    _text(marks[-1]),
+                    _text(units[name] / _STEPS),
+                    name if len(sets) > 1 else None,
+                    f"{stem}.csv",
+                    references,
+                )
+
+
+def _commands(vehicle: Vehicle) -> list[float]:
+    """In %: the greatest over which the vehicle was identified, both ways, and less."""
+    most = 100.0 * min(1.0, vehicle.command_range[1])
+    return [round(share * most, 6) for share in (0.4, 1.0, -1.0)]
+
+
+def _unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
+    """Tau and the longest lag to three digits; shorter where nothing would be left to see of what is faster."""
+    lag = max((rov[curve.coefficient("T")] for curve in rov.layout.curves if curve.has_lag), default=0.0)
+    Tau = min(rov.response(axis, command)[1] + lag, _LONGEST, _horizon(rov, inputs))
+    return float(f"{Tau:.3g}")
+
+
+def _horizon(rov: Rov, inputs: Values) -> float:
+    """Some forty of the fastest time constants of the vehicle, and not many more radians of a turn (s)."""
+    rates = [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
+    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
+        A, B = motion.drag(motion.C)
+        turning = sqrt(abs(motion.C)) if form.axis is YAW else 0.0
+        rates.append(B + 2.0 * sqrt(A * abs(motion.C)) + turning)
+        V = motion.steady_velocity()
+        if form.axis is YAW and isfinite(V):
+            rates.append(abs(V))
+        if rov.layout.coupled and isfinite(V):
+            rates.append(_OF_COUPLING * sum(abs(rov.parameters[f"coupling_{v}"]) for v in "uvr") * abs(V))
+    return 40.0 / max(rates) if any(rates) else _LONGEST
+
+
+def _words(
+    rov: Rov, axis: Axis, percent: float, name: str, table: ResponseTable | None, row: ResponseRow | None
+) -> str:
+    """What the experiment is, and what it comes to in the words of the tables."""
+    V_ss, Tau = rov.response(axis, percent / 100.0)
+    model = row and (row.scaled if name == "tuned" else row.non_linear)
+
+    def beside(cell: Cell | None) -> str:
+        told = {"printed": cell.printed, "measured": cell.measured} if cell else {}
+        found = ", ".join(f"{words} {value}" for words, value in told.items() if value is not None)
+        return f" ({found})" if found else ""
+
+    late = ", without the lag" if rov.layout.lagging else ""
+    return (
+        f"{f'Table {table.number}: ' if table else ''}{axis.name}, {percent:g} % from rest{', ' * bool(name)}{name}: "
+        f"V_ss = {V_ss:.4g} {axis.unit}{beside(model.V_ss if model else None)}, "
+        f"Tau = {Tau:.4g} s{beside(model.Tau if model else None)}{late}"
+    )
+
+
+# ---- A manoeuvre -----------------------------------------------------------------------------------------------------
+
+# Shares of the greatest command by axis, and of loads and current, phase by phase.
+_PHASES: tuple[tuple[Mapping[Axis, float], float], ...] = (
+    ({SURGE: 0.8, HEAVE: 0.5}, 0.0),
+    ({SURGE: 0.4, SWAY: 0.3, YAW: 0.3}, 1.0),
+    ({SURGE: -0.5, HEAVE: -0.4, YAW: -0.2}, 1.0),
+    ({}, 0.0),
+)
+
+
+def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[Experiment]:
+    """All axes at once, with loads, a current and reversals, and what is left when all is off; all outputs."""
+    rov, layout = vehicle.rov, vehicle.layout
+    phases = []
+    for shares, load in _PHASES:
+        inputs = dict.fromkeys(layout.inputs, 0.0)
+        for axis, share in shares.items():
+            for name, sign in layout.signs(axis).items() if layout.has(axis) else ():
+                inputs[name] = round(inputs[name] + share * sign * vehicle.command_range[1], 6)
+        for name, meta in layout.inputs.items():
+            inputs[name] = max(-1.0, min(1.0, inputs[name])) if name in layout.commands else 0.05 * load * meta.nominal
+        phases.append(inputs)
+    length = float(f"{min(_PHASE, *(_horizon(rov, inputs) for inputs in phases)):.1g}")
+    ends = [length * n for n in range(len(phases) + 1)]
+    stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
+    held = [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
+    trajectory = _trajectory(rov, held)
+    files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
+    files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.state))
+    yield Experiment(
+        "manoeuvre",
+        "All axes at once, with loads, a current and reversals, then all off",
+        _text(ends[-1]),
+        _text(length / _STEPS),
+        None,
+        "manoeuvre.csv",
+        "manoeuvre_expected.csv",
+    )
+
+
+# ---- Trajectories ----------------------------------------------------------------------------------------------------
+
+
+def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
+    """Return the states from rest at the times of each phase, during which the inputs are held."""
+    found: list[_Row] = [(0.0, dict.fromkeys(rov.layout.state, 0.0))]
+    for inputs, times in phases:
+        for t in times:
+            before, state = found[-1]
+            found.append((t, rov.step(inputs, state, t - before)))
+    return found
+
+
+def _moving(rows: Sequence[_Row], variables: Mapping[str, Meta]) -> list[_Row]:
+    """The variables that do not stay at zero but for rounding."""
+    names = [
+        name
+        for name, meta in variables.items()
+        if max(abs(values[name]) for _, values in rows) > _NEGLIGIBLE * meta.nominal
+    ]
+    return [(t, {name: values[name] for name in names}) for t, values in rows]
+
+
+def _commanded(vehicle: Vehicle, inputs: Values) -> Values:
+    return {name: inputs[name] for name in vehicle.layout.commands}
+
+
+def _csv(rows: Sequence[_Row]) -> str:
+    lines = [["time", *rows[0][1]], *([_text(t), *map(_text, values.values())] for t, values in rows)]
+    return "".join(",".join(line) + "\n" for line in lines)
+
+
+def _text(value: float) -> str:
+    return format(value, _DIGITS)

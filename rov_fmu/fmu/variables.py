@@ -1,0 +1,194 @@
+"""Every FMU variable, declared once.
+
+modelDescription.xml, the C structs and value references, the documentation and the PythonFMU registration are all
+derived from `variables`. Their order is: inputs, state, derivatives, thrust, coefficients. The value reference of a
+variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import degrees, isfinite
+from typing import Any
+
+from rov_fmu.io.templates import render
+from rov_fmu.model.dependencies import dependencies_of
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Layout, Meta
+from rov_fmu.model.rov import Rov
+
+
+@dataclass(frozen=True)
+class Unit:
+    """An SI unit: its exponents of the FMI base units, and the unit a person reads, value times factor."""
+
+    exponents: Mapping[str, int]
+    display: str | None = None
+    factor: float = 1.0
+
+
+_KNOT = 1852.0 / 3600.0  # m/s
+
+UNITS: dict[str, Unit] = {
+    "1": Unit({}, "%", 100.0),
+    "kg": Unit({"kg": 1}),
+    "m": Unit({"m": 1}),
+    "s": Unit({"s": 1}),
+    "rad": Unit({"rad": 1}, "deg", degrees(1.0)),
+    "m/s": Unit({"m": 1, "s": -1}, "knot", 1.0 / _KNOT),
+    "rad/s": Unit({"rad": 1, "s": -1}, "deg/s", degrees(1.0)),
+    "m/s2": Unit({"m": 1, "s": -2}),
+    "rad/s2": Unit({"rad": 1, "s": -2}),
+    "N": Unit({"kg": 1, "m": 1, "s": -2}),
+    "N/s": Unit({"kg": 1, "m": 1, "s": -3}),
+    "N.m": Unit({"kg": 1, "m": 2, "s": -2}),
+    "kg.m2": Unit({"kg": 1, "m": 2}),
+    "N.s/m": Unit({"kg": 1, "s": -1}),
+    "N.s2/m2": Unit({"kg": 1, "m": -1}),
+    "N.m.s/rad": Unit({"kg": 1, "m": 2, "s": -1, "rad": -1}),
+    "N.m.s2/rad2": Unit({"kg": 1, "m": 2, "rad": -2}),
+}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One scalar variable as FMI describes it. Every one is a Real, a Float64 in FMI 3.0.
+
+    `dependencies` maps each known that the variable depends on to its dependenciesKind, for outputs and derivatives.
+    """
+
+    name: str
+    value_reference: int
+    """In FMI 2.0. It is also the place of the variable in the arrays of the C code, from 0."""
+    description: str
+    unit: str
+    causality: str
+    variability: str
+    initial: str | None = None
+    start: float | None = None
+    display_unit: str | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    derivative_of: str | None = None
+    dependencies: Mapping[str, str] | None = None
+
+    @property
+    def index(self) -> int:
+        """Position in <ModelVariables>, from 1."""
+        return self.value_reference + 1
+
+    def reference(self, fmi: int) -> int:
+        """Value reference in a version of FMI: in FMI 3.0 the index, because OMSimulator takes one for the other."""
+        return self.value_reference if fmi == 2 else self.index
+
+    @property
+    def kind(self) -> str:
+        """What it is in C: variable_kind of variable.h."""
+        if self.causality == "input":
+            return "INPUT"
+        if self.causality == "parameter":
+            return self.variability.upper()
+        return "STATE" if self.initial == "exact" else "CALCULATED"
+
+
+# ---- What each derivative is ---------------------------------------------------------------------------------------
+
+
+def _derivatives(layout: Layout) -> dict[str, Meta]:
+    """The derivative of every state."""
+    found: dict[str, Meta] = {}
+    for axis in (form.axis for form in layout.axes):
+        found[axis.velocity] = Meta(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {axis.equations[1]}")
+    if layout.has(SURGE, SWAY):
+        found["x"] = _over_ground(layout, "northward", "V_N", {"u": "+ u cos ψ", "v": "- v sin ψ"})
+        found["y"] = _over_ground(layout, "eastward", "V_E", {"u": "+ u sin ψ", "v": "+ v cos ψ"})
+    if layout.has(HEAVE):
+        found["z"] = Meta("m/s", "Rate of change of depth, w")
+    if layout.has(YAW):
+        found["psi"] = Meta("rad/s", "Rate of change of heading, r")
+    for name in layout.lagging:
+        found[name] = Meta("N/s", f"Rate of change of {name}, (F(c) - F) / T")
+    return found
+
+
+def _over_ground(layout: Layout, way: str, current: str, terms: Mapping[str, str]) -> Meta:
+    """A horizontal velocity over ground: a term of each velocity; ψ is 0 without yaw."""
+    turns = layout.has(YAW)
+    words = [
+        term if turns else f"+ {v}" for v, term in terms.items() if v in layout.velocities and (turns or "cos" in term)
+    ]
+    return Meta("m/s", f"Velocity over ground {way}, {' '.join([*words, f'+ {current}']).removeprefix('+ ')}")
+
+
+def variables(rov: Rov) -> tuple[Variable, ...]:
+    """All variables of the FMU of a vehicle, in the order of their value references."""
+    layout = rov.layout
+    result: list[Variable] = []
+
+    def add(name: str, meta: Meta, causality: str, variability: str, **rest: Any) -> None:
+        bounds = {end: x for end, x in (("minimum", meta.minimum), ("maximum", meta.maximum)) if isfinite(x)}
+        given = {"display_unit": UNITS[meta.unit].display, **bounds, **rest}
+        result.append(Variable(name, len(result), meta.description, meta.unit, causality, variability, **given))
+
+    for name, meta in layout.inputs.items():
+        add(name, meta, "input", "continuous", start=0.0, nominal=meta.nominal)
+    for name, meta in layout.state.items():
+        add(
+            name,
+            meta,
+            "output",
+            "continuous",
+            initial="exact",
+            start=0.0,
+            nominal=meta.nominal,
+            dependencies={name: "constant"},
+        )
+    derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
+    for name in layout.state:
+        add(
+            f"der({name})",
+            derivatives[name],
+            "local",
+            "continuous",
+            initial="calculated",
+            derivative_of=name,
+            dependencies=dependencies[f"der({name})"],
+        )
+    for name, meta in layout.thrust.items():
+        add(
+            name, meta, "output", "continuous", initial="calculated", display_unit=None, dependencies=dependencies[name]
+        )
+    for name, meta in layout.coefficients.items():
+        add(
+            name,
+            meta,
+            "parameter",
+            "tunable" if meta.tunable else "fixed",
+            initial="exact",
+            start=rov[name],
+            display_unit=None if meta.unit == "1" else UNITS[meta.unit].display,
+        )
+    return tuple(result)
+
+
+# Names by the standard (2.2.4) and what is said in each.
+LOG_CATEGORIES = {
+    "logEvents": "Changes of mode: initialization, event mode, reset, termination",
+    "logStatusWarning": "A command beyond ±1 that saturates, a call or a time that the standard does not foresee; once",
+    "logStatusDiscard": "A refused value, of a variable or of a solver's state: not finite, or outside min ... max",
+    "logStatusError": "Illegal calls and arguments, steps past stopTime, results that overflow",
+    "logAll": "All of these categories at once",
+}
+
+
+def interface_header(rov: Rov, identifier: str, token: str, fmi: int = 2) -> str:
+    """interface.h: what the FMI layer knows of the variables, and the names of the functions in a static library."""
+    return render(
+        "interface.h.j2",
+        variables=variables(rov),
+        first_reference=variables(rov)[0].reference(fmi),
+        identifier=identifier,
+        token=token,
+        fmi=fmi,
+        log_categories=LOG_CATEGORIES,
+        c_double=lambda value, otherwise: otherwise if value is None else repr(value),
+    )

@@ -1,0 +1,102 @@
+"""Within which numbers a fit is sought: beyond them no vehicle is, and what ends there is nonsense."""
+
+from collections.abc import Iterator, Sequence
+from math import exp, log
+
+import numpy as np
+
+from rov_fmu.identify.effects.extras import Extra, Kind
+from rov_fmu.identify.least_squares import bounds
+from rov_fmu.identify.recordings.runs import PreparedRecording, axes_of
+from rov_fmu.model.layout import REVERSE, Axis
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.recording import Recording
+
+_LEAST_BETA = 1e-3
+_LOAD = 1.5  # of the strongest thrust: against more no vehicle is driven
+_DRAG = 20.0  # of what would hold the strongest thrust at the highest velocity seen
+
+_EXTRAS: dict[Kind, tuple[float, float]] = {
+    "delay": (-2.0, 5.0),
+    "current": (-3.0, 3.0),
+    "current north": (-3.0, 3.0),
+    "current east": (-3.0, 3.0),
+    "lag": (0.05, 10.0),
+    "dead band": (-0.2, 0.3),  # below 0 is none: a search that ends at a bound is slow
+    "reverse thrust": (0.05, 20.0),
+    "reverse drag": (0.05, 20.0),
+}
+
+
+class NoFitError(ValueError):
+    """Recordings that no vehicle fits: one line, that names the axis and its files."""
+
+
+def limits(
+    base: Rov, data: Sequence[PreparedRecording], names: Sequence[str], extras: Sequence[Extra], size: int
+) -> tuple[Array, Array]:
+    """Lower and upper limits of x: coefficients (internal), extras, and what may be anything."""
+    low, high = bounds(names, size - len(names))
+    for axis in axes_of(data):
+        strongest, fastest = _strongest(base, axis), max(d.speed for d in data if d.axis is axis)
+        for power, key in enumerate(("b_d", "a_d"), 1):
+            for name in (axis.coefficient(key + end) for end in ("", REVERSE)):
+                if name in names and fastest > 0.0:
+                    high[names.index(name)] = min(high[names.index(name)], _DRAG * strongest / fastest**power)
+        if (beta := axis.coefficient("beta")) in names:
+            low[names.index(beta)] = log(_LEAST_BETA)
+    for curve in base.layout.curves:  # beyond a dead band the force begins with the command
+        if curve.coefficient("c_0") in names or Extra("dead band", curve.name) in extras:
+            for name in {curve.coefficient("b_t"), curve.coefficient("b_t" + REVERSE)} & {*names}:
+                low[names.index(name)] = 0.0
+    for n, extra in enumerate(extras, len(names)):
+        if extra.kind == "load":
+            load = _LOAD * max(_strongest(base, d.axis) for d in data if extra.concerns(d.recording))
+            low[n], high[n] = -load, load
+        else:
+            low[n], high[n] = _EXTRAS[extra.kind]
+    return low, high
+
+
+def refuse_nonsense(
+    base: Rov, data: Sequence[PreparedRecording], names: Sequence[str], extras: Sequence[Extra], x: Array
+) -> None:
+    """Nothing may end at a limit that only nonsense reaches. Raises NoFitError."""
+    low, high = limits(base, data, names, extras, len(x))
+    for axis in axes_of(data):
+        own = [d.recording for d in data if d.axis is axis]
+        if what := next(_ends(axis, own, names, extras, x, low, high), None):
+            files = ", ".join(dict.fromkeys(r.file for r in own))
+            raise NoFitError(
+                f"{files}: no {axis.name} of a vehicle with this thrust and mass moves so: {what} would do it best. "
+                f"Check units, signs and the order of the thrusters"
+            )
+
+
+def _ends(
+    axis: Axis,
+    own: Sequence[Recording],
+    names: Sequence[str],
+    extras: Sequence[Extra],
+    x: Array,
+    low: Array,
+    high: Array,
+) -> Iterator[str]:
+    """What stops at a limit, in words."""
+    near = np.where(np.isfinite(high - low), 1e-6 * (high - low), 0.0)
+    at_low, at_high = x <= low + near, x >= high - near
+    drag = [axis.coefficient(key + end) for key in ("a_d", "b_d") for end in ("", REVERSE)]
+    beta = axis.coefficient("beta")
+    for n, name in enumerate(names):
+        if (name in drag and at_high[n]) or (name == beta and (at_low[n] or at_high[n])):
+            yield f"{name} = {exp(x[n]) if name == beta else x[n]:.3g}"
+    for n, extra in enumerate(extras, len(names)):
+        if extra.kind == "load" and any(map(extra.concerns, own)) and (at_low[n] or at_high[n]):
+            yield f"a load of {x[n]:.3g} {axis.load}"
+
+
+def _strongest(base: Rov, axis: Axis) -> float:
+    """Thrust along an axis, N or N.m."""
+    force = base[axis.coefficient("alpha")] * base.strongest(axis)
+    return force if force > 0.0 else 1e6

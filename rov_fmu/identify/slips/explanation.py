@@ -1,0 +1,132 @@
+"""Which slip of unit explains best what the files of one axis tell, each by itself.
+
+A file that says k times what was measured tells of m/β / k, a_d / k^2, b_d / k and k times the speed: one look at it
+tells all scales. Of the files' vehicles, undone by a slip or not, the one is sought that agrees with all of them, is
+like a vehicle, and needs the fewest slips. Costs are squares of standard deviations, in decades.
+
+What is like a vehicle comes from those that ship, the Otter of the examples and the paper: drag by ½ρ(m/ρ)^(2/3) v^2 is
+0.4 to 11 from 20 to 100 % of thrust, the torque in yaw by ½ρ(6 I/ρ) r^2, the same of a box, 0.4 to 3.4; and m/β is 1.0
+to 2.4 times m, in yaw up to 8. Each is taken as spread about the middle of these by a factor of some 3, or 2.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite, log10, pi, sqrt
+
+from rov_fmu.identify.slips.single_recording import Alone
+from rov_fmu.model.layout import YAW, Axis
+from rov_fmu.model.rov import Rov
+
+FASTEST = {"m/s": 4.0, "rad/s": 8.0}
+"""No ROV is faster."""
+CERTAIN = 15.0
+"""A slip that lowers the costs by so much is certain,"""
+LIKELY = 4.0
+"""by so much worth a word."""
+_RHO = 1000.0
+_ALIKE = 0.15  # decades within which two files of one vehicle agree: loads, currents, curves that are not quite so
+_MOST = 25.0  # cost of one number, at most
+_SLIP, _ONE_MORE = 5.0, 0.5  # cost of a slip, and of each file that has it
+_LENGTHS = (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
+_ANGLES = (pi / 180.0, 0.1, 10.0, 180.0 / pi, 100.0)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a file tells by itself."""
+
+    file: str
+    quantity: str
+    alone: Alone
+
+    def undone(self, factor: float) -> "Evidence":
+        """Had it not said `factor` times what was measured."""
+        k, one = factor, self.alone
+        true = replace(one, inertia=k * one.inertia, a=k * k * one.a, b=k * one.b, speed=one.speed / k)
+        return replace(self, alone=true)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A slip and the files that have it; none where all is well."""
+
+    factor: float
+    """What they say, as a multiple of what was measured."""
+    files: frozenset[str]
+    cost: float
+    vehicle: Alone
+
+
+@dataclass(frozen=True, eq=False)
+class Files:
+    """All evidence of one axis; `given` is what is known of the vehicle beforehand."""
+
+    axis: Axis
+    base: Rov
+    evidence: Sequence[Evidence]
+    given: Alone | None = None
+
+    def explanations(self) -> list[Explanation]:
+        """The best one of every slip and every vehicle, the best of all first; that without slip is among them."""
+        factors = _ANGLES if self.axis is YAW else _LENGTHS
+        found = {(e.factor, e.files): e for e in sorted(self._all((1.0, *factors)), key=lambda e: -e.cost)}
+        return sorted(found.values(), key=lambda e: e.cost)
+
+    def _all(self, factors: Sequence[float]) -> Iterator[Explanation]:
+        for factor in factors:
+            undone = [e.undone(factor) for e in self.evidence]
+            vehicles = [self.given] if self.given else [e.alone for e in (*self.evidence, *undone)]
+            for vehicle in vehicles:
+                cost, files = 0.0 if self.given else self._unlike(vehicle), []
+                for plain, other in zip(self.evidence, undone, strict=True):
+                    as_it_is, without = (self._apart(e.alone, vehicle) for e in (plain, other))
+                    if factor != 1.0 and without + _ONE_MORE < as_it_is:
+                        files.append(plain.file)
+                        as_it_is = without + _ONE_MORE
+                    cost += as_it_is
+                if files or factor == 1.0:
+                    yield Explanation(factor, frozenset(files), cost + _SLIP * bool(files), vehicle)
+
+    def _apart(self, one: Alone, vehicle: Alone) -> float:
+        """How much a file contradicts a vehicle; and what is sensible in any vehicle."""
+        v = sqrt(one.speed * vehicle.speed)
+        cost = max(log10(one.speed / FASTEST[self.axis.unit]), 0.0) ** 2 / 0.01
+        for ratio, errors in (
+            (_ratio(one.inertia, vehicle.inertia), (one.errors[0], vehicle.errors[0])),
+            (_ratio(one.drag(v), vehicle.drag(v)), (one.errors[1], vehicle.errors[1])),
+        ):
+            spread = _ALIKE**2 + sum((error / 2.3) ** 2 for error in errors if isfinite(error))
+            cost += min(ratio**2 / spread, _MOST) if isfinite(ratio) else 0.0
+        return min(cost, 2.0 * _MOST)
+
+    def _unlike(self, vehicle: Alone) -> float:
+        """How little it is like a vehicle."""
+        inertia, drag = proportions(self.axis, self.base, vehicle)
+        typical, spread = (1.0, 0.25) if self._added else (2.0, 0.3)
+        cost = (log10(drag / (1.0 if self.axis is YAW else 1.5)) / 0.45) ** 2 if drag > 0.0 else _MOST
+        return min(cost, _MOST) + (min((log10(inertia / typical) / spread) ** 2, _MOST) if isfinite(inertia) else 0.0)
+
+    @property
+    def _added(self) -> bool:
+        return "m_a" in self.base.layout.kinds[self.axis.name].keys
+
+
+def proportions(axis: Axis, base: Rov, vehicle: Alone) -> tuple[float, float]:
+    """m/β by the mass and the added mass that are given, and drag by size and speed; see the module."""
+    mass, v = base[axis.inertia], vehicle.speed
+    size = 0.5 * _RHO * (6.0 * mass / _RHO if axis is YAW else (mass / _RHO) ** (2.0 / 3.0))
+    return vehicle.inertia / base.inertia(base.layout.kinds[axis.name]), vehicle.drag(v) / (size * v * v)
+
+
+def contradict(explanations: Sequence[Explanation]) -> Explanation | None:
+    """Another explanation about as good as the first, which blames other files."""
+    first = explanations[0]
+    others = (e for e in explanations[1:] if e.files and not e.files & first.files)
+    return next((e for e in others if e.cost < first.cost + LIKELY), None)
+
+
+def _ratio(one: float, other: float) -> float:
+    """In decades."""
+    if one <= 0.0 or other <= 0.0:
+        return inf if (one > 0.0) != (other > 0.0) else 0.0
+    return log10(one / other)

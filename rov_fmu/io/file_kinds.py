@@ -1,0 +1,59 @@
+"""Kinds of files, to say what a file is where a command expects another kind."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from rov_fmu.io.messages import FileError
+
+VEHICLE_FILE, PLAN, FMU, PAGE = "a vehicle file (TOML)", "the plan of a study (TOML)", "an FMU", "a page (HTML)"
+TESTS_FILE = "the rov.toml of a folder of tank tests"
+_TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "an autopilot's log"
+_BY_SUFFIX = {
+    **{".toml": _TOML, ".fmu": FMU, ".html": PAGE},
+    **dict.fromkeys((".csv", ".tsv"), _TABLE),
+    **dict.fromkeys((".bin", ".tlog"), _LOG),
+}
+_BY_KEY = {
+    **dict.fromkeys(("stop_time", "vary", "figures"), PLAN),
+    **dict.fromkeys(("known", "windows", "against", "base"), TESTS_FILE),
+    **dict.fromkeys(("thruster", "axes"), VEHICLE_FILE),
+}
+"""Keys at the top of a TOML file, each of which only one kind of file can have, or is most likely to have."""
+_HINTS = {
+    VEHICLE_FILE: "`rov-fmu build` makes an FMU of it, and a plan names it as `vehicle`",
+    PLAN: "`rov-fmu study` carries it out",
+    TESTS_FILE: "`rov-fmu identify FOLDER -o VEHICLE.toml` makes a vehicle file of the folder",
+    _TOML: "`rov-fmu build` makes an FMU of a vehicle file",
+    _TABLE: "to see a recording beside a vehicle, run `rov-fmu fly VEHICLE` and choose the recording on the page",
+    _LOG: "`rov-fmu identify` reads it in a folder of tank tests, as log_*",
+}
+
+
+def check_suffix(path: Path, wanted: str, failure: type[FileError] = FileError) -> None:
+    """Raise `failure` about a file whose suffix says that it is of another kind than the wanted one."""
+    if kind := _other_kind(path, wanted):
+        raise failure(_told(path, wanted, kind))
+
+
+def check_keys(path: Path, keys: Iterable[str], wanted: str, failure: type[FileError]) -> None:
+    """Raise `failure` about a TOML file whose keys belong to another kind than the wanted one."""
+    kinds = dict.fromkeys(_BY_KEY[key] for key in keys if key in _BY_KEY)
+    if kinds and wanted not in kinds:
+        raise failure(_told(path, wanted, next(iter(kinds))))
+
+
+def check_written(path: Path, kind: str) -> None:
+    """Raise FileError about a path to write whose suffix belongs to another kind of file."""
+    if other := _other_kind(path, kind):
+        raise FileError(f"{path}: would be {kind}, but {path.suffix} is the suffix of {other}")
+
+
+def _other_kind(path: Path, wanted: str) -> str | None:
+    """The kind of file that a suffix tells, where it is not the wanted one."""
+    kind = _BY_SUFFIX.get(path.suffix.lower())
+    return None if kind == wanted or (kind == _TOML and wanted in (VEHICLE_FILE, PLAN)) else kind
+
+
+def _told(path: Path, wanted: str, kind: str) -> str:
+    hint = f"; {_HINTS[kind]}" if kind in _HINTS else ""
+    return f"{path}: must be {wanted}, and not {kind}{hint}"

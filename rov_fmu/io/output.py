@@ -1,0 +1,110 @@
+"""Files written whole or not at all."""
+
+import errno
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from rov_fmu.io.interrupts import UNDIVIDED, cleaned_up
+
+
+class WriteError(OSError):
+    """A path that cannot be written."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """A file to write."""
+
+    path: Path
+    content: bytes
+    check: Callable[[Path], None] = lambda _: None
+    """What a draft of it must pass."""
+
+
+def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
+    """Raise WriteError about the first path that no file can be put at, or that is an input or another target."""
+    taken = list(inputs)
+    for path in targets:
+        if path.is_dir():
+            raise WriteError(errno.EISDIR, "is a folder, not a file to write", str(path))
+        if not path.parent.is_dir():
+            raise WriteError(errno.ENOENT, f"there is no folder {path.parent}", str(path))
+        if path.exists() and not path.is_file():
+            raise WriteError(errno.EINVAL, "is a device or a pipe, which no file can take the place of", str(path))
+        if path.exists() and not os.access(path, os.W_OK):
+            raise WriteError(errno.EACCES, "is read-only", str(path))
+        _check_folder(path)
+        for other in taken:
+            if is_same(path, other):
+                raise WriteError(errno.EEXIST, f"would overwrite {other}, an input or another output", str(path))
+        taken.append(path)
+
+
+def _check_folder(path: Path) -> None:
+    """Raise WriteError where the folder of a path takes no new file, which only the attempt can show."""
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        reasons = {
+            errno.EACCES: "its folder is read-only",
+            errno.EROFS: "its folder is read-only",
+            errno.ENOENT: f"the folder {path.parent} takes no new files",
+        }
+        reason = reasons.get(error.errno or 0, f"the folder {path.parent} takes no new files: {error.strerror}")
+        raise WriteError(error.errno, reason, str(path)) from error
+
+
+def write_whole(*outputs: Output) -> None:
+    """Put every content in place of whatever file was there, once all drafts have passed their checks: all or none.
+
+    A link is replaced, and what it leads to stays. Raises WriteError about the path that cannot be written, and what a
+    check raises.
+    """
+    check_targets(output.path for output in outputs)
+    with ExitStack() as drafts:
+        ready = [(output.path, _draft(output, drafts)) for output in outputs]
+        with UNDIVIDED:
+            for path, draft in ready:
+                with _errors_about(path):
+                    draft.replace(path)
+
+
+def _draft(output: Output, drafts: ExitStack) -> Path:
+    """A file beside the target, checked and ready to take its place; gone with the stack."""
+    path = output.path
+    with _errors_about(path):
+        with UNDIVIDED:
+            descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".part", dir=path.parent)
+            draft = Path(name)
+            drafts.enter_context(cleaned_up(partial(draft.unlink, missing_ok=True)))
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(output.content)
+            file.flush()
+            os.fsync(file.fileno())
+    output.check(draft)
+    with _errors_about(path):
+        mask = os.umask(0)
+        os.umask(mask)
+        draft.chmod(0o666 & ~mask)  # as if it had been opened like any file
+    return draft
+
+
+def is_same(path: Path, other: Path) -> bool:
+    """Whether two paths lead to the same file, be it there or not."""
+    if path.exists() and other.exists():
+        return path.samefile(other)
+    return os.path.realpath(path) == os.path.realpath(other)
+
+
+@contextmanager
+def _errors_about(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise WriteError(error.errno, error.strerror, str(path)) from error

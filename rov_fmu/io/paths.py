@@ -1,0 +1,51 @@
+"""The paths of the package's own data files, and the paths that a user's file names.
+
+A file that names another one may come from a stranger, so each name must lead to a place inside the folder of that
+file.
+"""
+
+import os
+from pathlib import Path, PureWindowsPath
+
+_PACKAGE = Path(__file__).parent.parent
+# An installed package holds its data files itself; a checkout has them at its top.
+_TOP = _PACKAGE / "data" if (_PACKAGE / "data").is_dir() else _PACKAGE.parent
+
+FMU_SRC = _TOP / "fmu_src"
+"""The folder of the C sources, templates and scripts that go into an FMU."""
+LICENSE = _TOP / "LICENSE"
+"""The licence, which goes into an FMU."""
+MODELS = _TOP / "models"
+"""The folder of the vehicles that ship; each has a folder of its own."""
+
+
+def inside(folder: Path, name: str) -> Path:
+    """The place that a file in this folder names. Raises ValueError with the reason alone.
+
+    A name means the same on every system: it is relative, and `/` stands between its parts. The place must be inside
+    the folder after links are followed.
+    """
+    on_windows = PureWindowsPath(name)
+    if not name or "\0" in name or "\\" in name or on_windows.drive or on_windows.root:
+        raise ValueError("must be a relative path with / between its parts, without a drive, a backslash or a NUL")
+    place = folder / name
+    if not Path(os.path.realpath(place)).is_relative_to(os.path.realpath(folder)):
+        raise ValueError("must lead to a place inside the folder of this file, after links are followed")
+    return place
+
+
+def inside_or_shipped(folder: Path, name: str) -> Path:
+    """The same; where nothing is there, the place of this name among the vehicles that ship. Raises ValueError."""
+    place, shipped = inside(folder, name), inside(MODELS, name)
+    return shipped if os.path.lexists(shipped) and not os.path.lexists(place) else place
+
+
+def name_of(place: Path, folder: Path) -> str:
+    """The name by which a file in this folder can name a place, which may ship. Raises ValueError if there is none."""
+    real = Path(os.path.realpath(place.parent), place.name)
+    for top in (folder, MODELS):
+        if real.is_relative_to(os.path.realpath(top)):
+            name = real.relative_to(os.path.realpath(top)).as_posix()
+            inside(top, name)
+            return name
+    raise ValueError(f"{place} is not inside the folder of this file")

@@ -1,0 +1,41 @@
+"""A vehicle's own pictures: each is what the end of its name says, or it is refused."""
+
+import warnings
+from io import BytesIO
+from pathlib import Path
+
+from lxml import etree
+from PIL import Image, UnidentifiedImageError
+
+from rov_fmu.io.messages import FileError
+from rov_fmu.io.reading import read_bytes
+
+_LARGEST = 20_000_000
+"""Bytes of a picture."""
+
+
+def read_png(path: Path) -> bytes:
+    """A PNG picture. Raises FileError."""
+    content = read_bytes(path, most=_LARGEST)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(BytesIO(content), formats=["PNG"]) as picture:
+                picture.load()
+    except UnidentifiedImageError as error:
+        raise FileError(f"{path}: not a PNG picture") from error
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+        raise FileError(f"{path}: not a PNG picture that can be read: {error}") from error
+    return content
+
+
+def read_svg(path: Path) -> bytes:
+    """An SVG picture. It may hold scripts, so it must be shown as an image, where none runs. Raises FileError."""
+    content = read_bytes(path, most=_LARGEST)
+    try:
+        root = etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
+    except etree.XMLSyntaxError as error:
+        raise FileError(f"{path}: not an SVG picture: {error.msg}") from error
+    if root.tag != "{http://www.w3.org/2000/svg}svg":
+        raise FileError(f"{path}: not an SVG picture: its root is {root.tag} and not svg of http://www.w3.org/2000/svg")
+    return content

@@ -1,0 +1,50 @@
+"""A digest in the first line of a file, which shows whether anybody has changed the file since it was written."""
+
+import errno
+import hashlib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from rov_fmu.io.messages import FileError
+from rov_fmu.io.output import WriteError
+from rov_fmu.io.reading import read_text
+
+_WORDS = "rov-fmu identify wrote this file. SHA-256 of the lines below:"
+_SEAL = re.compile(rf"(?:#|<!--) {re.escape(_WORDS)} ([0-9a-f]{{64}})(?: -->)?")
+
+
+def sealed(text: str, comment: str) -> str:
+    """The text below a line with its digest; `comment` is the form of a comment in this kind of file, `# {}`."""
+    return f"{comment.format(f'{_WORDS} {_digest(text)}')}\n{text}"
+
+
+def check_replaced(paths: Iterable[Path], *, force: bool) -> list[str]:
+    """A line for each file that is there already and is to be replaced.
+
+    Raises WriteError about the first file that `identify` did not write, or that has changed since, unless `force`.
+    """
+    told = []
+    for path in paths:
+        if not path.exists():
+            continue
+        if (reason := _not_as_written(path)) and not force:
+            raise WriteError(errno.EEXIST, f"the file there {reason}; --force replaces it", str(path))
+        told.append(f"{path}: replaced a file that {reason or 'was as identify wrote it'}")
+    return told
+
+
+def _not_as_written(path: Path) -> str:
+    """What shows that a file is not as `identify` wrote it; nothing where it is."""
+    try:
+        first, _, rest = read_text(path).partition("\n")
+    except FileError:
+        first = rest = ""
+    seal = _SEAL.fullmatch(first)
+    if not seal:
+        return "does not begin with a digest by identify, so it may be made by hand"
+    return "" if seal[1] == _digest(rest) else "has changed since identify wrote it"
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()

@@ -1,0 +1,58 @@
+"""CSV files of variables over time: the time in the first column, a variable by its plain name in each other."""
+
+import csv
+import io
+import re
+from collections.abc import Callable, Mapping, Sequence
+from math import isfinite, nan
+
+from rov_fmu.io.messages import FileError, shown
+
+_NUMBER = re.compile(r"[-+0-9.][-+0-9.eE]*")
+_WORDS = {"true": 1.0, "false": 0.0}
+
+Series = Mapping[str, Sequence[float]]
+"""Columns of a CSV file by name; the first is the time."""
+
+
+def series(text: str, error: Callable[[str], FileError], check_column: Callable[[str], None]) -> Series:
+    """The columns of a file's text. Raises what `error` makes of a reason, and what the check of a column raises."""
+    try:
+        lines = list(csv.reader(io.StringIO(text, newline=""), strict=True))
+    except csv.Error as wrong:
+        raise error(f"not CSV: {wrong}") from wrong
+    lines = [line for line in lines if any(map(str.strip, line))]
+    if not lines:
+        raise error("is empty")
+    if len(lines) < 2:
+        raise error("has no rows below a header")
+    header = [name.strip() for name in lines[0]]
+    if all(_NUMBER.fullmatch(name) for name in header):
+        raise error("the first line must be a header that names the columns: the time, and then variables")
+    if len(header) == 1 and (mark := next((mark for mark in ";\t" if mark in header[0]), None)):
+        raise error(f"columns are parted by commas, and not by {shown(mark)}; numbers have a point")
+    if twice := next((name for name in header if header.count(name) > 1), None):
+        raise error(f"column {shown(twice)}: there is such a column before")
+    for name in header[1:]:
+        check_column(name)
+    rows: list[list[float]] = []
+    for n, line in enumerate(lines[1:], 1):
+        if len(line) != len(header):
+            raise error(f"row {n}: {len(line)} cells below {len(header)} columns")
+        rows.append(
+            [number(cell, f"row {n}, column {shown(name)}", error) for name, cell in zip(header, line, strict=True)]
+        )
+        if n > 1 and rows[-1][0] < rows[-2][0]:
+            raise error(f"row {n}: the time goes back")
+    return dict(zip(header, zip(*rows, strict=True), strict=True))
+
+
+def number(text: str, where: str, error: Callable[[str], FileError]) -> float:
+    """A finite number, or true or false as one. Raises what `error` makes of a reason."""
+    try:
+        found = float(_WORDS.get(text.strip().lower(), text))
+    except ValueError:
+        found = nan
+    if not isfinite(found):
+        raise error(f"{where} = {shown(text)}: must be a number")
+    return found

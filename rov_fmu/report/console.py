@@ -1,0 +1,107 @@
+"""Where the command line prints, and the tables of the paper beside a vehicle."""
+
+from collections.abc import Iterable, Iterator
+from decimal import Decimal
+from math import isnan
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from rov_fmu.vehicle.published import Cell, ResponseTable
+from rov_fmu.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from rov_fmu.fmu.proof import Finding
+
+DEVIATION = "+.1%"
+_MIN_WIDTH = 110  # rich takes 80 columns in a pipe, and cuts digits off to fit a table into them
+
+
+def console() -> Console:
+    """Where to print: text as it is, wide enough for the tables."""
+    found = Console(markup=False, highlight=False, emoji=False)
+    found.width = max(found.width, _MIN_WIDTH)
+    return found
+
+
+def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
+    """Tables 6-8 of the paper beside what the vehicle gives."""
+    out = console()
+    out.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
+    for t in tables:
+        out.print()
+        out.print(_side_by_side(vehicle, t))
+    out.print(
+        "\nnon-linear: every alpha and beta is 1; scaled: those of the vehicle file; computed in closed form.\n"
+        "dev.: the computed value against the printed one; under test, the scaled model against the test.\n"
+        "*: the printed value is not the computed one rounded to its digits. -: not printed, not measured."
+    )
+
+
+def print_proof(findings: "Iterable[Finding]") -> None:
+    """How far each variable of an experiment is from its expected values."""
+    found = table("", "experiment", (), ("variable",))
+    for header in ("deviation", "tolerance"):
+        found.add_column(header, justify="right", no_wrap=True)
+    found.add_column("")
+    for f in findings:
+        found.add_row(
+            f.experiment,
+            f.variable,
+            text(f.deviation, ".1e"),
+            text(f.tolerance, ".1e"),
+            "pass" if f.passed else f"FAIL {f.error}",
+        )
+    console().print(found)
+    console().print("\nDeviation: relative to the largest expected value of the variable.")
+
+
+def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
+    values = ", ".join(f"{name} = {vehicle.rov[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
+    compared = [f"{model}\nprinted|\ncomputed|\ndev." for model in ("non-linear", "scaled")]
+    headers = "|".join([*compared, "test\nmeasured|\ndev."]).split("|")
+    result = table(f"Table {t.number}. {t.axis.name.capitalize()}, {values}", "\ncommand", headers)
+    for quantity, unit in (("V_ss", t.axis.unit), ("Tau", "s")):
+        result.add_section()
+        result.add_row(f"{quantity} [{unit}]")
+        for row in t.rows:
+            scaled: Cell = getattr(row.scaled, quantity)
+            result.add_row(
+                f"{row.command} %",
+                *_model(getattr(row.non_linear, quantity)),
+                *_model(scaled),
+                text(scaled.measured),
+                text(scaled.from_measured, DEVIATION),
+            )
+    return result
+
+
+def _model(cell: Cell) -> Iterator[str]:
+    """Printed, computed, deviation."""
+    yield text(cell.printed)
+    yield f"{cell.computed:.4f}"
+    yield text(cell.from_printed, DEVIATION) + (" " if cell.rounds_to_printed else "*")
+
+
+def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] = ()) -> Table:
+    """An empty table: a first column, then numbers, then texts."""
+    result = Table(
+        title=title,
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        show_edge=False,
+    )
+    result.add_column(first, no_wrap=True)
+    for header in numbers:
+        result.add_column(header, justify="right", no_wrap=True)
+    for header in texts:
+        result.add_column(header)
+    return result
+
+
+def text(value: float | Decimal | None, form: str = "") -> str:
+    """A number as the format has it; a dash where there is none."""
+    return "-" if value is None or isnan(value) else format(value, form)

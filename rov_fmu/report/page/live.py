@@ -1,0 +1,155 @@
+"""The live section of a page: the model as WebAssembly, what is told of the vehicle, and the scripts that fly it."""
+
+import base64
+import hashlib
+import json
+import re
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import floor, log10
+from typing import Any
+
+from markupsafe import Markup
+
+from rov_fmu.engine.compile import MODULE_SOURCES
+from rov_fmu.fmu.variables import variables
+from rov_fmu.model.layout import Thruster, VehicleAxis
+from rov_fmu.model.rov import Rov
+from rov_fmu.report.plots.drawing import place, size_of
+from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
+from rov_fmu.report.templates import number, page, pretty_unit
+from rov_fmu.vehicle.vehicle import Vehicle
+
+_SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "controls.js")
+# Types and words for who reads the source; a quarter of it.
+_COMMENT = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ ")
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A vehicle and its module."""
+
+    vehicle: Vehicle
+    module: bytes
+
+
+@dataclass(frozen=True)
+class Live:
+    """What the templates of a page need to fly the first vehicle, with another one as a ghost."""
+
+    data: Markup
+    """JSON, as fmu_src/live/model.js declares it."""
+    script: Markup
+    policy: str
+    """What the content security policy allows beside the page's own."""
+    tests: Sequence[dict[str, Any]]
+    loads: Sequence[tuple[str, float, str]]
+    """Inputs beside the commands: name, how far the slider goes, unit."""
+    tunable: Sequence[tuple[str, str, float, float, float]]
+    """Name, words, ends of the slider, value of the file."""
+    other: str | None
+    """The name of the ghost."""
+
+
+def live(flown: Sequence[Flown]) -> Live:
+    """The section that flies the first of these vehicles. Raises DataFileError."""
+    pilot = flown[0].vehicle
+    told = [_told(one) for one in flown]
+    data = json.dumps(told, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    script = _COMMENT.sub("", "".join((MODULE_SOURCES / name).read_text(encoding="utf-8") for name in _SCRIPTS))
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    tests = told[0]["tests"]
+    return Live(
+        data=Markup(data),
+        script=Markup(script),
+        policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
+        tests=[{**test, "words": _words(pilot, test)} for test in tests],
+        loads=list(_loads(pilot.rov)),
+        tunable=list(_tunable(pilot.rov)),
+        other=flown[1].vehicle.name if len(flown) > 1 else None,
+    )
+
+
+def fly_page(flown: Sequence[Flown]) -> str:
+    """A page of the live section alone: the first vehicle, with another one as a ghost. Raises DataFileError."""
+    vehicle = flown[0].vehicle
+    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=live(flown))
+
+
+def _told(flown: Flown) -> dict[str, Any]:
+    vehicle, rov, layout = flown.vehicle, flown.vehicle.rov, flown.vehicle.layout
+    return {
+        "name": vehicle.name,
+        "module": base64.b64encode(zlib.compress(flown.module, 9)).decode(),
+        "variables": [(v.name, v.start or 0.0) for v in variables(rov)],
+        "inputs": len(layout.inputs),
+        "states": len(layout.state),
+        "commands": list(layout.commands),
+        "mixed": bool(layout.mix),
+        "axes": [_axis(rov, form) for form in layout.axes],
+        "thrusters": [_thruster(rov, thruster) for thruster in layout.thrusters],
+        "tunable": [name for name, meta in layout.coefficients.items() if meta.tunable],
+        "tests": list(_tests(vehicle)),
+        "size": size_of(rov),
+    }
+
+
+def _axis(rov: Rov, form: VehicleAxis) -> dict[str, Any]:
+    axis = form.axis
+    position = {"heave": "z", "yaw": "psi"}.get(axis.name)
+    return {
+        "name": axis.name,
+        "velocity": axis.velocity,
+        "unit": axis.unit,
+        "external": axis.external,
+        "position": position,
+        "positionUnit": axis.position_unit,
+        "signs": rov.layout.signs(axis),
+    }
+
+
+def _thruster(rov: Rov, thruster: Thruster) -> dict[str, Any]:
+    curve = rov.layout.curve_of[thruster.name]
+    most = max(abs(rov.curve_force(curve, command)) for command in (1.0, -1.0))
+    return {
+        "force": f"F_{thruster.name}",
+        "at": place(rov, thruster)[:2],
+        "along": thruster.direction,
+        "most": most or 1.0,
+    }
+
+
+def _tests(vehicle: Vehicle) -> Iterator[dict[str, Any]]:
+    """The published step tests of every axis; of a vehicle without any, the commands of the page's plots."""
+    tables = tables_by_axis(vehicle)
+    for n, form in enumerate(vehicle.layout.axes):
+        table = tables.get(form.axis.name)
+        for command in [row.command for row in table.rows] if table else held_commands(vehicle, ()):
+            step = measured_step(table, command)
+            V, Tau = (values[0] if values else None for values in (step.V_ss, step.Tau))
+            yield {"axis": n, "command": step.command, "V": V, "Tau": Tau}
+
+
+def _words(vehicle: Vehicle, test: dict[str, Any]) -> str:
+    return f"{vehicle.layout.axes[test['axis']].axis.name} {number(100.0 * test['command'], 3)} %"
+
+
+def _loads(rov: Rov) -> Iterator[tuple[str, float, str]]:
+    """Loads reach as far as the thrusters do, a current 1 m/s."""
+    most = {form.axis.external: _round(rov.strongest(form.axis)) for form in rov.layout.axes}
+    for name, meta in rov.layout.inputs.items():
+        if name not in rov.layout.commands:
+            yield name, most.get(name, 1.0), pretty_unit(meta.unit)
+
+
+def _tunable(rov: Rov) -> Iterator[tuple[str, str, float, float, float]]:
+    for key, letter in (("alpha", "α"), ("beta", "β")):
+        for axis in (form.axis for form in rov.layout.axes):
+            value = rov[name := axis.coefficient(key)]
+            yield name, f"{letter} of {axis.name}", min(0.1, value), max(3.0, 2.0 * value), value
+
+
+def _round(x: float) -> float:
+    """To one digit."""
+    return round(x, -floor(log10(x))) if x > 0.0 else 1.0

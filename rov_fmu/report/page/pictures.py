@@ -1,0 +1,46 @@
+"""Pictures of a vehicle in its FMU, drawn from its thrusters: the icon, the diagram, the icon of a terminal."""
+
+from collections.abc import Sequence
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from rov_fmu.fmu.terminals import FOLDER, ICON, SIGNAL
+from rov_fmu.model.rov import Rov
+from rov_fmu.report.plots.drawing import Scene, draw_icon, draw_thrusters, scenes
+from rov_fmu.report.plots.png import png_file
+from rov_fmu.report.plots.svg import LIGHT, svg_file
+
+_ICON, _SIGNAL = (2.0, 2.0), (0.2, 0.2)  # inches
+
+
+def pictures(rov: Rov) -> dict[str, bytes]:
+    """All by their path in the FMU."""
+    icon, views = partial(_icon, rov=rov), list(scenes(rov).values())
+    widths, heights = zip(*(scene.inches for scene in views), strict=True)
+    diagram = partial(_diagram, rov=rov, views=views)
+    return {
+        "documentation/diagram.png": png_file(diagram, (sum(widths), max(heights)), background="white", margin=0.05),
+        ICON: png_file(icon, _ICON, background="none"),
+        f"{FOLDER}/icon.svg": svg_file(icon, _ICON, salt="icon", background="none", margin=0.0).encode(),
+        f"{FOLDER}/{SIGNAL}.png": png_file(_signal, _SIGNAL, background="none"),
+    }
+
+
+def _diagram(figure: Figure, rov: Rov, views: Sequence[Scene]) -> None:
+    """The thrusters and axes, view beside view."""
+    for ax, scene in zip(figure.subplots(1, len(views)), views, strict=True):
+        draw_thrusters(ax, rov, scene)
+        ax.set_anchor("NW")
+
+
+def _icon(figure: Figure, rov: Rov) -> None:
+    draw_icon(figure.subplots(), rov)
+
+
+def _signal(figure: Figure) -> None:
+    """A triangle, the way that signals go: in on the left of an icon, out on the right."""
+    ax = figure.subplots()
+    ax.fill([0.0, 1.0, 0.0], [0.0, 0.5, 1.0], color=LIGHT["blue"], linewidth=0.0)
+    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    ax.set_axis_off()

@@ -1,0 +1,258 @@
+"""The vehicle's thrusters drawn from its geometry: from above and from starboard."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import atan2, cos, degrees, hypot, sin
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.patches import Arc, Circle, PathPatch, Wedge
+from matplotlib.path import Path
+
+from rov_fmu.model.layout import AXES, HEAVE, SURGE, SWAY, YAW, Axis, Thruster
+from rov_fmu.model.rov import Rov
+from rov_fmu.report.plots.labels import AROUND, Place, Space
+from rov_fmu.report.plots.svg import LIGHT
+
+Point = tuple[float, float, float]
+
+VIEWS = {"from above": (SWAY, HEAVE, -1), "from starboard": (HEAVE, SWAY, 1)}
+"""The axis that points down in the view, the one along the line of sight, and whether that points at who looks (1)."""
+_LETTERS = {SURGE: "x", SWAY: "y", HEAVE: "z"}
+_INDEX = {axis: n for n, axis in enumerate(AXES.values())}
+_SMALLEST = 0.05  # m
+_WIDTH = 3.7  # inches
+
+
+def place(rov: Rov, thruster: Thruster) -> Point:
+    """Where a thruster is, from the centre of mass: that of an arm R, γ behind it; the centre where nothing is said."""
+    if thruster.position is not None:
+        return thruster.position
+    if not thruster.arm or not rov.layout.has_arm:
+        return 0.0, 0.0, 0.0
+    R, gamma = rov["R"], rov["gamma"]
+    return -R * cos(gamma), -thruster.arm * R * sin(gamma), 0.0
+
+
+@dataclass(frozen=True)
+class _Mark:
+    """Thrusters that look the same in a view: where, and the direction of a positive force."""
+
+    at: Place
+    along: Place
+    toward: float
+    """Of the direction, the part toward who looks."""
+    label: str
+    width: float
+    """Of the label, in inches."""
+
+    def tip(self, size: float) -> Place:
+        """The end of its arrow."""
+        return self.at[0] + 0.5 * size * self.along[0], self.at[1] + 0.5 * size * self.along[1]
+
+
+def _marks(rov: Rov, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
+    seen: dict[tuple[float, ...], list[str]] = {}
+    for thruster in rov.layout.thrusters:
+        at, d = place(rov, thruster), thruster.direction
+        along = d[0], d[_INDEX[down]]
+        hidden = toward * d[_INDEX[sight]] if hypot(*along) < 0.1 else 0.0
+        key = tuple(round(part, 3) + 0.0 for part in (at[0], at[_INDEX[down]], *along, hidden))
+        seen.setdefault(key, []).append(thruster.name)
+    for (x, y, dx, dy, hidden), names in seen.items():
+        label = ", ".join("$F_{" + name.replace("_", r"\_") + "}$" for name in names)
+        yield _Mark((x, y), (dx, dy), hidden, label, sum(0.16 + 0.06 * len(name) for name in names) - 0.08)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a view shows, in metres; the second coordinate runs downward."""
+
+    view: str
+    marks: list[_Mark]
+    labels: list[tuple[str, Place, str]]
+    """Text, centre and colour."""
+    size: float
+    """How far thrusters are from the centre of mass."""
+    limits: tuple[Place, Place]
+
+    @property
+    def inches(self) -> Place:
+        """Width and height of a drawing that it fits."""
+        (left, right), (low, high) = self.limits
+        return _WIDTH, _WIDTH * (low - high) / (right - left) + 0.3
+
+
+def scenes(rov: Rov) -> dict[str, Scene]:
+    """By view, at the scale that both share."""
+    inch = 0.9 * size_of(rov)
+    for _ in range(3):  # the larger the part of the drawing that text takes, the smaller the rest
+        found = {view: _arranged(rov, view, inch) for view in VIEWS}
+        left, right = zip(*(scene.limits[0] for scene in found.values()), strict=True)
+        inch = (max(right) - min(left)) / _WIDTH
+    across = min(left), max(right)
+    return {view: replace(scene, limits=(across, scene.limits[1])) for view, scene in found.items()}
+
+
+def size_of(rov: Rov) -> float:
+    """How far thrusters are from the centre of mass, in m."""
+    return max([_SMALLEST, *(abs(part) for thruster in rov.layout.thrusters for part in place(rov, thruster))])
+
+
+def _arranged(rov: Rov, view: str, inch: float) -> Scene:
+    """A view with its names, where an inch is so many metres."""
+    down, sight, toward = VIEWS[view]
+    size = size_of(rov)
+    space = Space(inch, [(-1.2 * size, 0.0)])  # the width of a drawing with little in it
+    marks = list(_marks(rov, down, sight, toward))
+    ends = {SURGE: (1.4 * size, 0.0), down: (0.0, 0.9 * size)}
+    for end in ends.values():
+        space.line((0.0, 0.0), end)
+    tail, tip = _turn(size)
+    if turns := down is SWAY and rov.layout.has(YAW):
+        space.line(tail, (1.27 * size, 0.0))
+        space.line((1.27 * size, 0.0), tip)
+    for mark in marks:
+        space.ring(mark.at, 0.1 * size)
+        if not mark.toward:
+            space.line(mark.at, mark.tip(size))
+    labels = []
+    if down is SWAY and rov.layout.has_arm:
+        x, y, _ = _armed(rov)
+        space.line((0.0, 0.0), (x, y))
+        space.line((0.0, 0.0), (1.15 * x, 0.0))
+        gamma, far, side = atan2(abs(y), -x), 0.38 * size, -1.0 if y < 0.0 else 1.0
+        labels = [
+            ("$R$", (0.68 * x, 0.68 * y - 0.12 * side * size), "muted"),
+            (r"$\gamma$", (-far * cos(gamma / 2.0), side * far * sin(gamma / 2.0)), "muted"),
+        ]
+        for _, at, _ in labels:
+            space.box(at, 0.1)
+    for axis, end in ends.items():
+        words = rf"${_LETTERS[axis]}, {axis.velocity}$" if rov.layout.has(axis) else f"${_LETTERS[axis]}$"
+        ahead = end[0] / hypot(*end), end[1] / hypot(*end)
+        labels.append((words, space.name(0.3 if "," in words else 0.1, [(end, 0.0, [ahead, *AROUND])]), "ink"))
+    if turns:
+        at = space.name(0.3, [(tip, 0.0, [AROUND[5], AROUND[2], AROUND[0]]), (tail, 0.0, [AROUND[4], AROUND[1]])])
+        labels.append((r"$\psi, r$", at, "ink"))
+    for mark in marks:
+        dx, dy = (part / (hypot(*mark.along) or 1.0) for part in mark.along)
+        behind, beside = (-dx, -dy), [(dy, -dx), (-dy, dx)]
+        around = [
+            (mark.at, 0.1 * size, [behind, *sorted(beside, key=lambda way: way[1]), *AROUND]),
+            (mark.tip(size), 0.0, [(dx, dy), *AROUND]),
+        ]
+        at = space.name(mark.width, [(mark.at, 0.1 * size, AROUND)] if mark.toward else around)
+        labels.append((mark.label, at, "blue"))
+    (left, right), (high, low) = space.limits()
+    edge = 0.06 * inch
+    has_scale = any(any(place(rov, thruster)) for thruster in rov.layout.thrusters)
+    low += (0.3 if has_scale else 0.06) * inch
+    return Scene(view, marks, labels, size, ((left - edge, right + edge), (low, high - edge)))
+
+
+def _armed(rov: Rov) -> Point:
+    return next(place(rov, t) for t in rov.layout.thrusters if t.position is None and t.arm)
+
+
+def _turn(size: float) -> tuple[Place, Place]:
+    """Where the arrow of a positive turn begins and ends."""
+    tail, tip = ((1.27 * size * cos(angle), 1.27 * size * sin(angle)) for angle in (-0.25, 0.25))
+    return tail, tip
+
+
+def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
+    """Centre of mass, body frame, thrusters with the direction of a positive force, R and γ where they are given."""
+    down, size = VIEWS[scene.view][0], scene.size
+    _draw_frame(ax, size, turns=down is SWAY and rov.layout.has(YAW))
+    if not any(mark.toward and hypot(*mark.at) < 0.05 * size for mark in scene.marks):
+        _draw_centre(ax, size)
+    for mark in scene.marks:
+        _draw_mark(ax, mark, size)
+    if down is SWAY and rov.layout.has_arm:
+        _draw_arm(ax, _armed(rov), size)
+    for text, at, color in scene.labels:
+        ax.text(*at, text, color=LIGHT[color], zorder=8, ha="center", va="center")
+    ax.set(aspect="equal", xlim=scene.limits[0], ylim=scene.limits[1])
+    ax.grid(visible=False)
+    ax.spines[:].set_visible(False)
+    if any(any(place(rov, thruster)) for thruster in rov.layout.thrusters):
+        _draw_scale(ax, size)
+    ax.set(xticks=[], yticks=[])
+    ax.set_title(scene.view.capitalize(), loc="left")
+
+
+def draw_icon(ax: Axes, rov: Rov) -> None:
+    """The vehicle from above without words: its thrusters, on a body as wide as they are apart, round at the bow."""
+    size, marks = size_of(rov), list(_marks(rov, *VIEWS["from above"]))
+    x, y = 1.2 * size, max([0.5 * size, *(abs(mark.at[1]) for mark in marks)])
+    ax.add_patch(PathPatch(_body(x, y), facecolor=LIGHT["band"], edgecolor=LIGHT["metal"], linewidth=2.0))
+    for mark in marks:
+        _draw_mark(ax, mark, 1.6 * size)
+    reach = 1.1 * max(x, *(abs(part) for mark in marks for part in mark.tip(1.6 * size)))
+    ax.set(aspect="equal", xlim=(-reach, reach), ylim=(reach, -reach))
+    ax.set_axis_off()
+
+
+def _body(x: float, y: float) -> Path:
+    """An outline from -x to x and from -y to y."""
+    starboard = [(-x, 0.0), (-x, 0.8 * y), (-x, y), (-x + 0.2 * y, y), (0.4 * x, y), (x, y), (x, 0.0)]
+    port = [(along, -across) for along, across in reversed(starboard)]
+    ways = [Path.LINETO, Path.CURVE3, Path.CURVE3, Path.LINETO, Path.CURVE3, Path.CURVE3]
+    back = [Path.CURVE3, Path.CURVE3, Path.LINETO, Path.CURVE3, Path.CURVE3, Path.LINETO]
+    return Path(starboard + port[1:], [Path.MOVETO, *ways, *back])
+
+
+def _arrow(ax: Axes, start: tuple[float, float], end: tuple[float, float], color: str, **how: Any) -> None:
+    style = {"arrowstyle": "-|>", "color": LIGHT[color], "shrinkA": 0.0, "shrinkB": 0.0, "linewidth": 1.4, **how}
+    ax.annotate("", end, start, arrowprops=style)
+
+
+def _draw_mark(ax: Axes, mark: _Mark, size: float) -> None:
+    (x, y), (dx, dy), r = mark.at, mark.along, 0.1 * size
+    ax.add_patch(Circle(mark.at, r, facecolor=LIGHT["panel"], edgecolor=LIGHT["metal"], linewidth=1.4, zorder=3))
+    if not mark.toward:
+        _arrow(ax, (x + dx * r, y + dy * r), mark.tip(size), "blue")
+    elif mark.toward > 0.0:  # the point of an arrow
+        ax.add_patch(Circle(mark.at, 0.3 * r, color=LIGHT["blue"], zorder=4))
+    else:  # its feathers
+        a = 0.7 * r
+        for way in (-1, 1):
+            ax.plot([x - a, x + a], [y - way * a, y + way * a], color=LIGHT["blue"], linewidth=1.4, zorder=4)
+
+
+def _draw_frame(ax: Axes, size: float, *, turns: bool) -> None:
+    """Axes of the body."""
+    for end in ((1.4 * size, 0.0), (0.0, 0.9 * size)):
+        _arrow(ax, (0.0, 0.0), end, "ink", linewidth=1.0)
+    if turns:
+        _arrow(ax, *_turn(size), "ink", linewidth=1.0, connectionstyle="arc3,rad=0.13")
+
+
+def _draw_centre(ax: Axes, size: float) -> None:
+    """The centre of mass."""
+    r = 0.055 * size
+    ax.add_patch(Circle((0.0, 0.0), r, facecolor=LIGHT["page"], edgecolor=LIGHT["ink"], linewidth=1.0, zorder=6))
+    for angle in (0.0, 180.0):
+        ax.add_patch(Wedge((0.0, 0.0), r, angle, angle + 90.0, color=LIGHT["ink"], linewidth=0.0, zorder=7))
+
+
+def _draw_arm(ax: Axes, at: Point, size: float) -> None:
+    """Lines of R from the centre of mass to a rear thruster, and of γ from the centre line."""
+    x, y, _ = at
+    dashed: Any = {"color": LIGHT["muted"], "linewidth": 1.0, "dashes": (4, 3), "zorder": 1}
+    ax.plot([0.0, x], [0.0, y], **dashed)
+    ax.plot([0.0, 1.15 * x], [0.0, 0.0], **dashed)
+    angle = degrees(atan2(abs(y), -x))
+    start = 180.0 if y < 0.0 else 180.0 - angle
+    arc = 1.1 * size * 0.5
+    ax.add_patch(Arc((0.0, 0.0), arc, arc, theta1=start, theta2=start + angle, color=LIGHT["muted"], linewidth=1.0))
+
+
+def _draw_scale(ax: Axes, size: float) -> None:
+    """A bar of a length that one reads at once."""
+    decade = 10.0 ** next(n for n in range(3, -4, -1) if 10.0**n <= 0.6 * size)
+    length = next(step * decade for step in (5.0, 2.0, 1.0) if step * decade <= 0.6 * size)
+    y, x = ax.get_ylim()[0] - 0.08 * size, ax.get_xlim()[0]
+    ax.plot([x, x + length], [y, y], color=LIGHT["muted"], linewidth=2.0, solid_capstyle="butt")
+    ax.text(x + length + 0.06 * size, y, f"{length:g} m", color=LIGHT["muted"], ha="left", va="center", fontsize=8.5)

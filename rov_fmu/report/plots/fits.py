@@ -1,0 +1,222 @@
+"""The plots of the identification report: every fit with its 95 % band, and its residuals below."""
+
+from collections.abc import Iterator, Sequence
+from math import log
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rov_fmu.identify.identification import AxisResult, Comparison, Identification
+from rov_fmu.identify.points.curve_fit import CurveFit
+from rov_fmu.identify.points.response_fit import holding_force, responses
+from rov_fmu.identify.points.thrust_fit import ThrustFit, forces
+from rov_fmu.report.findings import Known
+from rov_fmu.report.plots.steps import Step, draw_steps, evenly
+from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.templates import pretty_unit, text
+from rov_fmu.tank.arrays import Array, Flags
+
+_WIDEST = 5.0  # end of an interval by the value, or its inverse: beyond it there is an arrow
+_TICKS = (
+    0.001,
+    0.002,
+    0.003,
+    0.005,
+    0.01,
+    0.02,
+    0.03,
+    0.04,
+    0.05,
+    0.1,
+    0.15,
+    0.2,
+    0.3,
+    0.4,
+    0.5,
+    0.75,
+    1.0,
+    2.0,
+    3.0,
+    4.0,
+)
+_REACH = 1.96  # standard errors of a 95 % interval
+
+
+def plot_thrust(figure: Figure, results: Identification, fit: ThrustFit) -> None:
+    """Force over command, and the curve of the vehicle where recordings have moved it away from the fit."""
+    rov = results.vehicle.rov
+    curve = next(curve for curve in rov.layout.curves if curve.name == fit.curve.name)
+    moved = curve != fit.curve or not all(np.isclose(rov[name], value, rtol=1e-9) for name, value in fit.values.items())
+    above, below, x = _fitted(figure, fit, 100.0, "grey" if moved else "blue", "fit to the forces")
+    if moved:
+        above.plot(100.0 * x, forces(curve, rov.coefficients, x), color=LIGHT["blue"], label="with the recordings")
+    _finish(above, below, "Force (N)", "command (%)", "residual (N)")
+
+
+def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> None:
+    """Thrust at measured V_ss: the drag that the vehicle takes, and the fit to these forces alone as in (11)-(16)."""
+    assert result.drag
+    axis, load, rov = result.axis, pretty_unit(result.axis.load), results.vehicle.rov
+    above, below, v = _fitted(figure, result.drag, 1.0, "grey", "fit to these forces")
+    alpha = rov[axis.coefficient("alpha")]
+    above.plot(v, [holding_force(rov, axis, x) for x in v.tolist()], color=LIGHT["blue"], label="model")
+    other = results.against.rov if results.against and results.against.layout.has(axis) else None
+    if other and (scale := other[axis.coefficient("alpha")]):
+        scaled = [holding_force(other, axis, x) * alpha / scale for x in v.tolist()]
+        above.plot(v, scaled, ":", color=LIGHT["teal"], label="compared")
+    title = f"Drag ({load}) over ${axis.velocity}$"
+    _finish(above, below, title, f"velocity ({axis.unit})", f"residual ({load})")
+
+
+def _fitted(figure: Figure, fit: CurveFit, scale: float, color: str, label: str) -> tuple[Axes, Axes, Array]:
+    """Both parts of the plot of a fit, and over which numbers it is drawn."""
+    above, below = _two(figure)
+    x = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
+    _band(above, scale * x, *fit.band(x), color)
+    above.plot(scale * x, fit.value(x), "--" if color == "grey" else "-", color=LIGHT[color], label=label)
+    _dots(above, scale * fit.x, fit.y, fit.counts, label="measured")
+    _dots(below, scale * fit.x, fit.residuals, fit.counts)
+    _diamonds(below, scale * fit.x, fit.y - fit.leave_one_out)
+    return above, below, x
+
+
+def plot_response(
+    figure: Figure, results: Identification, result: AxisResult, quantity: str, comparison: Comparison | None
+) -> None:
+    """V_ss or Tau over command, signs dropped, and below the relative errors."""
+    axis, points, which = result.axis, comparison.points if comparison else (), int(quantity == "Tau")
+    above, below = _two(figure) if points else (figure.subplots(), None)
+    at = [abs(p.command) for p in points] or list(results.vehicle.command_range)
+    c = np.linspace(max(0.5 * min(at), 0.01), min(max(at) + 0.05, 1.0), 46)
+    tested = (c >= min(at)) & (c <= max(at))
+    curve = responses(axis, results.vehicle.rov, c)[:, which]
+    if fit := result.recordings or result.response:
+        low, high = fit.band(c)[2 * which :][:2]
+        _band(above, 100.0 * c, np.maximum(low, 0.0), high, "blue")
+    above.plot(100.0 * c, curve, color=LIGHT["blue"], label="model")
+    reverse = responses(axis, results.vehicle.rov, -c)[:, which] * (1.0 if which else -1.0)
+    if any(p.command < 0.0 for p in points) and not np.allclose(reverse, curve, rtol=0.01):
+        above.plot(100.0 * c, reverse, "-.", color=LIGHT["blue"], linewidth=1.0, label="model, negative commands")
+    if results.against and results.against.layout.has(axis):
+        other = responses(axis, results.against.rov, c)[:, which]
+        above.plot(100.0 * c, other, "--", color=LIGHT["grey"], label="compared")
+    top = [*(abs(p.value) for p in points), *curve[tested][np.isfinite(curve[tested])].tolist()]
+    above.set_ylim(0.0, 1.25 * max(top, default=1.0) or 1.0)
+    if comparison and below:
+        x, y = 100.0 * np.array(at), np.array([abs(p.value) for p in points])
+        counts = np.array([p.weight > 0.0 for p in points])
+        errors = _REACH * np.array([p.error or 0.0 for p in points])
+        _bars(above, x, y, errors)
+        _dots(above, x, y, counts, label="measured")
+        off = np.abs(comparison.model) / y
+        _bars(below, x, 100.0 * (off - 1.0), 100.0 * off * errors / y)
+        _dots(below, x, 100.0 * (off - 1.0), counts)
+        _diamonds(below, x, 100.0 * (np.abs(comparison.leave_one_out) / y - 1.0))
+    title = "$Tau$ (s)" if quantity == "Tau" else rf"$V_{{ss}}$ ({axis.unit})"
+    _finish(above, below, title, "command (%)", "error (%)")
+
+
+def plot_steps(figure: Figure, results: Identification, result: AxisResult) -> None:
+    """Steps of the command from rest, up to four, with what was measured of them; signs dropped."""
+    tested = sorted({round(abs(p.command), 6) for p in result.points})
+    steps = []
+    for command in evenly(tested):
+        here = [p for p in result.points if round(abs(p.command), 6) == command]
+        V_ss, Tau = ([abs(p.value) for p in here if p.quantity == quantity] for quantity in ("V_ss", "Tau"))
+        steps.append(Step(command, V_ss, Tau))
+    ax: Axes = figure.subplots()
+    draw_steps(ax, result.axis, steps, [(results.vehicle.rov, "-")])
+    ax.set_title(f"Steps: ${result.axis.velocity}$ ({result.axis.unit})", loc="left")
+
+
+def plot_known(figure: Figure, found: Sequence[Known]) -> None:
+    """The intervals of coefficients by their values, side by side; an arrow where one goes beyond the plot."""
+    ax: Axes = figure.subplots()
+    ends = [abs(log(max(end, 1.0 / _WIDEST))) for k in found for end in k.relative or ()]
+    reach = min(max([1.15 * end for end in ends], default=0.0), log(_WIDEST)) or log(_WIDEST)
+    for row, k in enumerate(found):
+        low, high = (log(max(end, 1e-9)) for end in k.relative or (0.0, 1e9))
+        color = LIGHT["blue"] if max(-low, high) <= reach else LIGHT["orange"]
+        dashes = (0, (1.0, 1.0)) if k.relative is None else "-"
+        ax.plot(
+            [max(low, -reach), min(high, reach)],
+            [row, row],
+            color=color,
+            linewidth=6.0,
+            alpha=0.4,
+            linestyle=dashes,
+            solid_capstyle="butt",
+            dash_capstyle="butt",
+        )
+        for is_beyond, at, arrow in ((-low > reach, -reach, "<"), (high > reach, reach, ">")):
+            if is_beyond:
+                ax.plot([at], [row], arrow, color=color, markersize=6.0, clip_on=False)
+        if k.relative:
+            ax.plot([0.0], [row], "o", color=color, markersize=4.5)
+    ax.axvline(0.0, color=LIGHT["muted"], linewidth=0.8, zorder=0)
+    ticks = [0.0, *_ticks(_TICKS, reach), *_ticks([-t for t in _TICKS if t < 1.0], reach)]
+    ax.set_xticks([log(1.0 + t) for t in ticks], [text(100.0 * t, "+g") + " %" if t else "value" for t in ticks])
+    ax.set_yticks(range(len(found)), [k.name for k in found])
+    ax.set(xlim=(-reach, reach), ylim=(len(found) - 0.4, -0.6))
+    ax.tick_params(axis="y", labelcolor=LIGHT["ink"])
+
+
+def _ticks(sizes: Sequence[float], reach: float) -> Iterator[float]:
+    """The outermost within reach, and one nearer to the middle."""
+    places = {size: abs(log(1.0 + size)) for size in sizes}
+    inside = [size for size in sizes if places[size] <= reach]
+    yield from inside[-1:]
+    yield from [size for size in inside if places[size] <= 0.55 * places[inside[-1]] and places[size] > 0.25 * reach][
+        -1:
+    ]
+
+
+def _band(ax: Axes, x: Array, low: Array, high: Array, color: str) -> None:
+    if np.isfinite(low).all() and np.isfinite(high).all():
+        ax.fill_between(x, low, high, color=LIGHT[color], alpha=0.18, linewidth=0.0, label="95 %")
+
+
+def _two(figure: Figure, heights: tuple[float, float] = (2.6, 1.0)) -> tuple[Axes, Axes]:
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=heights)
+    below.axhline(0.0, color=LIGHT["muted"], linewidth=0.8)
+    return above, below
+
+
+def _finish(above: Axes, below: Axes | None, title: str, x: str, y: str) -> None:
+    above.set_title(title, loc="left")
+    (below or above).set_xlabel(x)
+    above.locator_params(nbins=6)
+    if below:
+        below.set_ylabel(y)
+        below.locator_params(axis="y", nbins=3)
+        reach = 1.15 * max(map(abs, below.get_ylim()))
+        below.set_ylim(-reach, reach)
+    above.legend(loc="best")
+
+
+def _dots(ax: Axes, x: Array, y: Array, counts: Flags, label: str = "") -> None:
+    """Points that count are filled."""
+    for which, face, name in ((counts, LIGHT["orange"], label), (~counts, "none", label and f"{label}, weight 0")):
+        if which.any():
+            ax.plot(
+                x[which],
+                y[which],
+                "o",
+                color=LIGHT["orange"],
+                markerfacecolor=face,
+                markersize=4.5,
+                zorder=5,
+                label=name or None,
+            )
+
+
+def _bars(ax: Axes, x: Array, y: Array, errors: Array) -> None:
+    """Intervals of points, where they are known."""
+    if (there := errors > 0.0).any():
+        ax.errorbar(x[there], y[there], errors[there], fmt="none", ecolor=LIGHT["orange"], elinewidth=1.1, capsize=2.0)
+
+
+def _diamonds(ax: Axes, x: Array, y: Array) -> None:
+    """Leave-one-thrust-out."""
+    ax.plot(x, y, "D", color=LIGHT["violet"], markerfacecolor="none", markersize=4.0, zorder=4)

@@ -1,0 +1,21 @@
+"""Plots as small PNG files: few colours, no metadata, the same bytes at every call."""
+
+from io import BytesIO
+
+from PIL.Image import Dither, Quantize, frombytes
+
+from rov_fmu.report.plots.svg import Draw, saved
+
+_DPI = 100
+_COLOURS = 64
+"""The flat ones of a plot, and what is between them at its edges."""
+
+
+def png_file(draw: Draw, size: tuple[float, float], *, background: str, margin: float = 0.0) -> bytes:
+    """A figure (size in inches) as PNG, whatever the user's Matplotlib is set to."""
+    width, height = (round(inches * _DPI) for inches in size)
+    inches = (width + 1e-6) / _DPI, (height + 1e-6) / _DPI  # for Matplotlib cuts off what is no whole pixel
+    drawn = saved(draw, inches, background=background, margin=margin, format="rgba", dpi=_DPI)
+    picture, file = frombytes("RGBA", (width, height), drawn), BytesIO()
+    picture.quantize(_COLOURS, Quantize.FASTOCTREE, dither=Dither.NONE).save(file, "PNG", optimize=True)
+    return file.getvalue()

@@ -1,0 +1,181 @@
+"""The plots of recordings: measured, modelled and predicted velocity, the residuals, and one step close up."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rov_fmu.identify.identification import AxisResult
+from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
+from rov_fmu.identify.recordings.residual_analysis import Simulation
+from rov_fmu.identify.recordings.runs import prepare, push
+from rov_fmu.model.rov import Rov
+from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.report.templates import text
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.smoothing import velocity, without_spikes
+
+_BINS = 300  # of a recording: as many as one can see
+_BEFORE = 1.0  # s, of a step
+_WINDOWS = (0.2, 0.3, 0.5, 0.8, 1.2)  # s
+_STILL = 0.02  # of a change of velocity: noise that does not hide it
+_SETTLED = 0.3  # s, within which a command that is ramped has changed
+_FROM_REST = 1.25  # how much better a step from rest shows a delay
+
+
+def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -> None:
+    """Velocity of a recording, of the model, and as predicted unseen; below the residuals of the measured samples."""
+    recording, axis = simulation.recording, result.axis
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    below.axhline(0.0, color=LIGHT["muted"], linewidth=0.8)
+    for hold in (step for step in result.steps if step.file == recording.file):
+        above.axvspan(hold.start, hold.end, facecolor=LIGHT["band"], edgecolor=LIGHT["page"], zorder=0)
+        above.text(
+            0.5 * (hold.start + hold.end),
+            1.0,
+            text(hold.command, ".0%"),
+            fontsize=8.5,
+            transform=above.get_xaxis_transform(),
+            ha="center",
+            va="top",
+            color=LIGHT["muted"],
+        )
+    above.plot(*_thin(*measured(simulation)), color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label="measured")
+    above.plot(*_thin(*modelled(simulation)), color=LIGHT["blue"], linewidth=1.2, label="model")
+    label: str | None = "predicted unseen"
+    for p in result.held_out.predictions if result.held_out else ():
+        if p.recording.file == recording.file:
+            above.plot(*_thin(p.time, p.predicted), "--", color=LIGHT["violet"], linewidth=1.0, label=label)
+            label = None
+    above.margins(y=0.18)
+    parts = np.array_split(np.arange(len(simulation.time)), min(_BINS, len(simulation.time)))
+    low, high = ([pick(simulation.residuals[part]) for part in parts] for pick in (np.min, np.max))
+    below.fill_between([simulation.time[part[0]] for part in parts], low, high, color=LIGHT["orange"], linewidth=0.6)
+    above.set_title(f"${axis.velocity}$ ({axis.unit})", loc="left")
+    above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
+    above.locator_params(nbins=6)
+    below.set(xlabel="time (s)", ylabel=f"residual ({recording.unit})")
+    below.locator_params(axis="y", nbins=3)
+    reach = 1.15 * max(map(abs, below.get_ylim()))
+    below.set_ylim(-reach, reach)
+    _legend(above)
+
+
+def measured(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]:
+    """Velocity as the sensor tells it, smoothed over a window (s), on even times."""
+    values, is_position = without_spikes(simulation.measured), simulation.recording.is_position
+    return velocity(simulation.time, values, is_position=is_position, window=window)
+
+
+def modelled(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]:
+    """What the sensor would tell of the model, smoothed alike."""
+    is_position = simulation.recording.is_position
+    return velocity(simulation.time, simulation.modelled, is_position=is_position, window=window)
+
+
+def _legend(ax: Axes) -> None:
+    """Above the plot, clear of what it holds."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, columnspacing=1.2)
+
+
+def _thin(time: Array, values: Array) -> tuple[Array, Array]:
+    some = slice(None, None, max(1, len(time) // (2 * _BINS)))
+    return time[some], values[some]
+
+
+# ---- One step close up -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class CommandStep:
+    """A change of the commands of a recording."""
+
+    simulation: Simulation
+    at: float
+    """s, the time of the recording."""
+    strength: float
+    """N or N m by which the push changes along the axis, more for a step from rest."""
+    words: str
+    """From what to what."""
+    Tau: float
+    """s, about, of what follows."""
+
+
+def clearest_step(fit: RecordingsFit) -> CommandStep | None:
+    """The strongest step of the recordings of an axis, one from rest rather; None where there is none."""
+    found = [step for s in fit.simulations if (step := _strongest(s, fit.rov))]
+    return max(found, key=lambda step: step.strength, default=None)
+
+
+def _strongest(simulation: Simulation, rov: Rov) -> CommandStep | None:
+    recording, axis = simulation.recording, simulation.recording.axis
+    data = prepare(recording, rov)
+    curves = [curve for curve in rov.layout.curves if any(t.curve == curve.name for t in rov.layout.drivers(axis))]
+    force = np.sum([push(rov, axis, curve, data.commands).force for curve in curves], axis=0)
+    at = data.switches[1:]
+    after = force[np.searchsorted(data.switches, at + _SETTLED, side="right") - 1]
+    strength = np.abs(after - force[:-1]) * np.where(force[:-1] == 0.0, _FROM_REST, 1.0)
+    strength[(at < simulation.time[0] + 0.5 * _BEFORE) | (at > simulation.time[-1] - _BEFORE)] = 0.0
+    if not strength.size or strength.max() <= 0.0:
+        return None
+    n = int(strength.argmax())
+    unit, scale, ends = axis.load, 1.0, (force[n], after[n])
+    command, held = recording.command, 1.0
+    if command is not None:
+        place = np.searchsorted(recording.time, [at[n] - 1e-9, at[n] + _SETTLED], side="right") - 1
+        unit, scale, ends = "%", 100.0, (command[place[0]], command[place[1]])
+        held = float(ends[1] or np.abs(command).max())
+    words = " → ".join(f"{scale * end:.3g}".replace("-", "−") for end in ends) + f" {unit}"
+    Tau = rov.response(axis, held)[1]
+    return CommandStep(simulation, float(at[n]), float(strength[n]), words, Tau if isfinite(Tau) and Tau > 0.0 else 1.0)
+
+
+def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
+    """Velocity from a second before a change of the command to three time constants after it, and the fitted delay."""
+    axis = result.axis
+    late = result.recordings.delay_of(step.simulation.recording.file) if result.recordings else 0.0
+    low, high = -_BEFORE, max(3.0 * step.Tau, _BEFORE) + max(late, 0.0)
+    ax: Axes = figure.subplots()
+    ax.axvline(0.0, color=LIGHT["muted"], linewidth=1.2)
+    ax.text(
+        0.0,
+        1.0,
+        f"{step.words}  ",
+        fontsize=8.5,
+        transform=ax.get_xaxis_transform(),
+        ha="right",
+        va="top",
+        color=LIGHT["muted"],
+    )
+    if late:
+        label = f"delay {text(late, '.2f')} s"
+        ax.axvspan(0.0, late, facecolor=LIGHT["violet"], edgecolor="none", alpha=0.25, zorder=0, label=label)
+    window = _window(step.simulation)
+    for (time, v), color, width, label in (
+        (measured(step.simulation, window), "orange", 2.6, "measured"),
+        (modelled(step.simulation, window), "blue", 1.4, "model"),
+    ):
+        near = (time >= step.at + low) & (time <= step.at + high)
+        alpha = 0.6 if color == "orange" else 1.0
+        ax.plot(*_thin(time[near] - step.at, v[near]), color=LIGHT[color], linewidth=width, alpha=alpha, label=label)
+    ax.margins(y=0.14)
+    ax.set(xlim=(low, high), xlabel="time after the change of the command (s)")
+    ax.set_title(f"${axis.velocity}$ ({axis.unit})", loc="left")
+    ax.locator_params(nbins=6)
+    _legend(ax)
+
+
+def _window(simulation: Simulation) -> float:
+    """The shortest window (s) in which noise does not hide a step of the velocity."""
+    from scipy.signal import savgol_coeffs
+
+    rate = (len(simulation.time) - 1) / float(simulation.time[-1] - simulation.time[0])
+    visible = _STILL * float(np.ptp(simulation.velocity))
+    for window in _WINDOWS[:-1]:
+        n = max(2 * int(0.5 * window * rate) + 1, 5)
+        kernel = savgol_coeffs(n, 3, deriv=int(simulation.recording.is_position), delta=1.0 / rate)
+        if simulation.noise * float(np.linalg.norm(kernel)) < visible:
+            return window
+    return _WINDOWS[-1]

@@ -1,0 +1,135 @@
+"""The plot that all pages share: steps of the command from rest, modelled and measured."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from math import ceil, isfinite
+from typing import Literal, TypeVar
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.layout import Axis, Curve
+from rov_fmu.model.riccati import RISE
+from rov_fmu.model.rov import Rov
+from rov_fmu.report.plots.svg import LIGHT
+from rov_fmu.vehicle.published import ResponseTable, load_tables
+from rov_fmu.vehicle.vehicle import Vehicle
+
+Number = TypeVar("Number", float, Decimal)
+
+LINES = ("teal", "blue", "violet", "orange")
+"""Colours of lines beside each other."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A held command (fraction of full thrust) from rest, and what was measured of its response."""
+
+    command: float
+    V_ss: Sequence[float] = ()
+    Tau: Sequence[float] = ()
+
+
+def measured_step(table: ResponseTable | None, command: Decimal) -> Step:
+    """A command (%) and what the published table has of it."""
+    rows = [row.scaled for row in table.rows if row.command == command] if table else []
+    V_ss, Tau = (
+        [float(cell.measured) for cell in cells if cell.measured is not None]
+        for cells in ([row.V_ss for row in rows], [row.Tau for row in rows])
+    )
+    return Step(float(command) / 100.0, V_ss, Tau)
+
+
+def evenly(commands: Sequence[Number]) -> list[Number]:
+    """Up to four of the commands, evenly from the first to the last."""
+    last = len(LINES) - 1
+    return sorted({commands[round((len(commands) - 1) * n / last)] for n in range(last + 1)})
+
+
+def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
+    """The published tables of a vehicle by axis, none without a data folder. Raises DataFileError."""
+    return {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
+
+
+def held_commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Decimal]:
+    """Up to four commands (%) for the step responses: those that all tables hold, else tens across the range."""
+    rows = [{row.command for row in table.rows} for table in tables]
+    common = sorted(set.intersection(*rows)) if rows else []
+    if len(common) < 2:
+        low, high = (max(1, round(100.0 * end)) for end in vehicle.command_range)
+        tens = range(-(-low // 10) * 10, high + 1, 10)
+        common = [Decimal(c) for c in (tens if len(tens) > 1 else range(low, high + 1))]
+    return evenly(common)
+
+
+def finish(
+    ax: Axes, title: str, x: str, y: str = "", where: Literal["upper left", "lower right"] = "upper left"
+) -> None:
+    """Labels, title, legend; the axes begin at 0, as far as the data let them."""
+    ax.set(xlabel=x, ylabel=y)
+    ax.set_xlim(left=0.0)
+    if ax.dataLim.y0 >= 0.0:
+        ax.set_ylim(bottom=0.0)
+    ax.locator_params(nbins=6)
+    ax.set_title(title, loc="left")
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc=where)
+
+
+def draw_curve(ax: Axes, rov: Rov, curve: Curve) -> None:
+    """Steady thrust of a thruster over its command, reverse and dead band as they are."""
+    commands = {n / 50.0 for n in range(-50, 51)}
+    if "c_0" in curve.keys:
+        ends = -rov[curve.coefficient("c_0_reverse")], rov[curve.coefficient("c_0")]
+        commands |= set(ends)
+        low, high = (100.0 * end for end in ends)
+        ax.axvspan(low, high, label="dead band", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+    c = sorted(commands)
+    ax.plot([100.0 * x for x in c], [rov.curve_force(curve, x) for x in c], color=LIGHT["blue"], linewidth=1.8)
+    finish(ax, f"Curve {curve.name}: thrust (N)", "command (%)")
+    ax.set_xlim(-100, 100)
+
+
+def after_step(rov: Rov, axis: Axis, command: float, times: Sequence[float]) -> list[float]:
+    """Return the velocity along an axis at each time, the first 0, under a held command from rest.
+
+    The other axes are left without a force, so that they stay at rest and do not act on this one.
+    """
+    others = {
+        name: 0.0
+        for form in rov.layout.axes
+        if form.axis is not axis
+        for name in (form.axis.coefficient("alpha"), form.coefficient("F_0"))
+        if name in rov.coefficients
+    }
+    values = {**rov.held_inputs(axis, command), **others}
+    velocity: list[float] = simulate(rov, np.array(times), values, [axis.velocity]).values[0, 0].tolist()
+    return velocity
+
+
+def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Rov, str]]) -> None:
+    """Velocity after steps of the command, of every model (the last is the one to label): measured V_ss are dotted
+    lines, measured Tau points at 1 - 1/e of it."""
+    Taus = [models[-1][0].response(axis, step.command)[1] for step in steps]
+    Taus += [Tau for step in steps for Tau in step.Tau]
+    end = ceil(3.3 * max((Tau for Tau in Taus if isfinite(Tau)), default=3.0))
+    t = [end * (n / 45) ** 1.5 for n in range(46)]  # closer where the curve bends
+    roles = dict(zip(sorted({abs(step.command) for step in steps}), LINES, strict=False))
+    for step in steps:
+        color = LIGHT[roles[abs(step.command)]]
+        for rov, dashes in models:
+            v = after_step(rov, axis, step.command, t)
+            ax.plot(t, v, dashes, color=color, linewidth=1.8 if dashes == "-" else 1.0)
+        label = f"{100.0 * step.command:g} %".replace("-", "−")
+        ax.text(1.015 * end, v[-1], label, color=color, va="center", fontsize=8.5)
+        for V in step.V_ss:
+            ax.plot([0, end], [V, V], ":", color=color, linewidth=1.2)
+        if step.V_ss:
+            at = RISE * (sum(step.V_ss) / len(step.V_ss))
+            ax.plot(step.Tau, [at] * len(step.Tau), "o", color=color, markersize=5.0, zorder=5)
+    ax.set(xlim=(0, end), xlabel="time (s)")
+    if all(step.command >= 0.0 for step in steps):
+        ax.set_ylim(bottom=0.0)
+    ax.locator_params(nbins=6)

@@ -1,0 +1,158 @@
+"""Plots as SVG: the same bytes at every call, in the colours and the type of the page that they stand in."""
+
+import base64
+import re
+from collections.abc import Callable
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from lxml import etree
+from markupsafe import Markup
+from matplotlib import style
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from rov_fmu.io.picture import read_svg
+
+# Role: colour on a light and on a dark page. In a page a plot refers to the role, so it follows the page.
+PALETTE = {
+    "page": ("#fcfdfe", "#11171d"),
+    "panel": ("#f1f5f9", "#1a222b"),
+    "ink": ("#1c2733", "#e3e9ee"),
+    "muted": ("#566572", "#a3b2bf"),
+    "rule": ("#d3dce3", "#33404c"),
+    "band": ("#e7f0f7", "#1d2c39"),
+    "grey": ("#84919c", "#8796a3"),
+    "teal": ("#12877b", "#4fd0c0"),
+    "blue": ("#0a5cad", "#6db3f2"),
+    "violet": ("#8444b8", "#c99af0"),
+    "orange": ("#c43e12", "#ff9468"),
+    "steel": ("#22303d", "#4d6172"),
+    "metal": ("#5d6f7e", "#8497a6"),
+}
+LIGHT = {role: light for role, (light, _) in PALETTE.items()}
+_FONTS = "system-ui, sans-serif"
+_STYLE: Any = {
+    "svg.fonttype": "none",
+    "font.family": "DejaVu Sans",
+    "mathtext.fontset": "dejavusans",
+    "font.size": 9.5,
+    "axes.facecolor": "none",
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "axes.edgecolor": LIGHT["muted"],
+    "axes.labelcolor": LIGHT["muted"],
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.titlecolor": LIGHT["ink"],
+    "grid.color": LIGHT["rule"],
+    "grid.linewidth": 0.6,
+    "xtick.bottom": False,
+    "ytick.left": False,
+    "xtick.color": LIGHT["muted"],
+    "ytick.color": LIGHT["muted"],
+    "text.color": LIGHT["ink"],
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "legend.handlelength": 1.8,
+}
+_SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
+
+Draw = Callable[[Figure], None]
+
+
+def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
+    """A plot as part of a page, named for readers of screens. No other plot of the page has this label."""
+    return inline(label, svg_file(draw, size, salt=label, background="none", margin=0.02))
+
+
+def image(label: str, path: Path) -> Markup:
+    """An SVG file from elsewhere as an image of a page: there no script runs, and nothing in it leads elsewhere.
+
+    Its place in the page is light, for a file knows nothing of the page's colours. Raises FileError.
+    """
+    data = base64.b64encode(read_svg(path)).decode()
+    return Markup('<img src="data:image/svg+xml;base64,{}" alt="{}">').format(data, label)
+
+
+def inline(label: str, svg: str) -> Markup:
+    """An SVG document as part of a page: named, in the colours of the page where they are those of the palette."""
+    head = f'role="img" aria-label="{escape(label)}">'
+    svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', lambda found: f"<svg {found[1]} {head}", svg, count=1)
+    svg = svg.replace(f"font-family:{_FONTS};", "")
+    for role, color in LIGHT.items():
+        svg = svg.replace(color, f"var(--{role})")
+    return Markup(svg)
+
+
+def svg_file(
+    draw: Draw, size: tuple[float, float], *, salt: str, background: str = "white", margin: float = 0.1
+) -> str:
+    """A figure (size in inches) as SVG, whatever the user's Matplotlib is set to."""
+    svg = saved(draw, size, background=background, margin=margin, salt=salt, format="svg", metadata={"Date": None})
+    return _without_ballast(svg).replace("'DejaVu Sans'", _FONTS)
+
+
+def saved(
+    draw: Draw, size: tuple[float, float], *, background: str, margin: float, salt: str = "", **how: Any
+) -> bytes:
+    """A figure (size in inches) as Matplotlib saves it, in the one style; `how` tells it the format."""
+    file = BytesIO()
+    margins = {f"figure.constrained_layout.{side}_pad": margin for side in "wh"}
+    with style.context(["default", _STYLE, {"svg.hashsalt": salt, **margins}]):
+        figure = Figure(figsize=size, layout="constrained", facecolor=background)
+        draw(figure)
+        _arrange(figure, how["format"])
+        figure.savefig(file, **how)
+    return file.getvalue()
+
+
+def _arrange(figure: Figure, form: str) -> None:
+    """Lay it out as it is saved; where that is left to Matplotlib, it draws all of it once more."""
+    if form == "svg":
+        FigureCanvasSVG(figure)
+        figure.dpi = 72.0  # as SVG is drawn
+    engine = figure.get_layout_engine()
+    assert engine
+    engine.execute(figure)
+    figure.set_layout_engine(None)
+
+
+def _without_ballast(svg: bytes) -> str:
+    """The same picture without metadata, groups and ids that nothing refers to, and digits that no one sees."""
+    parser = etree.XMLParser(remove_comments=True, remove_blank_text=True)
+    root = etree.fromstring(svg, parser)
+    root.set("stroke-linejoin", "round")
+    used = set(re.findall(rb'(?:href="|url\()#(\w+)', svg))
+    for element in list(root.iter()):
+        if element.get("id", "").encode() not in used:
+            element.attrib.pop("id", None)
+        if element.get("transform", "").startswith("rotate(-0 "):
+            del element.attrib["transform"]
+        if link := element.attrib.pop(_XLINK, None):
+            element.set("href", link)
+        if "style" in element.attrib:
+            element.set("style", element.get("style").replace(": ", ":").replace("; ", ";"))
+        for name in ("d", "x", "y", "transform"):
+            if name in element.attrib:
+                element.set(name, _rounded(element.get(name)))
+    for element in reversed(list(root.iter(*(_SVG + tag for tag in ("g", "defs", "style", "metadata"))))):
+        parent = element.getparent()
+        if element.tag == f"{_SVG}g" and not element.attrib:
+            for child in list(element):
+                element.addprevious(child)
+        if not len(element) or element.tag == f"{_SVG}metadata":
+            parent.remove(element)
+    etree.cleanup_namespaces(root)
+    return str(etree.tostring(root, encoding="unicode"))
+
+
+def _rounded(text: str) -> str:
+    """Coordinates to a fiftieth of a point."""
+    text = re.sub(r"-?\d+\.\d+", lambda x: f"{float(x[0]):.2f}".rstrip("0").rstrip("."), text)
+    return " ".join(text.split())

@@ -1,0 +1,100 @@
+"""What `vary_from` brings to a study: the estimates of a vehicle file, drawn together."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from math import isclose
+
+import numpy as np
+
+from rov_fmu.io.toml_file import line
+from rov_fmu.study.plan.model import Variable, unsettable
+from rov_fmu.study.plan.plan import Plan
+from rov_fmu.vehicle.uncertainty import NOTHING, Uncertainty
+from rov_fmu.vehicle.vehicle import Vehicle
+
+_KEY = "vary_from"
+_SHOWN = 5
+
+
+class Estimates:
+    """Of the coefficients to which a vehicle file gives an interval, but those that the plan itself gives."""
+
+    def __init__(self, plan: Plan, vehicle: Vehicle | None, has: Mapping[str, Variable]) -> None:
+        self._plan, self._vehicle, self._has = plan, vehicle, has
+        self._whole = vehicle.uncertainty if vehicle else NOTHING
+        errors = zip(self._whole.names, self._whole.errors.tolist(), strict=True)
+        self._part = self._whole.part([name for name, error in errors if error and not self._given(name)])
+        self.names = self._part.names
+        """What varies."""
+
+    @property
+    def known(self) -> Uncertainty:
+        """What they are drawn by: within what the FMU takes, too."""
+        own = np.array([(self._has[name].minimum, self._has[name].maximum) for name in self.names]).reshape(-1, 2)
+        bounds = [np.maximum(self._part.bounds, own)[:, 0], np.minimum(self._part.bounds, own)[:, 1]]
+        return replace(self._part, bounds=np.column_stack(bounds))
+
+    @property
+    def mark(self) -> dict[str, object]:
+        """What results depend on, in a form that JSON has."""
+        numbers = zip(self.names, self._part.values.tolist(), self._part.errors.tolist(), strict=True)
+        told = {name: {"value": value, "error": error} for name, value, error in numbers}
+        return {_KEY: {"estimates": told, "correlation": self._part.correlation.tolist()}} if told else {}
+
+    def nonsense(self) -> Iterator[str]:
+        """What does not fit the plan or the FMU, a line each."""
+        plan, groups = self._plan, self._part.groups
+        if self._vehicle and not self._vehicle.intervals:
+            yield line(_KEY, "no coefficient of this vehicle has an interval", plan.vary_from)
+        elif self._vehicle and not self.names and not plan.vary:
+            yield line(_KEY, "nothing varies, for [set] gives all that has an interval there", plan.vary_from)
+        if self.names and plan.sampler == "grid":
+            yield line(_KEY, "a grid needs values or a range, and what is estimated has none", plan.vary_from)
+        for name, value in zip(self.names, self._part.values.tolist(), strict=True):
+            if reason := unsettable(name, self._has):
+                yield line(_KEY, reason, plan.vary_from)
+            elif reason := self._has[name].wrong(value):
+                yield line(_KEY, f"the {name} of this vehicle {reason} in the FMU", plan.vary_from)
+        if plan.sampler == "saltelli" and len(self.names) > len(groups) + len(plan.vary) == 1:
+            reason = "Sobol indices tell apart what is independent, and all that varies is correlated"
+            yield line("sampler", reason, plan.sampler)
+
+    def warnings(self) -> Iterator[str]:
+        """What the results have in them that a reader may not expect, a sentence each."""
+        if not self._vehicle:
+            return
+        file, has = self._plan.vary_from, self._has
+        alone = [name for name in self.names if name not in self._vehicle.estimates]
+        if alone and len(self.names) > 1:
+            yield (
+                f"no row in [estimates] of {file}: {_listed(alone)} vary as if correlated with nothing, which makes "
+                "what was found together far too uncertain"
+            )
+        for name, row in zip(self._whole.names, self._whole.correlation, strict=True):
+            others = [
+                other for other, value in zip(self._whole.names, row, strict=True) if value and other in self.names
+            ]
+            if self._given(name) and others:
+                yield f"the plan gives {name}: its correlation with {_listed(others)} in {file} is left out"
+        differ = [
+            f"{name} ({has[name].start:g}, not {value:g})"
+            for name, value in self._vehicle.rov.coefficients.items()
+            if name in has
+            and name not in self.names
+            and not self._given(name)
+            and not isclose(has[name].start, value, rel_tol=1e-9)
+        ]
+        if differ:
+            yield f"the FMU has other values than {file} of {_listed(differ)}: the estimates were found beside those"
+        together = [_listed(group) for group in self._part.groups if len(group) > 1]
+        if self._plan.sampler == "saltelli" and together:
+            yield f"what is correlated has one Sobol index together: {'; '.join(together)}"
+
+    def _given(self, name: str) -> bool:
+        """Whether the plan itself says what a variable is."""
+        return name in self._plan.vary or name in self._plan.set
+
+
+def _listed(words: Sequence[str]) -> str:
+    some = [*words[:_SHOWN], *([f"{len(words) - _SHOWN} more"] if len(words) > _SHOWN else [])]
+    return " and ".join(filter(None, [", ".join(some[:-1]), some[-1]]))

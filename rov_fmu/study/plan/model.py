@@ -1,0 +1,152 @@
+"""The FMU that a study runs, as its description has it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import BytesIO
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from rov_fmu.fmu.unpacking import unpack_fmu
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import FileError, did_you_mean, shown
+from rov_fmu.io.reading import read_bytes
+
+TYPES = {
+    2: {"Real": "f8", "Integer": "i4", "Enumeration": "i4", "Boolean": "i4"},
+    3: {
+        "Float64": "f8",
+        "Float32": "f4",
+        "Enumeration": "i8",
+        "Boolean": "?",
+        "Int8": "i1",
+        "Int16": "i2",
+        "Int32": "i4",
+        "Int64": "i8",
+        "UInt8": "u1",
+        "UInt16": "u2",
+        "UInt32": "u4",
+        "UInt64": "u8",
+    },
+}
+"""NumPy's type of each type of variable that is a number, by the version of FMI."""
+_WHOLE = ("Integer", "Enumeration", "Int")
+_FUNCTIONS = {2: {"Enumeration": "Integer"}, 3: {"Enumeration": "Int64"}}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable that is a number."""
+
+    name: str
+    reference: int
+    type: str
+    """FMI's name of it."""
+    causality: str
+    can_be_set: bool
+    """Before a run."""
+    is_continuous: bool
+    minimum: float
+    maximum: float
+    unit: str
+    start: float
+    """0 where the FMU tells none."""
+    description: str = ""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it holds whole numbers alone."""
+        return self.type.removeprefix("U").startswith(_WHOLE)
+
+    def wrong(self, value: float) -> str:
+        """Why it cannot have a value; nothing where it can."""
+        if self.type == "Boolean" and value not in (0.0, 1.0):
+            return "must be true or false, or 1 or 0"
+        if self.is_whole and value != int(value):
+            return "must be a whole number"
+        if not self.minimum <= value <= self.maximum:
+            return f"must be within {self.minimum:.12g} ... {self.maximum:.12g}{f' {self.unit}' * (self.unit != '1')}"
+        return ""
+
+    def dtype(self, version: int) -> str:
+        """NumPy's name of its type."""
+        return TYPES[version][self.type]
+
+    def function(self, version: int) -> str:
+        """The end of the names of the functions that get and set it."""
+        return _FUNCTIONS[version].get(self.type, self.type)
+
+
+@dataclass(frozen=True)
+class Model:
+    """An FMU for Co-Simulation."""
+
+    name: str
+    """Of its file."""
+    content: bytes
+    version: int
+    """Of FMI: 2 or 3."""
+    once_per_process: bool
+    """Whether a process holds one instance at most."""
+    variables: Mapping[str, Variable]
+    """By name."""
+
+    def unpack(self, folder: Path) -> Any:
+        """Put the FMU's files into a folder; FMPy's description of it. Raises FileError."""
+        return unpack_fmu(BytesIO(self.content), Path(self.name), folder)
+
+
+def read_model(path: Path) -> Model:
+    """Read an FMU. Raises FileError if it cannot be unpacked, or is not for Co-Simulation of FMI 2.0 or 3.0."""
+    content = read_bytes(path)
+    with temporary_folder("fmu-") as folder:
+        description = unpack_fmu(BytesIO(content), path, Path(folder))
+    version = {"2": 2, "3": 3}.get(description.fmiVersion[:1])
+    if version is None:
+        raise FileError(f"{path}: is of FMI {description.fmiVersion}, and not of 2.0 or 3.0")
+    if description.coSimulation is None:
+        raise FileError(f"{path}: is not for Co-Simulation")
+    variables = {
+        v.name: _variable(v) for v in description.modelVariables if v.type in TYPES[version] and not v.dimensions
+    }
+    once = description.coSimulation.canBeInstantiatedOnlyOncePerProcess
+    return Model(path.name, content, version, bool(once), variables)
+
+
+def unsettable(name: str, has: Mapping[str, Variable]) -> str:
+    """Why no variable of this name can be given a value; nothing where one can."""
+    if name not in has:
+        return unknown(name, has)
+    return "" if has[name].can_be_set else "the FMU computes it, and it cannot be set"
+
+
+def unknown(name: str, names: Mapping[str, object]) -> str:
+    """What is wrong with a name that the FMU has not."""
+    return f"the FMU has no variable {shown(name)} that is a number{did_you_mean(name, names, 3)}"
+
+
+def _variable(v: Any) -> Variable:
+    can_be_set = v.causality == "input" or (v.variability != "constant" and v.initial in ("exact", "approx"))
+    declared = v.declaredType
+    low, high, unit = (getattr(v, key) or getattr(declared, key, None) for key in ("min", "max", "unit"))
+    return Variable(
+        v.name,
+        v.valueReference,
+        v.type,
+        v.causality,
+        can_be_set,
+        v.variability == "continuous",
+        -inf if low is None else float(low),
+        inf if high is None else float(high),
+        unit or "1",
+        _number(v.start),
+        v.description or "",
+    )
+
+
+def _number(start: Any) -> float:
+    """Of what FMPy read of a start value."""
+    try:
+        return float({"true": 1.0, "false": 0.0}.get(str(start), start))
+    except (TypeError, ValueError):
+        return 0.0

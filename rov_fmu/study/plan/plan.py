@@ -1,0 +1,356 @@
+"""The plan of a study: the TOML file that says what is run, what is varied, what is kept and what is computed."""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from itertools import pairwise
+from math import prod
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
+from typing_extensions import Self
+
+from rov_fmu.io.file_kinds import PLAN, check_suffix
+from rov_fmu.io.messages import FileError
+from rov_fmu.io.paths import inside
+from rov_fmu.io.toml_file import Strict, folder_of, line, pair, read_checked
+from rov_fmu.study.plan.figures import read_expression
+from rov_fmu.vehicle.quantity import Finite, not_blank
+
+_MOST_RUNS = 100_000_000
+_MOST_STEPS = 10_000_000
+_MOST_NAMED = 10_000
+"""Variables that a table of a plan gives something of."""
+_ALWAYS = -1e300
+"""A time before any start."""
+
+
+class PlanError(FileError):
+    """A plan that cannot be carried out: a line for each reason."""
+
+
+def _increasing(limits: tuple[float, float]) -> tuple[float, float]:
+    if limits[0] >= limits[1]:
+        raise ValueError("must be [low, high]")
+    return limits
+
+
+def _some(given: tuple[Any, ...]) -> tuple[Any, ...]:
+    if not given:
+        raise ValueError("must have an entry")
+    return given
+
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+_Limits = Annotated[tuple[Finite, Finite], BeforeValidator(pair), AfterValidator(_increasing)]
+_List = Annotated[tuple[Finite, ...], BeforeValidator(pair), AfterValidator(_some)]
+
+
+class Normal(Strict):
+    """A normal distribution, cut off where the FMU's variable has its bounds."""
+
+    mean: Finite
+    """In the variable's unit."""
+    sd: Positive
+    """Standard deviation, in the variable's unit."""
+
+
+class LogNormal(Strict):
+    """The distribution of a positive number whose logarithm is normal, cut off at the variable's bounds."""
+
+    median: Positive
+    """In the variable's unit."""
+    sd: Positive
+    """Standard deviation of the natural logarithm."""
+
+
+class Range(Strict):
+    """Numbers evenly from one to another."""
+
+    first: Finite = Field(alias="from")
+    """The first."""
+    last: Finite = Field(alias="to")
+    """The last."""
+    count: Annotated[int, Field(ge=2, le=1_000_000)]
+    """How many, with both ends."""
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """All of them."""
+        ways = self.count - 1
+        return tuple(((ways - n) * self.first + n * self.last) / ways for n in range(self.count))
+
+
+class Varied(Strict):
+    """How a variable of the FMU differs from run to run: in one of these ways."""
+
+    normal: Normal | None = None
+    """{ mean = ..., sd = ... }."""
+    lognormal: LogNormal | None = None
+    """{ median = ..., sd = ... }, the sd of the logarithm."""
+    uniform: _Limits | None = None
+    """[low, high]."""
+    values: _List | None = None
+    """A list; each is as likely as the others."""
+    range: Range | None = None
+    """{ from = ..., to = ..., count = ... }; each is as likely as the others."""
+
+    @model_validator(mode="after")
+    def _in_one_way(self) -> Self:
+        ways = [key for key in type(self).model_fields if getattr(self, key) is not None]
+        if len(ways) != 1:
+            raise ValueError(f"must have one of {', '.join(type(self).model_fields)}")
+        return self
+
+    @property
+    def choices(self) -> tuple[float, ...] | None:
+        """The numbers of a list or a range."""
+        return self.range.values if self.range else self.values
+
+
+def _held(given: Any) -> Any:
+    """A number alone is held from the start to the end; true and false are 1 and 0."""
+    if isinstance(given, int | float):
+        return {"steps": [[_ALWAYS, float(given)]]}
+    if not isinstance(given, dict | Signal):
+        raise ValueError("must be a number, { steps = [[time, value], ...] } or { ramps = ... }")
+    return given
+
+
+def _as_number(given: Any) -> Any:
+    """true and false are 1 and 0, as a Boolean variable has them."""
+    return float(given) if isinstance(given, bool) else given
+
+
+def _points(given: Any) -> Any:
+    return tuple(map(pair, given)) if isinstance(given, list) else given
+
+
+def _in_order(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    for before, after in pairwise(points):
+        if after[0] < before[0]:
+            raise ValueError(f"the time must not go back, as it does from {before[0]:g} to {after[0]:g}")
+    return points
+
+
+Points = Annotated[
+    tuple[tuple[Finite, Finite], ...], BeforeValidator(_points), AfterValidator(_some), AfterValidator(_in_order)
+]
+"""[time, value] pairs."""
+
+
+class Signal(Strict):
+    """An input over time: held from point to point, or straight from point to point.
+
+    Before its first point it has the start value of the FMU, after its last one the value of that.
+    """
+
+    steps: Points | None = None
+    """[[time, value], ...]: each value is held until the next time; communication points."""
+    ramps: Points | None = None
+    """[[time, value], ...]: straight between them; two of the same time are a jump, at a communication point.
+
+    An FMU takes what a step begins with for all of it: that is the value of the middle of the step.
+    """
+
+    @model_validator(mode="after")
+    def _either(self) -> Self:
+        if (self.steps is None) == (self.ramps is None):
+            raise ValueError("must have either steps or ramps")
+        return self
+
+    @property
+    def points(self) -> tuple[tuple[float, float], ...]:
+        """Of either."""
+        return self.steps or self.ramps or ()
+
+    def jumps(self, before: float) -> Iterator[int]:
+        """The numbers of the points at which the value is another at once; `before` the first one it is this."""
+        last: tuple[float, float] | None = None
+        for n, (time, value) in enumerate(self.points):
+            if value != (last[1] if last else before) and (self.steps or last is None or time == last[0]):
+                yield n
+            last = time, value
+
+
+def _beside(name: str, info: ValidationInfo) -> str:
+    inside(folder_of(info), name)
+    return name
+
+
+_Beside = Annotated[str, AfterValidator(_beside)]
+"""A file in the folder of the plan, or in a folder inside it."""
+
+
+class InputFile(Strict):
+    """Inputs in a CSV file: the time (s) in a column `time`, a variable of the FMU in each other one."""
+
+    path: _Beside
+    """A file beside the plan, or in a folder beside it."""
+    between: Literal["steps", "ramps"] = "ramps"
+    """Whether a row is held until the next one, or is reached on a straight line."""
+
+    @property
+    def is_held(self) -> bool:
+        """Whether rows are held."""
+        return self.between == "steps"
+
+
+def _once(names: tuple[str, ...]) -> tuple[str, ...]:
+    if len(set(names)) < len(names):
+        raise ValueError("must name each once")
+    return names
+
+
+def _ascending(times: tuple[float, ...]) -> tuple[float, ...]:
+    if list(times) != sorted(set(times)):
+        raise ValueError("must be times one after another")
+    return times
+
+
+class Keep(Strict):
+    """The trajectories that are kept; without this table none are, and figures alone remain."""
+
+    outputs: Annotated[tuple[str, ...], BeforeValidator(pair), AfterValidator(_some), AfterValidator(_once)]
+    """Names of variables."""
+    every: Positive | None = None
+    """s, from the start on; a multiple of the step. Every step where neither this nor `at` is given."""
+    at: Annotated[_List, AfterValidator(_ascending)] | None = None
+    """Times instead, s."""
+
+    @model_validator(mode="after")
+    def _not_both(self) -> Self:
+        if self.every is not None and self.at is not None:
+            raise ValueError("must have either every or at")
+        return self
+
+
+def _file(name: str, info: ValidationInfo) -> str:
+    if not os.path.isfile(inside(folder_of(info), name)):  # noqa: PTH113 (Path.is_file raises on names that are too long)
+        raise ValueError("there is no such file beside the plan")
+    return name
+
+
+def _expression(text: str) -> str:
+    read_expression(text)
+    return text
+
+
+class Plan(Strict):
+    """A study: many runs of one FMU."""
+
+    fmu: Annotated[str, AfterValidator(_file)] | None = None
+    """An FMU for Co-Simulation beside the plan, or in a folder beside it; or `vehicle`."""
+    vehicle: _Beside | None = None
+    """A vehicle file beside the plan, or the name of one that ships: its FMU is built for this machine."""
+    start_time: Finite = 0.0
+    """s."""
+    stop_time: Finite
+    """s; a whole number of steps from the start."""
+    step: Positive
+    """Communication step, s: inputs are set, and outputs read, once a step."""
+    tolerance: Positive | None = None
+    """Relative, for an FMU whose solver takes one."""
+    time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = 300.0
+    """s on the clock: a run that takes longer fails."""
+    runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
+    """How many; a grid has as many as it has points. Of sampler saltelli rounded up to a multiple of (number of
+    varied variables + 2), where those that are correlated count as one."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """The parameters of a run depend on this and on the run's number alone."""
+    sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
+    """How the numbers are drawn; saltelli is what Sobol indices are computed from."""
+    vary_from: _Beside | None = None
+    """A vehicle file beside the plan, or the name of a vehicle that ships: its coefficients vary by the errors and
+    correlations that identification wrote there, but for those in [vary] and [set]."""
+    vary: dict[str, Varied] = Field({}, max_length=_MOST_NAMED)
+    """By variable: what differs from run to run. An input that varies is held."""
+    set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({}, max_length=_MOST_NAMED)
+    """By variable: a start value for all runs in place of the FMU's."""
+    inputs: dict[str, Annotated[Signal, BeforeValidator(_held)]] = Field({}, max_length=_MOST_NAMED)
+    """By input: a number, steps or ramps."""
+    input_file: InputFile | None = None
+    """Inputs from a CSV file."""
+    keep: Keep | None = None
+    """Which trajectories are kept."""
+    figures: dict[
+        Annotated[str, AfterValidator(not_blank)],
+        Annotated[str, Field(min_length=1, max_length=2000), AfterValidator(_expression)],
+    ] = Field({})
+    """By name: an expression over the outputs."""
+
+    @property
+    def steps(self) -> int:
+        """Of a run."""
+        return round((self.stop_time - self.start_time) / self.step)
+
+    def step_at(self, time: float) -> int | None:
+        """The number of steps to a time of a run; None where it is not a multiple of the step."""
+        steps = (time - self.start_time) / self.step
+        return round(steps) if _whole(steps) and 0 <= round(steps) <= self.steps else None
+
+    @property
+    def mark(self) -> dict[str, Any]:
+        """What results depend on: the plan in a form that JSON has, without the number of runs where it matters not.
+
+        The numbers of a Latin hypercube depend on how many there are; those of the other samplers do not.
+        """
+        told: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True, exclude_none=True))
+        runs = [] if self.sampler == "latin-hypercube" else ["runs"]
+        for key in ("fmu", "vehicle", "vary_from", "time_limit", *runs):
+            told.pop(key, None)
+        return told
+
+
+def _whole(steps: float) -> bool:
+    """Whether a quotient is a whole number, but for rounding."""
+    return abs(steps - round(steps)) <= 1e-9 * max(1.0, abs(steps))
+
+
+def load_plan(path: Path) -> Plan:
+    """Read a plan; what does not go together in it is told with what does not fit its FMU. Raises PlanError."""
+    check_suffix(path, PLAN, PlanError)
+    plan = read_checked(path, PLAN, Plan, PlanError)
+    if (plan.fmu is None) == (plan.vehicle is None):
+        raise PlanError(*(f"{path}: {words}" for words in ("must have either fmu or vehicle", *nonsense(plan))))
+    return plan
+
+
+def nonsense(plan: Plan) -> Iterator[str]:
+    """What does not go together, in a line each."""
+    if plan.stop_time <= plan.start_time:
+        yield line("stop_time", f"must be after start_time = {plan.start_time:g}", plan.stop_time)
+    elif not _whole((plan.stop_time - plan.start_time) / plan.step):
+        yield line("stop_time", f"must be a whole number of steps of {plan.step:g} s after the start", plan.stop_time)
+    elif plan.steps > _MOST_STEPS:
+        yield line("step", f"must divide a run into at most {_MOST_STEPS} steps", plan.step)
+    elif plan.keep:
+        yield from _unreachable(plan, plan.keep)
+    if plan.sampler == "grid" and plan.runs is not None:
+        yield line("runs", "a grid has as many as it has points; leave this out", plan.runs)
+    if plan.sampler == "grid" and (points := prod(len(way.choices or ()) for way in plan.vary.values())) > _MOST_RUNS:
+        yield line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {points:.3g}")
+    if plan.sampler != "grid" and plan.runs is None:
+        yield "runs: this key is missing"
+    if not plan.keep and not plan.figures:
+        yield "must have [keep] or [figures], or nothing remains of a run"
+
+
+def _unreachable(plan: Plan, keep: Keep) -> Iterator[str]:
+    """Times to keep that no step ends at."""
+    if keep.every is not None and not _whole(keep.every / plan.step):
+        yield line("keep.every", f"must be a multiple of step = {plan.step:g}", keep.every)
+    elif keep.every is not None and keep.every > plan.stop_time - plan.start_time:
+        yield line("keep.every", "must not be longer than a run", keep.every)
+    for time in keep.at or ():
+        if plan.step_at(time) is None:
+            told = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
+            yield line("keep.at", told, list(keep.at or ()))
+            return
+
+
+def digest(content: bytes) -> str:
+    """SHA-256."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,256 @@
+"""A plan put together with its FMU: what does not fit in words, and what the workers must know."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+import numpy.typing as npt
+
+from rov_fmu.io.messages import FileError, did_you_mean, lines_on, shown
+from rov_fmu.io.reading import read_text
+from rov_fmu.io.time_series import series
+from rov_fmu.io.toml_file import line
+from rov_fmu.study.plan.estimates import Estimates
+from rov_fmu.study.plan.expression import CONSTANTS
+from rov_fmu.study.plan.expression import TIME as TIMES
+from rov_fmu.study.plan.figures import meaning, read_expression, unusable
+from rov_fmu.study.plan.model import Model, Variable, unknown, unsettable
+from rov_fmu.study.plan.plan import Plan, PlanError, Signal, Varied, nonsense
+from rov_fmu.study.plan.sampling import Design
+from rov_fmu.study.run.simulator import Manoeuvre
+from rov_fmu.study.run.worker import REASON, RUN, STATUS, TIME, Job
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A plan that fits its FMU."""
+
+    plan: Plan
+    job: Job
+    design: Design
+    mark: Mapping[str, Any]
+    """What results depend on."""
+    warnings: Sequence[str]
+    """What they have in them that a reader may not expect, in sentences."""
+
+
+def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
+    """See that a plan, read from a path, fits an FMU. Raises PlanError with every reason."""
+    vehicle = load_vehicle(vehicle_file("vary_from", plan.vary_from, path)) if plan.vary_from else None
+    estimates = Estimates(plan, vehicle, model.variables)
+    own, from_file, unread = [*nonsense(plan)], {}, []
+    try:
+        from_file = _file_inputs(plan, path, model)
+    except FileError as error:
+        unread = [str(error)]
+    times = np.zeros(0) if own else _times(plan)
+    words = [*own, *estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file, times)]
+    wrong = lines_on(path, words) + unread
+    if plan.input_file:
+        file = path.parent / plan.input_file.path
+        wrong += [f"{file}: {told}" for told in _wrong_rows(plan, model.variables, from_file)]
+    if wrong:
+        raise PlanError(*wrong)
+    design = Design(plan, model.variables, estimates.known)
+    middles = times[:-1] + 0.5 * plan.step
+    signals = {**plan.inputs, **from_file}
+    inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in signals.items()}
+    kept = plan.keep.outputs if plan.keep else ()
+    named = {name for text in plan.figures.values() for name in read_expression(text).names} & model.variables.keys()
+    recorded = [*dict.fromkeys([*kept, *sorted(named - {*design.names})])]
+    manoeuvre = Manoeuvre(
+        plan.start_time, plan.step, plan.steps, plan.tolerance, plan.set, design.names, inputs, recorded
+    )
+    mark = {
+        **plan.mark,
+        **estimates.mark,
+        "vary": [
+            [name, way.model_dump(by_alias=True, mode="json", exclude_none=True)] for name, way in plan.vary.items()
+        ],
+        "inputs": {name: signal.model_dump(mode="json", exclude_none=True) for name, signal in signals.items()},
+    }
+    mark.pop("input_file", None)
+    job = Job(f"rov-fmu-{uuid4().hex}", model, manoeuvre, plan.figures, kept, _kept_points(plan), plan.time_limit)
+    return Prepared(plan, job, design, mark, [*estimates.warnings(), *design.warnings()])
+
+
+def vehicle_file(key: str, given: str, path: Path) -> Path:
+    """What a key of the plan at a path names: a vehicle file beside the plan, or one that ships. Raises PlanError."""
+    beside = path.parent / given
+    if beside.is_file():
+        return beside
+    if given not in SHIPPED:
+        ships = ", ".join(SHIPPED)
+        told = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
+        raise PlanError(f"{path}: {line(key, told, given)}{did_you_mean(given, SHIPPED)}")
+    return SHIPPED[given]
+
+
+def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
+    if not plan.input_file:
+        return {}
+    file = path.parent / plan.input_file.path
+
+    def error(reason: str) -> FileError:
+        return FileError(f"{file}: {reason}")
+
+    def check_column(name: str) -> None:
+        if name not in model.variables:
+            raise error(unknown(name, model.variables))
+
+    (_, times), *columns = series(read_text(file), error, check_column).items()
+    found = {}
+    for name, values in columns:
+        points = tuple(zip(times, values, strict=True))
+        held = plan.input_file.is_held or not model.variables[name].is_continuous
+        found[name] = Signal(steps=points) if held else Signal(ramps=points)
+    return found
+
+
+# ---- What does not fit -----------------------------------------------------------------------------------------------
+
+
+def _nonsense(
+    plan: Plan, model: Model, known: Sequence[str], from_file: Mapping[str, Signal], times: Array
+) -> Iterator[str]:
+    """A line each; `known` varies besides [vary]."""
+    has = model.variables
+    for name, way in plan.vary.items():
+        key = f"vary.{name}"
+        if reason := unsettable(name, has):
+            yield line(key, reason)
+        elif name in plan.set or name in plan.inputs or name in from_file:
+            yield line(key, "is given in [set] or [inputs] too")
+        else:
+            yield from (line(key, reason, value) for reason, value in _beyond(way, has[name], plan.sampler == "grid"))
+    if not (known or plan.vary or plan.vary_from) and plan.sampler != "grid":
+        yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
+    for name, value in plan.set.items():
+        if reason := unsettable(name, has) or has[name].wrong(value):
+            yield line(f"set.{name}", reason, value)
+    yield from _wrong_inputs(plan, has)
+    for name in plan.keep.outputs if plan.keep else ():
+        if name not in has:
+            yield line("keep.outputs", unknown(name, has))
+    yield from _wrong_figures(plan, has, {*known, *plan.vary}, times)
+
+
+def _beyond(way: Varied, variable: Variable, is_grid: bool) -> Iterator[tuple[str, Any]]:
+    """What cannot be of a distribution: the reason and the value."""
+    if is_grid and way.choices is None:
+        yield "a grid needs values or a range", way.model_dump(exclude_none=True)
+        return
+    numbers = way.choices or way.uniform or ((way.normal.mean,) if way.normal else ())
+    numbers = numbers or ((way.lognormal.median,) if way.lognormal else ())
+    for value in numbers:
+        if reason := variable.wrong(value):
+            yield reason, value
+            return
+
+
+def _wrong_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
+    for name, signal in plan.inputs.items():
+        key = f"inputs.{name}"
+        if name not in has:
+            yield line(key, unknown(name, has))
+        elif reason := _no_input(name, plan, has):
+            yield line(key, reason)
+        elif signal.ramps and not has[name].is_continuous:
+            yield line(key, "must be steps, for it is not continuous")
+        else:
+            points = signal.points
+            yield from (line(key, reason, points[n][1]) for n, reason in _beyond_bounds(signal, has[name]))
+            yield from (line(key, reason, [*points[n]]) for n, reason in _between(signal, plan, has[name].start))
+
+
+def _wrong_rows(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
+    """The same of the inputs in a file, by its columns and rows."""
+    for name, signal in from_file.items():
+        column, points = f"column {shown(name)}", signal.points
+        if reason := "is given in [inputs] too" if name in plan.inputs else _no_input(name, plan, has):
+            yield f"{column}: {reason}"
+        else:
+            for n, reason in (*_beyond_bounds(signal, has[name]), *_between(signal, plan, has[name].start)):
+                yield f"row {n + 1}, {column} = {points[n][1]:g} at {points[n][0]:g} s: {reason}"
+
+
+def _no_input(name: str, plan: Plan, has: Mapping[str, Variable]) -> str:
+    if has[name].causality != "input":
+        return f"is no input of the FMU; its causality is {has[name].causality}"
+    return "is given in [set] too" if name in plan.set else ""
+
+
+def _beyond_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, str]]:
+    """The number of the first point whose value cannot be, and why."""
+    for n, (_, value) in enumerate(signal.points):
+        if reason := variable.wrong(value):
+            yield n, reason
+            return
+
+
+def _between(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, str]]:
+    """The number of the first point with a jump that no step begins with, for it would come late, and why not."""
+    for n in signal.jumps(before):
+        time = signal.points[n][0]
+        if plan.start_time < time < plan.stop_time and plan.step_at(time) is None:
+            was = signal.points[n - 1][1] if n else before
+            told = (
+                f"a jump, as from {was:g} here, must be at a communication point, a multiple of step = {plan.step:g} s"
+            )
+            yield n, f"{told} after the start"
+            return
+
+
+def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], times: Array) -> Iterator[str]:
+    for name, text in plan.figures.items():
+        if name in {RUN, STATUS, REASON} | varied:
+            yield line(f"figures.{name}", "the results have another column of this name")
+            continue
+        names = read_expression(text).names
+        if strange := sorted(names - CONSTANTS.keys() - {TIMES} - has.keys()):
+            told = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
+            yield line(f"figures.{name}", meaning(strange[0]) or told, text)
+        elif reason := unusable(text, has, varied, times):
+            if reason.startswith("TypeError") and (numbers := names & varied):
+                reason += f"; {min(numbers)} varies, and what varies is a number"
+            yield line(f"figures.{name}", reason, text)
+    if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
+        yield line("keep.outputs", f"the results have another column {taken.pop()}")
+
+
+# ---- Over time -------------------------------------------------------------------------------------------------------
+
+
+def _times(plan: Plan) -> Array:
+    """Of the communication points, s."""
+    return plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
+
+
+def _kept_points(plan: Plan) -> Sequence[int]:
+    if plan.keep is None:
+        return ()
+    if plan.keep.at:
+        return [n for time in plan.keep.at if (n := plan.step_at(time)) is not None]
+    stride = round(plan.keep.every / plan.step) if plan.keep.every else 1
+    return range(0, plan.steps + 1, stride)
+
+
+def _sampled(signal: Signal, times: Array, before: float) -> Array:
+    """The signal at the middle of each step, which held over the step is exact to second order of it."""
+    at, values = np.array(signal.points, np.float64).T
+    place = np.searchsorted(at, times, side="right") - 1
+    found: Array = np.where(place >= 0, values[np.maximum(place, 0)], before)
+    if signal.steps:
+        return found
+    inside = (place >= 0) & (place < len(at) - 1)
+    n = place[inside]
+    share = (times[inside] - at[n]) / (at[n + 1] - at[n])
+    found[inside] = values[n] + share * (values[n + 1] - values[n])
+    return found

@@ -1,0 +1,128 @@
+"""The folder of a study's results: what it belongs to, and Parquet files, each of them whole."""
+
+import json
+import re
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rov_fmu import __version__
+from rov_fmu.io.interrupts import cleaned_up
+from rov_fmu.io.messages import FileError
+from rov_fmu.io.output import Output, WriteError, write_whole
+from rov_fmu.io.reading import read_text
+
+STUDY, RUNS, TRAJECTORIES = "study.json", "runs", "trajectories"
+_FORMAT = 1
+_LOCK = ".lock"
+_PART = re.compile(r"part-(\d{9,})-(\d{9,})\.parquet")
+
+
+class Store:
+    """A folder of results; a range of runs is there as soon as its file in runs/ is."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Make the folder, for this process alone; it goes where no run came into it. Raises FileError, WriteError."""
+        import locket
+
+        is_new = not self.folder.exists()
+        try:
+            for each in (self.folder, self.folder / RUNS, self.folder / TRAJECTORIES):
+                each.mkdir(exist_ok=True)
+            lock = locket.lock_file(str(self.folder / _LOCK), timeout=0)
+            try:
+                lock.acquire()
+            except locket.LockError:
+                raise FileError(f"{self.folder}: another study is writing there") from None
+        except OSError as error:
+            raise WriteError(error.errno, error.strerror, str(error.filename or self.folder)) from error
+
+        def leave() -> None:
+            if is_new and not self.done():
+                shutil.rmtree(self.folder, ignore_errors=True)
+            lock.release()
+
+        with cleaned_up(leave, "the same command continues the study"):
+            yield
+
+    def belongs_to(
+        self,
+        plan: Mapping[str, Any],
+        fmu: str,
+        vehicle: str | None,
+        runs: int,
+        columns: Mapping[str, Sequence[str]],
+        **more: Any,
+    ) -> None:
+        """See that what is there is of this plan and FMU (its digest), and write down that it is, with more on it.
+
+        A vehicle is what the FMU was built of for the study. Raises FileError, WriteError.
+        """
+        path = self.folder / STUDY
+        mark = {"plan": dict(plan), "fmu": fmu}
+        if self.done() and path.exists():
+            there = self.description()
+            if there["fmu"] != fmu:
+                why = f", for the vehicle {vehicle} has changed, or rov-fmu, which builds it" if vehicle else ""
+                raise FileError(f"{self.folder}: holds runs of another FMU{why}: choose another folder")
+            keys = {*there["plan"], *plan}
+            if changed := sorted(key for key in keys if there["plan"].get(key) != plan.get(key)):
+                raise FileError(
+                    f"{self.folder}: holds runs of another plan ({', '.join(changed)} changed): choose another folder"
+                )
+        elif self.done():
+            raise FileError(f"{self.folder}: holds runs without {STUDY}, which tells what they are of")
+        if (end := max((end for _, end in self.done()), default=0)) > runs:
+            raise FileError(f"{self.folder}: holds runs up to number {end - 1}, and the plan has {runs} alone")
+        self._clean()
+        head = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", "runs": runs}
+        text = json.dumps({**head, **mark, "columns": columns, **more}, indent=2, ensure_ascii=False)
+        write_whole(Output(path, f"{text}\n".encode()))
+
+    def description(self) -> dict[str, Any]:
+        """What the folder belongs to. Raises FileError."""
+        path = self.folder / STUDY
+        if not self.folder.is_dir():
+            raise FileError(f"{self.folder}: there is no such folder")
+        try:
+            found = json.loads(read_text(path))
+            known = isinstance(found, dict) and found.get("format") == _FORMAT
+        except ValueError:
+            known = False
+        if not known:
+            raise FileError(f"{path}: is not the description of a study, or of another version of this tool")
+        return dict(found)
+
+    def done(self) -> list[tuple[int, int]]:
+        """The ranges of runs that are there, from the first to the one after the last, in order."""
+        names = (_PART.fullmatch(path.name) for path in (self.folder / RUNS).iterdir())
+        return sorted((int(name[1]), int(name[2]) + 1) for name in names if name)
+
+    def missing(self, runs: int) -> list[tuple[int, int]]:
+        """The ranges that are not there."""
+        found, begin = [], 0
+        for first, end in [*self.done(), (runs, runs)]:
+            if first > begin:
+                found.append((begin, first))
+            begin = max(begin, end)
+        return found
+
+    def write(self, first: int, end: int, runs: bytes, trajectories: bytes | None) -> None:
+        """Put the rows of some runs there, whole or not at all. Raises WriteError."""
+        name = f"part-{first:09d}-{end - 1:09d}.parquet"
+        outputs = [Output(self.folder / TRAJECTORIES / name, trajectories)] if trajectories is not None else []
+        write_whole(*outputs, Output(self.folder / RUNS / name, runs))
+
+    def _clean(self) -> None:
+        """Without what a process left that was killed as it wrote."""
+        there = {path.name for path in (self.folder / RUNS).iterdir()}
+        for folder in (self.folder / RUNS, self.folder / TRAJECTORIES):
+            for path in folder.iterdir():
+                if path.name.startswith(".part-") or (_PART.fullmatch(path.name) and path.name not in there):
+                    path.unlink()

@@ -1,0 +1,40 @@
+"""What the command line tells of a study when it has ended."""
+
+import numpy as np
+from rich.text import Text
+
+from rov_fmu.report.console import console, table, text
+from rov_fmu.report.templates import pretty_unit
+from rov_fmu.study.results.results import Results
+from rov_fmu.study.run.cluster import Spent
+from rov_fmu.study.run.worker import REASON
+
+_SHOWN = (0.05, 0.5, 0.95)
+_FAILURES = 5
+"""Reasons that are shown, the most frequent first."""
+
+
+def print_summary(results: Results, spent: Spent) -> None:
+    """How many runs, how fast, the figures' quantiles, and why runs failed or figures are missing."""
+    out, runs = console(), results.runs
+    counts = f"{len(runs)} runs, {len(results.failed)} failed, {len(results.incomplete)} incomplete"
+    out.print(Text.assemble((str(results.folder), "bold"), f"  {counts}"))
+    if spent.runs:
+        rate = spent.runs / max(spent.elapsed, 1e-3)
+        often = f"{rate:.0f}" if rate >= 10.0 else f"{rate:.2g}"
+        out.print(f"  {spent.runs} of them now, in {spent.elapsed:.1f} s; {often} a second")
+    if results.figures:
+        shown = table("", "figure", [*(f"{q:.0%}" for q in _SHOWN), "mean", "runs"])
+        for name in results.figures:
+            values = runs[name].to_numpy(float)
+            there = values[np.isfinite(values)]
+            numbers = [*np.quantile(there, _SHOWN), there.mean()] if there.size else [np.nan] * (len(_SHOWN) + 1)
+            unit = results.figure_units[name]
+            told = name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})"
+            shown.add_row(told, *(text(number, ".5g") for number in numbers), str(there.size))
+        out.print(shown)
+    reasons = runs[REASON].value_counts()
+    for reason, count in reasons.head(_FAILURES).items():
+        out.print(f"  {count} runs: {reason}", soft_wrap=True)
+    if len(others := reasons[_FAILURES:]):
+        out.print(f"  {others.sum()} runs: other reasons ({len(others)}), which are on the page", soft_wrap=True)

@@ -1,0 +1,303 @@
+"""Runs of an FMU for Co-Simulation, many in one instance, by the functions of its library and arrays made once."""
+
+import ctypes
+import os
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock, local
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rov_fmu.io.messages import brief
+from rov_fmu.study.plan.model import TYPES, Model, Variable
+
+Array = npt.NDArray[np.float64]
+_WARNING = 1
+_FATAL = 4
+_STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
+"""By number, in every version of FMI."""
+
+
+class RunError(Exception):
+    """A run that the FMU does not do: the reason in a line."""
+
+
+class LoadError(Exception):
+    """An FMU of which there is no instance on this machine."""
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """What every run has in common."""
+
+    start: float
+    step: float
+    """Communication step, s."""
+    steps: int
+    tolerance: float | None
+    set: Mapping[str, float]
+    """Start values by variable."""
+    varied: Sequence[str]
+    """Variables that are set to other values in each run."""
+    inputs: Mapping[str, Array]
+    """By variable: a value for each step, set at its beginning."""
+    recorded: Sequence[str]
+    """Variables that are read after every step, and once before."""
+
+    @property
+    def times(self) -> Array:
+        """Of the communication points, s."""
+        return self.start + self.step * np.arange(self.steps + 1, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Variables of one type, and numbers for them: a row of the table for each point of time, or one row."""
+
+    get: Callable[..., int]
+    set: Callable[..., int]
+    names: Sequence[str]
+    references: Any
+    table: npt.NDArray[Any]
+
+    @property
+    def call(self) -> tuple[int, int, int, int]:
+        """Address of the references, their number, address of the first row, bytes a row."""
+        return self.references.ctypes.data, len(self.names), self.table.ctypes.data, self.table.strides[0]
+
+
+class Simulator:
+    """An instance of an unpacked FMU; for one thread at a time. Raises LoadError."""
+
+    def __init__(self, folder: str, description: Any, model: Model, manoeuvre: Manoeuvre) -> None:
+        self._folder, self._description, self._manoeuvre, self._version = folder, description, manoeuvre, model.version
+        self._logs = False
+        self._fmu = self._instantiate()
+        self._functions = _functions(self._fmu.dll, model.version)
+        self._times: list[float] = manoeuvre.times.tolist()
+        make, points, variables = self._groups, manoeuvre.steps + 1, model.variables
+        started = [*manoeuvre.set, *manoeuvre.varied]
+        self._start = make([variables[name] for name in started], 1)
+        self._inputs = make([variables[name] for name in manoeuvre.inputs], manoeuvre.steps)
+        self._reads = make([variables[name] for name in manoeuvre.recorded], points)
+        for group in self._start:
+            for column, name in enumerate(group.names):
+                if name in manoeuvre.set:
+                    group.table[0, column] = manoeuvre.set[name]
+        for group in self._inputs:
+            for column, name in enumerate(group.names):
+                group.table[:, column] = manoeuvre.inputs[name]
+        self._places = {name: (group, n) for group in self._start for n, name in enumerate(group.names)}
+        self._changes = self._changing()
+
+    def run(self, values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
+        """Every recorded variable at every communication point, for these values of what varies.
+
+        The arrays are those of the next run too. Raises RunError.
+        """
+        try:
+            self._run(values)
+        except _FailedError as failed:
+            reason = str(failed)
+            if not self._logs:
+                reason = self._with_message(values) or reason
+            self.renew()
+            raise RunError(brief(reason, 240)) from failed
+        return {name: group.table[:, n] for group in self._reads for n, name in enumerate(group.names)}
+
+    def reset(self) -> None:
+        """Make ready for the next run; with an instance of its own where the FMU cannot be reset."""
+        reset, terminate = self._functions["Reset"], self._functions["Terminate"]
+        if terminate(self._fmu.component) > _WARNING or reset(self._fmu.component) > _WARNING:
+            self.renew()
+
+    def renew(self) -> None:
+        """Go on with another instance."""
+        self.free()
+        self._fmu = self._instantiate()
+
+    def free(self) -> None:
+        """End the instance. The library stays: to load one again has crashed processes."""
+        if self._fmu.component is not None:
+            self._functions["FreeInstance"](self._fmu.component)
+            self._fmu.component = None
+
+    def _run(self, values: Sequence[float]) -> None:
+        m, functions, component = self._manoeuvre, self._functions, self._fmu.component
+        for name, value in zip(m.varied, values, strict=True):
+            group, column = self._places[name]
+            group.table[0, column] = value
+        for group in self._start:
+            references, count, address, _ = group.call
+            _check(group.set(component, references, count, address), "setting the start values")
+        self._initialize()
+        reads = [(group.get, *group.call) for group in self._reads]
+        for get, references, count, address, _ in reads:
+            _check(get(component, references, count, address), "reading", m.start)
+        do_step, times, step = functions["DoStep"], self._times, m.step
+        for n in range(m.steps):
+            for put, references, count, address in self._changes.get(n, ()):
+                if (status := put(component, references, count, address)) > _WARNING:
+                    _check(status, "setting the inputs", times[n])
+            if (status := do_step(component, times[n], step, True)) > _WARNING:
+                _check(status, "the step", times[n])
+            for get, references, count, address, row in reads:
+                if (status := get(component, references, count, address + (n + 1) * row)) > _WARNING:
+                    _check(status, "reading", times[n + 1])
+
+    def _initialize(self) -> None:
+        m, component = self._manoeuvre, self._fmu.component
+        has_tolerance, tolerance = m.tolerance is not None, m.tolerance or 0.0
+        enter, leave = (self._functions[f"{way}InitializationMode"] for way in ("Enter", "Exit"))
+        if self._version == 2:
+            setup = self._functions["SetupExperiment"]
+            _check(setup(component, has_tolerance, tolerance, m.start, True, self._times[-1]), "setting it up")
+            _check(enter(component), "initialization")
+        else:
+            _check(enter(component, has_tolerance, tolerance, m.start, True, self._times[-1]), "initialization")
+        for put, references, count, address in self._changes.get(0, ()):
+            _check(put(component, references, count, address), "setting the inputs", m.start)
+        _check(leave(component), "initialization")
+
+    def _changing(self) -> dict[int, list[tuple[Callable[..., int], int, int, int]]]:
+        """By step: the inputs that are another then than before, as the calls that set them."""
+        found = defaultdict(list)
+        for group in self._inputs:
+            references, count, address, row = group.call
+            differs = np.any(group.table[1:] != group.table[:-1], axis=1)
+            for n in [0, *(np.flatnonzero(differs) + 1).tolist()]:
+                found[n].append((group.set, references, count, address + n * row))
+        return dict(found)
+
+    def _groups(self, variables: Sequence[Variable], rows: int) -> list[_Group]:
+        by_type = defaultdict(list)
+        for variable in variables:
+            by_type[variable.type].append(variable)
+        return [
+            _Group(
+                self._functions[f"Get{some[0].function(self._version)}"],
+                self._functions[f"Set{some[0].function(self._version)}"],
+                [variable.name for variable in some],
+                np.array([variable.reference for variable in some], np.uint32),
+                np.zeros((rows, len(some)), some[0].dtype(self._version)),
+            )
+            for some in by_type.values()
+        ]
+
+    def _instantiate(self) -> Any:
+        import fmpy.simulation
+
+        _TOLD.last = ""
+        try:
+            with _loading():
+                return fmpy.simulation.instantiate_fmu(
+                    self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=_keep
+                )
+        except Exception as error:  # FMPy raises that itself
+            what = str(error).replace(self._folder + os.sep, "").rstrip(".")
+            raise LoadError(brief(f"{what}{self._message()}", 240)) from error
+
+    def _message(self) -> str:
+        """The FMU's last warning, or nothing."""
+        return f"; the FMU: {_TOLD.last}" if getattr(_TOLD, "last", "") else ""
+
+    def _with_message(self, values: Sequence[float]) -> str:
+        """Why a run fails, with the FMU's last warning: it is done once more, with messages on."""
+        self._logs = True
+        self.renew()
+        try:
+            self._run(values)
+        except _FailedError as failed:
+            return f"{failed}{self._message()}"
+        finally:
+            self._logs = False
+        return ""
+
+
+_ONE_ONLY = Lock()
+
+
+@contextmanager
+def _loading() -> Iterator[None]:
+    """One thread at a time: FMPy takes the process to the library's folder, and not back where it cannot be loaded."""
+    with _ONE_ONLY:
+        here = Path.cwd()
+        try:
+            yield
+        finally:
+            os.chdir(here)
+
+
+_TOLD = local()
+"""The last warning of an FMU, by the thread that called it: FMPy hands those of all to whom it was asked to last."""
+
+
+def _keep(*told: Any) -> None:
+    """A message of an FMU: its last arguments are the same in every version of FMI."""
+    status, _, text = told[-3:]
+    if status >= _WARNING:
+        _TOLD.last = (text or b"").decode(errors="replace")
+
+
+class _FailedError(Exception):
+    """A call of the FMU that did not do what was asked."""
+
+
+def _check(status: int, what: str, time: float | None = None) -> None:
+    if status > _WARNING:
+        word = _STATUS[status] if status < len(_STATUS) else f"status {status}"
+        raise _FailedError(f"{what}{'' if time is None else f' at {time:.6g} s'}: {word}")
+
+
+def _functions(library: Any, version: int) -> dict[str, Callable[..., int]]:
+    """By name without the version: arrays are given by their address, which FMPy's prototypes would not take."""
+    pointer, number, size, whole = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
+    flag = whole if version == 2 else ctypes.c_bool
+
+    def typed(name: str, *arguments: Any, result: Any = whole) -> Any:
+        function = library[f"fmi{version}{name}"]  # another object at each look, whose prototype is its own
+        function.argtypes, function.restype = (pointer, *arguments), result
+        return function
+
+    found = {name: typed(name) for name in ("Reset", "Terminate", "ExitInitializationMode")}
+    found["FreeInstance"] = typed("FreeInstance", result=None)
+    experiment = (flag, number, number, flag, number)
+    if version == 2:
+        found["SetupExperiment"] = typed("SetupExperiment", *experiment)
+        found["EnterInitializationMode"] = typed("EnterInitializationMode")
+        found["DoStep"] = typed("DoStep", number, number, whole)
+        kinds = ("Real", "Integer", "Boolean")
+        return found | {
+            f"{way}{kind}": typed(f"{way}{kind}", pointer, size, pointer) for way in ("Get", "Set") for kind in kinds
+        }
+    found["EnterInitializationMode"] = typed("EnterInitializationMode", *experiment)
+    found["DoStep"] = _step_of_3(typed("DoStep", number, number, flag, *[pointer] * 4))
+    for kind in TYPES[3].keys() - {"Enumeration"}:
+        for way in ("Get", "Set"):
+            found[f"{way}{kind}"] = _sized(typed(f"{way}{kind}", pointer, size, pointer, size))
+    return found
+
+
+def _sized(function: Callable[..., int]) -> Callable[..., int]:
+    """A function of FMI 3.0 for scalars, which have as many values as references."""
+    return lambda component, references, count, values: function(component, references, count, values, count)
+
+
+def _step_of_3(function: Callable[..., int]) -> Callable[..., int]:
+    flags = (ctypes.c_bool * 3)()
+    last = ctypes.c_double()
+    event, ends, early = (ctypes.addressof(flags) + n for n in range(3))
+    reached = ctypes.addressof(last)
+
+    def step(component: int, time: float, length: float, no_return: bool) -> int:
+        status = function(component, time, length, no_return, event, ends, early, reached)
+        if flags[1]:
+            raise _FailedError(f"the FMU ended the run at {last.value:.6g} s")
+        return status
+
+    return step

@@ -1,0 +1,74 @@
+"""The page that compares the vehicles with their publications: its tables against numbers computed here or printed."""
+
+import re
+from math import sqrt
+
+import pytest
+
+from docs.compared import MANOEUVRE, Table, fly, tables, without
+from rov_fmu.io.toml_file import read_toml
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+from tests.commands import ROOT
+
+
+@pytest.fixture(scope="module")
+def computed() -> dict[str, Table]:
+    return tables()
+
+
+def numbers(row: tuple[str, ...]) -> list[float]:
+    """Of the cells of a row after its first, those that begin with one."""
+    cells = (re.match(r"[+-]?\d+(\.\d+)?", cell) for cell in row[1:])
+    return [float(cell[0]) for cell in cells if cell]
+
+
+def test_the_page_has_all_tables_and_no_other(computed: dict[str, Table]) -> None:
+    page = (ROOT / "docs" / "vehicles.md").read_text(encoding="utf-8")
+    assert re.findall(r"\{\{ (\S+) \}\}", page) == list(computed)
+    for name, table in computed.items():
+        assert len(table) > 3, name
+        assert {len(row) for row in table} == {len(table[0])}, name
+    assert all(f"`{name}`" in page for name in SHIPPED)
+
+
+def test_videoray_is_as_far_from_the_tables_as_the_design_says(computed: dict[str, Table]) -> None:
+    heave, yaw, surge = computed["videoray_printed"][2:]
+    assert numbers(heave) == [4.4, 14.3, 2.9, -5.7]
+    assert numbers(yaw) == [0.2, 4.0, -4.7, 3.4]
+    assert not numbers(surge), "Table 8 is lost"
+    assert [numbers(row)[0] for row in computed["videoray_measured"][2:]] == [-13.5, -21.8, 21.8]
+
+
+def test_thrust_is_as_far_from_the_makers_points_as_the_design_says(computed: dict[str, Table]) -> None:
+    shipped, symmetric = computed["t200"][2:]
+    assert numbers(shipped)[:2] == pytest.approx([0.30, 0.32], abs=0.011)
+    assert numbers(symmetric)[:2] == pytest.approx([2.93, 2.93], abs=0.021)  # every third of the points
+
+
+@pytest.mark.parametrize("column", [1, 2])
+def test_top_speeds_balance_thrust_and_drag(computed: dict[str, Table], column: int) -> None:
+    file = read_toml(SHIPPED[["bluerov2", "bluerov2_heavy"][column - 1]], VehicleFileError)
+    k = {key: q["value"] for key, q in file["curves"]["t200"].items() if key != "description"}
+    m = 1.0 - k["c_0"]
+    strong, weak = (k["a_t" + end] * m * m + k["b_t" + end] * m for end in ("", "_reverse"))
+    pairs, verticals = 2.0 * (strong + weak), len(file["thruster"]) - 4
+    arm = (0.156 + 0.111) / sqrt(2.0)
+    forces = [pairs / sqrt(2.0)] * 4 + [verticals * strong, -verticals * weak] + [pairs * arm] * 2
+    for n, row in enumerate(computed["top_speeds"][2:10]):
+        axis = file["axes"][["surge", "sway", "heave", "yaw"][n // 2]]
+        force = abs(forces[n] + axis.get("F_0", {"value": 0.0})["value"])
+        a, b = axis["a_d"]["value"], axis["b_d"]["value"]
+        assert numbers(row)[column - 1] == pytest.approx((sqrt(b * b + 4.0 * a * force) - b) / (2.0 * a), abs=0.006), (
+            row
+        )
+
+
+def test_what_is_left_out_is_left_out() -> None:
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    bare = without(rov, coupling=True, lag=True, shape=True)
+    assert sum(seconds for seconds, _ in MANOEUVRE) == 30.0
+    assert (not rov.layout.coupled, bool(rov.layout.lagging), rov["c_0_t200"]) == (False, True, 0.0872)
+    assert (not bare.layout.coupled, bool(bare.layout.lagging), "c_0_t200" in bare.coefficients) == (True, False, False)
+    assert bare.curve_force(bare.layout.curves[0], -0.5) == -bare.curve_force(bare.layout.curves[0], 0.5)
+    assert fly(without(rov)) == fly(rov)

@@ -1,0 +1,348 @@
+"""What README and documentation say holds: commands run, options exist, links lead somewhere, the site builds."""
+
+import os
+import re
+import runpy
+import shlex
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import redirect_stdout
+from functools import cache
+from importlib.util import find_spec
+from io import BytesIO, StringIO, TextIOWrapper
+from math import hypot, pi, sin
+from pathlib import Path
+
+import pytest
+import tomlkit
+
+from docs import reference
+from rov_fmu import __version__
+from rov_fmu.cli import main
+from rov_fmu.model.layout import ARM, AXIS, BODY, CURVE, TUNING
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import ROOT
+from tests.vehicles import VEHICLES
+
+State = dict[str, float]
+
+WEEKLY = ".github/workflows/weekly.yml"
+README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
+PAGES = [
+    *(README, ROOT / "CONTRIBUTING.md", CHANGELOG),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "models").rglob("README.md")),
+    *sorted((ROOT / "examples").rglob("README.md")),
+]
+PROGRAMS = ("rov-fmu ", "python build_fmu.py", "python -m ")
+HOLDS_COMMANDS = re.compile(r"(?:rov-fmu|fmpy|cat|mkdir|python -m examples\.(?:tank_tests|dive_log)) ")
+HERE_DOCUMENT = re.compile(r"(?<=<<END\n).*?^END$", re.MULTILINE | re.DOTALL)
+
+
+def name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    text = page.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def lines(block: str) -> list[str]:
+    """The commands of a block, without the files they make."""
+    return HERE_DOCUMENT.sub("", block).replace("\\\n", " ").strip().splitlines()
+
+
+def runnable(page: Path) -> list[str]:
+    """The blocks that need neither network nor anything installed but this package."""
+    return [
+        block for block in blocks(page, "sh") if all(HOLDS_COMMANDS.match(line) for line in filter(None, lines(block)))
+    ]
+
+
+def commands(page: Path) -> Iterator[list[str]]:
+    """The words of every command of ours, in blocks and in running text."""
+    inline = re.findall(r"(?<!`)`([^`\n]+)`(?!`)", page.read_text(encoding="utf-8"))
+    for line in [*inline, *(line for block in blocks(page, "sh") for line in lines(block))]:
+        for command in line.split("#")[0].split("&&"):
+            if command.strip().startswith(PROGRAMS) and "|" not in command and "<" not in command:
+                yield shlex.split(command)
+
+
+@cache
+def usage(command: tuple[str, ...]) -> str:
+    """What --help says."""
+    if command[1:2] == ("rov_fmu",) or command == ("build_fmu.py",):
+        said = StringIO()
+        with redirect_stdout(said):
+            assert main([*(command[2:] or ["build"]), "--help"]) == 0
+        return said.getvalue()
+    # in this process, which has imported most of what they need
+    printed, code = BytesIO(), None
+    text = TextIOWrapper(printed, encoding="utf-8", write_through=True)
+    with warnings.catch_warnings(), redirect_stdout(text), pytest.MonkeyPatch.context() as patched:
+        warnings.simplefilter("ignore", RuntimeWarning)  # that it is imported already
+        patched.setattr("sys.argv", [command[1], "--help"])
+        try:
+            runpy.run_module(command[1], run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+    assert not code
+    return printed.getvalue().decode()
+
+
+OF_OMSIMULATOR = "from OMSimulator import"
+
+
+def module_of(words: Sequence[str]) -> tuple[tuple[str, ...], Sequence[str]]:
+    """What to ask for help, and the words after it."""
+    if words[0] == "rov-fmu":
+        subcommand, rest = words[1:2], words[2:]
+        return ("-m", "rov_fmu", *(subcommand if subcommand and subcommand[0][0] != "-" else ())), rest
+    if words[1] == "build_fmu.py":
+        return ("build_fmu.py",), words[2:]
+    return ("-m", words[2]), words[3:]
+
+
+def test_readme_is_read_in_one_sitting() -> None:
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 110
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_to_files(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8"))
+    missing = [target for target in targets if "://" not in target and not (page.parent / target).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != CHANGELOG], ids=name)
+def test_commands_and_options_exist(page: Path) -> None:
+    for words in commands(page):
+        asked, rest = module_of(words)
+        if asked[-1] in {"venv", "fmpy.webapp"}:
+            continue
+        help_text = usage(asked)
+        unknown = [word for word in rest if word.startswith("-") and not re.search(rf"(?<!\S){word}\b", help_text)]
+        assert not unknown, f"{' '.join(words)}: {unknown}"
+
+
+def test_there_are_commands_to_look_at() -> None:
+    said = {" ".join(module_of(words)[0]) for page in PAGES for words in commands(page)}
+    wanted = [f"-m rov_fmu {command}" for command in ("build", "identify", "tune", "tables", "figures")]
+    wanted += [f"-m verification.{name}" for name in ("interoperability", "fuzzing", "benchmarks")]
+    assert {*wanted, "build_fmu.py"} <= said
+
+
+# ---- Run -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def workplace(tmp_path: Path, videoray_fmu: Path, videoray3_fmu: Path) -> Path:
+    """What a reader has at hand: both FMUs, a folder of tank tests, the command (it builds for this machine alone)."""
+    shutil.copy(videoray_fmu, tmp_path)
+    shutil.copy(videoray3_fmu, tmp_path)
+    shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", tmp_path / "my_tests")
+    program = tmp_path / "bin" / "rov-fmu"
+    program.parent.mkdir()
+    program.write_text(
+        "#!/usr/bin/env bash\n"
+        'if [[ $1 = build && "$*" != *--platform* && "$*" != *--backend* ]]; then set -- "$@" --platform host; fi\n'
+        f'exec "{sys.executable}" -m rov_fmu "$@"\n'
+    )
+    program.chmod(0o755)
+    return tmp_path
+
+
+def run(workplace: Path, *command: str) -> str:
+    path = os.pathsep.join([str(workplace / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = os.environ | {"PATH": path, "PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg", "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(
+        command, cwd=workplace, env=environment, capture_output=True, text=True, encoding="utf-8", check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+SHELL_PAGES = [page for page in PAGES if runnable(page)]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the pages' commands are written for a POSIX shell")
+@pytest.mark.long
+@pytest.mark.parametrize("page", SHELL_PAGES, ids=name)
+def test_commands_run(page: Path, workplace: Path) -> None:
+    for block in runnable(page):
+        run(workplace, "bash", "-euc", block)
+
+
+def test_the_pages_with_commands_are_found() -> None:
+    pages = ("identify", "importers", "model", "platforms", "studies")
+    tutorials = (f"tutorial-{name}" for name in ("dive-log", "tank-tests", "stopping-distance"))
+    wanted = {"README.md", *(f"docs/{page}.md" for page in (*pages, *tutorials))}
+    assert wanted <= {name(page) for page in SHELL_PAGES}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name)
+def test_programs_print_what_is_said(page: Path, workplace: Path) -> None:
+    for program in blocks(page, "python"):
+        if OF_OMSIMULATOR in program and find_spec("OMSimulator") is None:
+            continue  # its package fetches its binaries as it is installed; the next test looks at what it prints
+        printed = run(workplace, sys.executable, "-c", program).splitlines()
+        said = re.findall(r"^ *print\(.*?  # (.*)$", program, re.MULTILINE)
+        assert len(printed) == len(said) == 1
+        if printed != said:
+            value = re.search(r"\d+\.(\d+) ", said[0])
+            assert value, "a sentence that ends with a number and its unit"
+            assert f"{float(printed[0]):.{len(value[1])}f}" == value[0].strip()
+
+
+def test_the_program_for_omsimulator_is_python_and_ends_where_it_says(vehicle: Vehicle) -> None:
+    (program,) = (text for text in blocks(ROOT / "docs" / "importers.md", "python") if OF_OMSIMULATOR in text)
+    compile(program, "importers.md", "exec")
+    assert 'CRef("default", "rov", "u_t"), 0.3)' in program
+    assert "setStopTime(10)" in program
+    (*_, down) = course(vehicle.rov, lambda _: {"u_t": 0.3}, 10.0, 0.1, 0.0)
+    assert f"# {down['z']:.4f} m\n" in program
+
+
+def course(
+    rov: Rov, command: Callable[[float], Mapping[str, float]], seconds: float, h: float, at: float
+) -> list[State]:
+    """The states from rest after each 0.1 s, the command of a step taken at a fraction of it."""
+    state, rows = dict.fromkeys(rov.layout.state, 0.0), []
+    rest = dict.fromkeys(rov.layout.inputs, 0.0)
+    for n in range(round(seconds / h)):
+        state = rov.step({**rest, **command((n + at) * h)}, state, h)
+        rows.append(state)
+    return rows[round(0.1 / h) - 1 :: round(0.1 / h)]
+
+
+def test_the_steps_of_the_readme_end_where_it_says(vehicle: Vehicle) -> None:
+    text = README.read_text(encoding="utf-8")
+    (*_, ahead) = course(vehicle.rov, lambda _: {"u_l": 0.3, "u_r": 0.3}, 10.0, 0.1, 0.0)
+    assert f"ends at u = {ahead['u']:.4f} m/s" in text
+    untuned = vehicle.rov.replaced({"alpha_w": 1.0, "beta_w": 1.0})
+    (*_, down) = course(untuned, lambda _: {"u_t": 0.3}, 20.0, 0.1, 0.0)
+    assert f"positive down: {down['w']:.4f} m/s" in text
+
+
+def test_held_commands_err_as_told(vehicle: Vehicle) -> None:
+    """Against steps a tenth as long, fed with the middle: their error is a hundredth of that."""
+
+    def winding(t: float) -> dict[str, float]:
+        turn = 0.4 * sin(2.0 * pi * t / 20.0)
+        return {"u_l": 0.5 + turn, "u_r": 0.5 - turn}
+
+    true = course(vehicle.rov, winding, 20.0, 0.01, 0.5)
+    told = (ROOT / "docs" / "importers.md").read_text(encoding="utf-8")
+    for what, at, digits in (("start", 0.0, 3), ("middle", 0.5, 4)):
+        rows = course(vehicle.rov, winding, 20.0, 0.1, at)
+        pairs = list(zip(rows, true, strict=True))
+        off = max(hypot(a["x"] - b["x"], a["y"] - b["y"]) for a, b in pairs)
+        in_r = max(abs(a["r"] - b["r"]) for a, b in pairs)
+        assert f"| that of its {what} | {1000.0 * off:.0f} mm | {in_r:.{digits}f} rad/s |" in told
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_tab_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    assert f"{shell}_source" in README.read_text(encoding="utf-8")
+    monkeypatch.setenv("COMP_WORDS", "rov-fmu build video")
+    monkeypatch.setenv("COMP_CWORD", "video" if shell == "fish" else "2")
+    said = []
+    for asked in ("source", "complete"):
+        monkeypatch.setenv("_ROV_FMU_COMPLETE", f"{shell}_{asked}")
+        with pytest.raises(SystemExit):
+            main([])
+        said.append(capsys.readouterr().out)
+    assert "_rov_fmu_completion" in said[0]
+    assert [vehicle for vehicle in SHIPPED if vehicle in said[1]] == ["videoray", "videoray_refit"]
+
+
+# ---- What is said elsewhere too --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_every_variable_is_told(kind: str) -> None:
+    table = (ROOT / "docs" / "variables.md").read_text(encoding="utf-8")
+    layout = VEHICLES[kind].layout
+    known = {
+        "thruster": {thruster.name for thruster in layout.thrusters} | set(layout.mix),
+        "curve": {curve.name for curve in layout.curves},
+        "axis": set("uvwr"),
+    }
+    told = {name for name in re.findall(r"`([^`]+)`", table) if "<" not in name}
+    for pattern, of in re.findall(r"`([^`<]+)<(thruster|curve|axis)>`", table):
+        told |= {f"{pattern}{name}" for name in known[of]}
+    names = {*layout.inputs, *layout.state, *layout.thrust, *layout.coefficients}
+    assert {name.removesuffix("_reverse") for name in names} <= told
+
+
+@pytest.mark.parametrize("page", reference.PAGES, ids=name)
+def test_tables_that_follow_from_the_code_are_as_it_has_them(page: Path) -> None:
+    """`python -m docs.reference` writes them."""
+    text = page.read_text(encoding="utf-8")
+    assert text == reference.filled(text)
+    assert "{{" not in text
+
+
+def test_every_such_table_stands_in_a_page() -> None:
+    pages = "".join(page.read_text(encoding="utf-8") for page in reference.PAGES)
+    for name, table in reference.tables().items():
+        assert len(table) > 2
+        assert f"<!-- table: {name} -->\n\n{reference.markdown(table)}\n\n<!-- end -->" in pages
+
+
+def test_version_is_that_of_the_package() -> None:
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    newest = re.findall(r"^## (.*)$", CHANGELOG.read_text(encoding="utf-8"), re.MULTILINE)[0]
+    assert newest == f"[Unreleased] – {__version__}" or newest.startswith(f"[{__version__}] – ")
+
+
+def test_workflow_runs_the_two_commands() -> None:
+    workflow = (ROOT / ".github" / "workflows" / "test.yml").read_text(encoding="utf-8")
+    two = [line.split("#")[0].strip() for line in lines(blocks(README, "sh")[0])]
+    assert len(two) == 2
+    assert all(f"- run: {command}\n" in workflow for command in two)
+    oldest = re.search(r'requires-python = ">=([\d.]+)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert oldest
+    assert f'python: ["{oldest[1]}", ' in workflow
+
+
+def test_every_set_of_tests_is_run_and_told() -> None:
+    """The long tests and the importers on every change, the exhaustive tests every week."""
+    lines_of = {name: (ROOT / name).read_text(encoding="utf-8").splitlines() for name in (".ci/run", WEEKLY)}
+    found = tomlkit.parse((ROOT / "pyproject.toml").read_text(encoding="utf-8")).unwrap()["tool"]["pytest"]
+    markers = {marker.partition(":")[0] for marker in found["ini_options"]["markers"]}
+    assert markers == {"long", "interop", "weekly"}
+    assert found["ini_options"]["addopts"].endswith("-m 'not long and not weekly and not interop'")
+    assert {"pytest -rs -m long", "pytest -rs -m interop"} <= {*lines_of[".ci/run"]}
+    assert not any("-m weekly" in line and not line.startswith("#") for line in lines_of[".ci/run"])
+    assert {"  schedule:", "      - run: pytest -rs -m weekly", "      - run: .ci/run"} <= {*lines_of[WEEKLY]}
+    contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    assert all(f"`pytest -m {marker}`" in contributing for marker in markers)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(find_spec("furo") is None, reason='the site needs Sphinx: pip install -e ".[docs]"')
+def test_site_builds_strictly_and_fetches_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "docs", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    pages = {page.name: page.read_text(encoding="utf-8") for page in tmp_path.glob("*.html")}
+    assert {f"{page.stem}.html" for page in (ROOT / "docs").glob("*.md")} <= set(pages)
+    assert "ends at u = 0.4729 m/s" in pages["index.html"], "the README is the first page"
+    flown = re.findall(r'(?:href|src)="(fly/[^"]+)"', pages["index.html"])
+    assert {"fly/videoray.html", "fly/bluerov2_heavy.html"} == {*flown}
+    assert all("live-vehicles" in (tmp_path / page).read_text(encoding="utf-8") for page in flown)
+    for key in (*BODY, *ARM, *CURVE, *AXIS, *TUNING):
+        assert f">{key}</span>" in pages["vehicle-file.html"]
+    for title, page in pages.items():
+        assert "{{" not in page, title
+        assert not re.findall(r'<(?:script|img|iframe)[^>]*src="(?:https?:)?//|<link[^>]*href="(?:https?:)?//', page), (
+            title
+        )

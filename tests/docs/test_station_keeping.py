@@ -1,0 +1,420 @@
+"""examples/station_keeping: the autopilot's promises, the closed loop, and that engines agree on it."""
+
+import zipfile
+from collections.abc import Callable, Iterator
+from math import degrees, pi, radians, sin
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+from fmpy.ssp.ssd import read_ssd, validate_tree
+from lxml import etree
+
+from examples.station_keeping import run
+from examples.station_keeping.autopilot import Thruster
+from examples.station_keeping.engines import ENGINES, NAMES, Trajectory, plain
+from examples.station_keeping.system import (
+    DEFAULT,
+    GROUPS,
+    MISSION,
+    SEA,
+    STEP,
+    build_system,
+    parameter_sets,
+    system_files,
+)
+from examples.systems import PARAMETER_SET
+from rov_fmu.model.layout import Curve, Layout
+from rov_fmu.model.rov import Rov
+from verification.references.fmpy_slave import keep_loaded
+
+SETS = tuple(parameter_sets())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("station keeping") / "system"
+    build_system(path)
+    return path
+
+
+class Fmu:
+    """An FMU that runs in FMPy, variables by name."""
+
+    def __init__(self, folder: Path, **values: float | bool) -> None:
+        description = fmpy.read_model_description(str(folder), validate=False)
+        self.variables = {v.name: v for v in description.modelVariables}
+        identifier = description.coSimulation.modelIdentifier
+        self.slave = FMU2Slave(
+            guid=description.guid, unzipDirectory=str(folder), modelIdentifier=identifier, instanceName=identifier
+        )
+        self.time = 0.0
+        self.slave.instantiate()
+        self.slave.setupExperiment(startTime=0.0)
+        self.slave.enterInitializationMode()
+        self.set(**values)
+        self.slave.exitInitializationMode()
+
+    def set(self, **values: float | bool) -> None:
+        for name, value in values.items():
+            variable = self.variables[name]
+            put = self.slave.setBoolean if variable.type == "Boolean" else self.slave.setReal
+            put([variable.valueReference], [value])
+
+    def get(self, *names: str) -> list[float]:
+        return list(self.slave.getReal([self.variables[name].valueReference for name in names]))
+
+    def step(self, times: int = 1, /, **values: float | bool) -> None:
+        self.set(**values)
+        for _ in range(times):
+            self.slave.doStep(currentCommunicationPoint=self.time, communicationStepSize=STEP)
+            self.time += STEP
+
+    def stop(self) -> None:
+        self.slave.terminate()
+        self.slave.freeInstance()
+
+
+Start = Callable[..., Fmu]
+
+
+@pytest.fixture(scope="module")
+def unzipped(folder: Path) -> Path:
+    for name in ("Autopilot", "videoray"):
+        fmpy.extract(str(folder / f"{name}.fmu"), unzipdir=str(folder / name))
+    keep_loaded(folder / "Autopilot")
+    return folder
+
+
+@pytest.fixture
+def start(unzipped: Path) -> Iterator[Start]:
+    """Start an FMU with values; all are stopped in the end."""
+    running = []
+
+    def start_one(name: str, **values: float | bool) -> Fmu:
+        running.append(Fmu(unzipped / name, **values))
+        return running[-1]
+
+    yield start_one
+    for fmu in running:
+        fmu.stop()
+
+
+COMMANDS = ("u_l", "u_r", "u_t")
+
+
+# ---- The autopilot ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("curve", [(42.9, 2.711), (6.494, 0.0513), (5.0, 0.0), (0.0, 5.0)])
+def test_the_thrust_curve_is_that_of_the_model_and_inverted(curve: tuple[float, float]) -> None:
+    thruster, of_model = Thruster(*curve), Curve("rear")
+    rov = Rov(Layout((), (of_model,), ()), dict(zip(("a_t_rear", "b_t_rear"), curve, strict=True)))
+    for command in np.linspace(-1.0, 1.0, 21):
+        force = thruster.force(command)
+        assert force == pytest.approx(rov.curve_force(of_model, command), abs=1e-14)
+        assert thruster.command(force) == pytest.approx(command, abs=1e-12)
+    assert Thruster(0.0, 0.0).command(1.0) == 0.0
+
+
+def test_sticks_go_to_the_thrusters(start: Start) -> None:
+    autopilot = start("Autopilot", surge=0.4, heave=-0.3)
+    autopilot.step(10)
+    assert autopilot.get(*COMMANDS) == pytest.approx([0.4, 0.4, -0.3])
+    autopilot.step(10, surge=0.0, yaw=0.5)
+    assert autopilot.get(*COMMANDS) == pytest.approx([0.5, -0.5, -0.3])
+
+
+def test_commands_keep_their_limits(start: Start) -> None:
+    autopilot = start(
+        "Autopilot", depth_hold=True, heading_hold=True, z_ref=50.0, psi_ref=3.0, surge=1.0, u_max=0.6, u_rate=2.0
+    )
+    before, largest = np.zeros(3), np.zeros(3)
+    for n in range(1000):
+        if n == 300:
+            autopilot.set(z_ref=-50.0, psi_ref=-3.0, surge=-1.0)
+        autopilot.step()
+        now = np.array(autopilot.get(*COMMANDS))
+        assert np.all(np.abs(now) <= 0.6)
+        assert np.all(np.abs(now - before) <= 2.0 * STEP + 1e-12)
+        largest = np.maximum(largest, np.abs(now - before))
+        before = now
+    assert now == pytest.approx([-0.6, 0.6, -0.6])  # it ends at all limits
+    assert largest == pytest.approx(2.0 * STEP)  # and went there as fast as it may
+
+
+def test_heading_goes_before_speed(start: Start) -> None:
+    autopilot = start("Autopilot", surge=1.0, yaw=0.5)
+    autopilot.step(20)
+    u_l, u_r, _ = autopilot.get(*COMMANDS)
+    rear = Thruster(0.5 * 42.9, 0.5 * 2.711)
+    assert u_l == pytest.approx(1.0)
+    assert rear.force(u_l) - rear.force(u_r) == pytest.approx(2.0 * rear.force(0.5))
+
+
+@pytest.mark.parametrize("loop", ["depth", "heading"])
+def test_the_integral_does_not_wind_up(start: Start, loop: str) -> None:
+    switch, target, measured, command, away = {
+        "depth": ("depth_hold", "z_ref", "z", "u_t", 2.0),
+        "heading": ("heading_hold", "psi_ref", "psi", "u_l", 2.0),
+    }[loop]
+
+    def steps_at_the_limit(T_t: float) -> int:
+        """It is held fast for a minute, comes free and passes the target: how long the command stays at its limit."""
+        autopilot = start("Autopilot", T_t=T_t, **{switch: True, target: away})
+        autopilot.step(round(60.0 / STEP))
+        assert autopilot.get(command) == [1.0]
+        for n in range(round(60.0 / STEP)):
+            autopilot.step(**{measured: min(2.0 * away, 0.01 * n)})
+            if autopilot.get(command)[0] < 1.0:
+                break
+        return n
+
+    free, wound_up = steps_at_the_limit(1.0), steps_at_the_limit(1e9)
+    assert free <= 200  # before it is there
+    assert wound_up >= 1000
+
+
+@pytest.mark.parametrize("loop", ["depth", "heading"])
+@pytest.mark.parametrize("rate", [0.0, 0.12])
+def test_a_hold_goes_on_without_a_jump(start: Start, loop: str, rate: float) -> None:
+    switch, target, measured, stick, command = {
+        "depth": ("depth_hold", "z_ref", "z", "heave", "u_t"),
+        "heading": ("heading_hold", "psi_ref", "psi", "yaw", "u_l"),
+    }[loop]
+    autopilot = start("Autopilot", **{stick: 0.45, target: 3.0})
+    for n in range(40):
+        autopilot.step(**{measured: rate * n * STEP})
+    (before,) = autopilot.get(command)
+    assert before == pytest.approx(0.45)
+    autopilot.step(**{measured: rate * 40 * STEP, switch: True})
+    assert autopilot.get(command) == pytest.approx([before], abs=1e-9)
+    autopilot.step(**{measured: rate * 41 * STEP})
+    assert autopilot.get(command) == pytest.approx([before], abs=0.15)  # then it starts towards the target
+    assert autopilot.get(command)[0] > before
+
+
+def test_a_hold_goes_off_to_the_stick_at_the_limited_rate(start: Start) -> None:
+    autopilot = start("Autopilot", depth_hold=True, z_ref=1.0, heave=-0.2)
+    autopilot.step(100)
+    (before,) = autopilot.get("u_t")
+    assert before == 1.0
+    seen = [before]
+    for _ in range(10):
+        autopilot.step(depth_hold=False)
+        seen += autopilot.get("u_t")
+    assert seen == pytest.approx([max(-0.2, 1.0 - 4.0 * STEP * n) for n in range(11)])
+
+
+def test_the_heading_error_is_the_short_way_round(start: Start) -> None:
+    autopilot = start("Autopilot", heading_hold=True, psi=radians(350.0), psi_ref=radians(10.0))
+    autopilot.step(5)
+    u_l, u_r, _ = autopilot.get(*COMMANDS)
+    assert u_l > 0.05  # to starboard, through north
+    assert u_r == pytest.approx(-u_l)
+
+
+def test_a_compass_may_wrap(start: Start) -> None:
+    def commands(wrapped: bool) -> list[list[float]]:
+        autopilot = start("Autopilot", heading_hold=True, psi=radians(340.0), psi_ref=radians(20.0))
+        rows = []
+        for n in range(200):
+            psi = radians(340.0 + 0.25 * n)
+            autopilot.step(psi=psi % (2.0 * pi) if wrapped else psi)
+            rows.append(autopilot.get(*COMMANDS))
+        return rows
+
+    assert np.allclose(commands(True), commands(False), atol=1e-9)
+
+
+# ---- The closed loop -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module", params=SETS)
+def expected(request: pytest.FixtureRequest) -> tuple[str, Trajectory]:
+    return request.param, plain(request.param)
+
+
+def agree(result: Trajectory, expected: Trajectory) -> None:
+    assert set(result) == {f"{component}.{name}" for component, name in NAMES}
+    assert max(run.difference(result, expected).values()) <= 1e-9
+    depth, heading = run.held(result)
+    assert depth <= 0.02
+    assert heading <= 2.0
+
+
+def test_fmpy_holds_and_agrees(folder: Path, expected: tuple[str, Trajectory]) -> None:
+    parameters, trajectory = expected
+    result = ENGINES["FMPy, SSP"].run(folder, parameters)
+    agree(result, trajectory)
+    assert np.ptp(result["rov.z"]) > 4.9  # it did dive
+    assert degrees(np.ptp(result["rov.psi"])) > 89.0
+    assert result["rov.z"].max() < 5.0 + 0.02  # and not beyond
+
+
+@pytest.mark.long
+def test_the_parameter_sets_make_a_difference() -> None:
+    apart = run.difference(*(plain(name) for name in SETS))
+    assert apart["rov.z"] > 1e-3
+    assert degrees(apart["rov.psi"]) > 1.0
+
+
+@pytest.mark.long
+def test_the_order_of_stepping_makes_a_difference(expected: tuple[str, Trajectory]) -> None:
+    parameters, trajectory = expected
+    apart = run.difference(plain(parameters, sequential=True), trajectory)
+    assert 1e-3 < apart["rov.z"] < 1e-2
+    assert max(run.held(plain(parameters, sequential=True))) < 0.02  # it is held all the same
+
+
+def test_a_load_that_comes_on_is_held(start: Start) -> None:
+    rov = start("videoray")
+    autopilot = start("Autopilot", depth_hold=True, heading_hold=True, surge=0.26)
+    deviation = []
+    for n in range(800):
+        if n == 400:
+            rov.set(X_ext=SEA["X_ext"], Z_ext=SEA["Z_ext"], N_ext=SEA["N_ext"])
+        z, psi = rov.get("z", "psi")
+        commands = dict(zip(COMMANDS, autopilot.get(*COMMANDS), strict=True))
+        rov.step(**commands)
+        autopilot.step(z=z, psi=psi)
+        deviation.append([abs(z), abs(degrees(psi))])
+    depth, heading = np.max(deviation[400:], axis=0)
+    assert 0.01 < depth <= 0.02  # the load is one that matters
+    assert 1.0 < heading <= 2.0
+    assert deviation[-1] == pytest.approx([0.0, 0.0], abs=0.02)
+
+
+# ---- The files -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("parameters", SETS)
+def test_the_ssp_is_one_that_engines_read(folder: Path, parameters: str) -> None:
+    path = system_files(folder, parameters)[0]
+    system = read_ssd(str(path)).system  # checked against the schemas of SSP 1.0
+    assert system.connectors == []
+    with zipfile.ZipFile(path) as archive:
+        assert [name for name in archive.namelist() if name.endswith(".ssd")] == ["SystemStructure.ssd"]
+        text = archive.read("SystemStructure.ssd").decode()
+        assert "<ssd:SystemStructureDescription" in text
+        assert "<ssc:Real" in text
+        assert {c.source for c in system.elements} <= set(archive.namelist())
+    # FMPy sets every input connector at every step, connected or not
+    ends = {(c.endElement, c.endConnector) for c in system.connections}
+    assert {(e.name, c.name) for e in system.elements for c in e.connectors if c.kind == "input"} == ends
+
+
+@pytest.mark.parametrize("parameters", SETS)
+def test_a_component_has_one_parameter_binding(folder: Path, parameters: str) -> None:
+    with zipfile.ZipFile(system_files(folder, parameters)[0]) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    validate_tree(root, "SystemStructureDescription.xsd")
+    bindings = [len(list(component.iter("{*}ParameterBinding"))) for component in root.iter("{*}Component")]
+    assert bindings == [1, 1]
+    assert len(list(root.iter("{*}ParameterBinding"))) == 2, "and none beside those of the components"
+    sets = list(root.iter("{*}ParameterSet"))
+    assert [s.get("name") for s in sets] == [PARAMETER_SET] * 2, "Ecos takes those of one name"
+    for values in sets:
+        validate_tree(values, "SystemStructureParameterValues.xsd")
+
+
+@pytest.mark.parametrize("parameters", SETS)
+def test_omsimulator_finds_a_master_with_fixed_steps(folder: Path, parameters: str) -> None:
+    with zipfile.ZipFile(system_files(folder, parameters)[0]) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    # It looks for literal tags, and at the system's first annotation only.
+    tags = {element: f"{element.prefix}:{etree.QName(element).localname}" for element in root.iter(etree.Element)}
+    found = next(element for element in root if tags[element] == "ssd:System")
+    for tag in (
+        "ssd:Annotations",
+        "ssc:Annotation",
+        "oms:Annotations",
+        "oms:SimulationInformation",
+        "oms:FixedStepMaster",
+    ):
+        found = next(element for element in found if tags[element] == tag)
+        assert tag != "ssc:Annotation" or found.get("type") == "org.openmodelica"
+    assert dict(found.attrib) == {"description": "oms-ma", "stepSize": "0.05", "relativeTolerance": "1e-4"}
+
+
+def test_the_parameter_sets_of_the_two_systems(folder: Path) -> None:
+    def values(parameters: str) -> dict[str, dict[str, str]]:
+        system = read_ssd(str(system_files(folder, parameters)[0])).system
+        return {
+            c.name: {p.name: p.value for p in c.parameterBindings[0].parameterValues[0].parameters}
+            for c in system.elements
+        }
+
+    default, other = (values(name) for name in SETS)
+    assert SETS[0] == DEFAULT
+    assert default["autopilot"] == other["autopilot"]
+    assert {
+        name: float(default["autopilot"][name]) for name in ("z_ref", "psi_ref", "surge")
+    }.items() <= MISSION.items()
+    table9, untuned = ({name: float(value) for name, value in given["rov"].items()} for given in (default, other))
+    tuning = {f"{letter}_{axis}" for letter in ("alpha", "beta") for axis in "uwr"}
+    assert {name for name in table9 if table9[name] != untuned[name]} == tuning - {"beta_u"}  # 1 in Table 9
+    assert {untuned[name] for name in tuning} == {1.0}
+    assert SEA.items() <= table9.items()
+
+
+@pytest.mark.parametrize("parameters", SETS)
+def test_the_groups_of_the_osp_configuration_fit(folder: Path, parameters: str) -> None:
+    root = etree.parse(str(system_files(folder, parameters)[1])).getroot()
+    assert [e.get("name") for e in root.iter("{*}VariableGroup")] == [name for name in GROUPS for _ in range(2)]
+    causality = []
+    for model, fmu in (("videoray", "videoray.fmu"), ("Autopilot", "Autopilot.fmu")):
+        description = fmpy.read_model_description(str(folder / fmu), validate=False)
+        assert description.modelName == model
+        variables = {v.name: v.causality for v in description.modelVariables}
+        osp = etree.parse(str(folder / f"{model}_OspModelDescription.xml")).getroot()
+        groups = {e.get("name"): e for e in next(osp.iter("{*}VariableGroups"))}
+        causality.append([[variables[v.get("ref")] for v in groups[name]] for name in GROUPS])
+        simulator = next(e for e in root.iter("{*}Simulator") if e.get("source") == fmu)
+        assert {e.get("variable") for e in simulator.iter("{*}InitialValue")} <= set(variables)
+    opposite = {"input": "output", "output": "input"}
+    assert [[opposite[c] for c in group] for group in causality[0]] == causality[1]
+
+
+def test_the_stick_balances_current_and_tether() -> None:
+    result = plain(DEFAULT)
+    assert result["rov.u"][-1] == pytest.approx(-SEA["V_E"], abs=0.01)
+    assert MISSION["psi_ref"] == pytest.approx(pi / 2)
+    assert sin(result["rov.psi"][-1]) == pytest.approx(1.0)  # it faces the current
+
+
+@pytest.mark.long
+def test_the_picture_shows_all_four(tmp_path: Path) -> None:
+    path = tmp_path / "picture.svg"
+    run.draw({name: plain(name) for name in SETS}, path)
+    text = path.read_text(encoding="utf-8")
+    for title in ("Depth", "Heading", "Track", "Commands", "Table 9", "α = β = 1", "reference model"):
+        assert f">{title}<" in text
+    assert len(text) < 100_000
+
+
+# ---- Engines that have to be installed -------------------------------------------------------------------------------
+
+
+@pytest.mark.interop
+@pytest.mark.parametrize("engine", [name for name in ENGINES if "FMPy" not in name])
+def test_engines_hold_and_agree(engine: str, folder: Path, expected: tuple[str, Trajectory]) -> None:
+    parameters, trajectory = expected
+    if reason := ENGINES[engine].missing():
+        pytest.skip(f"{engine}: {reason}")
+    agree(ENGINES[engine].run(folder, parameters), trajectory)
+
+
+@pytest.mark.interop
+def test_the_command_runs_and_judges(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run.main([str(tmp_path / "system")]) == 0
+    told = capsys.readouterr().out
+    assert told.count(" ok\n") >= 4
+    assert (tmp_path / "system" / "station_keeping.svg").is_file()
+    monkeypatch.setattr(run, "DEPTH", 1e-9)
+    assert run.main([str(tmp_path / "system")]) == 1
+    assert "FAILED" in capsys.readouterr().out

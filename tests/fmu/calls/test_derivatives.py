@@ -1,0 +1,353 @@
+"""Derivatives are those of the values, and the model structure declares exactly those that can be non-zero."""
+
+import random
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import Any
+
+import pytest
+from mpmath import mp
+
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests import fmi3
+from tests.fmi import (
+    CO_SIMULATION,
+    ERROR,
+    EVERY_MODE,
+    INITIALIZATION,
+    INSTANTIATED,
+    MODEL_EXCHANGE,
+    MODES,
+    OK,
+    STEP,
+    AnyInstance,
+    Fmu,
+    integers,
+    reals,
+    room,
+)
+from tests.fmu.calls.conftest import WRAPPERS
+from tests.vehicles import EVERYTHING, HEAVY, VIDEORAY, State, Values, at_rest
+from verification.references.equations import calculated, effect, equations
+
+ROVS = {
+    "videoray_dir": VIDEORAY,
+    "videoray3_dir": VIDEORAY,
+    "heavy_dir": HEAVY,
+    "heavy3_dir": HEAVY,
+    "everything_dir": load_vehicle(EVERYTHING).rov,
+}
+
+
+@pytest.fixture(scope="module", params=ROVS)
+def fmu(request: pytest.FixtureRequest) -> Fmu:
+    """Of a vehicle of the paper, of one with sway, lag, coupling and dead band, and of one that has everything."""
+    return WRAPPERS[3 if "3" in request.param else 2](request.getfixturevalue(request.param))
+
+
+@pytest.fixture(scope="module", params=["videoray3_dir", "heavy3_dir"])
+def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
+    return fmi3.Fmu(request.getfixturevalue(request.param))
+
+
+@pytest.fixture
+def rov(fmu: Fmu) -> Rov:
+    """The same vehicle."""
+    return rov_of(fmu)
+
+
+def rov_of(fmu: Fmu) -> Rov:
+    return next(rov for rov in ROVS.values() if set(rov.layout.inputs) == set(fmu.inputs))
+
+
+def random_motion(fmu: Fmu, rng: random.Random) -> dict[str, float]:
+    """Inputs and states of either sign, zeros, and commands beyond full, none on the corner."""
+    values = {name: rng.uniform(-3.0, 3.0) for name in fmu.inputs + fmu.states}
+    for name in fmu.commands:
+        values[name] = rng.choice([rng.uniform(-0.99, 0.99), rng.choice([-1, 1]) * rng.uniform(1.01, 2.0)])
+    for name in (*fmu.commands, *(velocity for velocity in "uvwr" if velocity in values)):
+        values[name] = rng.choice([values[name], values[name], 0.0])
+    return values
+
+
+def random_parameters(
+    fmu: Fmu, rng: random.Random, variability: Sequence[str] = ("fixed", "tunable")
+) -> dict[str, float]:
+    chosen = [name for name in fmu.parameters if fmu.variables[name].variability in variability]
+    return {name: (float(fmu.variables[name].start) or 1.0) * rng.uniform(0.7, 1.3) for name in chosen}
+
+
+def points(fmu: Fmu, n: int, seed: int) -> list[dict[str, float]]:
+    rng = random.Random(seed)  # no zeros: beside an input that saturates they put the mix on the corner
+    motions = ({name: x or rng.uniform(-0.9, 0.9) for name, x in random_motion(fmu, rng).items()} for _ in range(n))
+    return [motion | random_parameters(fmu, rng) for motion in motions]
+
+
+def bring(rov: AnyInstance, mode: str, point: dict[str, float]) -> None:
+    assert rov.set(point) == OK
+    rov.reach(mode)
+
+
+def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> AnyInstance:
+    rov = fmu.instance(kind)
+    bring(rov, mode, point)
+    return rov
+
+
+# ---- Directional derivatives ----
+
+
+_SLOPES: dict[tuple[Any, ...], dict[str, float]] = {}
+"""By vehicle, point, known and side: both versions and interfaces are held to the same ones."""
+
+
+def slopes(rov: Rov, point: Values, known: str, side: int = 1) -> dict[str, float]:
+    """Of every output and derivative by one known, from one side: in 50 digits all that a double has."""
+    key = (id(rov), *point.items(), known, side)
+    if key not in _SLOPES:
+        with mp.workdps(50):
+            h = side * mp.mpf(10) ** -18
+            here, near, far = (calculated(rov, {**point, known: mp.mpf(point[known]) + n * h}) for n in range(3))
+            _SLOPES[key] = {name: float((4 * near[name] - far[name] - 3 * here[name]) / (2 * h)) for name in here}
+    return _SLOPES[key]
+
+
+def check_slopes(rov: Rov, instance: AnyInstance, point: Values, known: str, side: int = 1) -> None:
+    unknowns = instance.fmu.outputs + instance.fmu.derivatives
+    found, expected = instance.derivatives(unknowns, known), slopes(rov, point, known, side)
+    size = max(1.0, *map(abs, expected.values()))  # what a sum of large terms leaves
+    for name, d in zip(unknowns, found, strict=True):
+        assert d == pytest.approx(expected[name], rel=1e-12, abs=1e-14 * size), (name, known, side, point)
+
+
+@pytest.mark.parametrize(
+    "number", [2, pytest.param(15, marks=pytest.mark.long), pytest.param(60, marks=pytest.mark.weekly)]
+)
+def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
+    """By every input, state and coefficient, of all that is calculated, in both interfaces."""
+    for point, kind in product(points(fmu, number, seed=1), MODES):
+        with at_point(fmu, kind, INITIALIZATION, point) as instance:
+            for known in point:
+                check_slopes(rov, instance, point, known)
+
+
+def kinks(rov: Rov, point: Values) -> Iterator[tuple[State, str, int]]:
+    """Points on the edge of saturation, of a dead band and at rest; what crosses it there, and where its inside is."""
+    layout = rov.layout
+    still = {**point, **dict.fromkeys(layout.commands, 0.0)}
+    for command, sign in product(layout.commands, (1, -1)):
+        yield {**still, command: sign}, command, -sign
+        for thruster in (t for t in layout.thrusters if command in layout.gains[t.name]):
+            gain, curve = layout.gains[thruster.name][command], layout.curve_of[thruster.name]
+            if "c_0" in curve.keys:
+                dead_band = curve.coefficient("c_0" if sign * gain > 0.0 else "c_0_reverse")
+                edge = {**still, command: sign * point[dead_band] / abs(gain)}
+                yield edge, command, -sign
+                yield edge, dead_band, 1
+    for velocity in layout.velocities:
+        yield {**point, velocity: 0.0}, velocity, 1
+
+
+def test_at_a_kink_the_derivative_is_that_of_the_inside(fmu: Fmu, rov: Rov) -> None:
+    """Of commands within ±1, and of the dead band; a velocity at rest is about to go ahead."""
+    for kink, known, inside in kinks(rov, *points(fmu, 1, seed=9)):
+        with at_point(fmu, CO_SIMULATION, INITIALIZATION, kink) as instance:
+            check_slopes(rov, instance, kink, known, inside)
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode"), [c for c in EVERY_MODE if c[1] not in (INSTANTIATED, INITIALIZATION)], ids=str
+)
+def test_directional_derivatives_are_the_same_in_every_mode(fmu: Fmu, kind: int, mode: str) -> None:
+    unknowns = fmu.outputs + fmu.derivatives
+    for point in points(fmu, 5, seed=2):
+        with at_point(fmu, kind, INITIALIZATION, point) as rov, at_point(fmu, kind, mode, point) as later:
+            for known in fmu.inputs + fmu.states:
+                assert later.derivatives(unknowns, known) == rov.derivatives(unknowns, known)
+
+
+def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
+    rng = random.Random(3)
+    unknowns, (point,) = fmu.outputs + fmu.derivatives, points(fmu, 1, seed=4)
+    with at_point(fmu, MODEL_EXCHANGE, INITIALIZATION, point) as rov:
+        seeds = {known: rng.uniform(-1.0, 1.0) for known in point}
+        columns = [[seed * d for d in rov.derivatives(unknowns, known)] for known, seed in seeds.items()]
+        result = rov.derivatives(unknowns, seeds)
+        for i, column in enumerate(zip(*columns, strict=True)):
+            assert result[i] == pytest.approx(sum(column), rel=1e-12, abs=1e-12 * max(map(abs, column)))
+
+
+# ---- Adjoint derivatives ----
+
+
+@pytest.mark.parametrize(
+    "number", [2, pytest.param(10, marks=pytest.mark.long), pytest.param(40, marks=pytest.mark.weekly)]
+)
+@pytest.mark.parametrize("kind", MODES)
+def test_adjoint_derivatives_are_the_slopes_of_the_equations(fmu3: fmi3.Fmu, kind: int, number: int) -> None:
+    """Of every output and derivative, by every input, state and coefficient."""
+    unknowns = fmu3.outputs + fmu3.derivatives
+    for point in points(fmu3, number, seed=1):
+        columns = [slopes(rov_of(fmu3), point, known) for known in point]
+        size = [max(1.0, *map(abs, column.values())) for column in columns]
+        with fmu3.instance(kind) as instance:
+            bring(instance, INITIALIZATION, point)
+            for name in unknowns:
+                row = instance.adjoint([name], list(point), [1.0])
+                for known, d, column, scale in zip(point, row, columns, size, strict=True):
+                    assert d == pytest.approx(column[name], rel=1e-12, abs=1e-14 * scale), (name, known, point)
+
+
+@pytest.mark.parametrize(("kind", "mode"), [c for c in fmi3.EVERY_MODE if c[1] != INSTANTIATED], ids=str)
+def test_adjoint_derivatives_are_those_of_the_directional_ones(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
+    """(v J) u = v (J u), by the knowns of the mode."""
+    rng = random.Random(4)
+    unknowns = fmu3.outputs + fmu3.derivatives
+    for point in points(fmu3, 5, seed=2):
+        known = list(point) if mode == INITIALIZATION else fmu3.inputs + fmu3.states
+        u, v = ({name: rng.uniform(-1.0, 1.0) for name in names} for names in (known, unknowns))
+        with fmu3.instance(kind) as rov:
+            bring(rov, mode, point)
+            change, row = rov.derivatives(unknowns, u), rov.adjoint(unknowns, known, list(v.values()))
+            terms = [a * b for a, b in zip(v.values(), change, strict=True)]
+            combined = sum(a * b for a, b in zip(row, u.values(), strict=True))
+            assert combined == pytest.approx(sum(terms), rel=1e-11, abs=1e-13 * sum(map(abs, terms)))
+
+
+@pytest.mark.parametrize("function", ["fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"])
+def test_as_many_seeds_and_sensitivities_are_wanted_as_there_are_variables(fmu3: fmi3.Fmu, function: str) -> None:
+    of, n_seed = fmu3.references, 2 if "Directional" in function else 3
+    arguments = (of(["u", "der(u)", "der(psi)"]), 3, of(["r", "u"]), 2)
+    with fmu3.instance() as rov:
+        rov.start({"u": 0.5, "r": 0.2})
+        for seeds, sensitivities in [(n_seed - 1, 5 - n_seed), (n_seed, 4 - n_seed), (0, 0)]:
+            found = room(5 - n_seed)
+            assert rov.call(function, *arguments, reals(1.0, 2.0, 3.0), seeds, found, sensitivities) == ERROR
+            assert list(found) == list(room(5 - n_seed))
+            assert f"it takes {n_seed} and {5 - n_seed}" in rov.log[-1].text
+        rov.expect(function, *arguments, reals(1.0, 2.0, 3.0), n_seed, found, 5 - n_seed)
+        d = rov.derivatives(["der(u)"], "u")[0]
+        assert list(found) == ([2.0, 2.0 * d, 1.0] if n_seed == 2 else [3.0, 1.0 + 2.0 * d])
+
+
+# ---- The model structure ----
+
+Jacobian = dict[tuple[str, str], float]
+
+
+def jacobian(rov: AnyInstance, unknowns: Sequence[str], knowns: Sequence[str]) -> Jacobian:
+    columns = {known: rov.derivatives(unknowns, known) for known in knowns}
+    return {(name, known): d for known, column in columns.items() for name, d in zip(unknowns, column, strict=True)}
+
+
+def declared(unknowns: Sequence[Any]) -> dict[tuple[str, str], str]:
+    return {
+        (unknown.variable.name, known.name): kind
+        for unknown in unknowns
+        for known, kind in zip(unknown.dependencies, unknown.dependenciesKind, strict=True)
+    }
+
+
+@pytest.mark.parametrize("structure", ["outputs", "derivatives"])
+def test_dependencies_are_declared_as_they_are(fmu: Fmu, structure: str) -> None:
+    rng = random.Random(5)
+    unknowns = [unknown.variable.name for unknown in getattr(fmu.description, structure)]
+    knowns = fmu.inputs + fmu.states
+    motions = [random_motion(fmu, rng) for _ in range(20)]
+    sets = [{}, random_parameters(fmu, rng, "fixed"), random_parameters(fmu, rng, "tunable")]
+    samples: list[list[Jacobian]] = []
+    for parameters in sets:
+        samples.append([])
+        for motion in motions:
+            with at_point(fmu, CO_SIMULATION, STEP, motion | parameters) as rov:
+                samples[-1].append(jacobian(rov, unknowns, knowns))
+
+    def strongest(pair: tuple[str, str]) -> str | None:
+        values = [{sample[pair] for sample in of_set} for of_set in samples]
+        if set.union(*values) == {0.0}:
+            return None
+        if any(len(of_set) > 1 for of_set in values):
+            return "dependent"
+        start, fixed, tunable = values
+        return "tunable" if tunable != start else "fixed" if fixed != start else "constant"
+
+    found = {(name, known): strongest((name, known)) for name in unknowns for known in knowns}
+    assert {pair: kind for pair, kind in found.items() if kind} == declared(getattr(fmu.description, structure))
+
+
+def test_initial_dependencies_are_declared_as_they_are(fmu: Fmu) -> None:
+    unknowns = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
+    samples: list[Jacobian] = []
+    for point in points(fmu, 30, seed=6):
+        with at_point(fmu, CO_SIMULATION, INITIALIZATION, point) as rov:
+            samples.append(jacobian(rov, unknowns, list(point)))
+    values = {pair: {sample[pair] for sample in samples} for pair in samples[0]}
+    found = {pair: "constant" if len(of) == 1 else "dependent" for pair, of in values.items() if of != {0.0}}
+    assert found == declared(fmu.description.initialUnknowns)
+
+
+def test_the_structure_lists_every_output_state_and_calculated_variable(fmu: Fmu) -> None:
+    variables = fmu.variables.values()
+    assert fmu.outputs == [v.name for v in variables if v.causality == "output"]
+    assert fmu.derivatives == [v.name for v in variables if v.derivative is not None]
+    initial = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
+    assert initial == [v.name for v in variables if v.initial == "calculated"]
+    assert fmu.derivatives == [f"der({name})" for name in fmu.states]
+
+
+# ---- Derivatives by time ----
+
+
+def exact_rates(rov: Rov, point: Values) -> dict[str, Any]:
+    """The first time derivative of every output: the slopes of the outputs along the motion, with the inputs held."""
+    k = Rov(rov.layout, {name: point[name] for name in rov.coefficients})
+    found: dict[str, Any] = equations(k, point).rates({n: mp.mpf(point[n]) for n in rov.layout.state}, point)
+    forces = {t.name: found.get(f"F_{t.name}", mp.zero) for t in rov.layout.thrusters}  # those without lag are constant
+    found = found | {f"F_{name}": F for name, F in forces.items()}
+    for curve in rov.layout.turning_curves:
+        turning = (effect(k, t, "r") * forces[t.name] for t in rov.layout.thrusters if t.curve == curve.name)
+        found[f"tau_{curve.name}"] = mp.fsum(turning)
+    return found
+
+
+@pytest.mark.parametrize(
+    "number", [8, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
+)
+def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
+    """From any motion, and from rest."""
+    for n, point in enumerate(points(fmu, number, seed=7)):
+        motion = point | (at_rest(rov) if n % 4 == 0 else {})
+        with mp.workdps(50):
+            exact_values = exact_rates(rov, motion)
+        expected = [float(exact_values[name]) for name in fmu.outputs]
+        size = max(map(abs, expected))
+        with at_point(fmu, CO_SIMULATION, STEP, motion) as instance:
+            assert instance.rates(fmu.outputs) == pytest.approx(expected, rel=1e-11, abs=1e-13 * size), motion
+            instance.expect("Terminate")
+            assert instance.rates(["u"]) == pytest.approx(instance.get(["der(u)"]), rel=1e-13)
+
+
+@pytest.mark.parametrize("order", [-1, 0, 2, 19])
+def test_output_derivatives_of_other_orders_are_refused(fmu: Fmu, order: int) -> None:
+    """Order 1 alone is declared; nothing is written when any order of a call is refused."""
+    assert fmu.description.coSimulation.maxOutputDerivativeOrder == 1
+    values = room(2)
+    with fmu.instance() as rov:
+        rov.start({"u": 0.5})
+        assert rov.rates_by(fmu.references(["w", "u"]), integers(1, order), values) == ERROR
+        assert list(values) == list(room(2))
+        assert rov.log[-1].text.endswith(f"order {order} of u is not available, only 1.")
+
+
+@pytest.mark.parametrize("mode", MODES[MODEL_EXCHANGE][1:])
+def test_the_solver_gets_the_derivatives_and_states_that_the_variables_have(fmu: Fmu, mode: str) -> None:
+    n = len(fmu.states)
+    for point in points(fmu, 5, seed=8):
+        with at_point(fmu, MODEL_EXCHANGE, mode, point) as rov:
+            derivatives, states = room(n), room(n)
+            rov.expect("GetContinuousStateDerivatives", derivatives, n)
+            rov.expect("GetContinuousStates", states, n)
+            assert bytes(derivatives) == bytes(reals(*rov.get(fmu.derivatives)))
+            assert bytes(states) == bytes(reals(*(point[name] for name in fmu.states)))
+            assert len({*derivatives}) > 3

@@ -1,0 +1,166 @@
+"""Instances of either version of FMI are made, or refused with one log line that says why."""
+
+import ctypes
+from typing import Any
+
+import pytest
+from fmpy.fmi2 import fmi2CallbackFunctions
+from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
+
+from tests import fmi2, fmi3
+from tests.fmi import CO_SIMULATION, ERROR, MODEL_EXCHANGE, OK, Message, references, room
+
+CS, ME = CO_SIMULATION, MODEL_EXCHANGE
+GUID = object()  # the FMU's own
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "guid", "said"),
+    [
+        (None, CS, GUID, "name"),
+        (b"", CS, GUID, "name"),
+        (b" \t\r\n", ME, GUID, "name"),
+        (b"rov", 2, GUID, "fmuType = 2"),
+        (b"rov", -1, GUID, "fmuType = -1"),
+        (b"rov", CS, None, "NULL"),
+        (b"rov", CS, b"", "GUID"),
+        (b"rov", ME, b"{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}", "{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}"),
+        (b"rov", CS, b"%n" * 300, "GUID"),
+    ],
+)
+def test_a_bad_instantiation_gives_no_instance_and_one_log_line(
+    fmu2: fmi2.Fmu, name: bytes | None, kind: int, guid: Any, said: str
+) -> None:
+    log: list[Message] = []
+    callbacks = fmi2.recording_callbacks(log)
+    own = fmu2.token
+    component = fmu2.dll.fmi2Instantiate(name, kind, own if guid is GUID else guid, None, ctypes.byref(callbacks), 0, 0)
+    assert component is None
+    (message,) = log
+    assert (message.status, message.category) == (ERROR, "logStatusError")
+    assert message.text.startswith("fmi2Instantiate: ")
+    assert said in message.text
+    silent = fmi2CallbackFunctions()  # no logger
+    assert fmu2.dll.fmi2Instantiate(name, kind, own if guid is GUID else guid, None, ctypes.byref(silent), 0, 0) is None
+
+
+def test_no_callbacks_give_no_instance(fmu2: fmi2.Fmu) -> None:
+    assert fmu2.dll.fmi2Instantiate(b"rov", CS, fmu2.token, None, None, 0, 0) is None
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        None,
+        b"",
+        b"file:/x",
+        b"file:///x",
+        b"file:////x/",
+        b"file:///no such%20folder",
+        b"\xff%n%s",
+        b"C:\\x",
+        b"x" * 9999,
+    ],
+)
+def test_any_resource_location_will_do(fmu2: fmi2.Fmu, uri: bytes | None) -> None:
+    callbacks = fmi2CallbackFunctions()  # NULL, all of them
+    component = fmu2.dll.fmi2Instantiate(b"rov", CS, fmu2.token, uri, ctypes.byref(callbacks), -1, -1)
+    assert fmu2.call("fmi2SetupExperiment", component, 0, 0.0, 0.0, 0, 0.0) == OK
+    assert fmu2.call("fmi2DoStep", component, 0.0, 0.1, 1) == ERROR  # without a logger, too
+    fmu2.dll.fmi2FreeInstance(component)
+
+
+def test_the_callbacks_are_copied(fmu2: fmi2.Fmu) -> None:
+    log: list[Message] = []
+    callbacks = fmi2.recording_callbacks(log)
+    given = fmi2CallbackFunctions.from_buffer_copy(callbacks)
+    component = fmu2.dll.fmi2Instantiate(b"rov", CS, fmu2.token, None, ctypes.byref(given), 0, 0)
+    ctypes.memset(ctypes.byref(given), 0xAA, ctypes.sizeof(given))
+    assert fmu2.call("fmi2DoStep", component, 0.0, 0.1, 1) == ERROR
+    fmu2.dll.fmi2FreeInstance(component)
+    assert len(log) == 1
+
+
+# ---- FMI 3.0 ----
+
+NO_LOGGER, NO_UPDATE = fmi3LogMessageCallback(), fmi3IntermediateUpdateCallback()
+
+
+def instantiate(
+    fmu3: fmi3.Fmu,
+    name: bytes | None,
+    token: bytes | None,
+    logger: Any,
+    references: Any = None,
+    n: int = 0,
+    logging: bool = True,
+) -> Any:
+    """Of Co-Simulation, without intermediate update."""
+    arguments = (name, token, None, False, logging, False, False, references, n, None, logger, NO_UPDATE)
+    return fmu3.dll.fmi3InstantiateCoSimulation(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("name", "token", "said"),
+    [
+        (None, GUID, "name"),
+        (b" \t\r\n", GUID, "name"),
+        (b"rov", None, "NULL"),
+        (b"rov", b"", "instantiation token"),
+        (b"rov", b"{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}", "{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}"),
+    ],
+)
+def test_of_fmi_3_a_bad_instantiation_gives_no_instance(
+    fmu3: fmi3.Fmu, name: bytes | None, token: Any, said: str
+) -> None:
+    given = fmu3.token if token is GUID else token
+    log: list[Message] = []
+    for function in ("fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"):
+        logger = fmi3.recorder(log)
+        if function == "fmi3InstantiateCoSimulation":
+            assert instantiate(fmu3, name, given, logger) is None
+            assert instantiate(fmu3, name, given, logger, logging=False) is None
+            assert instantiate(fmu3, name, given, NO_LOGGER) is None
+        else:
+            for logging, to in [(True, logger), (False, logger), (True, NO_LOGGER)]:
+                assert fmu3.dll.fmi3InstantiateModelExchange(name, given, None, False, logging, None, to) is None
+        (message,) = log
+        assert (message.status, message.category) == (ERROR, "logStatusError")
+        assert message.text.startswith(f"{function}: ")
+        assert said in message.text
+        log.clear()
+
+
+def test_variables_of_intermediate_update_are_those_of_the_fmu(fmu3: fmi3.Fmu) -> None:
+    n = len(fmu3.variables)  # references are 1 to n
+    for vr, size in [(references(1, n + 1), 2), (references(0), 1), (None, 1)]:
+        log: list[Message] = []
+        assert instantiate(fmu3, b"rov", fmu3.token, fmi3.recorder(log), vr, size) is None
+        assert instantiate(fmu3, b"rov", fmu3.token, fmi3.recorder(log), vr, size, logging=False) is None
+        (message,) = log
+        assert "requiredIntermediateVariables" in message.text
+
+
+def test_intermediate_variables_without_a_callback_are_those_of_some_importers(fmu3: fmi3.Fmu) -> None:
+    component = instantiate(fmu3, b"rov", fmu3.token, NO_LOGGER, references(*fmu3.vr.values()), len(fmu3.vr))
+    assert fmu3.call("EnterInitializationMode", component, False, 0.0, 0.0, False, 0.0) == OK
+    assert fmu3.call("ExitInitializationMode", component) == OK
+    flags = [fmi3.flags(True) for _ in range(3)]
+    last = room()
+    assert fmu3.call("DoStep", component, 0.0, 0.1, True, *flags, last) == OK
+    assert last[0] == 0.1
+    assert fmu3.call("DoStep", component, 0.1, 0.0, True, *flags, last) == ERROR  # without a logger, too
+    fmu3.dll.fmi3FreeInstance(component)
+
+
+def test_there_is_no_scheduled_execution(fmu3: fmi3.Fmu) -> None:
+    log: list[Message] = []
+    logger = fmi3.recorder(log)
+    for logging in (False, True):
+        arguments = (b"rov", fmu3.token, None, False, logging, None, logger, None, None, None)
+        assert fmu3.dll.fmi3InstantiateScheduledExecution(*arguments) is None
+    (message,) = log
+    assert (message.status, message.text) == (
+        ERROR,
+        "fmi3InstantiateScheduledExecution: this FMU has no Scheduled Execution.",
+    )

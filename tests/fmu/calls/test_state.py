@@ -1,0 +1,282 @@
+"""A run goes on bit-equal wherever its state is taken and restored."""
+
+import ctypes
+import shutil
+import subprocess
+import sys
+from ctypes import c_void_p
+from pathlib import Path
+
+import pytest
+
+from tests import fmi3
+from tests.fmi import (
+    CO_SIMULATION,
+    CONTINUOUS,
+    ERROR,
+    EVENT,
+    EVERY_MODE,
+    MODEL_EXCHANGE,
+    MODES,
+    OK,
+    STEP,
+    WITH_EVENTS,
+    AnyInstance,
+    Fmu,
+    reals,
+)
+
+H = 0.05
+# Parameters, a load, a current and a motion that are not those of the start.
+DISTURBED = {"m_rov": 7.5, "gamma": 0.4, "beta_u": 0.7, "alpha_w": 1.3, "a_d_r": 0.03, "Z_ext": -1.5, "V_E": 0.25}
+DISTURBED |= {"u": -0.4, "w": 0.2, "r": 0.9, "x": 10.0, "psi": 2.0}
+
+
+def commands(i: int) -> dict[str, float]:
+    """A run that turns and changes its signs, with commands beyond full and a parameter tuned on the way."""
+    return {
+        "u_l": 0.3 * (i % 7) - 1.0,
+        "u_r": 1.1 - 0.4 * (i % 5),
+        "u_t": (-1.0) ** (i // 3) * 0.6,
+        "N_ext": 0.1 * (i % 3),
+        "beta_r": 1.0 + 0.1 * (i % 2),
+    }
+
+
+def run(rov: AnyInstance, first: int, last: int) -> bytes:
+    """All outputs after each step from the first to before the last."""
+    result = b""
+    for i in range(first, last):
+        assert rov.set(commands(i)) == OK
+        assert rov.step(H * i, H) == OK, rov.log
+        result += bytes(reals(*rov.get(rov.fmu.outputs)))
+    return result
+
+
+@pytest.fixture(scope="module")
+def whole(fmu: Fmu) -> bytes:
+    """The outputs of 20 steps in one go."""
+    with fmu.instance() as rov:
+        rov.start(DISTURBED, stop=1.0)
+        result = run(rov, 0, 20)
+    assert len({result[i : i + 8] for i in range(0, len(result), 8)}) > 100
+    return result
+
+
+def half(whole: bytes) -> bytes:
+    return whole[len(whole) // 2 :]
+
+
+@pytest.fixture(scope="module")
+def midway(fmu: Fmu) -> bytes:
+    """The serialized state after ten steps."""
+    with fmu.instance() as rov:
+        rov.start(DISTURBED, stop=1.0)
+        run(rov, 0, 10)
+        return rov.save()
+
+
+# ---- The same bits ----
+
+
+def test_a_state_restored_in_its_own_run_repeats_it(fmu: Fmu, whole: bytes) -> None:
+    state = c_void_p()
+    with fmu.instance() as rov:
+        rov.start(DISTURBED, stop=1.0)
+        run(rov, 0, 10)
+        rov.expect("GetFMUState", ctypes.byref(state))
+        for _ in range(3):
+            assert run(rov, 10, 20) == half(whole)
+            rov.expect("SetFMUState", state)
+        rov.expect("FreeFMUState", ctypes.byref(state))
+        assert state.value is None
+
+
+def test_a_state_goes_on_in_an_instance_only_just_instantiated(fmu: Fmu, whole: bytes, midway: bytes) -> None:
+    with fmu.instance() as rov:
+        assert rov.load(midway) == OK
+        assert rov.mode() == STEP
+        assert run(rov, 10, 20) == half(whole)
+
+
+def test_a_state_goes_on_in_another_process(fmu: Fmu, whole: bytes, midway: bytes, tmp_path: Path) -> None:
+    saved = tmp_path / "state"
+    saved.write_bytes(midway)
+    script = (
+        "import sys; from pathlib import Path; from tests.fmu.calls.conftest import WRAPPERS\n"
+        "from tests.fmu.calls.test_state import run\n"
+        "with WRAPPERS[int(sys.argv[3])](Path(sys.argv[1])).instance(name='elsewhere') as rov:\n"
+        "    assert rov.load(Path(sys.argv[2]).read_bytes()) == 0, rov.log\n"
+        "    sys.stdout.write(run(rov, 10, 20).hex())\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", script, str(fmu.folder), str(saved), str(fmu.VERSION)],
+        cwd=Path(__file__).parents[3],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert bytes.fromhex(result.stdout) == half(whole)
+
+
+def test_reset_and_run_again_gives_the_same_bits(fmu: Fmu, whole: bytes) -> None:
+    with fmu.instance() as rov:
+        rov.start({"u": 2.0, "alpha_u": 0.5, "R": 0.3})
+        run(rov, 0, 7)
+        rov.expect("Reset")
+        rov.start(DISTURBED, stop=1.0)
+        assert run(rov, 0, 20) == whole
+
+
+def test_a_freed_and_a_new_instance_give_the_same_bits(fmu: Fmu, whole: bytes) -> None:
+    for _ in range(3):
+        with fmu.instance() as rov:
+            rov.start(DISTURBED, stop=1.0)
+            assert run(rov, 0, 20) == whole
+
+
+def test_the_library_unloaded_and_loaded_again_gives_the_same_bits(fmu: Fmu, whole: bytes, tmp_path: Path) -> None:
+    copy = tmp_path / fmu.library.name
+    shutil.copyfile(fmu.library, copy)
+    for _ in range(2):
+        loaded = type(fmu)(fmu.folder, copy)
+        rov = loaded.instance()
+        rov.start(DISTURBED, stop=1.0)
+        assert run(rov, 0, 20) == whole
+        rov.free()
+        loaded.unload()
+
+
+def test_two_instances_in_turns_give_the_bits_of_each_alone(fmu: Fmu, whole: bytes) -> None:
+    with fmu.instance(name="alone") as alone:
+        alone.start()
+        other = run(alone, 0, 20)
+    with fmu.instance(name="a") as a, fmu.instance(name="b") as b, fmu.instance(MODEL_EXCHANGE, name="c") as c:
+        a.start(DISTURBED, stop=1.0)
+        b.start()
+        c.start({"u": -3.0})
+        together = [(run(a, i, i + 1), c.set(commands(i)), run(b, i, i + 1)) for i in range(20)]
+    assert b"".join(row[0] for row in together) == whole
+    assert b"".join(row[2] for row in together) == other
+
+
+# ---- Event Mode of Co-Simulation ----
+
+
+@pytest.mark.parametrize("mode", fmi3.MODES[WITH_EVENTS])
+def test_with_event_mode_a_state_holds_the_mode(fmu3: fmi3.Fmu, mode: str) -> None:
+    with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance(WITH_EVENTS) as another:
+        rov.reach(mode)
+        assert another.load(rov.save()) == OK
+        assert another.mode() == mode
+        assert another.save() == rov.save()
+
+
+def test_a_state_in_event_mode_is_refused_where_that_is_not_used(fmu3: fmi3.Fmu) -> None:
+    state, restored = c_void_p(), c_void_p()
+    with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance() as other:
+        rov.reach(EVENT)
+        rov.expect("GetFMUState", ctypes.byref(state))
+        before = other.save()
+        assert other.call("SetFMUState", state) == ERROR
+        assert "Event Mode" in other.log[-1].text
+        assert other.deserialize(rov.save(), restored) == ERROR
+        assert restored.value is None
+        assert other.save() == before
+        rov.expect("FreeFMUState", ctypes.byref(state))
+
+
+def test_a_state_between_steps_goes_on_with_event_mode_and_without(fmu3: fmi3.Fmu) -> None:
+    with fmu3.instance() as plain, fmu3.instance(WITH_EVENTS) as events:
+        plain.start(DISTURBED)
+        events.reach(STEP)
+        commanded = {name: value for name, value in commands(0).items() if name in fmu3.inputs}
+        assert plain.set(commanded) == OK
+        assert events.load(plain.save()) == OK
+        assert events.mode() == STEP
+        for rov in (plain, events):
+            assert rov.step(0.0, 0.3) == OK
+        assert events.get(fmu3.states) == plain.get(fmu3.states)
+        assert plain.load(events.save()) == OK
+
+
+def test_a_state_of_the_other_version_is_refused(fmus: dict[int, Fmu]) -> None:
+    """The bytes begin with whose they are; in memory a state tells whose it is."""
+    for version, fmu in fmus.items():
+        state, restored = c_void_p(), c_void_p()
+        with fmu.instance() as rov, fmus[5 - version].instance() as other:
+            before = other.save()
+            rov.expect("GetFMUState", ctypes.byref(state))
+            assert other.call("SetFMUState", state) == ERROR
+            assert other.deserialize(rov.save(), restored) == ERROR
+            assert "not a state of this FMU" in other.log[-1].text
+            assert other.save() == before
+            rov.expect("FreeFMUState", ctypes.byref(state))
+
+
+# ---- What a state holds ----
+
+
+@pytest.mark.parametrize(("kind", "mode"), EVERY_MODE)
+def test_a_state_holds_the_mode(fmu: Fmu, kind: int, mode: str) -> None:
+    with fmu.instance(kind) as rov, fmu.instance(kind) as another:
+        rov.reach(mode)
+        assert another.load(rov.save()) == OK
+        assert another.mode() == mode
+        another.expect("Reset")
+        another.reach(MODES[kind][2])
+        assert another.load(rov.save()) == OK
+        assert another.mode() == mode
+
+
+def test_a_state_holds_every_value_and_the_time(fmu: Fmu, midway: bytes) -> None:
+    with fmu.instance() as rov:
+        rov.start(DISTURBED, stop=1.0)
+        run(rov, 0, 10)
+        before = rov.get(list(fmu.variables))
+        rov.expect("Reset")
+        rov.start({"u_l": 0.1, "b_t_top": 3.0, "y": -4.0}, stop=50.0, at=40.0)
+        assert rov.step(40.0, 1.0) == OK
+        assert rov.load(midway) == OK
+        assert rov.get(list(fmu.variables)) == before
+        assert rov.time() == pytest.approx(0.5, abs=1e-15)
+        assert rov.step(0.5, 0.6) == ERROR  # past its stop time
+
+
+def test_a_state_is_a_copy_that_later_calls_leave_alone(fmu: Fmu, midway: bytes) -> None:
+    state = c_void_p()
+    with fmu.instance() as rov, fmu.instance() as another:
+        assert rov.load(midway) == OK
+        rov.expect("GetFMUState", ctypes.byref(state))
+        run(rov, 10, 15)
+        rov.expect("Reset")
+        assert rov.save(state) == midway
+        assert another.save(state) == midway  # any instance can read it
+        another.expect("FreeFMUState", ctypes.byref(state))
+
+
+def test_a_state_given_again_is_overwritten_in_place(fmu: Fmu, midway: bytes) -> None:
+    state = c_void_p()
+    with fmu.instance() as rov:
+        rov.expect("GetFMUState", ctypes.byref(state))
+        first, new = state.value, rov.save(state)
+        assert rov.load(midway) == OK
+        rov.expect("GetFMUState", ctypes.byref(state))
+        assert (state.value, rov.save(state)) == (first, midway)
+        assert rov.deserialize(new, state) == OK
+        assert (state.value, rov.save(state)) == (first, new)
+        rov.expect("FreeFMUState", ctypes.byref(state))
+
+
+@pytest.mark.parametrize(("kind", "mode"), [(CO_SIMULATION, STEP), (MODEL_EXCHANGE, CONTINUOUS)])
+def test_a_state_of_the_other_interface_is_refused(fmu: Fmu, kind: int, mode: str) -> None:
+    state = c_void_p()
+    with fmu.instance(kind) as rov, fmu.instance(1 - kind) as other:
+        rov.reach(mode)
+        rov.expect("GetFMUState", ctypes.byref(state))
+        before = other.save()
+        for status in (other.call("SetFMUState", state), other.load(rov.save())):
+            assert status == ERROR
+            assert "interface" in other.log[-1].text
+            assert other.save() == before
+        rov.expect("FreeFMUState", ctypes.byref(state))

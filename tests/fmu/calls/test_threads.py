@@ -1,0 +1,80 @@
+"""Instances know nothing of each other: eight threads drive their own, under ThreadSanitizer and AddressSanitizer."""
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.fmu.archive import native_content
+from rov_fmu.vehicle.vehicle import Vehicle
+from verification.references.c_programs import Ended, clang, compile_c, run_program
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="the programs are run on Linux"),
+    pytest.mark.skipif(clang() is None, reason="clang with its sanitizers is missing"),
+]
+
+PROGRAM = Path(__file__).parent / "threads.c"
+
+# Some clangs find no room for their bookkeeping among addresses as random as new kernels make them: 0x0040000 is
+# ADDR_NO_RANDOMIZE; where it is not allowed the program runs as it is.
+_PLAIN_ADDRESSES = (
+    "import ctypes, os, sys; ctypes.CDLL(None).personality(0x0040000); os.execv(sys.argv[1], sys.argv[1:])"
+)
+
+
+def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls: int) -> Ended:
+    program = compile_c(PROGRAM, folder / "threads", sources, "-pthread", sanitizers=sanitizers)
+    return run_program(sys.executable, "-c", _PLAIN_ADDRESSES, program, str(calls))
+
+
+@pytest.mark.parametrize(
+    "calls", [20_000, pytest.param(200_000, marks=pytest.mark.long), pytest.param(2_000_000, marks=pytest.mark.weekly)]
+)
+@pytest.mark.parametrize(
+    ("fmi", "sanitizers"),
+    [
+        (2, "thread"),
+        (3, "thread"),
+        *(pytest.param(fmi, "address,undefined", marks=pytest.mark.long) for fmi in (2, 3)),  # as the corpus has it
+    ],
+)
+def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
+    vehicle: Vehicle, tmp_path: Path, fmi: int, sanitizers: str, calls: int
+) -> None:
+    run = run_threads(native_content(vehicle, fmi=fmi).sources, tmp_path, sanitizers, calls)
+    assert run.code == 0, run.errors
+    assert run.errors == ""
+    counts = {name: int(count) for name, count in run.lines}
+    assert counts["calls"] == calls
+    assert 0.8 * calls < counts["accepted"] < 0.99 * calls  # refused calls are driven too
+    assert counts["messages"] > 0.1 * calls
+
+
+@pytest.mark.parametrize(
+    ("sanitizers", "file", "line", "fault", "report"),
+    [
+        (
+            "thread",
+            "step.c",
+            "    motion m;\n",
+            "    static motion m;\n",
+            "data race",
+        ),
+        pytest.param(
+            *("address", "fmi2_common.c", "    free(c);\n", "(void)c;\n", "detected memory leaks"),
+            marks=pytest.mark.long,
+        ),
+    ],
+    ids=["shared variable", "lost instance"],
+)
+def test_a_shared_variable_or_a_lost_instance_would_be_reported(
+    vehicle: Vehicle, tmp_path: Path, sanitizers: str, file: str, line: str, fault: str, report: str
+) -> None:
+    sources = native_content(vehicle).sources
+    assert sources[file].count(line) == 1
+    faulty = {**sources, file: sources[file].replace(line, fault)}
+    run = run_threads(faulty, tmp_path, sanitizers, 8_000)
+    assert run.code != 0
+    assert report in run.errors

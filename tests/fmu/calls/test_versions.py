@@ -1,0 +1,75 @@
+"""The FMU of FMI 3.0 gives what that of FMI 2.0 gives, to the bit, whatever is asked of both."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.vehicle.shipped import SHIPPED
+from tests import fmi2, fmi3
+from tests.conftest import unzipped
+from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, AnyInstance, reals
+
+BUILT = {"videoray": ("videoray_dir", "videoray3_dir"), "bluerov2_heavy": ("heavy_dir", "heavy3_dir")}
+"""By other tests, too."""
+_NAMES = [name if name in BUILT else pytest.param(name, marks=pytest.mark.long) for name in SHIPPED]
+
+
+@pytest.fixture(scope="module", params=_NAMES)
+def both(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[fmi2.Fmu, fmi3.Fmu]:
+    """Both FMUs of a vehicle that ships."""
+    name: str = request.param
+
+    def folder(version: int) -> Path:
+        if name in BUILT:
+            found: Path = request.getfixturevalue(BUILT[name][version - 2])
+            return found
+        return unzipped(SHIPPED[name], tmp_path_factory.mktemp(f"{name}{version}"), version)
+
+    return fmi2.Fmu(folder(2)), fmi3.Fmu(folder(3))
+
+
+def inputs(rov: AnyInstance, rng: random.Random) -> dict[str, float]:
+    return {name: rng.choice([0.0, rng.uniform(-1.2, 1.2), rng.uniform(-1.2, 1.2)]) for name in rov.fmu.inputs}
+
+
+def run(rov: AnyInstance, steps: int) -> list[bytes]:
+    """All that can be read after each of random steps of random commands, with tuning on the way."""
+    rng, t, seen = random.Random(6), 0.0, []
+    for _ in range(steps):
+        h = 10.0 ** rng.uniform(-4.0, 0.8)
+        assert rov.set({**inputs(rov, rng), f"beta_{rov.fmu.states[0]}": rng.uniform(0.5, 1.0)}) == OK
+        assert rov.step(t, h) == OK
+        t += h
+        read = rov.get([name for name in rov.fmu.variables if name != "time"])
+        read += rov.rates(rov.fmu.outputs)
+        seen.append(bytes(reals(*read, rov.time())))
+    return seen
+
+
+@pytest.mark.parametrize("steps", [300, pytest.param(30_000, marks=pytest.mark.long)])
+def test_co_simulation_gives_the_same_bits(both: tuple[fmi2.Fmu, fmi3.Fmu], steps: int) -> None:
+    runs = []
+    for fmu in both:
+        with fmu.instance() as rov:
+            rov.start({"psi": 0.5})
+            runs.append(run(rov, steps))
+    assert runs[0] == runs[1]
+    assert len(set(runs[0])) == steps
+
+
+def test_model_exchange_gives_the_same_bits(both: tuple[fmi2.Fmu, fmi3.Fmu]) -> None:
+    assert both[0].states == both[1].states
+    n, seen = len(both[0].states), []
+    for fmu in both:
+        rng = random.Random(8)
+        with fmu.instance(MODEL_EXCHANGE) as rov:
+            rov.reach(CONTINUOUS)
+            for _ in range(300):
+                assert rov.set(inputs(rov, rng)) == OK
+                rov.expect("SetContinuousStates", reals(*(rng.uniform(-2.0, 2.0) for _ in range(n))), n)
+                rates = reals(*[0.0] * n)
+                rov.expect("GetContinuousStateDerivatives", rates, n)
+                seen.append(bytes(rates))
+    assert seen[:300] == seen[300:]
+    assert len(set(seen)) == 300

@@ -1,0 +1,284 @@
+"""Each binary of the archive for all platforms: what it needs, what it exports, and that it runs as the others do.
+
+The first build for all platforms compiles the C libraries of seven targets, which takes minutes: these tests are long.
+"""
+
+import os
+import random
+import re
+import shutil
+import struct
+import sys
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import fmpy
+import lief
+import numpy as np
+import pytest
+
+from rov_fmu.build import chosen_platforms
+from rov_fmu.cli import main
+from rov_fmu.engine.compile import PLATFORMS, fmi_headers, host_platform
+from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.shipped import SHIPPED
+from tests.conftest import Made
+from verification.references.c_programs import compile_c, run_program
+
+lief.logging.disable()
+
+LINUX = ["linux64", "linux32", "aarch64-linux"]
+WINDOWS = ["win64", "win32"]
+DARWIN = ["darwin64", "aarch64-darwin"]
+TUPLES = {
+    "linux64": "x86_64-linux",
+    "linux32": "x86-linux",
+    "aarch64-linux": "aarch64-linux",
+    "win64": "x86_64-windows",
+    "win32": "x86-windows",
+    "darwin64": "x86_64-darwin",
+    "aarch64-darwin": "aarch64-darwin",
+}
+"""Folders in FMI 3.0 by those in FMI 2.0."""
+LARGEST = 600_000  # 31,000 of them for the page that flies
+
+
+def functions(fmi: int) -> set[str]:
+    """All of a version, as its header names them."""
+    header = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
+    return set(re.findall(rf"#define (fmi{fmi}\w+)\s+fmi{fmi}FullName\(\1\)", header))
+
+
+@dataclass(frozen=True)
+class Binaries:
+    """An unzipped FMU for all platforms, of a version of FMI."""
+
+    archive: Path
+    folder: Path
+    fmi: int
+
+    def of(self, name: str) -> Path:
+        folder = TUPLES[name] if self.fmi == 3 else name
+        return self.folder / "binaries" / folder / f"videoray{PLATFORMS[name].suffix}"
+
+
+@pytest.fixture(
+    scope="session", params=[pytest.param(fmi, marks=pytest.mark.long) for fmi in (2, 3)], ids=["FMI 2.0", "FMI 3.0"]
+)
+def binaries(request: pytest.FixtureRequest, made_once: Made) -> Binaries:
+    """The FMU that a build writes by default."""
+
+    def found(folder: Path) -> Binaries:
+        return Binaries(folder / "videoray.fmu", folder / "fmu", request.param)
+
+    def fill(folder: Path) -> None:
+        assert main(["build", "--fmi", str(request.param), "-o", str(found(folder).archive)]) == 0
+        fmpy.extract(str(found(folder).archive), unzipdir=str(found(folder).folder))
+
+    return found(made_once(f"all platforms of FMI {request.param}", fill))
+
+
+def test_one_archive_holds_all_platforms(binaries: Binaries) -> None:
+    assert binaries.archive.stat().st_size <= LARGEST
+    with zipfile.ZipFile(binaries.archive) as content:
+        names = {n for n in content.namelist() if n.startswith("binaries/")}
+    assert names == {binaries.of(name).relative_to(binaries.folder).as_posix() for name in PLATFORMS}
+    assert set(PLATFORMS) == {*LINUX, *WINDOWS, *DARWIN}
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(
+    "vehicle",
+    [pytest.param(n, marks=pytest.mark.long if n == "bluerov2_heavy" else pytest.mark.weekly) for n in SHIPPED],
+)
+def test_every_vehicle_that_ships_is_built_for_all_platforms(
+    vehicle: str, fmi: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["build", vehicle, "--fmi", str(fmi)]) == 0
+    (archive,) = tmp_path.iterdir()
+    assert archive.name == f"{vehicle}{'.fmi3' if fmi == 3 else ''}.fmu"
+    assert archive.stat().st_size <= LARGEST
+    assert capsys.readouterr().out.startswith(f"{archive.name}  ")
+
+
+# As FMPy looks for it (in its own words by platform and machine), but Linux on ARM, which has no name in FMI 2.0.
+@pytest.mark.parametrize(
+    ("system", "machine", "two", "three"),
+    [
+        ("Linux", "x86_64", "linux64", "x86_64-linux"),
+        ("Linux", "aarch64", "aarch64-linux", "aarch64-linux"),
+        ("Windows", "AMD64", "win64", "x86_64-windows"),
+        ("Darwin", "x86_64", "darwin64", "x86_64-darwin"),
+        ("Darwin", "arm64", "darwin64", "aarch64-darwin"),
+    ],
+)
+def test_the_hosts_binary_is_the_one_that_importers_load_there(
+    system: str, machine: str, two: str, three: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("platform.system", lambda: system)
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    (of_two,), (of_three,) = (chosen_platforms(["host"], fmi) for fmi in (2, 3))
+    assert (of_two, TUPLES[of_three]) == (two, three)
+
+
+@pytest.mark.parametrize(("fmi", "number"), [(2, 44), (3, 75)])
+def test_there_are_so_many_functions(fmi: int, number: int) -> None:
+    assert len(functions(fmi)) == number
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the others are looked at in the archive for all platforms")
+def test_the_library_of_this_machine_has_all_functions(either_dir: Path, fmi: int) -> None:
+    (path,) = (either_dir / "binaries").glob("*/*.so")
+    library = lief.ELF.parse(path)
+    assert library is not None
+    assert {s.name for s in library.exported_symbols} == functions(fmi)
+
+
+@pytest.mark.parametrize("name", LINUX)
+def test_linux_needs_libc_and_libm_of_2012_alone(binaries: Binaries, name: str) -> None:
+    library = lief.ELF.parse(binaries.of(name))
+    assert library is not None
+    assert set(library.libraries) <= {"libc.so.6", "libm.so.6"}
+    versions = re.findall(r"GLIBC_([\d.]+)", " ".join(str(s.symbol_version) for s in library.imported_symbols))
+    assert versions
+    assert max(tuple(map(int, v.split("."))) for v in versions) <= (2, 17)
+    assert {s.name for s in library.exported_symbols} == functions(binaries.fmi)
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+def test_windows_needs_the_system_and_its_c_run_time_alone(binaries: Binaries, name: str) -> None:
+    library = lief.PE.parse(binaries.of(name))
+    assert library is not None
+    needed = {str(i.name) for i in library.imports}
+    assert "KERNEL32.dll" in needed
+    assert [n for n in needed if n != "KERNEL32.dll" and not n.startswith("api-ms-win-crt-")] == []
+    exports = library.get_export()
+    assert exports is not None
+    assert {e.name for e in exports.entries} == functions(binaries.fmi)
+
+
+@pytest.mark.parametrize("name", DARWIN)
+def test_darwin_has_the_processors_of_its_folder_and_needs_the_system_alone(binaries: Binaries, name: str) -> None:
+    universal = lief.MachO.parse(binaries.of(name))
+    assert universal is not None
+    slices = {str(part.header.cpu_type).rsplit(".", 1)[-1]: part for part in universal}
+    # FMPy loads darwin64 on both, and in FMI 3.0 the folder of the processor
+    both = {"X86_64", "ARM64"} if binaries.fmi == 2 else {"X86_64"}
+    assert set(slices) == (both if name == "darwin64" else {"ARM64"})
+    for part in slices.values():
+        assert {str(lib.name) for lib in part.libraries} == {"@rpath/videoray.dylib", "/usr/lib/libSystem.B.dylib"}
+        assert part.dyld_info is not None
+        exported = {str(e.symbol.name) for e in part.dyld_info.exports if e.symbol is not None}
+        # the linker adds two symbols of its own
+        assert exported - {"__mh_dylib_header", "___dso_handle"} == {f"_{f}" for f in functions(binaries.fmi)}
+    if "ARM64" in slices:
+        assert slices["ARM64"].has_code_signature  # Apple Silicon loads nothing unsigned; ad hoc is enough
+
+
+# ---- Run for real --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Machine:
+    """How a program for a platform is run here, and why it cannot be."""
+
+    target: str
+    suffix: str
+    command: tuple[str, ...]
+    missing: Callable[[], str | None]
+
+
+def _needs_program(program: str) -> str | None:
+    return None if shutil.which(program) else f"{program} is not installed"
+
+
+def _needs_file(path: str, package: str) -> str | None:
+    return None if Path(path).exists() else f"{package} is not installed"
+
+
+def _needs_wine32() -> str | None:
+    found = any(Path("/usr/lib").glob("i386-linux-gnu/wine*")) or shutil.which("wine32")
+    return _needs_program("wine") or (None if found else "wine32 is not installed")
+
+
+_AARCH64_ROOT = "/usr/aarch64-linux-gnu"
+MACHINES = {
+    "linux64": Machine("x86_64-linux-gnu.2.17", "", (), lambda: None),
+    "linux32": Machine("x86-linux-gnu.2.17", "", (), lambda: _needs_file("/lib/ld-linux.so.2", "libc6-i386")),
+    "aarch64-linux": Machine(
+        "aarch64-linux-gnu.2.17",
+        "",
+        ("qemu-aarch64", "-L", _AARCH64_ROOT),
+        lambda: _needs_program("qemu-aarch64") or _needs_file(f"{_AARCH64_ROOT}/lib", "libc6-arm64-cross"),
+    ),
+    "win64": Machine("x86_64-windows-gnu", ".exe", ("wine",), lambda: _needs_program("wine")),
+    "win32": Machine("x86-windows-gnu", ".exe", ("wine",), _needs_wine32),
+}
+
+
+def _recorded_steps() -> str:
+    """A command sequence with every branch of the step: reversals, turns, rest, loads, current, 1e-5 s to 1e3 s."""
+    random_ = random.Random(20)
+    lines = []
+    for _ in range(400):
+        h = 10.0 ** random_.uniform(-5.0, 1.0) if random_.random() < 0.98 else 1000.0
+        commands = [random_.choice((0.0, random_.uniform(-1.2, 1.2))) for _ in range(3)]
+        loads = [random_.choice((0.0, random_.gauss(0.0, 3.0))) for _ in range(2)] + [random_.choice((0.0, 0.1))]
+        current = [random_.choice((0.0, 0.3)) for _ in range(2)]
+        values = [h, *commands, *loads, *current]
+        assert len(values) == 1 + len(PAPER.inputs)
+        lines.append(" ".join(struct.pack(">d", value).hex() for value in values))
+    return "\n".join(lines) + "\n"
+
+
+def _run(binaries: Binaries, name: str, folder: Path) -> np.ndarray:
+    machine = MACHINES[name]
+    if reason := machine.missing():
+        pytest.skip(f"{name}: {reason}")
+    program = folder / f"host-{name}-{binaries.fmi}{machine.suffix}"
+    # With the flags of the binaries, so that the compiler finds the C library that it built for them.
+    of_binaries = ("-g0", "-s", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables")
+    flags = ("-target", machine.target, *of_binaries, *(() if machine.suffix else ("-ldl",)))
+    compile_c(Path(__file__).with_name("host.c"), program, binaries.folder / "sources", *flags)
+    library = shutil.copy(binaries.of(name), folder / f"{name}-{binaries.fmi}{PLATFORMS[name].suffix}")
+    environment = os.environ | {"WINEPREFIX": str(folder / "wine"), "WINEDEBUG": "-all"}
+    command: list[str | Path] = [*machine.command, program, f"./{Path(library).name}"]
+    run = run_program(*command, input=_recorded_steps(), cwd=folder, env=environment)
+    assert run.code == 0, run.errors
+    return np.array([[struct.unpack(">d", bytes.fromhex(x))[0] for x in line] for line in run.lines])
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("hosts")
+
+
+@pytest.fixture(scope="session")
+def trajectory(binaries: Binaries, folder: Path) -> np.ndarray:
+    if sys.platform != "linux":
+        pytest.skip("the programs are run on Linux")
+    return _run(binaries, "linux64", folder)
+
+
+@pytest.mark.skipif(host_platform() != "linux64", reason="the programs are run on Linux on x86-64")
+def test_both_versions_of_fmi_fly_the_same_to_the_last_bit(
+    videoray_fmu: Path, videoray_dir: Path, videoray3_fmu: Path, videoray3_dir: Path, folder: Path
+) -> None:
+    two = _run(Binaries(videoray_fmu, videoray_dir, 2), "linux64", folder)
+    three = _run(Binaries(videoray3_fmu, videoray3_dir, 3), "linux64", folder)
+    assert two.shape == (400, 11)
+    assert two.tobytes() == three.tobytes()
+
+
+@pytest.mark.parametrize("name", [*LINUX[1:], *WINDOWS])
+def test_every_platform_runs_as_linux64_does(
+    binaries: Binaries, folder: Path, trajectory: np.ndarray, name: str
+) -> None:
+    other = _run(binaries, name, folder)
+    assert trajectory.shape == (400, 11)
+    assert np.isfinite(trajectory).all()
+    scale = np.maximum.accumulate(np.abs(trajectory))
+    assert np.all(np.abs(other - trajectory) <= 1e-12 * scale + 1e-300)

@@ -1,0 +1,146 @@
+"""The archive that a build writes."""
+
+import re
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+from lxml import etree
+
+from rov_fmu.build import build
+from rov_fmu.cli import main
+from rov_fmu.engine import compile as fmu_compile
+from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.variables import UNITS, variables
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import ALONE
+
+_LAYERS = {2: {"fmi2_host.h"}, 3: {"fmi3_host.h", "buildDescription.xml"}}
+"""What is a version's own beside its C files."""
+
+
+def _build(output: Path, *arguments: str) -> int:
+    return main(["build", "--platform", "host", "-o", str(output), *arguments])
+
+
+def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(either_fmu: Path) -> None:
+    assert validate_fmu(str(either_fmu)) == []
+    for interface in ("CoSimulation", "ModelExchange"):
+        result = fmpy.simulate_fmu(str(either_fmu), fmi_type=interface, start_values={"u_l": 0.3, "u_r": 0.3})
+        assert round(float(result["u"][-1]), 4) == 0.4729
+
+
+def test_the_archive_is_one_that_every_importer_unpacks(either_fmu: Path) -> None:
+    with zipfile.ZipFile(either_fmu) as archive:
+        assert archive.testzip() is None
+        members = archive.infolist()
+    names = [m.filename for m in members]
+    assert names[0] == "modelDescription.xml"
+    assert {
+        "model.png",
+        "documentation/index.html",
+        "documentation/diagram.png",
+        "documentation/licenses/license.txt",
+        "sources/fmu.c",
+        "sources/interface.h",
+        "terminalsAndIcons/terminalsAndIcons.xml",
+    } <= set(names)
+    headers = {path.name for path in fmu_compile.fmi_headers().glob("*.h")}
+    assert len(headers) > 6
+    assert not [n for n in names if Path(n).name in headers], "they are the importer's"
+    for m in members:
+        assert m.compress_type == zipfile.ZIP_DEFLATED
+        assert m.extract_version <= 20
+        assert m.date_time == (1980, 1, 1, 0, 0, 0)
+        assert "\\" not in m.filename
+        assert m.external_attr >> 16 == 0o644  # a file, not a link
+        assert not m.flag_bits & 0x1
+
+
+def test_the_archive_has_what_is_of_its_version_alone(either_dir: Path, fmi: int) -> None:
+    here = {path.name for path in (either_dir / "sources").iterdir()}
+    layers = {path.name for path in fmu_compile.C_SOURCES.glob(f"fmi{fmi}_*")} | _LAYERS[fmi]
+    shared = {path.name for path in fmu_compile.C_SOURCES.iterdir() if not path.name.startswith("fmi")}
+    assert here == layers | shared | {"interface.h", "model.h", "equation.h"}
+    (binaries,) = (either_dir / "binaries").iterdir()
+    assert binaries.name == {2: fmpy.platform, 3: fmpy.platform_tuple}[fmi]
+    page = (either_dir / "documentation" / "index.html").read_text(encoding="utf-8")
+    for claim in (f"FMI {fmi}.0 ", f"fmi{fmi}Discard", f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"):
+        assert claim in page
+    assert not re.findall(f"FMI {5 - fmi}|fmi{5 - fmi}", page)
+    license_ = (either_dir / "documentation" / "licenses" / "fmi-headers.txt").read_text(encoding="utf-8")
+    header = (fmu_compile.fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
+    assert license_.startswith("Copyright (C) 2008-2011 MODELISAR")
+    assert license_.split() == header[header.index("Copyright (C)") :].partition("*/")[0].split()
+    needed = either_dir / "documentation" / "externalDependencies.txt"
+    assert needed.exists() == (fmi == 3)
+
+
+def test_the_description_says_what_the_interface_declares(videoray_dir: Path, vehicle: Vehicle) -> None:
+    description = fmpy.read_model_description(str(videoray_dir))
+    declared = variables(vehicle.rov)
+    assert [v.name for v in description.modelVariables] == [v.name for v in declared]
+    for read, v in zip(description.modelVariables, declared, strict=True):
+        assert read.valueReference == v.value_reference
+        assert (read.causality, read.variability) == (v.causality, v.variability)
+        assert read.unit == v.unit
+        assert read.displayUnit == v.display_unit
+        assert (None if read.start is None else float(read.start)) == v.start
+        assert read.description == v.description
+    assert {u.name for u in description.unitDefinitions} == {v.unit for v in declared} <= set(UNITS)
+    for interface in (description.coSimulation, description.modelExchange):
+        assert interface.modelIdentifier == vehicle.identifier
+        assert interface.canGetAndSetFMUstate
+        assert interface.canSerializeFMUstate
+        assert interface.providesDirectionalDerivative
+        assert not interface.needsExecutionTool
+    assert description.coSimulation.canHandleVariableCommunicationStepSize
+    assert description.coSimulation.maxOutputDerivativeOrder == 1
+
+
+def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> None:
+    """FMI++ ends where these are absent."""
+    description = etree.parse(videoray_dir / "modelDescription.xml")
+    once = "canBeInstantiatedOnlyOncePerProcess"
+    for interface, flags in {
+        "CoSimulation": (once, "canInterpolateInputs", "canRunAsynchronuously"),
+        "ModelExchange": (once,),
+    }.items():
+        element = description.find(interface)
+        assert element is not None
+        assert [element.get(flag) for flag in flags] == ["false"] * len(flags)
+
+
+@pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.long)], indirect=True)
+def test_the_same_inputs_give_the_same_bytes(either_fmu: Path, fmi: int, tmp_path: Path) -> None:
+    """FMI 2.0 by default in a notebook, too: tests/cli/test_start.py."""
+    again = tmp_path / "elsewhere" / "other name.fmu"
+    again.parent.mkdir()
+    assert _build(again, "--fmi", str(fmi)) == 0
+    assert again.read_bytes() == either_fmu.read_bytes()
+
+
+def test_another_coefficient_is_another_guid(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
+    guids = [fmpy.read_model_description(str(videoray_fmu)).guid]
+    for mass in ("6.57", "6.58"):
+        path = tmp_path / f"{mass}.toml"
+        path.write_text(ALONE.replace("6.57", mass), encoding="utf-8")
+        guids.append(native_content(load_vehicle(path)).guid)
+    assert guids[0] == guids[1] != guids[2]
+    assert vehicle.rov["m_rov"] == 6.57
+
+
+def test_the_command_line_says_what_it_built(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _build(tmp_path / "rov.fmu") == 0
+    told = capsys.readouterr().out
+    assert str(fmu_compile.host_platform()) in told
+    assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in told
+    assert "built in" in told
+
+
+def test_a_program_is_told_of_a_platform_that_does_not_exist(vehicle: Vehicle, tmp_path: Path) -> None:
+    with pytest.raises(fmu_compile.BuildError, match="there is no platform linux, only host, linux64"):
+        build(vehicle, tmp_path / "rov.fmu", platforms=["linux"])
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,237 @@
+"""What a build does when it cannot: one clear line, an exit code, the old FMU untouched, nothing left behind."""
+
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.engine import compile as fmu_compile
+from rov_fmu.engine.compile import compile_engine
+from tests.commands import BARE, ROOT, endless_compiler
+
+_SCRIPT = str(ROOT / "build_fmu.py")
+_OLD = b"the old one"
+
+
+def _build(output: Path, *arguments: str) -> int:
+    return main(["build", str(BARE), "--platform", "host", "-o", str(output), *arguments])
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    """An FMU that is there already, alone in its folder."""
+    path = tmp_path / "target" / "rov.fmu"
+    path.parent.mkdir()
+    path.write_bytes(_OLD)
+    return path
+
+
+def _untouched(old: Path) -> bool:
+    return old.read_bytes() == _OLD and list(old.parent.iterdir()) == [old]
+
+
+def _one_line(capsys: pytest.CaptureFixture[str]) -> str:
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1, lines
+    return lines[0]
+
+
+def test_an_impossible_output_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _build(tmp_path) == 2
+    assert "is a folder" in _one_line(capsys)
+    assert _build(tmp_path / "nowhere" / "rov.fmu") == 2
+    assert f"there is no folder {tmp_path / 'nowhere'}" in _one_line(capsys)
+
+
+def test_an_fmu_that_is_not_valid_does_not_replace_the_old_one(
+    old: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def unhappy(_path: str) -> list[str]:
+        return ["something is wrong with it"]
+
+    monkeypatch.setattr("fmpy.validation.validate_fmu", unhappy)
+    assert _build(old) == 1
+    assert "not valid: something is wrong with it" in _one_line(capsys)
+
+    def interrupted(_path: str) -> list[str]:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fmpy.validation.validate_fmu", interrupted)
+    assert _build(old) == 130
+    assert capsys.readouterr().err.lstrip("\n") == "rov-fmu: interrupted, no file is half-written\n"  # after ^C
+    assert _untouched(old)
+
+
+def test_a_compile_error_is_told_with_the_compilers_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken = tmp_path / "c"
+    shutil.copytree(fmu_compile.C_SOURCES, broken)
+    (broken / "step.c").write_text("int no semicolon", encoding="utf-8")
+    monkeypatch.setattr("rov_fmu.fmu.archive.C_SOURCES", broken)
+    assert _build(tmp_path / "rov.fmu") == 1
+    told = capsys.readouterr().err
+    assert told.startswith(f"rov-fmu: {fmu_compile.host_platform()}: the compiler failed")
+    assert "step.c:1" in told
+    assert not (tmp_path / "rov.fmu").exists()
+
+
+def test_a_missing_compiler_says_how_to_get_it(
+    old: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    find = fmu_compile.importlib.util.find_spec  # type: ignore[attr-defined]
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "ziglang" else find(name))
+    assert _build(old) == 1
+    assert _one_line(capsys) == "rov-fmu: the C compiler is missing: pip install ziglang"
+    assert _untouched(old)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder that takes no files, for the administrator too")
+def test_a_folder_that_takes_no_file_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert _build(Path("/proc/rov.fmu")) == 2
+    assert "/proc/rov.fmu: cannot be written" in _one_line(capsys)
+
+
+def test_a_compiler_that_does_not_end_starts_again_without_its_vectorizer(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[bool] = []
+    begin = subprocess.Popen
+
+    def popen(command: Sequence[str], **how: Any) -> Any:
+        again = "-fno-slp-vectorize" in command
+        started.append(again)
+        return begin(command if again else [sys.executable, "-c", "while True: pass"], **how)
+
+    monkeypatch.setattr(fmu_compile, "LONGEST", 0.5)
+    monkeypatch.setattr(subprocess, "Popen", popen)
+    sources = {"engine.c": "int one(void); int one(void) { return 1; }"}
+    assert compile_engine(sources)
+    assert started == [False, True]
+
+
+@pytest.mark.parametrize("function", ["fsync", pytest.param("replace", marks=pytest.mark.long)])
+def test_a_full_disk_leaves_the_old_fmu(
+    old: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], function: str
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(*{"fsync": (os, "fsync", full), "replace": (Path, "replace", full)}[function])
+    assert _build(old) == 2
+    assert "No space left on device" in _one_line(capsys)
+    assert _untouched(old)
+
+
+def _run(old: Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
+    """The script as a process of its own, its temporary files in a folder that can be looked at."""
+    (folder / "tmp").mkdir()
+    return subprocess.Popen(
+        [sys.executable, _SCRIPT, str(BARE), "--platform", "host", "-o", str(old)],
+        env=os.environ | {"TMPDIR": str(folder / "tmp")} | environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+        # a shell starts what it runs in the background with interrupts ignored, and that is inherited
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a limit on the size of files is POSIX")
+def test_no_room_for_temporary_files(old: Path, tmp_path: Path) -> None:
+    limited = tmp_path / "limited.py"
+    limited.write_text(
+        "import matplotlib.font_manager, resource, runpy, signal, sys\n"  # which writes a cache of its own
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
+        f"sys.argv = ['build_fmu.py', {str(BARE)!r}, '--platform', 'host', '-o', {str(old)!r}]\n"
+        f"runpy.run_path({_SCRIPT!r}, run_name='__main__')\n",
+        encoding="utf-8",
+    )
+    # -B: what Python compiles would be cut off too, and stay so for all who import it
+    result = subprocess.run(
+        [sys.executable, "-B", limited],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},  # this checkout, whichever is installed
+    )
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[0].startswith("rov-fmu: ")
+    assert "File too large" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert _untouched(old)
+
+
+def _is_running(process: int) -> bool:
+    """Not gone, and not waiting for init to take note of its end."""
+    stat = Path(f"/proc/{process}/stat")
+    try:
+        return stat.read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals are POSIX, /proc is Linux")
+@pytest.mark.parametrize("signal_", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
+    old: Path, tmp_path: Path, signal_: signal.Signals
+) -> None:
+    """No clock tells: nothing but the interrupt ends the compiler, and the limits are those of a test that hangs."""
+    process = _run(old, tmp_path, **endless_compiler(tmp_path))
+    deadline = time.monotonic() + 120.0
+    while not (number := tmp_path / "number").exists():
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal_)
+    _, error = process.communicate(timeout=120)
+    deadline = time.monotonic() + 120.0
+    assert process.returncode == 130
+    assert error == "rov-fmu: interrupted, no file is half-written\n"
+    while _is_running(int(number.read_text(encoding="utf-8"))):  # killed, but perhaps not yet through with ending
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    assert list((tmp_path / "tmp").iterdir()) == []
+    assert _untouched(old)
+
+
+_MOMENTS = list(product([signal.SIGINT, signal.SIGTERM], [0.0, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7]))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+@pytest.mark.parametrize(
+    ("signal_", "share"),
+    [
+        pytest.param(*moment, marks=pytest.mark.weekly if n % 4 else pytest.mark.long)
+        for n, moment in enumerate(_MOMENTS)
+    ],
+)
+def test_interrupted_at_any_moment_it_leaves_nothing(
+    old: Path, tmp_path: Path, signal_: signal.Signals, share: float
+) -> None:
+    """The real compiler, which an empty cache makes work for seconds."""
+    cache = tmp_path / "cache"
+    process = _run(old, tmp_path, ZIG_GLOBAL_CACHE_DIR=str(cache), ZIG_LOCAL_CACHE_DIR=str(cache))
+    deadline = time.monotonic() + 120.0
+    while not list((tmp_path / "tmp").glob("fmu-*/fmu.c")):
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.001)
+    time.sleep(share)
+    process.send_signal(signal_)
+    _, error = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert error == "rov-fmu: interrupted, no file is half-written\n"
+    assert list((tmp_path / "tmp").iterdir()) == []
+    assert _untouched(old)

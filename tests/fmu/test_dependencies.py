@@ -1,0 +1,90 @@
+"""The dependencies in modelDescription.xml of vehicles of every kind, against slopes of the equations in `checks`."""
+
+import random
+from collections.abc import Mapping, Sequence
+
+import pytest
+from lxml import etree
+
+from rov_fmu.fmu.model_description import NATIVE, model_description
+from rov_fmu.fmu.variables import Variable, variables
+from rov_fmu.model.layout import Layout
+from rov_fmu.model.rov import Rov
+from tests.vehicles import VEHICLES, a_vehicle, numbered
+from verification.references.equations import calculated
+
+Point = dict[str, float]
+Slopes = dict[tuple[str, str], float]
+
+
+def slopes(rov: Rov, point: Point, knowns: Sequence[str]) -> Slopes:
+    """Central differences at a point of inputs, states and coefficients."""
+    found = {}
+    for known in knowns:
+        step = 1e-6 * max(1.0, abs(point[known]))
+        ends = []
+        for x in (point[known] + step, point[known] - step):
+            ends.append({name: float(y) for name, y in calculated(rov, point | {known: x}).items()})
+        for name, above in ends[0].items():
+            slope = (above - ends[1][name]) / (2.0 * step)
+            found[name, known] = 0.0 if abs(slope) < 1e-7 else slope
+    return found
+
+
+def motion(layout: Layout, rng: random.Random) -> Point:
+    return {name: rng.uniform(-0.9, 0.9) for name in (*layout.inputs, *layout.state)}
+
+
+def parameters(rov: Rov, rng: random.Random, tunable: Sequence[bool]) -> Point:
+    of = rov.layout.coefficients
+    return {n: x * (rng.uniform(0.6, 1.4) if of[n].tunable in tunable else 1.0) for n, x in rov.coefficients.items()}
+
+
+def vary(values: Sequence[float]) -> bool:
+    return max(values) - min(values) > 1e-4 * max(map(abs, values))
+
+
+def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
+    """One list of <ModelStructure>."""
+    of_rov = variables(rov)
+    root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=NATIVE[2]))
+    name: Mapping[str, Variable] = {str(v.index): v for v in of_rov}
+    found: dict[tuple[str, str], str] = {}
+    for unknown in root.find(f"ModelStructure/{of}"):
+        kinds = zip(unknown.get("dependencies").split(), unknown.get("dependenciesKind").split(), strict=True)
+        found |= {(name[unknown.get("index")].name, name[known].name): kind for known, kind in kinds}
+    return found
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_dependencies_are_declared_as_they_are(kind: str) -> None:
+    rov, rng = numbered(VEHICLES[kind].layout), random.Random(1)
+    knowns = [*rov.layout.inputs, *rov.layout.state]
+    motions = [motion(rov.layout, rng) for _ in range(12)]
+    sets = [parameters(rov, rng, tunable) for tunable in ([], [False], [True])]
+    samples = [[slopes(rov, m | k, knowns) for m in motions] for k in sets]
+
+    def strongest(pair: tuple[str, str]) -> str | None:
+        values = [[sample[pair] for sample in of_set] for of_set in samples]
+        if not any(map(any, values)):
+            return None
+        if any(map(vary, values)):
+            return "dependent"
+        start, fixed, tunable = (of_set[0] for of_set in values)
+        return "tunable" if vary([start, tunable]) else "fixed" if vary([start, fixed]) else "constant"
+
+    found = {pair: strength for pair in samples[0][0] if (strength := strongest(pair))}
+    outputs = {v.name for v in variables(rov) if v.causality == "output"}
+    assert {pair: s for pair, s in found.items() if pair[0] in outputs} == declared(rov, "Outputs")
+    assert {pair: s for pair, s in found.items() if pair[0].startswith("der(")} == declared(rov, "Derivatives")
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_initial_dependencies_are_declared_as_they_are(kind: str) -> None:
+    """Knowns are inputs, states and coefficients; kinds are constant or dependent alone (2.2.8)."""
+    rov, rng = numbered(VEHICLES[kind].layout), random.Random(2)
+    points = [motion(rov.layout, rng) | parameters(rov, rng, [False, True]) for _ in range(16)]
+    samples = [slopes(rov, point, list(point)) for point in points]
+    values = {pair: [sample[pair] for sample in samples] for pair in samples[0] if pair[0] not in rov.layout.state}
+    found = {pair: "dependent" if vary(of) else "constant" for pair, of in values.items() if any(of)}
+    assert found == declared(rov, "InitialUnknowns")

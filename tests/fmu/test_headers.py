@@ -1,0 +1,337 @@
+"""The C sources under the FMI headers that importers ship, by other compilers: names, warnings, the same bits.
+
+FMPy's package brings headers whose names never bear a prefix. The others are made of them, by what the standard's own
+differ in: FMI 2.0.0 (as in FMI Library, FMI4cpp, MasterSim or PythonFMU 0.6.3) has const members in
+fmi2CallbackFunctions and pastes the prefix; 2.0.1 to 2.0.3 (and Reference-FMUs) paste it; 2.0.4 and 2.0.5 do, unless
+FMI2_OVERRIDE_FUNCTION_PREFIX is defined. FMPy's headers of FMI 3.0 are the standard's: as those of 2.0.4.
+"""
+
+import platform
+import random
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import lief
+import pytest
+
+from rov_fmu.engine.compile import compiler, fmi_headers
+from rov_fmu.fmu.archive import native_content
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests import fmi2, fmi3
+from tests.fmi import OK, Fmu, reals
+
+_EXPORT = "#if defined _WIN32"  # begins the definition of FMI2_Export in FMPy's header
+_NAME = "#define fmi2FullName(name) name"
+_KNOWS_OVERRIDE = (
+    "#if !defined FMI2_OVERRIDE_FUNCTION_PREFIX && defined FMI2_FUNCTION_PREFIX\n"
+    "#define FMI2_ACTUAL_FUNCTION_PREFIX FMI2_FUNCTION_PREFIX\n#endif\n"
+)
+
+
+def _write_headers(folder: Path, release: str) -> Path:
+    shutil.copytree(fmi_headers(), folder)
+    if release == "3.0":
+        return folder
+    functions, types = folder / "fmi2Functions.h", folder / "fmi2FunctionTypes.h"
+    prefix = "FMI2_ACTUAL_FUNCTION_PREFIX" if release == "2.0.4" else "FMI2_FUNCTION_PREFIX"
+    if release != "FMPy":
+        text = functions.read_text(encoding="utf-8")
+        assert text.count(_EXPORT) == text.count(_NAME) == 1
+        before, _, after = text.partition(_EXPORT)
+        export, _, after = after.partition(_NAME)
+        functions.write_text(
+            f"{before}{_KNOWS_OVERRIDE if release == '2.0.4' else ''}#if defined FMI2_Export\n#elif defined {prefix}\n"
+            f"#define FMI2_Export\n#elif defined _WIN32{export}\n#ifdef {prefix}\n#define fmi2Paste(a, b) a##b\n"
+            f"#define fmi2PasteB(a, b) fmi2Paste(a, b)\n#define fmi2FullName(name) fmi2PasteB({prefix}, name)\n#else\n"
+            f"{_NAME}\n#endif\n{after}",
+            encoding="utf-8",
+        )
+    if release == "2.0.0":
+        text, n = re.subn(
+            r"^( +)(fmi2\w+ +(?:logger|allocateMemory|freeMemory|stepFinished|componentEnvironment);)",
+            r"\1const \2",
+            types.read_text(encoding="utf-8"),
+            flags=re.M,
+        )
+        assert n == 5
+        types.write_text(text, encoding="utf-8")
+    return folder
+
+
+_OF_FMI2 = ("2.0.0", "2.0.1", "2.0.4", "FMPy")
+RELEASES = (*_OF_FMI2, "3.0")
+
+
+def _version(release: str) -> int:
+    return 3 if release == "3.0" else 2
+
+
+@pytest.fixture(scope="module")
+def fmus(fmu: fmi2.Fmu, videoray3_dir: Path) -> dict[int, Fmu]:
+    """By version of FMI."""
+    return {2: fmu, 3: fmi3.Fmu(videoray3_dir)}
+
+
+@pytest.fixture(scope="module")
+def headers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("headers")
+    return {release: _write_headers(folder / release, release) for release in RELEASES}
+
+
+_STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
+_PLAIN = {"2.0.4": ("-DFMI2_OVERRIDE_FUNCTION_PREFIX",), "3.0": ("-DFMI3_OVERRIDE_FUNCTION_PREFIX",)}
+"""What these headers are told for a shared library; the others need nothing."""
+COMPILERS = {"zig": compiler()} | {name: [name] for name in ("gcc", "clang") if shutil.which(name)}
+_HAS_FMA = "fma" in Path("/proc/cpuinfo").read_text(encoding="utf-8") if Path("/proc/cpuinfo").exists() else False
+
+
+def _compile(fmu: Fmu, headers: Path, command: Sequence[str], library: Path, warnings: Sequence[str] = _STRICT) -> Path:
+    """The FMU's sources as a shared library."""
+    sources = fmu.folder / "sources"
+    include = "-isystem" if headers.name == "3.0" else "-I"  # where the standard itself declares f() without arguments
+    shared = ("-shared", "-fPIC", include, str(headers), "fmu.c", "-lm", "-o", str(library))
+    built = subprocess.run([*command, *warnings, *shared], cwd=sources, capture_output=True, text=True, check=False)
+    assert (built.returncode, built.stderr) == (0, "")
+    return library
+
+
+def _flight(fmu: Fmu, steps: int = 400) -> bytes:
+    """All values along a random flight: turns, reversals, saturation, loads, long and short steps, tuned."""
+    drawn = random.Random(20)
+    result = b""
+    with fmu.instance() as rov:
+        rov.start({"u": -0.4, "r": 0.9, "psi": 2.0, "gamma": 0.4})
+        t = 0.0
+        for _ in range(steps):
+            chosen = drawn.sample(fmu.inputs, 4)
+            values = {name: drawn.choice((0.0, drawn.uniform(-1.2, 1.2))) for name in chosen}
+            assert rov.set(values | {"beta_r": drawn.uniform(0.5, 2.0)}) == OK
+            h = 10.0 ** drawn.uniform(-4.0, 1.5)
+            assert rov.step(t, h) == OK
+            t += h
+            result += bytes(reals(*rov.get([name for name in fmu.variables if name != "time"])))
+    return result
+
+
+@pytest.fixture(scope="module")
+def shipped(fmu: fmi2.Fmu) -> bytes:
+    """That of FMI 2.0 is that of all."""
+    return _flight(fmu)
+
+
+def _flies_the_same(fmu: Fmu, library: Path, shipped: bytes) -> None:
+    assert _flight(type(fmu)(fmu.folder, library)) == shipped
+
+
+def _exports(library: Path) -> set[str]:
+    binary = lief.parse(str(library))
+    assert isinstance(binary, lief.ELF.Binary | lief.PE.Binary | lief.MachO.Binary)
+    return {name for function in binary.exported_functions if re.search("fmi[23]", name := str(function.name))}
+
+
+# Every header once, every compiler once, both standards; all of them in the weekly tests.
+_STANDARDS, _NAMES = ("c99", "c11"), list(COMPILERS)
+_SOME = {(release, _NAMES[i % len(_NAMES)], _STANDARDS[i % 2]) for i, release in enumerate(RELEASES)}
+_MATRIX = [
+    pytest.param(r, c, s, marks=() if (r, c, s) in _SOME else pytest.mark.weekly)
+    for r in RELEASES
+    for c in COMPILERS
+    for s in _STANDARDS
+]
+
+
+@pytest.mark.parametrize(("release", "name", "standard"), _MATRIX)
+def test_a_shared_library_has_plain_names_and_flies_the_same(
+    fmus: dict[int, Fmu],
+    headers: dict[str, Path],
+    shipped: bytes,
+    tmp_path: Path,
+    release: str,
+    name: str,
+    standard: str,
+) -> None:
+    fmu = fmus[_version(release)]
+    command = [*COMPILERS[name], f"-std={standard}", "-O2", *_PLAIN.get(release, ())]
+    library = _compile(fmu, headers[release], command, tmp_path / "videoray.so")
+    assert _exports(library) == _exports(fmu.library)
+    _flies_the_same(fmu, library, shipped)
+
+
+@pytest.mark.parametrize("release", [pytest.param("2.0.0", marks=pytest.mark.weekly), "3.0"])
+def test_as_cpp_they_fly_the_same(
+    fmus: dict[int, Fmu], headers: dict[str, Path], shipped: bytes, tmp_path: Path, release: str
+) -> None:
+    """Not pedantically so: compound literals are an extension there, of GCC and Clang."""
+    fmu = fmus[_version(release)]
+    command = [*compiler(), "-x", "c++", "-std=c++17", "-O2", *_PLAIN.get(release, ())]
+    library = _compile(fmu, headers[release], command, tmp_path / "videoray.so", ("-Wall", "-Wextra", "-Werror"))
+    assert _exports(library) == _exports(fmu.library)
+    _flies_the_same(fmu, library, shipped)
+
+
+# Each way that a release has it once; all of them in the weekly tests.
+_SOME_PREFIXES = {("2.0.0", False), ("2.0.4", False), ("2.0.4", True)}
+_PREFIXES = [
+    pytest.param(r, o, marks=() if (r, o) in _SOME_PREFIXES else pytest.mark.weekly)
+    for o in (False, True)
+    for r in ("2.0.0", "2.0.1", "2.0.4", "3.0")
+]
+
+
+@pytest.mark.parametrize(("release", "override"), _PREFIXES)
+def test_the_prefix_reaches_the_exports_only_where_it_is_meant_to(
+    fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, override: bool
+) -> None:
+    fmu = fmus[_version(release)]
+    plain = _exports(fmu.library)
+    prefixed = {f"videoray_{name}" for name in plain}
+    command = [*compiler(), "-O0", *_PLAIN.get(release, _PLAIN["2.0.4"]) * override]
+    library = _compile(fmu, headers[release], command, tmp_path / "a.so")
+    assert _exports(library) == (prefixed if release in _PLAIN and not override else plain)
+    if not override:  # asked for, for a static library
+        command = [*compiler(), "-O0", f"-DFMI{_version(release)}_FUNCTION_PREFIX=videoray_"]
+        assert _exports(_compile(fmu, headers[release], command, tmp_path / "b.so")) == prefixed
+
+
+_MAIN = r"""
+#include "fmi2FunctionTypes.h"
+#include "fmi3FunctionTypes.h"
+#include <stdio.h>
+static const fmi2CallbackFunctions callbacks;
+%s
+int main(void)
+{
+    printf("%%p %%p\n", %s);
+    return 0;
+}
+"""
+_INSTANTIATE = {
+    2: '{0}_fmi2Instantiate("rov", fmi2CoSimulation, "{1}", NULL, &callbacks, fmi2False, fmi2False)',
+    3: '{0}_fmi3InstantiateModelExchange("rov", "{1}", NULL, false, false, NULL, NULL)',
+}
+_DECLARE = {
+    2: "fmi2InstantiateTYPE {0}_fmi2Instantiate;",
+    3: "fmi3InstantiateModelExchangeTYPE {0}_fmi3InstantiateModelExchange;",
+}
+
+
+@pytest.mark.parametrize(
+    ("releases", "sister"),
+    [
+        *(pytest.param((release,) * 2, "sister", marks=pytest.mark.weekly) for release in ("2.0.0", "2.0.4", "3.0")),
+        (("2.0.4", "3.0"), "videoray"),
+    ],
+    ids=["2.0.0", "2.0.4", "3.0", "one model in both versions"],
+)
+def test_two_models_link_into_one_program_under_their_prefixes(
+    vehicle: Vehicle, headers: dict[str, Path], tmp_path: Path, releases: tuple[str, str], sister: str
+) -> None:
+    declared, calls, objects = [], [], []
+    for release, identifier in zip(releases, ("videoray", sister), strict=True):
+        fmi = _version(release)
+        content = native_content(replace(vehicle, identifier=identifier), fmi=fmi)
+        folder = tmp_path / f"{identifier}{fmi}"
+        folder.mkdir()
+        for name, text in content.sources.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        prefix = () if release in _PLAIN else (f"-DFMI2_FUNCTION_PREFIX={identifier}_",)
+        include = ("-isystem", str(headers[release]))
+        command = [*compiler(), "-std=c11", *prefix, *include, "-c", "fmu.c", "-o", f"{folder}.o"]
+        subprocess.run(command, cwd=folder, check=True)
+        declared.append(_DECLARE[fmi].format(identifier))
+        calls.append(_INSTANTIATE[fmi].format(identifier, content.guid))
+        objects.append(f"{folder}.o")
+    main = tmp_path / "main.c"
+    main.write_text(_MAIN % ("\n".join(declared), ", ".join(calls)), encoding="utf-8")
+    command = [*compiler(), "-isystem", str(fmi_headers()), "main.c", *objects, "-lm", "-o", "main"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    pointers = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.split()
+    assert len(pointers) == len(set(pointers)) == 2
+    assert "(nil)" not in pointers
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64" or not _HAS_FMA, reason="needs an x86-64 processor with FMA")
+@pytest.mark.parametrize(
+    ("name", "flags"),
+    [
+        pytest.param(name, flags, marks=() if name != "zig" and "-O2" in flags else pytest.mark.weekly)
+        for name in COMPILERS
+        for flags in (("-O2", "-march=haswell"), ("-O3", "-mfma", "-std=c99"), ("-O1", "-mfma", "-std=gnu11"))
+    ],
+)
+def test_fused_multiplication_does_not_change_a_bit(
+    fmu: fmi2.Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path, name: str, flags: tuple[str, ...]
+) -> None:
+    library = _compile(fmu, headers["2.0.0"], [*COMPILERS[name], *flags], tmp_path / "videoray.so")
+    _flies_the_same(fmu, library, shipped)
+
+
+_OF_ONE = ("fabs", "ceil", "sqrt", "sin", "cos", "exp", "log", "log1p", "expm1", "atan", "atanh")
+_OF_TWO = ("fmin", "fmax", "copysign", "hypot", "pow", "remainder")
+# What the sources use of the C library, as Microsoft's headers declare it; those cannot be had from a package.
+_MICROSOFT = {
+    "math.h": "#define INFINITY ((float)(1e300 * 1e300))\n#define NAN (-(float)(INFINITY * 0.0f))\n"
+    "short _dclass(double);\n#define isfinite(x) (_dclass(x) <= 0)\n#define isnan(x) (_dclass(x) == 2)\n"
+    + "".join(f"double {f}(double);\n" for f in _OF_ONE)
+    + "".join(f"double {f}(double, double);\n" for f in _OF_TWO),
+    "stdlib.h": "#include <stddef.h>\nvoid *calloc(size_t, size_t);\nvoid free(void *);\n",
+    "string.h": "#include <stddef.h>\nvoid *memset(void *, int, size_t);\nvoid *memcpy(void *, const void *, size_t);\n"
+    "int memcmp(const void *, const void *, size_t);\nint strcmp(const char *, const char *);\n"
+    "size_t strlen(const char *);\nchar *strcpy(char *, const char *);\nsize_t strspn(const char *, const char *);\n",
+    "stdio.h": "#include <stdarg.h>\n#include <stddef.h>\nint vsnprintf(char *, size_t, const char *, va_list);\n"
+    "int snprintf(char *, size_t, const char *, ...);\n",
+}
+
+
+@pytest.mark.parametrize(
+    ("release", "standard"),
+    [
+        pytest.param(release, standard, marks=() if i % 2 == j else pytest.mark.weekly)
+        for i, release in enumerate(RELEASES)
+        for j, standard in enumerate(_STANDARDS)
+    ],
+)
+def test_microsofts_compiler_would_take_them(
+    fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, standard: str
+) -> None:
+    """By clang, which takes its place: its target, its language, no __GNUC__."""
+    for name, text in _MICROSOFT.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    zig = Path(compiler()[0])
+    result = subprocess.run(
+        [
+            *(zig, "clang", "--target=x86_64-pc-windows-msvc", "-fms-compatibility", "-fms-extensions"),
+            *("-fms-compatibility-version=19.30", "-ffreestanding", "-nostdinc", "-fsyntax-only", f"-std={standard}"),
+            *(*_STRICT, "-isystem", tmp_path, "-isystem", zig.parent / "lib" / "include"),
+            *("-isystem", headers[release], "fmu.c"),
+        ],
+        cwd=fmus[_version(release)].folder / "sources",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_the_headers_are_what_their_releases_are(headers: dict[str, Path], tmp_path: Path) -> None:
+    """Const members are refused where they are assigned; a prefix is pasted where it is known."""
+    program = tmp_path / "p.c"
+    program.write_text(
+        '#define FMI2_FUNCTION_PREFIX pre_\n#include "fmi2Functions.h"\n'
+        "void *prefixed(void) { return (void *)pre_fmi2Reset; }\n"
+        "#ifdef ASSIGN\nvoid f(fmi2CallbackFunctions *a, const fmi2CallbackFunctions *b) { *a = *b; }\n#endif\n",
+        encoding="utf-8",
+    )
+
+    def takes(release: str, *flags: str) -> bool:
+        command = [*compiler(), *flags, "-I", str(headers[release]), "-c", str(program), "-o", str(tmp_path / "p.o")]
+        return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+    override = "-DFMI2_OVERRIDE_FUNCTION_PREFIX"
+    assert [takes(r) for r in _OF_FMI2] == [True, True, True, False]
+    assert [takes(r, override) for r in _OF_FMI2] == [True, True, False, False]
+    assert [takes(r, "-DASSIGN") for r in _OF_FMI2] == [False, True, True, False]

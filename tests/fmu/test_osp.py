@@ -1,0 +1,154 @@
+"""The OSP model description: what the interface declares, in groups as OSP-IS 1.0.1 has them."""
+
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from rov_fmu.cli import main
+from rov_fmu.fmu.osp import osp_model_description, osp_path
+from rov_fmu.fmu.variables import UNITS, variables
+from rov_fmu.model.layout import Layout
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import BARE
+from tests.vehicles import VEHICLES
+
+NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
+
+# The sequence of the schema as far as it concerns motion, and the dimension of what each element groups.
+SEQUENCE = {
+    "Generic": {},
+    "Force": {"kg": 1, "m": 1, "s": -2},
+    "Torque": {"kg": 1, "m": 2, "s": -2},
+    "LinearVelocity": {"m": 1, "s": -1},
+    "AngularVelocity": {"rad": 1, "s": -1},
+    "LinearDisplacement": {"m": 1},
+    "AngularDisplacement": {"rad": 1},
+}
+
+
+@pytest.fixture(scope="module")
+def groups(vehicle: Vehicle) -> list[etree._Element]:
+    return groups_of(vehicle.layout)
+
+
+def groups_of(layout: Layout) -> list[etree._Element]:
+    root = etree.fromstring(osp_model_description(layout))
+    assert root.tag == f"{NAMESPACE}OspModelDescription"
+    assert dict(root.attrib) == {"version": "1.0"}
+    (parent,) = root
+    assert parent.tag == f"{NAMESPACE}VariableGroups"
+    return list(parent)
+
+
+def references(group: etree._Element) -> list[str]:
+    assert {variable.tag for variable in group} == {f"{NAMESPACE}Variable"}
+    return [variable.get("ref") for variable in group]
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_every_input_and_output_is_in_one_group(kind: str) -> None:
+    """Of vehicles of every kind; a group is of one causality, one unit and one variable an axis."""
+    groups = groups_of(VEHICLES[kind].layout)
+    declared = {v.name: v for v in variables(VEHICLES[kind])}
+    grouped = sorted(name for group in groups for name in references(group))
+    assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
+    names = [group.get("name") for group in groups]
+    assert all(names)
+    assert len(set(names)) == len(names)
+    for group in groups:
+        members = [declared[name] for name in references(group)]
+        assert 1 <= len(members) <= 3
+        assert len({v.causality for v in members}) == 1
+        assert [v.unit for v in members] == [variable.get("unit") for variable in group]
+        (unit,) = {v.unit for v in members}
+        assert UNITS[unit].exponents == SEQUENCE[group.tag.removeprefix(NAMESPACE)]
+        axes = [axis for variable in group if (axis := variable.get("axis"))]
+        assert set(axes) <= {"x", "y", "z"}
+        assert len(set(axes)) == len(axes)
+
+
+def test_groups_come_in_the_order_of_the_schema(groups: list[etree._Element]) -> None:
+    elements = [group.tag.removeprefix(NAMESPACE) for group in groups]
+    assert elements == sorted(elements, key=list(SEQUENCE).index)
+    assert set(elements) == set(SEQUENCE)
+
+
+@pytest.mark.parametrize(
+    ("name", "element", "members"),
+    [
+        ("thruster_commands", "Generic", {"u_l": None, "u_r": None, "u_t": None}),
+        ("external_force", "Force", {"X_ext": "x", "Z_ext": "z"}),
+        ("thrust_t", "Force", {"F_t": "z"}),
+        ("rear_torque", "Torque", {"tau_rear": "z"}),
+        ("current", "LinearVelocity", {"V_N": "x", "V_E": "y"}),
+        ("velocity", "LinearVelocity", {"u": "x", "w": "z"}),
+        ("yaw_rate", "AngularVelocity", {"r": "z"}),
+        ("position", "LinearDisplacement", {"x": "x", "y": "y"}),
+        ("depth", "LinearDisplacement", {"z": "z"}),
+        ("heading", "AngularDisplacement", {"psi": "z"}),
+    ],
+)
+def test_what_systems_connect_by(
+    groups: list[etree._Element], name: str, element: str, members: dict[str, str | None]
+) -> None:
+    (group,) = [group for group in groups if group.get("name") == name]
+    assert group.tag == NAMESPACE + element
+    assert {variable.get("ref"): variable.get("axis") for variable in group} == members
+
+
+def test_a_force_aslant_has_no_axis(heavy: Vehicle) -> None:
+    axes = {v.get("ref"): v.get("axis") for group in groups_of(heavy.layout) for v in group}
+    assert (axes["F_1"], axes["F_5"]) == (None, "z")
+
+
+# ---- rov-fmu build --osp -------------------------------------------------------------------------------------------
+
+
+def _build(path: Path, *arguments: str) -> int:
+    return main(["build", "--platform", "host", "-o", str(path), *arguments])
+
+
+def test_the_option_writes_it_beside_the_fmu(tmp_path: Path) -> None:
+    vehicle = load_vehicle(BARE)
+    assert _build(tmp_path / "rov.fmu", str(BARE)) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["rov.fmu"]
+    assert _build(tmp_path / "rov.fmu", str(BARE), "--osp") == 0
+    # named after the model, not after the archive: that is where libcosim looks for it
+    path = tmp_path / "bare_OspModelDescription.xml"
+    assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]
+    assert osp_path(tmp_path / "rov.fmu", vehicle.identifier) == path
+    assert path.read_bytes() == osp_model_description(vehicle.layout)
+
+
+def test_another_vehicle_has_its_own(tmp_path: Path) -> None:
+    text, other = BARE.read_text(encoding="utf-8"), tmp_path / "other.toml"
+    other.write_text(text.replace('"bare"\nversion', '"pilchard"\nversion'), encoding="utf-8")
+    assert _build(tmp_path / "other.fmu", "--osp", str(other)) == 0
+    assert (tmp_path / "pilchard_OspModelDescription.xml").is_file()
+
+
+def test_a_folder_in_its_place_stops_the_build(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "videoray_OspModelDescription.xml").mkdir()
+    assert _build(tmp_path / "rov.fmu", "--osp") == 2
+    assert "videoray_OspModelDescription.xml: cannot be written: is a folder" in capsys.readouterr().err
+    assert not (tmp_path / "rov.fmu").exists()
+
+
+def test_written_whole_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bare_OspModelDescription.xml"
+    path.write_text("as it was")
+    replace = Path.replace
+
+    def full(self: Path, target: Path) -> Path:
+        if target.suffix == ".xml":
+            raise OSError(28, "No space left on device")
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", full)
+    assert _build(tmp_path / "rov.fmu", str(BARE), "--osp") == 2
+    assert f"{path}: cannot be written: No space left on device" in capsys.readouterr().err
+    assert path.read_text() == "as it was"
+    assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]

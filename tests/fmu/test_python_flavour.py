@@ -1,0 +1,232 @@
+"""The FMU in pure Python: valid, and the same as the native one."""
+
+import os
+import random
+import sysconfig
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from fmpy.validation import validate_fmu
+
+from rov_fmu.cli import main
+from rov_fmu.fmu.python_flavour import python_sources
+from rov_fmu.fmu.variables import Variable, variables
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.conftest import Made
+from tests.fmi import WARNING, Message
+from tests.fmi2 import recording_callbacks
+from verification.references.c_programs import Ended, compile_c, run_program
+from verification.references.fmpy_slave import fmpy_slave, keep_loaded
+
+
+@pytest.fixture(scope="session")
+def python_fmu(made_once: Made) -> Path:
+    def fill(folder: Path) -> None:
+        path = folder / "videoray-python.fmu"
+        assert main(["build", "--backend", "pythonfmu", "-o", str(path)]) == 0
+        fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
+
+    # PythonFMU's binary takes no other special character than the space in its path
+    return made_once("python flavour", fill) / "videoray-python.fmu"
+
+
+@pytest.fixture(scope="session")
+def python_dir(python_fmu: Path) -> Path:
+    keep_loaded(python_fmu.with_suffix(""))
+    return python_fmu.with_suffix("")
+
+
+def _instance(folder: Path) -> FMU2Slave:
+    slave = fmpy_slave(folder)
+    slave.setupExperiment(startTime=0.0)
+    return slave
+
+
+def test_it_is_valid_and_says_what_it_can_do(python_fmu: Path, vehicle: Vehicle) -> None:
+    assert validate_fmu(str(python_fmu)) == []
+    description = fmpy.read_model_description(str(python_fmu))
+    assert [v.name for v in description.modelVariables] == [v.name for v in variables(vehicle.rov)]
+    assert description.modelExchange is None
+    can = description.coSimulation
+    assert (can.canGetAndSetFMUstate, can.canSerializeFMUstate, can.needsExecutionTool) == (True, True, True)
+    assert not can.providesDirectionalDerivative
+    assert can.maxOutputDerivativeOrder == 0
+
+
+def test_its_modules_bear_the_name_of_the_vehicle(python_fmu: Path) -> None:
+    with zipfile.ZipFile(python_fmu) as archive:
+        ours = {n for n in archive.namelist() if n.startswith("resources/") and "/pythonfmu/" not in n}
+    assert ours == {
+        "resources/slavemodule.txt",
+        "resources/variables.json",
+        "resources/videoray_slave.py",
+        *(
+            f"resources/videoray_model/{name}.py"
+            for name in ("__init__", "dependencies", "equation", "formula", "layout", "riccati", "rov", "step")
+        ),
+    }
+
+
+def test_its_modules_import_nothing_of_the_package(vehicle: Vehicle) -> None:
+    for name, text in python_sources(vehicle, variables(vehicle.rov)).items():
+        lines = [line.split() for line in text.splitlines()]
+        imported = [words[1] for words in lines if words[:1] in (["from"], ["import"]) and len(words) > 1]
+        assert not [module for module in imported if module.startswith("rov_fmu")], name
+
+
+def _by_kind(declared: tuple[Variable, ...], **wanted: str) -> list[Variable]:
+    return [v for v in declared if all(getattr(v, key) == value for key, value in wanted.items())]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_both_flavours_move_the_same_way(python_dir: Path, videoray_dir: Path, vehicle: Vehicle, seed: int) -> None:
+    random_ = random.Random(seed)
+    declared = variables(vehicle.rov)
+    both = [_instance(python_dir), _instance(videoray_dir)]
+    outputs = [v.value_reference for v in declared if v.causality != "parameter"]
+    parameters = _by_kind(declared, causality="parameter")
+
+    def set_both(chosen: list[Variable], values: list[float]) -> None:
+        for slave in both:
+            slave.setReal([v.value_reference for v in chosen], values)
+
+    def compare() -> None:
+        python, native = (slave.getReal(outputs) for slave in both)
+        assert python == pytest.approx(native, rel=1e-12, abs=1e-12)
+
+    set_both(parameters, [v.start * random_.uniform(0.5, 1.5) for v in parameters if v.start is not None])
+    for slave in both:
+        slave.enterInitializationMode()
+    compare()
+    for slave in both:
+        slave.exitInitializationMode()
+    t = 0.0
+    saved = [slave.getFMUState() for slave in both]
+    for _ in range(60):
+        inputs = _by_kind(declared, causality="input")
+        set_both(inputs, [random_.choice((0.0, random_.uniform(-1.2, 1.2))) for _ in inputs])
+        tuning = random_.choice(_by_kind(declared, variability="tunable"))
+        set_both([tuning], [random_.uniform(0.1, 2.0)])
+        h = 10.0 ** random_.uniform(-4.0, 1.0)
+        for slave in both:
+            slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+        t += h
+        compare()
+        if random_.random() < 0.1:
+            saved = [slave.getFMUState() for slave in both]
+        if random_.random() < 0.1:
+            for slave, state in zip(both, saved, strict=True):
+                as_bytes = slave.serializeFMUstate(state)
+                slave.setFMUState(slave.deSerializeFMUstate(as_bytes) if seed % 2 else state)
+            compare()
+    for slave in both:
+        slave.terminate()
+        slave.freeInstance()
+
+
+# start time, stop time, and of one step t, h, and whether it is done
+STOPS = [
+    (0.0, 1.0, 0.9, 0.1 + 1.0e-9, True),
+    (0.0, 1.0, 0.9, 0.1 + 1.2e-9, False),
+    (0.0, 1e-6, 9e-7, 1.0e-7 + 0.9e-15, True),
+    (0.0, 1e-6, 9e-7, 1.0e-7 + 1.2e-15, False),
+    (0.0, 1e6, 1e6, 1e-2, False),  # within 1e-9 of the stop time, but a whole step
+    (0.0, 1e6, 1e6 - 0.9e-3, 1e-3, True),
+    (0.0, 1e6, 1e6 - 0.4e-3, 1e-3, False),
+    (0.0, 1e6, 1e6 - 0.6e-3, 1e-3, True),
+    (-2.0, -1.0, -1.1, 0.1 + 1.0e-9, True),
+    (-2.0, -1.0, -1.1, 0.1 + 1.2e-9, False),
+    (0.0, None, 1e6, 1e3, True),
+]
+
+
+@pytest.mark.parametrize(("start", "stop", "t", "h", "done"), STOPS)
+def test_both_flavours_end_at_the_same_stop_time(
+    python_dir: Path, videoray_dir: Path, start: float, stop: float | None, t: float, h: float, done: bool
+) -> None:
+    for folder in (python_dir, videoray_dir):
+        slave = fmpy_slave(folder)
+        slave.setupExperiment(startTime=start, stopTime=stop)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        if done:
+            slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+        else:
+            with pytest.raises(FMICallException):
+                slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+        slave.freeInstance()
+
+
+def test_both_flavours_warn_once_of_what_saturates_and_of_a_jump_in_time(python_dir: Path, videoray_dir: Path) -> None:
+    for folder in (python_dir, videoray_dir):
+        log: list[Message] = []
+        slave = fmpy_slave(folder, recording_callbacks(log))
+        slave.setupExperiment(startTime=1.0)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        saved, warned = slave.getFMUState(), []
+        for t in (1.0, 1.1, 1.0, 1.1 + 1e-11, 1.5, 9.0):
+            if t == 1.0:
+                slave.setFMUState(saved)  # to step again from there is no jump
+            slave.setReal([0], [1.5])
+            slave.doStep(currentCommunicationPoint=t, communicationStepSize=0.1)
+            warned.append([m.text for m in log if m.status == WARNING])
+        assert [len(texts) for texts in warned] == [1, 1, 1, 1, 2, 2]
+        assert "u_l = 1.5 saturates at 1; said once." in warned[0][0]
+        assert "step from t = 1.5 does not begin at t = 1.2" in warned[-1][1]
+        slave.freeInstance()
+
+
+def test_what_the_native_one_refuses_is_refused(python_dir: Path, vehicle: Vehicle) -> None:
+    by_name = {v.name: v for v in variables(vehicle.rov)}
+    slave = _instance(python_dir)
+    slave.enterInitializationMode()
+    for name, value in (("u_l", float("nan")), ("Z_ext", float("inf")), ("m_rov", -1.0), ("beta_r", float("nan"))):
+        reference = [by_name[name].value_reference]
+        slave.setReal(reference, [value])
+        assert slave.getReal(reference) == [by_name[name].start]
+    slave.freeInstance()
+
+
+@pytest.fixture
+def importer(tmp_path: Path) -> Path:
+    """An importer that is no Python process."""
+    if fmpy.platform != "linux64":
+        pytest.skip(
+            "PythonFMU has a binary for Linux on x86-64; that of Windows is not preloaded but finds python3.dll"
+        )
+    return compile_c(Path(__file__).with_name("c_importer.c"), tmp_path / "c_importer", tmp_path, "-ldl")
+
+
+def _imported(importer: Path, folder: Path, **environment: str) -> Ended:
+    description = fmpy.read_model_description(str(folder))
+    library = folder / "binaries" / "linux64" / "videoray.so"
+    resources = (folder / "resources").as_uri()
+    return run_program(importer, library, description.guid, resources, env=os.environ | environment)
+
+
+def test_an_importer_that_is_no_python_process_preloads_libpython(
+    importer: Path, python_dir: Path, videoray_dir: Path
+) -> None:
+    """As docs/platforms.md says, and as the FMU's own description and page do."""
+    alone = _imported(importer, python_dir)
+    assert (alone.code, alone.lines) == (1, [])
+    assert "undefined symbol: _Py_NoneStruct" in alone.errors
+    libpython = Path(sysconfig.get_config_var("LIBDIR"), sysconfig.get_config_var("INSTSONAME"))
+    if not sysconfig.get_config_var("Py_ENABLE_SHARED") or not libpython.exists():
+        pytest.skip(f"this Python has no shared library: {libpython}")
+    preloaded, native = _imported(importer, python_dir, LD_PRELOAD=str(libpython)), _imported(importer, videoray_dir)
+    assert preloaded.code == native.code == 0, preloaded.errors + native.errors
+    ((u,),), ((expected,),) = preloaded.lines, native.lines
+    assert float(u) == pytest.approx(float(expected), rel=1e-12)
+
+
+def test_it_says_that_an_importer_in_another_language_preloads_libpython(python_dir: Path, videoray_dir: Path) -> None:
+    for folder, told in ((python_dir, True), (videoray_dir, False)):
+        description = fmpy.read_model_description(str(folder)).description
+        page = (folder / "documentation" / "index.html").read_text(encoding="utf-8")
+        assert ("LD_PRELOAD" in description) == ("LD_PRELOAD" in page) == told

@@ -1,0 +1,194 @@
+"""The experiments inside the FMU: by the standard's form, and with expected results that the C has no part in."""
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import replace
+from math import e
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+from lxml import etree
+
+from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.experiments import FOLDER, MANIFEST
+from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
+from rov_fmu.model.layout import AXES
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.published import load_tables, untuned
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.vehicles import VEHICLES, at_rest, still
+from verification.references import reference
+
+_SCHEMAS = Path(fmpy.__file__).parent
+# What the standard tells of its root element, around FMPy's copy of the attributes that all layered standards share.
+_FORM = f"""
+<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:ls="http://fmi-standard.org/fmi-ls-manifest">
+  <xs:import namespace="http://fmi-standard.org/fmi-ls-manifest"
+    schemaLocation="{(_SCHEMAS / "schema/fmi3/fmi3LayeredStandardManifest.xsd").as_uri()}"/>
+  <xs:element name="fmiReferences"><xs:complexType>
+    <xs:sequence><xs:element name="Related" maxOccurs="unbounded"><xs:complexType>
+      <xs:attribute name="type" type="xs:string"/>
+      <xs:attribute name="source" type="xs:anyURI" use="required"/>
+      <xs:attribute name="role" use="required"><xs:simpleType><xs:restriction base="xs:string">
+        <xs:pattern value="(parameter|document|experiment(/(smoke-test|validation))?)"/>
+      </xs:restriction></xs:simpleType></xs:attribute>
+      <xs:attribute name="description" type="xs:string"/>
+    </xs:complexType></xs:element></xs:sequence>
+    <xs:attributeGroup ref="ls:ALayeredStandardManifest"/>
+  </xs:complexType></xs:element>
+</xs:schema>
+"""
+
+
+@pytest.fixture(scope="module", params=sorted(SHIPPED))
+def shipped(request: pytest.FixtureRequest) -> tuple[Vehicle, Mapping[str, bytes]]:
+    vehicle = load_vehicle(SHIPPED[request.param])
+    return vehicle, reference_results(vehicle)
+
+
+def _rows(files: Mapping[str, bytes], name: str) -> list[dict[str, float]]:
+    lines = csv.DictReader(io.StringIO(files[f"{FOLDER}/{name}"].decode()))
+    return [{key: float(value) for key, value in line.items()} for line in lines]
+
+
+def _experiments(files: Mapping[str, bytes]) -> dict[str, Any]:
+    return {x.get("name"): x for x in etree.fromstring(files[f"{FOLDER}/experiments.exp"])}
+
+
+def test_the_files_have_the_form_of_the_standards(shipped: tuple[Vehicle, Mapping[str, bytes]]) -> None:
+    _, files = shipped
+    manifest = etree.fromstring(files[MANIFEST])
+    etree.XMLSchema(etree.fromstring(_FORM)).assertValid(manifest)
+    attribute = "{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-"
+    assert manifest.get(f"{attribute}name") == "org.fmi-standard.fmi-ls-ref"
+    assert manifest.get(f"{attribute}description").endswith("information on related files included in an FMU.")
+    related = {x.get("source") for x in manifest}
+    named = {part.get("source") for x in _experiments(files).values() for part in x}
+    listed = {name.removeprefix(f"{FOLDER}/") for name in files} - {"fmi-ls-manifest.xml"}
+    assert listed == {name for name in related | named if not name.startswith("../")}, "no file too few, none too many"
+    schema = etree.XMLSchema(etree.parse(_SCHEMAS / "ssp" / "schema" / "SystemStructureParameterValues.xsd"))
+    for name, content in files.items():
+        if name.endswith(".ssv"):
+            schema.assertValid(etree.fromstring(content))
+
+
+def test_expected_results_are_named_after_their_experiment(shipped: tuple[Vehicle, Mapping[str, bytes]]) -> None:
+    for name, experiment in _experiments(shipped[1]).items():
+        assert experiment.find("References").get("source") == f"{name}_expected.csv"
+
+
+def test_they_are_small_and_the_same_each_time(shipped: tuple[Vehicle, Mapping[str, bytes]]) -> None:
+    vehicle, files = shipped
+    assert len(archive(files)) < 15_000
+    assert files == reference_results(vehicle)
+
+
+def test_the_tables_of_the_paper_are_experiments(vehicle: Vehicle) -> None:
+    files = reference_results(vehicle)
+    experiments, told = _experiments(files), 0
+    for table in load_tables(vehicle):
+        v = table.axis.velocity
+        for row in table.rows:
+            for name, model, response in (
+                ("tuned", vehicle.rov, row.scaled),
+                ("untuned", untuned(vehicle.rov), row.non_linear),
+            ):
+                experiment = experiments.pop(f"{table.axis.name}_{row.command}_{name}")
+                told += 1
+                assert experiment.get("description").startswith(
+                    f"Table {table.number}: {table.axis.name}, {row.command} %"
+                )
+                for cell in (response.V_ss, response.Tau):
+                    assert cell.printed is None or f"printed {cell.printed}" in experiment.get("description")
+                V_ss, Tau = table.response(model, row.command)
+                start, after_tau, *_, last = _rows(files, experiment.find("References").get("source"))
+                assert start[v] == 0.0
+                assert after_tau["time"] == pytest.approx(Tau, rel=5e-3)
+                assert after_tau[v] == pytest.approx((1.0 - 1.0 / e) * V_ss, rel=5e-3)
+                assert last[v] == pytest.approx(V_ss, rel=1e-3)
+                ((_, parameters),) = [
+                    (x, {p.get("name"): float(p[0].get("value")) for p in x.iter("{*}Parameter")})
+                    for x in [etree.fromstring(files[f"{FOLDER}/{experiment.find('Parameters').get('source')}"])]
+                ]
+                assert parameters == {key: model[key] for key in parameters}
+                assert len(parameters) == 6
+    assert told == 28
+    assert list(experiments) == ["manoeuvre"]
+
+
+@pytest.mark.parametrize("name", sorted(set(SHIPPED) - {"videoray"}))
+def test_other_vehicles_have_experiments_of_their_own(name: str) -> None:
+    vehicle = load_vehicle(SHIPPED[name])
+    files = reference_results(vehicle)
+    assert not [path for path, content in files.items() if b"Table" in content]
+    experiments = _experiments(files)
+    for form in vehicle.layout.axes:
+        assert [x for x in experiments if x.startswith(f"{form.axis.name}_")]
+        assert [x for x in experiments if x.startswith(f"{form.axis.name}_minus_")]
+    moved = _rows(files, experiments["manoeuvre"].find("References").get("source"))[-1]
+    assert moved.keys() - {"time"} == vehicle.layout.state.keys()
+
+
+def _check(rov: Rov, files: Mapping[str, bytes], name: str) -> None:
+    """Every expected value against 50 digits."""
+    experiment = _experiments(files)[name]
+    stimuli, expected = (_rows(files, experiment.find(part).get("source")) for part in ("Stimuli", "References"))
+    state: Mapping[str, Any] = at_rest(rov)
+    largest = {key: max(0.01, *(abs(row[key]) for row in expected)) for key in expected[0]}
+    t = 0.0
+    for row in expected[1:]:
+        inputs = still(rov) | next(x for x in reversed(stimuli) if x["time"] <= t)
+        state = {key: float(x) for key, x in reference.step(rov, inputs, state, row["time"] - t).state.items()}
+        t = row["time"]
+        for key in row.keys() - {"time"}:
+            assert abs(row[key] - state[key]) < 0.2 * TOLERANCE * largest[key], (name, t, key)
+
+
+@pytest.mark.parametrize(
+    ("name", "experiment"),
+    [
+        ("videoray", "surge_30_tuned"),
+        ("videoray", "heave_20_tuned"),
+        ("videoray", "yaw_70_tuned"),
+        ("videoray", "manoeuvre"),
+        ("bluerov2_heavy", "heave_40"),
+    ],
+)
+def test_what_is_expected_is_right_to_the_digits_that_are_given(name: str, experiment: str) -> None:
+    vehicle = load_vehicle(SHIPPED[name])
+    _check(vehicle.rov, reference_results(vehicle), experiment)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.long if "videoray" in name else pytest.mark.weekly) for name in SHIPPED],
+)
+def test_all_that_is_expected_is_right_to_the_digits_that_are_given(name: str) -> None:
+    """Every experiment that the FMU of a vehicle that ships carries; with coupling and lag, 50 digits take minutes."""
+    vehicle = load_vehicle(SHIPPED[name])
+    files = reference_results(vehicle)
+    for experiment in _experiments(files):
+        _check(untuned(vehicle.rov) if experiment.endswith("_untuned") else vehicle.rov, files, experiment)
+
+
+# ---- Fast motions ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def spinner() -> Vehicle:
+    """Its thrust turns it at thousands of radians per second: within the limits of a vehicle file."""
+    rov = VEHICLES["sway and yaw"]
+    coefficients = {name: rov[name] for name in rov.layout.coefficients} | {"a_d_r": 0.0, "b_d_r": 0.01}
+    vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
+    return replace(vehicle, data=None, rov=Rov(rov.layout, coefficients))
+
+
+def test_what_is_expected_of_a_vehicle_that_spins_fast_is_right(spinner: Vehicle) -> None:
+    files = reference_results(spinner)
+    assert spinner.rov.response(AXES["yaw"], 1.0)[0] > 1000.0
+    for experiment in ("sway_100", "yaw_40", "yaw_100", "manoeuvre"):
+        _check(spinner.rov, files, experiment)

@@ -1,0 +1,104 @@
+"""terminalsAndIcons.xml: what the interface declares, in terminals as FMI 3.0 has them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import fmpy
+import pytest
+from lxml import etree
+
+from rov_fmu.fmu.archive import Content, native_content, python_content
+from rov_fmu.fmu.terminals import terminals_and_icons
+from rov_fmu.fmu.variables import variables
+from rov_fmu.report.page.pictures import pictures
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.vehicles import HEAVY, VEHICLES, VIDEORAY
+
+SCHEMA = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd"))
+INPUTS, OUTPUTS = {"thrusters", "load", "current"}, {"thrust", "body_velocity", "pose"}
+PLUGS = {"body_velocity", "pose"}
+
+
+def read(document: bytes) -> dict[str, etree._Element]:
+    """By name, from a document that the schema allows."""
+    root = etree.fromstring(document)
+    SCHEMA.assertValid(root)
+    found = root.findall("Terminals/Terminal")
+    named = {terminal.get("name"): terminal for terminal in found}
+    assert len(named) == len(found)
+    return named
+
+
+def members(terminal: etree._Element) -> list[str]:
+    return [member.get("variableName") for member in terminal.iter("TerminalMemberVariable")]
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
+    """Of vehicles of every kind: of one causality, with a name that is its own."""
+    declared = {v.name: v.causality for v in variables(VEHICLES[kind])}
+    found = read(terminals_and_icons(VEHICLES[kind].layout))
+    grouped = [name for terminal in found.values() for name in members(terminal)]
+    assert sorted(grouped) == sorted(name for name, causality in declared.items() if causality in {"input", "output"})
+    for name, terminal in found.items():
+        assert {declared[member] for member in members(terminal)} == {"input" if name in INPUTS else "output"}
+        assert name in INPUTS | OUTPUTS
+        assert terminal.get("matchingRule") == ("plug" if name in PLUGS else "bus")
+        assert terminal.get("terminalKind") is None
+        variable_names = terminal.findall("TerminalMemberVariable")
+        assert {v.get("variableKind") for v in variable_names} == {"signal"}
+        assert len({v.get("memberName") for v in variable_names}) == len(variable_names)
+
+
+@pytest.mark.parametrize(
+    ("name", "of_the_videoray", "of_the_heavy"),
+    [
+        ("thrusters", "u_l u_r u_t", "u_1 u_2 u_3 u_4 u_5 u_6 u_7 u_8"),
+        ("load", "X_ext Z_ext N_ext", "X_ext Y_ext Z_ext N_ext"),
+        ("current", "V_N V_E", "V_N V_E"),
+        ("body_velocity", "u w r", "u v w r"),
+        ("pose", "x y z psi", "x y z psi"),
+        ("thrust", "F_l F_r F_t tau_rear", "F_1 F_2 F_3 F_4 F_5 F_6 F_7 F_8 tau_t200"),
+    ],
+)
+def test_what_systems_connect_by(name: str, of_the_videoray: str, of_the_heavy: str) -> None:
+    for rov, expected in ((VIDEORAY, of_the_videoray), (HEAVY, of_the_heavy)):
+        assert members(read(terminals_and_icons(rov.layout))[name]) == expected.split()
+
+
+def test_what_a_vehicle_has_not_is_no_terminal() -> None:
+    assert read(terminals_and_icons(VEHICLES["heave only"].layout)).keys() == (INPUTS | OUTPUTS) - {"current"}
+
+
+@pytest.mark.parametrize("kind", VEHICLES)
+def test_terminals_stand_beside_the_icon_and_apart(kind: str) -> None:
+    """Inputs on its left, outputs on its right, each a square."""
+    document = terminals_and_icons(VEHICLES[kind].layout)
+    (icon,) = etree.fromstring(document).iter("Icon")
+    left, bottom, right, top = (float(icon.get(end)) for end in ("x1", "y1", "x2", "y2"))
+    ends: dict[bool, list[float]] = {True: [top], False: [top]}
+    for name, terminal in read(document).items():
+        (place,) = terminal.iter("TerminalGraphicalRepresentation")
+        x1, y1, x2, y2 = (float(place.get(end)) for end in ("x1", "y1", "x2", "y2"))
+        assert x2 - x1 == y2 - y1 == 20.0
+        assert (x2 == left) if name in INPUTS else (x1 == right)
+        side = ends[name in INPUTS]
+        assert bottom < y1 < y2 < side[-1]
+        side.append(y1)
+
+
+@pytest.mark.parametrize("content_of", [native_content, python_content])
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_fmu_has_them_with_their_pictures(name: str, content_of: Callable[..., Content]) -> None:
+    vehicle = load_vehicle(SHIPPED[name])
+    files = content_of(vehicle, pictures(vehicle.rov)).files
+    document = files["terminalsAndIcons/terminalsAndIcons.xml"]
+    described = etree.fromstring(files["modelDescription.xml"]).iter("ScalarVariable")
+    connected = sorted(v.get("name") for v in described if v.get("causality") in {"input", "output"})
+    assert sorted(name for terminal in read(document).values() for name in members(terminal)) == connected
+    places = etree.fromstring(document).iter("TerminalGraphicalRepresentation")
+    drawn = {f"{place.get('iconBaseName')}.png" for place in places}
+    in_folder = {path.removeprefix("terminalsAndIcons/") for path in files if path.startswith("terminalsAndIcons/")}
+    assert in_folder == drawn | {"terminalsAndIcons.xml", "icon.png", "icon.svg"}
+    assert "documentation/diagram.png" in files

@@ -1,0 +1,138 @@
+"""An FMU that may come from anyone is unpacked into its folder, within limits, or refused in one line."""
+
+import stat
+import struct
+import time
+import zipfile
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.fmu.unpacking import unpack_fmu
+from rov_fmu.io.messages import FileError
+
+_LINK = (stat.S_IFLNK | 0o777) << 16
+_PIPE = (stat.S_IFIFO | 0o644) << 16
+_STUDY = 'fmu = "bad.fmu"\nstop_time = 1.0\nstep = 0.1\nsampler = "grid"\n[figures]\nend = "u[-1]"\n'
+
+
+def _member(name: str, content: bytes = b"", mode: int = 0, method: int = zipfile.ZIP_DEFLATED) -> Callable[..., None]:
+    def add(archive: zipfile.ZipFile) -> None:
+        entry = zipfile.ZipInfo(name)
+        entry.create_system, entry.external_attr = 3, mode
+        archive.writestr(entry, content, method)
+
+    return add
+
+
+def _zeros(megabytes: int) -> Callable[..., None]:
+    def add(archive: zipfile.ZipFile) -> None:
+        entry = zipfile.ZipInfo("resources/zeros.bin")
+        entry.compress_type = zipfile.ZIP_DEFLATED
+        with archive.open(entry, "w") as file:
+            for _ in range(megabytes):
+                file.write(bytes(1_000_000))
+
+    return add
+
+
+BAD: dict[str, tuple[Callable[..., None], str]] = {
+    "a path upwards": (_member("../evil"), "member '../evil': a path in an FMU must be relative, with forward slashes"),
+    "a path upwards inside": (_member("resources/../../evil"), "member 'resources/../../evil': a path in an FMU must"),
+    "an absolute path": (_member("/tmp/evil"), "member '/tmp/evil': a path in an FMU must be relative"),
+    "a path of Windows": (_member("..\\evil"), r"member '..\\evil': a path in an FMU must be relative"),
+    "a drive": (_member("C:/evil"), "member 'C:/evil': a path in an FMU must be relative"),
+    "a link": (
+        _member("resources/link", b"/etc/passwd", _LINK),
+        "member 'resources/link': is a link or a special",
+    ),
+    "a pipe": (_member("resources/pipe", b"", _PIPE), "member 'resources/pipe': is a link or a special file"),
+    "another compression": (
+        _member("resources/a", bytes(1_000_000), method=zipfile.ZIP_BZIP2),
+        "member 'resources/a': must be stored or deflated, the compression that FMI allows",
+    ),
+    "a name that is too long": (_member("x" * 300), "cannot be unpacked: File name too long: xxx"),
+    "a file below a file": (_member("modelDescription.xml/x"), "cannot be unpacked: "),
+    "a bomb": (_zeros(150), "would take 15"),
+}
+
+
+@pytest.fixture
+def bad(request: pytest.FixtureRequest, videoray_fmu: Path, tmp_path: Path) -> tuple[Path, str]:
+    """An FMU with one member more, which it must not have, and what is told of it."""
+    add, told = BAD[request.param]
+    path = tmp_path / "bad.fmu"
+    path.write_bytes(videoray_fmu.read_bytes())
+    with zipfile.ZipFile(path, "a") as archive:
+        add(archive)
+    return path, told
+
+
+def _check(path: Path, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"rov-fmu: {path}: {told}")
+    assert err.count("\n") == 1
+    assert {file.name for file in path.parent.iterdir()} <= {"bad.fmu", "plan.toml"}
+
+
+@pytest.mark.parametrize("bad", BAD, indirect=True)
+def test_prove_refuses_it_in_one_line(bad: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
+    path, told = bad
+    assert main(["prove", str(path)]) == 2
+    _check(path, told, capsys)
+
+
+@pytest.mark.parametrize("bad", BAD, indirect=True)
+def test_study_refuses_it_in_one_line(bad: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
+    path, told = bad
+    (path.parent / "plan.toml").write_text(_STUDY)
+    assert main(["study", str(path.parent / "plan.toml"), "-o", str(path.parent / "results")]) == 2
+    _check(path, told, capsys)
+
+
+def _archive(*members: Callable[..., None]) -> BytesIO:
+    content = BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for add in members:
+            add(archive)
+    return content
+
+
+def test_an_archive_that_claims_to_be_huge_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    """3 GB, of which the archive says so; nothing is written."""
+    content = bytearray(_archive(_member("modelDescription.xml", b"a" * 100, method=zipfile.ZIP_STORED)).getvalue())
+    size = content.rindex(b"PK\x01\x02") + 24
+    struct.pack_into("<I", content, size, 3_000_000_000)
+    start = time.perf_counter()
+    with pytest.raises(FileError, match=r"^a\.fmu: would take 3 GB unpacked; at most 2 GB are allowed$"):
+        unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
+    assert time.perf_counter() - start < 5.0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_archive_that_says_too_little_gives_no_more_than_it_says(tmp_path: Path) -> None:
+    content = bytearray(_archive(_zeros(20)).getvalue())
+    for sign, place in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
+        struct.pack_into("<I", content, content.rindex(sign) + place, 1000)
+    with pytest.raises(FileError, match=r"^a\.fmu: is no FMU, or a damaged one: Bad CRC-32"):
+        unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
+    assert sum(file.stat().st_size for file in tmp_path.rglob("*") if file.is_file()) <= 1000
+
+
+def test_a_large_fmu_that_is_compressed_as_files_are_is_unpacked(tmp_path: Path) -> None:
+    """Up to 100 MB however well, as a table of zeros is."""
+    description = (
+        b'<fmiModelDescription fmiVersion="2.0" modelName="a" guid="a"><ModelVariables/></fmiModelDescription>'
+    )
+    archive = _archive(_member("modelDescription.xml", description), _zeros(99))
+    assert unpack_fmu(archive, Path("a.fmu"), tmp_path).modelName == "a"
+    assert (tmp_path / "resources" / "zeros.bin").stat().st_size == 99_000_000
+
+
+def test_an_archive_without_a_description_is_told(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"^a\.fmu: is no FMU that FMPy reads: .*modelDescription.xml"):
+        unpack_fmu(_archive(_member("resources/a")), Path("a.fmu"), tmp_path)

@@ -1,0 +1,211 @@
+"""What is told of a number is told in the unit of its column, whatever the first unit is; bounds may be touched."""
+
+import tracemalloc
+from collections.abc import Callable
+from math import isnan, pi
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.io.csv_table import LARGEST, Column, Columns, DataFileError, read_columns
+from rov_fmu.tank.logs import read_log
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+# Of 0.5 to 2 turns, or 0.25 at least where there is no bound.
+TURNS = {"turn": 1.0, "deg": 360.0}
+BOUNDED, LEAST = Column(TURNS, minimum=0.5, maximum=2.0), Column(TURNS, least=0.25)
+
+
+def _file(folder: Path, *cells: str) -> Path:
+    path = folder / "some.csv"
+    path.write_text("\n".join(("angle [deg]", *cells)), encoding="utf-8")
+    return path
+
+
+def _values(table: Columns) -> dict[str, list[float]]:
+    return {name: [*values] for name, values in table.values.items()}
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "told"),
+    [
+        (BOUNDED, "179.9", "must be at least 180"),
+        (BOUNDED, "720.1", "must be at most 720"),
+        (LEAST, "89.9", "must be 0, or 90 at least, or -90 at most"),
+        (LEAST, "-89.9", "must be 0, or 90 at least, or -90 at most"),
+    ],
+)
+def test_bounds_are_told_in_the_unit_of_the_column(column: Column, cell: str, told: str, tmp_path: Path) -> None:
+    path = _file(tmp_path, "360", "", cell)
+    with pytest.raises(DataFileError) as error:
+        read_columns(path, {"angle": column})
+    assert str(error.value) == f"{path}, line 4, column 'angle [deg]' = {cell!r}: {told}"
+
+
+def test_a_bound_is_within(tmp_path: Path) -> None:
+    assert _values(read_columns(_file(tmp_path, "180", "720"), {"angle": BOUNDED})) == {"angle": [0.5, 2.0]}
+    assert _values(read_columns(_file(tmp_path, "-90", "0", "90"), {"angle": LEAST})) == {"angle": [-0.25, 0.0, 0.25]}
+
+
+def test_a_number_found_wrong_later_is_told_as_it_stands(tmp_path: Path) -> None:
+    path = _file(tmp_path, "90", "-45")
+    table = read_columns(path, {"angle": Column({"rad": 1.0, "deg": 180.0 / pi})})
+    assert table.values["angle"] == pytest.approx([pi / 2.0, -pi / 4.0], rel=1e-15)
+    assert str(table.error(1, "angle", "too far")) == f"{path}, line 3, column 'angle [deg]' = -45: too far"
+
+
+# ---- As they come ----------------------------------------------------------------------------------------------------
+
+LENGTH, MAYBE = Column({"m": 1.0, "cm": 100.0}), Column({"s": 1.0}, blanks=True)
+
+
+def _table(folder: Path, text: str, **also: Column) -> Columns:
+    path = folder / "some.csv"
+    path.write_text(text, encoding="utf-8")
+    return read_columns(path, {"length": LENGTH, **also})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "length [m],time [s]\n0.5,1.25\n1e3,-2\n",
+        "length [m];time [s]\n0,5;1,25\n1e3;-2\n",
+        "length [m];time [s];\n0.5;1.25;\n1e3;-2;;\n",
+        "length [m]\ttime [s]\n0,5\t1.25\n1e3\t-2\n",
+        '"length [m]";"time [s]"\n"0,5";"1,25"\n\n;\n1000;-2\n',
+        "LENGTH[M],Time  [ S ]\n 0.5 , 1.25 \n1e3,-2\n",
+    ],
+)
+def test_separators_decimal_commas_case_and_spaces(text: str, tmp_path: Path) -> None:
+    assert _values(_table(tmp_path, text, time=MAYBE)) == {"length": [0.5, 1000.0], "time": [1.25, -2.0]}
+
+
+def test_blanks_where_they_may_be(tmp_path: Path) -> None:
+    table = _table(tmp_path, "length [m],time [s]\n1,\n2,-\n3,nan\n4,NaN\n5,0\n", time=MAYBE)
+    assert [isnan(value) for value in table.values["time"]] == [True, True, True, True, False]
+    assert [*table.texts("time")] == [("",), ("",), ("",), ("",), ("0",)]
+
+
+@pytest.mark.parametrize("cell", ["-", "nan", "1.234,5", "1,2,3", "inf", "1e400", "٣"])
+def test_no_numbers(cell: str, tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match=r"line 2, column 'length \[m\]' = .*: must be a number$"):
+        _table(tmp_path, f"length [m];time [s]\n{cell};1\n", time=MAYBE)
+
+
+def test_decimal_commas_between_commas_cannot_be_told(tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match=r"column 3 = '25': there is no such column \(are these decimal commas\?"):
+        _table(tmp_path, "length [m],time [s]\n0,5,25\n", time=MAYBE)
+    with pytest.raises(DataFileError, match="must be a number with a decimal point, unless ; parts the columns"):
+        _table(tmp_path, 'length [m],time [s]\n"0,5",25\n', time=MAYBE)
+
+
+def test_all_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
+    with pytest.raises(DataFileError) as error:
+        _table(tmp_path, "length [m],time [s]\nlong,1\n2,late\n3,4,5\n", time=MAYBE)
+    places = ("line 2, column 'length [m]' = 'long'", "line 3, column 'time [s]' = 'late'", "line 4, column 3 = '5'")
+    lines = str(error.value).splitlines()
+    assert len(lines) == 3
+    assert all(place in line for place, line in zip(places, lines, strict=True))
+    with pytest.raises(DataFileError) as error:
+        _table(tmp_path, "length [ft],tim [s]\n", time=MAYBE)
+    assert len(str(error.value).splitlines()) == 2
+    with pytest.raises(DataFileError, match=r"column 2: 'length \[m\]' is missing, and so is 'width \[m\]'"):
+        _table(tmp_path, "time [s]\n1\n", time=MAYBE, width=LENGTH)
+    with pytest.raises(DataFileError, match="the file is empty"):
+        _table(tmp_path, "", time=MAYBE)
+
+
+def test_of_many_mistakes_ten_are_told_and_the_others_counted(tmp_path: Path) -> None:
+    with pytest.raises(DataFileError) as error:
+        _table(tmp_path, "length [m]\n" + "long\n" * 25)
+    lines = str(error.value).splitlines()
+    assert len(lines) == 11
+    assert "line 11," in lines[9]
+    assert lines[10] == f"{tmp_path / 'some.csv'}: 15 more"
+
+
+def test_a_loose_reading_counts_what_is_no_number(tmp_path: Path) -> None:
+    path = tmp_path / "some.csv"
+    path.write_text("length [m],time [s],mode\n1,2,a\nx,,b\n,3\n1,2,3,4\n", encoding="utf-8")
+    table = read_columns(path, {"length": LENGTH, "time": MAYBE}, others=True, loose=True)
+    assert [*table.lines] == [2, 3, 4]
+    assert [[isnan(value) for value in table.values[name]] for name in ("length", "time")] == [
+        [False, True, True],
+        [False, True, False],
+    ]
+    assert (table.unread, table.torn) == ({"length": 1, "time": 0}, 1)
+
+
+def test_other_names_and_units_with_numbers(tmp_path: Path) -> None:
+    def scale(numbers: tuple[float, ...]) -> Callable[[float], float]:
+        if len(numbers) != 2:
+            raise ValueError("two numbers, please")
+        return lambda number: (number - numbers[0]) / numbers[1]
+
+    column = Column({"m": 1.0}, maximum=1.0, also=("l",), conversions={"raw": scale})
+    path = tmp_path / "some.csv"
+    path.write_text("L [RAW 10 2.5]\n15\n", encoding="utf-8")
+    table = read_columns(path, {"length": column})
+    assert (_values(table), table.units) == ({"length": [2.0]}, {"length": "raw"})
+    path.write_text("length [raw 10]\n15\n", encoding="utf-8")
+    with pytest.raises(DataFileError, match=r"column 1 = 'length \[raw 10\]': two numbers, please"):
+        read_columns(path, {"length": column})
+    path.write_text("length [m],l [km]\n1,15\n", encoding="utf-8")
+    assert _values(read_columns(path, {"length": column}, others=True)) == {"length": [1.0]}
+
+
+# ---- Large files -----------------------------------------------------------------------------------------------------
+
+
+def _log(path: Path, rows: int) -> int:
+    """Write a log such as autopilots make: eight pulses, depth, heading. Its size in bytes."""
+    names = "time [s]", *(f"u_{n} [us]" for n in range(1, 9)), "depth [m]", "heading [deg]"
+    pulses = "1523,1477,1500,1612,1388,1500,1550,1450", "1420,1477,1560,1612,1450,1550,1550,1480"
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(names) + "\n")
+        file.writelines(
+            f"{0.1 * n:.2f},{pulses[n // 50 % 2]},{1.0 + 1e-5 * n:.3f},{n % 360:.1f}\n" for n in range(rows)
+        )
+    return path.stat().st_size
+
+
+def _peak(action: Callable[[], object]) -> int:
+    """The most bytes that Python and NumPy allocated at once during an action."""
+    tracemalloc.start()
+    try:
+        action()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_log_takes_at_most_six_times_its_size_in_memory(tmp_path: Path) -> None:
+    path, layout = tmp_path / "log_dive.csv", load_vehicle(SHIPPED["bluerov2_heavy"]).layout
+    _log(path, 300)
+    read_log(path, layout)  # imports what it needs
+    size = _log(path, 40_000)
+    columns = {"time": Column({"s": 1.0}), "depth": Column({"m": 1.0})}
+    assert _peak(lambda: read_columns(path, columns, others=True, loose=True)) < 3 * size
+    assert _peak(lambda: read_log(path, layout)) < 6 * size
+
+
+@pytest.mark.long
+def test_a_log_of_mistakes_alone_takes_no_more(tmp_path: Path) -> None:
+    path = tmp_path / "some.csv"
+    path.write_text("length [m],time [s]\n" + "long,late\n" * 100_000, encoding="utf-8")
+
+    def read() -> None:
+        with pytest.raises(DataFileError, match=r"199990 more$"):
+            read_columns(path, {"length": LENGTH, "time": MAYBE})
+
+    assert _peak(read) < 6 * path.stat().st_size
+
+
+def test_a_file_that_is_too_large_is_told_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "some.csv"
+    with path.open("wb") as file:
+        file.truncate(LARGEST + 1_000_000)  # takes no room on the disk
+    with pytest.raises(DataFileError) as error:
+        read_columns(path, {"length": LENGTH})
+    assert str(error.value) == f"{path}: is too large, with 501 MB: at most 500 MB are read"

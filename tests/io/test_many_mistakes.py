@@ -1,0 +1,85 @@
+"""Of many mistakes in a TOML file the first ten are told and the others counted, soon, however many there are."""
+
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.io.messages import lines_on
+from tests.commands import BARE, TESTS
+
+Capsys = pytest.CaptureFixture[str]
+MANY = 200_000
+SOON = 30.0
+"""Seconds of processor time, several times what is needed; without a limit it took more than 180."""
+
+
+def _vehicle(folder: Path) -> tuple[Path, list[str]]:
+    path = Path(shutil.copy(BARE, folder / "vehicle.toml"))
+    return path, ["tables", str(path)]
+
+
+def _rov(folder: Path) -> tuple[Path, list[str]]:
+    tests = Path(shutil.copytree(TESTS, folder / "tests"))
+    return tests / "rov.toml", ["identify", str(tests)]
+
+
+def _plan(folder: Path) -> tuple[Path, list[str]]:
+    path = folder / "plan.toml"
+    path.write_text('vehicle = "videoray"\nstop_time = 1.0\nstep = 0.1\nruns = 4\n[figures]\nend = "u[-1]"\n')
+    return path, ["study", str(path), "-o", str(folder / "results")]
+
+
+@pytest.mark.parametrize("file", [_vehicle, _rov, _plan])
+def test_200000_unknown_tables(file: Callable[[Path], tuple[Path, list[str]]], tmp_path: Path, capsys: Capsys) -> None:
+    path, command = file(tmp_path)
+    with path.open("a", encoding="utf-8") as text:
+        text.writelines(f"[t{n}]\n" for n in range(MANY))
+    began = time.process_time()
+    assert main(command) == 2
+    assert time.process_time() - began < SOON
+    lines = capsys.readouterr().err.splitlines()
+    assert all(line.startswith(f"rov-fmu: {path}: t{n}: there is no such key") for n, line in enumerate(lines[:10]))
+    assert lines[10:] == [f"rov-fmu: {path}: {MANY - 10} more mistakes"]
+
+
+def test_unknown_coefficients_are_counted_too(tmp_path: Path, capsys: Capsys) -> None:
+    path, command = _rov(tmp_path)
+    quantity = '{ value = 1.0, unit = "kg", source = "nowhere" }'
+    known = "[known]\n" + "".join(f"m_rov{n} = {quantity}\n" for n in range(20_000))
+    path.write_text(path.read_text(encoding="utf-8").replace("[known]\n", known), encoding="utf-8")
+    began = time.process_time()
+    assert main(command) == 2
+    assert time.process_time() - began < SOON
+    lines = capsys.readouterr().err.splitlines()
+    assert (
+        lines[0] == f"rov-fmu: {path}: known.m_rov0: there is no such coefficient of this vehicle; did you mean m_rov?"
+    )
+    assert lines[10:] == [f"rov-fmu: {path}: 19990 more mistakes"]
+
+
+def test_a_misspelt_key_among_many_unknown_ones_is_not_told_as_missing_too(tmp_path: Path, capsys: Capsys) -> None:
+    path, command = _vehicle(tmp_path)
+    text = path.read_text(encoding="utf-8").replace("\nidentifier =", "\nidentifer =", 1)
+    path.write_text(text, encoding="utf-8")
+    assert main(command) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "vehicle.identifer: there is no such key" in line
+
+
+def test_a_file_of_toml_that_is_too_large_is_not_read(tmp_path: Path, capsys: Capsys) -> None:
+    path, command = _vehicle(tmp_path)
+    with path.open("ab") as file:
+        file.truncate(30_000_000)
+    assert main(command) == 2
+    assert capsys.readouterr().err == f"rov-fmu: {path}: is too large, with 30 MB: at most 20 MB are read\n"
+
+
+def test_each_mistake_is_told_once_and_one_more_is_in_the_singular() -> None:
+    path = Path("some.toml")
+    assert lines_on(path, ["a", "b", "a"]) == ["some.toml: a", "some.toml: b"]
+    assert lines_on(path, [*map(str, range(11)), "3"])[10:] == ["some.toml: 1 more mistake"]
+    assert lines_on(path, ["a", "", ""]) == ["some.toml: a", "some.toml: 2 more mistakes"]

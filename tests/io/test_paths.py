@@ -1,0 +1,155 @@
+"""Paths that a file names lead to places inside its folder, and everything else is refused in one line."""
+
+import os
+import shutil
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.io.paths import MODELS, inside, inside_or_shipped, name_of
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import ALONE, BARE, TESTS
+
+Capsys = pytest.CaptureFixture[str]
+NOT_RELATIVE = "must be a relative path with / between its parts"
+OUTSIDE = "must lead to a place inside the folder of this file"
+# What a name in a file must not be, as TOML writes it, and what is told of it. In the folder above the file there are
+# the files `secret` and `secrets/model.png`; `link` and `links` beside the file lead to these.
+WRONG = {
+    "absolute": ("/etc/passwd", NOT_RELATIVE),
+    "above": ("../secret", OUTSIDE),
+    "above, by a folder inside": ("tables/../../secret", OUTSIDE),
+    "a link": ("link", OUTSIDE),
+    "inside a linked folder": ("links/model.png", OUTSIDE),
+    "a drive": ("C:/secret", NOT_RELATIVE),
+    "on a drive": ("c:secret", NOT_RELATIVE),
+    "a share": ("//host/share/secret", NOT_RELATIVE),
+    "backslashes": ("..\\\\secret", NOT_RELATIVE),
+    "a share with backslashes": ("\\\\\\\\host\\\\share", NOT_RELATIVE),
+    "a NUL": ("secret\\u0000", NOT_RELATIVE),
+    "nothing": ("", NOT_RELATIVE),
+}
+OF_ANY_TEXT = {"a NUL": "must be without the control character", "nothing": "must have at least 1 character"}
+"""What is told of these where the key is a text in any case."""
+
+
+def _vehicle(folder: Path, old: str, new: str) -> list[str]:
+    path = folder / "rov.toml"
+    refit = SHIPPED["videoray_refit"].read_text(encoding="utf-8")
+    assert old in refit
+    path.write_text(refit.replace(old, new, 1), encoding="utf-8")
+    return ["build", str(path), "--platform", "host", "-o", str(folder / "out.fmu")]
+
+
+def _tests(folder: Path, new: str) -> list[str]:
+    shutil.copytree(TESTS, folder, dirs_exist_ok=True)
+    path = folder / "rov.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace('against = "videoray"', new, 1), encoding="utf-8")
+    return ["identify", str(folder), "-o", str(folder / "out.toml")]
+
+
+# A key, and how a file that has it is written and read. Those of a plan are in tests/study/test_plans.py.
+KEYS: dict[str, Callable[[Path, str], list[str]]] = {
+    "provenance.report": lambda f, n: _vehicle(f, "\n[provenance]", f'\n[provenance]\nreport = "{n}"'),
+    "vehicle.data": lambda f, n: _vehicle(f, "\n[validity]", f'data = "{n}"\n[validity]'),
+    "vehicle.pictures": lambda f, n: _vehicle(f, "\n[validity]", f'pictures = "{n}"\n[validity]'),
+    "against": lambda f, n: _tests(f, f'against = "{n}"'),
+    "base": lambda f, n: _tests(f, f'base = "{n}"'),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The folder of a file, with links that lead out of it."""
+    folder = tmp_path / "here"
+    (folder / "tables").mkdir(parents=True)
+    (tmp_path / "secrets").mkdir()
+    (tmp_path / "secrets" / "model.png").write_bytes(b"a secret")
+    (tmp_path / "secret").write_text(BARE.read_text(encoding="utf-8"), encoding="utf-8")
+    (folder / "link").symlink_to(tmp_path / "secret")
+    (folder / "links").symlink_to(tmp_path / "secrets", target_is_directory=True)
+    return folder
+
+
+def _refused(arguments: list[str], told: str, capsys: Capsys) -> str:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert told in said
+    assert not Path(arguments[-1]).exists()
+    return said
+
+
+@pytest.mark.parametrize("key", KEYS)
+@pytest.mark.parametrize("case", WRONG)
+def test_a_name_that_does_not_stay_in_the_folder_is_refused(key: str, case: str, folder: Path, capsys: Capsys) -> None:
+    name, told = WRONG[case]
+    arguments = KEYS[key](folder, name)
+    if key == "provenance.report":
+        told = OF_ANY_TEXT.get(case, told)
+    assert _refused(arguments, told, capsys).startswith(f"rov-fmu: {folder / 'rov.toml'}: {key} = ")
+
+
+@pytest.mark.parametrize(("key", "file"), [("pictures", "model.png"), ("data", "table7_yaw_response.csv")])
+def test_a_link_inside_a_folder_that_leads_out_of_it_is_refused(
+    key: str, file: str, folder: Path, capsys: Capsys
+) -> None:
+    (folder / "own").mkdir()
+    (folder / "own" / file).symlink_to(folder.parent / "secret")
+    told = f"vehicle.{key} = 'own': its file {file} {OUTSIDE}, after links are followed"
+    _refused(KEYS[f"vehicle.{key}"](folder, "own"), told, capsys)
+
+
+def test_a_link_that_stays_in_the_folder_is_followed(folder: Path) -> None:
+    (folder / "kept").mkdir()
+    (folder / "kept" / "page.html").write_text("found so", encoding="utf-8")
+    (folder / "report.html").symlink_to(Path("kept", "page.html"))
+    assert main(KEYS["provenance.report"](folder, "tables/../report.html")) == 0
+    with zipfile.ZipFile(folder / "out.fmu") as fmu:
+        assert fmu.read("documentation/identification.html") == b"found so"
+
+
+def test_a_vehicle_file_that_is_a_link_names_what_is_beside_the_link(folder: Path) -> None:
+    """The command line is free, and what the file names is sought where the command line has found the file."""
+    elsewhere = folder.parent / "vehicle.toml"
+    elsewhere.write_text(ALONE.replace("[validity]", 'data = "tables"\n[validity]', 1), encoding="utf-8")
+    (folder / "vehicle.toml").symlink_to(elsewhere)
+    assert load_vehicle(folder / "vehicle.toml").data == folder / "tables"
+
+
+def test_tables_are_sought_in_the_folder_and_then_by_name_among_those_that_ship(folder: Path) -> None:
+    vehicle, own = folder / "own.toml", folder / "videoray" / "tables"
+    text = ALONE.replace("[validity]", 'data = "videoray/tables"\npictures = "videoray/pictures"\n[validity]', 1)
+    vehicle.write_text(text, encoding="utf-8")
+    loaded = load_vehicle(vehicle)
+    assert (loaded.data, loaded.pictures) == (MODELS / "videoray" / "tables", MODELS / "videoray" / "pictures")
+    own.mkdir(parents=True)
+    assert load_vehicle(vehicle).data == own
+    with pytest.raises(ValueError, match=OUTSIDE):
+        inside_or_shipped(folder, "../models/videoray")
+
+
+def test_what_ships_names_nothing_above_its_folder() -> None:
+    for path in MODELS.rglob("*.toml"):
+        assert "../" not in path.read_text(encoding="utf-8"), path
+
+
+def test_a_vehicle_that_ships_is_tuned_in_any_folder_without_a_path_out_of_it(folder: Path) -> None:
+    output = folder / "tuned.toml"
+    assert main(["tune", "videoray", "--axis=heave", "--command=0.3", "--v-ss=0.2", "-o", str(output)]) == 0
+    assert 'data = "videoray/tables"' in output.read_text(encoding="utf-8")
+    assert load_vehicle(output).files == load_vehicle(VIDEORAY).files
+
+
+def test_a_name_and_its_place_are_each_others_inverse(folder: Path) -> None:
+    for name in ("tables", "tables/a.csv", "Röv [1].html", "ab:c", "videoray/tables"):
+        assert name_of(inside_or_shipped(folder, name), folder) == name
+    assert inside(folder, "tables/./a.csv") == folder / "tables" / "a.csv"
+    with pytest.raises(ValueError, match="is not inside the folder of this file"):
+        name_of(folder.parent / "secret", folder)
+    with pytest.raises(ValueError, match="is not inside the folder of this file"):
+        name_of(Path(os.devnull), folder)

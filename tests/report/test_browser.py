@@ -1,0 +1,219 @@
+"""What a person sees who opens the FMU: its documentation page, and FMPy's web app, in headless Chromium.
+
+SCREENSHOTS=docs pytest -m interop tests/report/test_browser.py takes the picture of the README anew.
+"""
+
+import importlib.util
+import os
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import groupby
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.fmu.variables import UNITS, Variable, variables
+from rov_fmu.report.templates import number, pretty_unit
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import TESTS
+from tests.report.conftest import Visit
+
+pytestmark = pytest.mark.interop
+
+
+@pytest.fixture(scope="module")
+def declared(vehicle: Vehicle) -> tuple[Variable, ...]:
+    return variables(vehicle.rov)
+
+
+# ---- documentation/index.html ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_documentation_asks_for_nothing_and_fits(
+    videoray_dir: Path, visit: Callable[..., Visit], tmp_path: Path, width: int, scheme: str
+) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    seen = visit(width=width, scheme=scheme)
+    url = (videoray_dir / "documentation" / "index.html").as_uri()
+    seen.page.goto(url)
+    seen.page.screenshot(path=tmp_path / f"documentation-{width}-{scheme}.png", full_page=True)
+    assert seen.said == []
+    assert seen.asked == [url]
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= width  # nothing to scroll sideways for
+    plots = seen.page.locator("svg:not(.live svg), img")
+    assert plots.count() == 12
+    for plot in plots.all():
+        box = plot.bounding_box()
+        assert box is not None
+        assert box["width"] > 200
+        assert box["height"] > 100
+    light = seen.page.evaluate("getComputedStyle(document.body).backgroundColor").removeprefix("rgb(").split(",")[0]
+    assert (int(light) > 128) == (scheme == "light")
+    seen.page.wait_for_selector("#live-section:not([hidden])")
+    assert axe.Axe().run(seen.page).response["violations"] == []
+
+
+def test_the_documentation_shows_the_variables_in_groups(
+    videoray_dir: Path, visit: Callable[..., Visit], declared: tuple[Variable, ...]
+) -> None:
+    page = visit().page
+    page.goto((videoray_dir / "documentation" / "index.html").as_uri())
+    groups = page.evaluate(
+        "Array.from(document.querySelectorAll('#variables + .wide tbody'), group => Array.from(group.rows,"
+        " row => Array.from(row.cells, cell => cell.innerText.trim())))"
+    )
+    expected = groupby(declared, lambda v: (v.causality, v.variability, v.initial))
+    assert groups == [[_row(v) for v in members] for _, members in expected]
+    assert len(groups) == 6  # inputs, states, derivatives, thrust, fixed and tunable coefficients
+
+
+def _row(v: Variable) -> list[str]:
+    unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
+    limits = ["" if value is None else number(value) for value in (v.start, v.minimum, v.maximum)]
+    return [v.name, v.description, v.causality, v.variability, unit, *limits]
+
+
+# ---- The report of an identification ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    assert main(["identify", str(TESTS), "--report", str(path)]) == 0
+    return path
+
+
+@pytest.mark.parametrize("width", [375, 1280])
+def test_the_report_asks_for_nothing_and_fits(
+    report: Path, visit: Callable[..., Visit], tmp_path: Path, width: int
+) -> None:
+    seen = visit(width=width)
+    seen.page.goto(report.as_uri())
+    seen.page.screenshot(path=tmp_path / f"report-{width}.png", full_page=True)
+    assert seen.said == []
+    assert seen.asked == [report.as_uri()]
+    assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+    tables = seen.page.evaluate("Array.from(document.querySelectorAll('#predicts ~ .wide'), t => t.scrollWidth)")
+    assert tables[0] <= width, "the first answer is not cut off"
+
+
+def test_folded_tables_of_the_report_are_open_on_paper(report: Path, visit: Callable[..., Visit]) -> None:
+    page = visit().page
+    page.goto(report.as_uri())
+    page.evaluate(
+        "document.querySelector('main').insertAdjacentHTML('beforeend', "
+        "'<details id=fold><summary>many</summary><p>rows</p></details>')"
+    )
+    rows = page.locator("#fold p")
+    assert not rows.is_visible()
+    page.emulate_media(media="print")
+    box = rows.bounding_box()
+    assert box is not None
+    assert box["height"] > 5
+
+
+# ---- FMPy's web app --------------------------------------------------------------------------------------------------
+
+COMMANDS = {"u_l": 0.32, "u_r": 0.3, "u_t": 0.4}
+SHOWN = {"u": "m/s", "w": "m/s", "r": "rad/s", "z": "m", "psi": "rad"}
+
+
+@pytest.fixture
+def webapp(videoray_fmu: Path, declared: tuple[Variable, ...], tmp_path: Path) -> Iterator[str]:
+    """The address of the app; it offers the commands and all parameters."""
+    pytest.importorskip("dash_bootstrap_components", reason="FMPy's web app is not installed: fmpy[webapp]")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    offered = [*COMMANDS, *(v.name for v in declared if v.causality == "parameter")]
+    command = [sys.executable, "-m", "fmpy.webapp", str(videoray_fmu), "--port", str(port)]
+    with (tmp_path / "log").open("w") as log:  # beside it it unzips the FMU, and leaves it
+        server = subprocess.Popen(
+            [*command, "--start-values", *offered, "--output-variables", *SHOWN],
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "TMPDIR": str(tmp_path)},
+        )
+    address = f"http://127.0.0.1:{port}/"
+    try:
+        for _ in range(1200):
+            with suppress(OSError):
+                urllib.request.urlopen(address).close()
+                break
+            assert server.poll() is None, (tmp_path / "log").read_text()
+            time.sleep(0.1)
+        yield address
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def _bootstrap() -> str:
+    """The style sheet as another package brings it; without it the page is plain, and has the same content."""
+    package = importlib.util.find_spec("flask_bootstrap")
+    if package is None or package.origin is None:
+        return ""
+    return Path(package.origin).with_name("static").joinpath("bootstrap5/css/bootstrap.min.css").read_text("utf-8")
+
+
+def test_the_web_app_offers_the_declared_values_simulates_and_tells_what_the_model_is(
+    webapp: str, visit: Callable[..., Visit], vehicle: Vehicle, declared: tuple[Variable, ...], tmp_path: Path
+) -> None:
+    from dash_bootstrap_components.themes import BOOTSTRAP
+
+    seen = visit(width=1120, height=720)
+    page = seen.page
+    # the one request to the outside is FMPy's own, and is answered here
+    page.route(BOOTSTRAP, lambda route: route.fulfill(content_type="text/css", body=_bootstrap()))
+    page.goto(webapp)
+    page.wait_for_selector("#simulate-button")
+    rows = page.evaluate(
+        "Array.from(document.querySelectorAll('#simulation-container label'), label => [label.innerText,"
+        " document.getElementById(label.htmlFor).value, label.parentElement.querySelector('span').innerText])"
+    )
+    offered = [v for v in declared if v.name in COMMANDS or v.causality == "parameter"]
+    assert [(name, float(value), unit) for name, value, unit in rows] == [(v.name, v.start, v.unit) for v in offered]
+
+    for name, value in COMMANDS.items():
+        box = page.get_by_label(name, exact=True)
+        box.fill(str(value))
+        box.blur()  # only then the app takes it
+    page.click("#simulate-button")
+    page.wait_for_selector("#result-col .js-plotly-plot .trace")
+    assert page.locator(".alert").count() == 0
+    page.wait_for_timeout(500)  # it draws with a transition
+    page.screenshot(path=Path(os.environ.get("SCREENSHOTS", tmp_path)) / "webapp.png")
+    last, titles = page.evaluate(
+        "(plot => [plot._fullData.map(trace => trace.y.at(-1)), plot.data.map((trace, n) =>"
+        " plot.layout['yaxis' + (n ? n + 1 : '')].title.text)])(document.querySelector('.js-plotly-plot'))"
+    )
+    rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
+    end = vehicle.rov.step(rest | COMMANDS, rest, 10.0)
+    assert titles == [f"{name} [{UNITS[unit].display or unit}]" for name, unit in SHOWN.items()]
+    assert titles[0] == "u [knot]"
+    assert last == pytest.approx([end[name] * UNITS[unit].factor for name, unit in SHOWN.items()], abs=1e-4)
+
+    page.get_by_role("tab", name="Model Info").click()
+    info = page.locator("#model-info-container")
+    info.wait_for(state="visible")
+    text = info.inner_text()
+    assert vehicle.description in text
+    assert "Model Exchange, Co-Simulation" in text
+    for label, count in (("Continuous States", 7), ("Event Indicators", 0), ("Variables", len(declared))):
+        assert f"{label}\n{count}\n" in text
+    size = info.locator("img").evaluate("image => [image.naturalWidth, image.naturalHeight]")
+    assert min(size) >= 100
+
+    page.get_by_role("tab", name="Documentation").click()
+    page.locator("#documentation-container").wait_for(state="visible")
+    assert vehicle.name in page.frame_locator("#documentation-container iframe").locator("h1").inner_text()
+    assert seen.problems() == []
+    assert [url for url in seen.asked if not url.startswith((webapp, BOOTSTRAP))] == []

@@ -1,0 +1,167 @@
+"""The equations that a page shows are those of the vehicle: evaluated as they stand, they give its rates and forces."""
+
+import random
+from collections.abc import Callable, Mapping
+from math import copysign, cos, prod, sin
+
+import pytest
+from lxml import html
+
+from rov_fmu.model.layout import Layout
+from rov_fmu.model.rov import Rov
+from rov_fmu.report.page import equations
+from rov_fmu.report.page.algebra import Call, Cases, Choice, Factor, Group, Product, Reader, Sum
+from rov_fmu.report.page.equations import Line, MathML, Text
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.vehicles import EVERYTHING, VEHICLES, random_inputs, random_state, random_vehicle
+from verification.references.equations import calculated
+
+ROVS = {
+    **VEHICLES,
+    **{name: load_vehicle(path).rov for name, path in SHIPPED.items()},
+    "everything": load_vehicle(EVERYTHING).rov,
+}
+Values = Mapping[str, float]
+FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "sin": sin,
+    "cos": cos,
+    "abs": abs,
+    "sgn": lambda x: copysign(1.0, x) if x else 0.0,
+}
+
+
+def of_sum(terms: Sum, at: Values) -> float:
+    return sum(of_product(product, at) for product in terms)
+
+
+def of_product(product: Product, at: Values) -> float:
+    above, below = (prod(of_factor(factor, at) for factor in part) for part in (product.above, product.below))
+    return product.sign * above / below
+
+
+def of_factor(factor: Factor, at: Values) -> float:
+    match factor:
+        case str():
+            return at[factor]
+        case float():
+            return factor
+        case Choice():
+            return at[factor.reverse if at[factor.subject] < 0.0 else factor.forward]
+        case Group():
+            return of_sum(factor.of, at)
+        case Call():
+            return FUNCTIONS[factor.function](of_sum(factor.of, at))
+        case Cases():
+            return of_sum(factor.at_most_zero if at[factor.name] <= 0.0 else factor.otherwise, at)
+
+
+def evaluated(rov: Rov, inputs: Values, state: Values) -> dict[str, float]:
+    """Every name to the left of an equation, with what is to its right; rates as der(<name>)."""
+    at = {**rov.coefficients, **inputs, **state}
+    at |= {name: max(-1.0, min(1.0, at[name])) for name in rov.layout.commands}
+    shown = equations.of(rov.layout)
+    found: dict[str, float] = {}
+
+    def calculate(line: Line) -> None:
+        left = prod(of_factor(factor, at) for factor in line.factors)
+        value = of_sum(line.right, at) / left
+        found[f"der({line.name})" if line.is_rate else line.name] = value
+        if not line.is_rate:
+            at[line.name] = max(-1.0, min(1.0, value)) if line in shown.commands else value
+
+    for line in shown.commands:
+        calculate(line)
+    for curve in shown.curves:
+        for line in [*curve.thrust[::-1], *curve.lag]:
+            calculate(line)
+    for name in rov.layout.thrust:  # those that the page tells of in words: "likewise"
+        if name not in at and name.startswith("F_"):
+            at[name] = float(calculated(rov, {**rov.coefficients, **inputs, **state})[name])
+    for curve in shown.curves:
+        for line in curve.torque:
+            calculate(line)
+    for line in [*shown.inertia, *shown.motion, *shown.pose]:
+        calculate(line)
+    return found
+
+
+def check(rov: Rov, rng: random.Random) -> set[str]:
+    inputs, state = random_inputs(rng, rov), random_state(rng, rov)
+    exact = {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}).items()}
+    found = evaluated(rov, inputs, state)
+    largest = max(map(abs, exact.values()))
+    for name, value in found.items():
+        if name in exact:
+            assert value == pytest.approx(exact[name], rel=1e-9, abs=1e-12 * largest), name
+    return {*found}
+
+
+@pytest.mark.parametrize("kind", ROVS)
+def test_the_equations_shown_are_those_of_the_vehicle(kind: str) -> None:
+    rov, rng = ROVS[kind], random.Random(1)
+    for _ in range(30):
+        found = check(rov, rng)
+        states = {name for name in rov.layout.state if not name.startswith("F_")}
+        assert {f"der({name})" for name in states} <= found, "every rate has its equation"
+        assert {name for name in rov.layout.thrust if name.startswith("tau_")} <= found
+
+
+def test_the_equations_shown_are_those_of_any_vehicle() -> None:
+    rng = random.Random(2)
+    for _ in range(200):
+        rov = random_vehicle(rng)
+        if {t.curve for t in rov.layout.thrusters} == {curve.name for curve in rov.layout.curves}:
+            check(rov, rng)
+
+
+def _text(layout: Layout) -> list[str]:
+    return [f"{Text(layout).line(line)}  {line.reference}".strip() for line in equations.of(layout)]
+
+
+def test_the_equations_of_the_paper_are_those_of_the_paper() -> None:
+    assert _text(VEHICLES["VideoRay"].layout) == [
+        "m_rov u' = β_u (α_u (F_l + F_r) + X_ext − b_d_u u − a_d_u |u| u)  (18a)",
+        "m_rov w' = β_w (α_w F_t + Z_ext − b_d_w w − a_d_w |w| w)  (18b)",
+        "I_r r' = β_r (α_r τ_rear + N_ext − b_d_r r − a_d_r |r| r)  (18c)",
+        "F_l = 0.5 (a_t_rear |u_l| u_l + b_t_rear u_l)  (9)",
+        "τ_rear = R sin γ (F_l − F_r)  (4)",
+        "F_t = a_t_top |u_t| u_t + b_t_top u_t  (10)",
+        "x' = V_N + u cos ψ",
+        "y' = V_E + u sin ψ",
+        "z' = w",
+        "ψ' = r",
+    ]
+
+
+def test_lag_coupling_dead_band_and_reverse_are_shown() -> None:
+    shown = _text(ROVS["everything"].layout)
+    for line in (
+        "M_u u' = α_u (0.7071 (F_1 + F_2 − F_3 − F_4) + F_l + F_r) + X_ext − b_d_u u − a_d_u |u| u + M_v v r  (18a)",
+        "M_w w' = −α_w F_5 + Z_ext + F_0_w − b_d_w± w − a_d_w± |w| w  (18b)",
+        "M_r = (I_r + m_a_r) / β_r",
+        "c_2 = u_surge + u_sway + u_yaw",
+        "F_1* = sgn(c_1) (a_t_frame± m_1² + b_t_frame± m_1) where m_1 > 0, else 0  the maker's table",
+        "m_1 = |c_1| − c_0_frame±",
+        "T_frame F_1' = F_1* − F_1",
+    ):
+        assert line in shown
+
+
+@pytest.mark.parametrize("kind", ROVS)
+def test_mathml_says_what_the_text_says(kind: str) -> None:
+    """Letters, numbers and signs stand in the same order; in MathML a coefficient's marks are above its indices."""
+    layout = ROVS[kind].layout
+    text, mathml = Text(layout), MathML(layout)
+    for line in equations.of(layout):
+        written = html.fromstring(f"<math>{mathml.line(line)}</math>").text_content()
+        plain = text.line(line)
+        for old, new in ((" where", "for"), ("else", "otherwise"), ("_reverse", "−"), ("'", "˙"), ("²", "2")):
+            plain = plain.replace(old, new)
+        left_out = "_ \xa0,()/{"  # a fraction and the cases need no brackets in MathML
+        assert sorted(c for c in written if c not in left_out) == sorted(c for c in plain if c not in left_out)
+
+
+def test_a_form_that_cannot_be_shown_is_told() -> None:
+    with pytest.raises(ValueError, match=r"2\.0 if x > 3\.0 else y: there is no way to show this"):
+        Reader({}).read("2 if x > 3 else y")

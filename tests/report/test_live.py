@@ -1,0 +1,538 @@
+"""The page that flies its model, in headless Chromium: what it computes, says, asks for, and does with files."""
+
+import random
+import re
+from collections.abc import Callable, Iterator
+from math import exp, log
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.fmu.module import module
+from rov_fmu.fmu.variables import variables
+from rov_fmu.model.layout import HEAVE
+from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.vehicle.published import load_tables
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import BARE
+from tests.report.conftest import Visit
+from tests.vehicles import EVERYTHING
+from verification.references.fmpy_slave import fmpy_slave
+
+pytestmark = pytest.mark.interop
+
+Visitor = Callable[..., Visit]
+FILES = {"videoray": SHIPPED["videoray"], "heavy": SHIPPED["bluerov2_heavy"], "everything": EVERYTHING, "bare": BARE}
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
+    """The address of the page of a vehicle."""
+    folder = tmp_path_factory.mktemp("pages")
+
+    def page(kind: str) -> str:
+        path = folder / f"{kind}.html"
+        if not path.exists():
+            vehicle = load_vehicle(FILES[kind])
+            path.write_text(fly_page([Flown(vehicle, module(vehicle.rov))]), encoding="utf-8")
+        return path.as_uri()
+
+    return page
+
+
+def flying(visit: Visitor, address: str, **options: Any) -> Visit:
+    seen = visit(**options)
+    seen.page.goto(address)
+    seen.page.wait_for_selector("#live-section:not([hidden])")
+    return seen
+
+
+def until(page: Any, condition: str) -> None:
+    """Playwright's own waiting evaluates strings in the page, which the page forbids."""
+    for _ in range(2400):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(50)
+    pytest.fail(f"never: {condition}")
+
+
+@pytest.fixture
+def quiet(visit: Visitor) -> Iterator[Visitor]:
+    """Pages that in the end have said nothing and asked for nothing but themselves."""
+    seen: list[Visit] = []
+
+    def new(**options: Any) -> Visit:
+        seen.append(visit(**options))
+        return seen[-1]
+
+    yield new
+    for one in seen:
+        assert one.said == []
+        assert len(one.asked) == 1
+
+
+# ---- What it computes ------------------------------------------------------------------------------------------------
+
+Leg = dict[str, Any]
+"""Its length in s, inputs, and α and β that change before it."""
+
+_FLY = """legs => {
+    live.pause(true);
+    live.flight.reset();
+    const { model } = live.flight.pilot;
+    return legs.map(({ length, inputs, tuning }) => {
+        live.flight.tune(tuning);
+        live.flight.set(inputs);
+        return [live.flight.advance(length), [...model.values]];
+    });
+}"""
+
+
+def a_manoeuvre(vehicle: Vehicle) -> list[Leg]:
+    """Commands beyond what saturates, loads, current and tuning at random, for 5 ms to 5 s each."""
+    rng, layout = random.Random(vehicle.identifier), vehicle.layout
+    tunable = [name for name, meta in layout.coefficients.items() if meta.tunable]
+    return [
+        {
+            "length": exp(rng.uniform(log(5e-3), log(5.0))),
+            "inputs": {name: rng.uniform(-1.2, 1.2) for name in layout.inputs},
+            "tuning": {name: rng.uniform(0.4, 1.6) for name in rng.sample(tunable, 2)} if n % 5 == 4 else {},
+        }
+        for n in range(60)
+    ]
+
+
+def natively(folder: Path, vehicle: Vehicle, legs: list[Leg]) -> Iterator[list[float]]:
+    """All variables after each leg, by the FMU's binary."""
+    declared = variables(vehicle.rov)
+    reference = {v.name: v.value_reference for v in declared}
+    slave = fmpy_slave(folder)
+    try:
+        slave.setupExperiment(startTime=0.0)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        time = 0.0
+        for leg in legs:
+            for given in (leg["tuning"], leg["inputs"]):
+                slave.setReal([reference[name] for name in given], list(given.values()))
+            slave.doStep(time, leg["length"])
+            time += leg["length"]
+            yield slave.getReal([v.value_reference for v in declared])
+    finally:
+        slave.terminate()
+        slave.freeInstance()
+
+
+@pytest.mark.parametrize("kind", ["videoray", "heavy", "everything"])
+def test_a_manoeuvre_is_that_of_the_native_fmu(
+    kind: str, pages: Callable[[str], str], quiet: Visitor, request: pytest.FixtureRequest
+) -> None:
+    page = flying(quiet, pages(kind)).page
+    check_manoeuvre(page, load_vehicle(FILES[kind]), request.getfixturevalue(f"{kind}_dir"))
+
+
+def test_a_manoeuvre_is_that_of_the_native_fmu_in_firefox(
+    pages: Callable[[str], str], firefox: Any, heavy: Vehicle, heavy_dir: Path
+) -> None:
+    seen, address = Visit(firefox), pages("heavy")
+    seen.page.goto(address)
+    seen.page.wait_for_selector("#live-section:not([hidden])")
+    check_manoeuvre(seen.page, heavy, heavy_dir)
+    assert seen.said == []
+    assert set(seen.asked) <= {address}  # Firefox need not tell of the page itself, which is a file
+
+
+def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path) -> None:
+    """All variables are those of the FMU in this folder after each leg."""
+    legs = a_manoeuvre(vehicle)
+    flown = page.evaluate(_FLY, legs)
+    names = [v.name for v in variables(vehicle.rov)]
+    worst = 0.0
+    for (done, values), expected in zip(flown, natively(folder, vehicle, legs), strict=True):
+        assert done
+        assert len(values) == len(names)
+        worst = max(worst, *(abs(x - y) / max(1.0, abs(y)) for x, y in zip(values, expected, strict=True)))
+    assert worst < 1e-12
+
+
+@pytest.mark.parametrize("kind", ["videoray", "heavy"])
+def test_ten_thousand_steps_take_less_than_a_frame(kind: str, pages: Callable[[str], str], visit: Visitor) -> None:
+    page = flying(visit, pages(kind)).page
+    best = page.evaluate(
+        """() => {
+            live.pause(true);
+            const { pilot } = live.flight;
+            let best = Infinity;
+            for (let round = 0; round < 100; round++) {
+                const start = performance.now();
+                for (let i = 0; i < 2000; i++) {
+                    const { commands } = live.vehicle;
+                    if (i % 50 === 0) commands.forEach((name, n) => pilot.model.set(name, Math.sin(i + n)));
+                    pilot.model.step(1 / 60);
+                }
+                best = Math.min(best, performance.now() - start);
+            }
+            return 5 * best;
+        }"""
+    )  # by a fifth of them, which fits into the time that a busy machine gives at once
+    assert best < 1000.0 / 60.0
+
+
+def test_a_frame_is_drawn_in_time(pages: Callable[[str], str], visit: Visitor) -> None:
+    page = flying(visit, pages("heavy")).page
+    page.evaluate("""() => {
+        live.flight.set({ u_1: -0.5, u_2: -0.3, u_3: 0.5, u_4: 0.5, u_5: 0.2 });
+        live.flight.advance(30);
+    }""")
+    took = page.evaluate(
+        """() => Array.from({ length: 100 }, () => {
+            const start = performance.now();
+            live.fly(1 / 60);
+            live.draw();
+            return performance.now() - start;
+        }).sort((one, other) => one - other)[50]"""
+    )
+    assert took < 8.0, "half of a frame at 60 Hz is left to the browser"
+
+
+# ---- What a person does with it --------------------------------------------------------------------------------------
+
+
+def test_it_is_flown_by_keys_alone(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("heavy")).page
+    for _ in range(10):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "live-stage":
+            break
+    page.keyboard.down("KeyW")
+    until(page, "live.flight.pilot.model.get('x') > 0.1")
+    page.keyboard.down("KeyD")
+    until(page, "live.flight.pilot.model.get('psi') > 0.1")
+    page.keyboard.up("KeyW")
+    page.keyboard.up("KeyD")
+    until(page, "live.vehicle.commands.every(name => live.flight.pilot.model.get(name) === 0)")
+    page.keyboard.press("Space")
+    time = page.evaluate("live.flight.time")
+    page.wait_for_timeout(200)
+    assert page.evaluate("live.flight.time") == time, "it pauses"
+    reached: list[str] = []
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        reached.append(page.evaluate("document.activeElement.id || document.activeElement.name || ''"))
+    buttons = {"live-pause", "live-slower", "live-faster", "live-reset", "live-still", "live-test", "live-run"}
+    assert buttons | {"u_1", "u_8", "live-recording"} <= set(reached)
+    page.focus("input[name=u_5]")
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    until(page, "live.flight.pilot.model.get('u_5') > 0")
+
+
+def test_a_gamepad_steers_and_lets_go(pages: Callable[[str], str], quiet: Visitor, heavy: Vehicle) -> None:
+    page = flying(quiet, pages("heavy")).page
+    sticks = {"yaw": 0.5, "heave": -0.25, "sway": 0.05, "surge": 0.75}  # sway is within the dead zone
+    axes = [sticks["yaw"], sticks["heave"], sticks["sway"], -sticks["surge"]]
+    page.evaluate("axes => { navigator.getGamepads = () => [null, { mapping: 'standard', axes }]; }", axes)
+    until(page, "live.flight.pilot.model.get('r') > 0.1")
+    asked = page.evaluate("Object.fromEntries(live.vehicle.commands.map(c => [c, live.flight.pilot.model.get(c)]))")
+    expected = dict.fromkeys(heavy.layout.commands, 0.0)
+    for form in heavy.layout.axes:
+        for name, sign in heavy.layout.signs(form.axis).items():
+            expected[name] += sign * sticks[form.axis.name] * (form.axis.name != "sway")
+    assert asked == pytest.approx({name: max(-1.0, min(1.0, value)) for name, value in expected.items()})
+    page.evaluate("() => { navigator.getGamepads = () => []; }")
+    until(page, "live.vehicle.commands.every(name => live.flight.pilot.model.get(name) === 0)")
+
+
+def test_a_step_test_stands_beside_what_was_measured(
+    pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle
+) -> None:
+    page = flying(quiet, pages("videoray")).page
+    (heave,) = (table for table in load_tables(vehicle) if table.axis is HEAVE)
+    for row in heave.rows:
+        page.select_option("#live-test", label=f"heave {row.command} %")
+        page.click("#live-run")
+        V, Tau = vehicle.rov.response(HEAVE, float(row.command) / 100.0)
+        until(page, "live.flight.time > 0.1")
+        title = page.text_content("#live-chart-heave .title") or ""
+        assert title.endswith(f"V_ss {V:.3f} · Tau {Tau:.2f} s")
+        said = page.inner_text("#live-said")
+        assert f"measured: V_ss {row.scaled.V_ss.measured} m/s, Tau {row.scaled.Tau.measured} s" in said
+        assert page.get_attribute("#live-chart-heave .point", "visibility") == "visible"
+    page.locator("input[name=u_l]").fill("0.25")
+    until(page, "document.querySelector('#live-chart-heave .point').getAttribute('visibility') === 'hidden'")
+
+
+def test_alpha_and_beta_are_felt_and_the_ghost_keeps_those_of_the_file(
+    pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle
+) -> None:
+    page = flying(quiet, pages("videoray")).page
+    page.locator("summary", has_text="Tuning").click()
+    page.locator("input[name=alpha_w]").fill("2")
+    page.locator("input[name=u_t]").fill("0.5")
+    until(page, "live.flight.pilot.model.marks[2] !== 0")
+    pilot, ghost = page.evaluate("[live.flight.pilot.model.marks[2], live.flight.ghost.model.marks[2]]")
+    assert pilot == pytest.approx(vehicle.rov.replaced({"alpha_w": 2.0}).response(HEAVE, 0.5)[0], rel=1e-12)
+    assert ghost == pytest.approx(vehicle.rov.response(HEAVE, 0.5)[0], rel=1e-12)
+    assert page.is_checked("#live-ghost")
+    page.click("#live-file")
+    tuned = page.evaluate(
+        "Object.fromEntries(live.vehicle.tunable.map(name => [name, live.flight.pilot.model.get(name)]))"
+    )
+    assert tuned == {name: vehicle.rov[name] for name in tuned}
+
+
+def test_a_vehicle_of_one_axis_flies_too(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("bare")).page
+    page.select_option("#live-test", index=0)
+    page.click("#live-run")
+    until(page, "live.flight.time > 0.3")
+    assert page.evaluate("live.flight.pilot.model.get('z')") > 0.0
+    assert page.locator("#live-track").count() == page.locator("#live-compass").count() == 0
+    assert page.evaluate("document.getElementById('live-chart-heave').clientWidth") <= 420, "text grows with it"
+
+
+def test_words_fit_their_places(tmp_path: Path, quiet: Visitor) -> None:
+    file, target = tmp_path / "long.toml", tmp_path / "long.html"
+    name = "a_name_of_a_thruster_as_may_be"
+    file.write_text(BARE.read_text(encoding="utf-8").replace('name = "t"', f'name = "{name}"'), encoding="utf-8")
+    assert main(["fly", str(file), "-o", str(target)]) == 0
+    page = flying(quiet, target.as_uri()).page
+    wide, room = page.evaluate("(span => [span.scrollWidth, span.clientWidth])(document.querySelector('label span'))")
+    assert wide <= room
+    title = "surge: u \N{MINUS SIGN}1.165 m/s · V_ss \N{MINUS SIGN}1.211 · Tau 10.65 s"
+    page.evaluate("words => { live.charts[0].title.textContent = words; }", title)
+    assert page.evaluate("live.charts[0].title.getComputedTextLength()") < 298
+
+
+def test_a_track_far_away_is_drawn(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("videoray")).page
+    lines = page.evaluate("""() => {
+        live.flight.pilot.model.set("x", 1e17);
+        live.zoom(1000);
+        live.draw();
+        return live.track.grid.getAttribute("d").split("M").length;
+    }""")
+    assert lines < 40
+    assert "north 1.00e17 m" in page.inner_text("#live-told")
+
+
+def test_a_heading_is_below_360(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("videoray")).page
+    page.evaluate("() => { live.flight.pilot.model.set('psi', -0.005); live.draw(); }")
+    assert page.inner_text("#live-told").endswith("heading 0°")
+
+
+def test_loads_and_current_act(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
+    page = flying(quiet, pages("videoray")).page
+    page.locator("summary", has_text="Loads").click()
+    page.evaluate("live.pause(true)")  # so that both act from the start
+    page.locator("input[name=Z_ext]").fill("1")
+    page.locator("input[name=V_E]").fill("0.5")
+    assert page.evaluate("live.flight.time") == 0.0
+    page.evaluate("live.pause(false)")
+    until(page, "live.flight.time > 1")
+    time, y, z = page.evaluate("[live.flight.time, ...['y', 'z'].map(name => live.flight.pilot.model.get(name))]")
+    rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
+    assert z > 0.9 * vehicle.rov.step(rest | {"Z_ext": 1.0}, rest, time)["z"] > 0.0
+    assert 0.4 * time < y <= 0.5 * time
+
+
+def test_another_vehicle_flies_the_same_commands_as_a_ghost(tmp_path: Path, quiet: Visitor) -> None:
+    target = tmp_path / "both.html"
+    assert main(["fly", "videoray", "--against", "bluerov2", "-o", str(target)]) == 0
+    page = flying(quiet, target.as_uri()).page
+    other = load_vehicle(SHIPPED["bluerov2"])
+    ghost = page.evaluate("""() => {
+        live.pause(true);
+        live.flight.set({ u_l: 0.5, u_r: 0.3, u_t: -0.2 });
+        live.flight.advance(3);
+        return [...live.flight.ghost.model.values];
+    }""")
+    demands = {"surge": 0.4, "yaw": 0.1, "heave": -0.2}
+    inputs = dict.fromkeys(other.layout.inputs, 0.0)
+    for form in other.layout.axes:
+        for name, sign in other.layout.signs(form.axis).items():
+            inputs[name] += sign * demands.get(form.axis.name, 0.0)
+    expected = other.rov.step(inputs, dict.fromkeys(other.layout.state, 0.0), 3.0)
+    names = [v.name for v in variables(other.rov)]
+    assert {name: ghost[names.index(name)] for name in expected} == pytest.approx(expected, rel=1e-11, abs=1e-12)
+    assert page.is_checked("#live-ghost")
+
+
+# ---- Recordings ------------------------------------------------------------------------------------------------------
+
+
+def drop(page: Any, name: str, content: bytes) -> None:
+    page.set_input_files("#live-recording", [{"name": name, "mimeType": "text/csv", "buffer": content}])
+
+
+def a_recording(vehicle: Vehicle, form: Callable[[float], str] = repr) -> str:
+    """A log of all axes at 10 Hz over 20 s, of the model itself in Python."""
+    rng, lines = random.Random(1), ["time [s],u_l [%],u_r [%],u_t [%],surge velocity [m/s],depth [m],heading [deg]"]
+    state = dict.fromkeys(vehicle.layout.state, 0.0)
+    inputs = dict.fromkeys(vehicle.layout.inputs, 0.0)
+    for n in range(200):
+        if n % 25 == 5:
+            inputs |= {name: rng.uniform(-0.8, 0.8) for name in vehicle.layout.commands}
+        heading = (state["psi"] * 57.29577951308232 + 180.0) % 360.0 - 180.0
+        cells = [n / 10.0, *(100.0 * inputs[c] for c in ("u_l", "u_r", "u_t")), state["u"], state["z"], heading]
+        lines.append(",".join(map(form, cells)))
+        state = vehicle.rov.step(inputs, state, 0.1)
+    return "\n".join(lines)
+
+
+def test_a_recording_flies_again_beside_its_prediction(
+    pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle
+) -> None:
+    page = flying(quiet, pages("videoray")).page
+    drop(page, "log_of_a_pool.csv", a_recording(vehicle).encode())
+    until(page, "live.flight.playback !== null")
+    page.evaluate("live.speed = 20")
+    until(page, "live.paused")
+    said = page.inner_text("#live-said")
+    deviations = [float(number) for number in re.findall(r"(?:surge|heave|yaw) (\S+) ", said)]
+    assert len(deviations) == 3
+    assert max(deviations) < 1e-8, said  # the recording is that of the model
+    assert page.is_checked("#live-ghost")
+    page.click("#live-reset")
+    assert not page.is_checked("#live-ghost"), "what was measured is gone"
+
+
+@pytest.mark.parametrize("other", ["bluerov2_heavy", "bare"])
+def test_what_was_measured_is_of_the_same_axes_in_a_ghost_of_others(other: str, tmp_path: Path, quiet: Visitor) -> None:
+    target = tmp_path / "both.html"
+    against = str(SHIPPED.get(other, BARE))
+    assert main(["fly", "videoray", "--against", against, "-o", str(target)]) == 0
+    page = flying(quiet, target.as_uri()).page
+    page.evaluate("live.pause(true)")
+    drop(
+        page, "pool.csv", b"time [s],u_l [%],u_r [%],u_t [%],depth [m]\n0,0,0,9,0\n1,0,0,9,0.5\n2,0,0,9,1\n3,0,0,9,2\n"
+    )
+    until(page, "live.flight.playback !== null")
+    page.evaluate("live.flight.advance(3)")
+    ghost = page.evaluate("['z', 'w', 'v'].map(name => live.flight.ghost.model.get(name))")
+    assert ghost == [1.0, 0.5, 0.0]
+
+
+def test_a_log_may_be_written_otherwise_and_have_other_columns(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("heavy")).page
+    rows = [f"{n},1700,{0.5 * n},12.6,," for n in range(3)]
+    header = "Time [S],U_5 [\N{GREEK SMALL LETTER MU}s],DEPTH [M],v [V]"
+    drop(page, "pool.csv", "\n".join([header, *rows]).encode())
+    until(page, "live.flight.playback !== null")
+    recording = page.evaluate("live.flight.playback.recording")
+    assert recording["commands"][2]["u_5"] == 0.5
+    assert [signal["values"] for signal in recording["signals"]] == [[0.0, 0.5, 1.0]]
+    assert recording["left"] == 0
+
+
+def test_a_log_of_one_axis_is_known_by_its_name(pages: Callable[[str], str], quiet: Visitor) -> None:
+    page = flying(quiet, pages("videoray")).page
+    rows = [f"{n / 5:g};{0 if n < 5 else 40};{0.01 * n:g}".replace(".", ",") for n in range(100)]
+    drop(page, "log_heave_2.csv", "\n".join(["time [s];command [%];depth [cm]", *rows]).encode())
+    until(page, "live.flight.playback !== null")
+    recording = page.evaluate("live.flight.playback.recording")
+    assert recording["commands"][5] == {"u_l": 0.0, "u_r": 0.0, "u_t": 0.4}
+    (depth,) = recording["signals"]
+    assert depth["isPosition"]
+    assert depth["values"][-1] == pytest.approx(0.0099)
+
+
+BAD = {
+    "empty": (b"", "less than two rows"),
+    "bytes": (bytes(range(256)) * 40, "no column"),
+    "other columns": (b"a,b\n1,2\n3,4\n", "no column \N{LEFT DOUBLE QUOTATION MARK}time"),
+    "no command": (b"time [s],depth [m]\n0,1\n1,2\n", "no column of a command"),
+    "no motion": (b"time [s],u_l [%]\n0,1\n1,2\n", "no motion"),
+    "no axis": (b"time [s],command [%],depth [m]\n0,1,0\n1,2,0\n", "call it log_surge.csv"),
+    "unit": (b"time [s],u_l [kg],depth [m]\n0,1,0\n1,2,0\n", "u_l [kg]\N{RIGHT DOUBLE QUOTATION MARK} has no unit"),
+    "length": (b"time [s],u_l [%],depth [deg]\n0,1,0\n1,2,0\n", "has no unit that this column can have"),
+    "velocity": (b"time [s],u_l [%],surge velocity [m]\n0,1,0\n1,2,0\n", "has no unit that this column can have"),
+    "words": (b"time [s],u_l [%],depth [m]\nx,y,z\nx,y,z\n", "no two of its rows"),
+    "many rows": (b"time [s],u_l [%],depth [m]\n" + b"0,1,0\n" * 200_001, "more than 200000 rows"),
+    "huge": (b"time [s],u_l [%],depth [m]\n" + b"0,1,0\n" * 4_000_000, "larger than 20 MB"),
+    "fractions": (b"time [s],u_l [%],depth [m]\n0,0.2,0\n1,0.5,0\n", "no command passes 1 %"),
+    "two logs": (b"time [s],u_l [%],depth [m]\n" + b"0,9,0\n1,9,0\n2,9,0\n" * 2, "its time goes back, and stays back"),
+    "far": (b"time [s],u_l [%],depth [m]\n0,9,0\n1,9,1e308\n", "numbers that no vehicle reaches"),
+    "twice": (b"time [s],u_l [%],depth [m],z [m]\n0,9,0,0\n1,9,1,1\n", "two of its columns tell the same of heave"),
+    "long": (b"time [s],u_l [%],depth [m]\n0,9,0\n1e9,9,0\n", "longer than a day"),
+}
+
+
+def test_a_file_that_is_no_recording_is_told_and_the_model_flies_on(
+    pages: Callable[[str], str], quiet: Visitor
+) -> None:
+    page = flying(quiet, pages("videoray")).page
+    page.locator("input[name=u_l]").fill("0.5")
+    for name, (content, told) in BAD.items():
+        page.evaluate("live.say('')")
+        drop(page, f"{name}.csv", content)
+        until(page, "document.getElementById('live-said').textContent !== ''")
+        said = page.inner_text("#live-said")
+        assert said.startswith(f"{name}.csv cannot be flown: "), said
+        assert told in said, said
+        time = page.evaluate("live.flight.time")
+        until(page, f"live.flight.time > {time}")
+        assert page.evaluate("live.flight.pilot.model.get('u_l')") == 0.5
+
+
+# ---- The page --------------------------------------------------------------------------------------------------------
+
+
+def test_a_file_is_taken_where_it_is_dropped(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
+    page = flying(quiet, pages("videoray")).page
+    page.evaluate(
+        """text => {
+            const dataTransfer = new DataTransfer();
+            dataTransfer.items.add(new File([text], "pool.csv"));
+            document.getElementById("live-track").dispatchEvent(
+                new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
+        }""",
+        a_recording(vehicle),
+    )
+    until(page, "live.flight.playback !== null")
+    page.locator("input[name=u_t]").fill("0.5")
+    until(page, "live.flight.pilot.model.get('u_t') === 0.5")
+    assert page.evaluate("live.flight.playback") is None, "the pilot has control again"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_axe_finds_nothing_and_it_fits(
+    pages: Callable[[str], str], quiet: Visitor, tmp_path: Path, width: int, scheme: str
+) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    page = flying(quiet, pages("videoray"), width=width, scheme=scheme).page
+    for summary in page.locator("summary").all():
+        summary.click()
+    page.click("#live-run")
+    page.wait_for_timeout(500)
+    page.screenshot(path=tmp_path / f"fly-{width}-{scheme}.png", full_page=True)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert axe.Axe().run(page).response["violations"] == []
+
+
+def test_a_browser_that_cannot_is_told(pages: Callable[[str], str], quiet: Visitor) -> None:
+    seen = quiet()
+    seen.page.add_init_script("delete globalThis.WebAssembly")
+    seen.page.goto(pages("videoray"))
+    seen.page.wait_for_selector("#live-sorry:not([hidden])")
+    assert not seen.page.locator("#live-section").is_visible()
+
+
+def test_without_scripts_and_on_paper_the_page_of_the_fmu_is_as_it_was(
+    videoray_dir: Path, browser: Any, visit: Visitor
+) -> None:
+    url = (videoray_dir / "documentation" / "index.html").as_uri()
+    plain = browser.new_page(java_script_enabled=False)
+    plain.goto(url)
+    assert not plain.locator("#live-section").is_visible()
+    assert not plain.locator("#live-link").is_visible()
+    plain.close()
+    page = flying(visit, url).page
+    assert page.locator("#live-link").is_visible()
+    page.emulate_media(media="print")
+    assert not page.locator("#live-section").is_visible()

@@ -1,0 +1,437 @@
+"""The identification report: whole, self-contained, the same bytes every time, and in the FMU of its vehicle."""
+
+import re
+import shutil
+import zipfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import html
+
+from rov_fmu.cli import main
+from rov_fmu.identify.identification import Identification, compare
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.next_test import NextTest
+from rov_fmu.identify.recordings.recordings_fit import Effect
+from rov_fmu.io.output import write_whole
+from rov_fmu.model.layout import HEAVE, SURGE, YAW
+from rov_fmu.model.rov import Rov
+from rov_fmu.report.console_results import print_identification
+from rov_fmu.report.report import report_output, report_page
+from rov_fmu.report.templates import number
+from rov_fmu.tank.tank_tests import load_tank_tests
+from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import ROOT, TESTS
+from tests.folders import DOWN, SPEED, pulled, read
+from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
+from tests.recordings import PLANS, clean, write_log
+from tests.report.test_fmu_page import check_refers_to_itself_alone
+
+PAGES = ["of_tables", "of_recordings"]
+
+
+@pytest.fixture(scope="module")
+def of_tables() -> Identification:
+    """The VideoRay's tests, as they ship."""
+    return identify(load_tank_tests(TESTS))
+
+
+@pytest.fixture(scope="module")
+def of_recordings(tmp_path_factory: pytest.TempPathFactory) -> Identification:
+    """Thrust tests, and a recording of each axis."""
+    folder, random = tmp_path_factory.mktemp("logs"), np.random.default_rng(1)
+    write_rov(folder, thrust_rear=(0.0, 0.7))
+    k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
+    for thruster, m in (("rear", SURGE), ("top", HEAVE)):
+        rows = [(c, k.force(m, c) + 0.05 * random.standard_normal()) for c in COMMANDS.tolist()]
+        write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
+    for m in (SURGE, HEAVE, YAW):
+        write_log(folder, "a&b $1", clean(k, m, PLANS[m.name][0], rate=20.0).noisy(random))
+    return identify(load_tank_tests(folder))
+
+
+@pytest.fixture(params=PAGES)
+def results(request: pytest.FixtureRequest) -> Identification:
+    found: Identification = request.getfixturevalue(request.param)
+    return found
+
+
+@pytest.fixture(scope="module")
+def pages(of_tables: Identification, of_recordings: Identification) -> Mapping[int, str]:
+    return {id(found): report_page(found) for found in (of_tables, of_recordings)}
+
+
+@pytest.fixture
+def page(results: Identification, pages: Mapping[int, str]) -> str:
+    return pages[id(results)]
+
+
+@pytest.fixture
+def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing takes most of the time, and words do not need it."""
+    monkeypatch.setattr("rov_fmu.report.report.inline_svg", lambda *_: "")
+
+
+def text_of(page: str) -> str:
+    return " ".join(html.fromstring(page).text_content().split())
+
+
+def rows(page: str) -> list[list[str]]:
+    return [[cell.text_content().strip() for cell in row.iter("th", "td")] for row in html.fromstring(page).iter("tr")]
+
+
+def test_page_is_whole_html(page: str) -> None:
+    assert page.startswith("<!DOCTYPE html>")
+    root = html.document_fromstring(page, ensure_head_body=True)
+    ids = [e.get("id") for e in root.iter() if isinstance(e.tag, str) and e.get("id")]
+    assert len(ids) == len(set(ids))
+    assert {a.get("href").removeprefix("#") for a in root.iter("a")} <= set(ids)
+    assert set(re.findall(r"url\(#(\w+)\)", page)) | set(re.findall(r'<use [^>]*href="#(\w+)"', page)) <= set(ids)
+    for tag in ("table", "tbody", "tr", "td", "th", "div", "p", "ul", "li", "svg", "text", "figure"):
+        assert len(re.findall(rf"<{tag}[\s>]", page)) == page.count(f"</{tag}>"), tag
+    assert "nan" not in re.findall(r"[a-z]+", text_of(page)), "a dash stands where there is no number"
+
+
+def test_loads_nothing(page: str) -> None:
+    check_refers_to_itself_alone(page)
+    assert not re.search(r"https?://|@import", page)
+    assert set(re.findall(r"url\((.)", page)) == {"#"}
+
+
+@pytest.mark.parametrize("results", ["of_tables", pytest.param("of_recordings", marks=pytest.mark.long)], indirect=True)
+def test_the_same_twice(results: Identification, page: str) -> None:
+    assert report_page(results) == page
+
+
+def test_every_input_has_its_hash(results: Identification, page: str) -> None:
+    table = [row for row in rows(page) if len(row) == 3]
+    for name, digest in results.tests.inputs.items():
+        (row,) = [row for row in table if row[0] == name]
+        assert row[1]
+        assert row[2] == digest
+
+
+def test_every_warning_is_there_in_words(of_tables: Identification, pages: Mapping[int, str]) -> None:
+    items = [item.text_content().strip() for item in html.fromstring(pages[id(of_tables)]).iter("li")]
+    assert of_tables.warnings
+    assert {f"{warning}." for warning in of_tables.warnings} <= set(items)
+
+
+def test_every_coefficient_has_its_interval(results: Identification, page: str) -> None:
+    table = {row[0]: row for row in reversed(rows(page)) if len(row) == 7}  # the first of each name
+    for name in PAPER.coefficients:
+        row, interval = table[name], results.vehicle.intervals.get(name)
+        assert row[2] == f"{results.vehicle.rov[name]:.5g}"
+        assert row[3:5] == ([f"{end:.4g}" for end in interval] if interval else ["", ""])
+        assert row[6] == results.vehicle.sources[name]
+
+
+def test_every_measured_point_stands_beside_the_models(of_tables: Identification, pages: Mapping[int, str]) -> None:
+    table = rows(pages[id(of_tables)])
+    for comparison in compare(of_tables):
+        for n, p in enumerate(comparison.points):
+            numbers = [f"{column[n]:.4g}".replace("-", "−") for column in comparison.columns]
+            assert [row for row in table if len(row) == 9 and row[2::2][:3] == numbers and p.source in row[8]]
+    assert ["Surge, Vss", "6", "5.3 %", "9.7 %", "16.6 %"] in table
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_a_vehicle_of_another_kind_stands_beside(of_tables: Identification) -> None:
+    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
+    axes = tuple(form for form in heavy.layout.axes if form.axis is not YAW)
+    rov = Rov(replace(heavy.layout, axes=axes, coupled=False), heavy.rov.coefficients)
+    results = replace(of_tables, against=replace(heavy, rov=rov))
+    for comparison in compare(results):
+        assert len(comparison.columns) == 3
+        assert np.isnan(comparison.columns[-1]).all() == (comparison.result.axis is YAW)
+    page = report_page(results)
+    assert f"“compared” is {heavy.name}" in " ".join(page.split())
+    of_yaw = [row for row in rows(page) if "steady_yaw" in row[-1]]
+    assert of_yaw
+    assert all(row[-3:-1] == ["–", "–"] for row in of_yaw)
+
+
+def test_recordings_are_drawn_and_their_holds_listed(of_recordings: Identification, pages: Mapping[int, str]) -> None:
+    page = pages[id(of_recordings)]
+    labels = {svg.get("aria-label") for svg in html.fromstring(page).iter("svg")}
+    for axis in of_recordings.axes:
+        assert axis.recordings
+        assert f"Recording: log_{axis.axis.name}_a&b $1.csv" in labels
+        assert sum(row[0].startswith(f"log_{axis.axis.name}") for row in rows(page)) >= len(axis.steps)
+    assert {"Thrust: rear", "Thrust: top"} <= labels
+    assert ["80 %", "weight 0"] in [[row[0], row[-1]] for row in rows(page) if len(row) == 6]
+
+
+# ---- Three questions first ------------------------------------------------------------------------------------------
+
+
+def sections(page: str) -> list[str]:
+    return [h2.get("id") for h2 in html.fromstring(page).iter("h2")]
+
+
+def test_three_questions_come_first(page: str) -> None:
+    assert sections(page)[:4] == ["predicts", "known", "next", "warnings"]
+
+
+def test_recordings_are_predicted_in_percent_of_the_velocity_over_time(
+    of_recordings: Identification, pages: Mapping[int, str]
+) -> None:
+    table = rows(pages[id(of_recordings)])
+    for result in of_recordings.axes:
+        assert result.held_out
+        p = np.concatenate([[p.measured, p.predicted] for p in result.held_out.predictions], axis=1)
+        fit = 1.0 - np.sqrt(np.mean((p[0] - p[1]) ** 2)) / np.std(p[0])
+        assert 0.5 < fit < 1.0
+        name, halves = result.axis.name.capitalize(), f"halves of log_{result.axis.name}_a&b $1.csv, each by a fit to"
+        assert [row[2] for row in table if row[0] == name and row[1].startswith(halves)] == [f"{100.0 * fit:.1f} %"]
+
+
+def test_points_are_predicted_by_fits_without_their_thrust(of_tables: Identification, pages: Mapping[int, str]) -> None:
+    table = rows(pages[id(of_tables)])
+    for words, error in (("Vss of 6 points", "9.7 %"), ("Tau of 4 points", "17.0 %")):
+        assert [row for row in table if row[1:2] == [f"{words}, each by a fit without its thrust"] and row[-1] == error]
+
+
+def test_what_was_sought_is_known_in_a_plot_and_a_table(results: Identification, page: str) -> None:
+    table = {row[0]: row for row in reversed(rows(page)) if len(row) in (4, 5)}
+    for name in (name for result in results.axes if result.estimate for name in result.estimate.names):
+        low, high = results.vehicle.intervals[name]
+        numbers = number(results.vehicle.rov[name], 4), number(low, 3), number(high, 3)
+        assert tuple(table[name][1:4]) == numbers
+    (plot,) = [svg for svg in html.fromstring(page).iter("svg") if svg.get("aria-label") == "What is known"]
+    labels = {text.text_content() for text in plot.iter("text")}
+    assert {"a_d_u", "b_d_w", "beta_r"} <= labels
+    assert not [label for label in labels if label.startswith(("alpha", "m_rov"))], "what is given, or by convention"
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_the_next_test_is_told_the_worst_axis_first(of_tables: Identification) -> None:
+    def test_of(n: int, interval: tuple[float, float] | None, width: float) -> NextTest:
+        return NextTest(
+            of_tables.axes[n].axis, PAPER.axes[n].axis.coefficient("a_d"), interval, width, 0.4, f"do {n} < 3"
+        )
+
+    tests = [test_of(0, (0.9, 1.1), 0.1), test_of(1, None, np.inf), test_of(2, (0.1, 0.3), 0.5)]
+    axes = tuple(replace(result, next_test=test) for result, test in zip(of_tables.axes, tests, strict=True))
+    (listed,) = html.fromstring(report_page(replace(of_tables, axes=axes))).iter("ol")
+    items = [" ".join(item.text_content().split()) for item in listed.iter("li")]
+    assert [item.split(":")[0] for item in items] == ["Heave", "Yaw", "Surge"]
+    assert items[0] == "Heave: do 1 < 3. It makes a_d_w identifiable, which the data do not tell yet."
+    assert items[1].endswith("would have an interval of 40 % of that width.")
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_what_else_acts_is_told_kept_or_not(of_recordings: Identification) -> None:
+    heave = of_recordings.axes[1]
+    assert heave.recordings
+    file = heave.recordings.simulations[0].recording.file
+    acts = (
+        Effect("load", "heave", "N", -0.25, (-0.3, -0.2), kept=True),
+        Effect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),
+        Effect("delay", file, "s", 0.001, None, kept=False),
+    )
+    axes = (of_recordings.axes[0], replace(heave, recordings=replace(heave.recordings, effects=acts)))
+    page = report_page(replace(of_recordings, axes=axes))
+    assert ["Constant load", "heave", "−0.25", "−0.3", "−0.2", "N", "kept"] in rows(page)
+    assert ["Delay from the commands to the motion", file, "0.001", "–", "–", "s", "left at 0"] in rows(page)
+    assert "The fitted delay of 0.21 s is shaded." in text_of(page)
+    folded = [fold.text_content() for fold in html.fromstring(page).iter("details")]
+    assert any("Sought in single recordings too, and left at zero: 1" in fold and file in fold for fold in folded)
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_long_tables_are_folded_without_a_script(of_recordings: Identification) -> None:
+    surge = of_recordings.axes[0]
+    many = replace(of_recordings, axes=(replace(surge, steps=surge.steps[:1] * 201),))
+    root = html.fromstring(report_page(many))
+    (fold,) = [fold for fold in root.iter("details") if fold.find("summary").text == "Held commands: 201 rows"]
+    assert len(list(fold.iter("tr"))) == 202
+    assert not [fold for fold in root.iter("details") if fold.get("open") is not None]
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_the_report_of_another_vehicle_speaks_of_it_alone(tmp_path: Path) -> None:
+    tables = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
+    results = identify(read(tmp_path / "mine", DOWN, tables))
+    page = report_page(results)
+    assert sections(page)[-3:] == ["thrust", "heave", "inputs"]
+    assert not re.search(r"videoray|rear|top thruster|surge|yaw", text_of(page), re.IGNORECASE)
+
+
+# ---- The same in the terminal ----------------------------------------------------------------------------------------
+
+
+def test_the_printout_is_short_and_says_the_same(
+    of_recordings: Identification, capsys: pytest.CaptureFixture[str]
+) -> None:
+    surge, heave, yaw = of_recordings.axes
+    assert heave.recordings
+    acts = (Effect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),)
+    heave = replace(
+        heave,
+        recordings=replace(heave.recordings, effects=acts),
+        next_test=NextTest(HEAVE, "a_d_w", (10.0, 20.0), 0.5, 0.25, "a dive"),
+        steps=heave.steps[:1] * 30,
+    )
+    print_identification(replace(of_recordings, axes=(surge, heave, yaw)))
+    out = capsys.readouterr().out
+    words = [" ".join(line.split()) for line in out.splitlines()]
+    assert heave.held_out
+    assert f"heave {heave.held_out.fit:.1f}% halves of log_heave_a&b $1.csv, each by a fit to the other" in words
+    assert "heave 0.21 0.2 0.22 s delay from the commands to the motion" in words
+    assert "- heave: a dive (a_d_w, now 10 ... 20; then 75% narrower)" in words
+    assert "and 10 more: --report lists them all" in words
+    order = [out.index(part) for part in ("Prediction of", "Coefficients", "What else acts", "To measure next", "held")]
+    assert order == sorted(order)
+
+
+# ---- Any data -------------------------------------------------------------------------------------------------------
+
+CASES: Mapping[str, Tables] = {
+    "no more than a fit needs": {"steady_yaw": [(0.3, 1.5), (0.6, 3.1)], "thrust_top": TOP[1:3]},
+    "one thrust": {"steady_heave": [(0.3, 0.163)]},
+    "drag at its bound": {"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]},
+    "backward too": {"thrust_rear": [*FORCES, (-0.5, -8.0)], "steady_heave": [*STEADY["heave"], (-0.5, -0.25)]},
+    "no warning but of Tau": {},
+}
+
+
+_SOME = ("backward too",)
+
+
+@pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in CASES])
+def test_any_data(case: str, tmp_path: Path) -> None:
+    text = text_of(report_page(folder_with(tmp_path, CASES[case])))
+    assert "nan" not in re.findall(r"[a-z]+", text)
+    assert "inf" not in re.findall(r"[a-z]+", text)
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_text_of_the_files_is_escaped(of_tables: Identification) -> None:
+    odd = replace(of_tables, vehicle=replace(of_tables.vehicle, name='<script>$1</script> & "Söhne"'))
+    root = html.fromstring(report_page(odd))
+    assert root.findtext(".//h1") == odd.vehicle.name
+    assert not list(root.iter("script"))
+
+
+# ---- The file, and the FMU -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_nothing_is_left_half_written(
+    of_tables: Identification, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "report.html"
+    path.write_text("before", encoding="utf-8")
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(OSError, match="No space left") as caught:
+        write_whole(report_output(of_tables, path))
+    assert caught.value.filename == str(path)
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+    assert path.read_text(encoding="utf-8") == "before"
+
+
+@pytest.mark.parametrize(("name", "reason"), [("no/report.html", "there is no folder"), (".", "is a folder")])
+def test_a_place_that_cannot_be_is_named(
+    name: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(TESTS), "--report", str(tmp_path / name), "-o", str(tmp_path / "v.toml")]) == 2
+    error = capsys.readouterr().err
+    assert reason in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir()), "no vehicle file without the report that it names"
+
+
+@pytest.fixture(scope="module")
+def with_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a vehicle file that names its report, in another folder."""
+    folder = tmp_path_factory.mktemp("identified")
+    (folder / "pages").mkdir()
+    options = ["-o", str(folder / "vehicle.toml"), "--report", str(folder / "pages" / "report.html")]
+    assert main(["identify", str(TESTS), *options]) == 0
+    return folder
+
+
+@pytest.fixture
+def identified(with_report: Path, tmp_path: Path) -> Path:
+    """A copy of it."""
+    shutil.copytree(with_report, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "vehicle.toml"
+
+
+@pytest.mark.parametrize(
+    "backend", [["--platform", "host"], pytest.param(["--backend", "pythonfmu"], marks=pytest.mark.long)]
+)
+def test_the_fmu_has_the_report(identified: Path, tmp_path: Path, backend: list[str]) -> None:
+    output = tmp_path / "out.fmu"
+    assert 'report = "pages/report.html"' in identified.read_text(encoding="utf-8")
+    assert main(["build", str(identified), *backend, "-o", str(output)]) == 0
+    with zipfile.ZipFile(output) as archive:
+        assert archive.read("documentation/identification.html") == (tmp_path / "pages/report.html").read_bytes()
+        index = html.fromstring(archive.read("documentation/index.html").decode())
+    assert "identification.html" in [a.get("href") for a in index.iter("a")]
+
+
+def test_a_report_that_is_gone(identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.rmtree(tmp_path / "pages")
+    assert main(["build", str(identified), "-o", str(tmp_path / "out.fmu")]) == 2
+    error = capsys.readouterr().err
+    assert "provenance.report = 'pages/report.html': there is no such file" in error
+    assert error.count("\n") == 1
+
+
+def test_a_tuned_vehicle_keeps_its_report_where_that_is_inside_its_folder(
+    with_report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    identified = Path(shutil.copytree(with_report, tmp_path / "found")) / "vehicle.toml"
+    tune = ["tune", str(identified), "--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "-o"]
+    assert main([*tune, str(tmp_path / "tuned.toml")]) == 0
+    provenance = load_vehicle(tmp_path / "tuned.toml").provenance
+    assert provenance
+    assert provenance.report
+    assert provenance.report.samefile(tmp_path / "found" / "pages" / "report.html")
+    (tmp_path / "other").mkdir()
+    capsys.readouterr()
+    assert main([*tune, str(tmp_path / "other" / "tuned.toml")]) == 2
+    error = capsys.readouterr().err
+    assert "provenance.report = 'pages/report.html': must be inside the folder of the new file" in error
+    assert error.count("\n") == 1
+    assert not list((tmp_path / "other").iterdir())
+
+
+def test_a_report_outside_the_folder_of_the_vehicle_file_is_refused_before_the_fit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "other").mkdir()
+    report = tmp_path / "report.html"
+    assert main(["identify", "no/tests", "-o", str(tmp_path / "other" / "v.toml"), "--report", str(report)]) == 2
+    assert capsys.readouterr().err.startswith(f"rov-fmu: {report}: must be inside the folder of ")
+
+
+def test_vehicle_without_a_report(of_tables: Identification) -> None:
+    assert of_tables.vehicle.provenance
+    assert of_tables.vehicle.provenance.report is None
+
+
+# ---- The paper's figures ---------------------------------------------------------------------------------------------
+
+
+def test_figures_of_the_paper_are_those_that_ship(tmp_path: Path) -> None:
+    assert main(["figures", str(tmp_path)]) == 0
+    made = tmp_path / "paper_figures.svg"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [made.name, "videoray.svg"]
+    text = made.read_text(encoding="utf-8")
+    shown = re.findall(r"<text[^>]*>([^<]*)</text>", text)
+    for figure in ("5", "6", "7", "8", "9", "11a", "11b"):
+        assert any(words.startswith(f"Figure {figure}: ") for words in shown), figure
+    shipped = (ROOT / "docs" / made.name).read_text(encoding="utf-8")
+    assert re.findall(r"<text[^>]*>([^<]*)</text>", shipped) == shown

@@ -1,0 +1,173 @@
+"""How often a predicted band holds what the true vehicle does: tests in a pool, identify, a vehicle file, a study.
+
+The truth and its tests come from the integrator in verification/references/pool.py, with what measuring adds: noise,
+some of it slow, time stamps with errors, scales and rulers with marks, and numbers read off a plot. The predicted
+manoeuvre is not one of the tests. The band from 2.5 to 97.5 % must contain the truth of 95 % of the vehicles at each
+time, and the page's band, from 5 to 95 %, that of 90 %. Neither may be wider than necessary.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from distributed import LocalCluster
+
+from rov_fmu.build import build
+from rov_fmu.identify.identify import identify
+from rov_fmu.model.layout import SURGE
+from rov_fmu.model.rov import Rov
+from rov_fmu.study import Results, study
+from rov_fmu.tank.tank_tests import load_tank_tests
+from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.writer import write_vehicle
+from tests.folders import FORCE, HEAD, MASS, SPEED, TAU, beside
+from tests.pool import run
+from tests.recordings import write_log
+from tests.vehicles import VIDEORAY
+from verification.references.pool import Array
+
+Random = np.random.Generator
+NOMINAL = {"a_t_rear": 42.9, "b_t_rear": 2.711, "a_d_u": 8.0, "b_d_u": 4.0}
+PLANS = (
+    ((0.0, 3.0), (0.3, 12.0), (0.0, 12.0), (0.6, 10.0), (0.0, 12.0)),
+    ((0.0, 3.0), (0.45, 12.0), (0.2, 12.0), (0.0, 10.0), (0.7, 8.0), (0.0, 12.0)),
+)
+OFF, TIMES = 8.0, (1.0, 2.0, 4.0, 8.0, 9.0, 10.0, 12.0, 16.0)
+PLAN = f"""fmu = "{{fmu}}"
+vary_from = "found.toml"
+stop_time = 16.0
+step = 0.5
+runs = 512
+seed = {{seed}}
+[inputs]
+u_l.steps = [[0.0, 0.5], [{OFF}, 0.0]]
+u_r.steps = [[0.0, 0.5], [{OFF}, 0.0]]
+[keep]
+outputs = ["u", "x"]
+at = {[*TIMES]}
+[figures]
+stopping_distance = "x[-1] - at(x, {OFF})"
+"""
+"""Ahead at half thrust, then none: a distance to stop."""
+LEVELS = {95: (0.025, 0.975), 90: (0.05, 0.95)}
+"""Quantiles by what lies between them, %."""
+
+
+def a_vehicle(random: Random) -> Rov:
+    """Of the VideoRay's form, its coefficients a quarter off, and any β that a body in water has."""
+    off = {name: value * np.exp(0.25 * random.standard_normal()) for name, value in NOMINAL.items()}
+    return VIDEORAY.replaced({**off, "alpha_u": 1.0, "beta_u": random.uniform(0.5, 1.0)})
+
+
+def pulls(folder: Path, k: Rov, random: Random) -> None:
+    """16 forces at a scale with marks of 0.1 N, 0.3 N off."""
+    c = np.tile(np.linspace(0.1, 0.8, 8), 2)
+    force = np.round(k["a_t_rear"] * c**2 + k["b_t_rear"] * c + 0.3 * random.standard_normal(16), 1)
+    rows = [f"{command:.2f},{newton}" for command, newton in zip(c.tolist(), force.tolist(), strict=True)]
+    (folder / "thrust_rear.csv").write_text("\n".join([FORCE, *rows]) + "\n", encoding="utf-8")
+
+
+def recordings(folder: Path, k: Rov, random: Random) -> None:
+    """Two logs of the distance, in cm, 10 a second: 2 cm off, which goes on for some samples; stamps 5 ms off."""
+    for number, plan in enumerate(PLANS):
+        found = run(k, SURGE, plan, 10.0).recorded(random, "distance", colour=0.5, jitter=0.005)
+        write_log(folder, str(number), replace(found, values=np.round(found.values, 2)))
+
+
+def points(folder: Path, k: Rov, random: Random) -> None:
+    """Six V_ss and Tau of steps from rest, read to the hundredth; no two starts are alike, by 3 % and 5 %."""
+    tables: dict[str, list[str]] = {SPEED: [], TAU: []}
+    for command in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7):
+        step = run(k, SURGE, ((command, 20.0),), 20.0)
+        u = step.velocity * (1.0 + 0.03 * random.standard_normal()) + 0.02 * random.standard_normal(len(step.time))
+        V_ss = u[-100:].mean()
+        smooth = np.convolve(u, np.ones(5) / 5.0, "same")
+        Tau = step.time[np.argmax(smooth >= (1.0 - np.exp(-1.0)) * V_ss)] * (1.0 + 0.05 * random.standard_normal())
+        tables[SPEED].append(f"{command},{V_ss:.2f}")
+        tables[TAU].append(f"{command},{Tau:.2f}")
+    for name, (header, rows) in zip(("steady_surge", "time_constant_surge"), tables.items(), strict=True):
+        (folder / f"{name}.csv").write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+
+
+KINDS: dict[str, Callable[[Path, Rov, Random], None]] = {"recordings": recordings, "points": points}
+
+
+def true_motion(k: Rov) -> dict[str, Array]:
+    """u and x at the times, and the stopping distance."""
+    motion = run(k, SURGE, ((0.5, OFF), (0.0, OFF + 0.2)), 10.0)
+    places = [round(10.0 * time) for time in TIMES]
+    u, x = motion.velocity[places], motion.position[places]
+    return {"u": u, "x": x, "stopping_distance": x[-1:] - x[TIMES.index(OFF)]}
+
+
+class Fmus:
+    """Those of the vehicles that were found; one for all that differ in nothing but what is drawn."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._made = folder, dict[object, Path]()
+
+    def of(self, vehicle: Vehicle) -> Path:
+        """The FMU to draw in."""
+        key = tuple((name, name in vehicle.intervals or value) for name, value in vehicle.rov.coefficients.items())
+        if key not in self._made:
+            path = self._folder / f"{len(self._made)}.fmu"
+            self._made[key] = build(vehicle, path, platforms=["host"]).path
+        return self._made[key]
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    folder = tmp_path_factory.mktemp("workers")
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", local_directory=folder
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.mark.parametrize(
+    ("kind", "vehicles", "width"),
+    [
+        pytest.param("points", 15, 0.25, marks=pytest.mark.long),
+        pytest.param("recordings", 4, 0.02, marks=pytest.mark.long),
+        pytest.param("points", 60, 0.25, marks=pytest.mark.weekly),
+        pytest.param("recordings", 15, 0.02, marks=pytest.mark.weekly),
+    ],
+)
+def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, address: str, tmp_path: Path) -> None:
+    """Of fewer than the 200 of which docs/studies.md tells, for their time; `width` is of the stopping distance."""
+    fmus, widths = Fmus(tmp_path), list[float]()
+    inside = {(level, of): list[float]() for level in LEVELS for of in ("u", "x", "stopping_distance")}
+    for seed in range(vehicles):
+        random, folder = np.random.default_rng([seed, len(kind)]), tmp_path / str(seed)
+        k = a_vehicle(random)
+        (folder / "tests").mkdir(parents=True)
+        (folder / "tests" / "rov.toml").write_text(f"{HEAD}[known]\n{MASS}", encoding="utf-8")
+        pulls(folder / "tests", k, random)
+        KINDS[kind](folder / "tests", k, random)
+        found = identify(load_tank_tests(folder / "tests")).vehicle
+        write_vehicle(found, folder / "found.toml")
+        (folder / "plan.toml").write_text(PLAN.format(fmu=beside(fmus.of(found), folder), seed=seed), encoding="utf-8")
+        results = study(folder / "plan.toml", folder / "results", scheduler=address)
+        assert results.warnings == ()
+        for of, true in true_motion(k).items():
+            for level, quantiles in LEVELS.items():
+                low, high = band(results, of, quantiles)
+                inside[level, of].append(float(np.mean((low <= true) & (true <= high))))
+        ends = results.runs.stopping_distance.quantile([*LEVELS[95], 0.5])
+        widths.append(float((ends[0.975] - ends[0.025]) / ends[0.5]))
+    shares = {key: 100.0 * float(np.mean(found)) for key, found in inside.items()}
+    told = ", ".join(f"{of} {level} %: {share:.1f} %" for (level, of), share in shares.items())
+    print(f"{kind}: {told}; width {np.median(widths):.3f}")
+    for (level, _), share in shares.items():
+        by_chance = 300.0 * np.sqrt(level / 100.0 * (1.0 - level / 100.0) / vehicles)  # three standard deviations
+        assert share >= level - 5.0 - by_chance, told
+    assert np.median(widths) < width, told
+
+
+def band(results: Results, of: str, quantiles: tuple[float, float]) -> Array:
+    """From which to which number, of an output at each time or of a figure."""
+    if of in results.figures:
+        return np.asarray(results.runs[of].quantile([*quantiles]), np.float64)[:, None]
+    return np.asarray(results.bands(of, quantiles), np.float64).T

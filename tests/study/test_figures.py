@@ -1,0 +1,166 @@
+"""Figures of responses whose figures are known."""
+
+import warnings
+from math import exp, log, nan, pi, sqrt
+
+import numpy as np
+import pytest
+
+from rov_fmu.study.plan.expression import ExpressionError
+from rov_fmu.study.plan.figure_units import figure_unit
+from rov_fmu.study.plan.figures import Figures, read_expression, unusable
+
+T = np.linspace(0.0, 40.0, 4001)
+FIRST = np.where(T > 2.0, 3.0 * (1.0 - np.exp(-np.maximum(T - 2.0, 0.0) / 1.5)), 0.0)
+"""From rest at 2 s to 3, by a time constant of 1.5 s."""
+ZETA, OMEGA = 0.4, 2.0
+_D = OMEGA * sqrt(1.0 - ZETA**2)
+SECOND = 1.0 - np.exp(-ZETA * OMEGA * T) * (np.cos(_D * T) + ZETA * OMEGA / _D * np.sin(_D * T))
+"""A step response that overshoots."""
+
+KNOWN = {
+    "V_ss(y)": 3.0,
+    "Tau(y, 2)": 1.5,
+    "Tau(y)": 3.5,
+    "overshoot(y)": 0.0,
+    "settling_time(y, 2)": 1.5 * log(20.0),
+    "settling_time(y, 2, 40, 0.02)": 1.5 * log(50.0),
+    "overshoot(z)": exp(-pi * ZETA / sqrt(1.0 - ZETA**2)),
+    "V_ss(-2*y)": -6.0,
+    "Tau(-2*y, 2)": 1.5,
+    "at(y, 3.5)": 3.0 * (1.0 - exp(-1.0)),
+    "at(y, 40)": 3.0,
+    "final(y)": 3.0,
+    "max(z) - m": exp(-pi * ZETA / sqrt(1.0 - ZETA**2)) + 1.0 - 6.5,
+    "out['der(y)'][-1]": 1.0,
+    "y[t >= 10][0]": 3.0 * (1.0 - exp(-8.0 / 1.5)),
+    "1 if m > 6 else 2": 1.0,
+    "z[-1] > 0.5": 1.0,
+    "t[where(y > 3*(1 - e**-1))[0][0]]": 3.5,
+    "y[where(y > 3*(1 - e**-1))[0][0] + 0]": 3.0 * (1.0 - exp(-1.0)),
+    "y[argmax(y > 0) - 1]": 0.0,
+    "sum(y[(t > 3.4) & ~(t >= 3.6)]) / len(y[341:360])": 3.0 * (1.0 - exp(-1.0)),
+    "len(y[10:20:2])": 5.0,
+    "mean(t[3 < y * 2 < 4]) > 2 and not m == 6": 1.0,
+    "where(m > 6, 4, 5)": 4.0,
+    "round(m / 4, 1) + 7 // 2 - 7 % 4": 1.6,
+    "2**-1 + (-8)**2": 64.5,
+    "sum(diff(t) * (y[1:] + y[:-1]) / 2)": 3.0 * (38.0 - 1.5),
+    "gradient(t**2, t)[1000]": 20.0,
+    "interp(3.5, t, y)": 3.0 * (1.0 - exp(-1.0)),
+    "percentile(y, 100) - clip(m, 0, 3)": 0.0,
+    "settling_time(y, start=2, band=0.02)": 1.5 * log(50.0),
+    "V_ss(y, end=40)": 3.0,
+}
+
+
+@pytest.mark.parametrize("expression", KNOWN)
+def test_a_figure_is_what_the_response_has_in_closed_form(expression: str) -> None:
+    run = {"y": FIRST, "z": SECOND, "m": 6.5, "der(y)": np.ones(len(T))}
+    (found,), reason = Figures({"f": expression}, T).of(run)
+    assert found == pytest.approx(KNOWN[expression], abs=1.1e-2)  # a step is 0.01 s
+    assert reason == ""
+
+
+def test_what_cannot_be_computed_is_nan_with_its_reason_and_the_others_are_there() -> None:
+    figures = Figures({"far": "y[9999]", "all": "2*y", "zero": "1/0", "late": "V_ss(y, 50, 60)", "m": "m"}, T)
+    found, reason = figures.of({"y": FIRST, "m": 6.5})
+    assert found == pytest.approx([nan, nan, nan, nan, 6.5], nan_ok=True)
+    far, others, zero, late = reason.split("; ")
+    assert far == "far: IndexError: index 9999 is out of bounds for axis 0 with size 4001"
+    assert others.startswith("all: must be one number, and not array(")
+    assert zero == "zero: ZeroDivisionError: division by zero"
+    assert late == "late: ValueError: there is no time 50 s in a run from 0 to 40 s"
+    found, reason = figures.of({"y": np.full(10_000, 2.0), "m": 1.0})
+    assert found[0] == 2.0, "the next run has nothing of this one's errors"
+
+
+@pytest.mark.parametrize("function", ["max", "min", "abs", "round", "sum", "mean", "sorted", "any", "all"])
+def test_a_function_is_numpys_and_hides_no_nan(function: str) -> None:
+    y = np.array([2.0, -7.0, nan, 1.0])
+    whole = Figures({"f": f"1.0 * sum({function}(y))"}, y).of({"y": y[[0, 1, 3]]})[0]
+    numpys = getattr(np, {"sorted": "sort"}.get(function, function))
+    assert whole == [float(np.sum(numpys(y[[0, 1, 3]])))]
+    if function not in ("any", "all"):
+        assert Figures({"f": f"sum({function}(y))"}, y).of({"y": y})[0] == pytest.approx([nan], nan_ok=True)
+
+
+def test_max_and_min_of_several_are_the_greatest_and_the_least() -> None:
+    texts = ("max(m, 2)", "min(m, 2, -1.5)", "max(2.0, y[1])", "max(max(y, 3))", "max(y, 0)")
+    found, reason = Figures(dict(zip("abcde", texts, strict=True)), T).of({"m": 6.5, "y": np.array([1.0, nan])})
+    assert found == pytest.approx([6.5, -1.5, nan, nan, nan], nan_ok=True)
+    assert "e: must be one number, and not array(" in reason
+
+
+@pytest.mark.parametrize("expression", ["Tau(0*y)", "overshoot(0*y)", "settling_time(0*y)", "log(-m)", "V_ss(0*y/0)"])
+def test_a_figure_that_is_nan_has_that_for_a_reason(expression: str) -> None:
+    found, reason = Figures({"f": expression}, T).of({"y": FIRST, "m": 6.5})
+    assert (repr(found), reason) == ("[nan]", "f: is NaN")
+
+
+def test_a_figure_that_is_infinite_is_missing_with_that_for_a_reason() -> None:
+    found, reason = Figures({"f": "max(y/0)", "g": "m"}, T).of({"y": FIRST[300:], "m": 6.5})
+    assert (repr(found), reason) == ("[nan, 6.5]", "f: is infinite")
+
+
+@pytest.mark.parametrize("function", ["V_ss", "Tau", "overshoot", "settling_time"])
+def test_a_time_that_no_run_has_is_told_before_the_first_one_by_one_rule(function: str) -> None:
+    told = "there is no time {} s in a run from 0 to 40 s"
+    late = {"(y, 0, 100)": "100", "(y, end=4*10.5)": "42", "(y, -1)": "-1", "(y, m, 41)": "41"}
+    for arguments, time in late.items():
+        assert unusable(f"1 + {function}{arguments}", ["y"], ["m"], T) == told.format(time)
+    assert unusable(f"{function}(y, 9, 8)", ["y"], ["m"], T) == "there is no communication point from 9 to 8"
+    for arguments in ("(y)", "(y, 0, 40)", "(y, m, m + 50)", "(y, end=39.995)"):
+        assert unusable(f"{function}{arguments}", ["y"], ["m"], T) == ""
+    assert Figures({"f": f"{function}(y, 0, m)"}, T).of({"y": FIRST, "m": 41.0})[1].endswith(told.format("41"))
+    assert unusable("at(y, 50)", ["y"], ["m"], T) == told.format("50")
+    assert unusable("at(y, m + 50)", ["y"], ["m"], T) == ""
+
+
+def test_a_plan_is_seen_without_warnings_of_numpy() -> None:
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert unusable("mean(y[t > 30])", ["y"], [], T) == ""
+    assert not told
+
+
+@pytest.mark.parametrize("long", ["m" + "+1" * 900, "-" * 1900 + "m", "sqrt(" * 99 + "m" + ")" * 99 + "+1"])
+def test_an_expression_that_is_nested_too_deeply_is_refused(long: str) -> None:
+    with pytest.raises(ExpressionError, match="is nested too deeply: at most 100 levels"):
+        read_expression(long)
+
+
+def test_an_expression_of_the_greatest_depth_is_computed() -> None:
+    assert Figures({"f": "m" + "+1" * 99}, T).of({"m": 6.5}) == ([105.5], "")
+
+
+def test_functions_and_variables_of_the_same_name_are_told_apart() -> None:
+    assert Figures({"f": "max(max) + t + pi + out['at']"}, T).of({"max": T, "t": 1.0, "pi": 2.0, "at": 3.0})[0] == [
+        46.0
+    ]
+
+
+UNITS = {"u": "m/s", "v": "m/s", "x": "m", "der(u)": "m/s2", "a": "1"}
+
+
+@pytest.mark.parametrize(
+    ("expression", "unit"),
+    [
+        ("x[-1] - at(x, 10)", "m"),
+        ("max(abs(u - v))", "m/s"),
+        ('final(out["der(u)"])', "m/s2"),
+        ("Tau(u, 0)", "s"),
+        ("overshoot(u)", "1"),
+        ("-u[0]", "m/s"),
+        ("t[u > 0.3][0]", "s"),
+        ("final(a)", "1"),
+        ("final(u) * 3.6", ""),
+        ("final(u) - final(x)", ""),
+        ("final(u) + 1.0", ""),
+        ("sqrt(final(x))", ""),
+        ("max([u for u in x])", ""),
+        ("1.0", ""),
+    ],
+)
+def test_the_unit_follows_from_the_variables_or_is_left_out(expression: str, unit: str) -> None:
+    assert figure_unit(expression, UNITS) == unit

@@ -1,0 +1,195 @@
+"""Studies of every kind of FMU, on workers of any number and place: the same rows."""
+
+import builtins
+import errno
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from distributed import LocalCluster
+
+from rov_fmu.cli import main
+from rov_fmu.study import Progress, Results, study
+from rov_fmu.study.results.store import Store
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.folders import beside
+
+RUNS = 24
+
+
+def _plan(folder: Path, source: str) -> Path:
+    path = folder / "plan.toml"
+    path.write_text(f"""{source}
+stop_time = 4.0
+step = 0.1
+runs = {RUNS}
+seed = 3
+[inputs]
+u_l.ramps = [[0.0, 0.0], [1.0, 0.5], [2.0, 0.5], [2.0, -0.2]]
+u_r = 0.3
+[set]
+w = 0.1
+[vary]
+alpha_u.normal = {{ mean = 1.1, sd = 0.1 }}
+m_rov.uniform = [6.0, 7.0]
+V_N.values = [0.0, 0.2]
+[keep]
+outputs = ["u", "psi"]
+at = [1.0, 4.0]
+[figures]
+final_x = "final(x)"
+drift = "mean(out['der(x)'])"
+""")
+    return path
+
+
+@pytest.fixture(scope="module")
+def native(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, scheduler: str) -> Results:
+    folder = tmp_path_factory.mktemp("native")
+    return study(_plan(folder, f'fmu = "{beside(videoray_fmu, folder)}"'), folder / "results", scheduler=scheduler)
+
+
+def _close(one: Results, other: Results) -> None:
+    pd.testing.assert_frame_equal(one.runs, other.runs, rtol=1e-11, atol=1e-13)
+    pd.testing.assert_frame_equal(one.trajectories(), other.trajectories(), rtol=1e-11, atol=1e-13)
+
+
+def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
+    """Run by run in Python, which the FMU is not made of."""
+    rov = load_vehicle(VIDEORAY).rov
+    for number, run in native.runs.iterrows():
+        own = type(rov)(rov.layout, {**rov.coefficients, "alpha_u": run.alpha_u, "m_rov": run.m_rov})
+        state = dict.fromkeys(rov.layout.state, 0.0) | {"w": 0.1}
+        inputs = dict.fromkeys(rov.layout.inputs, 0.0) | {"V_N": run.V_N, "u_r": 0.3}
+        for n in range(40):
+            left = 0.05 * (n + 0.5) if n < 10 else 0.5 if n < 20 else -0.2
+            state = own.step(inputs | {"u_l": left}, state, 0.1)
+        assert run.final_x == pytest.approx(state["x"], rel=1e-9), number
+        last = native.trajectories([int(str(number))]).iloc[-1]
+        assert (last.t, last.u, last.psi) == pytest.approx((4.0, state["u"], state["psi"]), rel=1e-9)
+
+
+def test_an_fmu_of_fmi_3_gives_the_same_rows(
+    tmp_path: Path, videoray3_fmu: Path, native: Results, scheduler: str
+) -> None:
+    _close(
+        study(_plan(tmp_path, f'fmu = "{beside(videoray3_fmu, tmp_path)}"'), tmp_path / "results", scheduler=scheduler),
+        native,
+    )
+
+
+@pytest.mark.long
+def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results) -> None:
+    assert main(["build", "--backend", "pythonfmu", "-o", str(tmp_path / "python.fmu")]) == 0
+    _close(study(_plan(tmp_path, 'fmu = "python.fmu"'), tmp_path / "results", workers=1), native)
+
+
+@pytest.mark.parametrize(
+    "workers", [pytest.param(2, marks=pytest.mark.long), *(pytest.param(n, marks=pytest.mark.weekly) for n in (1, 4))]
+)
+def test_any_number_of_workers_gives_the_same_rows(
+    tmp_path: Path, videoray_fmu: Path, native: Results, workers: int
+) -> None:
+    results = study(_plan(tmp_path, f'fmu = "{beside(videoray_fmu, tmp_path)}"'), tmp_path / "results", workers=workers)
+    pd.testing.assert_frame_equal(results.runs, native.runs, check_exact=True)
+    pd.testing.assert_frame_equal(results.trajectories(), native.trajectories(), check_exact=True)
+
+
+@pytest.mark.long
+def test_a_vehicle_is_built_for_its_study(tmp_path: Path, native: Results, scheduler: str) -> None:
+    results = study(_plan(tmp_path, 'vehicle = "videoray"'), tmp_path / "results", scheduler=scheduler)
+    _close(results, native)
+    assert (tmp_path / "results" / "videoray.fmu").is_file()
+
+
+def test_workers_of_a_scheduler_are_left_as_they_were(
+    tmp_path: Path, videoray_fmu: Path, native: Results, cluster: LocalCluster
+) -> None:
+    told: list[Progress] = []
+    plan, address = _plan(tmp_path, f'fmu = "{beside(videoray_fmu, tmp_path)}"'), cluster.scheduler_address
+    _close(study(plan, tmp_path / "results", scheduler=address, on_progress=told.append), native)
+    scheduler: Any = cluster.scheduler
+    folders = [Path(worker.local_directory) for worker in scheduler.workers.values()]
+    assert len(folders) == 2
+    assert not [path for folder in folders for path in folder.rglob("modelDescription.xml")]
+    assert [told[0].done, told[-1].done, told[-1].total] == [0, RUNS, RUNS]
+
+
+def test_the_tables_open_in_other_tools(native: Results) -> None:
+    """A folder of Parquet files is a data set."""
+    runs = pd.read_parquet(native.folder / "runs")
+    assert sorted(runs.columns) == ["V_N", "alpha_u", "drift", "final_x", "m_rov", "reason", "run", "status"]
+    assert len(runs) == RUNS
+    assert pd.read_parquet(native.folder / "trajectories").columns.tolist() == ["run", "t", "u", "psi"]
+
+
+def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
+    tmp_path: Path,
+    videoray_fmu: Path,
+    native: Results,
+    monkeypatch: pytest.MonkeyPatch,
+    scheduler: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    plan, folder = _plan(tmp_path, f'fmu = "{beside(videoray_fmu, tmp_path)}"'), tmp_path / "results"
+    fsync = os.fsync
+
+    def full(descriptor: int) -> None:
+        if list((folder / "runs").glob("part-*")):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        fsync(descriptor)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("rov_fmu.study.run.cluster._LEAST", 0.0)
+        patched.setattr("rov_fmu.study.run.cluster._TASK", 1e-4)
+        patched.setattr(os, "fsync", full)
+        assert main(["study", str(plan), "-o", str(folder), "--scheduler", scheduler]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"rov-fmu: {folder}")
+    assert told.endswith("cannot be written: No space left on device\n")
+    assert told.count("\n") == 1
+    assert 0 < len(Results(folder).runs) < RUNS
+    _close(study(plan, folder, scheduler=scheduler), native)
+
+
+def test_without_its_packages_the_command_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real: Callable[..., Any] = builtins.__import__
+
+    def missing(name: str, *rest: Any) -> Any:
+        if name.startswith("rov_fmu.study"):
+            raise ModuleNotFoundError("No module named 'dask'", name="dask")
+        return real(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    assert main(["study", "plan.toml", "-o", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == "rov-fmu: study: needs dask: pip install 'rov-fmu[study]'\n"
+
+
+def test_a_folder_takes_one_study_at_a_time(
+    tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan, folder = _plan(tmp_path, f'fmu = "{beside(videoray_fmu, tmp_path)}"'), tmp_path / "results"
+    with Store(folder).held():
+        assert main(["study", str(plan), "-o", str(folder), "--workers", "1"]) == 2
+        assert not list((folder / "runs").iterdir())
+    assert capsys.readouterr().err == f"rov-fmu: {folder}: another study is writing there\n"
+
+
+def test_an_fmu_that_cannot_be_loaded_is_a_line(
+    tmp_path: Path, videoray_fmu: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = tmp_path / "videoray.fmu"
+    with zipfile.ZipFile(videoray_fmu) as whole, zipfile.ZipFile(fmu, "w") as part:
+        part.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
+    plan = _plan(tmp_path, 'fmu = "videoray.fmu"')
+    assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("rov-fmu: videoray.fmu: cannot be run: Cannot find shared library binaries")
+    assert told.count("\n") == 1

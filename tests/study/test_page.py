@@ -1,0 +1,196 @@
+"""The page on a study says what the data frames say."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from lxml import html
+
+from rov_fmu.cli import main
+from rov_fmu.study import Results
+from tests.folders import beside
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path], scheduler: str) -> Path:
+    """A study of which some runs fail, and none is done, for `odd` is not there; its page, by the command."""
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "plan.toml").write_text(f"""fmu = "{beside(foreign(), folder)}"
+stop_time = 2.0
+step = 0.1
+runs = 600
+sampler = "saltelli"
+[vary]
+a.uniform = [0.0, 1.0]
+b.normal = {{ mean = 0.0, sd = 1.0 }}
+mode.values = [0, 0, 0, 0, 0, 0, 0, 1]
+[keep]
+outputs = ["y"]
+[figures]
+end = "y[-1]"
+odd = "y[99]"
+offset = "2.0 + 0*b"
+""")
+    assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 1
+    return folder / "results"
+
+
+def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> None:
+    results = Results(done)
+    text = (done / "study.html").read_text(encoding="utf-8")
+    page = html.fromstring(text)
+    rows = {row[0].text_content(): [cell.text_content() for cell in row] for row in page.iter("tr")}
+    ended = results.runs[results.runs.status != "failed"]
+    assert f"600 of 600 runs, {len(results.failed)} failed, {len(ended)} incomplete." in page.text_content()
+    assert float(rows["end"][3].replace("−", "-")) == pytest.approx(ended.end.median(), rel=1e-3)
+    assert rows["end"][-1] == str(len(ended))
+    assert rows["odd"][-1] == "0"
+    index = results.sensitivity("end").loc["b"]
+    indices = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='b']/td")
+    assert float(indices[1].text_content().replace("−", "-")) == pytest.approx(index.S1, abs=1e-3)
+    assert "Too few runs have odd" in page.text_content()
+    failed = next(row for row in page.iter("tr") if "the pump is blocked" in row.text_content())
+    assert failed[0].text_content() == str(len(results.failed))
+    labels = re.findall(r'aria-label="([^"]*)"', text)
+    assert labels == ["Distribution of end", "Trajectories of y"]
+    assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
+    assert "<script" not in text
+    assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
+
+
+def test_the_page_is_the_same_for_the_same_results(done: Path) -> None:
+    from rov_fmu.study.results.page import study_page
+
+    assert study_page(Results(done)) == (done / "study.html").read_text(encoding="utf-8")
+
+
+def test_a_grid_shows_figures_over_what_varies_with_their_units(
+    videoray_fmu: Path, tmp_path: Path, scheduler: str
+) -> None:
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(videoray_fmu, tmp_path)}"
+stop_time = 2.0
+step = 0.1
+sampler = "grid"
+inputs.u_r = 0.3
+[vary]
+u_l.values = [0.3, 0.2]
+m_rov.range = {{ from = 6.0, to = 8.0, count = 5 }}
+[keep]
+outputs = ["u"]
+[figures]
+V = "final(u) - u[0]"
+way = "max(x)"
+sway = "1.0 * t[0]"
+T = "Tau(u)"
+""")
+    arguments = [str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results"), "--scheduler", scheduler]
+    assert main(["study", *arguments]) == 0
+    text = (tmp_path / "results" / "study.html").read_text(encoding="utf-8")
+    page, runs = html.fromstring(text), Results(tmp_path / "results").runs
+    labels = re.findall(r'aria-label="([^"]*)"', text)
+    assert labels == [*(f"{name} over m_rov and u_l" for name in ("V", "way", "T")), "Trajectories of u"]
+    head, *rows = [
+        [cell.text_content() for cell in row] for row in page.xpath("//h2[@id='figures']/following::table[1]//tr")
+    ]
+    assert head == ["u_l", "m_rov (kg)", "V (m/s)", "way (m)", "sway", "T (s)"]
+    shown = [[float(cell.replace("−", "-")) for cell in row] for row in rows]
+    assert shown == [pytest.approx(row, rel=1e-5) for row in runs[["u_l", "m_rov", "V", "way", "sway", "T"]].to_numpy()]
+    assert "Surge velocity" in page.xpath("string(//h2[@id='trajectories']/following::figure[1])")
+
+
+def test_indices_of_few_blocks_are_said_to_tell_nothing(
+    foreign: Callable[..., Path], tmp_path: Path, scheduler: str
+) -> None:
+    """Two terms of the same variance: S1 is 1/2 each, which 3 blocks do not show and 500 do."""
+    pages = {}
+    for runs in (12, 2000):
+        (tmp_path / f"{runs}.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
+stop_time = 1.0
+step = 0.5
+runs = {runs}
+sampler = "saltelli"
+[vary]
+a.uniform = [0.0, 1.0]
+u.uniform = [0.0, 1.0]
+[figures]
+sum = "a + u"
+""")
+        arguments = [str(tmp_path / f"{runs}.toml"), "-o", str(tmp_path / f"{runs}"), "--scheduler", scheduler]
+        assert main(["study", *arguments]) == 0
+        pages[runs] = html.parse(tmp_path / f"{runs}" / "study.html")
+    said = "An index whose interval is as wide as itself (grey) tells nothing"
+    cells = "//h2[@id='sensitivity']/following::table[1]//td[@class='number same' or @class='number first same']"
+    assert said in pages[12].xpath("string(//body)")
+    assert pages[12].xpath(cells)
+    assert "So few blocks tell nothing" in pages[12].xpath("string(//body)")
+    assert "So few blocks tell nothing" not in pages[2000].xpath("string(//body)")
+    assert said not in pages[2000].xpath("string(//body)")
+    assert not pages[2000].xpath(cells)
+    assert "from 500 blocks" in pages[2000].xpath("string(//body)")
+
+
+def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_done(
+    done: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failed = len(Results(done).failed)
+    assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
+    told = capsys.readouterr()
+    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in told.out.replace("\n", " ")
+    assert told.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
+
+
+def test_another_page_of_this_name_is_not_overwritten(
+    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "study.html"
+    own.write_text("<p>My studies</p>")
+    assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
+    told = "is no page of this tool and would be overwritten: choose another folder"
+    assert capsys.readouterr().err == f"rov-fmu: {own}: {told}\n"
+    assert [*tmp_path.iterdir()] == [own]
+    assert own.read_text() == "<p>My studies</p>"
+
+
+def test_an_index_of_nothing_has_no_sign(foreign: Callable[..., Path], tmp_path: Path, scheduler: str) -> None:
+    """What brings a millionth of the variance has an index of 0.000, which chance makes negative as often as not."""
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
+stop_time = 1.0
+step = 0.5
+runs = 200
+sampler = "saltelli"
+[vary]
+a.uniform = [0.0, 1.0]
+u.uniform = [0.0, 1.0]
+[figures]
+up = "a + u / 1000"
+down = "a - u / 1000"
+""")
+    results = tmp_path / "results"
+    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(results), "--scheduler", scheduler]) == 0
+    small = [Results(results).sensitivity(name).loc["u"].S1 for name in ("up", "down")]
+    assert -0.0005 < min(small) < -1e-5
+    rows = html.parse(results / "study.html").xpath("//h2[@id='sensitivity']/following::tr[td/code='u']/td[2]")
+    assert [row.text_content() for row in rows[:2]] == ["0.000", "0.000"]
+
+
+def test_reasons_that_are_not_shown_are_counted(
+    foreign: Callable[..., Path], tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A reason for each of seven values, of which the command shows five and the page all."""
+    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
+stop_time = 1.0
+step = 0.5
+sampler = "grid"
+vary.a.range = {{ from = 3.0, to = 9.0, count = 7 }}
+vary.u.values = [0.0, 1.0]
+figures.odd = "t[a]"
+figures.end = "t[-1]"
+""")
+    results = tmp_path / "results"
+    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(results), "--scheduler", scheduler]) == 1
+    said = [line.strip() for line in capsys.readouterr().out.splitlines() if " runs: " in line]
+    assert len(said) == 6
+    assert said[-1] == "4 runs: other reasons (2), which are on the page"
+    page = (results / "study.html").read_text(encoding="utf-8")
+    assert all(f"index {n} is out of bounds" in page for n in range(3, 10))

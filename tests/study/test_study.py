@@ -1,0 +1,452 @@
+"""Studies done: the rows are those of the closed form, whoever does them, whatever happens to whom."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import psutil
+import pyarrow.parquet as pq
+import pytest
+from distributed import LocalCluster
+
+from rov_fmu.cli import main
+from rov_fmu.io.messages import FileError, StudyError
+from rov_fmu.study import Progress, Results, study
+from rov_fmu.study.plan.model import read_model
+from rov_fmu.study.plan.plan import load_plan
+from rov_fmu.study.plan.prepared import prepare
+from rov_fmu.study.results.store import Store
+from rov_fmu.study.run.apart import Apart
+from rov_fmu.study.run.run_study import run_study
+from rov_fmu.study.run.simulator import LoadError, RunError, Simulator
+from tests.commands import start
+from tests.folders import beside
+
+Foreign = Callable[..., Path]
+posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
+
+
+def _plan(
+    folder: Path, fmu: Path, runs: int = 40, more: str = "", vary: str = "", step: float = 0.1, limit: float = 60.0
+) -> Path:
+    path = folder / "plan.toml"
+    path.write_text(f"""fmu = "{beside(fmu, folder)}"
+time_limit = {limit}
+stop_time = 2.0
+step = {step}
+runs = {runs}
+seed = 5
+[inputs]
+u.steps = [[1.0, 0.5]]
+[vary]
+a.uniform = [0.0, 1.0]
+b.uniform = [0.0, 1.0]
+c.uniform = [0.0, 1.0]
+{vary}
+[keep]
+outputs = ["y"]
+every = 0.5
+[figures]
+end = "y[-1]"
+sooner = "at(y, 1)"
+{more}
+""")
+    return path
+
+
+def _expected(runs: pd.DataFrame, t: Any) -> Any:
+    """y of the foreign FMU, whose input is 0 before 1 s and 0.5 after."""
+    to = runs.a + 2.0 * runs.b + 3.0 * runs.c
+    return to * (1.0 - np.exp(-t / 0.5)) + 0.5 * (1.0 - np.exp(-max(t - 1.0, 0.0) / 0.5))
+
+
+def _same(one: Results, other: Results) -> None:
+    pd.testing.assert_frame_equal(one.runs, other.runs, check_exact=True)
+    pd.testing.assert_frame_equal(one.trajectories(), other.trajectories(), check_exact=True)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
+    """By one worker."""
+    folder = tmp_path_factory.mktemp("whole")
+    return study(_plan(folder, foreign()), folder / "results", workers=1)
+
+
+def test_the_rows_are_those_of_the_closed_form(whole: Results) -> None:
+    runs = whole.runs
+    assert runs.index.tolist() == [*range(40)]
+    assert {*runs.status} == {"done"}
+    assert runs.reason.isna().all()
+    assert runs.end.to_numpy() == pytest.approx(_expected(runs, 2.0).to_numpy(), rel=1e-12)
+    assert runs.sooner.to_numpy() == pytest.approx(_expected(runs, 1.0).to_numpy(), rel=1e-12)
+    long = whole.trajectories()
+    assert long.t.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0] * 40
+    assert long.run.tolist() == np.repeat(np.arange(40), 5).tolist()
+    for t, part in long.groupby("t"):
+        assert part.y.to_numpy() == pytest.approx(_expected(runs, t).to_numpy(), rel=1e-12)
+    assert whole.trajectories([3, 7]).run.unique().tolist() == [3, 7]
+
+
+def test_bands_are_quantiles_over_the_runs(whole: Results) -> None:
+    bands = whole.bands("y", (0.0, 0.5, 1.0))
+    assert bands.index.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    for t in bands.index:
+        y = _expected(whole.runs, t)
+        assert bands.loc[t].tolist() == pytest.approx([y.min(), y.median(), y.max()], rel=1e-12, abs=1e-15)
+
+
+def test_a_ramp_is_exact_to_second_order_of_the_step(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
+    """y of an input that is the time, in closed form: t - Tau (1 - exp(-t / Tau)); by the start of each step half a
+    step late."""
+    errors = []
+    for step in (0.1, 0.05):
+        plan = _plan(tmp_path, foreign(), runs=1, step=step)
+        plan.write_text(plan.read_text().replace("steps = [[1.0, 0.5]]", "ramps = [[0.0, 0.0], [2.0, 2.0]]"))
+        runs = study(plan, tmp_path / f"results{step}", scheduler=scheduler).runs
+        to = runs.a + 2.0 * runs.b + 3.0 * runs.c
+        known = to * (1.0 - np.exp(-4.0)) + 2.0 - 0.5 * (1.0 - np.exp(-4.0))
+        errors.append(float((runs.end - known).iloc[0]))
+    assert abs(errors[0]) < 2e-3
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.01)
+
+
+@pytest.mark.parametrize("reset", [1, 2])
+def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
+    reset: int, foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str
+) -> None:
+    """y itself is left as it was by a reset that does nothing."""
+    _same(study(_plan(tmp_path, foreign(reset)), tmp_path / "results", scheduler=scheduler), whole)
+
+
+def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
+    foreign: Foreign, tmp_path: Path, scheduler: str
+) -> None:
+    plan = _plan(tmp_path, foreign(), runs=30, vary="mode.values = [0, 1]", more='bad = "1/(mode - mode)"')
+    results = study(plan, tmp_path / "results", scheduler=scheduler)
+    failed, others = results.runs[results.runs["mode"] == 1], results.runs[results.runs["mode"] == 0]
+    assert 0 < len(failed) < 30
+    assert {*failed.status} == {"failed"}
+    assert {*failed.reason} == {"the step at 1 s: error; the FMU: the pump is blocked"}
+    assert failed[["end", "sooner"]].isna().all(axis=None)
+    table = pq.read_table(tmp_path / "results" / "runs")
+    assert [table[name].null_count for name in ("end", "bad")] == [len(failed), 30]
+    assert {*others.status} == {"incomplete"}
+    assert {*others.reason} == {"bad: ZeroDivisionError: division by zero"}
+    assert others.end.to_numpy() == pytest.approx(_expected(others, 2.0).to_numpy(), rel=1e-12)
+    assert {*results.trajectories().run} == {*others.index}
+
+
+LIMIT = 4.0
+"""Seconds for runs that take thousandths, for a busy machine may hold a process for long."""
+UNKIND = {2: "the FMU ended its process: SIGABRT", 3: "the FMU ended its process: SIGSEGV"} | {
+    4: f"the FMU did not return within time_limit = {LIMIT:g} s"
+}
+
+
+def _unkind(plan: Path, folder: Path, **where: Any) -> None:
+    """One run of sixteen is of each unkind mode, on the average."""
+    runs = study(plan, folder, **where).runs
+    assert runs.index.tolist() == [*range(64)]
+    for mode, reason in UNKIND.items():
+        of_mode = runs[runs["mode"] == mode]
+        assert len(of_mode) >= 2
+        assert {*of_mode.status} == {"failed"}
+        assert {*of_mode.reason} == {reason}
+    others = runs[runs["mode"] == 0]
+    assert {*others.status} == {"done"}
+    assert others.end.to_numpy() == pytest.approx(_expected(others, 2.0).to_numpy(), rel=1e-12)
+
+
+def _unkind_plan(folder: Path, fmu: Path) -> Path:
+    return _plan(folder, fmu, runs=64, vary=f"mode.values = {[0] * 13 + [*UNKIND]}", limit=LIMIT)
+
+
+@posix
+@pytest.mark.long
+@pytest.mark.parametrize("reset", [0, 2])
+def test_a_run_that_ends_its_process_or_does_not_return_is_a_row(reset: int, foreign: Foreign, tmp_path: Path) -> None:
+    _unkind(_unkind_plan(tmp_path, foreign(reset)), tmp_path / "results", workers=2)
+
+
+@posix
+@pytest.mark.long
+def test_workers_that_nobody_starts_again_outlive_an_fmu(foreign: Foreign, tmp_path: Path) -> None:
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0") as cluster:
+        _unkind(_unkind_plan(tmp_path, foreign()), tmp_path / "results", scheduler=cluster.scheduler_address)
+
+
+@posix
+def test_a_process_apart_is_a_simulator(foreign: Foreign, tmp_path: Path) -> None:
+    """And tells what has become of it, and goes on with the next run."""
+    path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 3, 4]", limit=LIMIT)
+    model = read_model(foreign())
+    job = prepare(load_plan(path), path, model).job
+    model.unpack(tmp_path / "fmu")
+    apart = Apart(str(tmp_path / "fmu"), model, job.manoeuvre, job.time_limit)
+    y = []
+    for mode in (0, 2, 3, 4, 1, 0):
+        try:
+            y.append(apart.run([1.0, 0.0, 0.0, mode])["y"][10])
+            apart.reset()
+        except RunError as error:
+            y.append(str(error))
+    apart.free()
+    end = pytest.approx(1.0 - np.exp(-2.0), rel=1e-12)
+    assert y == [end, *UNKIND.values(), "the step at 1 s: error; the FMU: the pump is blocked", end]
+
+
+def test_what_loads_an_fmu_or_cannot_leaves_the_process_where_it_was(foreign: Foreign, tmp_path: Path) -> None:
+    """Many threads at once."""
+    path, model, here = _plan(tmp_path, foreign()), read_model(foreign()), Path.cwd()
+    job = prepare(load_plan(path), path, model).job
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    description, _ = (model.unpack(folder) for folder in (whole, broken))
+    (library,) = broken.glob("binaries/*/foreign.*")
+    library.write_text("no library")
+
+    def load(folder: Path) -> None:
+        Simulator(str(folder), description, model, job.manoeuvre).free()
+
+    try:
+        with ThreadPoolExecutor(8) as threads:
+            [*threads.map(load, [whole] * 200)]
+        assert Path.cwd() == here
+        with pytest.raises(LoadError, match="Failed to load"):
+            load(broken)
+        assert Path.cwd() == here
+    finally:
+        os.chdir(here)
+
+
+def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
+    foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = tmp_path / "results"
+    study(_plan(tmp_path, foreign(), runs=16), results, scheduler=scheduler)
+    before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
+    _same(study(_plan(tmp_path, foreign(), runs=40, limit=99.0), results, scheduler=scheduler), whole)
+    assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
+    capsys.readouterr()
+    others = {
+        "holds runs of another plan (figures changed)": {"fmu": foreign(), "more": 'other = "y[0]"'},
+        "holds runs of another FMU": {"fmu": foreign(1)},
+        "holds runs up to number 39, and the plan has 12 alone": {"fmu": foreign(), "runs": 12},
+    }
+    for told, changed in others.items():
+        assert main(["study", str(_plan(tmp_path, **changed)), "-o", str(results)]) == 2  # type: ignore[arg-type]
+        line = capsys.readouterr().err
+        assert line.startswith(f"rov-fmu: {results}: {told}")
+        assert line.count("\n") == 1
+    _same(Results(results), whole)
+
+
+def test_the_fmu_of_a_changed_vehicle_is_told_as_that(tmp_path: Path) -> None:
+    store = Store(tmp_path / "results")
+    with store.held():
+        store.belongs_to({}, "one", "rov.toml", 1, {})
+        store.write(0, 1, b"", None)
+        with pytest.raises(FileError, match=r"another FMU, for the vehicle rov\.toml has changed, or rov-fmu, which"):
+            store.belongs_to({}, "another", "rov.toml", 1, {})
+
+
+def test_results_that_are_not_there_are_told(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
+    with pytest.raises(FileError, match="nowhere: there is no such folder"):
+        Results(tmp_path / "nowhere")
+    plan = _plan(tmp_path, foreign(), runs=2)
+    plan.write_text(plan.read_text().replace('[keep]\noutputs = ["y"]\nevery = 0.5\n', ""))
+    results = study(plan, tmp_path / "results", scheduler=scheduler)
+    with pytest.raises(FileError, match=r"no trajectory of 'y' is kept, nor any other: the plan has no \[keep\]"):
+        results.bands("y")
+    with pytest.raises(FileError, match="there is no figure 'y', only end, sooner"):
+        results.sensitivity("y")
+
+
+def test_sobol_indices_of_a_linear_fmu_are_those_of_the_closed_form(
+    foreign: Foreign, tmp_path: Path, scheduler: str
+) -> None:
+    """Of a sum of uniform terms with factors 1, 2, 3: shares of the variance 1/14, 4/14, 9/14, and no interaction."""
+    plan = _plan(tmp_path, foreign(), runs=5 * 1024, more='same = "0*y[0]"')
+    plan.write_text(plan.read_text().replace("seed = 5", 'sampler = "saltelli"'))
+    results = study(plan, tmp_path / "results", scheduler=scheduler)
+    with pytest.raises(FileError, match="same is the same in all runs"):
+        results.sensitivity("same")
+    found = results.sensitivity("end")
+    shares = [1 / 14, 4 / 14, 9 / 14]
+    assert found.index.tolist() == ["a", "b", "c"]
+    assert found.S1.tolist() == pytest.approx(shares, abs=0.01)
+    assert found.ST.tolist() == pytest.approx(shares, abs=0.01)
+    assert (abs(found.S1 - shares) <= found.S1_95).all()
+    assert (found.S1_95 < 0.1).all()
+
+
+def test_the_time_of_a_study_begins_when_the_workers_are_there(
+    foreign: Foreign, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter([0.0, 100.0, 107.0])  # at the beginning, with the workers, at the end
+    monkeypatch.setattr("rov_fmu.study.run.cluster.perf_counter", lambda: next(clock))
+    spent, _ = run_study(_plan(tmp_path, foreign(), runs=4), tmp_path / "results", None, scheduler, lambda _: None)
+    assert (spent.started, spent.elapsed) == (100.0, 7.0)
+
+
+# ---- Interrupted and killed ------------------------------------------------------------------------------------------
+
+
+def test_a_study_that_is_interrupted_half_way_goes_on_to_the_same_rows(
+    foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rov_fmu.study.run.cluster._LEAST", 0.0)
+    monkeypatch.setattr("rov_fmu.study.run.cluster._TASK", 1e-4)
+    plan, results = _plan(tmp_path, foreign()), tmp_path / "results"
+
+    def interrupt(now: Progress) -> None:
+        if now.done > 10:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study(plan, results, scheduler=scheduler, on_progress=interrupt)
+    assert 10 < len(Results(results).runs) < 40
+    _same(study(plan, results, scheduler=scheduler), whole)
+
+
+SLOW: dict[str, Any] = {"runs": 1500, "more": "[set]\nmode = 5"}
+"""Fifteen seconds of two workers, nearly all of them waiting: most are left when the first two parts are there."""
+
+
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
+    """Undisturbed."""
+    folder = tmp_path_factory.mktemp("slow")
+    return study(_plan(folder, foreign(), **SLOW), folder / "results", workers=4)
+
+
+def _parts(results: Path) -> list[Path]:
+    return [*(results / "runs").glob("part-*.parquet")] if results.is_dir() else []
+
+
+def _begun(plan: Path, results: Path) -> "subprocess.Popen[str]":
+    """A study under way, of which some is done."""
+    process = start(
+        ["study", str(plan), "-o", str(results), "--workers", "2"],
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
+        # a shell starts what it runs in the background with interrupts ignored, and that is inherited
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    deadline = time.monotonic() + 300.0
+    while len(_parts(results)) < 2:
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.01)
+    return process
+
+
+def _workers(pid: int) -> list[psutil.Process]:
+    return [child for child in psutil.Process(pid).children() if any("spawn_main" in word for word in child.cmdline())]
+
+
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        pytest.param("script.py", "the workers do not start; ", marks=pytest.mark.long),
+        ("-", "workers cannot be started of <stdin>, which is no file; "),
+    ],
+)
+def test_a_script_that_workers_cannot_import_is_told_of_its_guard(
+    script: str, told: str, foreign: Foreign, tmp_path: Path
+) -> None:
+    """And no worker says a word."""
+    _plan(tmp_path, foreign())
+    text = "from rov_fmu.study import study\nstudy('plan.toml', 'results', workers=2)\n"
+    (tmp_path / "script.py").write_text(text)
+    begin = [sys.executable, script]
+    ran = subprocess.run(begin, check=False, input=text, capture_output=True, text=True, cwd=tmp_path)
+    *_, last = ran.stderr.splitlines()
+    assert last.startswith(f'rov_fmu.io.messages.StudyError: {told}a script calls study under `if __name__ == "__m')
+    assert ran.stderr.count("Traceback") == 1
+    assert not (tmp_path / "results").exists()
+
+
+@posix
+@pytest.mark.long
+def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
+    process = _begun(plan, results)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
+    error = process.communicate(timeout=300)[1]
+    assert process.returncode == 130, error
+    assert error == "rov-fmu: interrupted, no file is half-written; the same command continues the study\n"
+    done = len(Results(results).runs)
+    assert 0 < done < SLOW["runs"]
+    kept = {path: path.read_bytes() for path in _parts(results)}
+    assert sum(pq.read_metadata(path).num_rows for path in kept) == done
+    _same(study(plan, results, workers=1), slow)
+    assert all(path.read_bytes() == content for path, content in kept.items())
+
+
+@posix
+@pytest.mark.long
+def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
+    process = _begun(plan, results)
+    victims = _workers(process.pid)
+    assert len(victims) == 2
+    for victim in victims:
+        victim.kill()
+    assert process.communicate(timeout=600)[1] == ""
+    assert process.returncode == 0
+    _same(Results(results), slow)
+
+
+@posix
+@pytest.mark.long
+def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
+    process = _begun(plan, results)
+    process.kill()
+    process.communicate(timeout=300)
+    assert 0 < len(Results(results).runs) < SLOW["runs"]
+    (results / "trajectories" / "part-000000000-000009999.parquet").write_bytes(b"half of it, without its runs")
+    (results / "runs" / ".part-000000000-000009999.parquet.abc.part").write_bytes(b"a draft")
+    _same(study(plan, results, workers=2), slow)
+    assert not [*results.glob("*/.*")]
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "host", ""])
+def test_a_scheduler_that_is_not_there_is_a_line(
+    address: str, foreign: Foreign, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 1.0)
+    assert (
+        main(["study", str(_plan(tmp_path, foreign())), "-o", str(tmp_path / "results"), "--scheduler", address]) == 2
+    )
+    assert capsys.readouterr().err == f"rov-fmu: --scheduler {address}: no scheduler of Dask answers there\n"
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("wait", [0.0, 5.0])
+def test_a_scheduler_that_goes_takes_nothing_with_it(
+    wait: float, foreign: Foreign, tmp_path: Path, slow: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Noticed at once, or when the client has given it up."""
+    monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 4.0)
+    plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
+    with LocalCluster(n_workers=1, dashboard_address="127.0.0.1:0", local_directory=tmp_path / "cluster") as cluster:
+
+        def close(now: Progress) -> None:
+            if now.done:
+                cluster.close()
+                time.sleep(wait)
+
+        with pytest.raises(StudyError, match="the scheduler is gone; what is done is kept"):
+            study(plan, results, scheduler=cluster.scheduler_address, on_progress=close)
+    assert 0 < len(Results(results).runs) < SLOW["runs"]
+    _same(study(plan, results, workers=2), slow)

@@ -1,0 +1,171 @@
+"""The architecture page's rules: imports run one way, inside functions too, and no folder is too large to overlook."""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+from tests.commands import ROOT
+
+# From the top down. A part imports from itself and from parts below it; io/ and model/ stand side by side.
+PARTS = (
+    "cli",
+    "study",
+    "interface",
+    "build",
+    "report",
+    "fmu",
+    "identify",
+    "tank",
+    "engine",
+    "vehicle",
+    "process",
+    "io",
+)
+REFERENCES = "verification/references"
+MAY_IMPORT = {
+    "rov_fmu": {"rov_fmu"},
+    REFERENCES: {REFERENCES, "rov_fmu"},
+    "examples": {"examples", REFERENCES, "rov_fmu"},
+    "verification/benchmarks": {"verification/benchmarks", REFERENCES, "rov_fmu"},
+    "verification/fuzzing": {"verification/fuzzing", REFERENCES, "rov_fmu"},
+    "verification/interoperability": {"verification/interoperability", REFERENCES, "examples", "rov_fmu"},
+    "tests/verification": {"tests", "tests/verification", "verification", "examples", "rov_fmu"},
+    "tests/docs": {"tests", "tests/docs", "docs", "examples", "rov_fmu", REFERENCES},
+    "tests": {"tests", REFERENCES, "rov_fmu"},
+}
+"""Which folders of this repository each folder may import. The innermost folder counts."""
+
+LARGEST_FOLDER = 12
+LARGER_FOLDERS = {"tests": 13, "tests/fmu": 15, "tests/fmu/calls": 13, "tests/identify": 18}
+"""The folders that have more than a dozen modules, without their __init__.py."""
+
+
+def _module(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+FILES = {
+    _module(path): path
+    for folder in ("rov_fmu", "verification", "examples", "tests")
+    for path in ROOT.glob(f"{folder}/**/*.py")
+    if not any(part.startswith(".") for part in path.relative_to(ROOT).parts)  # installed importers
+}
+
+
+def _names(module: str) -> Iterator[str]:
+    """The full name of everything that a module imports, anywhere in it."""
+    for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            outer = (*module.split("."), *(["__init__"] if FILES[module].name == "__init__.py" else []))
+            base = ".".join([*(outer[: -node.level] if node.level else ()), *filter(None, [node.module])])
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def _imports(module: str) -> set[str]:
+    """The modules of this repository that a module imports. An import from a package counts as the package."""
+    found = set()
+    for name in _names(module):
+        while name and name not in FILES:
+            name = name.rpartition(".")[0]  # noqa: PLW2901 (the last part is not a module)
+        found.add(name)
+    return found - {"", module}
+
+
+@pytest.fixture(scope="module")
+def imports() -> dict[str, set[str]]:
+    """The imports of every module."""
+    return {module: _imports(module) for module in FILES}
+
+
+def _part(module: str) -> str:
+    return [*module.split("."), ""][1]
+
+
+def test_the_imports_are_seen(imports: dict[str, set[str]]) -> None:
+    assert imports["rov_fmu.build"] >= {"rov_fmu.fmu.archive", "rov_fmu.report.page.fmu_page"}
+    assert "rov_fmu.report.report" in imports["rov_fmu.cli"], "inside a function"
+    assert "rov_fmu.model.rov" in imports["rov_fmu.fmu.slave"], "from a package"
+    assert {_part(module) for module in FILES if module.startswith("rov_fmu.")} == {*PARTS, "model", "__main__"}
+
+
+def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
+    assert imports["rov_fmu"] == {"rov_fmu.interface.model"}, "which rov_fmu.load imports when it is called"
+    try:
+        TopologicalSorter(imports | {"rov_fmu": set()}).prepare()
+    except CycleError as circle:
+        pytest.fail(" < ".join(circle.args[1]))
+
+
+def test_the_package_imports_downwards(imports: dict[str, set[str]]) -> None:
+    below = {part: {part, *PARTS[n:], "model", ""} for n, part in enumerate(PARTS)}
+    below |= {"model": {"model", ""}, "__main__": {"cli", "process"}, "": {"interface"}}
+    upward = {
+        f"{module} imports {name}"
+        for module in FILES
+        if module.split(".")[0] == "rov_fmu"
+        for name in imports[module]
+        if name.startswith("rov_fmu") and _part(name) not in below[_part(module)]
+    }
+    assert not upward
+
+
+def test_the_page_shows_the_imports_that_exist(imports: dict[str, set[str]]) -> None:
+    real: dict[str, set[str]] = {part: set() for part in (*PARTS, "model")}
+    for module in FILES:
+        if module.startswith("rov_fmu.") and _part(module) in real:
+            real[_part(module)] |= {_part(name) for name in imports[module] if name.startswith("rov_fmu.")}
+    order = (*PARTS, "model")
+    rows = [
+        f"| `{part}` | {', '.join(f'`{name}`' for name in order if name in real[part] - {part}) or '–'} |"
+        for part in order
+    ]
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^\| `\w+` \| (?:–|`\w+`(?:, `\w+`)*) \|$", page, re.M)
+    assert shown == rows, "the rows that the page needs:\n" + "\n".join(rows)
+
+
+def test_io_knows_nothing_of_the_model(imports: dict[str, set[str]]) -> None:
+    assert not [m for m in FILES if _part(m) in ("io", "process") and any(_part(n) == "model" for n in imports[m])]
+
+
+def test_the_model_imports_only_the_standard_library() -> None:
+    modules = [module for module in FILES if module.startswith("rov_fmu.model")]
+    assert modules
+    outside = {name.split(".")[0] for module in modules for name in _names(module)} - {"rov_fmu"}
+    assert outside <= sys.stdlib_module_names
+
+
+@pytest.mark.parametrize("folder", MAY_IMPORT)
+def test_folders_import_only_what_they_may(folder: str, imports: dict[str, set[str]]) -> None:
+    inner = {module for other in MAY_IMPORT if other.startswith(f"{folder}/") for module in _within(other)}
+    modules = _within(folder) - inner
+    assert modules
+    named = {name for module in modules for name in imports[module]}
+    foreign = {name for name in named if not any(_is_in(name, other) for other in MAY_IMPORT[folder])}
+    assert not foreign
+
+
+def _is_in(module: str, folder: str) -> bool:
+    package = folder.replace("/", ".")
+    return module == package or module.startswith(f"{package}.")
+
+
+def _within(folder: str) -> set[str]:
+    return {module for module in FILES if _is_in(module, folder)}
+
+
+def test_a_folder_has_at_most_a_dozen_modules() -> None:
+    counts: dict[str, int] = {}
+    for path in FILES.values():
+        if path.name not in ("__init__.py", "__main__.py"):
+            folder = path.parent.relative_to(ROOT).as_posix()
+            counts[folder] = counts.get(folder, 0) + 1
+    counts = {folder: count for folder, count in counts.items() if folder != "verification/interoperability/runners"}
+    assert {folder: count for folder, count in counts.items() if count > LARGEST_FOLDER} == LARGER_FOLDERS

@@ -1,0 +1,213 @@
+"""The benchmark measures what it says: every method solves the same equations, as exactly as it should."""
+
+import subprocess
+import sys
+from math import inf, log2
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from rov_fmu.vehicle.vehicle import Vehicle
+from verification.benchmarks import page, sections, steps, taylor
+from verification.benchmarks.fleet import INSTANCES, Variations, in_c, instances
+from verification.benchmarks.plain_c import CORE, CVODE, EULER, FMU, FMU_3, FMU_3_SET, HEYOKA, RK4, PlainC, measurable
+from verification.benchmarks.steps import TOLERANCES, Job, Measured, TaylorPlan, cost_at
+from verification.benchmarks.work import Work
+from verification.references import reference
+
+ROOT = Path(__file__).parent.parent.parent
+COMMANDS = 8
+_OURS = (CORE, FMU, FMU_3, FMU_3_SET)
+
+in_plain_c = pytest.mark.skipif(not measurable(), reason="the C programs are written for Linux on x86-64")
+
+
+@pytest.fixture(scope="module")
+def plain_c(vehicle: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> PlainC:
+    return PlainC(vehicle, tmp_path_factory.mktemp("plain C"))
+
+
+class Small:
+    """All methods on a few commands: those that turn the motion back, and those that do not."""
+
+    def __init__(self, vehicle: Vehicle, plain_c: PlainC) -> None:
+        self.work = Work(vehicle.rov, False, 1.0, COMMANDS, COMMANDS)
+        self.ahead = Work(vehicle.rov, True, 1.0, COMMANDS, COMMANDS, ahead=True)
+        self.long = Work(vehicle.rov, False, 100.0, COMMANDS, 4)
+        self.jobs = [
+            *(self.ours(method, h) for method in _OURS for h in (0.01, 1.0, 100.0)),
+            *(self.explicit(method, steps) for method in (EULER, RK4) for steps in (50, 100)),
+            *(self.solver(method, tolerance) for method in CVODE for tolerance in TOLERANCES),
+        ]
+        self.measured = Measured(plain_c, self.jobs, 2)
+
+    def ours(self, method: str, h: float) -> Job:
+        return Job(method, 1.0, self.long if h > 1.0 else self.work, h)
+
+    def explicit(self, method: str, steps: int) -> Job:
+        return Job(method, float(steps), self.ahead, 1.0)
+
+    def solver(self, method: str, tolerance: float) -> Job:
+        return Job(method, tolerance, self.work, 1.0)
+
+
+@pytest.fixture(scope="module")
+def small(vehicle: Vehicle, plain_c: PlainC) -> Small:
+    return Small(vehicle, plain_c)
+
+
+@pytest.mark.long
+@in_plain_c
+@pytest.mark.parametrize(("h", "limit"), [(0.01, 1e-13), (1.0, 1e-14)])
+def test_our_steps_are_exact_to_rounding(small: Small, h: float, limit: float) -> None:
+    assert small.measured.error(small.ours(FMU, h)) < limit
+
+
+@pytest.mark.long
+@in_plain_c
+def test_our_long_steps_are_exact_to_rounding_of_the_way(small: Small) -> None:
+    """In 100 s the vehicle turns by up to 480 rad. The reference says what scales each state: speed, path or turn."""
+    names, work = list(small.long.rov.layout.state), small.long
+    for start, command, end in zip(
+        work.states, work.sequence, small.measured.ends[small.ours(FMU, 100.0)], strict=False
+    ):
+        exact = reference.step(work.rov, command, dict(zip(names, start.tolist(), strict=True)), work.hold)
+        for name, value in zip(names, end, strict=True):
+            assert abs(value - exact.state[name]) < 1e-14 * exact.scale[name], name
+
+
+@pytest.mark.long
+@in_plain_c
+@pytest.mark.parametrize("h", [0.01, 1.0, 100.0])
+def test_the_step_without_fmi_is_that_of_the_fmu_of_either_version(small: Small, h: float) -> None:
+    bare, *fmus = (small.measured.ends[small.ours(method, h)] for method in _OURS)
+    assert fmus == [bare] * 3
+
+
+@pytest.mark.long
+@in_plain_c
+@pytest.mark.parametrize(("method", "order"), [(EULER, 1), (RK4, 4)])
+def test_explicit_methods_are_of_their_order(small: Small, method: str, order: int) -> None:
+    """Where nothing turns back; the drag's kink at rest costs RK4 an order."""
+    coarse, fine = (small.measured.error(small.explicit(method, steps)) for steps in (50, 100))
+    assert log2(coarse / fine) == pytest.approx(order, abs=0.25)
+
+
+@pytest.mark.long
+@in_plain_c
+@pytest.mark.parametrize("method", CVODE)
+def test_cvode_keeps_near_its_tolerance(small: Small, method: str) -> None:
+    for tolerance in TOLERANCES:
+        assert 0.1 * tolerance < small.measured.error(small.solver(method, tolerance)) < 300.0 * tolerance
+
+
+@pytest.mark.long
+@in_plain_c
+def test_every_job_is_timed_in_every_repetition(small: Small) -> None:
+    for job in small.jobs:
+        seconds = small.measured.seconds[job]
+        assert len(seconds) == 2
+        assert all(0.0 < s < inf for s in seconds)
+
+
+@pytest.mark.long
+@in_plain_c
+def test_runs_with_other_parameters_end_where_the_model_does(vehicle: Vehicle, plain_c: PlainC) -> None:
+    runs = in_c(plain_c, Variations(vehicle.rov, 20), 2)
+    assert runs.count == 20
+    assert 0.0 < runs.rate < inf
+    assert 0.0 < runs.error < 1e-11  # at 0 the C would be compared with itself
+
+
+@pytest.mark.long
+@in_plain_c
+def test_many_instances_are_stepped_and_small(plain_c: PlainC) -> None:
+    assert INSTANCES == (1, 100, 10_000)
+    seconds, memory = instances(plain_c, 2).T
+    assert all((seconds > 0.0) & (seconds < 1e-3))
+    assert all((memory > 0) & (memory < 4096))
+
+
+def test_cost_at_an_error_lies_between_the_settings() -> None:
+    """On logarithmic axes, of the settings that are worth their cost."""
+    found = {0: (1e-8, 1.0), 1: (1e-10, 100.0), 2: (1e-7, 7.0)}
+    measured = SimpleNamespace(
+        error=lambda job: found[job][0],
+        seconds={job: np.array([cost, 2.0 * cost]) for job, (_, cost) in found.items()},
+    )
+    assert cost_at(cast(Any, measured), cast(Any, list(found)), 1e-9) == pytest.approx([10.0, 20.0])
+
+
+@pytest.mark.long
+@in_plain_c
+def test_heyoka_solves_the_same_equations(vehicle: Vehicle, plain_c: PlainC) -> None:
+    """To rounding, in steps of every length; its cost over ours stands in the last row."""
+    pytest.importorskip("heyoka")
+    plan = TaylorPlan(vehicle.rov, COMMANDS, COMMANDS)
+    measured = Measured(plain_c, plan.jobs, 2)
+    for method in (CORE, HEYOKA):
+        for h, job in plan.rows[method].items():
+            assert measured.error(job) < (1e-11 if h > 1.0 else 1e-12), (method, h)
+    *_, heyoka, ratios = sections.taylor(plan, measured)
+    assert heyoka[0].startswith("heyoka, loop in C++")
+    assert ratios[0] == "heyoka / ours"
+    for h, ratio in zip(plan.rows[HEYOKA], ratios[1:], strict=True):
+        times = measured.seconds[plan.rows[HEYOKA][h]] / measured.seconds[plan.rows[CORE][h]]
+        assert ratio == page.digits(float(np.median(times)))
+
+
+def test_without_heyoka_its_row_says_so(vehicle: Vehicle, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steps, "installed", lambda: False)
+    plan = TaylorPlan(vehicle.rov, COMMANDS, COMMANDS)
+    measured = SimpleNamespace(cost=lambda _: 1e-7, error=lambda _: 1e-15)
+    *_, last = sections.taylor(plan, cast(Any, measured))
+    assert last == [f"heyoka: {taylor.NOT_INSTALLED}"]
+    assert "rov-fmu[benchmarks]" in last[0]
+
+
+def test_numbers_have_three_digits_and_a_unit() -> None:
+    assert [page.duration(s) for s in (1.234e-8, 9.999e-7, 0.04567, 12.3)] == [
+        "12.3 ns",
+        "1.00 µs",
+        "45.7 ms",
+        "12.3 s",
+    ]
+    assert [page.digits(x) for x in (0.0, 0.01234, 98765.4)] == ["0", "0.0123", "98,765"]
+    assert [page.error(x) for x in (0.0, 1.2e-9, 3e-16)] == ["0", "1e-9", "3e-16"]
+
+
+@pytest.mark.long
+@in_plain_c
+def test_one_command_prints_it_all(tmp_path: Path) -> None:
+    picture = tmp_path / "cost_error.svg"
+    command = [sys.executable, "-m", "benchmarks", "--quick", "--picture", str(picture)]
+    printed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, encoding="utf-8").stdout
+    for part in (
+        "Velocities and pose, turning",
+        "Velocities and pose, straight",
+        "fmi2DoStep",
+        "fmi3DoStep",
+        "forward Euler",
+        "RK4",
+        "CVODE BDF",
+        "CVODE Adams",
+        "A command of 1 s to 1e-9",
+        "PythonFMU",
+        "Model Exchange",
+        "10,000",
+        "memory of each",
+        "runs a second",
+        "by two workers",
+        "build, cold",
+        "library alone",
+        "Promised",
+        "heyoka",
+    ):
+        assert part in printed, printed
+    times_ours = next(line.split()[4] for line in printed.splitlines() if line.startswith("CVODE BDF  "))
+    assert float(times_ours) > 10.0, printed
+    assert etree.parse(str(picture)).getroot().tag.endswith("svg")

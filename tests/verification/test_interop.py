@@ -1,0 +1,337 @@
+"""Independent importers fly as `rov_fmu.model.rov` does, and the harness notices where one does not."""
+
+import csv
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
+from itertools import pairwise
+from math import nan
+from pathlib import Path
+
+import pytest
+
+from tests.commands import ROOT
+from verification.interoperability.__main__ import main
+from verification.interoperability.importers import EXACT, HERE, IMPORTERS, KITS, RUNNERS, Importer, pinned
+from verification.interoperability.install import install
+from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, Manoeuvre, ResultError
+from verification.interoperability.run import Verdict, build_fmu, run, without_places
+
+TOOLS = HERE / ".tools"
+SIMPLE = MANOEUVRES["videoray"]
+
+
+@pytest.fixture(scope="session", params=MANOEUVRES.values(), ids=list(MANOEUVRES))
+def manoeuvre(request: pytest.FixtureRequest) -> Manoeuvre:
+    found: Manoeuvre = request.param
+    return found
+
+
+# ---- The manoeuvre ---------------------------------------------------------------------------------------------------
+
+
+def test_manoeuvre_shows_what_it_promises(manoeuvre: Manoeuvre) -> None:
+    layout, starts = manoeuvre.rov.layout, sorted(manoeuvre.phases)
+    phases = [manoeuvre.inputs_at(start) for start in starts]
+    assert TIMES[0] == 0.0
+    assert TIMES[-1] == 30.0
+    assert {*starts, DETOUR} <= set(TIMES), "the inputs change, and the detour starts, at communication points"
+    assert not any(phases[0].values()), "it does not matter when an importer sets the first inputs"
+    for name in layout.inputs:
+        values = [inputs[name] for inputs in phases]
+        assert any(values), f"{name} is used"
+        if name in layout.commands:
+            changes = list(pairwise(values))
+            assert any(0.0 <= a < b for a, b in changes), f"{name} steps up"
+            assert any(a > b > 0.0 for a, b in changes), f"{name} steps down"
+            assert any(a * b < 0.0 for a, b in changes), f"{name} steps through zero"
+    for name in layout.velocities:
+        values = [row[name] for row in manoeuvre.reference]
+        assert min(values) < -0.1 < 0.1 < max(values), f"{name} changes sign"
+    assert {layout.coefficients[name].tunable for name in manoeuvre.parameters} == {True, False}
+
+
+def test_there_is_a_manoeuvre_with_sway_lag_coupling_and_dead_band() -> None:
+    heavy = MANOEUVRES["bluerov2_heavy"]
+    assert heavy.rov.layout.coupled
+    assert set(heavy.rov.layout.lagging) == {f"F_{n}" for n in range(1, 9)}
+    dead = heavy.parameters["c_0_t200"]
+    held = [heavy.inputs_at(time)[name] for time in heavy.phases for name in heavy.rov.layout.commands]
+    assert any(0.0 < command < dead for command in held)
+
+
+def test_files_say_the_same(tmp_path: Path, manoeuvre: Manoeuvre) -> None:
+    manoeuvre.write_files(tmp_path)
+    with (tmp_path / "manoeuvre.csv").open(newline="") as file:
+        held = [[float(value) for value in row] for row in list(csv.reader(file))[1:]]
+    with (tmp_path / "jumps.csv").open(newline="") as file:
+        corners = [[float(value) for value in row] for row in list(csv.reader(file))[1:]]
+    for time, *inputs, detour in held:
+        assert inputs == list(manoeuvre.inputs_at(time).values())
+        assert detour == (time == DETOUR)
+        if time < 30.0:
+            assert inputs == next(after for at, *after in reversed(corners) if at <= time)
+    with (tmp_path / "detour.csv").open(newline="") as file:
+        detour_commands = {row["name"]: float(row["value"]) for row in csv.DictReader(file)}
+    assert list(detour_commands) == list(manoeuvre.rov.layout.commands)
+    assert set(detour_commands.values()) == {1.0, -1.0}
+    assert (tmp_path / "outputs.txt").read_text().split() == list(manoeuvre.reference[0])[1:]
+
+
+# ---- The comparison --------------------------------------------------------------------------------------------------
+
+
+def write_result(path: Path, rows: list[dict[str, float]]) -> Path:
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def test_reference_agrees_with_itself(tmp_path: Path, manoeuvre: Manoeuvre) -> None:
+    expected = manoeuvre.reference
+    between = [row | {"time": row["time"] + 0.05, "u": 99.0} for row in expected]
+    rows = sorted(expected + between, key=lambda row: row["time"])
+    assert manoeuvre.difference(write_result(tmp_path / "result.csv", rows)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("manoeuvre", "name"),
+    [(m, name) for m in MANOEUVRES.values() for name in m.outputs],
+    ids=lambda p: getattr(p, "vehicle", p),
+)
+@pytest.mark.parametrize("point", [0, 150, 300])
+def test_difference_is_noticed(tmp_path: Path, manoeuvre: Manoeuvre, name: str, point: int) -> None:
+    rows = [*manoeuvre.reference]
+    rows[point] = rows[point] | {name: rows[point][name] + 1e-6}
+    assert manoeuvre.difference(write_result(tmp_path / "result.csv", rows)) == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda rows: rows[:-1], "no row for t = 30.0"),
+        (lambda rows: rows[:7] + rows[8:], "no row for t = 0.7"),
+        (lambda rows: [{k: v for k, v in row.items() if k != "psi"} for row in rows], "no column psi"),
+        (lambda rows: [{k: v for k, v in row.items() if k != "time"} for row in rows], "no column time"),
+        (lambda rows: [row | {"u": "much"} for row in rows], "cannot be read"),
+        (lambda rows: [*rows[:5], rows[5] | {"y": nan}, *rows[6:]], "y = nan at t = 0.5"),
+    ],
+)
+def test_incomplete_result_is_an_error(
+    tmp_path: Path, spoil: Callable[[list[dict[str, float]]], list[dict[str, float]]], message: str
+) -> None:
+    with pytest.raises(ResultError, match=message):
+        SIMPLE.difference(write_result(tmp_path / "result.csv", spoil(SIMPLE.reference)))
+
+
+def test_missing_result_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match=r"result\.csv cannot be read"):
+        SIMPLE.difference(tmp_path / "result.csv")
+
+
+# ---- The command -----------------------------------------------------------------------------------------------------
+
+PRETEND = Importer(
+    "pretend", "Pretend", "CS", "python", ("requirements.txt", "fmpy"), "pretend", ("{python}", "-c", "pass"), EXACT
+)
+COPY = "import shutil; shutil.copy({source!r}, 'result.csv')"
+
+
+@pytest.fixture
+def tools(tmp_path: Path) -> Path:
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "pretend").touch()
+    return tmp_path / "tools"
+
+
+@pytest.mark.parametrize(
+    ("program", "tolerance", "verdict"),
+    [
+        ("agree", EXACT, Verdict.AGREES),
+        ("differ", EXACT, Verdict.DIFFERS),
+        ("differ", 1e-5, Verdict.AGREES),
+        ("pass", None, Verdict.NO_FINDING),
+        ("pass", EXACT, Verdict.FAILED),
+        ("raise SystemExit(3)", EXACT, Verdict.FAILED),
+        ("raise SystemExit(3)", None, Verdict.FAILED),
+        ("import os; os.abort()", EXACT, Verdict.FAILED),
+    ],
+)
+def test_verdict(
+    tmp_path: Path,
+    tools: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    program: str,
+    tolerance: float | None,
+    verdict: Verdict,
+) -> None:
+    rows = [*SIMPLE.reference]
+    if program == "differ":
+        rows[200] = rows[200] | {"w": rows[200]["w"] + 1e-7}
+    if program in {"agree", "differ"}:
+        program = COPY.format(source=str(write_result(tmp_path / "given.csv", rows)))
+    fmu = tmp_path / "any.fmu"
+    fmu.touch()
+    importer = replace(PRETEND, command=("{python}", "-c", program), tolerance=tolerance)
+    outcome = run(importer, fmu, tools, SIMPLE)
+    assert outcome.verdict is verdict
+    monkeypatch.setattr("verification.interoperability.importers.IMPORTERS", (importer,))
+    arguments = ["--vehicle", "videoray", "--fmi", "2", "--fmu", str(fmu), "--tools", str(tools)]
+    assert main(arguments) == (0 if verdict.is_good else 1)
+
+
+@pytest.mark.parametrize("manoeuvre", MANOEUVRES.values(), ids=lambda manoeuvre: manoeuvre.vehicle)
+def test_thrust_that_lags_has_a_tolerance_of_its_own(tmp_path: Path, tools: Path, manoeuvre: Manoeuvre) -> None:
+    rows = [*manoeuvre.reference]
+    rows[200] = rows[200] | {"w": rows[200]["w"] + 1e-7}
+    program = COPY.format(source=str(write_result(tmp_path / "given.csv", rows)))
+    importer = replace(PRETEND, command=("{python}", "-c", program), late=1e-6)
+    (tmp_path / "any.fmu").touch()
+    expected = Verdict.AGREES if manoeuvre.vehicle == "bluerov2_heavy" else Verdict.DIFFERS
+    assert run(importer, tmp_path / "any.fmu", tools, manoeuvre).verdict is expected
+
+
+def test_importer_that_is_not_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = tmp_path / "any.fmu"
+    fmu.touch()
+    monkeypatch.setattr("verification.interoperability.importers.IMPORTERS", (PRETEND,))
+    arguments = ["--vehicle", "videoray", "--fmi", "2", "--fmu", str(fmu), "--tools", str(tmp_path)]
+    assert main(arguments) == 0
+    assert "python -m verification.interoperability --install python" in capsys.readouterr().out
+    assert main([*arguments, "pretend"]) == 1, "what is asked for by name must run"
+    assert main([*arguments, "python"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("nothing", "nothing: no such importer"),
+        ("--vehicle videoray --fmi 3 --fmu nothing.fmu", "nothing.fmu"),
+        ("--vehicle videoray --fmu nothing.fmu", "--fmu goes with --vehicle and --fmi"),
+        ("--fmi 3 --fmu nothing.fmu", "--fmu goes with --vehicle and --fmi"),
+        ("--fmi 3 fmpy-cs fmpy-cs-fmi3", "fmpy-cs: not with this version of FMI"),
+        ("--fmi 3 java", "java: not with this version of FMI"),
+    ],
+)
+def test_bad_arguments(arguments: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments.split()) == 2
+    assert capsys.readouterr().err.startswith(f"interop: {message}")
+
+
+def test_each_importer_gets_the_version_that_it_takes(
+    tools: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    built = []
+
+    def build(vehicle: str, fmi: int, folder: Path) -> Path:
+        built.append((vehicle, fmi))
+        (folder / f"{vehicle}{fmi}").write_text(str(fmi))
+        return folder / f"{vehicle}{fmi}"
+
+    program = "import sys; from pathlib import Path; sys.exit(Path('rov.fmu').read_text() != sys.argv[1])"
+    importers = [
+        replace(PRETEND, name=f"{n}", command=("{python}", "-c", program, f"{fmi}"), tolerance=None, fmi=fmi)
+        for n, fmi in enumerate((2, 3, 3, 2))
+    ]
+    monkeypatch.setattr("verification.interoperability.importers.IMPORTERS", tuple(importers))
+    monkeypatch.setattr("verification.interoperability.__main__.build_fmu", build)
+    assert main(["--tools", str(tools)]) == 0
+    assert sorted(built) == [(vehicle, fmi) for vehicle in sorted(MANOEUVRES) for fmi in (2, 3)], "each is built once"
+    assert [fmi for fmi in capsys.readouterr().out.split() if fmi in {"2.0", "3.0"}] == ["2.0", "3.0", "3.0", "2.0"]
+
+
+def test_log_names_no_folder_and_no_host(tmp_path: Path) -> None:
+    text = f"{tmp_path}/x {Path.home()}/y {HERE}/z https://packages.example:8080/simple ftp://example.org"
+    assert (
+        without_places(text, tmp_path, TOOLS)
+        == "./x ~/y ./verification/interoperability/z https://.../simple ftp://..."
+    )
+
+
+# ---- The declarations ------------------------------------------------------------------------------------------------
+
+
+def test_names_are_unique() -> None:
+    names = [importer.name for importer in IMPORTERS]
+    assert len({*names, *KITS}) == len(names) + len(KITS)
+
+
+@pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
+def test_importer_is_pinned_and_its_runner_is_there(importer: Importer) -> None:
+    assert re.fullmatch(r"\d+(\.\d+)+(rc\d+)?", importer.version)
+    for part in importer.command_line(TOOLS):
+        if part.startswith("verification.interoperability."):
+            assert (ROOT / Path(*part.split("."))).with_suffix(".py").is_file()
+        elif part.startswith(str(RUNNERS)):
+            assert Path(part).is_file()
+
+
+@pytest.mark.parametrize("file", sorted(HERE.glob("requirements*.txt")), ids=lambda file: file.name)
+def test_every_requirement_is_pinned(file: Path) -> None:
+    lines = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+    assert lines
+    assert all(re.fullmatch(r"[\w-]+==[\d.]+(rc\d+)?( +#.*)?", line) for line in lines)
+    with pytest.raises(LookupError):
+        pinned("requirements.txt", "fmp")
+
+
+def test_no_environment_is_cleared_for_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+
+    def call(command: list[str], tools: Path) -> None:
+        calls.append(command)
+        for importer in IMPORTERS if "-r" in command else ():
+            if importer.kit == "python" and command[-1] == str(HERE / importer.pin[0]):
+                place = tools / importer.proof.format(version=importer.version).replace("*", ".11")
+                place.mkdir(parents=True, exist_ok=True)
+
+    monkeypatch.setattr("verification.interoperability.install._call", call)
+    said: list[str] = []
+    install("python", tmp_path, said.append)
+    made = [command[-1] for command in calls if "venv" in command]
+    files = [command[-1] for command in calls if "-r" in command]
+    assert made == [str(tmp_path / name) for name in ("python", "python-cofmupy")]
+    assert files == [str(HERE / name) for name in ("requirements.txt", "requirements-cofmupy.txt")]
+    for importer in IMPORTERS:
+        if importer.kit == "python":
+            assert importer.is_installed(tmp_path)
+            assert Path(importer.command_line(tmp_path)[0]).parent.parent in {Path(place) for place in made}
+    calls.clear()
+    shutil.rmtree(tmp_path / "python-cofmupy")
+    install("python", tmp_path, said.append)
+    assert [command[-1] for command in calls if "venv" in command] == [str(tmp_path / "python-cofmupy")]
+
+
+def test_no_registry_is_named() -> None:
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", str(HERE)]
+    files = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    assert files
+    known = {"maven.apache.org"}  # an XML name space
+    for name in files:
+        hosts = set(re.findall(r"\w+://([^/\s\"']+)", (ROOT / name).read_text()))
+        assert Path(name).name != "Cargo.lock"
+        assert hosts <= known, name
+
+
+# ---- The matrix ------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
+    return cache(partial(build_fmu, folder=tmp_path_factory.mktemp("FMU für Tests")))
+
+
+@pytest.mark.interop
+@pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
+def test_importer(importer: Importer, fmu: Callable[[str, int], Path], manoeuvre: Manoeuvre) -> None:
+    outcome = run(importer, fmu(manoeuvre.vehicle, importer.fmi), TOOLS, manoeuvre)
+    if outcome.verdict is Verdict.NOT_RUN:
+        pytest.skip(outcome.reason)
+    assert outcome.verdict.is_good, f"{outcome.reason} {outcome.difference} {outcome.log[-2000:]}"

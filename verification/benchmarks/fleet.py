@@ -1,0 +1,83 @@
+"""Many instances, and many runs of one: in plain C and through FMPy, on one core."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from fmpy.fmi2 import FMU2Slave
+
+from rov_fmu.fmu.variables import variables
+from rov_fmu.model.rov import Rov
+
+from .importer import restart
+from .plain_c import PlainC, Reals
+from .work import Work
+
+INSTANCES = (1, 100, 10_000)
+_HOLD, _COMMANDS = 10.0, 10
+_STEPS, _CHECKED = 200_000, 10
+
+
+@dataclass(frozen=True)
+class Runs:
+    """How many; how many a second, the median; the first ones' largest difference from the step in Python (SI)."""
+
+    count: int
+    rate: float
+    error: float
+
+
+class Variations:
+    """Runs of 100 s, ten commands of 10 s, each with another α and β: within 30 % of the vehicle's."""
+
+    def __init__(self, rov: Rov, count: int) -> None:
+        self.rov, layout = rov, rov.layout
+        self.parameters = [name for name, meta in layout.coefficients.items() if meta.tunable]
+        self.values = np.random.default_rng(1).uniform(0.7, 1.3, (count, len(self.parameters)))
+        self.values *= [rov[name] for name in self.parameters]
+        self.work = Work(rov, False, _HOLD, _COMMANDS, 1)
+        declared = {variable.name: variable.value_reference for variable in variables(rov)}
+        self.references, self.inputs, self.outputs = (
+            [declared[name] for name in names] for names in (self.parameters, layout.commands, layout.state)
+        )
+
+    def error(self, ends: Reals) -> float:
+        """Compare the first runs with the step in Python, because the engine computes with the C that is measured."""
+        exact = []
+        for values in self.values[:_CHECKED].tolist():
+            rov = self.rov.replaced(dict(zip(self.parameters, values, strict=True)))
+            state = dict.fromkeys(rov.layout.state, 0.0)
+            for command in self.work.sequence:
+                state = rov.step(command, state, _HOLD)
+            exact.append(list(state.values()))
+        return float(np.abs(ends[:_CHECKED] - exact).max())
+
+
+def instances(plain_c: PlainC, repetitions: int) -> Reals:
+    """For each of INSTANCES, stepped in turn, medians: seconds a step of 10 ms, bytes of memory each."""
+    return np.median([[plain_c.step_in_turn(n, _STEPS) for n in INSTANCES] for _ in range(repetitions)], axis=0)
+
+
+def in_c(plain_c: PlainC, variations: Variations, repetitions: int) -> Runs:
+    """The runs, a share of them in each repetition."""
+    shares = np.array_split(variations.values, repetitions)
+    found = [plain_c.run_each(variations.references, share, variations.work.array) for share in shares]
+    rates = [len(share) / seconds for share, (seconds, _) in zip(shares, found, strict=True)]
+    error = variations.error(np.concatenate([ends for _, ends in found]))
+    return Runs(len(variations.values), float(np.median(rates)), error)
+
+
+def through_fmpy(slave: FMU2Slave, variations: Variations, runs: int, repetitions: int) -> Runs:
+    """The first runs of the same, function by function."""
+    seconds: list[float] = []
+    for _ in range(repetitions):
+        ends = []
+        start = time.process_time()
+        for values in variations.values[:runs].tolist():
+            restart(slave, variations.references, values)
+            for n, command in enumerate(variations.work.array.tolist()):
+                slave.setReal(variations.inputs, command)
+                slave.doStep(currentCommunicationPoint=n * _HOLD, communicationStepSize=_HOLD)
+            ends.append(slave.getReal(variations.outputs))
+        seconds.append(time.process_time() - start)
+    return Runs(runs, runs / float(np.median(seconds)), variations.error(np.array(ends)))

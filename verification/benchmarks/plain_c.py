@@ -1,0 +1,134 @@
+"""What is measured in plain C: built with the compiler of the FMU, and called in this process (Linux on x86-64)."""
+
+import ctypes
+from ctypes import POINTER, byref, c_double, c_long, c_size_t, c_void_p
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import sundials
+from fmpy.sundials.libraries import sundials_core, sundials_cvode
+from numpy.typing import NDArray
+
+from rov_fmu.engine.compile import PLATFORMS, compile_all, host_platform
+from rov_fmu.fmu.archive import native_content
+from rov_fmu.vehicle.vehicle import Vehicle
+from verification.references.c_programs import compile_c
+
+from .taylor import Heyoka
+
+PLATFORM = "linux64"
+# as steps.py names them: the FMU, the same with its commands set before every step, both of FMI 3.0 too, its step
+# without FMI, the explicit methods, CVODE's
+FMU, FMU_SET, FMU_3, FMU_3_SET = FMUS = ("fmu", "fmu-set", "fmu-3", "fmu-3-set")
+CORE, EULER, RK4 = "core", "euler", "rk4"
+HEYOKA = "heyoka"
+BDF, ADAMS = CVODE = ("bdf", "adams")
+_SOURCES = Path(__file__).with_name("c")
+# a library needs but a part of the FMU's sources; what replaces mallinfo came after the GLIBC that is linked here
+_FLAGS = (
+    "-target",
+    PLATFORMS[PLATFORM].target,
+    "-shared",
+    "-g0",
+    "-fno-asynchronous-unwind-tables",
+    "-Wshadow",
+    "-Wno-unused-function",
+    "-Wno-deprecated-declarations",
+)
+# Packed into pairs, RK4 takes a fifteenth longer for the VideoRay, and a tenth less for the Heavy.
+_FASTEST = ("-O3", "-fno-slp-vectorize")
+_SUNDIALS = (sundials_core._name, sundials_cvode._name)
+_REALS, _REFERENCES = np.ctypeslib.ndpointer(float, flags="C"), np.ctypeslib.ndpointer(np.uint32, flags="C")
+
+Reals = NDArray[np.float64]
+
+
+def measurable() -> bool:
+    """Whether that runs on this machine."""
+    return host_platform() == PLATFORM
+
+
+class PlainC:
+    """The FMU's shared library in both versions of FMI, and beside it the methods and what times them all, in a folder
+    of their own."""
+
+    def __init__(self, vehicle: Vehicle, folder: Path) -> None:
+        content = {fmi: native_content(vehicle, fmi=fmi) for fmi in (2, 3)}
+        self._states = len(vehicle.layout.state)
+
+        def load(name: str, fmi: int, *flags: str) -> Any:
+            output, sources = folder / f"{name}-{fmi}.so", content[fmi].sources
+            return ctypes.CDLL(str(compile_c(_SOURCES / f"{name}.c", output, sources, *_FLAGS, *flags)))
+
+        def measure(fmi: int) -> Any:
+            fmu = folder / f"{vehicle.identifier}-{fmi}{PLATFORMS[PLATFORM].suffix}"
+            fmu.write_bytes(compile_all([PLATFORM], content[fmi].sources, vehicle.identifier)[PLATFORM])
+            m = load("measure", fmi, "-ldl", *_SUNDIALS)
+            m.hold.argtypes = (c_void_p, c_void_p, c_void_p, c_double, c_long, c_long, c_long, _REALS, _REALS)
+            m.step_in_turn.argtypes = (c_size_t, c_size_t, POINTER(c_double))
+            m.run_each.argtypes = (c_size_t, _REFERENCES, c_size_t, _REALS, _REALS, _REALS)
+            m.hold.restype = m.step_in_turn.restype = m.run_each.restype = c_double
+            m.begin(str(fmu).encode())
+            return m
+
+        self._explicit = load("explicit", 2, *_FASTEST)
+        self._measure, self._measure_3 = measure(2), measure(3)
+        self._solver = cache(self._new_solver)
+        self._heyoka = cache(lambda: Heyoka(vehicle.rov))
+
+    def _new_solver(self, method: str, tolerance: float) -> tuple[Any, Any]:
+        """CVODE with the same relative and absolute tolerance, and its vector.
+
+        BDF: Newton's method with a dense matrix, as FMPy sets it up. Adams: fixed-point iteration.
+        """
+        context = sundials.SUNContext()
+        flags = [sundials.SUNContext_Create(sundials.SUN_COMM_NULL, byref(context))]
+        y = sundials.N_VNew_Serial(self._states, context)
+        rates = sundials.CVRhsFn(("cvode_rates", self._measure))
+        solver = sundials.CVodeCreate(2 if method == BDF else 1, context)
+        flags += [sundials.CVodeInit(solver, rates, 0.0, y), sundials.CVodeSetMaxNumSteps(solver, 1_000_000)]
+        flags += [sundials_cvode.CVodeSStolerances(c_void_p(solver), c_double(tolerance), c_double(tolerance))]
+        if method == ADAMS:
+            sundials_cvode.SUNNonlinSol_FixedPoint.restype = c_void_p
+            iteration = c_void_p(sundials_cvode.SUNNonlinSol_FixedPoint(y, 0, context))
+            flags += [sundials_cvode.CVodeSetNonlinearSolver(c_void_p(solver), iteration)]
+        else:
+            matrix = sundials.SUNDenseMatrix(self._states, self._states, context)
+            flags += [sundials.CVodeSetLinearSolver(solver, sundials.SUNLinSol_Dense(y, matrix, context), matrix)]
+        if any(flags):
+            raise RuntimeError(f"CVODE cannot be set up: {flags}")
+        return solver, ctypes.cast(y, c_void_p)
+
+    def hold(
+        self, method: str, setting: float, h: float, steps: int, commands: Reals, start: Reals
+    ) -> tuple[float, Reals]:
+        """Hold commands in turn, each for so many steps of h: seconds a step, and the end (all states).
+
+        `setting`: sub-steps, or the tolerance of CVODE.
+        """
+        if method == HEYOKA:
+            return self._heyoka().hold(h, steps, commands, start)
+        function, solver, end = None, (None, None), start.copy()
+        if method in CVODE:
+            solver = self._solver(method, setting)
+        elif method not in FMUS:
+            library = self._measure if method == CORE else self._explicit
+            function = ctypes.cast(getattr(library, method), c_void_p)
+        substeps = 0 if method in (FMU_SET, FMU_3_SET) else 1 if method in CVODE else round(setting)
+        measure = self._measure_3 if method in (FMU_3, FMU_3_SET) else self._measure
+        each = measure.hold(function, *solver, h, substeps, steps, len(commands), commands, end)
+        return 1e-9 * each, end
+
+    def step_in_turn(self, instances: int, steps: int) -> tuple[float, float]:
+        """So many instances, so many steps of 10 ms in all: seconds a step, bytes of memory an instance."""
+        memory = c_double()
+        return 1e-9 * self._measure.step_in_turn(instances, steps // instances, byref(memory)), memory.value
+
+    def run_each(self, references: list[int], values: Reals, commands: Reals) -> tuple[float, Reals]:
+        """A run of ten commands of 10 s for each row of start values: seconds, and where each ends."""
+        ends = np.empty((len(values), self._states))
+        vr = np.array(references, dtype=np.uint32)
+        seconds = 1e-9 * self._measure.run_each(len(values), vr, len(vr), values, commands, ends)
+        return seconds, ends

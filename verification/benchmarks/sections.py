@@ -1,0 +1,212 @@
+"""The sections of the table, of what was measured."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from .fleet import INSTANCES, Runs
+from .importer import INTERVAL, NATIVE, STOP
+from .page import Section, digits, duration, error
+from .plain_c import ADAMS, BDF, CORE, EULER, FMU, FMU_3, FMU_3_SET, FMU_SET, HEYOKA, RK4, Reals
+from .steps import METHODS, NAMES, SUBSTEP, TARGET, H, HeavyPlan, Job, Measured, Plan, TaylorPlan, compared
+from .studies import Cost, overhead
+from .taylor import NOT_INSTALLED
+
+_STEPS = [f"step {h:g} s" if h >= 1.0 else f"step {1000 * h:g} ms" for h in H]
+_OURS = {FMU: "ours, fmi2DoStep", CORE: "ours, without FMI"}
+_MORE = {
+    FMU_SET: "ours, fmi2SetReal and fmi2DoStep",
+    FMU_3: "ours, fmi3DoStep",
+    FMU_3_SET: "ours, fmi3SetFloat64 and fmi3DoStep",
+}
+_SUBSTEPS = f"sub-steps ≤ {1000 * SUBSTEP:g} ms"
+_NAMES = {**_MORE, **_OURS, RK4: f"RK4, {_SUBSTEPS}", EULER: f"forward Euler, {_SUBSTEPS}"}
+
+
+def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
+    """What a communication step costs (turning, straight, and straight ahead), and a held command of 1 s where all have
+    the same error."""
+    for straight in (False, True):
+        section = [[f"Velocities and pose, {_way(straight)}", *_STEPS]]
+        for method, tolerance in METHODS:
+            name = _NAMES.get(method) or f"{NAMES[method]}, tolerance {error(tolerance)}"
+            jobs = [plan.job(method, h, straight, tolerance) for h in H]
+            section.append([name, *(f"{duration(measured.cost(j))}  {error(measured.error(j)):>5}" for j in jobs)])
+        yield section
+    ahead = {name: [duration(measured.cost(plan.job(m, h, ahead=True))) for h in H] for m, name in _OURS.items()}
+    yield [["The same, nothing turns back", *_STEPS], *([name, *costs] for name, costs in ahead.items())]
+    ours = plan.job(CORE, 1.0)
+    section = [["ours, to rounding", duration(measured.cost(ours)), "1"]]
+    for method, name in NAMES.items():
+        cost, times = compared(measured, plan.sweeps[method], ours)
+        section.append([name, duration(cost), digits(times)])
+    yield [[f"A command of 1 s to {error(TARGET)}", "turning", "times ours"], *section]
+
+
+def _way(straight: bool) -> str:
+    return "straight" if straight else "turning"
+
+
+def heavy(plan: HeavyPlan, measured: Measured) -> Section:
+    """All states of a vehicle with coupling and lag."""
+    rows = {"ours, without FMI": plan.ours, _NAMES[RK4]: plan.rk4}
+    return [
+        ["BlueROV2 Heavy, coupling and lag", *_STEPS],
+        *(
+            [name, *(f"{duration(measured.cost(job))}  {error(measured.error(job)):>5}" for job in jobs.values())]
+            for name, jobs in rows.items()
+        ),
+    ]
+
+
+def taylor(plan: TaylorPlan, measured: Measured) -> Section:
+    """heyoka on the same system, and how many times the cost of ours its steps have."""
+    names = {CORE: _OURS[CORE], RK4: _NAMES[RK4], HEYOKA: "heyoka, loop in C++, thrust ahead and not timed"}
+    section: list[list[str]] = [["Velocities and pose, turning one way", *_STEPS]]
+    for method, jobs in plan.rows.items():
+        cells = (f"{duration(measured.cost(job))}  {error(measured.error(job)):>5}" for job in jobs.values())
+        section.append([names[method], *cells])
+    if HEYOKA not in plan.rows:
+        return [*section, [f"heyoka: {NOT_INSTALLED}"]]
+    ratios = (digits(_ratio(measured, plan.rows[HEYOKA][h], plan.rows[CORE][h])) for h in H)
+    return [*section, ["heyoka / ours", *ratios]]
+
+
+def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[str, Reals]) -> Section:
+    """The manoeuvre in an importer: as a user simulates it, and the functions of a step alone."""
+
+    def row(name: str, seconds: Reals, native: Reals, end: str) -> list[str]:
+        total = float(np.median(seconds))
+        return [name, duration(total / STOP * INTERVAL), duration(total), end, digits(np.median(seconds / native))]
+
+    return [
+        [f"FMPy, {STOP:g} s at {1000 * INTERVAL:g} ms, turning", "a step", "all", "error at the end", "times native"],
+        *(
+            row(f"simulate_fmu, {name}", seconds, simulated[NATIVE][0], error(end))
+            for name, (seconds, end) in simulated.items()
+        ),
+        *(row(f"set, doStep, get, {name}", seconds, stepped[NATIVE], "") for name, seconds in stepped.items()),
+    ]
+
+
+def instances(found: Reals) -> Section:
+    """Many instances, stepped in turn."""
+    return [
+        ["Instances in turn, straight and down", *(f"{n:,}" for n in INSTANCES)],
+        ["a step of 10 ms", *map(duration, found[:, 0])],
+        ["memory of each", *(f"{memory:,.0f} B" for memory in found[:, 1])],
+    ]
+
+
+def variations(runs: Mapping[str, Runs]) -> Section:
+    """Runs with other parameters."""
+    return [
+        ["Variations of α and β, 100 s, turning", "runs", "a run", "runs a second", "error at the end"],
+        *(
+            [name, f"{found.count:,}", duration(1.0 / found.rate), digits(found.rate), error(found.error)]
+            for name, found in runs.items()
+        ),
+    ]
+
+
+def studies(pairs: Sequence[tuple[Cost, Cost]], costs: Sequence[Cost]) -> Section:
+    """Runs by the engine of studies, beside those alone: processor time of who does them, and time on the clock."""
+    runs = pairs[0][0].runs
+    sides = zip(("the runs alone, in a loop", "by one worker"), zip(*pairs, strict=True), strict=True)
+    started = float(np.median([cost.started for cost in costs]))
+    return [
+        ["A study: 30 s, two outputs each 0.1 s, three figures", "runs", "a run", "on the clock", "memory grows by"],
+        *(
+            [
+                name,
+                f"{runs:,}",
+                duration(float(np.median([cost.processor for cost in side])) / runs),
+                duration(float(np.median([cost.clock for cost in side]))),
+            ]
+            for name, side in sides
+        ),
+        ["which is more by", "", f"{overhead(pairs, 'processor'):+.0%}", f"{overhead(pairs, 'clock'):+.0%}"],
+        *(
+            [
+                "by two workers",
+                f"{cost.runs:,}",
+                duration(cost.processor / cost.runs),
+                duration(cost.clock),
+                f"{cost.growth / 1e6:,.0f} MB",
+            ]
+            for cost in costs
+        ),
+        ["until two workers are there", "", "", duration(started)],
+    ]
+
+
+def archive(builds: Mapping[str, tuple[int, float, float]], loaded: Sequence[float]) -> Iterator[Section]:
+    """Size, build time and load time."""
+    rows = [
+        [name, f"{size / 1000:,.0f} kB", duration(cold), duration(warm)] for name, (size, cold, warm) in builds.items()
+    ]
+    yield [["The archive", "size", "build, cold", "build, warm"], *rows]
+    yield [
+        ["Loading it through FMPy", "extract", "description", "instance", "library alone"],
+        ["for this machine", *map(duration, loaded)],
+    ]
+
+
+FINE = 1e-10
+"""The error at which the Heavy is compared with RK4."""
+_SHORT = (0.001, SUBSTEP)
+_TO_RK4 = {(0.001, False): 1.5, (SUBSTEP, False): 1.7, (0.001, True): 2.2, (SUBSTEP, True): 2.2}
+"""Promised of a step, by its length and whether it is straight: its cost in steps of RK4."""
+_TO_OURS = {RK4: 5.0, ADAMS: 8.0, BDF: 18.0}
+"""Promised of a command of 1 s that each method simulates to TARGET: its cost in commands of ours, at least."""
+
+
+def _ratio(measured: Measured, ours: Job, other: Job) -> float:
+    return float(np.median(measured.seconds[ours] / measured.seconds[other]))
+
+
+def promises(
+    plan: Plan,
+    measured: Measured,
+    heavier: HeavyPlan,
+    measured_heavy: Measured,
+    series: TaylorPlan,
+    measured_series: Measured,
+) -> Section:
+    """What was promised of the cost of a step. Ratios and differences are the medians of those in each repetition."""
+    made: list[tuple[str, str, str, bool]] = []
+
+    def at_most(what: str, ratio: float, limit: float) -> None:
+        made.append((what, digits(ratio), f"≤ {limit:g}", ratio <= limit))
+
+    def at_least(what: str, ratio: float, limit: float) -> None:
+        made.append((what, digits(ratio), f"≥ {limit:g}", ratio >= limit))
+
+    for (h, straight), limit in _TO_RK4.items():
+        ratio = _ratio(measured, plan.job(CORE, h, straight), plan.job(RK4, h, straight))
+        at_most(f"{_way(straight)} step to one of RK4, {1000 * h:g} ms", ratio, limit)
+    set_too = _ratio(measured, plan.job(FMU_SET, SUBSTEP), plan.job(RK4, SUBSTEP))
+    at_most("turning, with fmi2SetReal and fmi2DoStep, 10 ms", set_too, 2.0)
+    for h in _SHORT:
+        ratio = _ratio(measured_heavy, heavier.ours[h], heavier.rk4[h])
+        at_most(f"Heavy, coupling and lag, to one of RK4, {1000 * h:g} ms", ratio, 2.5)
+    worst = max(measured.error(plan.job(CORE, h, straight)) for h in (SUBSTEP, 1.0) for straight in (False, True))
+    made.append(("its error after 1 s, in steps of 10 ms and 1 s", error(worst), "≤ 1e-13", worst <= 1e-13))
+    longest = measured.cost(plan.job(CORE, H[-1], straight=True))
+    made.append(("straight step of 100 s", duration(longest), "≤ 2 µs", longest <= 2e-6))
+    for method, limit in _TO_OURS.items():
+        times = compared(measured, plan.sweeps[method], plan.job(CORE, 1.0))[1]
+        at_least(f"{NAMES[method]} to ours, at {error(TARGET)} a command of 1 s", times, limit)
+    finer = compared(measured_heavy, heavier.sweep, heavier.ours[SUBSTEP], FINE)[1]
+    at_least(f"RK4 to ours of the Heavy, to {error(FINE)}", finer, 5.0)
+    fmu, bare = (measured.seconds[plan.job(method, SUBSTEP, straight=True)] for method in (FMU, CORE))
+    layer = max(0.0, float(np.median(fmu - bare)))
+    made.append(("what FMI adds to a step of 10 ms", duration(layer), "≤ 20 ns", layer <= 20e-9))
+    for step, h in zip(_STEPS, H, strict=True):
+        ratio = _ratio(measured, plan.job(FMU_3_SET, h), plan.job(FMU_SET, h))
+        at_most(f"turning, set and step, FMI 3.0 to FMI 2.0, {step}", ratio, 1.05)
+    for h in _SHORT if HEYOKA in series.rows else ():
+        times = _ratio(measured_series, series.rows[HEYOKA][h], series.rows[CORE][h])
+        at_least(f"heyoka to ours, turning, {1000 * h:g} ms", times, 4.0)
+    rows = [(what, found, promised, "kept" if kept else "NOT KEPT") for what, found, promised, kept in made]
+    return [("Promised", "measured", "promised", ""), *rows]

@@ -1,0 +1,133 @@
+"""python -m verification.fuzzing: random calls of the FMI functions under sanitizers."""
+
+import shutil
+import sys
+import tempfile
+import time
+from base64 import b64encode
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from itertools import product
+from os import cpu_count
+from pathlib import Path
+
+import click
+
+from rov_fmu.engine.compile import BuildError
+from rov_fmu.fmu.archive import native_content
+from rov_fmu.io.messages import FileError
+from rov_fmu.process import exit_code
+from rov_fmu.report.console import console, table
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+from .campaign import Counts, FindingError, build_target, fuzz, pack_corpus, replay, unpack_corpus
+
+_ROUND = 60  # s
+VEHICLES = {
+    "bluerov2_heavy": SHIPPED["bluerov2_heavy"],
+    "videoray": VIDEORAY,
+    "bare": Path(__file__).with_name("bare.toml"),
+}
+"""Lag, coupling, curves with reverse and dead band; closed form; as little as there can be. The slowest is first: each
+one begins with all that was found before it."""
+
+
+def _positive(text: str) -> int:
+    with suppress(ValueError, OverflowError):
+        if (number := int(float(text))) >= 1:
+            return number
+    raise click.BadParameter(f"{text} is not a number from 1 on")
+
+
+@click.command()
+@click.argument("inputs", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--calls", type=_positive, metavar="N", help="Go on until so many calls were made, e.g. 1e8.")
+@click.option("--seconds", type=_positive, metavar="N", help="Go on for so long; without either, a minute.")
+@click.option(
+    "--jobs", type=_positive, metavar="N", default=cpu_count() or 1, help="Processes (default: one a processor)."
+)
+@click.option("--vehicle", "chosen", type=click.Choice(list(VEHICLES)), help="Only this one (default: all in turn).")
+@click.option("--fmi", type=click.Choice(["2", "3"]), help="Only this version of FMI (default: both in turn).")
+@click.option("--keep", is_flag=True, help="Put what led to new places into the corpus.")
+def _command(
+    inputs: tuple[Path, ...],
+    calls: int | None,
+    seconds: int | None,
+    jobs: int,
+    chosen: str | None,
+    fmi: str | None,
+    keep: bool,
+) -> None:
+    """Turn random bytes into calls of the FMI functions on several instances, and look after each call whether it kept
+    its promises, under AddressSanitizer and UndefinedBehaviorSanitizer (clang).
+
+    INPUTS, where there are any, are run once instead.
+    """
+    if missing := [path for path in inputs if not path.exists()]:
+        raise FileError(f"{missing[0]}: there is no such file")
+    with tempfile.TemporaryDirectory(prefix="fuzz-", ignore_cleanup_errors=True) as name:
+        corpus = Path(name) / "corpus"
+        pairs = product([chosen] if chosen else VEHICLES, [int(fmi)] if fmi else (2, 3))
+        targets = {(vehicle, version): Path(name) / f"{vehicle}{version}" for vehicle, version in pairs}
+        with ThreadPoolExecutor(jobs) as pool:  # each waits for a compiler
+            list(pool.map(_build, targets, targets.values()))
+        unpack_corpus(corpus)
+        limit, share = seconds or (None if calls else _ROUND), len(targets)
+        for (vehicle, version), target in targets.items():
+            what = f"{vehicle}, FMI {version}.0"
+            try:
+                if inputs:
+                    print(f"{what}: {replay(target, inputs, Path(name)).total():,} calls, nothing found")
+                    continue
+                counts = _campaign(target, corpus, jobs, calls and calls // share, limit and max(1, limit // share))
+                _print_counts(what, *counts)
+            except FindingError as finding:
+                again = [_keep(f"--vehicle {vehicle} --fmi {version}", found) for found in finding.inputs]
+                raise FindingError("\n".join([f"{what}: {finding}", *again])) from None
+        if keep and not inputs:
+            print(f"the corpus now has {pack_corpus(list(targets.values()), corpus)} inputs")
+
+
+def _build(pair: tuple[str, int], target: Path) -> None:
+    vehicle, version = pair
+    build_target(native_content(load_vehicle(VEHICLES[vehicle]), fmi=version).sources, target, version)
+
+
+def _keep(options: str, found: Path) -> str:
+    """Copy an input here, and say what is in it: on a machine that is thrown away, what is printed is what is left."""
+    copy = shutil.copy(found, ".")
+    content = b64encode(found.read_bytes()).decode()
+    return f"again with: python -m verification.fuzzing {options} {copy}, in base64:\n{content}"
+
+
+def _campaign(target: Path, corpus: Path, jobs: int, calls: int | None, seconds: int | None) -> tuple[Counts, float]:
+    total, start, spent = Counts(), time.monotonic(), 0.0
+    while True:
+        length = _ROUND if seconds is None else max(1, min(_ROUND, round(seconds - spent)))
+        total.update(fuzz(target, corpus, corpus.parent, length, jobs))
+        spent = time.monotonic() - start
+        print(f"{spent:6.0f} s {total.total():15,} calls, nothing found", flush=True)
+        if (seconds is not None and spent >= seconds - 0.5) or (calls and total.total() >= calls):
+            return total, spent
+
+
+def _print_counts(what: str, counts: Counts, seconds: float) -> None:
+    title = f"{what}: {counts.total():,} calls in {seconds:.0f} s, nothing found"
+    result = table(title, "function", ("accepted", "refused"))
+    for name in dict.fromkeys(name for name, _ in counts):
+        result.add_row(name, f"{counts[name, True]:,}", f"{counts[name, False]:,}")
+    console().print(result)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code: 0 nothing was found, 1 a finding, 2 bad input, 130 interrupted."""
+    codes = {FindingError: 1, FileError: 2, BuildError: 2, OSError: 2, click.ClickException: 2}
+    return exit_code(
+        "fuzz", lambda: _command(arguments, "python -m verification.fuzzing", standalone_mode=False), codes
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The FMU in independent importers: python -m verification.interoperability."""

@@ -1,0 +1,119 @@
+"""Fly vehicles in independent importers, a manoeuvre each, and compare them with rov_fmu.model.rov."""
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from functools import cache, partial
+from itertools import product
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Column, Table
+
+from .importers import HERE, KITS, VERSIONS, Importer, chosen
+from .install import InstallError, install
+from .manoeuvre import MANOEUVRES
+from .run import Outcome, Verdict, build_fmu, run
+
+STYLES = {Verdict.DIFFERS: "red", Verdict.FAILED: "red", Verdict.NOT_RUN: "yellow"}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code: 0 all that ran agree, 1 one does not, 2 bad arguments."""
+    parser = argparse.ArgumentParser(prog="python -m verification.interoperability", description=__doc__)
+    add = parser.add_argument
+    add(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help=f"importer (see --list) or kit: {', '.join(KITS)}; what is named must "
+        "run (default: all that are installed)",
+    )
+    add("--vehicle", choices=MANOEUVRES, metavar="NAME", help=f"{' or '.join(MANOEUVRES)} (default: both)")
+    add("--fmi", type=int, choices=VERSIONS, help="version of FMI (default: both)")
+    add("--fmu", type=Path, metavar="FILE", help="FMU of that vehicle and version (default: built for this)")
+    add("--install", action="store_true", help="install the kits instead of running (Linux)")
+    add("--list", action="store_true", help="list the importers instead of running them")
+    add(
+        "--tools",
+        type=Path,
+        default=HERE / ".tools",
+        metavar="FOLDER",
+        help="where the importers are installed (default: verification/interoperability/.tools)",
+    )
+    options = parser.parse_args(arguments)
+    try:
+        versions = [options.fmi] if options.fmi else VERSIONS
+        importers = chosen(options.names, versions)
+        if options.fmu and not (options.vehicle and options.fmi):
+            raise LookupError("--fmu goes with --vehicle and --fmi")
+        if options.fmu and not options.fmu.is_file():
+            raise LookupError(f"{options.fmu}: there is no such file")
+    except LookupError as error:
+        print(f"interop: {error.args[0]}", file=sys.stderr)
+        return 2
+    tools, console = options.tools.resolve(), Console(highlight=False)
+    if options.list:
+        for importer in importers:
+            row = f"{importer.name:<18}{importer.kit:<8}FMI {importer.fmi}.0  {importer.title} {importer.version}"
+            print(f"{row}, {importer.interface}")
+        return 0
+    if options.install:
+        # All kits, whether or not one fails.
+        return max([_install(kit, tools, console) for kit in dict.fromkeys(importer.kit for importer in importers)])
+    outcomes = []
+    with tempfile.TemporaryDirectory() as folder:
+        vehicles = [options.vehicle] if options.vehicle else MANOEUVRES
+        built = cache(partial(build_fmu, folder=Path(folder)))
+        for vehicle, importer in product(vehicles, importers):
+            fmu = options.fmu or built(vehicle, importer.fmi)
+            with console.status(f"{importer.title}, FMI {importer.fmi}.0, {importer.interface}: {vehicle}"):
+                outcomes.append(run(importer, fmu, tools, MANOEUVRES[vehicle]))
+    _show(outcomes, console)
+    # What was asked for by name must run.
+    bad = {Verdict.DIFFERS, Verdict.FAILED, *([Verdict.NOT_RUN] if options.names else [])}
+    return int(any(outcome.verdict in bad for outcome in outcomes))
+
+
+def _install(kit: str, tools: Path, console: Console) -> int:
+    try:
+        with console.status(f"installing {kit}"):
+            install(kit, tools, console.print)
+    except InstallError as error:
+        print(f"interop: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _show(outcomes: Sequence[Outcome], console: Console) -> None:
+    """A row for each importer, a column for each vehicle; then what is to be said of one."""
+    vehicles = dict.fromkeys(outcome.vehicle for outcome in outcomes)
+    table = Table(
+        "importer",
+        "version",
+        "FMI",
+        "interface",
+        *(Column(name, justify="right") for name in vehicles),
+        title="The largest difference, 30 s, SI units",
+        title_justify="left",
+    )
+    rows: dict[Importer, list[str]] = {}
+    for outcome in outcomes:
+        shown = "" if outcome.difference is None else f"{outcome.difference:.1e}"
+        if outcome.verdict is not Verdict.AGREES:
+            shown = f"{shown} {outcome.verdict.value}".strip()
+        style = STYLES.get(outcome.verdict, "default")
+        rows.setdefault(outcome.importer, []).append(f"[{style}]{shown}[/]")
+    for importer, cells in rows.items():
+        table.add_row(importer.title, importer.version, f"{importer.fmi}.0", importer.interface, *cells)
+    console.print(table)
+    for outcome in outcomes:
+        if outcome.reason:
+            console.print(f"{outcome.importer.name} {outcome.verdict.value}, {outcome.vehicle}: {outcome.reason}")
+        for line in outcome.log.strip().splitlines()[-15:]:
+            console.print(f"    {line}", markup=False)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,230 @@
+"""The importers: how each is called, what it is to agree to, and how to tell that it is installed."""
+
+import re
+import sys
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+VERSIONS = (2, 3)
+"""Of FMI."""
+HERE = Path(__file__).parent
+RUNNERS = HERE / "runners"
+
+EXACT = 1e-9
+"""Tolerance where the FMU itself takes the steps."""
+SOLVER = 1e-5
+"""Tolerance of a solver with error control, in Model Exchange."""
+SINGLE = 2e-6
+"""Tolerance of outputs in single precision: half a unit in the last place of numbers up to 64."""
+EULER = 1e-3
+"""Tolerance of forward Euler with steps of 0.1 ms."""
+EULER_LATE = 1e-2
+"""The same where thrust lags: when a command jumps, such a step errs in the force by h ΔF / (2 e T) at most, which is
+7e-3 N for 58 N and a lag of 0.15 s."""
+
+
+@dataclass(frozen=True)
+class Importer:
+    """One row of the matrix."""
+
+    name: str
+    """On the command line."""
+    title: str
+    interface: str
+    kit: str
+    """What installs it: python, java or rust."""
+    pin: tuple[str, str]
+    """The file that pins the version, and the package."""
+    proof: str
+    """A file among the tools that exists where this version is installed."""
+    command: tuple[str, ...]
+    """Run in a folder with rov.fmu and the manoeuvre."""
+    tolerance: float | None = EXACT
+    """Of any output at any communication point, in SI units; None: it checks the FMU and runs nothing."""
+    late: float | None = None
+    """The same of a vehicle whose thrust lags behind the commands, where it is more."""
+    programs: tuple[str, ...] = ()
+    """From the system, beside what its kit takes."""
+    fmi: int = 2
+    """The version of the FMU that it loads."""
+
+    @property
+    def version(self) -> str:
+        """The version that is pinned."""
+        return pinned(*self.pin)
+
+    def is_installed(self, tools: Path) -> bool:
+        """Whether this version is among the tools."""
+        return any(tools.glob(self.proof.format(version=self.version)))
+
+    def command_line(self, tools: Path) -> list[str]:
+        """The command with all paths filled in."""
+        paths = {"tools": tools, "runners": RUNNERS, "python": sys.executable}
+        return [part.format(version=self.version, **paths) for part in self.command]
+
+
+def pinned(file: str, package: str) -> str:
+    """The version of a package in a requirements.txt, pom.xml or Cargo.toml."""
+    pattern = rf"^\W*(?:artifactId>)?{re.escape(package)}(?:==|</artifactId>\s*<version>|\s*=\s*\"=)([\w.]+)"
+    match = re.search(pattern, (HERE / file).read_text(), re.MULTILINE)
+    if match is None:
+        raise LookupError(f"{file} does not pin {package}")
+    return match[1]
+
+
+def environment(requirements: str) -> str:
+    """The folder among the tools that holds what a requirements file lists."""
+    return requirements.replace("requirements", "python").removesuffix(".txt")
+
+
+def _python(
+    name: str,
+    title: str,
+    interface: str,
+    package: str,
+    tolerance: float | None = EXACT,
+    programs: tuple[str, ...] = (),
+    requirements: str = "requirements.txt",
+) -> Importer:
+    module, *arguments = name.split("-")
+    place = environment(requirements)
+    proof = f"{place}/lib/python3*/site-packages/{package.replace('-', '_')}-{{version}}.dist-info"
+    command = f"{{tools}}/{place}/bin/python", "-m", f"verification.interoperability.runners.{module}", *arguments
+    return Importer(
+        name, title, interface, "python", (requirements, package), proof, command, tolerance, programs=programs
+    )
+
+
+def _java(
+    name: str,
+    title: str,
+    interface: str,
+    package: str,
+    proof: str,
+    command: tuple[str, ...],
+    tolerance: float | None = EXACT,
+) -> Importer:
+    pin = f"runners/{name}/pom.xml", package
+    return Importer(name, title, interface, "java", pin, f"java/{name}/{proof}", command, tolerance)
+
+
+def _both(*importers: Importer) -> Iterator[Importer]:
+    """Each with an FMU of FMI 2.0 and of FMI 3.0."""
+    for importer in importers:
+        yield from (importer, replace(importer, name=f"{importer.name}-fmi3", fmi=3))
+
+
+def _source(name: str, *options: str) -> tuple[str, ...]:
+    return ("java", *options, "-cp", f"{{tools}}/java/{name}/*", f"{{runners}}/{name}/Fly.java")
+
+
+def _rust(
+    name: str, package: str, interface: str, tolerance: float = EXACT, late: float | None = None, fmi: int = 2
+) -> Importer:
+    pin = f"runners/{package.replace('-', '_')}/Cargo.toml", package
+    proof = f"rust/{package}-{{version}}/debug/fly"
+    command = f"{{tools}}/{proof}", *name.removeprefix(package).split("-")[1:]
+    return Importer(name, package, interface, "rust", pin, proof, command, tolerance, late, fmi=fmi)
+
+
+_CARGO = "runners/fmu_runner/Cargo.toml"
+_FMI_SIM = "rust/fmi-sim-{version}/bin/fmi-sim"
+
+# Not among them: FMI++ (fmipp 2.1.0) and mosaik-fmi 1.1.0, which is built on it, come without binaries for Linux and
+# compile with SUNDIALS 3 only; OMSimulator's package (3.0.0.post198) fetches its binaries from another host as it is
+# installed, so tests/fmu/test_versions.py checks its rule for value references.
+# Jaxonomy's Model Exchange agrees to 4e-6, but takes minutes.
+IMPORTERS = (
+    *_both(
+        _python("fmpy-cs", "FMPy", "CS, state restored", "fmpy"),
+        _python("fmpy-me", "FMPy", "ME, CVode", "fmpy", SOLVER),
+        _python("fmpy-compile", "FMPy", "CS, built by fmpy compile", "fmpy", programs=("cc", "c++", "make")),
+    ),
+    replace(_python("fmpy-events", "FMPy", "CS, Event Mode, steps end early", "fmpy"), fmi=3),
+    _python("libcosim-cs", "libcosim", "CS", "libcosimpy"),
+    _python("libcosim-ssp", "libcosim", "CS, SSP", "libcosimpy"),
+    _python("libcosim-osp", "libcosim", "CS, OSP", "libcosimpy"),
+    *_both(_python("ecos-cs", "Ecos", "CS", "ecospy")),
+    _python("ecos-ssp", "Ecos", "CS, SSP", "ecospy"),
+    *_both(
+        _python("casadi-me", "CasADi", "ME, DaeBuilder, CVODES", "casadi", SOLVER),
+        _python("pathsim-cs", "PathSim", "CS", "pathsim-fmi"),
+        _python("pathsim-me", "PathSim", "ME, RKDP87", "pathsim-fmi", SOLVER),
+    ),
+    _python("jaxonomy", "Jaxonomy", "CS", "jaxonomy"),
+    _python("cofmupy", "CoFmuPy", "CS", "cofmupy", requirements="requirements-cofmupy.txt"),
+    *_both(_python("fmuloader", "fmuloader", "CS, state restored", "fmuloader")),
+    _python("fmugym", "FMUGym", "CS, single precision", "fmugym", SINGLE),
+    *_both(
+        _python("fmucontainer", "fmutool", "CS, container of two ROVs", "fmu-manipulation-toolbox"),
+        replace(
+            _python("fmutool", "fmutool", "-check: schema, rules", "fmu-manipulation-toolbox", None),
+            command=("{tools}/python/bin/fmutool", "-input", "rov.fmu", "-check"),
+        ),
+        _python("schemas", "lxml", "XML schemas", "lxml", None),
+    ),
+    _java("fmi4j", "FMI4j", "CS", "fmi-import", "fmi-import-{version}.jar", _source("fmi4j")),
+    _java(
+        "javafmi",
+        "JavaFMI",
+        "CS, state restored",
+        "fmu-wrapper",
+        "fmu-wrapper-{version}.jar",
+        _source("javafmi", "--add-opens", "java.prefs/java.util.prefs=ALL-UNNAMED"),
+    ),
+    _java(
+        "maestro",
+        "Maestro",
+        "CS, MaBL, state restored",
+        "maestro",
+        "maestro-{version}-jar-with-dependencies.jar",
+        (
+            "{python}",
+            "-m",
+            "verification.interoperability.runners.maestro.fly",
+            "{tools}/java/maestro/maestro-{version}-jar-with-dependencies.jar",
+        ),
+    ),
+    _java(
+        "vdmcheck",
+        "VDMCheck",
+        "static rules",
+        "vdmcheck2",
+        "vdmcheck-{version}/VDMCheck2.sh",
+        ("sh", "{runners}/vdmcheck/check.sh", "{tools}/java/vdmcheck/vdmcheck-{version}"),
+        None,
+    ),
+    *_both(
+        Importer(
+            "fmi-sim-cs", "fmi-sim", "CS", "rust", (_CARGO, "fmi-sim"), _FMI_SIM, ("sh", "{runners}/fmi_sim.sh", "cs")
+        ),
+        Importer(
+            "fmi-sim-me",
+            "fmi-sim",
+            "ME, forward Euler",
+            "rust",
+            (_CARGO, "fmi-sim"),
+            _FMI_SIM,
+            ("sh", "{runners}/fmi_sim.sh", "me"),
+            EULER,
+            EULER_LATE,
+        ),
+    ),
+    _rust("fmi-rs-cs", "fmi-rs", "CS, Event Mode", fmi=3),
+    _rust("fmi-rs-me", "fmi-rs", "ME, forward Euler", EULER, EULER_LATE, fmi=3),
+    _rust("fmu-runner", "fmu-runner", "CS, state restored"),
+)
+
+KITS = tuple(dict.fromkeys(importer.kit for importer in IMPORTERS))
+
+
+def chosen(names: list[str], versions: Collection[int] = VERSIONS) -> list[Importer]:
+    """The importers of these names or kits, all without names, with these versions of FMI. Raises LookupError."""
+    known = {*KITS, *(importer.name for importer in IMPORTERS)}
+    if unknown := [name for name in names if name not in known]:
+        raise LookupError(f"{unknown[0]}: no such importer; there are {', '.join(sorted(known))}")
+    named = [i for i in IMPORTERS if not names or i.name in names or i.kit in names]
+    if idle := set(names) - {name for i in named if i.fmi in versions for name in (i.name, i.kit)}:
+        raise LookupError(f"{min(idle)}: not with this version of FMI")
+    return [i for i in named if i.fmi in versions]

@@ -1,0 +1,187 @@
+"""The manoeuvres that every importer flies, one of each vehicle, and what `rov_fmu.model.rov` makes of them.
+
+Inputs are held over each communication step. A runner finds the FMU as `rov.fmu`, and beside it:
+
+- `parameters.csv`: name, value; to be set before the initialization.
+- `manoeuvre.csv`: a row for each communication point with the inputs of the step that starts there. Where `detour` is
+  1, an importer that can saves the state, takes a step with the commands of `detour.csv` (name, value), and restores:
+  it must leave no trace.
+- `jumps.csv`: the same inputs for tools that interpolate: the corners only, two rows where the inputs jump.
+- `outputs.txt`: the names of the outputs, a line each.
+
+It leaves `result.csv`: time and all outputs at each communication point, at the end of the step that leads there. Of
+several rows for one time the first counts; rows between communication points are allowed.
+"""
+
+import csv
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import cycle
+from math import isfinite
+from pathlib import Path
+
+from rov_fmu.model.layout import AXES
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+POINTS_A_SECOND = 10
+STEP = 1.0 / POINTS_A_SECOND
+TIMES = [n / POINTS_A_SECOND for n in range(301)]
+"""The communication points (s)."""
+DETOUR = 15.0
+
+
+class ResultError(Exception):
+    """A result that cannot be compared, in one line."""
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """What a vehicle is made to do."""
+
+    vehicle: str
+    """Of those that ship."""
+    parameters: Mapping[str, float]
+    """Those that are changed."""
+    phases: Mapping[float, Mapping[str, float]]
+    """From each time (s) on: inputs by name, and parts of the command to every thruster that drives an axis, by the
+    axis's name. The first has none, so that it does not matter when an importer sets the first inputs."""
+
+    @cached_property
+    def rov(self) -> Rov:
+        """The vehicle with its own parameters."""
+        return load_vehicle(SHIPPED[self.vehicle]).rov
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """The names of the outputs."""
+        return (*self.rov.layout.state, *self.rov.layout.thrust)
+
+    def inputs_at(self, time: float) -> dict[str, float]:
+        """All inputs of the step that starts at a time."""
+        layout = self.rov.layout
+        inputs = dict.fromkeys(layout.inputs, 0.0)
+        for name, value in self.phases[max(start for start in self.phases if start <= time)].items():
+            parts = layout.signs(AXES[name]) if name in AXES else {name: 1.0}
+            inputs |= {part: round(inputs[part] + sign * value, 9) for part, sign in parts.items()}
+        return inputs
+
+    def write_files(self, folder: Path) -> None:
+        """Write what the runners read."""
+        layout = self.rov.layout
+        _write(folder / "parameters.csv", ("name", "value"), self.parameters.items())
+        _write(folder / "detour.csv", ("name", "value"), zip(layout.commands, cycle((1.0, -1.0)), strict=False))
+        (folder / "outputs.txt").write_text("".join(f"{name}\n" for name in self.outputs))
+        _write(
+            folder / "manoeuvre.csv",
+            ("time", *layout.inputs, "detour"),
+            ((t, *self.inputs_at(t).values(), int(t == DETOUR)) for t in TIMES),
+        )
+        starts = sorted(self.phases)
+        corners = [
+            (t, self.inputs_at(start))
+            for start, end in zip(starts, [*starts[1:], TIMES[-1]], strict=True)
+            for t in (start, end)
+        ]
+        _write(folder / "jumps.csv", ("time", *layout.inputs), ((t, *inputs.values()) for t, inputs in corners))
+
+    @cached_property
+    def reference(self) -> list[dict[str, float]]:
+        """Time and outputs at each communication point by `rov_fmu.model.rov`."""
+        rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
+        state, rows = dict.fromkeys(rov.layout.state, 0.0), []
+        for time in TIMES:
+            if time > 0.0:
+                state = rov.step(inputs, state, STEP)
+            rows.append({"time": time, **state, **rov.thrust(inputs, state)})
+            inputs = self.inputs_at(time)
+        return rows
+
+    def difference(self, result: Path) -> float:
+        """The largest difference of any output at any communication point, in SI units. Raises ResultError."""
+        try:
+            with result.open(newline="") as file:
+                rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+        except (OSError, TypeError, ValueError, AttributeError) as error:
+            raise ResultError(f"{result.name} cannot be read: {error}") from error
+        if missing := [name for name in ("time", *self.outputs) if not rows or name not in rows[0]]:
+            raise ResultError(f"{result.name} has no column {missing[0]}")
+        largest, remaining = 0.0, iter(rows)
+        for point in self.reference:
+            row = next((row for row in remaining if row["time"] > point["time"] - 1e-6), None)
+            if row is None or row["time"] > point["time"] + 1e-6:
+                raise ResultError(f"{result.name} has no row for t = {point['time']}")
+            if strange := [name for name in self.outputs if not isfinite(row[name])]:
+                raise ResultError(f"{result.name} has {strange[0]} = {row[strange[0]]} at t = {point['time']}")
+            largest = max(largest, *(abs(row[name] - point[name]) for name in self.outputs))
+        return largest
+
+
+def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    with path.open("w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([header, *rows])
+
+
+_CURRENT = {"V_N": 0.3, "V_E": -0.2}
+_LOADS = {"X_ext": -6.0, "Z_ext": 3.0, "N_ext": 0.2, **_CURRENT}
+
+_VIDEORAY = Manoeuvre(
+    "videoray",
+    {
+        "m_rov": 7.2,
+        "I_r": 0.12,
+        "a_d_u": 3.5,
+        "b_d_w": 0.9,
+        "alpha_u": 1.0,
+        "beta_w": 0.7,
+        "alpha_r": 1.1,
+        "beta_r": 0.25,
+    },
+    {
+        0.0: {},
+        1.0: {"surge": 0.3},
+        4.0: {"u_l": 0.7, "u_r": 0.6, "u_t": 0.4},
+        8.0: {"u_l": 0.5, "u_r": 0.2, "u_t": 0.2},
+        11.0: {"yaw": -0.3, "heave": -0.5},
+        14.0: {"u_l": -0.5, "u_r": -0.4, "u_t": -0.2},
+        17.0: {"surge": 0.4, **_LOADS},
+        21.0: {"yaw": 1.0, "heave": 1.0, **_LOADS},
+        25.0: {"surge": -0.2, **_CURRENT},
+        28.0: _CURRENT,
+    },
+)
+
+_HEAVY = Manoeuvre(
+    "bluerov2_heavy",
+    {
+        "m_rov": 14.5,
+        "a_d_v": 190.0,
+        "b_d_r": 0.1,
+        "m_a_u": 7.0,
+        "F_0_w": -1.5,
+        "a_t_t200_reverse": 20.0,
+        "c_0_t200": 0.1,
+        "T_t200": 0.15,
+        "alpha_v": 0.9,
+        "beta_w": 0.7,
+        "alpha_r": 1.1,
+        "beta_r": 0.8,
+    },
+    {
+        0.0: {},
+        1.0: {"surge": 0.4, "heave": 0.3},
+        4.0: {"surge": 0.3, "yaw": 0.15, "heave": 0.2},
+        8.0: {"sway": 0.4, "yaw": -0.25, "heave": 0.07},  # in the dead band
+        11.0: {"surge": -0.5, "sway": -0.2, "yaw": 0.05, "heave": -0.4},
+        14.0: {"sway": -0.4, "yaw": -0.1, "heave": 0.2},
+        17.0: {"surge": 0.35, "sway": 0.1, **_LOADS, "Y_ext": 8.0},
+        21.0: {"yaw": 1.0, "heave": 1.0, **_LOADS, "Y_ext": 8.0},
+        25.0: {"u_1": 0.5, "u_6": -0.3, **_CURRENT},
+        28.0: {"u_2": 0.2, **_CURRENT},
+    },
+)
+
+MANOEUVRES = {manoeuvre.vehicle: manoeuvre for manoeuvre in (_VIDEORAY, _HEAVY)}
+"""By the name of the vehicle."""

@@ -1,0 +1,50 @@
+"""libcosim, its inputs overridden by a manipulator. cs: one slave; ssp: an SSP archive; osp: an OSP configuration; both
+with the parameters in the file."""
+
+import sys
+from functools import partial
+from pathlib import Path
+
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+from libcosimpy.CosimManipulator import CosimManipulator
+from libcosimpy.CosimObserver import CosimObserver
+from libcosimpy.CosimSlave import CosimLocalSlave
+
+from examples.systems import write_osp, write_ssp
+from verification.interoperability.runners.flight import FMU, OUTPUTS, Step, fly, parameters
+from verification.interoperability.runners.system import dive
+
+STEP = 100_000_000  # ns
+
+log_output_level(CosimLogLevel.WARNING)
+match sys.argv[1]:
+    case "cs":
+        execution = CosimExecution.from_step_size(STEP)
+        slave = CosimLocalSlave(fmu_path=FMU, instance_name="rov")  # to be kept as long as the execution
+        execution.add_local_slave(slave)
+    case "ssp":
+        write_ssp(Path("dive.ssp"), dive())
+        execution = CosimExecution.from_ssp_file("dive.ssp", STEP)
+    case "osp":
+        write_osp(Path("OspSystemStructure.xml"), dive())
+        execution = CosimExecution.from_osp_config_file("OspSystemStructure.xml")
+
+rov = execution.slave_index_from_instance_name("rov")
+reference = {variable.name.decode(): variable.reference for variable in execution.slave_variables(rov)}
+if sys.argv[1] == "cs":
+    for name, value in parameters().items():
+        if not execution.real_initial_value(rov, reference[name], value):
+            raise RuntimeError(f"{name} was refused")
+commands, observer = CosimManipulator.create_override(), CosimObserver.create_last_value()
+execution.add_manipulator(commands)
+execution.add_observer(observer)
+
+
+def advance(step: Step) -> None:
+    commands.slave_real_values(rov, [reference[name] for name in step.inputs], list(step.inputs.values()))
+    if not execution.step():
+        raise RuntimeError(f"the step to {step.end} s failed")
+
+
+fly(advance, partial(observer.last_real_values, rov, [reference[name] for name in OUTPUTS]))

@@ -1,0 +1,244 @@
+"""The motion with lag and coupling to some 30 digits, by extrapolation of the midpoint rule (Gragg, Bulirsch, Stoer).
+
+Nothing of rov_fmu/model/ is in it, not even its method: no series, no closed form. The equations of
+verification/references/equations.py are stepped with the signs of the velocities held, and cut where one of them
+reverses, which is found by Newton's method.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gmpy2
+from gmpy2 import mpfr
+from mpmath import mp
+
+from .equations import Equations
+
+Number = Any  # of gmpy2
+Rates = Callable[[Sequence[Number]], list[Number]]
+BITS = 260
+_DIVISIONS = tuple(range(2, 34, 2))
+_TOLERANCE = 1e-33  # of a step
+_SETTLED = 1e-42
+
+
+@dataclass
+class Ended:
+    """States by name, the pose counted from the start; the largest velocities, the ways there and back."""
+
+    state: dict[str, Number]
+    fastest: dict[str, Number]
+    ways: dict[str, Number]
+
+
+class _System:
+    """The equations on lists of numbers: velocities, then x, y, z, psi, then forces."""
+
+    def __init__(self, equations: Equations, psi: float) -> None:
+        self.names = list(equations.axes)
+        self.late = list(equations.lags)
+        self.first_force = len(self.names) + 4
+        self.axes = [
+            (
+                _real(axis.C),
+                [
+                    (n, _real(axis.late[name]))
+                    for n, name in enumerate(self.late, self.first_force)
+                    if axis.late[name] != 0
+                ],
+                [(_real(a), _real(b)) for a, b in (axis.ahead, axis.astern)],
+            )
+            for axis in equations.axes.values()
+        ]
+        self.lags = [(_real(lag.target), _real(lag.T)) for lag in equations.lags.values()]
+        self.psi = mpfr(psi)
+        self.places = [self.names.index(name) if name in self.names else -1 for name in ("u", "v", "w", "r")]
+        self.factors: list[Number] = []
+        if equations.coupled:
+            M_u, M_v, M_r = (equations.inertias[name] for name in ("u", "v", "r"))
+            self.factors = [_real(M_v / M_u), _real(M_u / M_v), _real((M_v - M_u) / M_r)]
+
+    def rates(self, signs: Sequence[int]) -> Rates:
+        """Time derivatives, drag as it is for velocities of these signs."""
+        drags = [drag[sign < 0] for (_, _, drag), sign in zip(self.axes, signs, strict=True)]
+        drags = [(sign * A, B) for (A, B), sign in zip(drags, signs, strict=True)]
+        U, V, W, R = self.places
+        zero, first = mpfr(0), self.first_force
+
+        def of(y: Sequence[Number]) -> list[Number]:
+            found = []
+            for a, (C, late, _) in enumerate(self.axes):
+                A, B = drags[a]
+                found.append(C + sum(gain * y[n] for n, gain in late) - (B + A * y[a]) * y[a])
+            u, v, w, r = (zero if n < 0 else y[n] for n in (U, V, W, R))
+            if self.factors:
+                for n, factor, term in zip((U, V, R), self.factors, (v * r, -u * r, -u * v), strict=True):
+                    found[n] += factor * term
+            s, c = gmpy2.sin_cos(self.psi + y[len(found) + 3])
+            found += [u * c - v * s, u * s + v * c, w, r]
+            found += [(target - F) / T for (target, T), F in zip(self.lags, y[first:], strict=True)]
+            return found
+
+        return of
+
+    def first_step(self, y: Sequence[Number]) -> Number:
+        """A time (s) within which little changes: from longer ones the way back is long."""
+        rates = [1 / T for _, T in self.lags] + [abs(y[n]) for n in self.places if n >= 0]
+        for a, (C, late, drags) in enumerate(self.axes):
+            lags = ((gain, y[n], self.lags[n - self.first_force][0]) for n, gain in late)
+            force = abs(C) + sum(abs(gain) * (abs(now) + abs(target)) for gain, now, target in lags)
+            rates += [B + 2 * A * abs(y[a]) + gmpy2.sqrt(A * force) for A, B in drags] + [gmpy2.sqrt(force)]
+        rates += [factor * sum(abs(x) for x in y[: len(self.names)]) for factor in map(abs, self.factors)]
+        return mpfr(0.1) / (sum(rates) or mpfr("1e-9"))
+
+    def is_settled(self, rates: Sequence[Number], y: Sequence[Number]) -> bool:
+        """Whether all that would still change is far behind the digits asked for."""
+        n, sizes = (
+            len(self.names),
+            [abs(C) + abs(y[a]) * drag[0][1] + y[a] ** 2 * drag[0][0] for a, (C, _, drag) in enumerate(self.axes)],
+        )
+        late = zip(self.lags, y[self.first_force :], strict=True)
+        return all(abs(rate) <= _SETTLED * size for rate, size in zip(rates[:n], sizes, strict=True)) and all(
+            abs(target - F) <= _SETTLED * abs(target) for (target, _), F in late
+        )
+
+
+def _real(number: Any) -> Number:
+    """Of mpmath, to gmpy2."""
+    return mpfr(mp.nstr(number, 90))
+
+
+def _leap(rates: Rates, y: Sequence[Number], start: Sequence[Number], h: Number) -> tuple[list[Number], Number]:
+    """The state after h, and the error against its size; `start` are the rates at y."""
+    rows: list[list[list[Number]]] = []
+    for divisions in _DIVISIONS:
+        step = h / divisions
+        before, now = list(y), [a + step * b for a, b in zip(y, start, strict=True)]
+        twice = 2 * step
+        for _ in range(divisions - 1):
+            before, now = now, [a + twice * b for a, b in zip(before, rates(now), strict=True)]
+        row = [now]
+        for k, coarser in enumerate(reversed(_DIVISIONS[: len(rows)]), 1):
+            weight = mpfr(1) / ((mpfr(divisions) / coarser) ** 2 - 1)
+            row.append([a + (a - b) * weight for a, b in zip(row[-1], rows[-1][k - 1], strict=True)])
+        rows.append(row)
+    best, second = rows[-1][-1], rows[-1][-2]
+    sizes = [abs(a) + abs(b) + abs(h * c) for a, b, c in zip(y, best, start, strict=True)]
+    errors = [abs(a - b) / size for a, b, size in zip(best, second, sizes, strict=True) if size]
+    return best, max(errors, default=mpfr(0))
+
+
+def _signs(system: _System, y: Sequence[Number], h: Number) -> tuple[list[int], Number]:
+    """Of the velocities, of those at rest the sign that they get; and a time after which they have it."""
+    n = len(system.names)
+    signs = [-1 if y[a] < 0 else 1 for a in range(n)]
+    soon = h / 2**24
+    if any(y[a] == 0 for a in range(n)):
+        rates = system.rates(signs)
+        later = _leap(rates, y, rates(y), soon)[0]
+        signs = [signs[a] if y[a] != 0 else -1 if later[a] < 0 else 1 for a in range(n)]
+    return signs, soon
+
+
+def _reversal(rates: Rates, y: Sequence[Number], a: int, low: Number, high: Number) -> tuple[Number, list[Number]]:
+    """When the velocity of an axis is zero between two times at which its signs differ, and the state then."""
+    start = rates(y)
+    t, sign = (low + high) / 2, _leap(rates, y, start, high)[0][a] > 0
+    for _ in range(400):
+        end = _leap(rates, y, start, t)[0]
+        low, high = (low, t) if (end[a] > 0) == sign else (t, high)
+        slope = rates(end)[a]
+        new = t - end[a] / slope if slope else (low + high) / 2
+        if abs(new - t) <= abs(t) * mpfr(2) ** (80 - BITS):
+            break
+        t = new if low < new < high else (low + high) / 2
+    end[a] = mpfr(0)
+    return t, end
+
+
+def _dip(rates: Rates, y: Sequence[Number], end: Sequence[Number], a: int, sign: int, h: Number) -> Number | None:
+    """A time at which a velocity of the same sign at both ends is of the other, where there is one."""
+    start, last = rates(y), rates(end)
+    if not (sign * start[a] < 0 < sign * last[a]) or min(abs(y[a]), abs(end[a])) > h * max(abs(start[a]), abs(last[a])):
+        return None
+    low, high = mpfr(0), h
+    for _ in range(60):
+        t = (low + high) / 2
+        middle = _leap(rates, y, start, t)[0]
+        if sign * middle[a] < 0:
+            return t
+        low, high = (t, high) if sign * rates(middle)[a] < 0 else (low, t)
+    return None
+
+
+def integrate(equations: Equations, state: Mapping[str, float], h: float) -> Ended:
+    """The motion over h seconds, the current left out."""
+    with gmpy2.context(gmpy2.get_context(), precision=BITS):
+        system = _System(equations, state.get("psi", 0.0))
+        n = len(system.names)
+        y = [mpfr(state[name]) for name in system.names] + [mpfr(0)] * 4
+        y += [mpfr(state[f"F_{name}"]) for name in system.late]
+        fastest, ways = [abs(x) for x in y[:n]], [mpfr(0)] * 3
+        rest = mpfr(h)
+        size = system.first_step(y)
+        while rest > 0:
+            size = min(size, rest)
+            signs, soon = _signs(system, y, size)
+            rates = system.rates(signs)
+            start = rates(y)
+            if system.is_settled(start, y):
+                y = _carried_on(system, y, start, rest)
+                ways = [way + abs(rest * rate) for way, rate in zip(ways, _pace(start, n), strict=True)]
+                break
+            end, error = _leap(rates, y, start, size)
+            scale = mpfr(0.9) * (mpfr(_TOLERANCE) / error) ** (mpfr(1) / 31) if error else mpfr(4)
+            if not gmpy2.is_finite(error) or error > _TOLERANCE:
+                size *= max(mpfr(0.1), scale) if gmpy2.is_finite(error) else mpfr(0.1)
+                continue
+            taken = size
+            for a in range(n):
+                low = soon if y[a] == 0 else mpfr(0)
+                high = taken if signs[a] * end[a] < 0 else _dip(rates, y, end, a, signs[a], taken)
+                if high is not None and high > low:
+                    taken, end = _reversal(rates, y, a, low, high)
+            moved = [b - a for a, b in zip(y[n : n + 4], end[n : n + 4], strict=True)]
+            steps = (gmpy2.hypot(moved[0], moved[1]), abs(moved[2]), abs(moved[3]))
+            ways = [way + step for way, step in zip(ways, steps, strict=True)]
+            y, rest = end, rest - taken
+            fastest = [max(a, abs(b)) for a, b in zip(fastest, y, strict=False)]
+            size *= min(mpfr(4), scale)
+        names = [*system.names, "x", "y", "z", "psi", *(f"F_{name}" for name in system.late)]
+        planar, depth, turn = map(_plain, ways)
+        return Ended(
+            {name: _plain(x) for name, x in zip(names, y, strict=True)},
+            {name: _plain(x) for name, x in zip(system.names, fastest, strict=True)},
+            {"x": planar, "y": planar, "z": depth, "psi": turn},
+        )
+
+
+def _pace(rates: Sequence[Number], n: int) -> tuple[Number, Number, Number]:
+    return gmpy2.hypot(rates[n], rates[n + 1]), rates[n + 2], rates[n + 3]
+
+
+def _carried_on(system: _System, y: Sequence[Number], rates: Sequence[Number], h: Number) -> list[Number]:
+    """A steady motion: straight, or on a circle."""
+    n = len(system.names)
+    r, end = rates[n + 3], list(y)
+    ahead, aside = rates[n], rates[n + 1]
+    if r == 0:
+        end[n], end[n + 1] = y[n] + ahead * h, y[n + 1] + aside * h
+    else:  # x' and y' turn by r h
+        s, c = gmpy2.sin_cos(r * h)
+        end[n] += (ahead * s - aside * (1 - c)) / r
+        end[n + 1] += (aside * s + ahead * (1 - c)) / r
+    end[n + 2] += rates[n + 2] * h
+    end[n + 3] += r * h
+    for place, (target, _) in enumerate(system.lags, system.first_force):
+        end[place] = target
+    return end
+
+
+def _plain(number: Number) -> Any:
+    """Of gmpy2, to mpmath."""
+    return mp.mpf(f"{number:.70e}")
