@@ -87,9 +87,9 @@ def run_process(program: str, main: Callable[[], int]) -> int:
 
 def _end_interrupted(program: str) -> None:
     """End all child processes, clean up, say so in one line, and end the process without waiting for any thread."""
-    from rov_fmu.io.interrupts import UNDIVIDED, clean_up_everything
+    from rov_fmu.io.interrupts import UNINTERRUPTED, clean_up_everything
 
-    with UNDIVIDED:  # no other thread begins or says anything more
+    with UNINTERRUPTED:  # no other thread begins or says anything more
         try:
             _kill_children()
             _say(program, "; ".join([_INTERRUPTED, *clean_up_everything()]), 130)
@@ -119,9 +119,9 @@ def _kill_children() -> None:
 
 
 def _say(program: str, message: str, code: int) -> int:
-    from rov_fmu.io.interrupts import UNDIVIDED
+    from rov_fmu.io.interrupts import UNINTERRUPTED
 
-    with UNDIVIDED:
+    with UNINTERRUPTED:
         for line in message.splitlines():
             print(f"{program}: {line}", file=sys.stderr)
     return code

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parent.parent
 REFIT = SHIPPED["videoray_refit"]
 TESTS = REFIT.parent / "tank_tests"
 """The tank tests that ship."""
-BARE = ROOT / "fuzz" / "bare.toml"
+BARE = ROOT / "verification" / "fuzzing" / "bare.toml"
 """A vehicle that is built soon: one axis, one thruster."""
 ALONE = re.sub(r"^(data|pictures) = .*\n", "", VIDEORAY.read_text(encoding="utf-8"), flags=re.M)
 """The VideoRay's vehicle file without the folders beside it."""

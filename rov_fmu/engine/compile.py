@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fat_macho import FatWriter
 
-from rov_fmu.io.interrupts import UNDIVIDED, cleaned_up, temporary_folder
+from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
 from rov_fmu.io.messages import brief
 from rov_fmu.io.paths import FMU_SRC
 
@@ -184,7 +184,7 @@ class _Compilers:
 
     def end(self) -> None:
         """Kill them, with the processes that they have started, and start no more."""
-        with UNDIVIDED:
+        with UNINTERRUPTED:
             self._ended = True
             for process in self._running:
                 _kill(process)
@@ -202,7 +202,7 @@ class _Compilers:
 
     def _run(self, command: Sequence[str], folder: str, longest: float | None) -> tuple[int, str]:
         """Run the compiler once. Raises TimeoutExpired, once it is killed, if it takes longer than `longest`."""
-        with UNDIVIDED:
+        with UNINTERRUPTED:
             if self._ended:
                 raise BuildError("interrupted")
             process = subprocess.Popen(
@@ -220,7 +220,7 @@ class _Compilers:
             process.communicate()
             raise
         finally:
-            with UNDIVIDED:
+            with UNINTERRUPTED:
                 self._running.remove(process)
         return process.returncode, output.decode(errors="replace").strip()
 

@@ -17,7 +17,7 @@ import numpy as np
 from rov_fmu.fmu.experiments import Carried, Experiment
 from rov_fmu.fmu.unpacking import unpack_fmu
 from rov_fmu.io.file_kinds import FMU, check_suffix
-from rov_fmu.io.interrupts import UNDIVIDED, ctrl_c_withheld, temporary_folder
+from rov_fmu.io.interrupts import UNINTERRUPTED, ctrl_c_withheld, temporary_folder
 from rov_fmu.io.messages import FileError, ProofError, brief, one_line
 from rov_fmu.io.time_series import Series
 
@@ -106,7 +106,7 @@ def _apart(folder: str, interface: str, experiments: Sequence[Experiment]) -> Ge
     spawn = get_context("spawn")
     here, there = spawn.Pipe(duplex=False)
     process = spawn.Process(target=_send_findings, args=(there, folder, interface, experiments), daemon=True)
-    with UNDIVIDED, ctrl_c_withheld():
+    with UNINTERRUPTED, ctrl_c_withheld():
         process.start()
     there.close()
     try:

@@ -11,7 +11,7 @@ from math import isfinite, sqrt
 
 from rov_fmu.fmu.experiments import FOLDER, NAME
 from rov_fmu.io.templates import render
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Meta
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Declaration
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -235,7 +235,7 @@ def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> l
     return found
 
 
-def _moving(rows: Sequence[_Row], variables: Mapping[str, Meta]) -> list[_Row]:
+def _moving(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> list[_Row]:
     """The variables that do not stay at zero but for rounding."""
     names = [
         name

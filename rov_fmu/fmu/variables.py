@@ -12,7 +12,7 @@ from typing import Any
 
 from rov_fmu.io.templates import render
 from rov_fmu.model.dependencies import dependencies_of
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Layout, Meta
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Declaration, Layout
 from rov_fmu.model.rov import Rov
 
 
@@ -93,30 +93,32 @@ class Variable:
 # ---- What each derivative is ---------------------------------------------------------------------------------------
 
 
-def _derivatives(layout: Layout) -> dict[str, Meta]:
+def _derivatives(layout: Layout) -> dict[str, Declaration]:
     """The derivative of every state."""
-    found: dict[str, Meta] = {}
+    found: dict[str, Declaration] = {}
     for axis in (form.axis for form in layout.axes):
-        found[axis.velocity] = Meta(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {axis.equations[1]}")
+        found[axis.velocity] = Declaration(
+            f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {axis.equations[1]}"
+        )
     if layout.has(SURGE, SWAY):
         found["x"] = _over_ground(layout, "northward", "V_N", {"u": "+ u cos ψ", "v": "- v sin ψ"})
         found["y"] = _over_ground(layout, "eastward", "V_E", {"u": "+ u sin ψ", "v": "+ v cos ψ"})
     if layout.has(HEAVE):
-        found["z"] = Meta("m/s", "Rate of change of depth, w")
+        found["z"] = Declaration("m/s", "Rate of change of depth, w")
     if layout.has(YAW):
-        found["psi"] = Meta("rad/s", "Rate of change of heading, r")
+        found["psi"] = Declaration("rad/s", "Rate of change of heading, r")
     for name in layout.lagging:
-        found[name] = Meta("N/s", f"Rate of change of {name}, (F(c) - F) / T")
+        found[name] = Declaration("N/s", f"Rate of change of {name}, (F(c) - F) / T")
     return found
 
 
-def _over_ground(layout: Layout, way: str, current: str, terms: Mapping[str, str]) -> Meta:
+def _over_ground(layout: Layout, way: str, current: str, terms: Mapping[str, str]) -> Declaration:
     """A horizontal velocity over ground: a term of each velocity; ψ is 0 without yaw."""
     turns = layout.has(YAW)
     words = [
         term if turns else f"+ {v}" for v, term in terms.items() if v in layout.velocities and (turns or "cos" in term)
     ]
-    return Meta("m/s", f"Velocity over ground {way}, {' '.join([*words, f'+ {current}']).removeprefix('+ ')}")
+    return Declaration("m/s", f"Velocity over ground {way}, {' '.join([*words, f'+ {current}']).removeprefix('+ ')}")
 
 
 def variables(rov: Rov) -> tuple[Variable, ...]:
@@ -124,7 +126,7 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
     layout = rov.layout
     result: list[Variable] = []
 
-    def add(name: str, meta: Meta, causality: str, variability: str, **rest: Any) -> None:
+    def add(name: str, meta: Declaration, causality: str, variability: str, **rest: Any) -> None:
         bounds = {end: x for end, x in (("minimum", meta.minimum), ("maximum", meta.maximum)) if isfinite(x)}
         given = {"display_unit": UNITS[meta.unit].display, **bounds, **rest}
         result.append(Variable(name, len(result), meta.description, meta.unit, causality, variability, **given))

@@ -11,7 +11,7 @@ from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_
 from rov_fmu.identify.points.thrust_fit import ThrustFit
 from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.usable import is_pushed
-from rov_fmu.io.toml_file import listed
+from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import REVERSE
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
@@ -43,7 +43,7 @@ def on_axis(result: AxisResult, base: Rov, thrust: Mapping[str, ThrustFit]) -> I
         yield from _on_drag(result, result.estimate)
     if still := sorted({p.command for p in result.points if not is_pushed(axis, base, p.command)}):
         yield (
-            f"what moves at {listed(f'{c:.0%}' for c in still)} is left out: the thrust curve gives no push there "
+            f"what moves at {join_names(f'{c:.0%}' for c in still)} is left out: the thrust curve gives no push there "
             f"(its dead band, or a slip in one of the tables)"
         )
     steady = [p for p in result.points if p.quantity == "V_ss"]
@@ -125,8 +125,8 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[str]:
     if fit.disagreement:
         low, high = (f"{end(fit.disagreement.values()):.2g}" for end in (min, max))
         yield (
-            f"the recordings disagree on {listed(fit.disagreement)} by more than their residuals explain, so the model "
-            f"misses something; intervals are {low if low == high else f'{low} to {high}'} times as wide for it"
+            f"the recordings disagree on {join_names(fit.disagreement)} by more than their residuals explain, so the "
+            f"model misses something; intervals are {low if low == high else f'{low} to {high}'} times as wide for it"
         )
     held_out = fit.held_out
     if held_out.fit < 0.5 * held_out.possible:

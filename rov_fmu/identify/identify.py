@@ -30,13 +30,13 @@ from rov_fmu.identify.slips.search import beta_out_of_range
 from rov_fmu.identify.together import Together
 from rov_fmu.identify.usable import check_push, check_recording, check_slips, is_pushed
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.toml_file import listed
+from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import TankTests
+from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
-from rov_fmu.vehicle.sense import no_thrust
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
 Progress = Callable[[str, float], None]
@@ -59,7 +59,7 @@ def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Id
     doubts: list[str] = []
     for curves, axes in connected(given.rov.layout):
         on_progress(
-            f"recordings of {listed(axis.name for axis in axes)}", 0.9 * len(results) / len(given.rov.layout.axes)
+            f"recordings of {join_names(axis.name for axis in axes)}", 0.9 * len(results) / len(given.rov.layout.axes)
         )
         tested = {curve.name: thrust[curve.name] for curve in curves if curve.name in thrust}
         doubts += check_slips(tests, axes, found.rov)
@@ -209,7 +209,7 @@ def _fit_recordings(
     except NoFitError as error:
         raise DataFileError(f"{tests.folder}: {error}") from None
     except MotionError as error:
-        files = listed(dict.fromkeys(recording.file for recording in recordings))
+        files = join_names(dict.fromkeys(recording.file for recording in recordings))
         raise DataFileError(f"{tests.folder}: {files}: {error}: check units and signs") from None
 
 

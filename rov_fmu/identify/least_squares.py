@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import least_squares
 
-from rov_fmu.model.layout import AXIS, CURVE, TUNING, Kind
+from rov_fmu.model.layout import AXIS, CURVE, TUNING, CoefficientKind
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
@@ -104,7 +104,7 @@ class Solution:
     """Of the residuals without the loss."""
 
 
-def kind_of(name: str) -> Kind:
+def kind_of(name: str) -> CoefficientKind:
     """What is declared of a coefficient of any curve or axis."""
     return next(kind for key, kind in (CURVE | AXIS | TUNING).items() if name.startswith(f"{key}_"))
 

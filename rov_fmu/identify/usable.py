@@ -9,7 +9,7 @@ from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.recordings.runs import prepare
 from rov_fmu.identify.slips.search import slips
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.toml_file import listed
+from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.columns import VELOCITIES
@@ -29,7 +29,7 @@ def is_pushed(axis: Axis, base: Rov, command: float) -> bool:
 def check_push(folder: Path, axis: Axis, base: Rov, commands: Sequence[float]) -> None:
     """Where the vehicle moves, its thrusters must push it there, at one command at least. Raises DataFileError."""
     if commands and not any(is_pushed(axis, base, c) for c in commands):
-        names = listed(c.name for c in curves_of(base.layout, axis))
+        names = join_names(c.name for c in curves_of(base.layout, axis))
         raise DataFileError(
             f"{folder}: the thrust curve of {names} gives {base.force(axis, commands[0]):.3g} {axis.load} at a command "
             f"of {commands[0]:.0%}, where {axis.name} needs a push that way"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rov_fmu.io.messages import InputError, brief, did_you_mean, shown
-from rov_fmu.model.layout import Layout, Meta
+from rov_fmu.model.layout import Declaration, Layout
 from rov_fmu.vehicle.quantity import within
 
 if TYPE_CHECKING:
@@ -36,7 +36,9 @@ def checked_times(key: str, given: ArrayLike, least: int = 2, *, may_stand: bool
     return times
 
 
-def checked_values(what: str, given: Mapping[str, Any], metas: Mapping[str, Meta], *, many: bool) -> dict[str, Array]:
+def checked_values(
+    what: str, given: Mapping[str, Any], metas: Mapping[str, Declaration], *, many: bool
+) -> dict[str, Array]:
     """Return values by name as arrays, if each name is known and each value is within its bounds.
 
     For many vehicles each value is a number, or an array of one number for each vehicle, which becomes a column.
@@ -103,7 +105,7 @@ def _names(what: str, given: Any) -> list[str]:
     return list(given.keys())
 
 
-def _check_name(what: str, name: str, metas: Mapping[str, Meta]) -> None:
+def _check_name(what: str, name: str, metas: Mapping[str, Declaration]) -> None:
     if name not in metas:
         kind = {"inputs": "input", "start": "state", "coefficients": "coefficient"}[what]
         only = f", only {', '.join(metas)}" if len(metas) < 20 else ""

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from threading import RLock
 
-UNDIVIDED = RLock()
+UNINTERRUPTED = RLock()
 """A thread holds this lock while it does something that an interrupt must not cut in two. See `clean_up_everything`."""
 _PENDING: list[tuple[Callable[[], object], str]] = []
 """What is still to be cleaned up, in the order in which it began, with what the user should know then."""
@@ -29,12 +29,12 @@ def cleaned_up(clean: Callable[[], object], note: str = "") -> Iterator[None]:
     The line about the interrupt ends with the note.
     """
     entry = clean, note
-    with UNDIVIDED:
+    with UNINTERRUPTED:
         _PENDING.append(entry)
     try:
         yield
     finally:
-        with UNDIVIDED:
+        with UNINTERRUPTED:
             _PENDING.remove(entry)
             clean()
 
@@ -43,7 +43,7 @@ def cleaned_up(clean: Callable[[], object], note: str = "") -> Iterator[None]:
 def temporary_folder(prefix: str) -> Iterator[str]:
     """Make a folder for temporary files; it is removed when the block ends or an interrupt ends the process."""
     with ExitStack() as stack:
-        with UNDIVIDED:
+        with UNINTERRUPTED:
             folder = tempfile.mkdtemp(prefix=prefix)
             stack.enter_context(cleaned_up(partial(_remove, folder)))
         yield folder
@@ -52,8 +52,8 @@ def temporary_folder(prefix: str) -> Iterator[str]:
 def clean_up_everything() -> list[str]:
     """Clean up whatever is pending, the latest first, because the process is about to end; return the notes.
 
-    Whoever calls this holds UNDIVIDED until the process has ended. So what another thread does undivided is finished
-    before, and no thread begins anything more that would have to be cleaned up.
+    The caller holds UNINTERRUPTED until the process has ended. Every other thread has therefore finished what must not
+    be interrupted, and none begins anything more that would have to be cleaned up.
     """
     for clean, _ in reversed(_PENDING):
         with suppress(Exception):

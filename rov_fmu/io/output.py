@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from rov_fmu.io.interrupts import UNDIVIDED, cleaned_up
+from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
 
 
 class WriteError(OSError):
@@ -69,7 +69,7 @@ def write_whole(*outputs: Output) -> None:
     check_targets(output.path for output in outputs)
     with ExitStack() as drafts:
         ready = [(output.path, _draft(output, drafts)) for output in outputs]
-        with UNDIVIDED:
+        with UNINTERRUPTED:
             for path, draft in ready:
                 with _errors_about(path):
                     draft.replace(path)
@@ -79,7 +79,7 @@ def _draft(output: Output, drafts: ExitStack) -> Path:
     """A file beside the target, checked and ready to take its place; gone with the stack."""
     path = output.path
     with _errors_about(path):
-        with UNDIVIDED:
+        with UNINTERRUPTED:
             descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:40]}.", suffix=".part", dir=path.parent)
             draft = Path(name)
             drafts.enter_context(cleaned_up(partial(draft.unlink, missing_ok=True)))

@@ -49,9 +49,9 @@ def read_checked(path: Path, kind: str, model: type[Checked], failure: type[File
     """Read a TOML file of the given kind and form; `folder` and what else is given is the context. Raises `failure`."""
     data = read_toml(path, failure)
     check_keys(path, data, kind, failure)
-    checked, problems = check(data, model, folder=path.parent, **context)
+    checked, problems = validate(data, model, folder=path.parent, **context)
     if checked is None:
-        raise failure(*lines_on(path, told(problems, data, model)))
+        raise failure(*lines_on(path, problem_lines(problems, data, model)))
     return checked
 
 
@@ -66,7 +66,7 @@ def read_toml(path: Path, failure: type[FileError]) -> Toml:
         raise failure(f"{path}: not TOML: {brief(str(error))}{': ' if line else ''}{brief(line)}") from error
 
 
-def check(data: Toml, model: type[Checked], **context: object) -> tuple[Checked | None, list[ErrorDetails]]:
+def validate(data: Toml, model: type[Checked], **context: object) -> tuple[Checked | None, list[ErrorDetails]]:
     """The data in the given form, or every problem with them."""
     try:
         return model.model_validate(data, context=context), []
@@ -74,7 +74,7 @@ def check(data: Toml, model: type[Checked], **context: object) -> tuple[Checked 
         return None, error.errors(include_url=False)
 
 
-def pair(value: object) -> object:
+def as_tuple(value: object) -> object:
     """TOML knows lists, not tuples."""
     return tuple(value) if isinstance(value, list) else value
 
@@ -102,7 +102,7 @@ _COMPARED = 100
 """Unknown keys of a table that a missing key is compared with."""
 
 
-def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> Iterator[str]:
+def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> Iterator[str]:
     """A line for each problem with the file: key, value, what is allowed.
 
     After the first ten the lines are empty, for it takes long to find what each of many unknown keys may mean.
@@ -123,18 +123,18 @@ def told(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> I
             yield _told(problem, data, form)
 
 
-def listed(names: Iterable[str]) -> str:
+def join_names(names: Iterable[str]) -> str:
     """Names in a line, and neither endlessly many nor endless ones."""
     some = [name or repr("") for name in names]
     return brief(", ".join(some[:_LISTED]) + (", ..." if len(some) > _LISTED else ""), 200)
 
 
-def line(key: str, reason: str, *value: object) -> str:
+def key_line(key: str, reason: str, *value: object) -> str:
     """What is wrong with a key, or with its value."""
     return f"{brief(key)} = {shown(value[0])}: {reason}" if value else f"{brief(key)}: {reason}"
 
 
-def label(table: str, entries: Sequence[Any], number: int) -> str:
+def entry_label(table: str, entries: Sequence[Any], number: int) -> str:
     """An entry of a list of tables by its name, or by its number from 1 where it has none of its own."""
     names = [entry.get("name") if isinstance(entry, dict) else None for entry in entries]
     name = names[number] if number < len(names) else None
@@ -211,7 +211,7 @@ def _told(problem: ErrorDetails, data: Toml, form: _Form) -> str:
     if kind == "extra_forbidden":
         allowed = form.keys(place[:-1])
         hint = did_you_mean(str(place[-1]), allowed)
-        only = "" if hint and len(allowed) > _LISTED else f", only {listed(allowed)}"
+        only = "" if hint and len(allowed) > _LISTED else f", only {join_names(allowed)}"
         return f"{key}: there is no such key{only}{hint}"
     reason = _reason(problem, form)
     *above, last = place
@@ -254,7 +254,7 @@ def _key(place: _Place, data: Any) -> str:
     for step in place:
         if step == "[key]":  # pydantic's word for a problem with a key itself
             continue
-        words = label(words, data, step) if isinstance(step, int) else f"{words}.{step or repr('')}"
+        words = entry_label(words, data, step) if isinstance(step, int) else f"{words}.{step or repr('')}"
         try:
             data = data[step]
         except (LookupError, TypeError):

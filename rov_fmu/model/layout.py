@@ -72,7 +72,7 @@ def coefficient_name(key: str, of: str) -> str:
 
 
 @dataclass(frozen=True)
-class Meta:
+class Declaration:
     """What a coefficient or a variable is: SI unit, words, the values allowed (both ends included), a typical size."""
 
     unit: str
@@ -84,7 +84,7 @@ class Meta:
 
 
 @dataclass(frozen=True)
-class Kind:
+class CoefficientKind:
     """One kind of coefficient. In `unit` and `words` stands {...} for what it belongs to."""
 
     unit: str
@@ -94,44 +94,52 @@ class Kind:
     needed: bool = True
     tunable: bool = False
 
-    def meta(self, **of: str) -> Meta:
+    def meta(self, **of: str) -> Declaration:
         """Of one curve or axis."""
         words = self.words.format(**of)
-        return Meta(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
+        return Declaration(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
 
 
 BODY = {
-    "m_rov": Kind("kg", "Mass m_rov, (3a), (3b)", 1e-3, 1e6),
-    "I_r": Kind("kg.m2", "Moment of inertia about the vertical axis I_r, (3c)", 1e-6, 1e6),
+    "m_rov": CoefficientKind("kg", "Mass m_rov, (3a), (3b)", 1e-3, 1e6),
+    "I_r": CoefficientKind("kg.m2", "Moment of inertia about the vertical axis I_r, (3c)", 1e-6, 1e6),
 }
 ARM = {
-    "R": Kind("m", "Distance from the centre of mass to a rear thruster R, (4)", 0.0, 100.0),
-    "gamma": Kind("rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, pi / 2),
+    "R": CoefficientKind("m", "Distance from the centre of mass to a rear thruster R, (4)", 0.0, 100.0),
+    "gamma": CoefficientKind("rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, pi / 2),
 }
 CURVE = {
-    "a_t": Kind("N", "Quadratic thrust coefficient a_t of the {curve}, {equation}", -1e6, 1e6),
-    "b_t": Kind("N", "Linear thrust coefficient b_t of the {curve}, {equation}", -1e6, 1e6),
-    "a_t_reverse": Kind("N", "Quadratic thrust coefficient a_t of the {curve} in reverse", -1e6, 1e6, needed=False),
-    "b_t_reverse": Kind("N", "Linear thrust coefficient b_t of the {curve} in reverse", -1e6, 1e6, needed=False),
-    "c_0": Kind("1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False),
-    "c_0_reverse": Kind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, needed=False),
-    "T": Kind("s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False),
+    "a_t": CoefficientKind("N", "Quadratic thrust coefficient a_t of the {curve}, {equation}", -1e6, 1e6),
+    "b_t": CoefficientKind("N", "Linear thrust coefficient b_t of the {curve}, {equation}", -1e6, 1e6),
+    "a_t_reverse": CoefficientKind(
+        "N", "Quadratic thrust coefficient a_t of the {curve} in reverse", -1e6, 1e6, needed=False
+    ),
+    "b_t_reverse": CoefficientKind(
+        "N", "Linear thrust coefficient b_t of the {curve} in reverse", -1e6, 1e6, needed=False
+    ),
+    "c_0": CoefficientKind(
+        "1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False
+    ),
+    "c_0_reverse": CoefficientKind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, False),
+    "T": CoefficientKind(
+        "s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False
+    ),
 }
 AXIS = {
-    "m_a": Kind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
-    "a_d": Kind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}, {drag}", 0.0, 1e6),
-    "b_d": Kind("{load}.s/{length}", "Linear drag coefficient b_d of {axis}, {drag}", 0.0, 1e6),
-    "a_d_reverse": Kind(
+    "m_a": CoefficientKind("{inertia}", "Added {what} m_a of {axis}", 0.0, 1e6, needed=False),
+    "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis}, {drag}", 0.0, 1e6),
+    "b_d": CoefficientKind("{load}.s/{length}", "Linear drag coefficient b_d of {axis}, {drag}", 0.0, 1e6),
+    "a_d_reverse": CoefficientKind(
         "{load}.s2/{length}2", "Quadratic drag coefficient a_d of {axis} {negative}", 0.0, 1e6, needed=False
     ),
-    "b_d_reverse": Kind(
+    "b_d_reverse": CoefficientKind(
         "{load}.s/{length}", "Linear drag coefficient b_d of {axis} {negative}", 0.0, 1e6, needed=False
     ),
-    "F_0": Kind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
+    "F_0": CoefficientKind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
 }
 TUNING = {
-    "alpha": Kind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
-    "beta": Kind("1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}", 0.0, 1e3, False, True),
+    "alpha": CoefficientKind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
+    "beta": CoefficientKind("1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}", 0.0, 1e3, False, True),
 }
 """1 where the file does not give it."""
 LEAST_BETA = 1e-3
@@ -278,9 +286,9 @@ class Layout:
     # -- declared --
 
     @cached_property
-    def coefficients(self) -> dict[str, Meta]:
+    def coefficients(self) -> dict[str, Declaration]:
         """Name to what it is, in the order of the FMU's variables."""
-        found: dict[str, Meta] = {}
+        found: dict[str, Declaration] = {}
         if self.has(SURGE, SWAY, HEAVE):
             found["m_rov"] = BODY["m_rov"].meta()
         if self.has(YAW):
@@ -302,66 +310,66 @@ class Layout:
         return found
 
     @cached_property
-    def commands(self) -> dict[str, Meta]:
+    def commands(self) -> dict[str, Declaration]:
         """The inputs that drive the thrusters: fractions of full thrust."""
         if not self.mix:
             return {f"u_{t.name}": _command(t) for t in self.thrusters}
         return {
-            f"u_{name}": Meta("1", f"Command u_{name} of {_listed(gains)}; saturates at ±1", -1.0, 1.0)
+            f"u_{name}": Declaration("1", f"Command u_{name} of {_listed(gains)}; saturates at ±1", -1.0, 1.0)
             for name, gains in self.mix.items()
         }
 
     @cached_property
-    def inputs(self) -> dict[str, Meta]:
+    def inputs(self) -> dict[str, Declaration]:
         """Commands, loads from outside, current."""
         found = dict(self.commands)
         for form in self.axes:
             axis = form.axis
             example = "ballast" if axis is HEAVE else "contact"
             words = f"Load from outside in {axis.name} (tether, {example}), positive {axis.positive}"
-            found[axis.external] = Meta(axis.load, words, nominal=1.0 if axis is YAW else 10.0)
+            found[axis.external] = Declaration(axis.load, words, nominal=1.0 if axis is YAW else 10.0)
         if self.has(SURGE, SWAY):
             for name, way in (("V_N", "northward"), ("V_E", "eastward")):
-                found[name] = Meta("m/s", f"Velocity of a steady horizontal current, {way}")
+                found[name] = Declaration("m/s", f"Velocity of a steady horizontal current, {way}")
         return found
 
     @cached_property
-    def velocities(self) -> dict[str, Meta]:
+    def velocities(self) -> dict[str, Declaration]:
         """The first states: velocities through the water."""
         found = {}
         for axis in (form.axis for form in self.axes):
             through = "" if axis is YAW else " through the water"
             words = f"{axis.name.capitalize()} velocity {axis.velocity}{through}, positive {axis.positive}"
-            found[axis.velocity] = Meta(axis.unit, words)
+            found[axis.velocity] = Declaration(axis.unit, words)
         return found
 
     @cached_property
-    def pose(self) -> dict[str, Meta]:
+    def pose(self) -> dict[str, Declaration]:
         """The states that follow: position and heading, as far as the axes move them."""
         found = {}
         if self.has(SURGE, SWAY):
-            found["x"] = Meta("m", "Position north x", nominal=10.0)
-            found["y"] = Meta("m", "Position east y", nominal=10.0)
+            found["x"] = Declaration("m", "Position north x", nominal=10.0)
+            found["y"] = Declaration("m", "Position east y", nominal=10.0)
         if self.has(HEAVE):
-            found["z"] = Meta("m", "Depth z, positive down", nominal=10.0)
+            found["z"] = Declaration("m", "Depth z, positive down", nominal=10.0)
         if self.has(YAW):
-            found["psi"] = Meta("rad", "Heading ψ, positive north to east, not wrapped")
+            found["psi"] = Declaration("rad", "Heading ψ, positive north to east, not wrapped")
         return found
 
     @cached_property
-    def lagging(self) -> dict[str, Meta]:
+    def lagging(self) -> dict[str, Declaration]:
         """The last states: forces that follow the commands late."""
         return {
             f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters if self.curve_of[t.name].has_lag
         }
 
     @cached_property
-    def state(self) -> dict[str, Meta]:
+    def state(self) -> dict[str, Declaration]:
         """All states."""
         return self.velocities | self.pose | self.lagging
 
     @cached_property
-    def thrust(self) -> dict[str, Meta]:
+    def thrust(self) -> dict[str, Declaration]:
         """What is calculated of the thrusters, before the tuning α: their forces, unless they are states, and the
         torque of the thrusters of each curve."""
         found = {
@@ -373,7 +381,7 @@ class Layout:
             of = f"of the {curve.description}" if curve.description else curve.name
             by_arm = any(t.curve == curve.name and t.position is None for t in self.drivers(YAW))
             words = f"Torque τ_{curve.name} of the thrusters with the curve {of}{', (4)' if by_arm else ''}"
-            found[f"tau_{curve.name}"] = Meta("N.m", f"{words}, positive bow to starboard")
+            found[f"tau_{curve.name}"] = Declaration("N.m", f"{words}, positive bow to starboard")
         return found
 
     @cached_property
@@ -390,7 +398,7 @@ class Layout:
         return tuple(curve for curve in self.curves if curve.name in driving)
 
 
-def metas_of(axis: Axis) -> dict[str, Meta]:
+def metas_of(axis: Axis) -> dict[str, Declaration]:
     """Every coefficient that an axis can have, by its key."""
     drag, motion = axis.equations
     words = {
@@ -424,15 +432,15 @@ def _pushes(direction: tuple[float, float, float]) -> str:
     return " and ".join(words)
 
 
-def _command(thruster: Thruster) -> Meta:
+def _command(thruster: Thruster) -> Declaration:
     words = f"Command u_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
-    return Meta("1", f"{words}, positive {_pushes(thruster.direction)}; saturates at ±1", -1.0, 1.0)
+    return Declaration("1", f"{words}, positive {_pushes(thruster.direction)}; saturates at ±1", -1.0, 1.0)
 
 
-def _thrust(thruster: Thruster, curve: Curve) -> Meta:
+def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
     words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
     share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
-    return Meta("N", f"{words}, {curve.equation}{share}, positive {_pushes(thruster.direction)}")
+    return Declaration("N", f"{words}, {curve.equation}{share}, positive {_pushes(thruster.direction)}")
 
 
 def arm(R: float, gamma: float) -> float:

@@ -14,13 +14,23 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on
 from rov_fmu.io.paths import inside
-from rov_fmu.io.toml_file import Strict, Toml, check, folder_of, line, listed, pair, read_toml, told
-from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Axis, Layout, Meta, VehicleAxis, coefficient_name
+from rov_fmu.io.toml_file import (
+    Strict,
+    Toml,
+    as_tuple,
+    folder_of,
+    join_names,
+    key_line,
+    problem_lines,
+    read_toml,
+    validate,
+)
+from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Axis, Declaration, Layout, VehicleAxis, coefficient_name
+from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.form import Head, Validity
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Finite, Quantity
 from rov_fmu.vehicle.schema import NOT_GIVEN, OpenHardware, where
-from rov_fmu.vehicle.sense import as_far_as_readable, incoherent, misgiven
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
@@ -38,7 +48,7 @@ def _window(window: tuple[float, float]) -> tuple[float, float]:
     return window
 
 
-_Window = Annotated[tuple[Finite, Finite], BeforeValidator(pair), AfterValidator(_window)]
+_Window = Annotated[tuple[Finite, Finite], BeforeValidator(as_tuple), AfterValidator(_window)]
 
 
 def _vehicle(name: str, info: ValidationInfo) -> str:
@@ -120,8 +130,8 @@ def read_said(path: Path) -> tuple[Said | None, list[str]]:
     Raises VehicleFileError where there is no such file, or it is not TOML.
     """
     data, context = read_toml(path, VehicleFileError), {"folder": path.parent}
-    _, problems = check(data, _RovFile, **context)
-    file, lost = as_far_as_readable(data, problems, context, _Readable)
+    _, problems = validate(data, _RovFile, **context)
+    file, lost = readable_parts(data, problems, context, _Readable)
     base, of_base = _base(file, path.parent)
     of_hardware = [*_hardware(file, lost, data)]
     said, mistakes = None, of_hardware
@@ -131,7 +141,7 @@ def read_said(path: Path) -> tuple[Said | None, list[str]]:
         strange = {("known", name) for name in said.named if name not in everything}
         problems = [problem for problem in problems if problem["loc"][:2] not in strange]
         mistakes = [*_mistakes(file, lost, said)]
-    return said, lines_on(path, (*told(problems, data, _RovFile), *mistakes)) + of_base
+    return said, lines_on(path, (*problem_lines(problems, data, _RovFile), *mistakes)) + of_base
 
 
 def _base(file: _Readable, folder: Path) -> tuple[Vehicle | None, list[str]]:
@@ -148,14 +158,14 @@ def _hardware(file: _Readable, lost: set[str], data: Toml) -> Iterator[str]:
     there = [name for name in _OF_BASE if name in data]
     if "base" in data:
         for name in there:
-            yield line(name, "must not stand beside base, which has its own; coefficients may be given in [known]")
+            yield key_line(name, "must not stand beside base, which has its own; coefficients may be given in [known]")
         return
     for name in ("curves", "thruster") if there else ():
         if name not in data or data[name] in ({}, []):
             form = "[[thruster]]" if name == "thruster" else "[curves.<name>]"
-            yield line(name, f"this table is missing, and there is {there[0]}: write {form}")
+            yield key_line(name, f"this table is missing, and there is {there[0]}: write {form}")
     if {"curves", "thruster"} <= data.keys():
-        yield from incoherent(file, lost, data)
+        yield from check_names_and_keys(file, lost, data)
 
 
 def _said(path: Path, file: _Readable, data: Toml, base: Vehicle | None) -> Said:
@@ -222,27 +232,31 @@ def _mistakes(file: _Readable, lost: set[str], said: Said) -> Iterator[str]:
     layout, everything = said.layout, _everything(said.layout)
     strange = [name for name in said.named if name not in everything]
     for name in strange[:MOST]:
-        yield line(f"known.{name}", f"there is no such coefficient of this vehicle{did_you_mean(name, everything)}")
+        yield key_line(f"known.{name}", f"there is no such coefficient of this vehicle{did_you_mean(name, everything)}")
     yield from ("" for _ in strange[MOST:])
-    yield from misgiven("known", {name: q for name, q in file.known.items() if name in everything}, everything)
+    yield from check_quantities("known", {name: q for name, q in file.known.items() if name in everything}, everything)
     tables = dict(where(layout))
     for name in (name for name, q in file.quantities(layout).items() if q and name in file.known):
-        yield line(f"known.{name}", f"is given in [{'.'.join(tables[name][:-1])}] too")
+        yield key_line(f"known.{name}", f"is given in [{'.'.join(tables[name][:-1])}] too")
     if "known" not in lost:
         yield from _halves(file, said)
     windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.kinds]
     for name in file.windows:
         if name not in windows:
-            yield line(f"windows.{name}", f"there is no such key, only {listed(windows)}{did_you_mean(name, windows)}")
+            yield key_line(
+                f"windows.{name}", f"there is no such key, only {join_names(windows)}{did_you_mean(name, windows)}"
+            )
     curves = [curve.name for curve in layout.curves]
     for name in said.lag:
         if name not in curves:
-            yield line("fit.lag", f"there is no such curve, only {listed(curves)}{did_you_mean(name, curves)}", name)
+            yield key_line(
+                "fit.lag", f"there is no such curve, only {join_names(curves)}{did_you_mean(name, curves)}", name
+            )
         elif (T := coefficient_name("T", name)) in said.named:
-            yield line("fit.lag", f"{T} is given, so it cannot be fitted too", name)
+            yield key_line("fit.lag", f"{T} is given, so it cannot be fitted too", name)
 
 
-def _everything(layout: Layout) -> dict[str, Meta]:
+def _everything(layout: Layout) -> dict[str, Declaration]:
     """Every coefficient that the vehicle could have."""
     return replace(
         layout,
@@ -257,7 +271,7 @@ def _halves(file: _Readable, said: Said) -> Iterator[str]:
     for one, other in _pairs(said.layout):
         if one in given and other not in given and (one in file.known or not one.endswith(REVERSE)):
             place = "known" if one in file.known else ".".join(tables[one][:-1])
-            yield line(place, f"{one} is given, but {other} is not")
+            yield key_line(place, f"{one} is given, but {other} is not")
 
 
 def _pairs(layout: Layout) -> Iterator[tuple[str, str]]:

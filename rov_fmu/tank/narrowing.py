@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rov_fmu.io.toml_file import line, listed
+from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import (
     ARM,
     AXES,
@@ -15,14 +15,14 @@ from rov_fmu.model.layout import (
     SWAY,
     YAW,
     Axis,
-    Kind,
+    CoefficientKind,
     Layout,
     coefficient_name,
 )
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.given import Said
 from rov_fmu.vehicle.form import Head
-from rov_fmu.vehicle.geometry import impossible, places
+from rov_fmu.vehicle.geometry import check_layout, places
 from rov_fmu.vehicle.quantity import Quantity
 
 UNKNOWN = 1.0
@@ -84,7 +84,7 @@ def narrowed(said: Said, tested: Tested, folder: Path) -> tuple[Given | None, li
     layout = _narrow(wide, axes)
     if not layout.axes:
         return None, [f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"], []
-    unplaced = [*places(_with(wide, axes))] or [*impossible(layout)]
+    unplaced = [*places(_with(wide, axes))] or [*check_layout(layout)]
     mistakes = [f"{said.path}: {words}" for words in (*unplaced, *_missing(said, layout, known))]
     mistakes += [f"{folder}: {words}" for words in _too_little(said, tested, layout, known)]
     if mistakes or said.head is None:
@@ -137,7 +137,7 @@ def _kept(said: Said, tested: Tested) -> dict[str, Quantity]:
 def _without(layout: Layout, known: Collection[str]) -> Layout:
     """Without the coefficients that a vehicle need not have, where they are not known."""
 
-    def left(keys: tuple[str, ...], kinds: Mapping[str, Kind], of: str) -> tuple[str, ...]:
+    def left(keys: tuple[str, ...], kinds: Mapping[str, CoefficientKind], of: str) -> tuple[str, ...]:
         return tuple(key for key in keys if kinds[key].needed or coefficient_name(key, of) in known)
 
     axes = tuple(replace(form, keys=left(form.keys, AXIS, form.axis.velocity)) for form in layout.axes)
@@ -176,8 +176,8 @@ def _narrow(layout: Layout, axes: Collection[Axis]) -> Layout:
 def _left_out(said: Said, tested: Tested, layout: Layout) -> Iterator[str]:
     """What the vehicle was said to have, or was tested, and is not there."""
     if axes := [name for name in said.axes if name not in layout.kinds]:
-        drag = listed(AXES[name].coefficient(key) for name in axes for key in ("a_d", "b_d"))
-        yield f"{listed(axes)}: neither tested nor known ({drag}), so the vehicle has no {' and no '.join(axes)}"
+        drag = join_names(AXES[name].coefficient(key) for name in axes for key in ("a_d", "b_d"))
+        yield f"{join_names(axes)}: neither tested nor known ({drag}), so the vehicle has no {' and no '.join(axes)}"
     if said.layout.coupled and not layout.coupled:
         yield "surge, sway and yaw are not coupled, which needs all three"
     for name, (file, _) in tested.thrust.items():
@@ -194,7 +194,7 @@ def _missing(said: Said, layout: Layout, known: Collection[str]) -> Iterator[str
     needed |= dict.fromkeys(ARM, YAW) if layout.has_arm else {}
     for name in layout.coefficients:
         if name in needed and name not in {*known, *said.named}:
-            yield line(f"known.{name}", f"this key is missing, and the vehicle has {needed[name].name}")
+            yield key_line(f"known.{name}", f"this key is missing, and the vehicle has {needed[name].name}")
 
 
 def _too_little(said: Said, tested: Tested, layout: Layout, known: Collection[str]) -> Iterator[str]:

@@ -130,7 +130,7 @@ class _Found:
             self.recordings.setdefault(recording.axis.name, []).append(recording)
 
     def _name(self, path: Path) -> tuple[str, str]:
-        """Kind of test, and the curve or axis it is of; no axis where a log tells itself."""
+        """CoefficientKind of test, and the curve or axis it is of; no axis where a log tells itself."""
         curves = [curve.name for curve in self.layout.curves] if self.layout else None
         kind, of = _parts(path.stem.lower(), curves)
         if path.suffix.lower() in _LOGS:

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from rov_fmu.io.output import is_same
 from rov_fmu.io.paths import inside, inside_or_shipped
-from rov_fmu.io.toml_file import Strict, folder_of, pair
+from rov_fmu.io.toml_file import Strict, as_tuple, folder_of
 from rov_fmu.vehicle.quantity import Name, Text
 
 _RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)
@@ -101,7 +101,7 @@ class Validity(Strict):
     """Strongest thruster command over which the model was identified, a fraction of full thrust."""
     command_min: Annotated[_Command, AfterValidator(_below)]
     """Weakest one."""
-    limits: Annotated[tuple[Text, ...], BeforeValidator(pair)] = ()
+    limits: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
     """What was found of this vehicle that the model leaves out, in sentences; they stand in the FMU's documentation."""
 
     @property
@@ -126,7 +126,7 @@ class Made(Strict):
     """How."""
     inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
     """File name to SHA-256 of every input."""
-    warnings: Annotated[tuple[Text, ...], BeforeValidator(pair)] = ()
+    warnings: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
     """What the data do not determine, in sentences."""
     report: Annotated[Text, AfterValidator(_report)] | None = None
     """The report, a file beside this one; a build puts it into the FMU."""

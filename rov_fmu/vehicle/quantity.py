@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
-from rov_fmu.io.toml_file import Strict, pair, table_of
-from rov_fmu.model.layout import Meta
+from rov_fmu.io.toml_file import Strict, as_tuple, table_of
+from rov_fmu.model.layout import Declaration
 
 
 def _printable(text: str) -> str:
@@ -43,7 +43,7 @@ Symbol = Annotated[str, AfterValidator(_symbol), WithJsonSchema({"type": "string
 
 Interval = Annotated[
     tuple[Finite, Finite],
-    BeforeValidator(pair),
+    BeforeValidator(as_tuple),
     WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
 ]
 """[low, high] in a TOML file."""
@@ -66,7 +66,7 @@ class Quantity(Strict):
     """95 % confidence: [low, high] around the value."""
 
 
-def within(value: float, meta: Meta) -> float:
+def within(value: float, meta: Declaration) -> float:
     """The value, if it is within the bounds of its coefficient."""
     if not meta.minimum <= value <= meta.maximum:
         unit = "" if meta.unit == "1" else f" {meta.unit}"
@@ -74,7 +74,7 @@ def within(value: float, meta: Meta) -> float:
     return value
 
 
-def quantity(name: str, meta: Meta) -> Any:
+def quantity(name: str, meta: Declaration) -> Any:
     """A quantity in the unit and within the bounds of its coefficient."""
     bounds = {"type": "number", "minimum": meta.minimum, "maximum": meta.maximum}
     fields: dict[str, Any] = {

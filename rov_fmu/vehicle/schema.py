@@ -6,9 +6,21 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from rov_fmu.io.toml_file import DOCUMENTED, Strict, pair, table_of
+from rov_fmu.io.toml_file import DOCUMENTED, Strict, as_tuple, table_of
 from rov_fmu.model import layout
-from rov_fmu.model.layout import ARM, AXES, AXIS, BODY, CURVE, TUNING, Axis, Kind, Layout, Meta, VehicleAxis
+from rov_fmu.model.layout import (
+    ARM,
+    AXES,
+    AXIS,
+    BODY,
+    CURVE,
+    TUNING,
+    Axis,
+    CoefficientKind,
+    Declaration,
+    Layout,
+    VehicleAxis,
+)
 from rov_fmu.vehicle.form import FileHead, Made, Validity
 from rov_fmu.vehicle.quantity import Finite, Name, Quantity, Symbol, Text, not_blank, quantity
 
@@ -24,7 +36,7 @@ _MOST_COEFFICIENTS = 1000
 
 
 def _coefficients(
-    name: str, metas: Mapping[str, Meta], kinds: Mapping[str, Kind] | None = None, words: str = ""
+    name: str, metas: Mapping[str, Declaration], kinds: Mapping[str, CoefficientKind] | None = None, words: str = ""
 ) -> Any:
     """A table with a coefficient a key; those are needed that are needed by their kind, if these are given."""
     fields: dict[str, Any] = {}
@@ -37,18 +49,18 @@ def _coefficients(
     return table_of(f"_{name}", Strict, fields, words)
 
 
-def given(table: Strict, kinds: Mapping[str, Kind]) -> dict[str, Quantity]:
+def given(table: Strict, kinds: Mapping[str, CoefficientKind]) -> dict[str, Quantity]:
     """The coefficients that a table of the file gives, by key."""
     return {key: q for key in kinds if (q := getattr(table, key)) is not None}
 
 
-def keys(table: Strict, kinds: Mapping[str, Kind]) -> tuple[str, ...]:
+def keys(table: Strict, kinds: Mapping[str, CoefficientKind]) -> tuple[str, ...]:
     """The coefficients that a vehicle has by a table of the file: those needed, and those given."""
     has = given(table, kinds)
     return tuple(key for key, kind in kinds.items() if key in has or kind.needed)
 
 
-def _opened(table: Any, kinds: Mapping[str, Kind]) -> Any:
+def _opened(table: Any, kinds: Mapping[str, CoefficientKind]) -> Any:
     """A table none of whose coefficients is needed."""
     fields: dict[str, Any] = {
         key: (field.annotation | None, Field(None, description=field.description))
@@ -117,7 +129,7 @@ _FARTHEST = 100.0  # m, from the centre of mass
 def _vector(vector: object) -> object:
     if not isinstance(vector, list) or len(vector) != 3:
         raise ValueError("must be three numbers: forward, starboard, down")
-    return pair(vector)
+    return as_tuple(vector)
 
 
 def _near(vector: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.special import ndtri, stdtrit
 
-from rov_fmu.model.layout import TUNING, Meta
+from rov_fmu.model.layout import TUNING, Declaration
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.schema import Estimated
 
@@ -163,7 +163,7 @@ def quantile(degrees_of_freedom: float) -> float:
 _NORMAL = quantile(inf)
 
 
-def _reach(name: str, value: float, interval: tuple[float, float], meta: Meta) -> float:
+def _reach(name: str, value: float, interval: tuple[float, float], meta: Declaration) -> float:
     """Half the interval, or where a bound cuts it the other side of it; of a factor the value times the logarithm's."""
     (low, high), by_logarithm = interval, is_factor(name) and value > 0.0
     sides = [value * log(high / value) if by_logarithm else high - value] if high < meta.maximum else []

@@ -11,13 +11,13 @@ from typing_extensions import Self
 
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
 from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, shown
-from rov_fmu.io.toml_file import check, line, read_toml, told
+from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
 from rov_fmu.vehicle.form import PICTURES, TABLES, Head
 from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
-from rov_fmu.vehicle.sense import as_far_as_readable, no_thrust, nonsense
 
 if TYPE_CHECKING:
     from rov_fmu.vehicle.uncertainty import Uncertainty
@@ -196,10 +196,13 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         raise VehicleFileError(f"{path}: format: this key is missing: write format = {FORMAT}")
     if data["format"] != FORMAT:  # all else in the file may then have another meaning
         reason = f"must be {FORMAT}, the only version of the vehicle file"
-        raise VehicleFileError(f"{path}: {line('format', reason, data['format'])}")
+        raise VehicleFileError(f"{path}: {key_line('format', reason, data['format'])}")
     context = {"folder": path.parent, "coming": coming}
-    file, problems = check(data, File, **context)
-    mistakes = [*told(problems, data, File), *nonsense(*as_far_as_readable(data, problems, context, Parts), data)]
+    file, problems = validate(data, File, **context)
+    mistakes = [
+        *problem_lines(problems, data, File),
+        *check_parts(*readable_parts(data, problems, context, Parts), data),
+    ]
     if file is None or mistakes:
         raise VehicleFileError(*lines_on(path, mistakes))
     head, made, layout = file.vehicle, file.provenance, file.layout

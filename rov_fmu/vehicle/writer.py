@@ -13,8 +13,8 @@ from rov_fmu.io.output import Output, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.seal import sealed
-from rov_fmu.io.toml_file import line
-from rov_fmu.model.layout import Curve, Meta, Thruster
+from rov_fmu.io.toml_file import key_line
+from rov_fmu.model.layout import Curve, Declaration, Thruster
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -153,7 +153,7 @@ def _moved(document: Any, source: Path, path: Path) -> Output:
                 document[table][key] = name_of(inside_or_shipped(source.parent, name), path.parent)
             except ValueError as error:
                 reason = f"must be inside the folder of the new file: write that beside {source}, or leave this key out"
-                raise VehicleFileError(f"{path}: {line(f'{table}.{key}', reason, str(name))}") from error
+                raise VehicleFileError(f"{path}: {key_line(f'{table}.{key}', reason, str(name))}") from error
     return _checked(path, tomlkit.dumps(document))
 
 
@@ -204,7 +204,7 @@ def _estimated(row: Estimated) -> InlineTable:
     return _inline_of(entry | ({"correlation": _inline_of(shares)} if shares else {}))
 
 
-def _inline(value: float, meta: Meta, source: str, interval: list[float] | None = None) -> InlineTable:
+def _inline(value: float, meta: Declaration, source: str, interval: list[float] | None = None) -> InlineTable:
     ends = {"interval": interval} if interval else {}
     return _inline_of({"value": value, "unit": meta.unit, **ends, "source": source})
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify.effects.coupling import EAST, NORTH
-from rov_fmu.identify.effects.extras import Extra, Kind
+from rov_fmu.identify.effects.extras import EffectKind, Extra
 from rov_fmu.identify.recordings.limits import NoFitError, limits, refuse_nonsense
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
@@ -87,8 +87,8 @@ def test_what_only_nonsense_fits_is_one_line() -> None:
         refuse_nonsense(TRUTH, model.data, NAMES, extras, x)
 
 
-@pytest.mark.parametrize("kind", get_args(Kind))
-def test_every_effect_has_words(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", get_args(EffectKind))
+def test_every_effect_has_words(kind: EffectKind) -> None:
     assert acting(Effect(kind, FILE, "m/s", 0.1, None, kept=True))
 
 

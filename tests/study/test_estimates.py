@@ -163,7 +163,7 @@ WRONG: dict[str, tuple[Vehicle, dict[str, Variable], dict[str, Any]]] = {
 @pytest.mark.parametrize("words", WRONG)
 def test_what_does_not_fit_is_a_line(words: str) -> None:
     vehicle, has, told = WRONG[words]
-    (said,) = _estimates(vehicle, has, **told)[1].nonsense()
+    (said,) = _estimates(vehicle, has, **told)[1].check()
     assert said.startswith(words)
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rov_fmu.io.messages import FileError
 from rov_fmu.tank.given import ROV_FILE
 from rov_fmu.tank.tank_tests import load_tank_tests
-from rov_fmu.vehicle.geometry import impossible
+from rov_fmu.vehicle.geometry import check_layout
 from tests.damage import changed_toml, fuzz
 from tests.folders import (
     BLUEROV2,
@@ -251,7 +251,7 @@ def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int,
             check_lines(str(error), folder)
             return
         layout = given.rov.layout
-        assert [*impossible(layout)] == []
+        assert [*check_layout(layout)] == []
         assert {"surge", "yaw"} <= layout.kinds.keys()
         assert given.rov.coefficients.keys() == layout.coefficients.keys() >= given.known.keys()
         assert all(isfinite(value) for value in given.rov.coefficients.values())

@@ -184,7 +184,7 @@ def test_numbers_have_three_digits_and_a_unit() -> None:
 @in_plain_c
 def test_one_command_prints_it_all(tmp_path: Path) -> None:
     picture = tmp_path / "cost_error.svg"
-    command = [sys.executable, "-m", "benchmarks", "--quick", "--picture", str(picture)]
+    command = [sys.executable, "-m", "verification.benchmarks", "--quick", "--picture", str(picture)]
     printed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, encoding="utf-8").stdout
     for part in (
         "Velocities and pose, turning",

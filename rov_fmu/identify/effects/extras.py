@@ -9,7 +9,7 @@ from rov_fmu.model.layout import AXES, HEAVE, REVERSE, Axis, coefficient_name
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 
-Kind = Literal[
+EffectKind = Literal[
     "load", "delay", "current", "current north", "current east", "lag", "dead band", "reverse thrust", "reverse drag"
 ]
 
@@ -20,7 +20,7 @@ class Extra:
     along the axis or north and east, the lag or the dead band of a curve's thrusters; thrust or drag in reverse, as a
     ratio to the other direction's."""
 
-    kind: Kind
+    kind: EffectKind
     of: str
     """An axis, or one recording by its file, or a curve."""
     axis: str = ""

@@ -22,7 +22,7 @@ from rov_fmu.identify.least_squares import (
 from rov_fmu.identify.points.curve_fit import CurveFit
 from rov_fmu.model.layout import REVERSE, Curve
 from rov_fmu.tank.arrays import Array, Flags
-from rov_fmu.vehicle.sense import no_thrust
+from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import quantile
 
 _DIGITS = 1e-5  # of the strongest force: no scale resolves less

@@ -5,7 +5,7 @@ from math import exp, log
 
 import numpy as np
 
-from rov_fmu.identify.effects.extras import Extra, Kind
+from rov_fmu.identify.effects.extras import EffectKind, Extra
 from rov_fmu.identify.least_squares import bounds
 from rov_fmu.identify.recordings.runs import PreparedRecording, axes_of
 from rov_fmu.model.layout import REVERSE, Axis
@@ -17,7 +17,7 @@ _LEAST_BETA = 1e-3
 _LOAD = 1.5  # of the strongest thrust: against more no vehicle is driven
 _DRAG = 20.0  # of what would hold the strongest thrust at the highest velocity seen
 
-_EXTRAS: dict[Kind, tuple[float, float]] = {
+_EXTRAS: dict[EffectKind, tuple[float, float]] = {
     "delay": (-2.0, 5.0),
     "current": (-3.0, 3.0),
     "current north": (-3.0, 3.0),

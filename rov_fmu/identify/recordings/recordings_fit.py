@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from rov_fmu.identify.driving import curves_of
-from rov_fmu.identify.effects.extras import Extra, Kind
+from rov_fmu.identify.effects.extras import EffectKind, Extra
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.response_fit import response_band
 from rov_fmu.identify.recordings.held_out import HeldOut
@@ -25,7 +25,7 @@ _DISAGREEMENT = 3.0
 class Effect:
     """Something beside thrust, drag and β that acts in the recordings, or was looked for in vain."""
 
-    kind: Kind
+    kind: EffectKind
     of: str
     """An axis, one recording by its file, or a curve."""
     unit: str

@@ -7,7 +7,7 @@ import numpy as np
 
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.effects.coupling import EAST, NORTH, is_in_flow
-from rov_fmu.identify.effects.extras import Extra, Kind
+from rov_fmu.identify.effects.extras import EffectKind, Extra
 from rov_fmu.identify.least_squares import covariance
 from rov_fmu.identify.recordings.residual_analysis import ResidualAnalysis
 from rov_fmu.identify.recordings.runs import PreparedRecording, axes_of
@@ -32,7 +32,7 @@ def candidates(
     yield from (Extra("lag", name) for name in curves if name in lag)
     for axis in axes:
         recordings = [d.recording for d in data if d.axis is axis]
-        kinds: tuple[Kind, ...] = ("load", "delay")
+        kinds: tuple[EffectKind, ...] = ("load", "delay")
         for kind in kinds:
             if kind == "delay" or axis.coefficient("F_0") not in known:
                 yield Extra(kind, axis.name)

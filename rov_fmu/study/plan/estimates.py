@@ -6,7 +6,7 @@ from math import isclose
 
 import numpy as np
 
-from rov_fmu.io.toml_file import line
+from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.model import Variable, unsettable
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.vehicle.uncertainty import NOTHING, Uncertainty
@@ -41,23 +41,23 @@ class Estimates:
         told = {name: {"value": value, "error": error} for name, value, error in numbers}
         return {_KEY: {"estimates": told, "correlation": self._part.correlation.tolist()}} if told else {}
 
-    def nonsense(self) -> Iterator[str]:
+    def check(self) -> Iterator[str]:
         """What does not fit the plan or the FMU, a line each."""
         plan, groups = self._plan, self._part.groups
         if self._vehicle and not self._vehicle.intervals:
-            yield line(_KEY, "no coefficient of this vehicle has an interval", plan.vary_from)
+            yield key_line(_KEY, "no coefficient of this vehicle has an interval", plan.vary_from)
         elif self._vehicle and not self.names and not plan.vary:
-            yield line(_KEY, "nothing varies, for [set] gives all that has an interval there", plan.vary_from)
+            yield key_line(_KEY, "nothing varies, for [set] gives all that has an interval there", plan.vary_from)
         if self.names and plan.sampler == "grid":
-            yield line(_KEY, "a grid needs values or a range, and what is estimated has none", plan.vary_from)
+            yield key_line(_KEY, "a grid needs values or a range, and what is estimated has none", plan.vary_from)
         for name, value in zip(self.names, self._part.values.tolist(), strict=True):
             if reason := unsettable(name, self._has):
-                yield line(_KEY, reason, plan.vary_from)
+                yield key_line(_KEY, reason, plan.vary_from)
             elif reason := self._has[name].wrong(value):
-                yield line(_KEY, f"the {name} of this vehicle {reason} in the FMU", plan.vary_from)
+                yield key_line(_KEY, f"the {name} of this vehicle {reason} in the FMU", plan.vary_from)
         if plan.sampler == "saltelli" and len(self.names) > len(groups) + len(plan.vary) == 1:
             reason = "Sobol indices tell apart what is independent, and all that varies is correlated"
-            yield line("sampler", reason, plan.sampler)
+            yield key_line("sampler", reason, plan.sampler)
 
     def warnings(self) -> Iterator[str]:
         """What the results have in them that a reader may not expect, a sentence each."""

@@ -15,7 +15,7 @@ from typing_extensions import Self
 from rov_fmu.io.file_kinds import PLAN, check_suffix
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.paths import inside
-from rov_fmu.io.toml_file import Strict, folder_of, line, pair, read_checked
+from rov_fmu.io.toml_file import Strict, as_tuple, folder_of, key_line, read_checked
 from rov_fmu.study.plan.figures import read_expression
 from rov_fmu.vehicle.quantity import Finite, not_blank
 
@@ -44,8 +44,8 @@ def _some(given: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-_Limits = Annotated[tuple[Finite, Finite], BeforeValidator(pair), AfterValidator(_increasing)]
-_List = Annotated[tuple[Finite, ...], BeforeValidator(pair), AfterValidator(_some)]
+_Limits = Annotated[tuple[Finite, Finite], BeforeValidator(as_tuple), AfterValidator(_increasing)]
+_List = Annotated[tuple[Finite, ...], BeforeValidator(as_tuple), AfterValidator(_some)]
 
 
 class Normal(Strict):
@@ -125,7 +125,7 @@ def _as_number(given: Any) -> Any:
 
 
 def _points(given: Any) -> Any:
-    return tuple(map(pair, given)) if isinstance(given, list) else given
+    return tuple(map(as_tuple, given)) if isinstance(given, list) else given
 
 
 def _in_order(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
@@ -213,7 +213,7 @@ def _ascending(times: tuple[float, ...]) -> tuple[float, ...]:
 class Keep(Strict):
     """The trajectories that are kept; without this table none are, and figures alone remain."""
 
-    outputs: Annotated[tuple[str, ...], BeforeValidator(pair), AfterValidator(_some), AfterValidator(_once)]
+    outputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_some), AfterValidator(_once)]
     """Names of variables."""
     every: Positive | None = None
     """s, from the start on; a multiple of the step. Every step where neither this nor `at` is given."""
@@ -314,24 +314,26 @@ def load_plan(path: Path) -> Plan:
     check_suffix(path, PLAN, PlanError)
     plan = read_checked(path, PLAN, Plan, PlanError)
     if (plan.fmu is None) == (plan.vehicle is None):
-        raise PlanError(*(f"{path}: {words}" for words in ("must have either fmu or vehicle", *nonsense(plan))))
+        raise PlanError(*(f"{path}: {words}" for words in ("must have either fmu or vehicle", *check_plan(plan))))
     return plan
 
 
-def nonsense(plan: Plan) -> Iterator[str]:
+def check_plan(plan: Plan) -> Iterator[str]:
     """What does not go together, in a line each."""
     if plan.stop_time <= plan.start_time:
-        yield line("stop_time", f"must be after start_time = {plan.start_time:g}", plan.stop_time)
+        yield key_line("stop_time", f"must be after start_time = {plan.start_time:g}", plan.stop_time)
     elif not _whole((plan.stop_time - plan.start_time) / plan.step):
-        yield line("stop_time", f"must be a whole number of steps of {plan.step:g} s after the start", plan.stop_time)
+        yield key_line(
+            "stop_time", f"must be a whole number of steps of {plan.step:g} s after the start", plan.stop_time
+        )
     elif plan.steps > _MOST_STEPS:
-        yield line("step", f"must divide a run into at most {_MOST_STEPS} steps", plan.step)
+        yield key_line("step", f"must divide a run into at most {_MOST_STEPS} steps", plan.step)
     elif plan.keep:
         yield from _unreachable(plan, plan.keep)
     if plan.sampler == "grid" and plan.runs is not None:
-        yield line("runs", "a grid has as many as it has points; leave this out", plan.runs)
+        yield key_line("runs", "a grid has as many as it has points; leave this out", plan.runs)
     if plan.sampler == "grid" and (points := prod(len(way.choices or ()) for way in plan.vary.values())) > _MOST_RUNS:
-        yield line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {points:.3g}")
+        yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {points:.3g}")
     if plan.sampler != "grid" and plan.runs is None:
         yield "runs: this key is missing"
     if not plan.keep and not plan.figures:
@@ -341,13 +343,13 @@ def nonsense(plan: Plan) -> Iterator[str]:
 def _unreachable(plan: Plan, keep: Keep) -> Iterator[str]:
     """Times to keep that no step ends at."""
     if keep.every is not None and not _whole(keep.every / plan.step):
-        yield line("keep.every", f"must be a multiple of step = {plan.step:g}", keep.every)
+        yield key_line("keep.every", f"must be a multiple of step = {plan.step:g}", keep.every)
     elif keep.every is not None and keep.every > plan.stop_time - plan.start_time:
-        yield line("keep.every", "must not be longer than a run", keep.every)
+        yield key_line("keep.every", "must not be longer than a run", keep.every)
     for time in keep.at or ():
         if plan.step_at(time) is None:
             told = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
-            yield line("keep.at", told, list(keep.at or ()))
+            yield key_line("keep.at", told, list(keep.at or ()))
             return
 
 

@@ -12,13 +12,13 @@ import numpy.typing as npt
 from rov_fmu.io.messages import FileError, did_you_mean, lines_on, shown
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.time_series import series
-from rov_fmu.io.toml_file import line
+from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.estimates import Estimates
 from rov_fmu.study.plan.expression import CONSTANTS
 from rov_fmu.study.plan.expression import TIME as TIMES
 from rov_fmu.study.plan.figures import meaning, read_expression, unusable
 from rov_fmu.study.plan.model import Model, Variable, unknown, unsettable
-from rov_fmu.study.plan.plan import Plan, PlanError, Signal, Varied, nonsense
+from rov_fmu.study.plan.plan import Plan, PlanError, Signal, Varied, check_plan
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.run.simulator import Manoeuvre
 from rov_fmu.study.run.worker import REASON, RUN, STATUS, TIME, Job
@@ -45,13 +45,13 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     """See that a plan, read from a path, fits an FMU. Raises PlanError with every reason."""
     vehicle = load_vehicle(vehicle_file("vary_from", plan.vary_from, path)) if plan.vary_from else None
     estimates = Estimates(plan, vehicle, model.variables)
-    own, from_file, unread = [*nonsense(plan)], {}, []
+    own, from_file, unread = [*check_plan(plan)], {}, []
     try:
         from_file = _file_inputs(plan, path, model)
     except FileError as error:
         unread = [str(error)]
     times = np.zeros(0) if own else _times(plan)
-    words = [*own, *estimates.nonsense(), *_nonsense(plan, model, estimates.names, from_file, times)]
+    words = [*own, *estimates.check(), *_check(plan, model, estimates.names, from_file, times)]
     wrong = lines_on(path, words) + unread
     if plan.input_file:
         file = path.parent / plan.input_file.path
@@ -89,7 +89,7 @@ def vehicle_file(key: str, given: str, path: Path) -> Path:
     if given not in SHIPPED:
         ships = ", ".join(SHIPPED)
         told = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
-        raise PlanError(f"{path}: {line(key, told, given)}{did_you_mean(given, SHIPPED)}")
+        raise PlanError(f"{path}: {key_line(key, told, given)}{did_you_mean(given, SHIPPED)}")
     return SHIPPED[given]
 
 
@@ -117,7 +117,7 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
 # ---- What does not fit -----------------------------------------------------------------------------------------------
 
 
-def _nonsense(
+def _check(
     plan: Plan, model: Model, known: Sequence[str], from_file: Mapping[str, Signal], times: Array
 ) -> Iterator[str]:
     """A line each; `known` varies besides [vary]."""
@@ -125,20 +125,22 @@ def _nonsense(
     for name, way in plan.vary.items():
         key = f"vary.{name}"
         if reason := unsettable(name, has):
-            yield line(key, reason)
+            yield key_line(key, reason)
         elif name in plan.set or name in plan.inputs or name in from_file:
-            yield line(key, "is given in [set] or [inputs] too")
+            yield key_line(key, "is given in [set] or [inputs] too")
         else:
-            yield from (line(key, reason, value) for reason, value in _beyond(way, has[name], plan.sampler == "grid"))
+            yield from (
+                key_line(key, reason, value) for reason, value in _beyond(way, has[name], plan.sampler == "grid")
+            )
     if not (known or plan.vary or plan.vary_from) and plan.sampler != "grid":
         yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
     for name, value in plan.set.items():
         if reason := unsettable(name, has) or has[name].wrong(value):
-            yield line(f"set.{name}", reason, value)
+            yield key_line(f"set.{name}", reason, value)
     yield from _wrong_inputs(plan, has)
     for name in plan.keep.outputs if plan.keep else ():
         if name not in has:
-            yield line("keep.outputs", unknown(name, has))
+            yield key_line("keep.outputs", unknown(name, has))
     yield from _wrong_figures(plan, has, {*known, *plan.vary}, times)
 
 
@@ -159,15 +161,15 @@ def _wrong_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
     for name, signal in plan.inputs.items():
         key = f"inputs.{name}"
         if name not in has:
-            yield line(key, unknown(name, has))
+            yield key_line(key, unknown(name, has))
         elif reason := _no_input(name, plan, has):
-            yield line(key, reason)
+            yield key_line(key, reason)
         elif signal.ramps and not has[name].is_continuous:
-            yield line(key, "must be steps, for it is not continuous")
+            yield key_line(key, "must be steps, for it is not continuous")
         else:
             points = signal.points
-            yield from (line(key, reason, points[n][1]) for n, reason in _beyond_bounds(signal, has[name]))
-            yield from (line(key, reason, [*points[n]]) for n, reason in _between(signal, plan, has[name].start))
+            yield from (key_line(key, reason, points[n][1]) for n, reason in _beyond_bounds(signal, has[name]))
+            yield from (key_line(key, reason, [*points[n]]) for n, reason in _between(signal, plan, has[name].start))
 
 
 def _wrong_rows(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
@@ -211,18 +213,18 @@ def _between(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, s
 def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], times: Array) -> Iterator[str]:
     for name, text in plan.figures.items():
         if name in {RUN, STATUS, REASON} | varied:
-            yield line(f"figures.{name}", "the results have another column of this name")
+            yield key_line(f"figures.{name}", "the results have another column of this name")
             continue
         names = read_expression(text).names
         if strange := sorted(names - CONSTANTS.keys() - {TIMES} - has.keys()):
             told = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
-            yield line(f"figures.{name}", meaning(strange[0]) or told, text)
+            yield key_line(f"figures.{name}", meaning(strange[0]) or told, text)
         elif reason := unusable(text, has, varied, times):
             if reason.startswith("TypeError") and (numbers := names & varied):
                 reason += f"; {min(numbers)} varies, and what varies is a number"
-            yield line(f"figures.{name}", reason, text)
+            yield key_line(f"figures.{name}", reason, text)
     if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
-        yield line("keep.outputs", f"the results have another column {taken.pop()}")
+        yield key_line("keep.outputs", f"the results have another column {taken.pop()}")
 
 
 # ---- Over time -------------------------------------------------------------------------------------------------------

@@ -82,7 +82,7 @@ class Trial:
     """That a run takes."""
 
 
-class Shop:
+class InstancePool:
     """The FMU on one worker. Instances are lent to a thread at a time, and used again."""
 
     def __init__(self, job: Job, folder: Path, is_watched: bool) -> None:
@@ -145,7 +145,7 @@ class Shop:
                 os._exit(1)
 
 
-_SHOPS: dict[str, Shop] = {}
+_SHOPS: dict[str, InstancePool] = {}
 """Of this process, by the key of the study."""
 
 
@@ -161,7 +161,7 @@ class Delivery(WorkerPlugin):
         if self._own and current_thread() is main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has started these
             warnings.simplefilter("ignore", RuntimeWarning)  # of NumPy: what is NaN is told of the run
-        _SHOPS[self.name] = Shop(self._job, Path(worker.local_directory), is_watched=worker.nanny is not None)
+        _SHOPS[self.name] = InstancePool(self._job, Path(worker.local_directory), is_watched=worker.nanny is not None)
 
     def teardown(self, worker: Worker) -> None:  # noqa: ARG002 (as it is called)
         """Called as the study ends."""

@@ -62,7 +62,7 @@ TIME, ZERO = references(R3.nothing[0] - 1), references(0)
 FOREIGN = ctypes.create_string_buffer(4096)
 
 Case = tuple[int, str, str, tuple[Any, ...]]
-"""Kind of instance, mode, function, arguments."""
+"""CoefficientKind of instance, mode, function, arguments."""
 
 
 def counted(*of: Any) -> tuple[Any, ...]:
