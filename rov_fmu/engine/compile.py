@@ -24,9 +24,8 @@ MODULE_SOURCES = FMU_SRC / "live"
 MODULE_FILE = "module.c"
 ENGINE_FILE = FMU_SRC / "engine" / "engine.c"
 # What the numbers depend on, and their cost: the same rounding on every processor, no errno in the mathematics.
-C_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
-LONGEST = 120.0
-"""Seconds that a compiler may take before it is started again without its vectorizer of straight-line code."""
+# LLVM's vectorizer of straight-line code is off, because it does not come to an end for a few equations.
+C_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-slp-vectorize")
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 _LIBRARY_FLAGS = ("-g0", "-s", "-shared", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables")
 # -Os makes the module a third smaller. A step then takes a microsecond, and a page draws an image every 16 ms.
@@ -190,18 +189,7 @@ class _Compilers:
                 _kill(process)
 
     def run(self, command: Sequence[str], folder: str) -> tuple[int, str]:
-        """Return the exit code and the output, when no process is left that might write into the folder.
-
-        The vectorizer of straight-line code in LLVM does not come to an end for a few equations. After LONGEST seconds
-        the compiler therefore starts again without it. The results of the code are the same to the last bit.
-        """
-        try:
-            return self._run(command, folder, LONGEST)
-        except subprocess.TimeoutExpired:
-            return self._run([*command, "-fno-slp-vectorize"], folder, None)
-
-    def _run(self, command: Sequence[str], folder: str, longest: float | None) -> tuple[int, str]:
-        """Run the compiler once. Raises TimeoutExpired, once it is killed, if it takes longer than `longest`."""
+        """Return the exit code and the output, when no process is left that might write into the folder."""
         with UNINTERRUPTED:
             if self._ended:
                 raise BuildError("interrupted")
@@ -214,11 +202,7 @@ class _Compilers:
             )
             self._running.add(process)
         try:
-            output, _ = process.communicate(timeout=longest)  # until all that can write have ended
-        except subprocess.TimeoutExpired:
-            _kill(process)
-            process.communicate()
-            raise
+            output, _ = process.communicate()  # until all that can write have ended
         finally:
             with UNINTERRUPTED:
                 self._running.remove(process)
