@@ -120,6 +120,14 @@ def test_links_lead_to_files(page: Path) -> None:
     assert not missing
 
 
+@pytest.mark.parametrize("page", ["robustness", "extending", "architecture"])
+def test_files_that_a_page_names_exist(page: str) -> None:
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:rov_fmu|tests|fmu_src|verification|docs)/[\w./]+)`", text))
+    assert named
+    assert not [path for path in named if not (ROOT / path).exists()]
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if page != CHANGELOG], ids=name)
 def test_commands_and_options_exist(page: Path) -> None:
     for words in commands(page):
