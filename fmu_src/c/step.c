@@ -249,7 +249,7 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
 static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES])
 {
     const double *const state = at + FIRST_STATE;
-    double done = 0.0, tau = h, change[N_SERIES];
+    double done = 0.0, lost = 0.0, tau = h, change[N_SERIES]; /* rounding has taken `lost` from `done` */
     int pieces = 0;
     motion m;
     series s;
@@ -257,7 +257,7 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
     m.n = n;
     model_start(at, n, &m.q, m.y, m.scale);
     while (++pieces <= MOST_PIECES && tau > 0.0) {
-        const double rest = h - done;
+        const double rest = h - done - lost;
         for (int i = 0; i < N_USED; i++) {
             if (GROUP[i] == i) {
                 const double size = group_size(m.y, i);
@@ -304,16 +304,16 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
         if (HAS_LAG) {
             model_arrive(at, n, &m.q, m.y, m.scale);
         }
-        done += length * s.tau;
+        motion_add(&done, length * s.tau, &lost);
         if (length * s.tau >= rest) {
             break;
         }
         tau = 2.0 * s.tau * reach;
         if (motion_is_slow(&m, &s, change)) {
-            motion_settle(&m, h - done);
+            motion_settle(&m, h - done - lost);
         }
         if (m.settled == (1U << N_DYNAMIC) - 1U) {
-            model_coast(n, &m.q, h - done, m.y, m.gone);
+            model_coast(n, &m.q, h - done - lost, m.y, m.gone);
             break;
         }
     }
