@@ -38,7 +38,7 @@ class Head(Strict):
     version: Name
     """The version of the vehicle; goes into the FMU."""
     description: Text
-    """One sentence; goes into the FMU."""
+    """A description in one sentence; goes into the FMU."""
     source: Text
     """Who identified the vehicle, and where it is published; the FMU's author."""
 
@@ -57,8 +57,9 @@ def _folder(files: Iterable[str]) -> AfterValidator:
     """Return a validator of a folder beside the file. The given files in it must not be links that lead elsewhere."""
 
     def check(name: str, info: ValidationInfo) -> str:
-        if not os.path.isdir(inside_or_shipped(folder_of(info), name)):  # noqa: PTH112 (Path.is_dir raises on names
-            raise ValueError("there is no such folder beside the file")  # that are too long)
+        folder = inside_or_shipped(folder_of(info), name)
+        if not os.path.isdir(folder):  # noqa: PTH112 (Path.is_dir raises an exception if the name is too long)
+            raise ValueError("there is no such folder beside the file")
         for file in files:
             try:
                 inside(folder_of(info), f"{name}/{file}")
@@ -77,8 +78,8 @@ class FileHead(Head):
     (`videoray/tables`). Its files have the names and headers of those in `models/videoray/tables`."""
     pictures: Annotated[str, _folder(PICTURES)] | None = None
     """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, or one that
-    ships (`videoray/pictures`). Drawings are shown on a light ground. The icon and the thrusters are drawn from their
-    geometry in any case."""
+    ships (`videoray/pictures`). Drawings are shown on a light background. The icon and the thrusters are always drawn
+    from their geometry."""
 
     def folders_from(self, folder: Path) -> dict[str, Path | None]:
         """Return the paths of `data` and `pictures`, for a vehicle file in the given folder."""

@@ -123,7 +123,8 @@ OpenAxes = table_of("_OpenAxes", Strict, _open_axes, Axes.__doc__)
 # ---- Thrusters -------------------------------------------------------------------------------------------------------
 
 
-_FARTHEST = 100.0  # m, from the centre of mass
+_FARTHEST = 100.0
+"""The largest coordinate of a thruster from the centre of mass, in m."""
 
 
 def _vector(vector: object) -> object:
@@ -191,7 +192,9 @@ class Thruster(Strict):
     def plain(self) -> layout.Thruster:
         """Return the thruster of the model, with a unit vector as its direction."""
         x, y, z = self.direction.value
-        length = hypot(x, y, z) if abs(hypot(x, y, z) - 1.0) > 1e-12 else 1.0  # a unit vector stays as it is
+        length = hypot(x, y, z)
+        if abs(length - 1.0) <= 1e-12:  # a unit vector stays as it is
+            length = 1.0
         return layout.Thruster(
             self.name,
             self.curve,

@@ -33,13 +33,13 @@ class Uncertainty:
 
     names: tuple[str, ...]
     values: Array
-    """p: the values of the vehicle file."""
+    """The p values of the vehicle file."""
     errors: Array
-    """p: the standard errors; for α and β, the value times the standard error of the logarithm."""
+    """The p standard errors; for α and β, the value times the standard error of the logarithm."""
     correlation: Array
-    """p x p: the correlations, which are 0 where the file gives none."""
+    """The p x p correlations, which are 0 where the file gives none."""
     bounds: Array
-    """p x 2: the physical bounds."""
+    """The p x 2 physical bounds."""
 
     def drawn(self, uniform: Array) -> Array:
         """Return n x p coefficients, made from independent uniform numbers (n x p, 0 to 1) of any sampler.
@@ -79,7 +79,7 @@ class Uncertainty:
 
     @property
     def _is_factor(self) -> NDArray[np.bool_]:
-        """p: True for α and β, unless their value is 0."""
+        """A mask of the coefficients that are a factor, α or β, with a positive value."""
         return np.array([is_factor(name) for name in self.names], bool) & (self.values > 0.0)
 
     def _scaled(self, deviations: Array) -> Array:
@@ -101,12 +101,12 @@ class Uncertainty:
         return np.where(held, edges, scores)
 
     def _scores_of_bounds(self) -> tuple[Array, Array]:
-        """p and p: the normal scores of the lower and the upper bounds."""
+        """Return the normal scores of the lower and of the upper bounds."""
         low, high = self.bounds.T
         return self._scores(low, -inf), self._scores(high, inf)
 
     def _scores(self, bound: Array, without_error: float) -> Array:
-        """p: the normal scores of some bounds, and a given score for a coefficient whose standard error is 0."""
+        """Return the normal scores of some bounds, with a given score where the standard error is 0."""
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = np.where(self._is_factor, self.values * np.log(bound / self.values), bound - self.values)
             return np.where(self.errors > 0.0, distance / self.errors, without_error)

@@ -15,7 +15,7 @@ from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
-from rov_fmu.vehicle.form import PICTURES, TABLES, Head
+from rov_fmu.vehicle.form import PICTURES, TABLES
 from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
 
@@ -210,7 +210,11 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     if made:
         provenance = Provenance(made.tool, made.method, made.inputs, made.warnings, made.report_in(path.parent))
     return Vehicle(
-        **{key: getattr(head, key) for key in Head.model_fields},
+        name=head.name,
+        identifier=head.identifier,
+        version=head.version,
+        description=head.description,
+        source=head.source,
         rov=Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()}),
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,

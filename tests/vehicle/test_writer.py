@@ -1,4 +1,4 @@
-"""Vehicle files with intervals and provenance: written whole or not at all, read back as they were."""
+"""Vehicle files are written completely or not at all, and read back as they were written."""
 
 import re
 from collections.abc import Callable
@@ -36,7 +36,7 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
 
 
 def test_a_vehicle_with_everything_reads_back(tmp_path: Path) -> None:
-    """Every table and key; the directions, normalised once, stay as they are."""
+    """The file has every table and key. Directions that are unit vectors stay as they are."""
     everything, path = load_vehicle(EVERYTHING), tmp_path / "made.toml"
     write_vehicle(everything, path)
     assert load_vehicle(path) == everything
@@ -46,7 +46,7 @@ def test_a_vehicle_with_everything_reads_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("source", [EVERYTHING, VIDEORAY], ids=lambda path: path.stem)
-def test_tuning_changes_what_it_must_and_nothing_else(source: Path, tmp_path: Path) -> None:
+def test_tuning_changes_only_the_given_coefficients(source: Path, tmp_path: Path) -> None:
     before, path = load_vehicle(source), tmp_path / "tuned.toml"
     kept = float(before.rov["alpha_w"])
     write_tuned(source, path, {"alpha_w": kept, "beta_w": 0.25, "a_d_w": 12.5}, "a test")
