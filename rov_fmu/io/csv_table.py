@@ -107,13 +107,14 @@ def read_columns(
     not a number becomes NaN, and a row with too many cells is left out. `check_header` is called before the rows are
     read, with the headers that are read, by column, and with all other headers; it returns the mistakes in them.
     """
-    opened = read_lines(path, DataFileError, most=LARGEST)
-    separator = _separator(opened())
-    lines = _csv_lines(path, opened(), separator)
+    open_stream = read_lines(path, DataFileError, most=LARGEST)
+    separator = _separator(open_stream())
+    lines = _csv_lines(path, open_stream(), separator)
     line, header = next(lines, (1, []))
     if not header:
         raise DataFileError(f"{path}: the file is empty")
     found = _find_columns(path, line, header, columns, others)
+    names = [column.name for column in found.values()]
     headers = {column.name: header[place] for place, column in found.items()}
     if reasons := [*check_header(headers, [title for n, title in enumerate(header) if n not in found])]:
         raise DataFileError(*(f"{path}, line {line}: {reason}" for reason in reasons))
@@ -123,10 +124,9 @@ def read_columns(
         return dict(zip(names, texts, strict=True))
 
     def rows() -> Iterator[Mapping[str, str]]:
-        below = islice(_csv_lines(path, opened(), separator), 1, None)
+        below = islice(_csv_lines(path, open_stream(), separator), 1, None)
         return (by_column(cells) for _, cells in below if len(cells) <= len(header))
 
-    names = [column.name for column in found.values()]
     values = {name: array("d") for name in names}
     row_lines = array("L")
     unread = dict.fromkeys(names, 0)

@@ -10,8 +10,8 @@ import tomlkit
 
 from rov_fmu.model.layout import AXIS, CURVE, HEAVE, SURGE, SWAY, YAW
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from tests.vehicles import EVERYTHING
 
-EVERYTHING = Path(__file__).with_name("everything.toml")
 TEXT = EVERYTHING.read_text(encoding="utf-8")
 
 

@@ -18,9 +18,9 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import BARE, REFIT
 from tests.damage import changed_bytes, changed_lines, changed_numbers, changed_toml, fuzz
+from tests.vehicles import EVERYTHING
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
-EVERYTHING = Path(__file__).with_name("everything.toml")
 SOURCES = [path.read_bytes() for path in (VIDEORAY, REFIT, EVERYTHING, EVERYTHING)]
 _BUILT = 10
 """Every tenth file that can be read is made into an FMU."""
@@ -123,7 +123,7 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    "examples", [20, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
+    "examples", [10, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
 )
 def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path: Path) -> None:
     written = path.with_name("written.toml")
@@ -149,7 +149,7 @@ def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path:
 
 
 @pytest.mark.parametrize(
-    "examples", [15, pytest.param(40, marks=pytest.mark.long), pytest.param(100, marks=pytest.mark.weekly)]
+    "examples", [5, pytest.param(40, marks=pytest.mark.long), pytest.param(100, marks=pytest.mark.weekly)]
 )
 def test_every_command_prints_the_same_lines_and_writes_nothing(
     examples: int, path: Path, capsys: pytest.CaptureFixture[str]
@@ -217,9 +217,8 @@ def test_a_rare_mistake_is_one_clear_line(case: str, path: Path) -> None:
         assert word in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "identifier", ["x" * 100, *(pytest.param(word, marks=pytest.mark.long) for word in ("int", "__init__"))]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("identifier", ["x" * 100, "int", "__init__"])
 def test_any_identifier_makes_an_fmu(identifier: str, path: Path) -> None:
     text = BARE.read_text(encoding="utf-8")
     path.write_text(text.replace('identifier = "bare"', f'identifier = "{identifier}"'), encoding="utf-8")

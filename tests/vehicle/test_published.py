@@ -47,64 +47,24 @@ def off(low: float, reason: str) -> Band:
 
 ROUNDED = Band(-0.005, 0.005, "the paper rounds")
 TRUNCATED = Band(0.0, 0.01, "the paper cuts digits off")
-HEAVE_TAU = (
+TAU_W = (
     "Not from Table 9: its α_w, β_w make Tau 1.59 to 1.60 times as long as without them, the printed Tau are 1.68 to "
     "1.79 times as long; the paper does not tell how it read Tau."
 )
-YAW_TAU = "Table 9 gives 1 to 4 % more; the paper does not tell how it read Tau, and prints two of heave's here."
-YAW_V = "Not from Table 9: 5 % more at 20 %, 1 to 2 % less at 30 and 50 %, although 70 % agrees; no α_r gives all four."
+TAU_R = "Table 9 gives 1 to 4 % more; the paper does not tell how it read Tau, and prints two of heave's here."
+V_R = "Not from Table 9: 5 % more at 20 %, 1 to 2 % less at 30 and 50 %, although 70 % agrees; no α_r gives all four."
 
 # For each axis and command in %: V_ss and Tau of the non-linear model, V_ss and Tau of the scaled model; each as the
 # printed value and its band.
 CELLS: dict[tuple[str, int], tuple[tuple[str, Band], ...]] = {
-    ("heave", 20): (
-        ("0.10", ROUNDED),
-        ("1.76", off(0.25, HEAVE_TAU)),
-        ("0.11", ROUNDED),
-        ("3.08", off(0.13, HEAVE_TAU)),
-    ),
-    ("heave", 30): (
-        ("0.16", ROUNDED),
-        ("1.33", off(0.05, HEAVE_TAU)),
-        ("0.17", ROUNDED),
-        ("2.23", off(-0.03, HEAVE_TAU)),
-    ),
-    ("heave", 50): (
-        ("0.28", ROUNDED),
-        ("0.80", off(0.05, HEAVE_TAU)),
-        ("0.30", ROUNDED),
-        ("1.40", off(-0.05, HEAVE_TAU)),
-    ),
-    ("heave", 70): (
-        ("0.39", TRUNCATED),
-        ("0.58", off(0.03, HEAVE_TAU)),
-        ("0.42", TRUNCATED),
-        ("1.04", off(-0.06, HEAVE_TAU)),
-    ),
-    ("yaw", 20): (
-        ("0.93", ROUNDED),
-        ("0.39", off(0.01, YAW_TAU)),
-        ("1.10", off(-0.06, YAW_V)),
-        ("3.08", off(0.05, YAW_TAU)),
-    ),
-    ("yaw", 30): (
-        ("1.47", ROUNDED),
-        ("0.29", TRUNCATED),
-        ("1.61", off(0.03, YAW_V)),
-        ("2.23", off(0.07, YAW_TAU)),
-    ),
-    ("yaw", 50): (
-        ("2.57", ROUNDED),
-        ("0.19", TRUNCATED),
-        ("2.82", off(0.03, YAW_V)),
-        ("1.46", off(0.04, YAW_TAU)),
-    ),
-    ("yaw", 70): (
-        ("3.68", ROUNDED),
-        ("0.14", TRUNCATED),
-        ("4.07", ROUNDED),
-        ("1.10", off(0.01, YAW_TAU)),
-    ),
+    ("heave", 20): (("0.10", ROUNDED), ("1.76", off(0.25, TAU_W)), ("0.11", ROUNDED), ("3.08", off(0.13, TAU_W))),
+    ("heave", 30): (("0.16", ROUNDED), ("1.33", off(0.05, TAU_W)), ("0.17", ROUNDED), ("2.23", off(-0.03, TAU_W))),
+    ("heave", 50): (("0.28", ROUNDED), ("0.80", off(0.05, TAU_W)), ("0.30", ROUNDED), ("1.40", off(-0.05, TAU_W))),
+    ("heave", 70): (("0.39", TRUNCATED), ("0.58", off(0.03, TAU_W)), ("0.42", TRUNCATED), ("1.04", off(-0.06, TAU_W))),
+    ("yaw", 20): (("0.93", ROUNDED), ("0.39", off(0.01, TAU_R)), ("1.10", off(-0.06, V_R)), ("3.08", off(0.05, TAU_R))),
+    ("yaw", 30): (("1.47", ROUNDED), ("0.29", TRUNCATED), ("1.61", off(0.03, V_R)), ("2.23", off(0.07, TAU_R))),
+    ("yaw", 50): (("2.57", ROUNDED), ("0.19", TRUNCATED), ("2.82", off(0.03, V_R)), ("1.46", off(0.04, TAU_R))),
+    ("yaw", 70): (("3.68", ROUNDED), ("0.14", TRUNCATED), ("4.07", ROUNDED), ("1.10", off(0.01, TAU_R))),
 }
 
 # Table 8 is lost, so surge is compared with the V_ss measured in Table 4: command in %, and the relative deviations of
