@@ -1,6 +1,6 @@
-"""How a command line ends: its exit code, and one line about what went wrong.
+"""Running a command line and ending it with an exit code, and with one line about an error or an interrupt.
 
-Little is imported at the top, because Python itself prints a traceback at Ctrl-C until `run_process` is called.
+Most imports are inside functions, because Python prints a traceback at Ctrl-C until `run_process` is called.
 """
 
 import os
@@ -13,13 +13,14 @@ from threading import Thread
 
 _INTERRUPTED = "interrupted, no file is half-written"
 _POLL = 0.5
-"""Seconds after which the main thread looks for signals itself: on Windows they do not end a wait."""
+"""The longest wait of the main thread in seconds; on Windows, a signal does not end a wait."""
 
 
 def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exception], int]) -> int:
-    """Do the action and return the exit code: 0 done, 130 interrupted, 1 nobody reads the output, else from `codes`.
+    """Do the action and return its exit code.
 
-    OSError is among the codes. The messages of the other exceptions are printed as they are.
+    The code is 0 if the action succeeds, 130 if it is interrupted, 1 if nobody reads the output, and otherwise the one
+    that `codes` has for the exception. `codes` includes OSError; the messages of the others are printed unchanged.
     """
     from click import Abort, ClickException
 
@@ -30,46 +31,46 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
         try:
             action()
         finally:
-            if sys.stdout:  # --help leaves by SystemExit
+            if sys.stdout:  # also after SystemExit, with which --help ends
                 sys.stdout.flush()
     except (KeyboardInterrupt, Abort) as interrupt:
-        if isinstance(interrupt.__cause__, EOFError):  # click aborts then, too
+        if isinstance(interrupt.__cause__, EOFError):  # click also raises Abort at the end of the input
             raise interrupt.__cause__ from None
-        return _say(program, _INTERRUPTED, 130)
+        return _print_error(program, _INTERRUPTED, 130)
     except BrokenPipeError:
         _end_output()
-        return 1  # as Rich does
+        return 1  # the code that Rich uses
     except OSError as error:
         _end_output()
         about = one_line(os.fsdecode(error.filename or "the output, or a temporary file"))
         written = isinstance(error, WriteError) or not error.filename
         reason = f"{'cannot be written: ' if written else ''}{one_line(error.strerror or str(error))}"
-        return _say(program, f"{about}: {reason}", codes[OSError])
+        return _print_error(program, f"{about}: {reason}", codes[OSError])
     except tuple(codes) as error:
         text = error.format_message() if isinstance(error, ClickException) else str(error)
-        return _say(program, text, next(code for kind, code in codes.items() if isinstance(error, kind)))
+        return _print_error(program, text, next(code for kind, code in codes.items() if isinstance(error, kind)))
     return 0
 
 
 def run_process(program: str, main: Callable[[], int]) -> int:
-    """Run a command line as a process of its own, in a thread; the main thread waits for its end, Ctrl-C or SIGTERM.
+    """Run a command line in a thread, while the main thread waits for its end, Ctrl-C or SIGTERM.
 
-    Python would raise KeyboardInterrupt wherever the main thread happens to be, and drop it where that is a finalizer,
-    for example. So a signal raises nothing here: the main thread cleans up and ends the process.
+    Python would raise KeyboardInterrupt at any place in the main thread, and ignore it in some, such as a finalizer. So
+    a signal raises nothing here: the main thread cleans up and ends the process.
     """
     events: SimpleQueue[int | BaseException | signal.Signals] = SimpleQueue()
 
     def run() -> None:
         try:
             events.put(main())
-        except BaseException as error:  # the main thread raises it
+        except BaseException as error:  # the main thread raises it again
             events.put(error)
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        if signal.getsignal(number) is not signal.SIG_IGN:  # a shell may start a job in the background so
+        if signal.getsignal(number) is not signal.SIG_IGN:  # a shell may ignore signals for a background job
             signal.signal(number, lambda number, _: events.put(signal.Signals(number)))
     for stream in (sys.stdout, sys.stderr):
-        if stream:  # a terminal without Greek letters gets \u03b1
+        if stream:  # α becomes \u03b1 on a terminal without Greek letters
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     Thread(target=run, daemon=True).start()
     while True:
@@ -86,14 +87,14 @@ def run_process(program: str, main: Callable[[], int]) -> int:
 
 
 def _end_interrupted(program: str) -> None:
-    """End all child processes, clean up, say so in one line, and end the process without waiting for any thread."""
+    """End all child processes, clean up, print one line, and end the process without waiting for any thread."""
     from rov_fmu.io.interrupts import UNINTERRUPTED, clean_up_everything
 
-    with UNINTERRUPTED:  # no other thread begins or says anything more
+    with UNINTERRUPTED:  # no other thread begins or prints anything more
         try:
             _kill_children()
-            _say(program, "; ".join([_INTERRUPTED, *clean_up_everything()]), 130)
-            _kill_children()  # Dask starts a worker again that has ended
+            _print_error(program, "; ".join([_INTERRUPTED, *clean_up_everything()]), 130)
+            _kill_children()  # Dask restarts workers that have ended
         finally:
             os._exit(130)
 
@@ -101,13 +102,13 @@ def _end_interrupted(program: str) -> None:
 def _kill_children() -> None:
     """Kill the worker processes.
 
-    While a thread of Dask starts a worker, multiprocessing does not list it yet. Such a worker would print a traceback
-    when this process ends, so psutil, which Dask imports, finds it.
+    multiprocessing does not list a worker that a thread of Dask is just starting. Such a worker would print a traceback
+    when this process ends, so it is found with psutil, which Dask imports.
     """
     from multiprocessing import active_children
 
     for child in active_children():
-        with suppress(ValueError):  # another thread has just seen it end
+        with suppress(ValueError):  # another thread has already joined the child
             child.kill()
     if "psutil" in sys.modules:
         import psutil
@@ -118,7 +119,8 @@ def _kill_children() -> None:
                     process.kill()
 
 
-def _say(program: str, message: str, code: int) -> int:
+def _print_error(program: str, message: str, code: int) -> int:
+    """Print the lines of a message to stderr, and return the exit code."""
     from rov_fmu.io.interrupts import UNINTERRUPTED
 
     with UNINTERRUPTED:
@@ -128,7 +130,7 @@ def _say(program: str, message: str, code: int) -> int:
 
 
 def _end_output() -> None:
-    """Send further output nowhere, since it cannot be written, or Python would try again at its end."""
+    """Discard further output if it cannot be written, because Python would otherwise try again when it ends."""
     try:
         if sys.stdout:
             sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""Files with something wrong: what Hypothesis does to bytes, to the values of TOML and to the cells of CSV files."""
+"""Damaged files for fuzzing: Hypothesis changes bytes, values of TOML files and cells of CSV files."""
 
 import random
 from collections.abc import Callable
@@ -45,12 +45,12 @@ VALUES: st.SearchStrategy[Any] = st.recursive(
 
 
 def fuzz(check: Callable[[st.DataObject], None], examples: int) -> None:
-    """Run a check over so many examples."""
+    """Run a check with a given number of examples."""
     settings(max_examples=examples, suppress_health_check=list(HealthCheck))(given(data=st.data())(check))()
 
 
 def changed_bytes(content: bytes, data: st.DataObject) -> bytes:
-    """The content cut, flipped, filled, encoded otherwise, or gone."""
+    """Return the content cut, with other bytes, repeated, or in another encoding."""
     at = data.draw(st.integers(0, len(content)))
     end = data.draw(st.integers(at, min(at + 50, len(content))))
     put = data.draw(
@@ -62,7 +62,7 @@ def changed_bytes(content: bytes, data: st.DataObject) -> bytes:
             st.binary(max_size=20),
         )
     )
-    encodings: dict[str, bytes] = {
+    changes: dict[str, bytes] = {
         "cut": content[:at],
         "put": content[:at] + put + content[at:],
         "replaced": content[:at] + put + content[end:],
@@ -73,11 +73,11 @@ def changed_bytes(content: bytes, data: st.DataObject) -> bytes:
         "old Mac": content.replace(b"\n", b"\r"),
         "garbage": (put * 10_000)[:20_000],
     }
-    return encodings[data.draw(st.sampled_from(sorted(encodings)))]
+    return changes[data.draw(st.sampled_from(sorted(changes)))]
 
 
 def changed_lines(content: bytes, data: st.DataObject) -> bytes:
-    """A line gone, or there twice, or in another place."""
+    """Return the content with a line removed, repeated or moved."""
     lines = content.splitlines(keepends=True)
     n, to = data.draw(st.integers(0, len(lines) - 1)), data.draw(st.integers(0, len(lines) - 1))
     line = lines[n]
@@ -89,7 +89,7 @@ def changed_lines(content: bytes, data: st.DataObject) -> bytes:
 
 
 def changed_toml(content: bytes, data: st.DataObject) -> bytes:
-    """Keys with other values, dropped, renamed or added."""
+    """Return a TOML file with keys changed, removed, renamed or added."""
     document = tomlkit.parse(content.decode()).unwrap()
     for _ in range(data.draw(st.integers(1, 2))):
         table = document
@@ -111,7 +111,7 @@ def changed_toml(content: bytes, data: st.DataObject) -> bytes:
 
 
 def changed_numbers(content: bytes, data: st.DataObject) -> bytes:
-    """Numbers of other sizes, of those that have a place in a TOML file."""
+    """Return a TOML file with other numbers in place of some of its numbers."""
     document = tomlkit.parse(content.decode()).unwrap()
     places: list[tuple[Any, Any, float]] = []
     tables: list[Any] = [document]
@@ -129,7 +129,7 @@ def changed_numbers(content: bytes, data: st.DataObject) -> bytes:
 
 
 def changed_cells(content: bytes, data: st.DataObject) -> bytes:
-    """Cells with something else in them, the header's too."""
+    """Return a CSV file with other texts in some cells, including cells of the header."""
     rows = [line.split(",") for line in content.decode().splitlines()]
     for _ in range(data.draw(st.integers(1, 3))):
         row = data.draw(st.sampled_from(rows[1:])) if data.draw(st.integers(0, 5)) else rows[0]
@@ -151,7 +151,7 @@ CELLS = st.one_of(
 
 
 def changed_course(content: bytes, data: st.DataObject) -> bytes:
-    """A table of numbers whose columns run otherwise: scaled, shifted, constant, noisy, with gaps or of few rows."""
+    """Return a table of numbers with some columns scaled, shifted, constant or noisy, or with only some rows."""
     header, *lines = content.decode().splitlines()
     rows = [[float(cell) for cell in line.split(",")] for line in lines]
     for _ in range(data.draw(st.integers(1, 2))):
@@ -159,7 +159,9 @@ def changed_course(content: bytes, data: st.DataObject) -> bytes:
         start = data.draw(st.integers(0, len(rows) - 1))
         end = data.draw(st.integers(start + 1, len(rows)))
         noise = random.Random(data.draw(st.integers(0, 99)))
-        kind = data.draw(st.sampled_from(["scaled", "shifted", "constant", "noisy", "jumping", "late", "few", "ramp"]))
+        kind = data.draw(
+            st.sampled_from(["scaled", "shifted", "constant", "noisy", "jumping", "stepped", "few", "ramp"])
+        )
         if kind == "few":
             rows = rows[start:end]
             continue
@@ -170,7 +172,7 @@ def changed_course(content: bytes, data: st.DataObject) -> bytes:
                 "constant": size,
                 "noisy": row[column] + size * noise.gauss(0.0, 1.0),
                 "jumping": size * (-1.0) ** n,
-                "late": row[column] + size * (n > 0),
+                "stepped": row[column] + size * (n > 0),
                 "ramp": size * n,
             }[kind]
     return "\n".join([header, *(",".join(map(repr, row)) for row in rows)]).encode()

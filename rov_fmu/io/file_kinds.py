@@ -1,4 +1,4 @@
-"""Kinds of files, to say what a file is where a command expects another kind."""
+"""The kinds of files, and messages about a file that is of another kind than a command expects."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,7 +18,7 @@ _BY_KEY = {
     **dict.fromkeys(("known", "windows", "against", "base"), TESTS_FILE),
     **dict.fromkeys(("thruster", "axes"), VEHICLE_FILE),
 }
-"""Keys at the top of a TOML file, each of which only one kind of file can have, or is most likely to have."""
+"""Keys at the top of a TOML file, with the only or the most likely kind of file that has each."""
 _HINTS = {
     VEHICLE_FILE: "`rov-fmu build` makes an FMU of it, and a plan names it as `vehicle`",
     PLAN: "`rov-fmu study` carries it out",
@@ -30,30 +30,33 @@ _HINTS = {
 
 
 def check_suffix(path: Path, wanted: str, failure: type[FileError] = FileError) -> None:
-    """Raise `failure` about a file whose suffix says that it is of another kind than the wanted one."""
+    """Raise `failure` if the suffix of a file belongs to another kind than the wanted one."""
     if kind := _other_kind(path, wanted):
-        raise failure(_told(path, wanted, kind))
+        raise failure(_message(path, wanted, kind))
 
 
 def check_keys(path: Path, keys: Iterable[str], wanted: str, failure: type[FileError]) -> None:
-    """Raise `failure` about a TOML file whose keys belong to another kind than the wanted one."""
+    """Raise `failure` if the keys of a TOML file belong to another kind than the wanted one."""
     kinds = dict.fromkeys(_BY_KEY[key] for key in keys if key in _BY_KEY)
     if kinds and wanted not in kinds:
-        raise failure(_told(path, wanted, next(iter(kinds))))
+        raise failure(_message(path, wanted, next(iter(kinds))))
 
 
 def check_written(path: Path, kind: str) -> None:
-    """Raise FileError about a path to write whose suffix belongs to another kind of file."""
+    """Raise FileError if the suffix of a path to write belongs to another kind of file."""
     if other := _other_kind(path, kind):
         raise FileError(f"{path}: would be {kind}, but {path.suffix} is the suffix of {other}")
 
 
 def _other_kind(path: Path, wanted: str) -> str | None:
-    """The kind of file that a suffix tells, where it is not the wanted one."""
+    """Return the kind of file that the suffix belongs to, or None if it is the wanted kind or unknown."""
     kind = _BY_SUFFIX.get(path.suffix.lower())
-    return None if kind == wanted or (kind == _TOML and wanted in (VEHICLE_FILE, PLAN)) else kind
+    if kind == wanted or (kind == _TOML and wanted in (VEHICLE_FILE, PLAN)):
+        return None
+    return kind
 
 
-def _told(path: Path, wanted: str, kind: str) -> str:
+def _message(path: Path, wanted: str, kind: str) -> str:
+    """Return the line about a file of the wrong kind, with what to do with such a file."""
     hint = f"; {_HINTS[kind]}" if kind in _HINTS else ""
     return f"{path}: must be {wanted}, and not {kind}{hint}"

@@ -1,4 +1,4 @@
-"""What Ctrl-C must not cut in two, and what must be cleaned up when it ends the process."""
+"""Protection of actions that Ctrl-C must not interrupt half-way, and the cleaning up when it ends the process."""
 
 import os
 import shutil
@@ -13,13 +13,13 @@ from pathlib import Path
 from threading import RLock
 
 UNINTERRUPTED = RLock()
-"""A thread holds this lock while it does something that an interrupt must not cut in two. See `clean_up_everything`."""
+"""A thread holds this lock during an action that must not be interrupted half-way. See `clean_up_everything`."""
 _PENDING: list[tuple[Callable[[], object], str]] = []
-"""What is still to be cleaned up, in the order in which it began, with what the user should know then."""
+"""Functions that still have to clean up, the oldest first, each with a note for the user."""
 _ATTEMPTS = 50
-"""How often a folder is removed while a thread may still be writing into it."""
+"""The number of attempts to remove a folder, since a thread may still be writing into it."""
 _PAUSE = 0.01
-"""Seconds between two attempts."""
+"""The time between two attempts, in seconds."""
 
 
 @contextmanager
@@ -50,10 +50,10 @@ def temporary_folder(prefix: str) -> Iterator[str]:
 
 
 def clean_up_everything() -> list[str]:
-    """Clean up whatever is pending, the latest first, because the process is about to end; return the notes.
+    """Call all pending functions, the latest first, because the process is about to end, and return their notes.
 
-    The caller holds UNINTERRUPTED until the process has ended. Every other thread has therefore finished what must not
-    be interrupted, and none begins anything more that would have to be cleaned up.
+    The caller holds UNINTERRUPTED until the process has ended. So every other thread has finished its protected action,
+    and no thread begins another one.
     """
     for clean, _ in reversed(_PENDING):
         with suppress(Exception):
@@ -63,9 +63,10 @@ def clean_up_everything() -> list[str]:
 
 @contextmanager
 def ctrl_c_withheld() -> Iterator[None]:
-    """Start processes in this block that Ctrl-C in a terminal does not reach: this process ends them.
+    """Block SIGINT, so that Ctrl-C in a terminal does not reach the processes that are started in the block.
 
-    They, and the threads that are started here, inherit that SIGINT is blocked. Windows has no such inheritance.
+    These processes, and threads that are started here, inherit the blocked signal; this process ends them. On Windows
+    the block has no effect.
     """
     if sys.platform == "win32":
         yield
@@ -81,8 +82,8 @@ def ctrl_c_withheld() -> Iterator[None]:
 def _start_resource_tracker() -> None:
     """Start Python's helper process that removes the semaphores of a process which has ended.
 
-    Its start ends with SIGINT not blocked, so it comes before SIGINT is blocked. Its warning that it had to remove some
-    is no news after an interrupt.
+    Starting it unblocks SIGINT, so it must be started first. Its warning about semaphores that it had to remove is
+    switched off, because they are expected after an interrupt.
     """
     from multiprocessing.resource_tracker import ensure_running
 
@@ -97,6 +98,7 @@ def _start_resource_tracker() -> None:
 
 
 def _remove(folder: str) -> None:
+    """Remove a folder, in several attempts if necessary."""
     for _ in range(_ATTEMPTS):
         shutil.rmtree(folder, ignore_errors=True)
         if not Path(folder).exists():

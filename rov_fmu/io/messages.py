@@ -1,4 +1,4 @@
-"""Messages to the user: whatever they tell of, one line that can be printed anywhere."""
+"""Messages to the user: errors, hints, and values on one printable line."""
 
 import reprlib
 from collections.abc import Iterable, Mapping
@@ -6,62 +6,63 @@ from difflib import get_close_matches
 from pathlib import Path
 
 MOST = 10
-"""Mistakes in a file that are told; the others are counted."""
+"""The number of mistakes in a file that are printed; the others are counted."""
 
 
 class FileError(ValueError):
-    """A file that cannot be used: a line for each reason, with file, place in it, value and what is allowed."""
+    """A file that cannot be used. Each reason is a line with the file, the place, the value and what is allowed."""
 
     def __init__(self, *reasons: str) -> None:
         super().__init__("\n".join(map(one_line, reasons)))
 
 
 class InputError(ValueError):
-    """An argument of a function that cannot be used: one line with its name, its value and what is allowed."""
+    """An argument that cannot be used. The message is a line with its name, its value and what is allowed."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(one_line(reason))
 
 
 class UnknownNameError(InputError, KeyError):
-    """A name that a result does not have."""
+    """A name that does not exist in a result."""
 
     __str__ = ValueError.__str__
 
 
 class ProofError(Exception):
-    """An FMU that does not come to the results that it carries."""
+    """An FMU that does not reproduce the results that it contains."""
 
 
 class StudyError(Exception):
-    """A study that cannot go on; what is done is kept."""
+    """A study that cannot continue. Its finished runs are kept."""
 
 
 def lines_on(path: Path, mistakes: Iterable[str]) -> list[str]:
-    """A line for each of the first ten different mistakes in a file, and one that counts the others.
+    """Return a line for each of the first ten different mistakes in a file, and one with the number of the others.
 
-    An empty mistake is only counted.
+    An empty string stands for a mistake that is only counted.
     """
-    every = [*mistakes]
-    different = [*dict.fromkeys(filter(None, every))]
-    more = len(different[MOST:]) + every.count("")
-    counted = [f"{more} more mistake{'s' if more > 1 else ''}"] if more else []
-    return [f"{path}: {line}" for line in (*different[:MOST], *counted)]
+    all_mistakes = [*mistakes]
+    different = [*dict.fromkeys(filter(None, all_mistakes))]
+    lines = [f"{path}: {line}" for line in different[:MOST]]
+    if more := len(different[MOST:]) + all_mistakes.count(""):
+        lines.append(f"{path}: {more} more mistake{'s' if more > 1 else ''}")
+    return lines
 
 
 def one_line(text: str) -> str:
-    """Line breaks, other control characters and undecodable bytes of a file's name as Python writes them."""
+    """Return the text with line breaks, control characters and undecodable bytes escaped, as Python writes them."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def brief(text: str, most: int = 80) -> str:
-    """On one line, and not endless."""
+    """Return the text on one line, cut to a largest number of characters."""
     clean = one_line(text[: most + 20])
     return clean if len(clean) <= most else f"{clean[: most - 3]}..."
 
 
 def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
-    """The names that are most like an unknown one, whatever their case; the most similar comes first."""
+    """Return the names that are most similar to an unknown one, without regard to case; the most similar is first."""
     by_folded: dict[str, list[str]] = {}
     for known in names:
         by_folded.setdefault(known.casefold(), []).append(known)
@@ -70,9 +71,9 @@ def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
 
 
 def did_you_mean(name: str, names: Iterable[str], most: int = 1, also: Mapping[str, str] | None = None) -> str:
-    """The end of a message about an unknown name: `; did you mean ...?`, or nothing where no name is similar.
+    """Return the end of a message about an unknown name: `; did you mean ...?`, or nothing if no name is similar.
 
-    `also` has other words that people use, and the name or names that each of them stands for.
+    `also` has other words that people use, each with the text to suggest for it.
     """
     words = {**{known: known for known in names}, **(also or {})}
     found = dict.fromkeys(words[word] for word in similar(name, words, most))
@@ -80,10 +81,10 @@ def did_you_mean(name: str, names: Iterable[str], most: int = 1, also: Mapping[s
 
 
 class _Repr(reprlib.Repr):
-    """A few levels and entries of a value; the defaults would cut what fits into a message."""
+    """A repr of limited length, which shows only a few levels and entries of a value."""
 
     def repr_int(self, x: int, level: int) -> str:
-        """Python refuses to write very long numbers in decimals."""
+        """Write very long numbers in hexadecimal, because Python refuses to write them in decimals."""
         return super().repr_int(x, level) if x.bit_length() < 1000 else hex(x)
 
 
@@ -92,5 +93,5 @@ _REPR.maxstring = _REPR.maxother = 80
 
 
 def shown(value: object) -> str:
-    """Any value as a message shows it."""
+    """Return any value as a message shows it."""
     return brief(_REPR.repr(value))

@@ -1,4 +1,4 @@
-"""Files written whole or not at all."""
+"""Writing files completely or not at all."""
 
 import errno
 import os
@@ -23,11 +23,11 @@ class Output:
     path: Path
     content: bytes
     check: Callable[[Path], None] = lambda _: None
-    """What a draft of it must pass."""
+    """A function that raises an exception if the written draft of the file is wrong."""
 
 
 def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
-    """Raise WriteError about the first path that no file can be put at, or that is an input or another target."""
+    """Raise WriteError about the first path that cannot be written, or that is an input or another target."""
     taken = list(inputs)
     for path in targets:
         if path.is_dir():
@@ -46,7 +46,7 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
 
 
 def _check_folder(path: Path) -> None:
-    """Raise WriteError where the folder of a path takes no new file, which only the attempt can show."""
+    """Raise WriteError if no new file can be made in the folder of a path. Only an attempt shows this."""
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             pass
@@ -61,10 +61,10 @@ def _check_folder(path: Path) -> None:
 
 
 def write_whole(*outputs: Output) -> None:
-    """Put every content in place of whatever file was there, once all drafts have passed their checks: all or none.
+    """Write all files, once their drafts have passed the checks, or none of them.
 
-    A link is replaced, and what it leads to stays. Raises WriteError about the path that cannot be written, and what a
-    check raises.
+    Existing files are replaced. If a path is a link, the link is replaced and its target stays. Raises WriteError about
+    a path that cannot be written, and whatever a check raises.
     """
     check_targets(output.path for output in outputs)
     with ExitStack() as drafts:
@@ -76,7 +76,7 @@ def write_whole(*outputs: Output) -> None:
 
 
 def _draft(output: Output, drafts: ExitStack) -> Path:
-    """A file beside the target, checked and ready to take its place; gone with the stack."""
+    """Write and check a draft beside the target. It is removed when the stack closes, unless it has been moved."""
     path = output.path
     with _errors_about(path):
         with UNINTERRUPTED:
@@ -91,12 +91,12 @@ def _draft(output: Output, drafts: ExitStack) -> Path:
     with _errors_about(path):
         mask = os.umask(0)
         os.umask(mask)
-        draft.chmod(0o666 & ~mask)  # as if it had been opened like any file
+        draft.chmod(0o666 & ~mask)  # the permissions that open() would give
     return draft
 
 
 def is_same(path: Path, other: Path) -> bool:
-    """Whether two paths lead to the same file, be it there or not."""
+    """Return True if two paths lead to the same file, whether or not it exists."""
     if path.exists() and other.exists():
         return path.samefile(other)
     return os.path.realpath(path) == os.path.realpath(other)
@@ -104,6 +104,7 @@ def is_same(path: Path, other: Path) -> bool:
 
 @contextmanager
 def _errors_about(path: Path) -> Iterator[None]:
+    """Raise WriteError about the path instead of any OSError in the block."""
     try:
         yield
     except OSError as error:

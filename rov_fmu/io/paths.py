@@ -1,7 +1,7 @@
 """The paths of the package's own data files, and the paths that a user's file names.
 
-A file that names another one may come from a stranger, so each name must lead to a place inside the folder of that
-file.
+A file that names another one may come from a stranger, so each name must lead to a place inside the folder of the file
+that contains the name.
 """
 
 import os
@@ -20,10 +20,10 @@ MODELS = _TOP / "models"
 
 
 def inside(folder: Path, name: str) -> Path:
-    """The place that a file in this folder names. Raises ValueError with the reason alone.
+    """Return the path for a name in a file of this folder. Raises ValueError with only the reason.
 
-    A name means the same on every system: it is relative, and `/` stands between its parts. The place must be inside
-    the folder after links are followed.
+    A name means the same on every system: it is relative, and `/` separates its parts. After links are followed, the
+    path must be inside the folder.
     """
     on_windows = PureWindowsPath(name)
     if not name or "\0" in name or "\\" in name or on_windows.drive or on_windows.root:
@@ -35,13 +35,13 @@ def inside(folder: Path, name: str) -> Path:
 
 
 def inside_or_shipped(folder: Path, name: str) -> Path:
-    """The same; where nothing is there, the place of this name among the vehicles that ship. Raises ValueError."""
+    """Return the path for a name as `inside` does, or, if nothing is there, the shipped vehicles' path of this name."""
     place, shipped = inside(folder, name), inside(MODELS, name)
     return shipped if os.path.lexists(shipped) and not os.path.lexists(place) else place
 
 
 def name_of(place: Path, folder: Path) -> str:
-    """The name by which a file in this folder can name a place, which may ship. Raises ValueError if there is none."""
+    """Return the name that `inside_or_shipped` turns into this path. Raises ValueError if there is none."""
     real = Path(os.path.realpath(place.parent), place.name)
     for top in (folder, MODELS):
         if real.is_relative_to(os.path.realpath(top)):

@@ -1,4 +1,4 @@
-"""A vehicle's own pictures: each is what the end of its name says, or it is refused."""
+"""Reading a vehicle's own pictures, which must have the format of their suffix."""
 
 import warnings
 from io import BytesIO
@@ -11,11 +11,11 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.io.reading import read_bytes
 
 _LARGEST = 20_000_000
-"""Bytes of a picture."""
+"""The largest picture that is read, in bytes."""
 
 
 def read_png(path: Path) -> bytes:
-    """A PNG picture. Raises FileError."""
+    """Return the content of a PNG picture. Raises FileError."""
     content = read_bytes(path, most=_LARGEST)
     try:
         with warnings.catch_warnings():
@@ -30,7 +30,10 @@ def read_png(path: Path) -> bytes:
 
 
 def read_svg(path: Path) -> bytes:
-    """An SVG picture. It may hold scripts, so it must be shown as an image, where none runs. Raises FileError."""
+    """Return the content of an SVG picture. Raises FileError.
+
+    It may contain scripts, so it must be shown as an image, in which browsers run no scripts.
+    """
     content = read_bytes(path, most=_LARGEST)
     try:
         root = etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))

@@ -1,4 +1,4 @@
-"""Files read whole; where one cannot be, a line that names it and says why."""
+"""Reading whole files; if one cannot be read, the error names it and says why."""
 
 from collections.abc import Callable
 from io import BytesIO, TextIOWrapper
@@ -9,7 +9,7 @@ from rov_fmu.io.messages import FileError
 
 
 def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> bytes:
-    """The content of a file. Raises `kind`, and reads nothing of a file of more bytes than `most`."""
+    """Return the content of a file. Raises `kind` if it cannot be read, or has more bytes than `most`."""
     try:
         if most is not None and (size := path.stat().st_size) > most:
             raise kind(f"{path}: is too large, with {size / 1e6:.0f} MB: at most {most / 1e6:.0f} MB are read")
@@ -19,12 +19,15 @@ def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int | Non
 
 
 def read_text(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> str:
-    """The text of a file in UTF-8, lines ended by \\n, without a byte order mark. Raises `kind` as read_bytes does."""
+    """Return the text of a file in UTF-8 with \\n as line end and without a byte order mark. Raises `kind`."""
     return read_lines(path, kind, most=most)().read()
 
 
 def read_lines(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> Callable[[], TextIO]:
-    """The same as a stream of lines, which takes less memory; each call of what is returned begins it anew."""
+    """Return a function that opens the text of a file as a stream of lines, each time from the start. Raises `kind`.
+
+    The stream takes less memory than `read_text`.
+    """
     content = read_bytes(path, kind, most=most)
     try:
         content.decode("utf-8-sig")

@@ -15,27 +15,27 @@ _SEAL = re.compile(rf"(?:#|<!--) {re.escape(_WORDS)} ([0-9a-f]{{64}})(?: -->)?")
 
 
 def sealed(text: str, comment: str) -> str:
-    """The text below a line with its digest; `comment` is the form of a comment in this kind of file, `# {}`."""
+    """Return the text with a first line that has its digest. `comment` is how this kind of file writes one: `# {}`."""
     return f"{comment.format(f'{_WORDS} {_digest(text)}')}\n{text}"
 
 
 def check_replaced(paths: Iterable[Path], *, force: bool) -> list[str]:
-    """A line for each file that is there already and is to be replaced.
+    """Return a line for each existing file that will be replaced.
 
     Raises WriteError about the first file that `identify` did not write, or that has changed since, unless `force`.
     """
-    told = []
+    lines = []
     for path in paths:
         if not path.exists():
             continue
         if (reason := _not_as_written(path)) and not force:
             raise WriteError(errno.EEXIST, f"the file there {reason}; --force replaces it", str(path))
-        told.append(f"{path}: replaced a file that {reason or 'was as identify wrote it'}")
-    return told
+        lines.append(f"{path}: replaced a file that {reason or 'was as identify wrote it'}")
+    return lines
 
 
 def _not_as_written(path: Path) -> str:
-    """What shows that a file is not as `identify` wrote it; nothing where it is."""
+    """Return why a file is not as `identify` wrote it, or an empty text if it is."""
     try:
         first, _, rest = read_text(path).partition("\n")
     except FileError:
@@ -47,4 +47,5 @@ def _not_as_written(path: Path) -> str:
 
 
 def _digest(text: str) -> str:
+    """Return the SHA-256 of a text in hexadecimal."""
     return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()

@@ -1,4 +1,4 @@
-"""Text made from the templates of fmu_src/ and of the pages: what comes from files is escaped."""
+"""Rendering of the templates in fmu_src/ and of the pages. Values are escaped, so they cannot inject markup."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,7 +12,7 @@ from rov_fmu.io.paths import FMU_SRC
 
 
 class _Compiled(BytecodeCache):
-    """Templates compiled before, as long as the process lives: to compile one takes longer than to render it."""
+    """The compiled templates of this process, kept because compiling one takes longer than rendering it."""
 
     def __init__(self) -> None:
         self._code: dict[str, bytes] = {}
@@ -29,9 +29,9 @@ _COMPILED = _Compiled()
 
 
 def render(template: str, folder: Path | None = None, /, **content: object) -> str:
-    """A template of fmu_src/, or of another folder that may include those; a name misspelt is an error.
+    """Render a template of fmu_src/, or of another folder, whose templates may include those. Unknown names are errors.
 
-    Functions among the content are filters.
+    Functions in `content` become filters.
     """
     folders = [*filter(None, [folder]), FMU_SRC / "templates"]
     templates = Environment(
@@ -43,11 +43,11 @@ def render(template: str, folder: Path | None = None, /, **content: object) -> s
         keep_trailing_newline=True,
         bytecode_cache=_COMPILED,
     )
-    filters: dict[str, Callable[..., str]] = {n: f for n, f in content.items() if callable(f)}
+    filters: dict[str, Callable[..., str]] = {name: value for name, value in content.items() if callable(value)}
     templates.filters |= {"attributes": _attributes} | filters
     return templates.get_template(template).render(content)
 
 
-def _attributes(given: Mapping[str, object]) -> Markup:
-    """XML attributes, those that have a value; a number is the shortest decimal that is exactly this double."""
-    return Markup("".join(f" {name}={quoteattr(str(v))}" for name, v in given.items() if v is not None))
+def _attributes(values: Mapping[str, object]) -> Markup:
+    """Return XML attributes for the values that are not None; floats are the shortest decimals that are exact."""
+    return Markup("".join(f" {name}={quoteattr(str(v))}" for name, v in values.items() if v is not None))

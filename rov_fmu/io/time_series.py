@@ -1,4 +1,4 @@
-"""CSV files of variables over time: the time in the first column, a variable by its plain name in each other."""
+"""CSV files of variables over time, with the time in the first column and a variable in each other column."""
 
 import csv
 import io
@@ -12,11 +12,14 @@ _NUMBER = re.compile(r"[-+0-9.][-+0-9.eE]*")
 _WORDS = {"true": 1.0, "false": 0.0}
 
 Series = Mapping[str, Sequence[float]]
-"""Columns of a CSV file by name; the first is the time."""
+"""The columns of a CSV file by name; the first is the time."""
 
 
 def series(text: str, error: Callable[[str], FileError], check_column: Callable[[str], None]) -> Series:
-    """The columns of a file's text. Raises what `error` makes of a reason, and what the check of a column raises."""
+    """Return the columns of a CSV text.
+
+    A mistake raises the exception that `error` returns for its reason. `check_column` may raise one about a name.
+    """
     try:
         lines = list(csv.reader(io.StringIO(text, newline=""), strict=True))
     except csv.Error as wrong:
@@ -48,7 +51,7 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
 
 
 def number(text: str, where: str, error: Callable[[str], FileError]) -> float:
-    """A finite number, or true or false as one. Raises what `error` makes of a reason."""
+    """Return a cell as a finite number; true is 1 and false is 0. Raises the exception that `error` returns."""
     try:
         found = float(_WORDS.get(text.strip().lower(), text))
     except ValueError:

@@ -16,10 +16,11 @@ from rov_fmu.io.toml_file import Strict, as_tuple, folder_of
 from rov_fmu.vehicle.quantity import Name, Text
 
 _RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)
-"""Names of devices in Windows, which no file can have there, whatever its extension."""
+"""Names of devices in Windows. No file can have such a name there, whatever its extension."""
 
 
 def _identifier(text: str) -> str:
+    """Return the text if it can name an FMU on every system. Raises ValueError."""
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,99}", text):
         raise ValueError("must be a C identifier: at most 100 letters, digits and underscores, no digit first")
     if _RESERVED.fullmatch(text):
@@ -28,18 +29,18 @@ def _identifier(text: str) -> str:
 
 
 class Head(Strict):
-    """What a vehicle is called and where it comes from."""
+    """The names of a vehicle, and where it comes from."""
 
     name: Name
-    """For people; at most 100 characters."""
+    """The name for people; at most 100 characters."""
     identifier: Annotated[str, AfterValidator(_identifier)]
     """A C identifier that Windows does not reserve: modelIdentifier and modelName of the FMU, and its file name."""
     version: Name
-    """Of the vehicle; goes into the FMU."""
+    """The version of the vehicle; goes into the FMU."""
     description: Text
-    """One sentence; goes into the FMU."""
+    """A description in one sentence; goes into the FMU."""
     source: Text
-    """Who identified it, where it is published; the FMU's author."""
+    """Who identified the vehicle, and where it is published; the FMU's author."""
 
 
 TABLES = {
@@ -47,17 +48,18 @@ TABLES = {
     "yaw": ("table7_yaw_response.csv", "table5_yaw_steady.csv"),
     "surge": ("table8_surge_response.csv", "table4_surge_steady.csv"),
 }
-"""Files of published tables in the data folder, by axis: responses, and measured steady velocities."""
+"""The files of published tables in the data folder, by axis: responses, and measured steady velocities."""
 PICTURES = ("model.png", "from_above.svg", "from_starboard.svg")
-"""Files in the folder of pictures."""
+"""The files in the folder of pictures."""
 
 
 def _folder(files: Iterable[str]) -> AfterValidator:
-    """A folder beside the file. The files in it that are read must not be links that lead elsewhere."""
+    """Return a validator of a folder beside the file. The given files in it must not be links that lead elsewhere."""
 
     def check(name: str, info: ValidationInfo) -> str:
-        if not os.path.isdir(inside_or_shipped(folder_of(info), name)):  # noqa: PTH112 (Path.is_dir raises on names
-            raise ValueError("there is no such folder beside the file")  # that are too long)
+        folder = inside_or_shipped(folder_of(info), name)
+        if not os.path.isdir(folder):  # noqa: PTH112 (Path.is_dir raises an exception if the name is too long)
+            raise ValueError("there is no such folder beside the file")
         for file in files:
             try:
                 inside(folder_of(info), f"{name}/{file}")
@@ -69,18 +71,18 @@ def _folder(files: Iterable[str]) -> AfterValidator:
 
 
 class FileHead(Head):
-    """What a vehicle is called, where it comes from, and the folders beside its file."""
+    """The names of a vehicle, where it comes from, and the folders beside its file."""
 
     data: Annotated[str, _folder([*chain(*TABLES.values())])] | None = None
-    """A folder beside the file with the published tables, as `rov-fmu tables` prints them, or one that ships
-    (`videoray/tables`); its files are named and headed as those of `models/videoray/tables`."""
+    """A folder beside the file with the published tables, which `rov-fmu tables` prints, or one that ships
+    (`videoray/tables`). Its files have the names and headers of those in `models/videoray/tables`."""
     pictures: Annotated[str, _folder(PICTURES)] | None = None
     """A folder beside the file with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, or one that
-    ships (`videoray/pictures`). Drawings are shown on a light ground. The icon and the thrusters are drawn from their
-    geometry in any case."""
+    ships (`videoray/pictures`). Drawings are shown on a light background. The icon and the thrusters are always drawn
+    from their geometry."""
 
     def folders_from(self, folder: Path) -> dict[str, Path | None]:
-        """The folders `data` and `pictures` that a file in this folder names."""
+        """Return the paths of `data` and `pictures`, for a vehicle file in the given folder."""
         names = {"data": self.data, "pictures": self.pictures}
         return {key: inside_or_shipped(folder, name) if name else None for key, name in names.items()}
 
@@ -88,29 +90,31 @@ class FileHead(Head):
 _Command = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
-def _below(low: float, info: ValidationInfo) -> float:
+def _below_maximum(low: float, info: ValidationInfo) -> float:
+    """Return `command_min` if it is less than `command_max`. Raises ValueError."""
     if low >= (high := info.data.get("command_max", inf)):
         raise ValueError(f"must be less than command_max = {high}")
     return low
 
 
 class Validity(Strict):
-    """Thruster commands over which the model holds."""
+    """The range of thruster commands in which the model holds, and what it leaves out."""
 
     command_max: _Command
-    """Strongest thruster command over which the model was identified, a fraction of full thrust."""
-    command_min: Annotated[_Command, AfterValidator(_below)]
-    """Weakest one."""
+    """The strongest thruster command for which the model was identified, as a fraction of full thrust."""
+    command_min: Annotated[_Command, AfterValidator(_below_maximum)]
+    """The weakest thruster command for which the model was identified."""
     limits: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
-    """What was found of this vehicle that the model leaves out, in sentences; they stand in the FMU's documentation."""
+    """Known effects on this vehicle that the model leaves out, in sentences. They appear in the FMU's documentation."""
 
     @property
     def command_range(self) -> tuple[float, float]:
-        """From the weakest to the strongest."""
+        """The weakest and the strongest command."""
         return self.command_min, self.command_max
 
 
 def _report(name: str, info: ValidationInfo) -> str:
+    """Return the name of the report if the file exists or is about to be written. Raises ValueError."""
     path, coming = inside(folder_of(info), name), (info.context or {})["coming"]
     if not (os.path.isfile(path) or (coming and is_same(path, coming))):  # noqa: PTH113 (as above)
         raise ValueError("there is no such file beside this one")
@@ -118,19 +122,19 @@ def _report(name: str, info: ValidationInfo) -> str:
 
 
 class Made(Strict):
-    """What made the file, as `rov-fmu identify` writes it; a file written by hand needs none."""
+    """What made the file. `rov-fmu identify` writes this table; a file written by hand needs none."""
 
     tool: Text
-    """What made the file."""
+    """The tool that made the file."""
     method: Text
-    """How."""
+    """How the tool made the file."""
     inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
-    """File name to SHA-256 of every input."""
+    """The SHA-256 of every input file, by file name."""
     warnings: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
-    """What the data do not determine, in sentences."""
+    """What the data do not determine, and what speaks against the model, in sentences."""
     report: Annotated[Text, AfterValidator(_report)] | None = None
-    """The report, a file beside this one; a build puts it into the FMU."""
+    """The name of the report, a file beside this one. A build puts it into the FMU."""
 
     def report_in(self, folder: Path) -> Path | None:
-        """The path of the report."""
+        """Return the path of the report, for a vehicle file in the given folder."""
         return folder / self.report if self.report else None

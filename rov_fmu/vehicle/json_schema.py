@@ -1,4 +1,4 @@
-"""JSON schema of the vehicle file: for editors, and for its reference page, as that of other files."""
+"""The JSON schemas of the vehicle file and of other TOML files, for editors and for the reference page."""
 
 import json
 from typing import Any
@@ -10,28 +10,31 @@ _NULL = {"type": "null"}
 
 
 def json_schema(of: type[Strict] = File) -> dict[str, Any]:
-    """The schema."""
-    found: dict[str, Any] = _plain(of.model_json_schema())
+    """Return the schema of a TOML file."""
+    found: dict[str, Any] = _simplified(of.model_json_schema())
     return found
 
 
 def json_schema_text() -> str:
-    """The schema as a file."""
+    """Return the schema of the vehicle file as the text of a file."""
     return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
-def _plain(node: Any) -> Any:
-    """As every version of pydantic could say it: without null, which TOML has not, titles and empty defaults."""
+def _simplified(node: Any) -> Any:
+    """Return a part of a schema in a form that does not depend on the version of pydantic.
+
+    It has no null, which TOML does not have, no titles and no empty defaults.
+    """
     if isinstance(node, list):
-        return [*map(_plain, node)]
+        return [*map(_simplified, node)]
     if not isinstance(node, dict):
         return node
-    plain = {key: _plain(value) for key, value in node.items() if key != "title" and (key != "default" or value)}
-    choices = [choice for key in ("allOf", "anyOf") for choice in plain.pop(key, []) if choice != _NULL]
+    simple = {key: _simplified(value) for key, value in node.items() if key != "title" and (key != "default" or value)}
+    choices = [choice for key in ("allOf", "anyOf") for choice in simple.pop(key, []) if choice != _NULL]
     if len(choices) > 1:
-        plain["anyOf"] = choices
+        simple["anyOf"] = choices
     elif choices:
-        plain |= choices[0]
-    if "const" in plain:
-        plain.pop("enum", None)
-    return {"$ref": plain["$ref"]} if "$ref" in plain else plain
+        simple |= choices[0]
+    if "const" in simple:
+        simple.pop("enum", None)
+    return {"$ref": simple["$ref"]} if "$ref" in simple else simple

@@ -1,4 +1,4 @@
-"""What a vehicle of the paper has: surge, heave and yaw, a pair of rear thrusters and one on top."""
+"""The layout of the paper's vehicle: surge, heave and yaw, a pair of rear thrusters and one on top."""
 
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Curve, Layout, Thruster, VehicleAxis
 
@@ -16,4 +16,4 @@ PAPER = Layout(
 )
 _SOURCE = "the form of the paper's vehicle: two rear thrusters ahead, one down"
 PAPER_SOURCES = {thruster.name: {"direction": _SOURCE} for thruster in PAPER.thrusters}
-"""Where the directions of its thrusters come from."""
+"""The sources of the thrusters' directions, by the name of the thruster."""

@@ -1,7 +1,7 @@
-"""Tables 6–8 of the paper: steady velocity and time constant as printed, as computed from the vehicle, as measured.
+"""Tables 6–8 of the paper: printed, computed and measured steady velocities and time constants.
 
-The printed numbers are the CSV files of the vehicle's data folder; the computed ones follow from its coefficients in
-closed form. Where the two differ, that is shown as it is.
+The printed and measured numbers come from the CSV files of the vehicle's data folder; the computed ones follow from its
+coefficients in closed form. Differences between them are shown, not adjusted.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ _SOURCES = ("non-linear", "scaled", "experiment")
 
 @dataclass(frozen=True)
 class Cell:
-    """One quantity at one command, as printed, computed and measured. Decimals keep the digits of the paper."""
+    """The printed, computed and measured value of a quantity at a command. Decimals keep the digits of the paper."""
 
     printed: Decimal | None
     computed: float
@@ -30,17 +30,17 @@ class Cell:
 
     @property
     def from_printed(self) -> float | None:
-        """Deviation of the computed from the printed value, relative to the printed one."""
+        """The relative deviation of the computed from the printed value."""
         return _deviation(self.computed, self.printed)
 
     @property
     def from_measured(self) -> float | None:
-        """Deviation of the computed from the measured value, relative to the measured one."""
+        """The relative deviation of the computed from the measured value."""
         return _deviation(self.computed, self.measured)
 
     @property
     def rounds_to_printed(self) -> bool:
-        """Whether the printed value is the computed one rounded to the printed digits; true of a lost one."""
+        """True if the computed value, rounded to the printed digits, is the printed one, or if no value is printed."""
         if self.printed is None:
             return True
         half_unit = Decimal(5).scaleb(int(self.printed.as_tuple().exponent) - 1)
@@ -49,7 +49,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Response:
-    """The response of one axis to a held command, from rest: V_ss in the unit of the table, Tau (17) in s."""
+    """The response of an axis from rest to a held command: V_ss in the unit of the table, and Tau (17) in s."""
 
     V_ss: Cell
     Tau: Cell
@@ -57,38 +57,39 @@ class Response:
 
 @dataclass(frozen=True)
 class ResponseRow:
-    """One row: the command in % of full thrust and the response of both models."""
+    """A row of a table: the command in % of full thrust, and the responses of both models."""
 
     command: Decimal
     non_linear: Response
-    """α = β = 1."""
+    """The response with α = β = 1."""
     scaled: Response
-    """With the vehicle's α and β, (18)."""
+    """The response with the vehicle's α and β, (18)."""
 
 
 @dataclass(frozen=True)
 class StepTest:
-    """How the responses of one axis were recorded."""
+    """The published step tests of an axis."""
 
     axis: Axis
     number: int
-    """Of the table of responses."""
+    """The number of the table of responses."""
     steady_number: int
-    """Of the table of measured steady velocities."""
+    """The number of the table of measured steady velocities."""
     steady_columns: tuple[str, ...]
-    """Directions of motion in that table; the responses belong to the last."""
+    """The directions of motion in that table; the responses belong to the last one."""
 
     def response(self, rov: Rov, command: Decimal) -> tuple[float, float]:
-        """V_ss and Tau (s) in closed form for a command given in %."""
+        """Return V_ss and Tau (s) in closed form for a command in %."""
         return rov.response(self.axis, float(command) / 100.0)
 
 
 @dataclass(frozen=True)
 class ResponseTable(StepTest):
-    """One of Tables 6–8, and the measured steady velocities of its axis by command in % (Tables 3–5)."""
+    """One of Tables 6–8, with the measured steady velocities of its axis from Tables 3–5."""
 
     rows: tuple[ResponseRow, ...]
     steady: Mapping[Decimal, Decimal]
+    """The measured steady velocities by command in %."""
 
 
 STEP_TESTS = (
@@ -99,14 +100,14 @@ STEP_TESTS = (
 
 
 def untuned(rov: Rov) -> Rov:
-    """The vehicle with every α and β at 1: the paper's non-linear model."""
+    """Return the vehicle with every α and β equal to 1, which is the paper's non-linear model."""
     return rov.replaced({name: 1.0 for name, meta in rov.layout.coefficients.items() if meta.tunable})
 
 
 def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
-    """Tables 6–8 of a vehicle, read and computed. Raises DataFileError.
+    """Return Tables 6–8 of a vehicle. Raises DataFileError.
 
-    A measured V_ss that the table of responses does not hold is that of the table of steady velocities.
+    If the table of responses has no measured V_ss, the one in the table of steady velocities is used.
     """
     if vehicle.data is None:
         raise DataFileError(f"{vehicle.name}: no published tables, the vehicle file has no key vehicle.data")
@@ -116,9 +117,9 @@ def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
 
 
 def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
-    """Rows of a CSV file by command in %; an empty cell is None. `units` are those of the other columns, by name."""
-    others = {name: Column({unit: 1.0}, blanks=True) for name, unit in units.items()}
-    table = read_columns(path, {"command": Column({"%": 1.0}), **others})
+    """Return the rows of a CSV file by command in %, with None for empty cells. `units` has the other columns."""
+    columns = {name: Column({unit: 1.0}, blanks=True) for name, unit in units.items()}
+    table = read_columns(path, {"command": Column({"%": 1.0}), **columns})
     rows: dict[Decimal, Cells] = {}
     for n, (text, *texts) in enumerate(table.texts("command", *units)):
         command = Decimal(text)
@@ -133,22 +134,24 @@ def _read_table(path: Path, units: Mapping[str, str]) -> dict[Decimal, Cells]:
 
 
 def _load_table(folder: Path, rov: Rov, test: StepTest) -> ResponseTable:
-    of_responses, of_velocities = (folder / name for name in TABLES[test.axis.name])
-    units = {"V_ss": test.axis.unit, "Tau": "s"}
-    responses = _read_table(of_responses, {f"{s} {quantity}": units[quantity] for s in _SOURCES for quantity in units})
-    velocities = _read_table(of_velocities, dict.fromkeys(test.steady_columns, test.axis.unit))
+    """Return one of Tables 6–8."""
+    responses_file, velocities_file = (folder / name for name in TABLES[test.axis.name])
+    units: dict[str, str] = {}
+    for source in _SOURCES:
+        units |= {f"{source} V_ss": test.axis.unit, f"{source} Tau": "s"}
+    responses = _read_table(responses_file, units)
+    velocities = _read_table(velocities_file, dict.fromkeys(test.steady_columns, test.axis.unit))
     steady = {command: V for command, cells in velocities.items() if (V := cells[-1]) is not None}
 
     rows = []
     for command, (*printed, V_measured, Tau_measured) in responses.items():
         measured = steady.get(command) if V_measured is None else V_measured, Tau_measured
-        models = [
-            Response(*map(Cell, printed[place : place + 2], test.response(k, command), measured))
-            for place, k in ((0, untuned(rov)), (2, rov))
-        ]
-        rows.append(ResponseRow(command, *models))
+        non_linear = Response(*map(Cell, printed[:2], test.response(untuned(rov), command), measured))
+        scaled = Response(*map(Cell, printed[2:], test.response(rov, command), measured))
+        rows.append(ResponseRow(command, non_linear, scaled))
     return ResponseTable(**vars(test), rows=tuple(rows), steady=steady)
 
 
 def _deviation(value: float, reference: Decimal | None) -> float | None:
+    """Return the relative deviation from a reference, or None if that is missing or zero."""
     return value / float(reference) - 1.0 if reference else None

@@ -1,4 +1,4 @@
-"""The parts that the tables of a vehicle file consist of: texts, names, and values with their unit and source."""
+"""The building blocks of the tables of a vehicle file: texts, names, and values with their unit and source."""
 
 import re
 from typing import Annotated, Any, Literal
@@ -10,13 +10,14 @@ from rov_fmu.model.layout import Declaration
 
 
 def _printable(text: str) -> str:
+    """Return the text if it has no control characters. Raises ValueError."""
     if found := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
         raise ValueError(f"must be without the control character {found[0]!a}")
     return text
 
 
 def not_blank(text: str) -> str:
-    """The text, if there is something to read in it."""
+    """Return the text if it has more than white space. Raises ValueError."""
     if not text.strip():
         raise ValueError("must not be blank")
     return text
@@ -33,24 +34,27 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 def _symbol(text: str) -> str:
+    """Return the text if it can be part of a variable's name. Raises ValueError."""
     if not re.fullmatch(r"[A-Za-z0-9_]{1,30}", text):
         raise ValueError("must be at most 30 letters, digits and underscores")
     return text
 
 
 Symbol = Annotated[str, AfterValidator(_symbol), WithJsonSchema({"type": "string", "pattern": "^[A-Za-z0-9_]{1,30}$"})]
-"""A part of the names of FMU variables."""
+"""A name that becomes part of the names of FMU variables."""
 
 Interval = Annotated[
     tuple[Finite, Finite],
     BeforeValidator(as_tuple),
     WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
 ]
-"""[low, high] in a TOML file."""
+"""The ends of an interval, `[low, high]` in a TOML file."""
 
 
 def _encloses(interval: tuple[float, float], info: ValidationInfo) -> tuple[float, float]:
-    if not interval[0] <= (value := info.data.get("value", interval[0])) <= interval[1]:
+    """Return the interval if the value is within it, or is missing. Raises ValueError."""
+    value = info.data.get("value", interval[0])
+    if not interval[0] <= value <= interval[1]:
         raise ValueError(f"must be [low, high] around the value {value}")
     return interval
 
@@ -63,11 +67,11 @@ class Quantity(Strict):
     source: Text
     """Where the value comes from."""
     interval: Annotated[Interval, AfterValidator(_encloses)] | None = None
-    """95 % confidence: [low, high] around the value."""
+    """The 95 % confidence interval: [low, high] around the value."""
 
 
 def within(value: float, meta: Declaration) -> float:
-    """The value, if it is within the bounds of its coefficient."""
+    """Return the value if it is within the bounds of its coefficient. Raises ValueError."""
     if not meta.minimum <= value <= meta.maximum:
         unit = "" if meta.unit == "1" else f" {meta.unit}"
         raise ValueError(f"must be within {meta.minimum:.12g} ... {meta.maximum:.12g}{unit}")
@@ -75,7 +79,7 @@ def within(value: float, meta: Declaration) -> float:
 
 
 def quantity(name: str, meta: Declaration) -> Any:
-    """A quantity in the unit and within the bounds of its coefficient."""
+    """Return a kind of Quantity that has the unit and the bounds of a coefficient."""
     bounds = {"type": "number", "minimum": meta.minimum, "maximum": meta.maximum}
     fields: dict[str, Any] = {
         "value": (Annotated[Finite, AfterValidator(lambda value: within(value, meta)), WithJsonSchema(bounds)], ...),

@@ -7,14 +7,14 @@ from rov_fmu.io.messages import FileError, did_you_mean
 from rov_fmu.io.paths import MODELS
 
 SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODELS.iterdir()) if folder.is_dir()}
-"""Name to vehicle file."""
+"""The vehicle files that ship, by name."""
 VIDEORAY = SHIPPED["videoray"]
 
 
 def find_vehicle(given: str | Path) -> Path:
-    """The vehicle file at a path, or of a vehicle that ships. Raises FileError."""
+    """Return the vehicle file at a path, or of a shipped vehicle with this name. Raises FileError."""
     path, name = Path(given), str(given)
-    if name in SHIPPED and not (path.exists() and not path.is_dir()):
+    if name in SHIPPED and (path.is_dir() or not path.exists()):
         return SHIPPED[name]
     if not name:
         raise FileError("VEHICLE is empty: it must be the path of a vehicle file, or the name of a vehicle that ships")
@@ -22,11 +22,8 @@ def find_vehicle(given: str | Path) -> Path:
         raise FileError(f"{path}: cannot be read: is a folder, and must be {VEHICLE_FILE}")
     check_suffix(path, VEHICLE_FILE)
     if not path.exists():
-        ships = (
-            ""
-            if path.suffix or path.parent != Path()
-            else f", and no vehicle of this name ships, only {', '.join(SHIPPED)}"
-        )
+        is_bare_name = not path.suffix and path.parent == Path()
+        ships = f", and no vehicle of this name ships, only {', '.join(SHIPPED)}" if is_bare_name else ""
         beside = [str(file) for file in sorted(path.parent.glob("*.toml"))]
         raise FileError(f"{name}: there is no such file{ships}{did_you_mean(name, [*SHIPPED, *beside])}")
     return path

@@ -1,6 +1,7 @@
-"""How well the coefficients of a vehicle are known, and how far they hang together: what vehicles are drawn by.
+"""Standard errors and correlations of a vehicle's coefficients, and random draws of vehicles from them.
 
-They are normal about their values, correlated; α and β, positive factors, by their logarithms.
+The coefficients have a normal distribution around their values. For α and β, which are positive factors, the logarithm
+has the normal distribution.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,52 +20,54 @@ from rov_fmu.vehicle.schema import Estimated
 Array = NDArray[np.float64]
 
 LEVEL = 0.95
-"""Of every interval."""
+"""The confidence level of every interval."""
 LEAST_EIGENVALUE = -1e-3
-"""Of a matrix of correlations; 0 but for the digits written."""
-_EDGE = 1e-12  # uniform numbers are as far from 0 and 1: a sequence of Sobol begins at 0
+"""The least eigenvalue of a valid matrix of correlations, which is below 0 only because files have rounded numbers."""
+_EDGE = 1e-12
+"""The least distance of a uniform number from 0 and 1, where normal scores are infinite. Sobol sequences start at 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Of p coefficients that have an interval, in SI units and in the order of the vehicle's."""
+    """The joint distribution of the p coefficients that have an interval, in SI units and in the vehicle's order."""
 
     names: tuple[str, ...]
     values: Array
-    """p."""
+    """The p values of the vehicle file."""
     errors: Array
-    """p: standard errors of normal distributions; of α and β the value times that of the logarithm."""
+    """The p standard errors; for α and β, the value times the standard error of the logarithm."""
     correlation: Array
-    """p x p; none where the file does not give it."""
+    """The p x p correlations, which are 0 where the file gives none."""
     bounds: Array
-    """p x 2: what is physical."""
+    """The p x 2 physical bounds."""
 
     def drawn(self, uniform: Array) -> Array:
-        """n x p: coefficients from independent uniform numbers (n x p, 0 to 1), those of any sampler.
+        """Return n x p coefficients, made from independent uniform numbers (n x p, 0 to 1) of any sampler.
 
-        One that would pass a bound stops there, and the rest are what the fit would make of them with it held: where
-        linear and quadratic drag are hardly told apart, the sum of both stays what it is. A row depends on its own
-        numbers alone, to the bit, and a coefficient that is correlated with no other on its own column.
+        A coefficient that would exceed a bound is held there, and the others become what a fit would give with this one
+        held: if the data hardly separate linear and quadratic drag, the sum of both is preserved. Each row depends, to
+        the last bit, only on its own numbers, and an uncorrelated coefficient depends only on its own column.
         """
-        squares, V = np.linalg.eigh(self.correlation)
-        root = (V * np.sqrt(np.maximum(squares, 0.0))) @ V.T  # the root that is one, whatever eigenvectors are found
+        eigenvalues, V = np.linalg.eigh(self.correlation)
+        root = (V * np.sqrt(np.maximum(eigenvalues, 0.0))) @ V.T  # symmetric, so it does not depend on the choice of V
         root /= np.linalg.norm(root, axis=1, keepdims=True)
-        scores = self._held(_times(ndtri(np.clip(uniform, _EDGE, 1.0 - _EDGE)), root.T))
-        off = self.errors * scores
+        scores = self._hold_at_bounds(_product(ndtri(np.clip(uniform, _EDGE, 1.0 - _EDGE)), root.T))
+        deviations = self.errors * scores
+        drawn = np.where(self._is_factor, self._scaled(deviations), self.values + deviations)
         low, high = self.bounds.T
-        return np.asarray(np.clip(np.where(self._is_factor, self._scaled(off), self.values + off), low, high))
+        return np.asarray(np.clip(drawn, low, high))
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """Its coefficients, those that are correlated together; what is in different groups is independent."""
-        _, group = connected_components(self.correlation != 0.0, directed=False)
-        return tuple(
-            tuple(name for name, of in zip(self.names, group.tolist(), strict=True) if of == n)
-            for n in dict.fromkeys(group.tolist())
-        )
+        """The names in groups of correlated coefficients; coefficients of different groups are independent."""
+        _, numbers = connected_components(self.correlation != 0.0, directed=False)
+        groups: dict[int, list[str]] = {}
+        for name, number in zip(self.names, numbers.tolist(), strict=True):
+            groups.setdefault(number, []).append(name)
+        return tuple(map(tuple, groups.values()))
 
     def part(self, names: Sequence[str]) -> "Uncertainty":
-        """Of some of them; of the others nothing is known then."""
+        """Return the distribution of some of the coefficients."""
         place = [self.names.index(name) for name in names]
         return Uncertainty(
             tuple(names),
@@ -76,48 +79,55 @@ class Uncertainty:
 
     @property
     def _is_factor(self) -> NDArray[np.bool_]:
+        """A mask of the coefficients that are a factor, α or β, with a positive value."""
         return np.array([is_factor(name) for name in self.names], bool) & (self.values > 0.0)
 
-    def _scaled(self, off: Array) -> Array:
+    def _scaled(self, deviations: Array) -> Array:
+        """Return the values multiplied by factors whose logarithms have the given deviations."""
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            return np.asarray(self.values * np.exp(off / self.values))
+            return np.asarray(self.values * np.exp(deviations / self.values))
 
-    def _held(self, free: Array) -> Array:
-        """n x p: normal scores with those beyond a bound at it, the others by their correlation with these."""
-        low, high = self._ends()
+    def _hold_at_bounds(self, free: Array) -> Array:
+        """Return n x p normal scores, with those beyond a bound held there and the others conditioned on these."""
+        low, high = self._scores_of_bounds()
         edges, scores, held = np.clip(free, low, high), free.copy(), np.zeros(free.shape, bool)
         while (beyond := ((scores < low) | (scores > high)) & ~held).any():
             held |= beyond
-            for some in np.unique(held[beyond.any(axis=1)], axis=0):
-                rows = (held == some).all(axis=1)
-                by = np.linalg.pinv(self.correlation[np.ix_(some, some)], hermitian=True) @ self.correlation[some]
-                scores[rows] = free[rows] + _times((edges - free)[rows][:, some], by)
+            for pattern in np.unique(held[beyond.any(axis=1)], axis=0):
+                rows = (held == pattern).all(axis=1)
+                within_held = self.correlation[np.ix_(pattern, pattern)]
+                regression = np.linalg.pinv(within_held, hermitian=True) @ self.correlation[pattern]
+                scores[rows] = free[rows] + _product((edges - free)[rows][:, pattern], regression)
         return np.where(held, edges, scores)
 
-    def _ends(self) -> tuple[Array, Array]:
-        """p and p: the normal scores of the bounds."""
-        ends = []
+    def _scores_of_bounds(self) -> tuple[Array, Array]:
+        """Return the normal scores of the lower and of the upper bounds."""
+        low, high = self.bounds.T
+        return self._scores(low, -inf), self._scores(high, inf)
+
+    def _scores(self, bound: Array, without_error: float) -> Array:
+        """Return the normal scores of some bounds, with a given score where the standard error is 0."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            for bound, none in zip(self.bounds.T, (-inf, inf), strict=True):
-                far = np.where(self._is_factor, self.values * np.log(bound / self.values), bound - self.values)
-                ends.append(np.where(self.errors > 0.0, far / self.errors, none))
-        return ends[0], ends[1]
+            distance = np.where(self._is_factor, self.values * np.log(bound / self.values), bound - self.values)
+            return np.where(self.errors > 0.0, distance / self.errors, without_error)
 
 
 NOTHING = Uncertainty((), np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros((0, 2)))
-"""Of no coefficient."""
+"""The distribution of no coefficients."""
 
 
 def uncertainty(
     rov: Rov, intervals: Mapping[str, tuple[float, float]], estimates: Mapping[str, Estimated]
 ) -> Uncertainty:
-    """By what a vehicle file gives."""
+    """Return the distribution of the coefficients by the intervals and estimates of a vehicle file."""
     metas = rov.layout.coefficients
     names = tuple(name for name in metas if name in intervals)
-    errors = [
-        estimates[name].error if name in estimates else _reach(name, rov[name], intervals[name], metas[name]) / _NORMAL
-        for name in names
-    ]
+    errors = []
+    for name in names:
+        if name in estimates:
+            errors.append(estimates[name].error)
+        else:
+            errors.append(_half_width(name, rov[name], intervals[name], metas[name]) / _NORMAL)
     return Uncertainty(
         names,
         np.array([rov[name] for name in names]),
@@ -128,7 +138,7 @@ def uncertainty(
 
 
 def correlation(names: Sequence[str], estimates: Mapping[str, Estimated]) -> Array:
-    """p x p: of named coefficients."""
+    """Return the matrix of correlations of some coefficients."""
     place = {name: n for n, name in enumerate(names)}
     found = np.eye(len(names))
     for name in place.keys() & estimates.keys():
@@ -138,35 +148,41 @@ def correlation(names: Sequence[str], estimates: Mapping[str, Estimated]) -> Arr
 
 
 def least_eigenvalue(estimates: Mapping[str, Estimated]) -> float:
-    """Of the matrix of all correlations: below 0, no numbers have them."""
+    """Return the least eigenvalue of the matrix of all correlations. It is never negative for possible correlations."""
     return float(np.linalg.eigvalsh(correlation([*estimates], estimates))[0])
 
 
-def _times(rows: Array, matrix: Array) -> Array:
-    """The product, of which a row has the same bits however many others there are, as that of BLAS has not."""
-    found = np.zeros((len(rows), matrix.shape[1]))
+def _product(rows: Array, matrix: Array) -> Array:
+    """Return the product of two matrices. Unlike with BLAS, no bit of a row depends on the number of rows."""
+    product = np.zeros((len(rows), matrix.shape[1]))
     for column, factors in zip(rows.T, matrix, strict=True):
-        found += column[:, None] * factors
-    return found
+        product += column[:, None] * factors
+    return product
 
 
 def is_factor(name: str) -> bool:
-    """Whether a coefficient is a positive factor, α or β, which errs by its logarithm."""
+    """Return True for the positive factors α and β, for which the standard error is that of the logarithm."""
     return name.startswith(tuple(f"{key}_" for key in TUNING))
 
 
 def quantile(degrees_of_freedom: float) -> float:
-    """How many standard errors a 95 % interval reaches (Student)."""
+    """Return the half-width of a 95 % interval in standard errors, by Student's distribution."""
     return float(stdtrit(degrees_of_freedom, 0.5 + 0.5 * LEVEL))
 
 
 _NORMAL = quantile(inf)
 
 
-def _reach(name: str, value: float, interval: tuple[float, float], meta: Declaration) -> float:
-    """Half the interval, or where a bound cuts it the other side of it; of a factor the value times the logarithm's."""
-    (low, high), by_logarithm = interval, is_factor(name) and value > 0.0
-    sides = [value * log(high / value) if by_logarithm else high - value] if high < meta.maximum else []
+def _half_width(name: str, value: float, interval: tuple[float, float], meta: Declaration) -> float:
+    """Return half the width of an interval; for a factor, the value times half the width in logarithms.
+
+    A side that ends at a physical bound is cut, so only the other side counts. If both are cut, the larger one counts.
+    """
+    low, high = interval
+    logarithmic = is_factor(name) and value > 0.0
+    sides = []
+    if high < meta.maximum:
+        sides.append(value * log(high / value) if logarithmic else high - value)
     if low > meta.minimum:
-        sides.append(value * log(value / low) if by_logarithm else value - low)
+        sides.append(value * log(value / low) if logarithmic else value - low)
     return sum(sides) / len(sides) if sides else max(high - value, value - low)

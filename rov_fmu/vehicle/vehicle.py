@@ -1,4 +1,4 @@
-"""Vehicle file (TOML) to `Vehicle`, checked: every number has its unit and source, and lies within its bounds."""
+"""The class Vehicle, and reading and checking vehicle files (TOML)."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
-from rov_fmu.vehicle.form import PICTURES, TABLES, Head
+from rov_fmu.vehicle.form import PICTURES, TABLES
 from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
 
@@ -23,35 +23,36 @@ if TYPE_CHECKING:
     from rov_fmu.vehicle.uncertainty import Uncertainty
 
 BY_HAND = "set by hand"
-"""The source of a coefficient that a program has set."""
+"""The source of a coefficient that was set by `Vehicle.with_`."""
 
 
 class VehicleFileError(FileError):
-    """A vehicle file that cannot be used: a line a mistake with file, key, value and what is allowed."""
+    """A vehicle file that cannot be used. Each mistake is a line with file, key, value and what is allowed."""
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """What made a vehicle file, how, and from which files."""
+    """The tool that made a vehicle file, its method, and its input files."""
 
     tool: str
     method: str
     inputs: Mapping[str, str]
-    """SHA-256 of every input file, by its name."""
+    """The SHA-256 of every input file, by file name."""
     warnings: tuple[str, ...] = ()
-    """What is not identifiable from the data, and what speaks against the model, in words."""
+    """What the data do not determine, and what speaks against the model, in sentences."""
     report: Path | None = None
-    """The page on the identification."""
+    """The report on the identification."""
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """Some coefficients that may stand in for the ones used."""
+    """A set of published coefficients that the model does not use."""
 
     description: str
     values: Mapping[str, float]
-    """By name."""
+    """The coefficients by name."""
     sources: Mapping[str, str]
+    """The sources of the coefficients by name."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -60,88 +61,86 @@ class Vehicle:
 
     name: str
     identifier: str
-    """A C identifier: modelIdentifier and modelName of the FMU."""
+    """A C identifier, which becomes modelIdentifier and modelName of the FMU."""
     version: str
     description: str
     source: str
     rov: Rov
-    """What it has, and its coefficients."""
+    """The model of the vehicle: its layout and its coefficients."""
     sources: Mapping[str, str]
-    """Where each coefficient comes from."""
+    """The sources of the coefficients by name."""
     command_range: tuple[float, float]
-    """Thruster commands over which the model was identified."""
+    """The weakest and the strongest thruster command for which the model was identified."""
     alternatives: Mapping[str, Alternative]
-    """Coefficients published beside the ones used."""
+    """Other sets of published coefficients, by a name for each set."""
     data: Path | None
     """The folder with the published tables."""
     pictures: Path | None = None
-    """The folder with the vehicle's own PICTURES, each if it has one."""
+    """The folder with the vehicle's own PICTURES, any of which may be missing."""
     limits: tuple[str, ...] = ()
-    """What was found of the vehicle that the model leaves out, in sentences."""
+    """Known effects on the vehicle that the model leaves out, in sentences."""
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """95 % confidence intervals of the coefficients that have one."""
+    """The 95 % confidence intervals of identified coefficients, by name."""
     estimates: Mapping[str, Estimated] = field(default_factory=dict)
-    """How far those that tests tell hang together, by name."""
+    """The standard errors and correlations of identified coefficients, by name."""
     provenance: Provenance | None = None
     thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    """Where `direction` and `position` of each thruster come from, by its name."""
+    """The sources of `direction` and `position`, by the name of the thruster."""
 
     def __repr__(self) -> str:
-        """Name the vehicle, its axes, its inputs, and the coefficients that were set by hand."""
+        """Return the name of the vehicle, its axes, its inputs, and the coefficients that were set by hand."""
         axes, inputs = ", ".join(self.layout.kinds), ", ".join(self.layout.commands)
-        return (
-            f"<{type(self).__name__} {self.identifier}: {self.name}; axes {axes}; inputs {inputs}{self._by_hand('; ')}>"
-        )
+        title = f"{type(self).__name__} {self.identifier}: {self.name}"
+        return f"<{title}; axes {axes}; inputs {inputs}{self._by_hand('; ')}>"
 
     def with_(self, **coefficients: float) -> Self:
         """Return this vehicle with other values of some coefficients, in SI units: `vehicle.with_(a_d_u=10)`.
 
-        Their source is then "set by hand", which the FMU and its page say, too; they have no confidence interval any
-        more. `vehicle.layout.coefficients` has the names, units and bounds.
+        Their source becomes "set by hand", which also appears in the FMU and on its page, and they have no confidence
+        intervals. `vehicle.layout.coefficients` has the names, units and bounds.
 
-        Raises InputError where the vehicle has no such coefficient, or cannot have the value.
+        Raises InputError if the vehicle has no such coefficient, or cannot have the value.
         """
         values = {name: _number(name, value) for name, value in coefficients.items()}
         check_coefficients(self.layout, values)
         rov = self.rov.replaced(values)
-        if reason := next(_senseless(rov), None):
-            raise InputError(reason)
+        if mistake := next(_contradictions(rov), None):
+            raise InputError(mistake)
+        estimates = {}
+        for name, estimated in self.estimates.items():
+            if name not in values:
+                kept = {other: r for other, r in estimated.correlation.items() if other not in values}
+                estimates[name] = estimated.model_copy(update={"correlation": kept})
         return replace(
             self,
             rov=rov,
             sources={**self.sources, **dict.fromkeys(values, BY_HAND)},
             intervals={name: interval for name, interval in self.intervals.items() if name not in values},
-            estimates={
-                name: estimated.model_copy(
-                    update={
-                        "correlation": {other: r for other, r in estimated.correlation.items() if other not in values}
-                    }
-                )
-                for name, estimated in self.estimates.items()
-                if name not in values
-            },
+            estimates=estimates,
         )
 
     @property
     def summary(self) -> str:
-        """The description, with the coefficients that were set by hand."""
+        """The description, followed by the coefficients that were set by hand."""
         return f"{self.description}{self._by_hand(' (', ')')}"
 
     def _by_hand(self, before: str, after: str = "") -> str:
-        """Name the coefficients that were set by hand, if there are any."""
-        metas = self.layout.coefficients
-        units = {name: "" if metas[name].unit == "1" else f" {metas[name].unit}" for name in metas}
-        told = [f"{name} = {self.rov[name]:.12g}{units[name]}" for name in metas if self.sources[name] == BY_HAND]
-        return f"{before}{BY_HAND}: {', '.join(told)}{after}" if told else ""
+        """Return the list of coefficients that were set by hand, or an empty text if there are none."""
+        items = []
+        for name, meta in self.layout.coefficients.items():
+            if self.sources[name] == BY_HAND:
+                unit = "" if meta.unit == "1" else f" {meta.unit}"
+                items.append(f"{name} = {self.rov[name]:.12g}{unit}")
+        return f"{before}{BY_HAND}: {', '.join(items)}{after}" if items else ""
 
     @property
     def layout(self) -> Layout:
-        """What it has."""
+        """The axes, curves, thrusters and inputs of the vehicle."""
         return self.rov.layout
 
     @property
     def files(self) -> list[Path]:
-        """Every file that is read beside the vehicle file."""
+        """The existing files that are read together with the vehicle file."""
         report = self.provenance.report if self.provenance else None
         tables = [self.data / name for names in TABLES.values() for name in names] if self.data else []
         pictures = [self.pictures / name for name in PICTURES] if self.pictures else []
@@ -149,19 +148,19 @@ class Vehicle:
 
     @property
     def uncertainty(self) -> "Uncertainty":
-        """How well its coefficients are known, and how far they hang together."""
+        """The joint distribution of the coefficients that have a confidence interval."""
         from rov_fmu.vehicle.uncertainty import uncertainty  # NumPy and SciPy: few need it
 
         return uncertainty(self.rov, self.intervals, self.estimates)
 
     def picture(self, name: str) -> Path | None:
-        """The vehicle's own picture of this name, if it has one."""
+        """Return the path of the vehicle's own picture with this name, or None."""
         own = self.pictures / name if self.pictures else None
         return own if own and own.is_file() else None
 
 
 def check_coefficients(layout: Layout, values: Mapping[str, float]) -> None:
-    """Raise InputError about the first value that belongs to no coefficient of the vehicle, or is out of its bounds."""
+    """Raise InputError about the first value that is out of its bounds or belongs to no coefficient of the vehicle."""
     for name, value in values.items():
         if name not in layout.coefficients:
             hint = did_you_mean(name, layout.coefficients)
@@ -179,8 +178,8 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
-def _senseless(rov: Rov) -> Iterator[str]:
-    """Say which coefficients together make no vehicle, although each is within its bounds."""
+def _contradictions(rov: Rov) -> Iterator[str]:
+    """Yield a line about coefficients that are within their bounds but impossible together."""
     for curve in rov.layout.curves:
         yield from no_thrust(curve, rov.coefficients, f"curve {curve.name}")
     if rov.layout.has_arm and rov["R"] * sin(rov["gamma"]) == 0.0:
@@ -188,13 +187,13 @@ def _senseless(rov: Rov) -> Iterator[str]:
 
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
-    """Read a vehicle file. Raises VehicleFileError. A report that is coming need not be there yet."""
+    """Read a vehicle file. Raises VehicleFileError. `coming` is a report that need not exist yet."""
     path = Path(path)
     data = read_toml(path, VehicleFileError)
     check_keys(path, data, VEHICLE_FILE, VehicleFileError)
     if "format" not in data:
         raise VehicleFileError(f"{path}: format: this key is missing: write format = {FORMAT}")
-    if data["format"] != FORMAT:  # all else in the file may then have another meaning
+    if data["format"] != FORMAT:  # the rest of the file may have another meaning
         reason = f"must be {FORMAT}, the only version of the vehicle file"
         raise VehicleFileError(f"{path}: {key_line('format', reason, data['format'])}")
     context = {"folder": path.parent, "coming": coming}
@@ -207,9 +206,15 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         raise VehicleFileError(*lines_on(path, mistakes))
     head, made, layout = file.vehicle, file.provenance, file.layout
     folders, found = head.folders_from(path.parent), file.quantities(layout)
-    words = {key: getattr(made, key) for key in ("tool", "method", "inputs", "warnings")} if made else {}
+    provenance = None
+    if made:
+        provenance = Provenance(made.tool, made.method, made.inputs, made.warnings, made.report_in(path.parent))
     return Vehicle(
-        **{key: getattr(head, key) for key in Head.model_fields},
+        name=head.name,
+        identifier=head.identifier,
+        version=head.version,
+        description=head.description,
+        source=head.source,
         rov=Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()}),
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,
@@ -226,6 +231,6 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         limits=file.validity.limits,
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=file.estimates,
-        provenance=Provenance(**words, report=made.report_in(path.parent)) if made else None,
+        provenance=provenance,
         thruster_sources=file.thruster_sources,
     )

@@ -1,4 +1,4 @@
-"""`Vehicle` to vehicle file (TOML), whole or not at all."""
+"""Writing vehicle files (TOML), completely or not at all."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -17,66 +17,69 @@ from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import Curve, Declaration, Thruster
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
 
 _DECIMALS = 6
-"""Of a correlation: thrust and drag that tests tell hardly apart are correlated by nearly 1."""
-_DIGITS = 6  # significant ones: more than any tank test has, few enough to be the same on every machine
+"""The decimals of a correlation, which is close to 1 if the tests hardly separate two coefficients."""
+_DIGITS = 6
+"""The significant digits of a number: more than any tank test gives, but few enough to be equal on every machine."""
 
 
 def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
-    """The vehicle file, in a folder, of a vehicle. Raises ValueError where it cannot name a folder or a report."""
+    """Return the text of a vehicle file in a folder. Raises ValueError if it cannot name a folder or a report."""
     document = tomlkit.document()
     if vehicle.provenance:
-        words = "Made from tank tests: [provenance] tells how, and `interval` is 95 % confidence."
-        document.add(tomlkit.comment(words)).add(tomlkit.nl())
+        comment = "Made from tank tests: [provenance] tells how, and `interval` is 95 % confidence."
+        document.add(tomlkit.comment(comment)).add(tomlkit.nl())
     low, high = map(_rounded, vehicle.command_range)
-    beside = {key: getattr(vehicle, key) for key in ("data", "pictures")}
-    folders = {key: name_of(path, folder) for key, path in beside.items() if path}
+    paths = {"data": vehicle.data, "pictures": vehicle.pictures}
+    folders = {key: name_of(path, folder) for key, path in paths.items() if path}
     document["format"] = FORMAT
     document["vehicle"] = {key: getattr(vehicle, key) for key in Head.model_fields} | folders
-    document["validity"] = {"command_min": low, "command_max": high, **_lines("limits", vehicle.limits)}
-    entries = {name: _quantity(vehicle, name) for name, source in vehicle.sources.items() if source != NOT_GIVEN}
-    for key, table in _hardware(vehicle, entries).items():
+    document["validity"] = {"command_min": low, "command_max": high} | _texts("limits", vehicle.limits)
+    quantities = {name: _quantity(vehicle, name) for name, source in vehicle.sources.items() if source != NOT_GIVEN}
+    for key, table in _hardware(vehicle, quantities).items():
         document[key] = table
     if vehicle.alternatives:
-        document["alternatives"] = {
-            name: {"description": other.description}
-            | {n: _inline(value, vehicle.layout.coefficients[n], other.sources[n]) for n, value in other.values.items()}
-            for name, other in vehicle.alternatives.items()
-        }
+        document["alternatives"] = {name: _alternative(vehicle, one) for name, one in vehicle.alternatives.items()}
     if vehicle.estimates:
         document["estimates"] = {name: _estimated(row) for name, row in vehicle.estimates.items()}
     if made := vehicle.provenance:
         report = {"report": name_of(made.report, folder)} if made.report else {}
-        head = {"tool": made.tool, "method": made.method, **report, **_lines("warnings", made.warnings)}
+        head = {"tool": made.tool, "method": made.method} | report | _texts("warnings", made.warnings)
         document["provenance"] = {**head, "inputs": dict(made.inputs)}
     text: str = tomlkit.dumps(document)
     return sealed(text, "# {}") if vehicle.provenance else text
 
 
-def _hardware(vehicle: Vehicle, entries: Mapping[str, Item]) -> dict[str, Any]:
-    """The tables that say what the vehicle has, with the entries of its coefficients."""
+def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item]) -> dict[str, Any]:
+    """Return the tables of the body, the curves, the thrusters, the axes and the inputs."""
     layout = vehicle.layout
     tables: dict[str, Any] = {"body": {"coupling": True} if layout.coupled else {}}
-    tables |= {"arm": {}} if layout.has_arm else {}
+    if layout.has_arm:
+        tables["arm"] = {}
     tables["curves"] = {curve.name: _curve(curve) for curve in layout.curves}
     tables["thruster"] = tomlkit.aot()
     for thruster in layout.thrusters:
         tables["thruster"].append(tomlkit.item(_thruster(thruster, vehicle.thruster_sources[thruster.name])))
     tables["axes"] = {form.axis.name: {} for form in layout.axes}
-    tables |= {"inputs": {name: _inline_of(gains) for name, gains in layout.mix.items()}} if layout.mix else {}
+    if layout.mix:
+        tables["inputs"] = {name: _inline_table(gains) for name, gains in layout.mix.items()}
     for name, (*above, key) in where(layout):
-        table = tables
-        for step in above:
-            table = table[step]
-        if name in entries:
-            table[key] = entries[name]
+        if name in quantities:
+            _table_at(tables, above)[key] = quantities[name]
+    return tables
+
+
+def _table_at(tables: Any, path: Iterable[str]) -> Any:
+    """Return a table inside others."""
+    for key in path:
+        tables = tables[key]
     return tables
 
 
 def vehicle_output(vehicle: Vehicle, path: Path) -> Output:
-    """The vehicle file to write, perhaps together with its report. Raises VehicleFileError."""
+    """Return the vehicle file to write; its report may be written together with it. Raises VehicleFileError."""
     report = vehicle.provenance.report if vehicle.provenance else None
     try:
         text = vehicle_text(vehicle, path.parent)
@@ -86,7 +89,7 @@ def vehicle_output(vehicle: Vehicle, path: Path) -> Output:
 
 
 def check_report(path: Path, report: Path) -> None:
-    """Raise VehicleFileError where the vehicle file at a path could not name this report."""
+    """Raise VehicleFileError if the vehicle file at a path cannot name this report."""
     try:
         name_of(report, path.parent)
     except ValueError as error:
@@ -94,14 +97,14 @@ def check_report(path: Path, report: Path) -> None:
 
 
 def write_vehicle(vehicle: Vehicle, path: Path) -> None:
-    """Write the vehicle file. Raises VehicleFileError where it could not be read again, OSError where not written."""
+    """Write the vehicle file. Raises VehicleFileError if it could not be read again, or OSError."""
     write_whole(vehicle_output(vehicle, path))
 
 
 def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: str) -> None:
-    """Write the vehicle file `source` with other values of some coefficients, all else in it as it is.
+    """Write a copy of the vehicle file `source` with other values of some coefficients. Raises as write_vehicle does.
 
-    `reason` is the source of those that change. Raises as write_vehicle.
+    `reason` becomes the source of the coefficients that change. Everything else in the file stays as it is.
     """
     document, vehicle = _read_document(source), load_vehicle(source)
     places = dict(where(vehicle.layout))
@@ -109,20 +112,18 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
         if (value := _rounded(exact)) == _rounded(vehicle.rov[name]):
             continue
         *above, key = places[name]
-        table = document
-        for step in above:
-            table = table[step]
+        table = _table_at(document, above)
         if key in table:
             table[key]["value"], table[key]["source"] = value, reason
             table[key].pop("interval", None)
         else:
-            table[key] = _inline(value, vehicle.layout.coefficients[name], reason)
-        _forget(document, name)
+            table[key] = _quantity_table(value, vehicle.layout.coefficients[name], reason)
+        _remove_estimate(document, name)
     write_whole(_moved(document, source, path))
 
 
-def _forget(document: Any, name: str) -> None:
-    """A coefficient that is no estimate any more; what is known of the others stays."""
+def _remove_estimate(document: Any, name: str) -> None:
+    """Remove a coefficient from [estimates], with its correlations; the other estimates stay."""
     rows = document.get("estimates", {})
     rows.pop(name, None)
     for row in rows.values():
@@ -134,7 +135,7 @@ def _forget(document: Any, name: str) -> None:
 
 
 def _read_document(source: Path) -> Any:
-    """The vehicle file with its comments, to write it otherwise. Raises VehicleFileError."""
+    """Read a vehicle file with its comments, in order to change it. Raises VehicleFileError."""
     try:
         document: Any = tomlkit.parse(read_text(source, VehicleFileError))
     except TOMLKitError as error:
@@ -145,7 +146,7 @@ def _read_document(source: Path) -> Any:
 
 
 def _moved(document: Any, source: Path, path: Path) -> Output:
-    """The document to write, with what is beside it named from its new place. Raises VehicleFileError."""
+    """Return the file to write. It names its folders and report relative to its new place. Raises VehicleFileError."""
     for table, key in (("vehicle", "data"), ("vehicle", "pictures"), ("provenance", "report")):
         if key in document.get(table, {}):
             name = document[table][key]
@@ -158,7 +159,7 @@ def _moved(document: Any, source: Path, path: Path) -> Output:
 
 
 def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
-    """The text of a vehicle file, to write once it has proved to be one. Raises VehicleFileError."""
+    """Return the file to write, whose draft is checked by loading it. Raises VehicleFileError."""
 
     def check(draft: Path) -> None:
         try:
@@ -174,54 +175,72 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
 
 
 def _curve(curve: Curve) -> dict[str, Any]:
-    words = {key: getattr(curve, key) for key in ("description", "equation", "together")}
-    return {key: word for key, word in words.items() if word != getattr(Curve, key)}
+    """Return the keys of a curve that differ from their defaults, without its coefficients."""
+    entries = {key: getattr(curve, key) for key in ("description", "equation", "together")}
+    return {key: entry for key, entry in entries.items() if entry != getattr(Curve, key)}
 
 
 def _thruster(thruster: Thruster, sources: Mapping[str, str]) -> dict[str, Any]:
+    """Return the table of a thruster."""
     entry: dict[str, Any] = {"name": thruster.name}
     if thruster.description:
         entry["description"] = thruster.description
     entry["curve"] = thruster.curve
-    entry["direction"] = _inline_of({"value": [*thruster.direction], "source": sources["direction"]})
+    entry["direction"] = _inline_table({"value": [*thruster.direction], "source": sources["direction"]})
     if thruster.position:
         position = {"value": [*thruster.position], "unit": "m", "source": sources["position"]}
-        entry["position"] = _inline_of(position)
+        entry["position"] = _inline_table(position)
     if thruster.arm:
         entry["arm"] = "port" if thruster.arm > 0 else "starboard"
     return entry
 
 
+def _alternative(vehicle: Vehicle, alternative: Alternative) -> dict[str, Any]:
+    """Return the table of a set of published coefficients that the model does not use."""
+    metas = vehicle.layout.coefficients
+    table: dict[str, Any] = {"description": alternative.description}
+    for name, value in alternative.values.items():
+        table[name] = _quantity_table(value, metas[name], alternative.sources[name])
+    return table
+
+
 def _quantity(vehicle: Vehicle, name: str) -> InlineTable:
+    """Return the table of a coefficient, with rounded numbers, and an interval that includes the rounded value."""
     value, interval = _rounded(vehicle.rov[name]), vehicle.intervals.get(name)
     ends = [min(_rounded(interval[0]), value), max(_rounded(interval[1]), value)] if interval else None
-    return _inline(value, vehicle.layout.coefficients[name], vehicle.sources[name], ends)
+    return _quantity_table(value, vehicle.layout.coefficients[name], vehicle.sources[name], ends)
 
 
 def _estimated(row: Estimated) -> InlineTable:
-    shares = {name: share for name, value in row.correlation.items() if (share := round(value, _DECIMALS))}
+    """Return the table of a standard error and those correlations that are not rounded to 0."""
+    rounded = {name: round(value, _DECIMALS) for name, value in row.correlation.items()}
+    correlation = {name: value for name, value in rounded.items() if value}
     entry: dict[str, Any] = {"error": _rounded(row.error)}
-    return _inline_of(entry | ({"correlation": _inline_of(shares)} if shares else {}))
+    if correlation:
+        entry["correlation"] = _inline_table(correlation)
+    return _inline_table(entry)
 
 
-def _inline(value: float, meta: Declaration, source: str, interval: list[float] | None = None) -> InlineTable:
+def _quantity_table(value: float, meta: Declaration, source: str, interval: list[float] | None = None) -> InlineTable:
+    """Return the table of a value with its unit and source."""
     ends = {"interval": interval} if interval else {}
-    return _inline_of({"value": value, "unit": meta.unit, **ends, "source": source})
+    return _inline_table({"value": value, "unit": meta.unit, **ends, "source": source})
 
 
-def _inline_of(entries: Mapping[str, Any]) -> InlineTable:
-    """With spaces inside the braces, as people write it."""
+def _inline_table(entries: Mapping[str, Any]) -> InlineTable:
+    """Return an inline table with spaces inside the braces, as people write it."""
     table = tomlkit.inline_table()
     table |= dict(entries)
     return cast(InlineTable, tomlkit.value(f"{{ {table.as_string()[1:-1]} }}"))
 
 
-def _lines(key: str, texts: Iterable[str]) -> dict[str, Array]:
-    """The texts a line each, where there are any."""
+def _texts(key: str, texts: Iterable[str]) -> dict[str, Array]:
+    """Return a key with a list of texts, one on each line, or nothing if there are no texts."""
     lines = tomlkit.array().multiline(True)
     lines.extend(texts)
     return {key: lines} if lines else {}
 
 
 def _rounded(value: float) -> float:
+    """Return a number rounded to _DIGITS significant digits."""
     return float(f"{value:.{_DIGITS}g}")

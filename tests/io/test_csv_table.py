@@ -1,4 +1,4 @@
-"""What is told of a number is told in the unit of its column, whatever the first unit is; bounds may be touched."""
+"""CSV files are read as spreadsheets save them; mistakes are reported as they stand in the file, in its own units."""
 
 import tracemalloc
 from collections.abc import Callable
@@ -12,14 +12,13 @@ from rov_fmu.tank.logs import read_log
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-# Of 0.5 to 2 turns, or 0.25 at least where there is no bound.
 TURNS = {"turn": 1.0, "deg": 360.0}
 BOUNDED, LEAST = Column(TURNS, minimum=0.5, maximum=2.0), Column(TURNS, least=0.25)
 
 
-def _file(folder: Path, *cells: str) -> Path:
+def _file(folder: Path, text: str) -> Path:
     path = folder / "some.csv"
-    path.write_text("\n".join(("angle [deg]", *cells)), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     return path
 
 
@@ -28,7 +27,7 @@ def _values(table: Columns) -> dict[str, list[float]]:
 
 
 @pytest.mark.parametrize(
-    ("column", "cell", "told"),
+    ("column", "cell", "reason"),
     [
         (BOUNDED, "179.9", "must be at least 180"),
         (BOUNDED, "720.1", "must be at most 720"),
@@ -36,34 +35,34 @@ def _values(table: Columns) -> dict[str, list[float]]:
         (LEAST, "-89.9", "must be 0, or 90 at least, or -90 at most"),
     ],
 )
-def test_bounds_are_told_in_the_unit_of_the_column(column: Column, cell: str, told: str, tmp_path: Path) -> None:
-    path = _file(tmp_path, "360", "", cell)
+def test_bounds_are_printed_in_the_unit_of_the_file(column: Column, cell: str, reason: str, tmp_path: Path) -> None:
+    path = _file(tmp_path, f"angle [deg]\n360\n\n{cell}")
     with pytest.raises(DataFileError) as error:
         read_columns(path, {"angle": column})
-    assert str(error.value) == f"{path}, line 4, column 'angle [deg]' = {cell!r}: {told}"
+    assert str(error.value) == f"{path}, line 4, column 'angle [deg]' = {cell!r}: {reason}"
 
 
-def test_a_bound_is_within(tmp_path: Path) -> None:
-    assert _values(read_columns(_file(tmp_path, "180", "720"), {"angle": BOUNDED})) == {"angle": [0.5, 2.0]}
-    assert _values(read_columns(_file(tmp_path, "-90", "0", "90"), {"angle": LEAST})) == {"angle": [-0.25, 0.0, 0.25]}
+def test_numbers_at_the_bounds_are_allowed(tmp_path: Path) -> None:
+    path = _file(tmp_path, "angle [deg]\n180\n720")
+    assert _values(read_columns(path, {"angle": BOUNDED})) == {"angle": [0.5, 2.0]}
+    path = _file(tmp_path, "angle [deg]\n-90\n0\n90")
+    assert _values(read_columns(path, {"angle": LEAST})) == {"angle": [-0.25, 0.0, 0.25]}
 
 
-def test_a_number_found_wrong_later_is_told_as_it_stands(tmp_path: Path) -> None:
-    path = _file(tmp_path, "90", "-45")
+def test_a_later_error_shows_the_number_as_it_stands_in_the_file(tmp_path: Path) -> None:
+    path = _file(tmp_path, "angle [deg]\n90\n-45")
     table = read_columns(path, {"angle": Column({"rad": 1.0, "deg": 180.0 / pi})})
     assert table.values["angle"] == pytest.approx([pi / 2.0, -pi / 4.0], rel=1e-15)
     assert str(table.error(1, "angle", "too far")) == f"{path}, line 3, column 'angle [deg]' = -45: too far"
 
 
-# ---- As they come ----------------------------------------------------------------------------------------------------
+# ---- Forms of files --------------------------------------------------------------------------------------------------
 
 LENGTH, MAYBE = Column({"m": 1.0, "cm": 100.0}), Column({"s": 1.0}, blanks=True)
 
 
 def _table(folder: Path, text: str, **also: Column) -> Columns:
-    path = folder / "some.csv"
-    path.write_text(text, encoding="utf-8")
-    return read_columns(path, {"length": LENGTH, **also})
+    return read_columns(_file(folder, text), {"length": LENGTH, **also})
 
 
 @pytest.mark.parametrize(
@@ -81,26 +80,26 @@ def test_separators_decimal_commas_case_and_spaces(text: str, tmp_path: Path) ->
     assert _values(_table(tmp_path, text, time=MAYBE)) == {"length": [0.5, 1000.0], "time": [1.25, -2.0]}
 
 
-def test_blanks_where_they_may_be(tmp_path: Path) -> None:
+def test_blank_cells_are_nan_where_they_are_allowed(tmp_path: Path) -> None:
     table = _table(tmp_path, "length [m],time [s]\n1,\n2,-\n3,nan\n4,NaN\n5,0\n", time=MAYBE)
     assert [isnan(value) for value in table.values["time"]] == [True, True, True, True, False]
     assert [*table.texts("time")] == [("",), ("",), ("",), ("",), ("0",)]
 
 
 @pytest.mark.parametrize("cell", ["-", "nan", "1.234,5", "1,2,3", "inf", "1e400", "٣"])
-def test_no_numbers(cell: str, tmp_path: Path) -> None:
+def test_a_text_that_is_not_a_number(cell: str, tmp_path: Path) -> None:
     with pytest.raises(DataFileError, match=r"line 2, column 'length \[m\]' = .*: must be a number$"):
         _table(tmp_path, f"length [m];time [s]\n{cell};1\n", time=MAYBE)
 
 
-def test_decimal_commas_between_commas_cannot_be_told(tmp_path: Path) -> None:
+def test_decimal_commas_with_commas_between_the_cells_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DataFileError, match=r"column 3 = '25': there is no such column \(are these decimal commas\?"):
         _table(tmp_path, "length [m],time [s]\n0,5,25\n", time=MAYBE)
     with pytest.raises(DataFileError, match="must be a number with a decimal point, unless ; parts the columns"):
         _table(tmp_path, 'length [m],time [s]\n"0,5",25\n', time=MAYBE)
 
 
-def test_all_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
+def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
     with pytest.raises(DataFileError) as error:
         _table(tmp_path, "length [m],time [s]\nlong,1\n2,late\n3,4,5\n", time=MAYBE)
     places = ("line 2, column 'length [m]' = 'long'", "line 3, column 'time [s]' = 'late'", "line 4, column 3 = '5'")
@@ -116,7 +115,7 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
         _table(tmp_path, "", time=MAYBE)
 
 
-def test_of_many_mistakes_ten_are_told_and_the_others_counted(tmp_path: Path) -> None:
+def test_of_many_mistakes_ten_are_printed_and_the_others_counted(tmp_path: Path) -> None:
     with pytest.raises(DataFileError) as error:
         _table(tmp_path, "length [m]\n" + "long\n" * 25)
     lines = str(error.value).splitlines()
@@ -125,9 +124,8 @@ def test_of_many_mistakes_ten_are_told_and_the_others_counted(tmp_path: Path) ->
     assert lines[10] == f"{tmp_path / 'some.csv'}: 15 more"
 
 
-def test_a_loose_reading_counts_what_is_no_number(tmp_path: Path) -> None:
-    path = tmp_path / "some.csv"
-    path.write_text("length [m],time [s],mode\n1,2,a\nx,,b\n,3\n1,2,3,4\n", encoding="utf-8")
+def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> None:
+    path = _file(tmp_path, "length [m],time [s],mode\n1,2,a\nx,,b\n,3\n1,2,3,4\n")
     table = read_columns(path, {"length": LENGTH, "time": MAYBE}, others=True, loose=True)
     assert [*table.lines] == [2, 3, 4]
     assert [[isnan(value) for value in table.values[name]] for name in ("length", "time")] == [
@@ -144,14 +142,13 @@ def test_other_names_and_units_with_numbers(tmp_path: Path) -> None:
         return lambda number: (number - numbers[0]) / numbers[1]
 
     column = Column({"m": 1.0}, maximum=1.0, also=("l",), conversions={"raw": scale})
-    path = tmp_path / "some.csv"
-    path.write_text("L [RAW 10 2.5]\n15\n", encoding="utf-8")
+    path = _file(tmp_path, "L [RAW 10 2.5]\n15\n")
     table = read_columns(path, {"length": column})
     assert (_values(table), table.units) == ({"length": [2.0]}, {"length": "raw"})
-    path.write_text("length [raw 10]\n15\n", encoding="utf-8")
+    _file(tmp_path, "length [raw 10]\n15\n")
     with pytest.raises(DataFileError, match=r"column 1 = 'length \[raw 10\]': two numbers, please"):
         read_columns(path, {"length": column})
-    path.write_text("length [m],l [km]\n1,15\n", encoding="utf-8")
+    _file(tmp_path, "length [m],l [km]\n1,15\n")
     assert _values(read_columns(path, {"length": column}, others=True)) == {"length": [1.0]}
 
 
@@ -159,7 +156,7 @@ def test_other_names_and_units_with_numbers(tmp_path: Path) -> None:
 
 
 def _log(path: Path, rows: int) -> int:
-    """Write a log such as autopilots make: eight pulses, depth, heading. Its size in bytes."""
+    """Write a log of eight pulses, depth and heading, as autopilots do; return its size in bytes."""
     names = "time [s]", *(f"u_{n} [us]" for n in range(1, 9)), "depth [m]", "heading [deg]"
     pulses = "1523,1477,1500,1612,1388,1500,1550,1450", "1420,1477,1560,1612,1450,1550,1550,1480"
     with path.open("w", encoding="utf-8") as file:
@@ -171,7 +168,7 @@ def _log(path: Path, rows: int) -> int:
 
 
 def _peak(action: Callable[[], object]) -> int:
-    """The most bytes that Python and NumPy allocated at once during an action."""
+    """Return the largest number of bytes that Python and NumPy held at once during an action."""
     tracemalloc.start()
     try:
         action()
@@ -180,20 +177,20 @@ def _peak(action: Callable[[], object]) -> int:
         tracemalloc.stop()
 
 
-def test_a_log_takes_at_most_six_times_its_size_in_memory(tmp_path: Path) -> None:
+@pytest.mark.parametrize("rows", [4_000, pytest.param(40_000, marks=pytest.mark.long)])
+def test_a_log_takes_at_most_six_times_its_size_in_memory(rows: int, tmp_path: Path) -> None:
     path, layout = tmp_path / "log_dive.csv", load_vehicle(SHIPPED["bluerov2_heavy"]).layout
     _log(path, 300)
-    read_log(path, layout)  # imports what it needs
-    size = _log(path, 40_000)
+    read_log(path, layout)  # imports modules, which should not count
+    size = _log(path, rows)
     columns = {"time": Column({"s": 1.0}), "depth": Column({"m": 1.0})}
     assert _peak(lambda: read_columns(path, columns, others=True, loose=True)) < 3 * size
     assert _peak(lambda: read_log(path, layout)) < 6 * size
 
 
 @pytest.mark.long
-def test_a_log_of_mistakes_alone_takes_no_more(tmp_path: Path) -> None:
-    path = tmp_path / "some.csv"
-    path.write_text("length [m],time [s]\n" + "long,late\n" * 100_000, encoding="utf-8")
+def test_a_log_with_only_mistakes_takes_no_more(tmp_path: Path) -> None:
+    path = _file(tmp_path, "length [m],time [s]\n" + "long,late\n" * 100_000)
 
     def read() -> None:
         with pytest.raises(DataFileError, match=r"199990 more$"):
@@ -202,10 +199,10 @@ def test_a_log_of_mistakes_alone_takes_no_more(tmp_path: Path) -> None:
     assert _peak(read) < 6 * path.stat().st_size
 
 
-def test_a_file_that_is_too_large_is_told_before_it_is_read(tmp_path: Path) -> None:
+def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "some.csv"
     with path.open("wb") as file:
-        file.truncate(LARGEST + 1_000_000)  # takes no room on the disk
+        file.truncate(LARGEST + 1_000_000)  # a sparse file, which takes no space on the disk
     with pytest.raises(DataFileError) as error:
         read_columns(path, {"length": LENGTH})
     assert str(error.value) == f"{path}: is too large, with 501 MB: at most 500 MB are read"

@@ -1,4 +1,4 @@
-"""Of many mistakes in a TOML file the first ten are told and the others counted, soon, however many there are."""
+"""Of many mistakes in a TOML file, the first ten are printed and the others counted, in a limited time."""
 
 import shutil
 import time
@@ -12,9 +12,8 @@ from rov_fmu.io.messages import lines_on
 from tests.commands import BARE, TESTS
 
 Capsys = pytest.CaptureFixture[str]
-MANY = 200_000
-SOON = 30.0
-"""Seconds of processor time, several times what is needed; without a limit it took more than 180."""
+SECONDS_PER_MISTAKE = 1.5e-4
+"""A limit for the processor time, several times what is needed. If every mistake had a line, it would take 9e-4 s."""
 
 
 def _vehicle(folder: Path) -> tuple[Path, list[str]]:
@@ -33,35 +32,35 @@ def _plan(folder: Path) -> tuple[Path, list[str]]:
     return path, ["study", str(path), "-o", str(folder / "results")]
 
 
+@pytest.mark.parametrize("number", [20_000, pytest.param(200_000, marks=pytest.mark.long)])
 @pytest.mark.parametrize("file", [_vehicle, _rov, _plan])
-def test_200000_unknown_tables(file: Callable[[Path], tuple[Path, list[str]]], tmp_path: Path, capsys: Capsys) -> None:
+def test_many_unknown_tables(
+    file: Callable[[Path], tuple[Path, list[str]]], number: int, tmp_path: Path, capsys: Capsys
+) -> None:
     path, command = file(tmp_path)
     with path.open("a", encoding="utf-8") as text:
-        text.writelines(f"[t{n}]\n" for n in range(MANY))
+        text.writelines(f"[t{n}]\n" for n in range(number))
     began = time.process_time()
     assert main(command) == 2
-    assert time.process_time() - began < SOON
+    assert time.process_time() - began < SECONDS_PER_MISTAKE * number
     lines = capsys.readouterr().err.splitlines()
     assert all(line.startswith(f"rov-fmu: {path}: t{n}: there is no such key") for n, line in enumerate(lines[:10]))
-    assert lines[10:] == [f"rov-fmu: {path}: {MANY - 10} more mistakes"]
+    assert lines[10:] == [f"rov-fmu: {path}: {number - 10} more mistakes"]
 
 
 def test_unknown_coefficients_are_counted_too(tmp_path: Path, capsys: Capsys) -> None:
     path, command = _rov(tmp_path)
     quantity = '{ value = 1.0, unit = "kg", source = "nowhere" }'
-    known = "[known]\n" + "".join(f"m_rov{n} = {quantity}\n" for n in range(20_000))
+    known = "[known]\n" + "".join(f"m_rov{n} = {quantity}\n" for n in range(10_000))
     path.write_text(path.read_text(encoding="utf-8").replace("[known]\n", known), encoding="utf-8")
-    began = time.process_time()
     assert main(command) == 2
-    assert time.process_time() - began < SOON
     lines = capsys.readouterr().err.splitlines()
-    assert (
-        lines[0] == f"rov-fmu: {path}: known.m_rov0: there is no such coefficient of this vehicle; did you mean m_rov?"
-    )
-    assert lines[10:] == [f"rov-fmu: {path}: 19990 more mistakes"]
+    reason = "there is no such coefficient of this vehicle; did you mean m_rov?"
+    assert lines[0] == f"rov-fmu: {path}: known.m_rov0: {reason}"
+    assert lines[10:] == [f"rov-fmu: {path}: 9990 more mistakes"]
 
 
-def test_a_misspelt_key_among_many_unknown_ones_is_not_told_as_missing_too(tmp_path: Path, capsys: Capsys) -> None:
+def test_a_misspelt_key_is_not_reported_as_missing_too(tmp_path: Path, capsys: Capsys) -> None:
     path, command = _vehicle(tmp_path)
     text = path.read_text(encoding="utf-8").replace("\nidentifier =", "\nidentifer =", 1)
     path.write_text(text, encoding="utf-8")
@@ -70,7 +69,7 @@ def test_a_misspelt_key_among_many_unknown_ones_is_not_told_as_missing_too(tmp_p
     assert "vehicle.identifer: there is no such key" in line
 
 
-def test_a_file_of_toml_that_is_too_large_is_not_read(tmp_path: Path, capsys: Capsys) -> None:
+def test_a_toml_file_that_is_too_large_is_not_read(tmp_path: Path, capsys: Capsys) -> None:
     path, command = _vehicle(tmp_path)
     with path.open("ab") as file:
         file.truncate(30_000_000)
@@ -78,7 +77,7 @@ def test_a_file_of_toml_that_is_too_large_is_not_read(tmp_path: Path, capsys: Ca
     assert capsys.readouterr().err == f"rov-fmu: {path}: is too large, with 30 MB: at most 20 MB are read\n"
 
 
-def test_each_mistake_is_told_once_and_one_more_is_in_the_singular() -> None:
+def test_each_mistake_is_printed_once_and_one_more_is_in_the_singular() -> None:
     path = Path("some.toml")
     assert lines_on(path, ["a", "b", "a"]) == ["some.toml: a", "some.toml: b"]
     assert lines_on(path, [*map(str, range(11)), "3"])[10:] == ["some.toml: 1 more mistake"]

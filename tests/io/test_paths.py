@@ -1,8 +1,7 @@
-"""Paths that a file names lead to places inside its folder, and everything else is refused in one line."""
+"""Names in files lead to places inside the folder of the file; any other name is refused in one line."""
 
 import os
 import shutil
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,8 +16,8 @@ from tests.commands import ALONE, BARE, TESTS
 Capsys = pytest.CaptureFixture[str]
 NOT_RELATIVE = "must be a relative path with / between its parts"
 OUTSIDE = "must lead to a place inside the folder of this file"
-# What a name in a file must not be, as TOML writes it, and what is told of it. In the folder above the file there are
-# the files `secret` and `secrets/model.png`; `link` and `links` beside the file lead to these.
+# Names that a file must not contain, as TOML writes them, and the message about each. The folder above the file has the
+# files `secret` and `secrets/model.png`; `link` and `links` beside the file lead to these.
 WRONG = {
     "absolute": ("/etc/passwd", NOT_RELATIVE),
     "above": ("../secret", OUTSIDE),
@@ -34,7 +33,7 @@ WRONG = {
     "nothing": ("", NOT_RELATIVE),
 }
 OF_ANY_TEXT = {"a NUL": "must be without the control character", "nothing": "must have at least 1 character"}
-"""What is told of these where the key is a text in any case."""
+"""The messages about these names for a key that must be a valid text first."""
 
 
 def _vehicle(folder: Path, old: str, new: str) -> list[str]:
@@ -52,7 +51,8 @@ def _tests(folder: Path, new: str) -> list[str]:
     return ["identify", str(folder), "-o", str(folder / "out.toml")]
 
 
-# A key, and how a file that has it is written and read. Those of a plan are in tests/study/test_plans.py.
+# For each key, a function that writes a file with a value and returns the command that reads it. The keys of a plan are
+# tested in tests/study/test_plans.py.
 KEYS: dict[str, Callable[[Path, str], list[str]]] = {
     "provenance.report": lambda f, n: _vehicle(f, "\n[provenance]", f'\n[provenance]\nreport = "{n}"'),
     "vehicle.data": lambda f, n: _vehicle(f, "\n[validity]", f'data = "{n}"\n[validity]'),
@@ -75,23 +75,24 @@ def folder(tmp_path: Path) -> Path:
     return folder
 
 
-def _refused(arguments: list[str], told: str, capsys: Capsys) -> str:
+def _check_refused(arguments: list[str], message: str, capsys: Capsys) -> str:
+    """Check that a command prints one line with the message and writes nothing; return the line."""
     assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert told in said
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert message in line
     assert not Path(arguments[-1]).exists()
-    return said
+    return line
 
 
 @pytest.mark.parametrize("key", KEYS)
 @pytest.mark.parametrize("case", WRONG)
 def test_a_name_that_does_not_stay_in_the_folder_is_refused(key: str, case: str, folder: Path, capsys: Capsys) -> None:
-    name, told = WRONG[case]
+    name, message = WRONG[case]
     arguments = KEYS[key](folder, name)
     if key == "provenance.report":
-        told = OF_ANY_TEXT.get(case, told)
-    assert _refused(arguments, told, capsys).startswith(f"rov-fmu: {folder / 'rov.toml'}: {key} = ")
+        message = OF_ANY_TEXT.get(case, message)
+    assert _check_refused(arguments, message, capsys).startswith(f"rov-fmu: {folder / 'rov.toml'}: {key} = ")
 
 
 @pytest.mark.parametrize(("key", "file"), [("pictures", "model.png"), ("data", "table7_yaw_response.csv")])
@@ -100,28 +101,28 @@ def test_a_link_inside_a_folder_that_leads_out_of_it_is_refused(
 ) -> None:
     (folder / "own").mkdir()
     (folder / "own" / file).symlink_to(folder.parent / "secret")
-    told = f"vehicle.{key} = 'own': its file {file} {OUTSIDE}, after links are followed"
-    _refused(KEYS[f"vehicle.{key}"](folder, "own"), told, capsys)
+    message = f"vehicle.{key} = 'own': its file {file} {OUTSIDE}, after links are followed"
+    _check_refused(KEYS[f"vehicle.{key}"](folder, "own"), message, capsys)
 
 
 def test_a_link_that_stays_in_the_folder_is_followed(folder: Path) -> None:
     (folder / "kept").mkdir()
-    (folder / "kept" / "page.html").write_text("found so", encoding="utf-8")
+    (folder / "kept" / "page.html").write_text("the report", encoding="utf-8")
     (folder / "report.html").symlink_to(Path("kept", "page.html"))
-    assert main(KEYS["provenance.report"](folder, "tables/../report.html")) == 0
-    with zipfile.ZipFile(folder / "out.fmu") as fmu:
-        assert fmu.read("documentation/identification.html") == b"found so"
+    KEYS["provenance.report"](folder, "tables/../report.html")
+    (report,) = (path for path in load_vehicle(folder / "rov.toml").files if path.suffix == ".html")
+    assert report.read_text(encoding="utf-8") == "the report"
 
 
 def test_a_vehicle_file_that_is_a_link_names_what_is_beside_the_link(folder: Path) -> None:
-    """The command line is free, and what the file names is sought where the command line has found the file."""
+    """The command line may contain any path; names in the file are relative to the folder of that path."""
     elsewhere = folder.parent / "vehicle.toml"
     elsewhere.write_text(ALONE.replace("[validity]", 'data = "tables"\n[validity]', 1), encoding="utf-8")
     (folder / "vehicle.toml").symlink_to(elsewhere)
     assert load_vehicle(folder / "vehicle.toml").data == folder / "tables"
 
 
-def test_tables_are_sought_in_the_folder_and_then_by_name_among_those_that_ship(folder: Path) -> None:
+def test_tables_are_searched_in_the_folder_and_then_among_the_shipped_ones(folder: Path) -> None:
     vehicle, own = folder / "own.toml", folder / "videoray" / "tables"
     text = ALONE.replace("[validity]", 'data = "videoray/tables"\npictures = "videoray/pictures"\n[validity]', 1)
     vehicle.write_text(text, encoding="utf-8")
@@ -133,12 +134,12 @@ def test_tables_are_sought_in_the_folder_and_then_by_name_among_those_that_ship(
         inside_or_shipped(folder, "../models/videoray")
 
 
-def test_what_ships_names_nothing_above_its_folder() -> None:
+def test_shipped_files_name_nothing_above_their_folder() -> None:
     for path in MODELS.rglob("*.toml"):
         assert "../" not in path.read_text(encoding="utf-8"), path
 
 
-def test_a_vehicle_that_ships_is_tuned_in_any_folder_without_a_path_out_of_it(folder: Path) -> None:
+def test_a_shipped_vehicle_can_be_tuned_in_any_folder(folder: Path) -> None:
     output = folder / "tuned.toml"
     assert main(["tune", "videoray", "--axis=heave", "--command=0.3", "--v-ss=0.2", "-o", str(output)]) == 0
     assert 'data = "videoray/tables"' in output.read_text(encoding="utf-8")

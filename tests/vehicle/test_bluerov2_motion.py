@@ -1,4 +1,4 @@
-"""The BlueROV2 Heavy, with coupling, lag, reverse curve and dead band, against DOP853 of equations written out here."""
+"""The motion of the BlueROV2 Heavy against DOP853. The file repeats the equations of motion as a reference."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,13 +22,14 @@ HEAVY = SHIPPED["bluerov2_heavy"]
 
 
 @dataclass
-class Written:
-    """The equations of motion written out again from the vehicle file, as the design states them."""
+class Reference:
+    """The equations of motion with the numbers of a vehicle file: coupling, lag, reverse curve and dead band."""
 
     file: Mapping[str, Any]
     signs: list[float] = field(default_factory=lambda: [1.0] * 4)
-    """Of the velocities, held between two reversals: |v| v is s v^2 there, which has all derivatives."""
+    """The signs of the velocities, constant between two reversals: |v| v becomes s v², which is smooth."""
     targets: list[float] = field(default_factory=list)
+    """The steady forces of the thrusters, which their lag approaches."""
 
     def __post_init__(self) -> None:
         def value(entry: Mapping[str, Any]) -> float:
@@ -48,7 +49,7 @@ class Written:
             self.effects.append([*d, np.cross(p, d)[2]])
 
     def hold(self, commands: Sequence[float]) -> None:
-        """From now on these commands."""
+        """Set the commands from now on."""
         self.targets = []
         for c in commands:
             m = max(min(abs(c), 1.0) - self.curve["c_0"], 0.0)
@@ -71,7 +72,7 @@ class Written:
         return found + [(target - f) / self.curve["T"] for target, f in zip(self.targets, F, strict=True)]
 
     def advance(self, y: Any, commands: Sequence[float], h: float) -> tuple[Any, int]:
-        """The state after h seconds by DOP853, cut at every reversal, and how many there were."""
+        """Return the state after h seconds, integrated from reversal to reversal, and the number of reversals."""
         self.hold(commands)
         self.signs = [1.0 if x > 0.0 else -1.0 for x in y[:4]]
         t, reversals = 0.0, 0
@@ -98,7 +99,7 @@ Flown = list[tuple[float, dict[str, float], dict[str, float]]]
 
 
 def manoeuvre(thrusters: int) -> list[tuple[float, list[float]]]:
-    """30 s of held commands: ahead, turning, aside, astern, and each thruster by itself; some are in the dead band."""
+    """Return held commands for 30 s, each with its duration: random motions of all axes, some in the dead band."""
     random, held = Random(1898), []
     ends = [0.0, *sorted(random.uniform(0.0, 30.0) for _ in range(23)), 30.0]
     for start, end in pairwise(ends):
@@ -111,21 +112,19 @@ def manoeuvre(thrusters: int) -> list[tuple[float, list[float]]]:
 
 @pytest.fixture(scope="module")
 def flown() -> Flown:
-    """The Heavy on the manoeuvre by DOP853: length, inputs and state of every held command, after the start."""
+    """Return the duration, the inputs and the final state of every held command, after the initial state."""
     vehicle = load_vehicle(HEAVY)
     assert vehicle.layout.coupled
     assert len(vehicle.layout.lagging) == 8
     names = ("u", "v", "w", "r", "x", "y", "z", "psi", *vehicle.layout.lagging)
-    written, y = (
-        Written(read_toml(HEAVY, VehicleFileError)),
-        np.array([0.2, -0.1, 0.05, 0.3, 0.0, 0.0, 5.0, 1.0] + 8 * [2.0]),
-    )
+    reference = Reference(read_toml(HEAVY, VehicleFileError))
+    y = np.array([0.2, -0.1, 0.05, 0.3, 0.0, 0.0, 5.0, 1.0] + 8 * [2.0])
     assert set(names) == set(vehicle.layout.state)
     quiet = dict.fromkeys(vehicle.layout.inputs, 0.0)
     found = [(0.0, quiet, dict(zip(names, y.tolist(), strict=True)))]
     total = 0
     for h, commands in manoeuvre(8):
-        y, reversals = written.advance(y, commands, h)
+        y, reversals = reference.advance(y, commands, h)
         inputs = quiet | {f"u_{n}": c for n, c in enumerate(commands, 1)}
         found.append((h, inputs, dict(zip(names, y.tolist(), strict=True))))
         total += reversals
@@ -135,7 +134,7 @@ def flown() -> Flown:
 
 
 @pytest.mark.parametrize("longest", [100.0, pytest.param(0.01, marks=pytest.mark.long)])
-def test_the_heavy_moves_as_dop853_says(flown: Flown, longest: float) -> None:
+def test_the_heavy_agrees_with_dop853(flown: Flown, longest: float) -> None:
     rov = load_vehicle(HEAVY).rov
     state, dead = flown[0][2], 0
     for h, inputs, wanted in flown[1:]:
@@ -148,7 +147,7 @@ def test_the_heavy_moves_as_dop853_says(flown: Flown, longest: float) -> None:
 
 
 @pytest.mark.parametrize("longest", [100.0, 0.01])
-def test_its_fmu_moves_as_dop853_says(flown: Flown, heavy_dir: Path, longest: float) -> None:
+def test_its_fmu_agrees_with_dop853(flown: Flown, heavy_dir: Path, longest: float) -> None:
     references = {v.name: v.valueReference for v in fmpy.read_model_description(str(heavy_dir)).modelVariables}
     slave, t = fmpy_slave(heavy_dir), 0.0
 

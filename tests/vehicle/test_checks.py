@@ -1,4 +1,4 @@
-"""What makes no sense as a vehicle: a line for each mistake, with key, value and what is allowed."""
+"""Contradictions in vehicle files: each gives a line with the key, the value and what is allowed."""
 
 import re
 from math import isclose, sqrt
@@ -10,8 +10,8 @@ import tomlkit
 
 from rov_fmu.model.layout import AXIS, CURVE, HEAVE, SURGE, SWAY, YAW
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from tests.vehicles import EVERYTHING
 
-EVERYTHING = Path(__file__).with_name("everything.toml")
 TEXT = EVERYTHING.read_text(encoding="utf-8")
 
 
@@ -23,12 +23,12 @@ def everything() -> Vehicle:
 # ---- A vehicle with every key ----------------------------------------------------------------------------------------
 
 
-def test_it_has_every_key_that_there_is() -> None:
+def test_the_file_has_every_possible_key() -> None:
     for key in (*CURVE, *AXIS, "alpha", "beta", "R", "gamma", "m_rov", "I_r", "coupling"):
         assert re.search(rf"^{key} = ", TEXT, re.M), key
 
 
-def test_what_it_says_is_what_the_vehicle_has(everything: Vehicle) -> None:
+def test_every_key_is_read(everything: Vehicle) -> None:
     layout, rov = everything.layout, everything.rov
     assert [form.axis for form in layout.axes] == [SURGE, SWAY, HEAVE, YAW]
     assert layout.coupled
@@ -58,19 +58,19 @@ def test_a_direction_of_any_length_is_a_unit_vector(everything: Vehicle) -> None
 
 
 def test_a_vectored_thruster_turns_by_its_lever(everything: Vehicle) -> None:
-    """Starboard bow, pushing ahead and to port: the bow goes to port, by the distance of its line from the centre."""
+    """A thruster at the starboard bow that pushes ahead and to port turns the bow to port."""
     assert isclose(everything.layout.thrusters[0].effect(YAW), -(0.156 + 0.111) * sqrt(0.5))
 
 
-# ---- Nonsense --------------------------------------------------------------------------------------------------------
+# ---- Mistakes --------------------------------------------------------------------------------------------------------
 
 
 GONE = object()
-"""In place of a value: the key is not there."""
+"""This value removes a key."""
 
 
 def changed(changes: dict[str, Any]) -> str:
-    """The file with other values at some keys; a thruster is found by its name."""
+    """Return the file with other values of some keys. A thruster is found by its name."""
     data: Any = tomlkit.parse(TEXT).unwrap()
     for place, value in changes.items():
         *above, key = place.split(".")
@@ -87,23 +87,23 @@ def changed(changes: dict[str, Any]) -> str:
 
 
 def quantity(value: float, unit: str) -> dict[str, Any]:
-    """A value with its unit and a source."""
+    """Return a value with its unit and a source."""
     return {"value": value, "unit": unit, "source": "x"}
 
 
 def place(*value: float) -> dict[str, Any]:
-    """Of a thruster."""
+    """Return the position of a thruster."""
     return {"value": [*value], "unit": "m", "source": "x"}
 
 
 _CURVE = {"a_t": quantity(1.0, "N"), "b_t": quantity(1.0, "N")}
 _ALONE: dict[str, Any] = {"inputs": GONE, "alternatives": GONE, "body.coupling": GONE}
-"""Without what names the parts of a vehicle a second time."""
+"""Changes that remove the keys which refer to other parts of the vehicle by name."""
 _NO_BOOST: dict[str, Any] = {**_ALONE, "thruster.l": GONE, "thruster.r": GONE, "curves.boost": GONE, "arm": GONE}
 
 
-# What is done to the file, and what each of the lines must name, in their order.
-NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
+# How the file is changed, and what each of the lines must contain, in their order.
+MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     # names
     "a name twice": ({**_ALONE, "thruster.2.name": "1"}, [("thruster#2.name = '1': thruster#1 has this name",)]),
     "a name and a curve that is not there twice": (
@@ -225,7 +225,7 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
         {"axes.roll": {"a_d": quantity(1.0, "N.m.s2/rad2")}},
         [("axes.roll: there is no such key, only surge, sway, heave, yaw",)],
     ),
-    "a gain beyond sense": ({"inputs.heave.5": 1e3}, [("inputs.heave.5 = 1000.0", "must be within -100 ... 100")]),
+    "a gain out of bounds": ({"inputs.heave.5": 1e3}, [("inputs.heave.5 = 1000.0", "must be within -100 ... 100")]),
     # thrust
     "thrust of the wrong sign": (
         {"curves.boost.a_t.value": -200.0, "curves.boost.b_t.value": 10.0},
@@ -316,7 +316,7 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
         {"alternatives.other.description": GONE},
         [("alternatives.other.description", "missing")],
     ),
-    # several at once, of form and of sense
+    # several mistakes at once, of form and of content
     "many": (
         {
             "validity.command_max": 7.0,
@@ -337,9 +337,9 @@ NONSENSE: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
 }
 
 
-@pytest.mark.parametrize("case", NONSENSE)
-def test_nonsense_is_one_clear_line_a_mistake(case: str, tmp_path: Path) -> None:
-    changes, wanted = NONSENSE[case]
+@pytest.mark.parametrize("case", MISTAKES)
+def test_each_mistake_is_one_clear_line(case: str, tmp_path: Path) -> None:
+    changes, wanted = MISTAKES[case]
     path = tmp_path / "rov.toml"
     path.write_text(changed(changes), encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
@@ -352,9 +352,9 @@ def test_nonsense_is_one_clear_line_a_mistake(case: str, tmp_path: Path) -> None
             assert word in line
 
 
-# ---- What does make sense --------------------------------------------------------------------------------------------
+# ---- Valid vehicles --------------------------------------------------------------------------------------------------
 
-SENSE: dict[str, dict[str, Any]] = {
+VALID: dict[str, dict[str, Any]] = {
     "as it is": {},
     "an input for each thruster": {"inputs": GONE},
     "without coupling": {"body.coupling": GONE},
@@ -381,10 +381,10 @@ SENSE: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("case", SENSE)
-def test_a_vehicle_has_what_it_says_and_no_more(case: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("case", VALID)
+def test_a_valid_vehicle_can_be_simulated(case: str, tmp_path: Path) -> None:
     path = tmp_path / "rov.toml"
-    path.write_text(changed(SENSE[case]), encoding="utf-8")
+    path.write_text(changed(VALID[case]), encoding="utf-8")
     vehicle = load_vehicle(path)
     start = dict.fromkeys(vehicle.layout.state, 0.0)
     moved = vehicle.rov.step(dict.fromkeys(vehicle.layout.inputs, 0.3), start, 0.01)

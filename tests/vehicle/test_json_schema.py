@@ -1,4 +1,4 @@
-"""The JSON schema of the vehicle file, which editors read, and what it says of itself."""
+"""The JSON schema of the vehicle file, which editors read."""
 
 import json
 from typing import Any
@@ -19,7 +19,7 @@ def test_the_file_in_the_repository_is_the_schema(capsys: pytest.CaptureFixture[
     assert capsys.readouterr().out == KEPT.read_text(encoding="utf-8")
 
 
-def test_every_kind_of_coefficient_stands_in_it_with_unit_and_bounds() -> None:
+def test_it_has_every_kind_of_coefficient_with_unit_and_bounds() -> None:
     tables: dict[str, Any] = json_schema()["$defs"]
     kinds = {
         "Body": {key: kind.meta() for key, kind in BODY.items()},
@@ -35,8 +35,8 @@ def test_every_kind_of_coefficient_stands_in_it_with_unit_and_bounds() -> None:
             assert {"value", "unit", "source"} <= set(entry["required"])
 
 
-def test_no_key_is_without_words() -> None:
-    """An editor shows them where the cursor stands."""
+def test_every_key_has_a_description() -> None:
+    """Editors show it for the key at the cursor."""
     schema = json_schema()
 
     def described(node: dict[str, Any]) -> bool:

@@ -1,4 +1,4 @@
-"""Tables 6–8 on the FMU: V_ss and Tau taken from its trajectories, against closed form, print and measurement."""
+"""Tables 6–8: V_ss and Tau from trajectories of the FMU against closed form, printed and measured values."""
 
 import os
 import re
@@ -28,12 +28,12 @@ from tests.commands import ALONE
 DATA = VIDEORAY.parent / "tables"
 
 
-# ---- What the paper prints, and how far Table 9 leads from it -------------------------------------------------------
+# ---- The printed values, and their deviations from Table 9 ----------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Band:
-    """Where the simulated value lies, less the printed one: one unit of the last printed digit wide."""
+    """The range of the simulated minus the printed value, which is one unit of the last printed digit wide."""
 
     low: float
     high: float
@@ -41,74 +41,35 @@ class Band:
 
 
 def off(low: float, reason: str) -> Band:
-    """The printed value is not what the coefficients give: it is off by `low` and up to 0.01 more."""
+    """Return the band of a printed value that is smaller than the simulated one by `low` to `low` + 0.01."""
     return Band(low, low + 0.01, reason)
 
 
 ROUNDED = Band(-0.005, 0.005, "the paper rounds")
 TRUNCATED = Band(0.0, 0.01, "the paper cuts digits off")
-HEAVE_TAU = (
+TAU_W = (
     "Not from Table 9: its α_w, β_w make Tau 1.59 to 1.60 times as long as without them, the printed Tau are 1.68 to "
     "1.79 times as long; the paper does not tell how it read Tau."
 )
-YAW_TAU = "Table 9 gives 1 to 4 % more; the paper does not tell how it read Tau, and prints two of heave's here."
-YAW_V = "Not from Table 9: 5 % more at 20 %, 1 to 2 % less at 30 and 50 %, although 70 % agrees; no α_r gives all four."
+TAU_R = "Table 9 gives 1 to 4 % more; the paper does not tell how it read Tau, and prints two of heave's here."
+V_R = "Not from Table 9: 5 % more at 20 %, 1 to 2 % less at 30 and 50 %, although 70 % agrees; no α_r gives all four."
 
-# Axis and command in %: V_ss and Tau of the non-linear model, V_ss and Tau of the scaled one, each as printed and band.
+# For each axis and command in %: V_ss and Tau of the non-linear model, V_ss and Tau of the scaled model; each as the
+# printed value and its band.
 CELLS: dict[tuple[str, int], tuple[tuple[str, Band], ...]] = {
-    ("heave", 20): (
-        ("0.10", ROUNDED),
-        ("1.76", off(0.25, HEAVE_TAU)),
-        ("0.11", ROUNDED),
-        ("3.08", off(0.13, HEAVE_TAU)),
-    ),
-    ("heave", 30): (
-        ("0.16", ROUNDED),
-        ("1.33", off(0.05, HEAVE_TAU)),
-        ("0.17", ROUNDED),
-        ("2.23", off(-0.03, HEAVE_TAU)),
-    ),
-    ("heave", 50): (
-        ("0.28", ROUNDED),
-        ("0.80", off(0.05, HEAVE_TAU)),
-        ("0.30", ROUNDED),
-        ("1.40", off(-0.05, HEAVE_TAU)),
-    ),
-    ("heave", 70): (
-        ("0.39", TRUNCATED),
-        ("0.58", off(0.03, HEAVE_TAU)),
-        ("0.42", TRUNCATED),
-        ("1.04", off(-0.06, HEAVE_TAU)),
-    ),
-    ("yaw", 20): (
-        ("0.93", ROUNDED),
-        ("0.39", off(0.01, YAW_TAU)),
-        ("1.10", off(-0.06, YAW_V)),
-        ("3.08", off(0.05, YAW_TAU)),
-    ),
-    ("yaw", 30): (
-        ("1.47", ROUNDED),
-        ("0.29", TRUNCATED),
-        ("1.61", off(0.03, YAW_V)),
-        ("2.23", off(0.07, YAW_TAU)),
-    ),
-    ("yaw", 50): (
-        ("2.57", ROUNDED),
-        ("0.19", TRUNCATED),
-        ("2.82", off(0.03, YAW_V)),
-        ("1.46", off(0.04, YAW_TAU)),
-    ),
-    ("yaw", 70): (
-        ("3.68", ROUNDED),
-        ("0.14", TRUNCATED),
-        ("4.07", ROUNDED),
-        ("1.10", off(0.01, YAW_TAU)),
-    ),
+    ("heave", 20): (("0.10", ROUNDED), ("1.76", off(0.25, TAU_W)), ("0.11", ROUNDED), ("3.08", off(0.13, TAU_W))),
+    ("heave", 30): (("0.16", ROUNDED), ("1.33", off(0.05, TAU_W)), ("0.17", ROUNDED), ("2.23", off(-0.03, TAU_W))),
+    ("heave", 50): (("0.28", ROUNDED), ("0.80", off(0.05, TAU_W)), ("0.30", ROUNDED), ("1.40", off(-0.05, TAU_W))),
+    ("heave", 70): (("0.39", TRUNCATED), ("0.58", off(0.03, TAU_W)), ("0.42", TRUNCATED), ("1.04", off(-0.06, TAU_W))),
+    ("yaw", 20): (("0.93", ROUNDED), ("0.39", off(0.01, TAU_R)), ("1.10", off(-0.06, V_R)), ("3.08", off(0.05, TAU_R))),
+    ("yaw", 30): (("1.47", ROUNDED), ("0.29", TRUNCATED), ("1.61", off(0.03, V_R)), ("2.23", off(0.07, TAU_R))),
+    ("yaw", 50): (("2.57", ROUNDED), ("0.19", TRUNCATED), ("2.82", off(0.03, V_R)), ("1.46", off(0.04, TAU_R))),
+    ("yaw", 70): (("3.68", ROUNDED), ("0.14", TRUNCATED), ("4.07", ROUNDED), ("1.10", off(0.01, TAU_R))),
 }
 
-# Table 8 is lost, so surge is held to the V_ss measured in Table 4: command in % and the relative deviation of the
-# non-linear and the scaled model from it. The paper tunes around 30 %, by fits that weigh low commands (section 5), and
-# says itself that surge deviates above. At 20 % the measured velocity needs more thrust than (9) has there.
+# Table 8 is lost, so surge is compared with the V_ss measured in Table 4: command in %, and the relative deviations of
+# the non-linear and the scaled model from it. The paper tunes around 30 % by fits that give low commands more weight
+# (section 5), and states that surge deviates above. At 20 % the measured velocity needs more thrust than (9) gives.
 SURGE: dict[int, tuple[float, float]] = {
     20: (-0.278, -0.211),
     30: (-0.075, +0.006),
@@ -117,17 +78,17 @@ SURGE: dict[int, tuple[float, float]] = {
     60: (+0.117, +0.202),
     70: (+0.082, +0.161),
 }
-SURGE_BAND = 0.0005  # half a unit of their last digit
+SURGE_BAND = 0.0005  # half a unit of the last digit of these deviations
 
 MODELS = ("non_linear", "scaled")
 ROWS = [*CELLS, *(("surge", command) for command in SURGE)]
 
 
-# ---- The tests of the paper, run on the FMU --------------------------------------------------------------------------
+# ---- The step tests of the paper, with the FMU -----------------------------------------------------------------------
 
 
 class Tank:
-    """A test tank with the FMU in it. The closed form is not used here: time passes by fmi2DoStep alone."""
+    """A simulated test tank. It moves the FMU only by fmi2DoStep and does not use the closed form."""
 
     def __init__(self, folder: Path) -> None:
         description = fmpy.read_model_description(str(folder))
@@ -154,7 +115,7 @@ class Tank:
         self._time += h
 
     def steady_velocity(self, velocity: str) -> float:
-        """The velocity that no longer changes."""
+        """Simulate until the velocity no longer changes, and return it."""
         before = inf
         for _ in range(1000):
             self.step(1.0)
@@ -165,7 +126,7 @@ class Tank:
         raise AssertionError(f"{velocity} still changes after {self._time:g} s")
 
     def time_to_reach(self, velocity: str, target: float) -> float:
-        """When the velocity crosses the target: bracketed by steps of 10 ms, then found within that step."""
+        """Return the time at which the velocity reaches the target: a root search in a step of 10 ms."""
         h = 0.01
         for _ in range(10_000):
             before, start = self._fmu.getFMUstate(), self._time
@@ -193,7 +154,7 @@ Responses = Callable[[str, int, str], tuple[float, float]]
 
 @pytest.fixture(scope="module")
 def simulated(videoray_dir: Path, vehicle: Vehicle) -> Iterator[Responses]:
-    """V_ss and Tau of an axis at a command in %, by one of the models, from trajectories of the FMU."""
+    """Return a function that simulates V_ss and Tau of an axis at a command in % with one of the models."""
     tank = Tank(videoray_dir)
 
     @cache
@@ -361,7 +322,7 @@ def test_vehicle_without_tables(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 HEAVE, YAW, SURGE_STEADY = "table6_heave_response.csv", "table7_yaw_response.csv", "table4_surge_steady.csv"
-# File, what stands there, what stands there instead, and all that the one line must name.
+# The file, the text to replace, its replacement, and what the one line must contain.
 BAD_TABLES: dict[str, tuple[str, str, str, tuple[str, ...]]] = {
     "text for a number": (HEAVE, "1.76", "slow", ("line 2", "'non-linear Tau [s]'", "'slow'", "number")),
     "decimal comma": (HEAVE, "1.33", '"1,33"', ("line 3", "'non-linear Tau [s]'", "'1,33'", "number")),
@@ -384,7 +345,7 @@ BAD_TABLES: dict[str, tuple[str, str, str, tuple[str, ...]]] = {
 
 
 def tables_with(tmp_path: Path, name: str, change: Callable[[str], bytes]) -> tuple[Path, Path]:
-    """A copy of the VideoRay's vehicle file with one table changed: both paths."""
+    """Copy the VideoRay's vehicle file, change one of its tables, and return the paths of both."""
     shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
     vehicle_file, folder = tmp_path / VIDEORAY.name, tmp_path / DATA.name
     (folder / name).write_bytes(change((DATA / name).read_text(encoding="utf-8")))
@@ -436,7 +397,7 @@ def test_missing_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_tables_as_spreadsheets_save_them(tmp_path: Path, vehicle: Vehicle) -> None:
-    """Byte order mark, CRLF, blank lines and blanks around the cells."""
+    """A byte order mark, CRLF, blank lines and blanks around cells are allowed."""
 
     def change(text: str) -> bytes:
         return ("\ufeff" + text.replace(",", " , ").replace("\n", "\r\n") + "\r\n ,\r\n").encode()

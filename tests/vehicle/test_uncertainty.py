@@ -1,4 +1,4 @@
-"""[estimates] of a vehicle file: written and read back, checked, and what is drawn by them."""
+"""[estimates] of a vehicle file: writing, reading, checking and drawing vehicles."""
 
 import re
 from collections.abc import Callable
@@ -27,17 +27,17 @@ def refit() -> Vehicle:
 
 
 def of(values: list[float], errors: list[float], correlation: list[list[float]]) -> Uncertainty:
-    """Of drag, which is not below 0."""
+    """Return the distribution of some drag coefficients, which are never negative."""
     p = len(values)
     bounds = np.column_stack([np.zeros(p), np.full(p, np.inf)])
     names = ("a_d_u", "b_d_u", "a_d_w")[:p]
     return Uncertainty(names, np.array(values), np.array(errors), np.array(correlation), bounds)
 
 
-# ---- Written and read ------------------------------------------------------------------------------------------------
+# ---- Writing, reading and checking -----------------------------------------------------------------------------------
 
 
-def test_what_is_written_reads_back(refit: Vehicle, tmp_path: Path) -> None:
+def test_estimates_read_back_as_they_were_written(refit: Vehicle, tmp_path: Path) -> None:
     rows = {
         "a_d_u": Estimated(error=4.0),
         "b_d_u": Estimated(error=1234.5, correlation={"a_d_u": -1.0}),
@@ -49,7 +49,7 @@ def test_what_is_written_reads_back(refit: Vehicle, tmp_path: Path) -> None:
     assert "estimates" not in (tmp_path / "none.toml").read_text(encoding="utf-8")
 
 
-def test_a_correlation_of_nothing_is_not_written(refit: Vehicle, tmp_path: Path) -> None:
+def test_a_correlation_that_is_rounded_to_0_is_not_written(refit: Vehicle, tmp_path: Path) -> None:
     rows = {
         "a_d_u": Estimated(error=4.0),
         "b_d_u": Estimated(error=4.0, correlation={"a_d_u": -4e-7}),
@@ -58,7 +58,7 @@ def test_a_correlation_of_nothing_is_not_written(refit: Vehicle, tmp_path: Path)
     assert load_vehicle(tmp_path / "made.toml").estimates["b_d_u"].correlation == {}
 
 
-def test_what_is_tuned_is_no_estimate_and_the_rest_stays(refit: Vehicle, tmp_path: Path) -> None:
+def test_tuning_removes_the_estimate_and_keeps_the_others(refit: Vehicle, tmp_path: Path) -> None:
     path = tmp_path / "tuned.toml"
     assert main(["tune", str(REFIT), "--axis=heave", "--command=0.3", "--v-ss=0.17", "--tau=2", "-o", str(path)]) == 0
     tuned = load_vehicle(path)
@@ -136,11 +136,11 @@ def test_a_bad_estimate_is_one_clear_line(case: str, tmp_path: Path, capsys: pyt
     assert text != TEXT
     path.write_text(text, encoding="utf-8")
     assert main(["build", str(path)]) == 2
-    (said,) = capsys.readouterr().err.splitlines()
-    assert said.startswith(f"rov-fmu: {path}: {words}")
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"rov-fmu: {path}: {words}")
 
 
-def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
+def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
     text = TEXT.replace("{ a_d_u =", "{ m_rov =").replace("a_d_w = -0.652272", "beta_w = 0.9")
     path.write_text(text, encoding="utf-8")
@@ -149,8 +149,8 @@ def test_every_mistake_is_told_at_once(tmp_path: Path) -> None:
     assert len(str(caught.value).splitlines()) == 2
 
 
-def test_numbers_that_move_as_one_may(tmp_path: Path) -> None:
-    """Drag in reverse is found as a multiple of that ahead: their correlation is 1, but for the digits written."""
+def test_a_correlation_of_1_is_allowed(tmp_path: Path) -> None:
+    """Drag in reverse is identified as a multiple of drag ahead, so their correlation is 1 before rounding."""
     path = tmp_path / "one.toml"
     third = " a_d_w = -0.652272, b_d_w = 0.366024"
     text = TEXT.replace("-0.860225", "1.0").replace(third, " a_d_w = 0.5, b_d_w = 0.50001")
@@ -163,11 +163,11 @@ def test_numbers_that_move_as_one_may(tmp_path: Path) -> None:
     assert spearmanr(a_d[both], b_d[both]).statistic > 0.999
 
 
-# ---- What it tells ---------------------------------------------------------------------------------------------------
+# ---- The distribution and its draws ----------------------------------------------------------------------------------
 
 
 def test_errors_and_correlations_are_those_of_the_fit(refit: Vehicle) -> None:
-    """Of the shipped refit, by the intervals that it prints, 1.96 standard errors to either side."""
+    """The intervals in the shipped refit end 1.96 standard errors to either side."""
     found = refit.uncertainty
     place = {name: n for n, name in enumerate(found.names)}
     assert {*found.names} == {*refit.intervals} == {*refit.estimates}
@@ -175,7 +175,7 @@ def test_errors_and_correlations_are_those_of_the_fit(refit: Vehicle) -> None:
     assert found.errors[place["a_d_u"]] == pytest.approx((12.8104 - 8.88145) / 1.95996, rel=1e-4)
     assert found.errors[place["b_d_r"]] == pytest.approx(0.165744 / 1.95996, rel=1e-4), "cut at 0 below"
     assert found.errors[place["beta_w"]] == pytest.approx(0.620654 * np.log(0.805371 / 0.620654) / 1.95996, rel=1e-4)
-    for axis, both in (("u", -0.88), ("w", -0.86), ("r", -0.92)):  # as the warnings of the file have them
+    for axis, both in (("u", -0.88), ("w", -0.86), ("r", -0.92)):  # the same as in the warnings of the file
         assert found.correlation[place[f"a_d_{axis}"], place[f"b_d_{axis}"]] == pytest.approx(both, abs=0.005)
     assert (found.correlation == found.correlation.T).all()
     assert (np.diag(found.correlation) == 1.0).all()
@@ -183,7 +183,7 @@ def test_errors_and_correlations_are_those_of_the_fit(refit: Vehicle) -> None:
     assert np.linalg.eigvalsh(found.correlation)[0] > 0.01
 
 
-def test_an_interval_by_hand_is_normal_and_alone(tmp_path: Path) -> None:
+def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path) -> None:
     path = tmp_path / "with.toml"
     text = ALONE.replace('6.57, unit = "kg"', '6.57, unit = "kg", interval = [6.374, 6.766]')
     path.write_text(text, encoding="utf-8")
@@ -204,8 +204,8 @@ def test_a_value_set_by_hand_within_its_interval_keeps_the_error(refit: Vehicle,
     assert (found.correlation == refit.uncertainty.correlation).all()
 
 
-def test_an_interval_cut_on_either_side_tells_the_error_by_the_other(refit: Vehicle) -> None:
-    """b_d_u not below 0, β_w at most 1000; and an interval that is all that is physical tells what it can."""
+def test_an_interval_cut_on_one_side_gives_the_error_by_the_other(refit: Vehicle) -> None:
+    """b_d_u is at least 0, β_w at most 1000. The interval of a_d_u is cut on both sides, so its larger side counts."""
     cut = {"a_d_u": (0.0, 1e6), "b_d_u": (0.0, 5.0 + 1.959964), "beta_w": (500.0, 1000.0)}
     rov = refit.rov.replaced({"a_d_u": 9.0, "b_d_u": 5.0, "beta_w": 900.0})
     found = replace(refit, rov=rov, intervals=cut, estimates={}).uncertainty
@@ -222,8 +222,8 @@ def test_without_intervals_nothing_is_drawn(vehicle: Vehicle) -> None:
     assert found.drawn(np.empty((5, 0))).shape == (5, 0)
 
 
-def test_what_is_drawn_is_normal_and_as_correlated_as_asked() -> None:
-    """Against SciPy's distribution, and the rank correlation of normal numbers, 6/π arcsin(ρ/2)."""
+def test_draws_are_normal_with_the_given_correlations() -> None:
+    """The rank correlation of normal numbers is 6/π arcsin(ρ/2)."""
     found = of([50.0, 80.0, 60.0], [1.0, 2.0, 3.0], [[1.0, -0.9, 0.3], [-0.9, 1.0, 0.0], [0.3, 0.0, 1.0]])
     drawn = found.drawn(qmc.Sobol(3, seed=0).random(4096))
     for n in range(3):
@@ -232,8 +232,8 @@ def test_what_is_drawn_is_normal_and_as_correlated_as_asked() -> None:
     assert ranks == pytest.approx(6.0 / np.pi * np.arcsin(found.correlation / 2.0), abs=0.01)
 
 
-def test_the_intervals_hold_95_percent_of_what_is_drawn(refit: Vehicle) -> None:
-    """Of those that no bound cuts, on either side alike, of β too, a positive factor."""
+def test_the_intervals_contain_95_percent_of_the_draws(refit: Vehicle) -> None:
+    """2.5 % are on either side of an interval that no bound cuts, also for the positive factor β."""
     alone = {name: Estimated(error=row.error) for name, row in refit.estimates.items()}
     found = replace(refit, estimates=alone).uncertainty
     drawn = found.drawn(qmc.Sobol(len(found.names), seed=0).random(8192))
@@ -245,8 +245,8 @@ def test_the_intervals_hold_95_percent_of_what_is_drawn(refit: Vehicle) -> None:
 
 
 @pytest.mark.parametrize("b", [0.0, 0.5, 3.0])
-def test_at_a_bound_the_rest_is_what_the_fit_would_be(b: float) -> None:
-    """y = a x^2 + b x + noise, b not below 0: what is drawn against as many bounded fits (SciPy) of noisy data."""
+def test_draws_at_a_bound_agree_with_bounded_fits(b: float) -> None:
+    """y = a x² + b x + noise with b >= 0: compare the draws with as many bounded fits (SciPy) of noisy data."""
     x = np.linspace(0.2, 1.0, 8)
     M = np.column_stack([x * x, x])
     random, noise, n = np.random.default_rng(1), 0.4, 2000
@@ -260,8 +260,8 @@ def test_at_a_bound_the_rest_is_what_the_fit_would_be(b: float) -> None:
     assert np.mean(drawn[:, 1] == 0.0) == pytest.approx(np.mean(fits[:, 1] < 1e-12), abs=0.05)
 
 
-def test_the_table_is_for_people_too(refit: Vehicle) -> None:
-    """A row a coefficient, with those above it."""
+def test_the_table_is_readable(refit: Vehicle) -> None:
+    """Each row has the correlations of one coefficient with those above it."""
     rows = re.search(r"^\[estimates\]\n((?:\w+ = .*\n)+)", TEXT, re.M)
     assert rows
     names = [line.split(" = ")[0] for line in rows[1].splitlines()]

@@ -1,4 +1,4 @@
-"""The vehicle file: what it holds, and one clear line for whatever is wrong with it."""
+"""Reading the VideoRay's vehicle file, and one clear line for each mistake in a vehicle file."""
 
 import re
 import shutil
@@ -14,8 +14,10 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
+WITH_SHIPPED_FOLDERS = re.sub(r'^(data|pictures) = "', r'\1 = "videoray/', TEXT, flags=re.MULTILINE)
+"""The VideoRay's file with names of folders that are valid from any place."""
 
-# Stated again as an independent witness of the vehicle file.
+# The coefficients of Table 9, written here again to check the vehicle file.
 TABLE_9 = {
     "m_rov": 6.57,
     "I_r": 0.105,
@@ -54,7 +56,7 @@ def test_every_coefficient_names_its_equation_or_table(vehicle: Vehicle) -> None
     assert {name: list(words) for name, words in vehicle.thruster_sources.items()} == {n: ["direction"] for n in "lrt"}
 
 
-def test_videoray_keeps_the_unweighted_thrust_curve_beside(vehicle: Vehicle) -> None:
+def test_videoray_has_the_unweighted_thrust_curve_as_an_alternative(vehicle: Vehicle) -> None:
     assert [a.values for a in vehicle.alternatives.values()] == [{"a_t_rear": 100.3, "b_t_rear": -27.09}]
 
 
@@ -72,7 +74,7 @@ def test_optional_parts_may_be_absent(tmp_path: Path) -> None:
 
 
 def edit(pattern: str, replacement: str) -> Callable[[str], str]:
-    """A change to the text of the VideoRay's file: the first line that matches."""
+    """Return a function that replaces the first match in the text of the VideoRay's file."""
 
     def change(text: str) -> str:
         changed, count = re.subn(pattern, lambda _: replacement, text, count=1, flags=re.MULTILINE)
@@ -83,13 +85,13 @@ def edit(pattern: str, replacement: str) -> Callable[[str], str]:
 
 
 def value(name: str, text: str) -> Callable[[str], str]:
-    """Another value of a coefficient, of the first one with this key."""
+    """Return a function that changes the value of the first coefficient with this key."""
     return edit(rf"(?<=^{name} = {{ value = )[^,]*", text)
 
 
 _COEFFICIENTS_OF_VERSION_1 = '[coefficients]\nm_rov = { value = 6.57, unit = "kg", source = "Table 9" }\n'
 
-# What is done to the file, and all that the one line must name: key, value, what is allowed.
+# How the file is changed, and what the one line must contain: the key, the value, what is allowed.
 BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "unknown coefficient": (
         edit(r"(?=^R = )", 'mass = { value = 6.57, unit = "kg", source = "" }\n'),
@@ -206,18 +208,8 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
 }
 
 
-@pytest.fixture(params=BAD_FILES)
-def bad_file(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, tuple[str, ...]]:
-    """A vehicle file with something wrong, and what must be named."""
-    change, named = BAD_FILES[request.param]
-    shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
-    path = tmp_path / "bad.toml"
-    path.write_text(change(TEXT), encoding="utf-8")
-    return path, named
-
-
-def test_every_mistake_of_a_file_is_told(tmp_path: Path) -> None:
-    """Those of form and those of sense, in one go."""
+def test_every_mistake_in_a_file_is_reported(tmp_path: Path) -> None:
+    """Mistakes of form and contradictions are reported together."""
     path = tmp_path / "bad.toml"
     text = ALONE.replace("m_rov = { value = 6.57", "m_rov = { value = -1.0").replace('"kg.m2"', '"lb"')
     text = text.replace("command_min = 0.2", "command_min = 20").replace("R = {", "radius = {")
@@ -241,9 +233,9 @@ def test_every_mistake_of_a_file_is_told(tmp_path: Path) -> None:
         assert line.startswith(f"{path}: {words}")
 
 
-def test_mistakes_beyond_the_form_are_told_together(tmp_path: Path) -> None:
+def test_missing_folders_are_reported_together_with_other_mistakes(tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
-    text = VIDEORAY.read_text(encoding="utf-8").replace("command_min = 0.2", "command_min = 0.8")
+    text = TEXT.replace("command_min = 0.2", "command_min = 0.8")
     path.write_text(text, encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
         load_vehicle(path)
@@ -251,14 +243,14 @@ def test_mistakes_beyond_the_form_are_told_together(tmp_path: Path) -> None:
     assert keys == ["vehicle.data", "vehicle.pictures", "validity.command_min"]
 
 
-def test_only_what_is_read_counts_as_an_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A folder with tables and pictures beside the vehicle file: the FMU of the first build is none of them."""
+def test_only_files_that_are_read_are_inputs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In a folder with tables and pictures, a build replaces its earlier FMU but no file that it reads."""
     for folder in ("tables", "pictures"):
         shutil.copytree(VIDEORAY.parent / folder, tmp_path, dirs_exist_ok=True)
     path, fmu = tmp_path / "here.toml", tmp_path / "here.fmu"
     path.write_text(re.sub(r'^(data|pictures) = "\w+"', r'\1 = "."', TEXT, flags=re.M), encoding="utf-8")
     table, picture = tmp_path / "table3_heave_steady.csv", tmp_path / "model.png"
-    fmu.write_bytes(b"that of the first build")
+    fmu.write_bytes(b"an earlier FMU")
     assert main(["build", str(path), "--backend", "pythonfmu", "-o", str(fmu)]) == 0
     assert {table, picture} < set(load_vehicle(path).files)
     assert fmu not in load_vehicle(path).files
@@ -276,25 +268,26 @@ def check_line(line: str, path: Path, named: tuple[str, ...]) -> None:
         assert word in line
 
 
-def test_bad_file_is_one_clear_line(bad_file: tuple[Path, tuple[str, ...]]) -> None:
-    path, named = bad_file
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_bad_file_is_one_clear_line(case: str, tmp_path: Path) -> None:
+    change, named = BAD_FILES[case]
+    path = tmp_path / "bad.toml"
+    path.write_text(change(WITH_SHIPPED_FOLDERS), encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
         load_vehicle(path)
     check_line(str(caught.value), path, named)
 
 
-def test_commands_refuse_a_bad_file(
-    bad_file: tuple[Path, tuple[str, ...]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path, named = bad_file
-    fmu = tmp_path / "out" / "bad.fmu"
-    fmu.parent.mkdir()
+def test_commands_refuse_a_bad_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, fmu = tmp_path / "bad.toml", tmp_path / "bad.fmu"
+    change, named = BAD_FILES["negative mass"]
+    path.write_text(change(WITH_SHIPPED_FOLDERS), encoding="utf-8")
     for arguments in (["build", str(path), "-o", str(fmu), "--platform", "host"], ["tables", str(path)]):
         assert main(arguments) == 2
         out, err = capsys.readouterr()
         assert out == ""
         check_line(err, path, named)
-    assert not any(fmu.parent.iterdir())
+    assert [*tmp_path.iterdir()] == [path]
 
 
 def test_missing_file(tmp_path: Path) -> None:
