@@ -21,6 +21,7 @@ from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.report import report_page
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables, untuned
@@ -196,7 +197,8 @@ def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
     found = identify(load_tank_tests(tmp_path))
     (fit,) = (result.recordings for result in found.axes if result.recordings)
     assert fit.disagreement["a_d_w"] > 3.0
-    assert any("heave: the recordings disagree on a_d_w" in warning for warning in found.warnings), found.warnings
+    (disagreement,) = (finding for finding in found.findings if finding.kind == "disagreement")
+    assert (disagreement.axis, "a_d_w" in disagreement.names["coefficients"]) == ("heave", True)
     low, high = found.vehicle.intervals["a_d_w"]
     assert low < k["a_d_w"] < high
 
@@ -301,7 +303,7 @@ def axis_of(found: Identification, axis: str) -> AxisResult:
     return next(result for result in found.axes if result.axis.name == axis)
 
 
-# ---- What is not identifiable, in words -----------------------------------------------------------------------------
+# ---- What is not identifiable ----------------------------------------------------------------------------------------
 
 FORCES = [(c, 42.9 * c * c + 2.711 * c) for c in (0.1, 0.3, 0.5, 0.7)]
 TOP = [(c, 6.494 * c * c + 0.0513 * c) for c in (0.1, 0.3, 0.5, 0.7)]
@@ -326,52 +328,77 @@ def folder_with(
 
 
 Tables = Mapping[str, list[tuple[float, float]]]
-WORDS: dict[str, tuple[Tables, str]] = {
-    "no Tau": ({}, "surge: m_rov/beta_u is not identifiable from V_ss alone"),
-    "no Tau in yaw": ({}, "yaw: I_r/beta_r is not identifiable from V_ss alone"),
+FOUND: dict[str, tuple[Tables, Finding]] = {
+    "no Tau": ({}, Finding("assumed beta", "surge", names={"beta": "beta_u", "inertia": "m_rov"})),
+    "no Tau in yaw": ({}, Finding("assumed beta", "yaw", names={"beta": "beta_r", "inertia": "I_r"})),
     "few points": (
         {"steady_heave": [(0.3, 0.15), (0.5, 0.29), (0.7, 0.38)]},
-        "heave: quadratic and linear drag are",
+        Finding("inseparable drag", "heave", names={"a_d": "a_d_w", "b_d": "b_d_w"}),
     ),
-    "as many as coefficients": ({"steady_yaw": [(0.3, 1.5), (0.6, 3.1)]}, "yaw: as many coefficients as measurements"),
+    "as many as coefficients": (
+        {"steady_yaw": [(0.3, 1.5), (0.6, 3.1)]},
+        Finding("drag without freedom", "yaw"),
+    ),
     "drag at its bound": (
         {"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]},
-        "heave: b_d_w is at its bound",
+        Finding("drag at zero", "heave", names={"coefficient": "b_d_w"}),
     ),
-    "one thrust carries": ({"steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)]}, "leave-one-thrust-out error of V_ss"),
-    "thrust that points backward": ({"thrust_rear": [(0.3, 1.0), (0.5, 11.5), (0.7, 30.0)]}, "backward below 27%"),
-    "weak reverse thrust": ({"thrust_rear": [*FORCES, (-0.5, -8.0)]}, "rear thrust: force differs by -34%"),
-    "slow upward": ({"steady_heave": [*STEADY["heave"], (-0.5, -0.25)]}, "heave: V_ss differs by -11%"),
-    "thrust not tested": ({"thrust_top": TOP[:3]}, "but top thrust was tested from 10% to 50% only"),
+    "one thrust carries": (
+        {"steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)]},
+        Finding("leave-one-out error", "yaw", names={"quantity": "V_ss"}),
+    ),
+    "thrust that points backward": (
+        {"thrust_rear": [(0.3, 1.0), (0.5, 11.5), (0.7, 30.0)]},
+        Finding("backward thrust", curve="rear", numbers={"command": 0.27}),
+    ),
+    "weak reverse thrust": (
+        {"thrust_rear": [*FORCES, (-0.5, -8.0)]},
+        Finding("asymmetry", curve="rear", numbers={"measured": -0.34}),
+    ),
+    "slow upward": (
+        {"steady_heave": [*STEADY["heave"], (-0.5, -0.25)]},
+        Finding("asymmetry", "heave", numbers={"measured": -0.11}),
+    ),
+    "thrust not tested": (
+        {"thrust_top": TOP[:3]},
+        Finding("untested thrust", "heave", curve="top", numbers={"tested_low": 0.1, "tested_high": 0.5}),
+    ),
     "motion in the dead band": (
         {
             "thrust_top": [(0.1, 0.0), (0.2, 0.0), (0.3, 0.42), (0.4, 0.98), (0.5, 1.62), (0.6, 2.37), (0.7, 3.2)],
             "steady_heave": [(0.1, 0.08), *STEADY["heave"]],
         },
-        "heave: what moves at 10% is left out",
+        Finding("no push", "heave", names={"commands": "10%"}),
     ),
-    "two thrusts": ({"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]}, "2 points for two"),
+    "two thrusts": (
+        {"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]},
+        Finding("thrust without freedom", curve="top", numbers={"count": 2}),
+    ),
 }
+"""Tables, and a finding about them with some of its names and numbers."""
 
 
 _SOME = ("no Tau", "few points", "drag at its bound", "one thrust carries", "weak reverse thrust", "two thrusts")
 
 
-@pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in WORDS])
-def test_warnings(case: str, tmp_path: Path) -> None:
-    tables, words = WORDS[case]
-    found = folder_with(tmp_path, tables)
-    assert any(words in warning for warning in found.warnings), found.warnings
-    assert found.vehicle.provenance
-    assert found.vehicle.provenance.warnings == found.warnings
+@pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in FOUND])
+def test_findings(case: str, tmp_path: Path) -> None:
+    tables, expected = FOUND[case]
+    results = folder_with(tmp_path, tables)
+    subject = expected.kind, expected.axis, expected.curve
+    (found,) = (f for f in results.findings if (f.kind, f.axis, f.curve) == subject)
+    assert {name: found.names[name] for name in expected.names} == expected.names
+    assert {name: found.numbers[name] for name in expected.numbers} == pytest.approx(expected.numbers, abs=0.005)
+    assert results.vehicle.provenance
+    assert results.vehicle.provenance.warnings == results.warnings
 
 
-def test_enough_good_data_raise_no_warning(tmp_path: Path, k: Rov) -> None:
+def test_enough_good_data_raise_no_finding(tmp_path: Path, k: Rov) -> None:
     tables: dict[str, list[tuple[float, float]]] = {}
     for m in AXES:
         for quantity, kind in enumerate(("steady", "time_constant")):
             tables[f"{kind}_{m.name}"] = [(c, k.response(m, c)[quantity]) for c in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)]
-    assert folder_with(tmp_path, tables).warnings == ()
+    assert folder_with(tmp_path, tables).findings == ()
 
 
 def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
@@ -406,7 +433,7 @@ def test_thrust_and_drag_by_direction_reach_the_vehicle_file(
     by_direction: Identification, tmp_path: Path, k: Rov
 ) -> None:
     found = by_direction
-    assert not any("thrust: " in warning or "heave: V_ss differs" in warning for warning in found.warnings)
+    assert not any(f.curve or (f.kind, f.axis) == ("asymmetry", "heave") for f in found.findings)
     write_vehicle(found.vehicle, tmp_path / "made.toml")
     read = load_vehicle(tmp_path / "made.toml").rov
     for name in ("a_t_rear", "b_t_rear", "a_t_top", "b_t_top"):
@@ -443,7 +470,7 @@ def test_tables_are_checked_against_recordings(full_folder: Path, tmp_path: Path
         write_csv(folder / f"steady_{axis}.csv", f"command [1],velocity [{unit}]", STEADY[axis])
     found = identify(load_tank_tests(folder))
     assert [axis.chosen for axis in found.axes] == ["recordings", "points", "points"]
-    assert any("surge: V_ss of the tables is" in warning for warning in found.warnings)
+    assert ("tables against recordings", "surge") in [(finding.kind, finding.axis) for finding in found.findings]
 
 
 def test_known_coefficients_are_kept(tmp_path: Path) -> None:
@@ -451,10 +478,10 @@ def test_known_coefficients_are_kept(tmp_path: Path) -> None:
     rov = tmp_path / "rov.toml"
     known = '[known]\nbeta_u = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
     rov.write_text(rov.read_text(encoding="utf-8").replace("[known]\n", known), encoding="utf-8")
-    vehicle = identify(load_tank_tests(tmp_path)).vehicle
-    assert (vehicle.rov["beta_u"], vehicle.sources["beta_u"]) == (0.8, "a guess")
-    assert vehicle.intervals["beta_u"] == (0.7, 0.9)
-    assert not any("beta_u" in warning for warning in vehicle.provenance.warnings) if vehicle.provenance else False
+    found = identify(load_tank_tests(tmp_path))
+    assert (found.vehicle.rov["beta_u"], found.vehicle.sources["beta_u"]) == (0.8, "a guess")
+    assert found.vehicle.intervals["beta_u"] == (0.7, 0.9)
+    assert not any("beta_u" in warning for warning in found.warnings)
 
 
 def test_estimate_without_freedom_has_no_interval() -> None:

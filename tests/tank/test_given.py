@@ -11,6 +11,7 @@ from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.given import ROV_FILE
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
@@ -171,7 +172,7 @@ def test_inputs_are_narrowed_too(tmp_path: Path) -> None:
     tests = read(tmp_path, VECTORED + mix, rows)
     assert [*tests.given.rov.layout.mix] == ["ahead"]
     assert len(tests.given.rov.layout.thrusters) == 4
-    assert tests.notes == ("sway: neither tested nor known (a_d_v, b_d_v), so the vehicle has no sway",)
+    assert tests.findings == (Finding("axis left out", axis="sway", names={"drag": "a_d_v, b_d_v"}),)
 
 
 def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:
@@ -180,10 +181,10 @@ def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:
     tables["thrust_t200.csv"] = pulled(30.0, 20.0)
     tests = read(tmp_path, rov, tables)
     assert not tests.given.rov.layout.coupled
-    assert tests.notes == ("surge, sway and yaw are not coupled, which needs all three",)
+    assert tests.findings == (Finding("not coupled"),)
     tests = read(tmp_path, rov, tables | {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n"})
     assert tests.given.rov.layout.coupled
-    assert tests.notes == ()
+    assert tests.findings == ()
 
 
 # ---- The paper's form ------------------------------------------------------------------------------------------------
@@ -200,9 +201,10 @@ def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
     assert [t.name for t in layout.thrusters] == ["t"]
     assert [curve.name for curve in layout.curves] == ["top"]
     assert set(layout.coefficients) == {"m_rov", "a_t_top", "b_t_top", "a_d_w", "b_d_w", "alpha_w", "beta_w"}
-    assert tests.notes == (
-        "surge, yaw: neither tested nor known (a_d_u, b_d_u, a_d_r, b_d_r), so the vehicle has no surge and no yaw",
-    )
+    assert [(finding.kind, finding.axis) for finding in tests.findings] == [
+        ("axis left out", "surge"),
+        ("axis left out", "yaw"),
+    ]
     found = identify(tests)
     assert found.vehicle.rov["beta_w"] == pytest.approx(k["beta_w"], rel=0.1)
     read_again(found, tmp_path / "mine.toml")
@@ -216,7 +218,7 @@ def test_what_no_axis_needs_is_not_used(tmp_path: Path) -> None:
     )
     assert tests.given.known.keys() == {"m_rov", "a_t_top", "b_t_top"}
     assert tests.thrust == {}
-    assert tests.notes[1].startswith("thrust_rear.csv: the thrusters of curve rear act on no axis")
+    assert Finding("unused curve", curve="rear", file="thrust_rear.csv") in tests.findings
 
 
 def test_any_coefficient_may_be_known(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SWAY, Layout
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.logs import Log, read_log
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -91,9 +92,10 @@ def test_a_telemetry_log_tells_of_a_dive(bluerov2: Layout, tmp_path: Path) -> No
     assert recording.command == pytest.approx(np.where(recording.time < 0.999, 0.0, 0.5))
     assert recording.thrusters["6"] == pytest.approx(recording.command)
     assert not recording.thrusters["1"].any()
-    assert any("no recording of yaw: the heading never changes" in note for note in log.notes)
-    assert any("no parameters MOT_n_DIRECTION" in note for note in log.notes)
-    assert all(note.startswith("Dive.TLOG: ") for note in log.notes)
+    assert [(f.kind, f.axis, f.file) for f in log.findings] == [
+        ("unknown direction", "", "Dive.TLOG"),
+        ("constant motion", "yaw", "Dive.TLOG"),
+    ]
 
 
 def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
@@ -110,7 +112,7 @@ def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path
         messages += [altitude(0.1 * n, -0.01 * n)]
     log = read_log(tlog(tmp_path / "dive.tlog", [*parameters, *messages]), bluerov2)
     assert of_axis(log, "heave").thrusters["6"][-1] == 0.5
-    assert log.notes == ("dive.tlog: MOT_n_DIRECTION turns the thrusters 6",)
+    assert log.findings == (Finding("reversed motors", file="dive.tlog", names={"thrusters": "6"}),)
 
 
 def test_a_clock_of_servos_that_begins_anew(bluerov2: Layout, tmp_path: Path) -> None:
@@ -132,7 +134,7 @@ def test_depth_of_messages_without_a_time(bluerov2: Layout, tmp_path: Path) -> N
     there = np.isfinite(recording.values)
     assert recording.time[there] == pytest.approx(0.1 * np.arange(N) + 0.02, abs=2e-3)
     assert recording.values[there] == pytest.approx(0.5 + 0.01 * np.arange(N), abs=1e-6)
-    assert f"dive.tlog: {N} messages VFR_HUD have no time" in " ".join(log.notes)
+    assert Finding("arrival time", file="dive.tlog", numbers={"count": N}) in log.findings
 
 
 def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -> None:
@@ -151,8 +153,8 @@ def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -
     assert surge.command is not None
     assert surge.command[-1] == pytest.approx(0.4)
     assert {recording.axis.name for recording in log.recordings} == {"surge"}
-    assert any("no recording of sway: what the thrusters do along it never changes" in note for note in log.notes)
-    assert "10 velocities left out" in " ".join(log.notes)
+    assert Finding("constant push", axis="sway", file="dive.tlog") in log.findings
+    assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in log.findings
 
 
 def test_another_vehicle_and_another_port_are_left_out(bluerov2: Layout, tmp_path: Path) -> None:
@@ -161,14 +163,14 @@ def test_another_vehicle_and_another_port_are_left_out(bluerov2: Layout, tmp_pat
     tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
     log = read_log(path, bluerov2)
     assert not of_axis(log, "heave").thrusters["1"].any()
-    assert any("system 1 is taken" in note for note in log.notes)
+    assert Finding("several vehicles", file="dive.tlog", names={"system": "1"}) in log.findings
 
 
 def test_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
     path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
     log = read_log(path, bluerov2)
     assert of_axis(log, "heave").thrusters["5"][0] == 0.0
-    assert any("6 pulses of 0 or 65535 us taken as no command" in note for note in log.notes)
+    assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
 
 
 def test_a_damaged_telemetry_log_is_read_around_the_damage(bluerov2: Layout, tmp_path: Path) -> None:
@@ -183,7 +185,7 @@ def test_a_damaged_telemetry_log_is_read_around_the_damage(bluerov2: Layout, tmp
     assert of_axis(log, "heave").values[there] == pytest.approx(
         [1.0 + 0.02 * max(n - 10, 0) for n in range(N) if n != 10]
     )
-    assert "dive.tlog: 1 damaged piece left out" in log.notes
+    assert Finding("damaged pieces", file="dive.tlog", numbers={"count": 1}) in log.findings
 
 
 # ---- .bin ------------------------------------------------------------------------------------------------------------
@@ -255,7 +257,7 @@ def test_a_dataflash_log_tells_of_a_turn(bluerov2: Layout, tmp_path: Path) -> No
     assert {name: values[-1] for name, values in recording.thrusters.items()} == pytest.approx(
         {"1": 0.25, "2": -0.25, "3": -0.25, "4": 0.25, "5": 0.0, "6": 0.0}
     )
-    assert log.notes == ()
+    assert log.findings == ()
 
 
 def test_depth_of_the_pressure_sensor_that_is_in_the_water(bluerov2: Layout, tmp_path: Path) -> None:
@@ -302,7 +304,7 @@ def test_a_damaged_dataflash_log_is_read_around_the_damage(
     path.write_bytes(content)
     log = read_log(path, bluerov2)
     assert np.flatnonzero(np.isnan(of_axis(log, "yaw").values)).tolist() == [30]
-    assert "a.bin: damaged in places: what could be read is used" in log.notes
+    assert Finding("damaged log", file="a.bin") in log.findings
     assert capfd.readouterr() == ("", "")
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tables import Row
 from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 from rov_fmu.vehicle.published import load_tables
@@ -116,8 +117,8 @@ def test_recording_of_a_camera(folder: Path) -> None:
 
 def test_what_was_left_out_of_logs_is_told(folder: Path) -> None:
     rows = [f"{n},30,{n}" for n in [*range(30), 29]]
-    assert log(folder, "heave", "time [s],command [%],depth [m]", rows).notes == (
-        "log_heave.csv: 1 repeated time stamp merged",
+    assert log(folder, "heave", "time [s],command [%],depth [m]", rows).findings == (
+        Finding("time stamps merged", file="log_heave.csv", numbers={"count": 1}),
     )
 
 
