@@ -37,7 +37,7 @@ COMMANDS = np.arange(0.1, 1.01, 0.1)
 
 @pytest.fixture
 def k(vehicle: Vehicle) -> Rov:
-    """The VideoRay with every α and β at 1."""
+    """Return the VideoRay with every α and β at 1."""
     return untuned(vehicle.rov)
 
 
@@ -48,7 +48,7 @@ def k(vehicle: Vehicle) -> Rov:
     ("axis", "a_d", "b_d"), [("surge", 4.99, 8.65), ("heave", 24.7, -0.92), ("yaw", 0.0789, 0.163)]
 )
 def test_unweighted_fits_of_tables_3_to_5(axis: str, a_d: float, b_d: float, vehicle: Vehicle, k: Rov) -> None:
-    """Against (9) and (10) they are not (14)-(16): those have weights, or data that are in figures only."""
+    """The comparison is with (9) and (10); (14)-(16) have weights, or data that are only in figures."""
     table = next(t for t in load_tables(vehicle) if t.axis.name == axis)
     m = table.axis
     commands, V_ss = np.array([(float(c) / 100.0, float(V)) for c, V in table.steady.items()]).T
@@ -65,7 +65,7 @@ def test_unweighted_fits_of_tables_3_to_5(axis: str, a_d: float, b_d: float, veh
 
 
 def test_window_of_weights_gives_the_lower_commands_their_curve() -> None:
-    """(7): forces that follow (9) up to 70 % and fall off above are fitted by (9) within the window."""
+    """Forces that follow (9) up to 70 % and fall off above are fitted by (9) within the window, (7)."""
     forces = 42.9 * COMMANDS**2 + 2.711 * COMMANDS - 30.0 * np.maximum(COMMANDS - 0.7, 0.0)
     weights = (COMMANDS < 0.75).astype(float)
     all_of_them, weighted = fit_quadratic(REAR, COMMANDS, forces), fit_quadratic(REAR, COMMANDS, forces, weights)
@@ -77,7 +77,7 @@ def test_window_of_weights_gives_the_lower_commands_their_curve() -> None:
 
 
 def test_covariance_correlation_and_band_are_those_of_a_straight_line() -> None:
-    """y/x = b + a x is a straight line where the errors grow with x, which weights of 1/x^2 say."""
+    """With weights of 1/x^2, the fit is the straight line y/x = b + a x."""
     forces = 42.9 * COMMANDS**2 + 2.711 * COMMANDS + COMMANDS * np.random.default_rng(0).standard_normal(10)
     fit, line = fit_quadratic(REAR, COMMANDS, forces, COMMANDS**-2.0), linregress(COMMANDS, forces / COMMANDS)
     assert [fit.a, fit.b] == pytest.approx([line.slope, line.intercept])
@@ -90,7 +90,7 @@ def test_covariance_correlation_and_band_are_those_of_a_straight_line() -> None:
 
 
 def test_intervals_and_bands_of_thrust_cover_the_truth() -> None:
-    """500 seeds: 95 % within three standard deviations of their share, 1 % each."""
+    """The share of 500 seeds within the intervals is 95 %, within three standard deviations of 1 %."""
     truth = 42.9 * COMMANDS**2 + 2.711 * COMMANDS
     random = np.random.default_rng(1)
     a, b, band = [], [], []
@@ -124,7 +124,7 @@ def test_two_points_have_a_curve_but_no_interval() -> None:
 
 
 def points_of(m: Axis, k: Rov, commands: tuple[float, ...], scatter: Array | None = None) -> list[Point]:
-    """V_ss and Tau of the model, with relative errors."""
+    """Return V_ss and Tau of the model, with relative errors."""
     found = [Point(q, c, k.response(m, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
     factors = 1.0 + (np.zeros(len(found)) if scatter is None else scatter)
     return [replace(p, value=p.value * f) for p, f in zip(found, factors.tolist(), strict=True)]
@@ -144,7 +144,7 @@ def test_points_of_a_model_give_the_model(m: Axis, vehicle: Vehicle) -> None:
 
 @pytest.mark.long
 def test_intervals_of_points_cover_the_truth(vehicle: Vehicle) -> None:
-    """60 seeds of 1 % scatter: 90-99 % in the intervals, and drag never negative."""
+    """With 1 % scatter, 90-99 % of 60 seeds are within the intervals, and drag is never negative."""
     k, random = vehicle.rov, np.random.default_rng(2)
     hits: dict[str, list[bool]] = {}
     for _ in range(60):
@@ -186,7 +186,7 @@ def test_thrust_that_is_uncertain_makes_drag_uncertain(k: Rov) -> None:
 
 @pytest.mark.long
 def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
-    """Three days, three payloads: drag, which the fit takes as one, is not; its interval and a warning say so."""
+    """Drag differs between three recordings, so the interval is wide and there is a finding."""
     write_rov(tmp_path)
     k, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(1)
     rows = [(c, k.force(HEAVE, c)) for c in (0.1, 0.3, 0.5, 0.7)]
@@ -208,7 +208,7 @@ def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Thrust tests with noise, and nine recordings of 60 s at 100 Hz of the VideoRay with α = 1."""
+    """Write thrust tests with noise, and nine recordings of 60 s at 25 Hz of the VideoRay with α = 1."""
     folder, random = tmp_path_factory.mktemp("full"), np.random.default_rng(0)
     write_rov(folder)
     k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
@@ -217,14 +217,12 @@ def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
     for m in AXES:
         for n, plan in enumerate(PLANS[m.name], 1):
-            recording = clean(k, m, plan)
-            assert len(recording.time) == 6000
-            write_log(folder, str(n), recording.noisy(random))
+            write_log(folder, str(n), clean(k, m, plan, 25.0).noisy(random))
     return folder
 
 
 def write_rov(folder: Path, **windows: tuple[float, float]) -> None:
-    """rov.toml with mass and geometry of the VideoRay."""
+    """Write rov.toml with mass and geometry of the VideoRay."""
     head, known = (TESTS / "rov.toml").read_text(encoding="utf-8").split("[known]")
     lines = [line for line in known.splitlines() if line.startswith(("m_rov", "I_r", "R ", "gamma"))]
     text = head.replace('against = "videoray"', "") + "[known]\n" + "\n".join(lines) + "\n[windows]\n"
@@ -317,7 +315,7 @@ STEADY = {
 def folder_with(
     folder: Path, tables: Mapping[str, list[tuple[float, float]]] | None = None, **windows: tuple[float, float]
 ) -> Identification:
-    """A small folder, with other tables by file name."""
+    """Identify a small folder, with other tables by file name."""
     write_rov(folder, **windows)
     all_tables = {"thrust_rear": FORCES, "thrust_top": TOP, **{f"steady_{axis}": rows for axis, rows in STEADY.items()}}
     for name, rows in {**all_tables, **(tables or {})}.items():
@@ -414,7 +412,7 @@ def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def by_direction(tmp_path_factory: pytest.TempPathFactory) -> Identification:
-    """Reverse thrust of 60 % on both thrusters; up twice the drag, which slows more than the thrust alone."""
+    """Identify a vehicle with 60 % thrust in reverse, and with twice the drag upward."""
     k = untuned(load_vehicle(VIDEORAY).rov)
     ahead, back = (0.1, 0.2, 0.4, 0.6, 0.8), dict[str, float]()
     tables = {}

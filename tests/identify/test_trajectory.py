@@ -50,7 +50,7 @@ def test_motion_is_that_of_another_integrator(seed: int, lags: int) -> None:
             v = starts[list(steps.first).index(n)]
         assert found.v[n] == pytest.approx(v, rel=1e-9, abs=1e-10)
         v, way = by_dop853(steps, n, v)
-        assert found.way[n] == pytest.approx(way, rel=1e-8, abs=1e-10)
+        assert found.distance[n] == pytest.approx(way, rel=1e-8, abs=1e-10)
     assert found.end[-1] == pytest.approx(v, rel=1e-9, abs=1e-10)
 
 
@@ -61,7 +61,7 @@ def test_slopes_are_those_of_differences() -> None:
 
     def at(of: Steps, start: Array) -> tuple[Array, Array]:
         found = motion(of, start, start)
-        return found.end, found.way
+        return found.end, found.distance
 
     slopes = motion(alone, v, v).slopes()
     for key in ("v", "A", "B", "C", "D", "kappa"):

@@ -1,4 +1,4 @@
-"""Folders of tests of vehicles of any form: what rov.toml says, what is left of the vehicle, what is known of it."""
+"""The description of a vehicle in rov.toml, and the vehicle that its tests identify."""
 
 import re
 import shutil
@@ -40,7 +40,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def read_again(found: Identification, path: Path) -> None:
-    """The vehicle is one that its file can hold."""
+    """Check that the vehicle can be written to a file and read again."""
     write_vehicle(found.vehicle, path)
     assert load_vehicle(path).layout == found.vehicle.layout
     assert load_vehicle(path).thruster_sources == found.vehicle.thruster_sources
@@ -73,7 +73,7 @@ def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
 
 
 def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
-    """F_0 too: another vehicle is trimmed another way."""
+    """The log also replaces F_0, because another vehicle has another trim."""
     base = load_vehicle(SHIPPED["bluerov2"]).rov
     folder = folder_of(tmp_path / "tests", BLUEROV2, {})
     true = base.replaced({"F_0_w": 0.0, "a_d_w": 50.0, "b_d_w": 8.0, "beta_w": 0.9})
@@ -106,7 +106,7 @@ def test_thrust_ahead_leaves_reverse_as_it_is(
 
 
 def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
-    """A bow thruster makes the vehicle sway, which its file does not have."""
+    """The vectored thrusters drive sway, which the file of the base does not have."""
     text = SHIPPED["bluerov2"].read_text(encoding="utf-8").replace("coupling = true", "")
     text = text[: text.index("[axes.sway]")] + text[text.index("[axes.heave]") :]
     folder = folder_of(tmp_path / "tests", HEAD, {})
@@ -164,7 +164,7 @@ def test_one_thruster_down(tmp_path: Path) -> None:
 
 
 def test_inputs_are_narrowed_too(tmp_path: Path) -> None:
-    """Without yaw the input that turns goes."""
+    """Without yaw, the vehicle has no input for turning."""
     mix = (
         "[inputs]\nahead = { 3 = 1.0, 4 = 1.0, 1 = -1.0, 2 = -1.0 }\nturn = { 3 = -1.0, 4 = 1.0, 1 = 1.0, 2 = -1.0 }\n"
     )
@@ -261,7 +261,7 @@ a_d_v = { value = 25.0, unit = "N.s2/m2", source = "a tow" }
 
 
 def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:
-    """The force begins at 10 %: the forces ahead are those of the command beyond."""
+    """The force begins at a command of 10 %."""
     curve = "".join(
         f'{key} = {{ value = {value}, unit = "{unit}", source = "s" }}\n'
         for key, value, unit in (("a_t_reverse", 20.0, "N"), ("b_t_reverse", 15.0, "N"), ("c_0", 0.1, "1"))

@@ -1,4 +1,4 @@
-"""Logs as loggers and spreadsheets save them: what is read, what is left out and told, what is refused."""
+"""CSV logs from loggers and spreadsheets: what is read, what is left out with a finding, and what is refused."""
 
 from collections.abc import Sequence
 from math import radians
@@ -105,7 +105,7 @@ def test_as_a_european_spreadsheet_saves_it(tmp_path: Path) -> None:
 
 
 def test_a_dive_tells_of_every_axis_that_is_driven(tmp_path: Path) -> None:
-    """First down, then ahead, then about, by pulses of 1500 ± 400 µs, fractions and percent."""
+    """The dive goes down, ahead and around; commands are pulses of 1500 ± 400 µs, fractions and percent."""
     rows = []
     for n in range(90):
         left, right, top = 0.4 * (n >= 30), 0.4 * (30 <= n < 60) - 0.4 * (n >= 60), 0.5 * (n < 30)
