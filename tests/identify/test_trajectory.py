@@ -1,4 +1,4 @@
-"""The motion of many steps at once, and its derivatives: against another integrator, and against differences."""
+"""The motion of many steps at once, compared with another integrator, and its derivatives with differences."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ LENGTHS = (1e-4, 0.005, 0.02)
 
 
 def some_steps(seed: int, number: int = 60, lags: int = 1) -> Steps:
-    """Two runs with reversals, drag by direction, and forces that fade."""
+    """Return two runs with reversals, drag by direction and lagging forces."""
     random = np.random.default_rng(seed)
     A, B = (np.outer(10.0 ** random.uniform(-2.0, 0.5, 2), np.ones(number)) for _ in range(2))
     return Steps(
@@ -28,7 +28,7 @@ def some_steps(seed: int, number: int = 60, lags: int = 1) -> Steps:
 
 
 def by_dop853(steps: Steps, n: int, v: float) -> tuple[float, float]:
-    """Velocity and distance after one step."""
+    """Return velocity and distance after one step."""
 
     def rates(t: float, y: Array) -> list[float]:
         side = 0 if y[0] > 0.0 else 1
