@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from rov_fmu.identify.effects.coupling import is_coupled, is_told
+from rov_fmu.identify.effects.coupling import is_coupled, is_logged
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_rms
@@ -113,7 +113,7 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
     finding = partial(Finding, axis=axis.name)
     for s in fit.simulations:
         file = s.recording.file
-        if is_coupled(fit.rov.layout, axis) and s.recording.command is None and not is_told(s.recording):
+        if is_coupled(fit.rov.layout, axis) and s.recording.command is None and not is_logged(s.recording):
             yield finding("coupling left out", file=file)
         if s.correlation_time > 3.0 and s.noise > 1e-4 * float(np.ptp(s.measured)):
             yield finding("correlated residuals", file=file, numbers={"samples": s.correlation_time})

@@ -78,21 +78,36 @@ class Tested:
         return {*self.steady, *self.time_constants, *self.logs}
 
 
-def narrowed(description: Description, tested: Tested, folder: Path) -> tuple[Given | None, list[str], list[Finding]]:
-    """Return what is given, a line for each coefficient that is missing or given twice, and what is left out."""
+@dataclass(frozen=True)
+class Narrowed:
+    """The vehicle that can be identified from the tests, or the mistakes that prevent it."""
+
+    given: Given | None
+    rov_file_mistakes: tuple[str, ...] = ()
+    """Lines about rov.toml."""
+    test_mistakes: tuple[str, ...] = ()
+    """Lines about missing tests, and about coefficients that are both given and tested."""
+    findings: tuple[Finding, ...] = ()
+    """What is left out of the vehicle."""
+
+
+def narrowed(description: Description, tested: Tested, folder: Path) -> Narrowed:
+    """Reduce the vehicle to the axes that are tested or known, and check that nothing is missing."""
     known = {**_kept_from_base(description, tested), **description.known}
     wide = _without_unknown_options(description.layout, known)
     axes = [form.axis for form in wide.axes if _is_tested_or_known(form.axis, tested, known)]
     layout = _with_axes_alone(wide, axes)
     if not layout.axes:
-        return None, [f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"], []
-    mistakes = [*places(_with_axes(wide, axes))] or [*check_layout(layout)]
-    mistakes += _missing_hardware(description, layout, known)
-    lines = [f"{description.path}: {mistake}" for mistake in mistakes]
-    lines += [f"{folder}: {mistake}" for mistake in _missing_or_doubled_tests(description, tested, layout, known)]
-    if lines or description.head is None:
-        return None, lines, []
-    return _given(description, description.head, layout, known), [], [*_left_out(description, tested, layout)]
+        line = f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
+        return Narrowed(None, test_mistakes=(line,))
+    hardware = [*places(_with_axes(wide, axes))] or [*check_layout(layout)]
+    hardware += _missing_hardware(description, layout, known)
+    tests = [*_missing_or_doubled_tests(description, tested, layout, known)]
+    if hardware or tests or description.head is None:
+        in_rov_file = tuple(f"{description.path}: {mistake}" for mistake in hardware)
+        return Narrowed(None, in_rov_file, tuple(f"{folder}: {mistake}" for mistake in tests))
+    given = _given(description, description.head, layout, known)
+    return Narrowed(given, findings=tuple(_left_out(description, tested, layout)))
 
 
 def _given(description: Description, head: Head, layout: Layout, known: Mapping[str, Quantity]) -> Given:

@@ -25,7 +25,7 @@ from rov_fmu.model.layout import AXES, Axis, Layout
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.given import ROV_FILE, Description, read_description
 from rov_fmu.tank.logs import read_log
-from rov_fmu.tank.narrowing import Given, Tested, narrowed
+from rov_fmu.tank.narrowing import Given, Narrowed, Tested, narrowed
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tables import Row, read_rows
 from rov_fmu.vehicle.vehicle import VehicleFileError
@@ -72,16 +72,16 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
     reader = _Reader(folder, description.layout if description else None)
     for path in paths:
         reader.read(path)
-    given, test_mistakes, findings = None, list[str](), list[Finding]()
+    vehicle = Narrowed(None)
     tested = reader.tested(description)
     # Without any axis, a file that could not be read may be the one with the axes.
     if description and (tested.axes or not reader.mistakes):
-        given, test_mistakes, findings = narrowed(description, tested, folder)
-    if mistakes := [*description_mistakes, *reader.mistakes, *test_mistakes]:
-        only_in_rov_file = all(line.startswith(str(folder / ROV_FILE)) for line in mistakes)
-        raise (VehicleFileError if only_in_rov_file else DataFileError)(*mistakes)
-    assert given
-    return reader.tests(given, findings)
+        vehicle = narrowed(description, tested, folder)
+    in_tests = [*reader.mistakes, *vehicle.test_mistakes]
+    if mistakes := [*description_mistakes, *reader.mistakes, *vehicle.rov_file_mistakes, *vehicle.test_mistakes]:
+        raise (DataFileError if in_tests else VehicleFileError)(*mistakes)
+    assert vehicle.given
+    return reader.tests(vehicle.given, vehicle.findings)
 
 
 def _read_description(path: Path) -> tuple[Description | None, list[str]]:

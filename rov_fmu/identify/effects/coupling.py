@@ -43,14 +43,14 @@ def is_coupled(layout: Layout, axis: Axis) -> bool:
     return layout.coupled and axis.name in _OTHERS
 
 
-def is_told(recording: Recording) -> bool:
+def is_logged(recording: Recording) -> bool:
     """Return True when the log has the velocities that the coupling depends on."""
     return recording.beside.keys() >= set(_OTHERS.get(recording.axis.name, ()))
 
 
 def coupling(rov: Rov, recording: Recording, current: Current) -> Coupling | None:
     """Return the coupling at the times of the recording; None where there is none, or where it is not logged."""
-    if not is_coupled(rov.layout, recording.axis) or not is_told(recording):
+    if not is_coupled(rov.layout, recording.axis) or not is_logged(recording):
         return None
     M_u, M_v = (rov.effective_inertia(rov.layout.kinds[axis.name]) for axis in (SURGE, SWAY))
     beside = recording.beside
