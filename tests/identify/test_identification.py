@@ -208,7 +208,7 @@ def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write thrust tests with noise, and nine recordings of 60 s at 100 Hz of the VideoRay with α = 1."""
+    """Write thrust tests with noise, and nine recordings of 60 s at 50 Hz of the VideoRay with α = 1."""
     folder, random = tmp_path_factory.mktemp("full"), np.random.default_rng(0)
     write_rov(folder)
     k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
@@ -217,7 +217,7 @@ def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
     for m in AXES:
         for n, plan in enumerate(PLANS[m.name], 1):
-            write_log(folder, str(n), clean(k, m, plan).noisy(random))
+            write_log(folder, str(n), clean(k, m, plan, 50.0).noisy(random))
     return folder
 
 
