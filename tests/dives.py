@@ -1,4 +1,4 @@
-"""A BlueROV2 on a dive: surge, sway, heave and yaw at once, coupled, lagging and in a current."""
+"""A dive of a BlueROV2: simultaneous motion in all four axes with coupling, lag and a current."""
 
 from dataclasses import dataclass
 from math import radians
@@ -14,26 +14,26 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from verification.references.pool import Array, swim
 
 LAG = 0.15
-"""s, of the thrusters."""
+"""The lag of the thrusters, s."""
 CURRENT = (0.06, -0.03)
-"""m/s, north and east."""
+"""The velocity of the water north and east, m/s."""
 TRUTH: Rov = load_vehicle(SHIPPED["bluerov2"]).rov.replaced({"T_t200": LAG})
 AXES = (SURGE, SWAY, HEAVE, YAW)
 RATE = 10.0
 NOISE = {"velocity": 0.01, "distance": 0.02, "depth": 0.005, "heading": radians(0.3)}
 _STICKS = ((0.4, 4.0), (0.3, 4.0), (0.45, 5.0), (0.18, 3.0))
-"""By axis: the most to either side, and for how long about it stays (s)."""
+"""The largest deflection of the stick of each axis, and the typical duration of a command (s)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Dive:
-    """n samples without noise, SI units."""
+    """n samples of a dive without noise, in SI units."""
 
     commands: Commands
     motion: dict[str, Array]
 
     def recorded(self, noise: float = 1.0, seed: int = 0, quantity: str = "velocity") -> tuple[Recording, ...]:
-        """As its sensors tell it, velocities or distances over ground; noise in standard deviations."""
+        """Return recordings of velocities or distances over ground; `noise` is a multiple of NOISE."""
         random, time = np.random.default_rng(seed), self.commands.time
         psi, (north, east) = self.motion["psi"], CURRENT
         c, s = np.cos(psi), np.sin(psi)
@@ -41,22 +41,22 @@ class Dive:
             SURGE: self.motion["u"] + north * c + east * s,
             SWAY: self.motion["v"] - north * s + east * c,
         }
-        if quantity == "distance":  # by trapezia, fine beside what is looked for
+        if quantity == "distance":  # by the trapezoidal rule, which is accurate enough
             steps = {axis: 0.5 * (v[1:] + v[:-1]) / RATE for axis, v in ground.items()}
             ground = {axis: np.concatenate([[0.0], np.cumsum(step)]) for axis, step in steps.items()}
         clean = [(axis, quantity, values) for axis, values in ground.items()]
         clean += [(HEAVE, "depth", self.motion["z"]), (YAW, "heading", psi)]
         signals = [
-            Signal(axis, of, time, values + noise * NOISE[of] * random.standard_normal(len(time)))
-            for axis, of, values in clean
+            Signal(axis, measured, time, values + noise * NOISE[measured] * random.standard_normal(len(time)))
+            for axis, measured, values in clean
         ]
-        found, reasons = recordings_of("dive.tlog", TRUTH.layout, self.commands, signals)
-        assert not reasons
-        return found
+        recordings, findings = recordings_of("dive.tlog", TRUTH.layout, self.commands, signals)
+        assert not findings
+        return recordings
 
 
 def dive(seconds: float, seed: int = 0) -> Dive:
-    """Each stick stays for a few seconds and then moves elsewhere, often back to the middle."""
+    """Simulate a dive in which each stick moves every few seconds, often back to the middle."""
     random, n = np.random.default_rng(seed), round(seconds * RATE)
     time = np.arange(n) / RATE
     sticks = [_stick(random, n, *stick) for stick in _STICKS]

@@ -1,4 +1,4 @@
-"""Folders of tank tests of vehicles of any form, small; what rov.toml may say."""
+"""Small folders of tank tests of different vehicles, and the parts of their rov.toml."""
 
 import shutil
 from collections.abc import Mapping
@@ -47,7 +47,7 @@ COMMANDS = (0.2, 0.4, 0.6, 0.8, -0.3, -0.7)
 
 
 def folder_of(folder: Path, rov: str, tables: Mapping[str, str]) -> Path:
-    """A folder of tests."""
+    """Write a folder of tests."""
     folder.mkdir(exist_ok=True)
     (folder / ROV_FILE).write_text(rov, encoding="utf-8")
     for name, text in tables.items():
@@ -56,7 +56,7 @@ def folder_of(folder: Path, rov: str, tables: Mapping[str, str]) -> Path:
 
 
 def responses(k: Rov, axis: Axis) -> dict[str, str]:
-    """Steady velocities and time constants of a vehicle, in closed form."""
+    """Return tables of steady velocities and time constants of a vehicle, in closed form."""
     rows = [(c, *k.response(axis, c)) for c in COMMANDS]
     steady = "".join(f"{c},{V:.6f}\n" for c, V, _ in rows)
     taus = "".join(f"{c},{T:.6f}\n" for c, _, T in rows)
@@ -67,7 +67,7 @@ def responses(k: Rov, axis: Axis) -> dict[str, str]:
 
 
 def pulled(a: float, b: float) -> str:
-    """Forces of a curve."""
+    """Return a table of forces of a thrust curve."""
     return f"{FORCE}\n" + "".join(f"{c},{(a * abs(c) + b) * c:.6f}\n" for c in COMMANDS)
 
 

@@ -1,4 +1,4 @@
-"""Tank tests in a pool that is not ideal, simulated by the integrator in verification/references/pool.py."""
+"""Tank tests with disturbances, simulated by the integrator in verification/references/pool.py."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,20 +13,20 @@ from rov_fmu.tank.recording import Recording
 from verification.references.pool import Array, swim
 
 Plan = Sequence[tuple[float, float]]
-"""Commands and how long each is held, s."""
+"""Commands with their durations, s."""
 
 PATTERNS: dict[str, dict[str, float]] = {
     "surge": {"l": 1.0, "r": 1.0},
     "heave": {"t": 1.0},
     "yaw": {"l": 1.0, "r": -1.0},
 }
-"""The thrusters of the VideoRay that drive an axis."""
+"""The thrusters of the VideoRay that drive each axis, with their signs."""
 NOISE = {"depth": 0.005, "heading": radians(0.5), "distance": 0.02, "velocity": 0.02}
-"""Standard deviations of the sensors: m, rad, m, m/s."""
+"""The standard deviations of the sensors: m, rad, m, m/s."""
 
 
 def with_more(k: Rov, **values: float) -> Rov:
-    """The vehicle with other coefficients, those too that its layout has not had: F_0_w, T_top, a_t_rear_reverse …"""
+    """Return the vehicle with other coefficients, including new ones such as F_0_w, T_top or a_t_rear_reverse."""
     axes, curves = [], []
     for form in k.layout.axes:
         more = [key for key in AXIS if coefficient_name(key, form.axis.velocity) in values and key not in form.keys]
@@ -41,17 +41,17 @@ def with_more(k: Rov, **values: float) -> Rov:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One axis without noise; n samples, SI units."""
+    """n samples of the motion along one axis without noise, in SI units."""
 
     axis: Axis
     time: Array
     command: Array
     velocity: Array
-    """Through the water."""
+    """The velocity through the water."""
     position: Array
-    """Over ground: the current carries distances along."""
+    """The position over ground, which includes the current."""
     current: float = 0.0
-    """m/s, along the axis."""
+    """The velocity of the water along the axis, m/s."""
 
     def recorded(
         self,
@@ -63,9 +63,9 @@ class Run:
         colour: float = 0.0,
         jitter: float = 0.0,
     ) -> Recording:
-        """What a sensor makes of it, and its velocity over ground. `noise` is in standard deviations of the sensor.
+        """Return the recording of a sensor; velocities are over ground, and `noise` is a multiple of NOISE.
 
-        `colour` is the correlation of one sample's noise with the next; stamps err by `jitter` (s).
+        `colour` is the correlation of the noise of successive samples, `jitter` the error of time stamps (s).
         """
         values = self.velocity + self.current if quantity == "velocity" else self.position
         taken = self.time + jitter * random.standard_normal(len(self.time))
@@ -85,7 +85,7 @@ def run(
     current: float = 0.0,
     pattern: Mapping[str, float] | None = None,
 ) -> Run:
-    """Run a plan from rest along one axis; the delay is that of the commands (s), the current flows along (m/s)."""
+    """Run a plan from rest along one axis, with a delay of the commands (s) and a current along the axis (m/s)."""
     command = np.concatenate([np.full(round(hold * rate), c) for c, hold in plan])
     time = np.arange(len(command)) / rate
     thrusters = {name: sign * command for name, sign in (pattern or PATTERNS[axis.name]).items()}

@@ -1,4 +1,4 @@
-"""Recordings of a vehicle with known coefficients, as its sensors would make them: the exact step, and noise on top."""
+"""Recordings of a vehicle with known coefficients: the exact motion with noise."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,9 +14,8 @@ from rov_fmu.tank.recording import Recording
 from verification.references.closed_form import axis_of
 
 NOISE = {"heave": 0.005, "yaw": radians(0.5), "surge": 0.02}
-"""Depth in m, heading in rad, velocity (a camera's) in m/s."""
+"""The standard deviations of depth (m), heading (rad) and the velocity of a camera (m/s)."""
 
-# Command and how long it is held, s: 60 s each. The vehicle moves up and down, to and fro, steps from rest and others.
 PLANS: dict[str, Sequence[Sequence[tuple[float, float]]]] = {
     "heave": (
         ((0.0, 4.0), (0.3, 16.0), (-0.3, 16.0), (0.5, 12.0), (-0.5, 12.0)),
@@ -34,6 +33,7 @@ PLANS: dict[str, Sequence[Sequence[tuple[float, float]]]] = {
         ((0.0, 4.0), (0.7, 10.0), (0.0, 10.0), (0.6, 10.0), (0.0, 10.0), (-0.5, 16.0)),
     ),
 }
+"""Three plans of 60 s for each axis: commands with their durations (s), in both directions, not always from rest."""
 AXES = (SURGE, HEAVE, YAW)
 
 
@@ -48,7 +48,7 @@ class Clean:
     position: Array
 
     def noisy(self, random: np.random.Generator, file: str = "log.csv", noise: float | None = None) -> Recording:
-        """What the sensor of the axis makes of it: depth, heading, or the velocity in surge."""
+        """Return the recording of the axis's sensor: depth, heading, or the velocity in surge."""
         quantity = "velocity" if self.axis is SURGE else self.axis.position
         values = self.velocity if quantity == "velocity" else self.position
         spread = NOISE[self.axis.name] if noise is None else noise
@@ -57,7 +57,7 @@ class Clean:
 
 
 def write_log(folder: Path, name: str, recording: Recording) -> Path:
-    """The recording as a logger saves it: commands in %, headings in degrees from 0 to 360."""
+    """Write the recording like a logger: commands in %, headings in degrees from 0 to 360."""
     heading = recording.quantity == "heading"
     values = np.degrees(recording.values) % 360.0 if heading else recording.values
     unit = "deg" if heading else "m" if recording.is_position else recording.axis.unit

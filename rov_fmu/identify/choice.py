@@ -1,26 +1,26 @@
-"""What a model may have beside its plain form, and whether the data ask for it: AICc, leave-one-out."""
+"""Decide whether the data justify an extension of the plain model: AICc and leave-one-out."""
 
 from dataclasses import dataclass
 from math import inf, log
 
 MARGIN = 2.0
-"""By which a form must be better in AICc than one with fewer coefficients: less is no evidence (Burnham, Anderson)."""
+"""The difference in AICc that justifies more coefficients; less is no evidence (Burnham, Anderson)."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Something that a curve or an axis may have, and whether it earned its place."""
+    """An optional extension of a curve or an axis, and whether the data justify it."""
 
     what: str
     kept: bool
     gain: float
-    """AICc without it less AICc with it: above 0 speaks for it; infinite where the data are too few for one."""
+    """AICc without the extension less AICc with it; positive values favour it. Infinite for too few data."""
     errors: tuple[float, float]
-    """Leave-one-thrust-out, without it and with it; NaN where too few are left."""
+    """Leave-one-thrust-out errors without and with the extension; NaN where too few data remain."""
 
     @property
     def words(self) -> str:
-        """In a sentence, without the full stop."""
+        """A sentence about the choice, without the full stop."""
         verdict = "earns its place" if self.kept else "does not earn its place and is left out"
         without, with_it = self.errors
         return (
@@ -30,9 +30,9 @@ class Choice:
 
 
 def aicc(rss: float, count: int, free: int, least: float) -> float:
-    """Akaike's information criterion for few data, of least squares with so many free coefficients.
+    """Return Akaike's information criterion for few data, of a least-squares fit with `free` coefficients.
 
-    `least` is an RMS that residuals cannot go below, the last digit of what is measured. Infinite for too few data.
+    `least` is the smallest possible RMS of the residuals, the last digit of the data. Infinite for too few data.
     """
     k, variance = free + 1, max(rss / count, least**2)
     return count * log(variance) + 2.0 * k + 2.0 * k * (k + 1) / (count - k - 1) if count > k + 1 else inf

@@ -1,29 +1,29 @@
-"""Which thrust curves drive which axes of a vehicle."""
+"""The relation between the thrust curves and the axes of a vehicle."""
 
 from collections.abc import Iterator
 
 from rov_fmu.model.layout import Axis, Curve, Layout
 
 _KEYS = ("a_t", "b_t", "a_t_reverse", "b_t_reverse")
-"""Thrust is linear in these."""
+"""The keys of coefficients that thrust is linear in."""
 
 
 def curves_of(layout: Layout, axis: Axis) -> list[Curve]:
-    """The curves of the thrusters that act on an axis."""
+    """Return the curves of the thrusters that act on an axis."""
     names = {thruster.curve for thruster in layout.drivers(axis)}
     return [curve for curve in layout.curves if curve.name in names]
 
 
 def thrust_names(layout: Layout, axis: Axis) -> tuple[str, ...]:
-    """The coefficients that the thrust along an axis is linear in."""
+    """Return the names of the coefficients that the thrust along an axis is linear in."""
     return tuple(curve.coefficient(key) for curve in curves_of(layout, axis) for key in _KEYS if key in curve.keys)
 
 
 def connected(layout: Layout) -> Iterator[tuple[list[Curve], list[Axis]]]:
-    """Curves and the axes that they drive, apart from all others: an axis with two curves joins their groups."""
-    left = list(layout.curves)
-    while left:
-        curves, axes = [left[0]], list[Axis]()
+    """Yield groups of curves and of the axes that they drive; no curve or axis is in two groups."""
+    remaining = list(layout.curves)
+    while remaining:
+        curves, axes = [remaining[0]], list[Axis]()
         while True:
             axes = [form.axis for form in layout.axes if any(c in curves for c in curves_of(layout, form.axis))]
             joined = [c for c in layout.curves if any(c in curves_of(layout, axis) for axis in axes)]
@@ -31,4 +31,4 @@ def connected(layout: Layout) -> Iterator[tuple[list[Curve], list[Axis]]]:
                 break
             curves = joined
         yield curves, axes
-        left = [curve for curve in left if curve not in curves]
+        remaining = [curve for curve in remaining if curve not in curves]

@@ -1,4 +1,4 @@
-"""A vehicle whose curve or axis has other coefficients than before: by direction, with a dead band."""
+"""Change the coefficients of a curve or an axis, for example to add a dead band."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -7,12 +7,12 @@ from rov_fmu.model.layout import AXIS, CURVE, Curve, Layout, VehicleAxis
 
 
 def with_keys(form: Curve, keys: Collection[str]) -> Curve:
-    """A curve with these keys, in the order of their declaration."""
+    """Return the curve with these keys, in the order of their declaration."""
     return replace(form, keys=tuple(key for key in CURVE if key in keys))
 
 
 def widened(layout: Layout, form: Curve | VehicleAxis) -> Layout:
-    """With another form of the curve or the axis of the same name."""
+    """Replace the curve or axis of the same name."""
     if isinstance(form, Curve):
         return replace(layout, curves=tuple(form if form.name == old.name else old for old in layout.curves))
     form = replace(form, keys=tuple(key for key in AXIS if key in form.keys))

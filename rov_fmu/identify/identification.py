@@ -1,4 +1,4 @@
-"""What an identification yields: per thruster and axis the data, the fits, the warnings, and the vehicle they make."""
+"""The results of an identification: the data, fits and findings of each thrust curve and axis, and the vehicle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import NextTest
 from rov_fmu.identify.points.drag_forms import Point
@@ -18,34 +19,35 @@ from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.identify.recordings.trajectory import MotionError
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tank_tests import TankTests
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True, eq=False)
 class AxisResult:
-    """One axis: what was measured, what was fitted, what is taken."""
+    """The measurements and fits of one axis, and the fit that the vehicle takes."""
 
     axis: Axis
     points: tuple[Point, ...]
-    """Of the tables and of the recordings."""
+    """The points of the tables and of the recordings."""
     steps: tuple[StepResponse, ...]
-    """Held commands of the recordings."""
+    """The held commands of the recordings."""
     drag: QuadraticFit | None
-    """Force over measured V_ss as in (11)-(16), for comparison."""
+    """The fit of force over measured V_ss as in (11)-(16), for comparison."""
     response: ResponseFit | None
-    """By the points."""
+    """The fit to the points."""
     recordings: RecordingsFit | None
-    """By the recordings."""
+    """The fit to the recordings."""
     assumed: Mapping[str, str]
-    """Coefficients that are not identifiable, and what is assumed instead."""
-    warnings: tuple[str, ...]
+    """Coefficients that are not identifiable, and the assumption about each."""
+    findings: tuple[Finding, ...]
     next_test: NextTest | None = None
-    """What would narrow the widest interval."""
+    """The test that would narrow the widest interval most."""
 
     @property
     def held_out(self) -> HeldOut | None:
-        """Each recording predicted by the others; None where that cannot be computed."""
+        """The prediction of each recording by a fit to the others; None where it cannot be computed."""
         try:
             return self.recordings.held_out if self.recordings else None
         except MotionError:
@@ -53,18 +55,18 @@ class AxisResult:
 
     @property
     def chosen(self) -> Literal["recordings", "points", "known"]:
-        """Which fit the vehicle takes."""
+        """The fit that the vehicle takes."""
         return "recordings" if self.recordings else "points" if self.response else "known"
 
     @property
     def estimate(self) -> Estimate | None:
-        """The chosen one."""
+        """The estimate of the chosen fit."""
         fit = self.recordings or self.response
         return fit.estimate if fit else None
 
     @property
     def method(self) -> str:
-        """The chosen one in words."""
+        """A phrase about the chosen fit."""
         if self.recordings:
             return self.recordings.method
         if self.response:
@@ -76,32 +78,33 @@ class AxisResult:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """A vehicle, and all that it was made of."""
+    """A vehicle, with the tests and fits that it comes from."""
 
     tests: TankTests
     vehicle: Vehicle
     thrust: Mapping[str, ThrustFit]
-    """By thruster, where it was tested; force (N) over command."""
+    """The fits of force (N) over command, by thrust curve, where it was tested."""
     axes: tuple[AxisResult, ...]
     against: Vehicle | None
-    """A vehicle to set beside."""
+    """The vehicle to compare with."""
+    findings: tuple[Finding, ...]
+    """What was left out, what is not identifiable, and what contradicts the model."""
 
     @property
     def next_tests(self) -> tuple[NextTest, ...]:
-        """What to measure next, the axis with the widest relative interval first."""
+        """The tests that would help most; the axis with the widest relative interval comes first."""
         found = (test for result in self.axes if (test := result.next_test))
         return tuple(sorted(found, key=lambda test: -test.width))
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is not identifiable from the data, and what speaks against the model."""
-        assert self.vehicle.provenance
-        return self.vehicle.provenance.warnings
+        """The sentences of the findings."""
+        return sentences(self.findings)
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The measured points of one quantity of an axis beside models; n points, NaN where there is no number."""
+    """The n measured points of one quantity of an axis, beside models; NaN where there is no number."""
 
     result: AxisResult
     quantity: str
@@ -109,21 +112,21 @@ class Comparison:
     points: tuple[Point, ...]
     model: Array
     leave_one_out: Array
-    """Leave-one-thrust-out: by the fit to the points without those of the same thrust."""
+    """Leave-one-thrust-out: the prediction by a fit without the points of the same thrust."""
     against: Array | None
 
     @property
     def columns(self) -> list[Array]:
-        """Of the vehicle, leave-one-thrust-out, and of the vehicle to compare with where there is one."""
+        """The numbers of the vehicle, of leave-one-thrust-out, and of the vehicle to compare with, if any."""
         return [self.model, self.leave_one_out, *([] if self.against is None else [self.against])]
 
     def rms(self, model: Array) -> float:
-        """RMS relative error over the points that count."""
+        """Return the RMS relative error over the points that count."""
         return relative_rms(self.points, model, self.quantity)
 
 
 def compare(identification: Identification) -> tuple[Comparison, ...]:
-    """Every measured V_ss and Tau beside the vehicle, the leave-one-thrust-out fit, and the vehicle to compare with."""
+    """Compare each measured V_ss and Tau with the vehicle, leave-one-thrust-out, and the vehicle to compare with."""
     found, against = [], identification.against
     for result in identification.axes:
         for quantity in ("V_ss", "Tau"):

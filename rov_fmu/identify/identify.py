@@ -1,8 +1,8 @@
-"""From a folder of tank tests to a vehicle: thrust, then drag and β of every axis, and what is not identifiable.
+"""Identify a vehicle from a folder of tank tests: thrust curves, then drag and β of every axis.
 
-An axis with recordings takes its coefficients from them (output error), and they have a say in the thrust curves too;
-one without, from the measured points V_ss and Tau. The points, of tables and of recordings, are fitted in either case,
-so the two can be set side by side.
+An axis with recordings takes its coefficients from them (output error), and the recordings also correct the thrust
+curves. An axis without recordings takes its coefficients from the measured points V_ss and Tau. The points of tables
+and recordings are fitted in either case, for comparison.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 from rov_fmu import __version__
 from rov_fmu.identify import diagnostics
 from rov_fmu.identify.driving import connected, curves_of
-from rov_fmu.identify.grouping import grouped
+from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identification import AxisResult, Identification
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import NOISE, NextTest, Sensor, next_test
@@ -33,6 +33,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import Axis, Curve
 from rov_fmu.model.rov import Rov
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import TankTests
 from rov_fmu.vehicle.checks import no_thrust
@@ -40,7 +41,7 @@ from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
 Progress = Callable[[str, float], None]
-"""Told what is done next, and the share of all that is done."""
+"""A function that is called with the name of the next step and the share of the work that is done."""
 
 _ASSUMED_ALPHA = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
 _ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
@@ -56,7 +57,7 @@ def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Id
     for fit in thrust.values():
         found.take_thrust(fit)
     results: list[AxisResult] = []
-    doubts: list[str] = []
+    doubts: list[Finding] = []
     for curves, axes in connected(given.rov.layout):
         on_progress(
             f"recordings of {join_names(axis.name for axis in axes)}", 0.9 * len(results) / len(given.rov.layout.axes)
@@ -64,7 +65,7 @@ def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Id
         tested = {curve.name: thrust[curve.name] for curve in curves if curve.name in thrust}
         doubts += check_slips(tests, axes, found.rov)
         recorded = _fit_recordings(tests, axes, found.rov, tested)
-        for fit_of_axis in recorded.values():  # the last word on the thrust curves too
+        for fit_of_axis in recorded.values():  # these replace the tested thrust curves
             found.take_recordings(fit_of_axis)
         for axis in axes:
             result = _axis(tests, axis, found.rov, recorded.get(axis.name), tested)
@@ -77,18 +78,23 @@ def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Id
     results.sort(key=lambda result: [*given.rov.layout.kinds].index(result.axis.name))
     on_progress("what to measure next", 0.95)
     results = [replace(result, next_test=_next_test(result, found.rov)) for result in results]
-    warnings = [f"{t} thrust: {words}" for t, fit in thrust.items() for words in diagnostics.on_thrust(t, fit)]
-    warnings += [w for result in results for w in result.warnings]
-    warnings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
-    vehicle = found.vehicle(results, Together(thrust.values(), results), [*tests.notes, *doubts, *warnings])
-    return Identification(tests, vehicle, thrust, tuple(results), against)
+    findings = [*tests.findings, *doubts]
+    for name, fit in thrust.items():
+        findings += diagnostics.on_thrust(name, fit)
+    for result in results:
+        findings += result.findings
+    findings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
+    vehicle = found.vehicle(results, Together(thrust.values(), results), findings)
+    return Identification(tests, vehicle, thrust, tuple(results), against, tuple(findings))
 
 
 @dataclass
 class _Found:
-    """The vehicle as far as it is known, and where each number comes from."""
+    """The vehicle as far as it is known, with the source of each number."""
 
     tests: TankTests
+    tested: dict[str, str] = field(default_factory=dict)
+    """The sources of coefficients that come from thrust tests."""
     rov: Rov = field(init=False)
     sources: dict[str, str] = field(init=False)
     intervals: dict[str, tuple[float, float]] = field(init=False)
@@ -101,28 +107,29 @@ class _Found:
         self.intervals = {name: q.interval for name, q in given.known.items() if q.interval}
 
     def take_thrust(self, fit: ThrustFit) -> None:
-        """A thrust curve by tests."""
+        """Take the thrust curve from tests."""
         self.rov = self.rov.extended(fit.values)
         weighted = "(7)" if 0.0 in fit.weights else "(6)"
         forces = count(int(fit.counts.sum()), "force")
-        self._take(fit.estimate, f"{weighted} over {forces}")
+        source = f"{weighted} over {forces}"
+        self._take(fit.estimate, source)
+        self.tested |= dict.fromkeys(fit.estimate.names, source)
 
     def take_recordings(self, fit: RecordingsFit) -> None:
-        """What recordings tell; of thrust curves that were tested they have a part."""
+        """Take the coefficients from recordings, which also correct tested thrust curves."""
         values = {name: fit.rov[name] for name in fit.estimate.names}
         self.rov = self.rov.extended(values)
         for name in fit.estimate.names:
-            before = self.sources.get(name, NOT_GIVEN)
-            tested = before if before.startswith("(") else ""
-            self.sources[name] = f"{tested.split(',')[0]}, and the recordings" if tested else _sentence(fit.method)
+            tested = self.tested.get(name)
+            self.sources[name] = f"{tested}, and the recordings" if tested else _capitalized(fit.method)
         self.intervals |= fit.estimate.intervals
 
     def take(self, result: AxisResult) -> None:
-        """What is chosen of an axis."""
+        """Take the chosen fit of an axis."""
         if result.response and result.chosen == "points":
             fitted = result.response
             self.rov = self.rov.extended({n: fitted.rov[n] for n in (*fitted.estimate.names, *fitted.assumed)})
-            self._take(fitted.estimate, _sentence(result.method))
+            self._take(fitted.estimate, _capitalized(result.method))
         self.sources |= result.assumed
 
     def _take(self, estimate: Estimate, source: str) -> None:
@@ -130,7 +137,7 @@ class _Found:
         self.intervals |= estimate.intervals
 
     def _estimates(self, together: Together) -> dict[str, Estimated]:
-        """How far those that these tests tell hang together, and what the base says of others that it still gives."""
+        """Return the standard errors and correlations of the identified coefficients, and those kept from the base."""
         given = self.tests.given
         base = load_vehicle(given.base) if given.base else None
         rows = base.estimates if base else {}
@@ -148,14 +155,13 @@ class _Found:
                 found[name] = Estimated(error=together.error(name), correlation=together.correlation(name, found))
         return found
 
-    def vehicle(self, results: Sequence[AxisResult], together: Together, warnings: Sequence[str]) -> Vehicle:
-        """The vehicle with its provenance."""
+    def vehicle(self, results: Sequence[AxisResult], together: Together, findings: Sequence[Finding]) -> Vehicle:
+        """Return the vehicle with its provenance."""
         given, names = self.tests.given, self.rov.layout.coefficients
         method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
-        made = Provenance(
-            f"rov-fmu {__version__} identify", method, self.tests.inputs, grouped(warnings, self.tests.inputs)
-        )
-        delays = (words for result in results if result.recordings for words in diagnostics.on_delay(result.recordings))
+        made = Provenance(f"rov-fmu {__version__} identify", method, self.tests.inputs, sentences(findings))
+        fits = [result.recordings for result in results if result.recordings]
+        delays = sentences(finding for fit in fits for finding in diagnostics.on_delay(fit))
         return Vehicle(
             **dict(given.head),
             rov=Rov(self.rov.layout, {name: self.rov[name] for name in names}),
@@ -171,7 +177,7 @@ class _Found:
         )
 
 
-def _sentence(words: str) -> str:
+def _capitalized(words: str) -> str:
     return words[0].upper() + words[1:]
 
 
@@ -179,7 +185,7 @@ def _sentence(words: str) -> str:
 
 
 def _thrust(tests: TankTests, curve: Curve) -> ThrustFit | None:
-    """A thrust curve; None where there are no tests of it."""
+    """Fit a thrust curve; return None where there are no tests of it."""
     rows, window = tests.thrust.get(curve.name, ()), f"thrust_{curve.name}"
     if not rows:
         return None
@@ -193,7 +199,7 @@ def _thrust(tests: TankTests, curve: Curve) -> ThrustFit | None:
 def _fit_recordings(
     tests: TankTests, axes: Sequence[Axis], base: Rov, thrust: Mapping[str, ThrustFit]
 ) -> dict[str, RecordingsFit]:
-    """The fits of axes with thrust curves in common, by axis, where they were recorded."""
+    """Fit the recordings of axes that share thrust curves; return the fits by axis."""
     recordings: list[Recording] = []
     for axis in axes:
         if drag_and_beta(axis, tests.given.known):
@@ -245,13 +251,13 @@ def _axis(
         assumed |= {} if alpha in known else {alpha: _ASSUMED_ALPHA}
         assumed |= {} if fitted or response or beta in known else {beta: _ASSUMED_BETA}
     result = AxisResult(axis, points, found, drag, response, fitted, assumed, ())
-    return replace(result, warnings=tuple(f"{axis.name}: {w}" for w in diagnostics.on_axis(result, base, driving)))
+    return replace(result, findings=tuple(diagnostics.on_axis(result, base, driving)))
 
 
 def _response(
     axis: Axis, points: Sequence[Point], base: Rov, known: Mapping[str, object], thrust: Estimate | None
 ) -> ResponseFit | None:
-    """The fit to the points, where they tell anything."""
+    """Fit the points; return None where there are too few."""
     used = [p for p in points if p.weight > 0.0]
     wanted = set(drag_and_beta(axis, known))
     enough = any(p.quantity == "V_ss" for p in used) or wanted <= {axis.coefficient("beta")}
@@ -261,19 +267,19 @@ def _response(
 
 
 def _thrust_of(fitted: RecordingsFit | None, thrust: Mapping[str, ThrustFit]) -> Estimate | None:
-    """The thrust curves of an axis as the tests and its recordings have them."""
+    """Return the estimate of an axis's thrust curves, from its recordings where there are any."""
     uncertain = measured(thrust.values())
     return fitted.estimate.part(uncertain.names) if fitted and uncertain else uncertain
 
 
 def _in_time(step: StepResponse, fitted: RecordingsFit | None) -> StepResponse:
-    """With the time constant from when the commands act: a delay is none of the model's."""
-    late = fitted.delay_of(step.file) if fitted else 0.0
-    return replace(step, Tau=step.Tau - late) if step.Tau is not None and step.Tau > late else step
+    """Subtract the delay of the commands from the time constant, because the model has no delay."""
+    delay = fitted.delay_of(step.file) if fitted else 0.0
+    return replace(step, Tau=step.Tau - delay) if step.Tau is not None and step.Tau > delay else step
 
 
 def _points(tests: TankTests, axis: Axis, found: Sequence[StepResponse]) -> tuple[Point, ...]:
-    """Rows of the tables, then the responses of the recordings."""
+    """Return the rows of the tables, then the responses of the recordings."""
     points = [
         Point(quantity, row.command, row.value, _weight(tests, axis.name, row.command), f"{row.file}, line {row.line}")
         for quantity, rows in (("V_ss", tests.steady), ("Tau", tests.time_constants))
@@ -288,7 +294,7 @@ def _points(tests: TankTests, axis: Axis, found: Sequence[StepResponse]) -> tupl
 
 
 def _next_test(result: AxisResult, rov: Rov) -> NextTest | None:
-    """What to measure next on an axis, by the sensor of its recordings or a plain one."""
+    """Return the test that would help an axis most, with the sensor of its recordings or a typical one."""
     if result.estimate is None:
         return None
     fit = result.recordings
@@ -303,7 +309,7 @@ def _weight(tests: TankTests, window: str, command: float) -> float:
 
 
 def _command_range(results: Sequence[AxisResult], rov: Rov) -> tuple[float, float]:
-    """From the weakest to the strongest command that counts."""
+    """Return the weakest and the strongest command that counts."""
 
     def used() -> Iterator[float]:
         for result in results:

@@ -1,6 +1,7 @@
-"""What a least-squares fit tells of its parameters: covariance, correlation and 95 % intervals.
+"""Least squares, with the covariance, correlation and 95 % intervals of the parameters.
 
-The fits themselves are SciPy's. Tuning α and β, positive factors, are fitted by their logarithms, all else as it is.
+The fits themselves are SciPy's. The positive factors α and β are fitted by their logarithms, other coefficients as they
+are.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,21 +17,23 @@ from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 Loss = Literal["huber", "linear"]
-_RANK = 1e-6  # singular values below this fraction of the largest belong to what is not identifiable
+_RANK = 1e-6
+"""Singular values below this fraction of the largest belong to coefficients that are not identifiable."""
 _LEAST_FACTOR = 1e-6
+"""The smallest α or β of a fit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Fitted coefficients in SI units, p of them."""
+    """p fitted coefficients in SI units."""
 
     names: tuple[str, ...]
     values: Array
-    """p."""
+    """p values."""
     covariance: Array
     """p x p; infinite where a coefficient is not identifiable."""
     degrees_of_freedom: float
-    """Degrees of freedom left: independent numbers less parameters."""
+    """Independent numbers less parameters."""
     noise: float
     """Standard deviation of the residuals, in their unit."""
 
@@ -39,11 +42,11 @@ class Estimate:
 
     @property
     def named(self) -> dict[str, float]:
-        """Values by name."""
+        """The values by name."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
     def part(self, names: Sequence[str]) -> "Estimate":
-        """The part of some of the coefficients."""
+        """Return the estimate of some of the coefficients."""
         place = [self.names.index(name) for name in names]
         return replace(
             self, names=tuple(names), values=self.values[place], covariance=self.covariance[np.ix_(place, place)]
@@ -51,18 +54,18 @@ class Estimate:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Standard errors by name."""
+        """The standard errors by name."""
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
     def correlation(self) -> Array:
-        """p x p; NaN where a coefficient is not identifiable."""
+        """The correlation matrix, p x p; NaN where a coefficient is not identifiable."""
         error = np.sqrt(np.diag(self.covariance))
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(self.covariance / np.outer(error, error))
 
     def interval(self, name: str) -> tuple[float, float] | None:
-        """95 % interval, cut where the coefficient ceases to be physical; None where it is not identifiable."""
+        """Return the physical part of the 95 % interval; None where the coefficient is not identifiable."""
         value, error = self[name], self.errors[name]
         if not isfinite(error) or not self.degrees_of_freedom > 0.0:
             return None
@@ -75,18 +78,18 @@ class Estimate:
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
-        """95 % intervals by name, of the coefficients that have one."""
+        """The 95 % intervals by name, of the coefficients that have one."""
         return {name: found for name in self.names if (found := self.interval(name))}
 
     @property
     def at_bound(self) -> tuple[str, ...]:
-        """Coefficients that stop at the edge of what is physical."""
+        """The coefficients at a physical bound."""
         return tuple(n for n, value in self.named.items() if value in (kind_of(n).minimum, kind_of(n).maximum))
 
     def half_band(self, slopes: Array) -> Array:
-        """Half the width of the 95 % band, to first order, of numbers with these derivatives by the coefficients.
+        """Return half the width of the 95 % band of numbers with these derivatives by the coefficients (... x p).
 
-        ... x p to ...; infinite where a coefficient is not identifiable.
+        The band is of first order, and infinite where a coefficient is not identifiable.
         """
         if self.degrees_of_freedom <= 0.0 or not np.isfinite(self.covariance).all():
             return np.full(slopes.shape[:-1], np.inf)
@@ -96,31 +99,31 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The end of a nonlinear fit in internal parameters (logarithms of factors)."""
+    """The solution of a nonlinear fit in internal parameters (logarithms of factors)."""
 
     x: Array
     residuals: Array
     jacobian: Array
-    """Of the residuals without the loss."""
+    """The Jacobian of the residuals without the loss."""
 
 
 def kind_of(name: str) -> CoefficientKind:
-    """What is declared of a coefficient of any curve or axis."""
+    """Return the declaration of a coefficient of any curve or axis."""
     return next(kind for key, kind in (CURVE | AXIS | TUNING).items() if name.startswith(f"{key}_"))
 
 
 def internal(names: Sequence[str], values: Mapping[str, float]) -> Array:
-    """Internal parameters of named coefficients."""
+    """Convert named coefficients to internal parameters."""
     return np.array([log(values[n]) if is_factor(n) else values[n] for n in names])
 
 
 def external(names: Sequence[str], x: Array) -> dict[str, float]:
-    """Named coefficients of internal parameters; x may go on with others."""
+    """Convert internal parameters to named coefficients; x may contain more parameters behind them."""
     return {n: exp(value) if is_factor(n) else value for n, value in zip(names, x.tolist(), strict=False)}
 
 
 def bounds(names: Sequence[str], free: int = 0) -> tuple[Array, Array]:
-    """Lower and upper bounds of internal parameters, and of so many free ones after them."""
+    """Return lower and upper bounds of internal parameters, followed by `free` unbounded ones."""
     low = [log(_LEAST_FACTOR) if is_factor(n) else kind_of(n).minimum for n in names]
     high = [log(kind_of(n).maximum) if is_factor(n) else kind_of(n).maximum for n in names]
     return np.array(low + [-np.inf] * free), np.array(high + [np.inf] * free)
@@ -137,9 +140,10 @@ def minimize(
     tolerance: float = 1e-10,
     far: bool = False,
 ) -> Solution:
-    """Bounded least squares by SciPy; with a robust loss residuals beyond the threshold count less than squared.
+    """Solve bounded least squares with SciPy.
 
-    `far` is for starts far off: the trust region then keeps away from the bounds until the end.
+    With a robust loss, residuals beyond the threshold count less than their square. `far` is for starts far from the
+    solution: the trust region then stays away from the bounds until the end.
     """
     low, high = limits
     start = np.clip(start, low, high)
@@ -163,13 +167,13 @@ def minimize(
 
 
 def fit_named(residuals: Callable[[dict[str, float]], Array], start: Mapping[str, float]) -> Solution:
-    """Least squares of residuals that are a function of named coefficients."""
+    """Fit residuals that are a function of named coefficients."""
     names = tuple(start)
     return minimize(lambda x: residuals(external(names, x)), internal(names, start), bounds(names))
 
 
 def covariance(gram: Array, meat: Array | None = None) -> Array:
-    """G^-1 M G^-1, or G^-1 without M, of G = J'J; infinite variance where a parameter is not identifiable."""
+    """Return G^-1 M G^-1, or G^-1 without M, for G = J'J; unidentifiable parameters get an infinite variance."""
     scale = np.sqrt(np.diag(gram))
     scale[scale == 0.0] = 1.0
     squares, V = np.linalg.eigh(gram / np.outer(scale, scale))
@@ -183,18 +187,18 @@ def covariance(gram: Array, meat: Array | None = None) -> Array:
 
 
 def propagated(jacobian: Array, of_known: Array, of_known_covariance: Array) -> Array:
-    """Covariance of the parameters that comes from numbers taken as known: their residuals' Jacobian, covariance."""
+    """Return the covariance of the parameters that is due to the uncertainty of numbers taken as known."""
     by_known = gain(jacobian, of_known)
     return np.asarray(by_known @ of_known_covariance @ by_known.T)
 
 
 def gain(jacobian: Array, of_known: Array) -> Array:
-    """By how much the parameters move with numbers taken as known: their residuals' Jacobian."""
+    """Return the derivatives of the fitted parameters by numbers taken as known."""
     return np.asarray(-np.linalg.pinv(jacobian) @ of_known)
 
 
 def estimate(names: Sequence[str], x: Array, of_x: Array, degrees_of_freedom: float, noise: float) -> Estimate:
-    """The estimate of the first parameters, named, from internal ones and their covariance."""
+    """Return the estimate of the first parameters, from internal parameters and their covariance."""
     p = len(names)
     values = np.array([external(names, x)[n] for n in names])
     slope = np.array([value if is_factor(n) else 1.0 for n, value in zip(names, values, strict=True)])
@@ -204,21 +208,21 @@ def estimate(names: Sequence[str], x: Array, of_x: Array, degrees_of_freedom: fl
 def estimate_alike(
     names: Sequence[str], solution: Solution, count: int, thrust: tuple[Array, Array] | None = None
 ) -> Estimate:
-    """The estimate where so many measured numbers err alike, by as much as the residuals tell.
+    """Return the estimate for `count` measurements with equal errors, estimated from the residuals.
 
-    `thrust` is the residuals' Jacobian by coefficients taken as known, and the covariance of these.
+    `thrust` is the Jacobian of the residuals by coefficients taken as known, and the covariance of these.
     """
     degrees, J = float(count - len(names)), solution.jacobian
     noise = sqrt(float(solution.residuals @ solution.residuals) / degrees) if degrees > 0.0 else nan
     of_x = covariance(J.T @ J) if degrees > 0.0 else np.full((len(names), len(names)), np.inf)
-    of_x[np.isfinite(of_x)] *= noise**2  # which may be 0, of what is identifiable alone
+    of_x[np.isfinite(of_x)] *= noise**2  # noise may be 0, and 0 times infinity is NaN
     if thrust is not None:
         of_x = of_x + propagated(J, *thrust)
     return estimate(names, solution.x, of_x, degrees, noise)
 
 
 def leave_one_out(groups: Array, predict: Callable[[Flags], Array | None]) -> Array:
-    """Predictions of every group's numbers by a fit without the group; NaN where too few are left (None)."""
+    """Predict the numbers of every group by a fit without it; NaN where too few remain (None)."""
     found = np.full(len(groups), np.nan)
     for group in np.unique(groups):
         out = groups == group
@@ -228,5 +232,5 @@ def leave_one_out(groups: Array, predict: Callable[[Flags], Array | None]) -> Ar
 
 
 def rms(errors: Array) -> float:
-    """Root mean square; NaN of nothing."""
+    """Return the root mean square; NaN for an empty array."""
     return float(np.sqrt(np.mean(errors**2))) if errors.size else nan

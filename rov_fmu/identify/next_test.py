@@ -1,4 +1,4 @@
-"""What to measure next: the recording that would narrow the widest interval most, by what it would tell (Fisher)."""
+"""Suggest the next test: the recording that would narrow the widest interval most, by its Fisher information."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,38 +18,40 @@ from rov_fmu.vehicle.uncertainty import is_factor
 
 _COMMANDS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
 _RATE = 10.0  # Hz
-_HOLDS = 5.0, 60.0  # s: the shortest and the longest
-_VAGUE = 1e3  # times its value: the standard error of what is not identifiable yet
+_HOLDS = 5.0, 60.0
+"""The shortest and the longest hold, s."""
+_VAGUE = 1e3
+"""The assumed standard error of a coefficient that is not identifiable yet, relative to its value."""
 NOISE = {"distance": 0.02, "depth": 0.01, "heading": 0.01, "velocity": 0.02}
-"""Of a plain sensor, m, rad and m/s: where no recording tells it."""
+"""The noise of a typical sensor (m, rad, m/s), where there is no recording."""
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """What a test would be recorded by."""
+    """The sensor of a test."""
 
     quantity: str
     noise: float
-    """Standard deviation of a sample, correlation counted, at 10 Hz."""
+    """The standard deviation of a sample at 10 Hz, increased for correlated noise."""
 
 
 @dataclass(frozen=True)
 class NextTest:
-    """An experiment, and what it would do to the widest interval of an axis."""
+    """An experiment, and its effect on the widest interval of an axis."""
 
     axis: Axis
     coefficient: str
     interval: tuple[float, float] | None
-    """Now; None where the coefficient is not identifiable yet."""
+    """The present interval; None where the coefficient is not identifiable yet."""
     width: float
-    """Half of it, relative to the value; infinite where there is none."""
+    """Half the width of the interval relative to the value; infinite where there is none."""
     narrowed: float
-    """The width of the interval after the test by that of now."""
+    """The width of the interval after the test, relative to the present width."""
     words: str
 
 
 def next_test(axis: Axis, rov: Rov, found: Estimate, sensor: Sensor) -> NextTest | None:
-    """The best of many; None where nothing is sought, or nothing moves."""
+    """Return the best of many tests; None where nothing is fitted or nothing moves."""
     if not found.names:
         return None
     error = np.sqrt(np.diag(found.covariance))
@@ -58,14 +60,14 @@ def next_test(axis: Axis, rov: Rov, found: Estimate, sensor: Sensor) -> NextTest
     widest = int(np.argmax(relative))
     error = np.maximum(np.where(np.isfinite(error), error, _VAGUE * size), 1e-12 * size)
     prior = np.where(np.isfinite(found.covariance), found.covariance, 0.0) / np.outer(error, error)
-    prior[np.diag_indices(len(size))] = 1.0  # in standard errors of now
+    prior[np.diag_indices(len(size))] = 1.0  # in present standard errors
     before = np.linalg.pinv(prior, hermitian=True)
     internal = error * [1.0 / v if is_factor(n) else 1.0 for n, v in zip(found.names, found.values, strict=True)]
     best: tuple[float, str] = (inf, "")
     for words, command in _tests(axis, rov):
-        told = _information(axis, rov, found.names, sensor, command) * np.outer(internal, internal)
-        if np.isfinite(told).all():
-            after = np.linalg.pinv(before + told, hermitian=True)
+        information = _information(axis, rov, found.names, sensor, command) * np.outer(internal, internal)
+        if np.isfinite(information).all():
+            after = np.linalg.pinv(before + information, hermitian=True)
             best = min(best, (float(np.sqrt(np.clip(after[widest, widest], 0.0, 1.0))), words))
     if not best[1]:
         return None
@@ -73,7 +75,7 @@ def next_test(axis: Axis, rov: Rov, found: Estimate, sensor: Sensor) -> NextTest
 
 
 def _tests(axis: Axis, rov: Rov) -> Iterator[tuple[str, Array]]:
-    """Steps from rest and back to rest, one way or both: in words, and the command at each sample."""
+    """Yield tests of steps from rest in one or both directions: a phrase, and the command at each sample."""
     for level in _COMMANDS:
         if not rov.force(axis, level) or not rov.force(axis, -level):
             continue
@@ -91,7 +93,7 @@ def _tests(axis: Axis, rov: Rov) -> Iterator[tuple[str, Array]]:
 
 
 def _information(axis: Axis, rov: Rov, names: tuple[str, ...], sensor: Sensor, command: Array) -> Array:
-    """What a recording tells of the coefficients (internal), its first velocity and position not known; or NaN."""
+    """Return the information of a recording about the coefficients, with unknown initial values; or NaN."""
     time, values = np.arange(len(command)) / _RATE, np.zeros(len(command))
     recording = Recording("", axis, sensor.quantity, time, command, values)
     model = Simulator((prepare(recording, rov),), rov, names, (), np.array([sensor.noise]))

@@ -1,4 +1,4 @@
-"""How far all that tests tell hangs together: fits that have a thrust curve in common err together."""
+"""The joint covariance of all identified coefficients: fits that share a thrust curve have correlated errors."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -14,19 +14,19 @@ from rov_fmu.vehicle.uncertainty import quantile
 
 
 class Together:
-    """The covariance of coefficients of several fits, those that are identifiable; SI units.
+    """The covariance of the identifiable coefficients of several fits, in SI units.
 
-    Few data tell their own scatter badly, which Student's distribution counts; here the normal one is used with errors
-    as much larger, so that those of several fits add up.
+    Student's distribution accounts for fits to few data. Here the normal distribution is used with correspondingly
+    larger errors, so that the errors of several fits can be combined.
     """
 
     def __init__(self, thrust: Iterable[ThrustFit], results: Iterable[AxisResult]) -> None:
-        """Recordings first, for they have a say in the thrust curves; then curves that only tests tell; then points."""
+        """Add the fits to recordings, which include thrust curves; then the other curves; then the fits to points."""
         self.names: tuple[str, ...] = ()
         self.covariance: Array = np.zeros((0, 0))
         chosen = [*results]
         for result in chosen:
-            if result.recordings:  # the same of all axes that were fitted at once
+            if result.recordings:  # axes that were fitted at once share this estimate
                 self._add(_as_normal(result.recordings.together))
         for fit in thrust:
             self._add(_as_normal(fit.estimate))
@@ -38,7 +38,7 @@ class Together:
                 self._widen(name, by)
 
     def _add(self, found: Estimate, by: Mapping[str, Array] | None = None) -> None:
-        """An estimate of its own, but for how it moves with numbers that are there already."""
+        """Add an independent estimate, except for its dependence `by` on coefficients that were added before."""
         places = [
             n for n, (name, error) in enumerate(found.errors.items()) if np.isfinite(error) and name not in self.names
         ]
@@ -52,18 +52,18 @@ class Together:
         self.covariance = np.block([[self.covariance, both.T], [both, own]])
 
     def _widen(self, name: str, by: float) -> None:
-        """Where recordings disagree."""
+        """Increase the standard error of a coefficient by a factor."""
         n = self.names.index(name)
         self.covariance[n, :] *= by
         self.covariance[:, n] *= by
 
     def error(self, name: str) -> float:
-        """Standard error."""
+        """Return the standard error of a coefficient."""
         n = self.names.index(name)
         return float(np.sqrt(self.covariance[n, n]))
 
     def correlation(self, name: str, others: Iterable[str]) -> dict[str, float]:
-        """Of a coefficient with others, by name; without those that it is not correlated with."""
+        """Return the correlation of a coefficient with others, by name, where it is not zero."""
         place = {name: n for n, name in enumerate(self.names)}
         found = {}
         for other in others:
@@ -74,7 +74,7 @@ class Together:
 
 
 def _as_normal(found: Estimate) -> Estimate:
-    """With errors of which the normal distribution has the same 95 %."""
+    """Increase the errors so that the normal distribution gives the same 95 % intervals."""
     if not found.degrees_of_freedom > 0.0:
         return found
     return replace(found, covariance=(quantile(found.degrees_of_freedom) / quantile(inf)) ** 2 * found.covariance)

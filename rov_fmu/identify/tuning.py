@@ -1,6 +1,6 @@
 """The tuning guide of section 5 in closed form: α for the wanted V_ss, then β for the wanted Tau, (17), (18).
 
-Of any vehicle and axis, by direction: thrust curves in reverse and their dead band, drag by direction, constant load.
+It holds for any vehicle and axis, with thrust and drag by direction, dead band and constant load.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,41 +21,41 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
 
 ALPHA = 0.5, 2.0
-"""Of a plausible tuning. Thrust that is measured in a tank is known to better than a factor of 2; the paper's α are
-1.1 to 1.2."""
+"""The range of a plausible α. Thrust that is measured in a tank is known to better than a factor of 2; the paper has α
+of 1.1 to 1.2."""
 
 
 class TuningError(ValueError):
-    """A response that no tuning gives: one line."""
+    """A response that no tuning gives; the message is one line."""
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """α and β of one axis for the wanted points, in the vehicle."""
+    """A vehicle with the α and β of one axis that give the wanted points."""
 
     axis: Axis
     rov: Rov
     points: tuple[Point, ...]
     estimate: Estimate | None = None
-    """Where they are fitted to many points."""
+    """The estimate, where α and β are fitted to many points."""
 
     @property
     def model(self) -> Array:
-        """V_ss or Tau of the tuned model at every point."""
+        """V_ss or Tau of the tuned vehicle at every point."""
         return predict(self.axis, self.rov, self.points)
 
 
 def tune(rov: Rov, axis: Axis, command: float, V_ss: float, Tau: float | None = None) -> Tuning:
-    """α and β that give V_ss (m/s, rad/s) and Tau (s) at one command; without Tau β stays. Raises TuningError."""
+    """Find α and β for V_ss (m/s, rad/s) and Tau (s) at one command; without Tau, β stays. Raises TuningError."""
     wanted = {"V_ss": V_ss} if Tau is None else {"V_ss": V_ss, "Tau": Tau}
     points = tuple(Point(quantity, command, value, 1.0, "") for quantity, value in wanted.items())
     return Tuning(axis, _each_median(rov, axis, points), points)
 
 
 def tune_over(rov: Rov, axis: Axis, points: Sequence[Point]) -> Tuning:
-    """α and β with the least relative errors over many V_ss and Tau, drag as it is; without Tau β stays.
+    """Fit α and β to the relative errors of many V_ss and Tau, without changing the drag.
 
-    Raises TuningError.
+    Without any Tau, β stays. Raises TuningError.
     """
     start = _each_median(rov, axis, points)
     kinds = ("alpha", "beta") if any(p.quantity == "Tau" for p in points) else ("alpha",)
@@ -69,7 +69,7 @@ def tune_over(rov: Rov, axis: Axis, points: Sequence[Point]) -> Tuning:
 
 
 def _each_median(rov: Rov, axis: Axis, points: Sequence[Point]) -> Rov:
-    """The median of the α that give each V_ss, and then of the β that give each Tau. Raises TuningError.
+    """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError.
 
     Tau is inversely proportional to β.
     """
@@ -87,7 +87,7 @@ def _each_median(rov: Rov, axis: Axis, points: Sequence[Point]) -> Rov:
 
 
 def tuned_values(tuning: Tuning) -> tuple[dict[str, float], str]:
-    """α and β by name, and in words what they are tuned to."""
+    """Return α and β by name, and a phrase about the points that they are tuned to."""
     names = [tuning.axis.coefficient(kind) for kind in ("alpha", "beta")]
     wanted = ", ".join(f"{p.quantity} = {p.value:g} at {p.command:.0%}" for p in tuning.points[:2])
     reason = f"Tuned to {wanted}{', ...' if len(tuning.points) > 2 else ''}"
@@ -95,7 +95,7 @@ def tuned_values(tuning: Tuning) -> tuple[dict[str, float], str]:
 
 
 def read_points(path: Path, rov: Rov, axis: Axis) -> tuple[Point, ...]:
-    """Wanted points from a CSV file: command, velocity, time constant; blanks where nothing is wanted.
+    """Read wanted points from a CSV file with command, velocity and time constant, which may have blanks.
 
     Raises DataFileError.
     """
@@ -122,7 +122,7 @@ def read_points(path: Path, rov: Rov, axis: Axis) -> tuple[Point, ...]:
 
 
 def implausible(tuning: Tuning) -> Iterator[str]:
-    """A sentence for each of α and β that is found, but that no vehicle is expected to have."""
+    """Yield a sentence for an implausible α, and for an implausible β."""
     axis, rov = tuning.axis, tuning.rov
     alpha, beta = map(axis.coefficient, ("alpha", "beta"))
     if not ALPHA[0] <= rov[alpha] <= ALPHA[1]:
@@ -140,7 +140,7 @@ def implausible(tuning: Tuning) -> Iterator[str]:
 
 
 def _impossible(rov: Rov, axis: Axis, point: Point) -> str | None:
-    """Why no tuning gives the point."""
+    """Return the reason why no tuning gives the point, or None."""
     command, value = point.command, point.value
     if not 0.0 < abs(command) <= 1.0:
         return f"a command of {command:g} must be within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3"
@@ -157,12 +157,12 @@ def _impossible(rov: Rov, axis: Axis, point: Point) -> str | None:
     if "F_0" in form.keys:
         drift = rov.acceleration_of(form, 0.0).steady_velocity()
         allowed = f"{'above' if force > 0.0 else 'below'} the {drift:g} {axis.unit} that F_0 alone gives"
-    told = f"a command of {command:g} gives a {axis.push} of {force:g} {axis.load}"
-    return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {told}"
+    thrust = f"a command of {command:g} gives a {axis.push} of {force:g} {axis.load}"
+    return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {thrust}"
 
 
 def _with(rov: Rov, name: str, wanted: Sequence[float]) -> Rov:
-    """With the median of the wanted values of a coefficient, each of which must be one that it may have."""
+    """Set a coefficient to the median of the wanted values, each of which must be possible. Raises TuningError."""
     maximum = kind_of(name).maximum
     for value in wanted:
         if not 0.0 < value <= maximum:

@@ -1,4 +1,4 @@
-"""What a test must have at least, so that anything can be fitted to it."""
+"""Check that the tests have enough content for a fit, and that their units and signs make sense."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.identify.driving import curves_of
+from rov_fmu.identify.findings import refusals
 from rov_fmu.identify.recordings.runs import prepare
 from rov_fmu.identify.slips.search import slips
 from rov_fmu.io.csv_table import DataFileError
@@ -13,21 +14,22 @@ from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.columns import VELOCITIES
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tables import Row
 from rov_fmu.tank.tank_tests import TankTests
 
 _LEAST_PUSH = 1e-6
-"""N or N m, less than moves any vehicle: what is fitted to it would overflow."""
+"""The smallest push that counts, N or N m. A fit to less could overflow."""
 
 
 def is_pushed(axis: Axis, base: Rov, command: float) -> bool:
-    """Whether the thrusters push the vehicle where the command tells it to go."""
+    """Return True when the thrusters push the vehicle in the direction of the command."""
     return float(np.sign(command)) * base.force(axis, command) >= _LEAST_PUSH
 
 
 def check_push(folder: Path, axis: Axis, base: Rov, commands: Sequence[float]) -> None:
-    """Where the vehicle moves, its thrusters must push it there, at one command at least. Raises DataFileError."""
+    """Check that the thrusters push in the direction of at least one command. Raises DataFileError."""
     if commands and not any(is_pushed(axis, base, c) for c in commands):
         names = join_names(c.name for c in curves_of(base.layout, axis))
         raise DataFileError(
@@ -37,7 +39,7 @@ def check_push(folder: Path, axis: Axis, base: Rov, commands: Sequence[float]) -
 
 
 def check_recording(folder: Path, recording: Recording, base: Rov) -> None:
-    """Commands and motion must change. Raises DataFileError."""
+    """Check that commands and motion change, and that the velocity is possible. Raises DataFileError."""
     path, values = folder / recording.file, recording.values[np.isfinite(recording.values)]
     moves = np.ptp(recording.reaching(base.layout), axis=0).any() or recording.reaching(base.layout).any()
     if still := "command" if not moves else recording.quantity if np.ptp(values) == 0.0 else None:
@@ -50,17 +52,17 @@ def check_recording(folder: Path, recording: Recording, base: Rov) -> None:
         )
 
 
-def check_slips(tests: TankTests, axes: Sequence[Axis], base: Rov) -> list[str]:
-    """What may be slips of units and signs, in sentences. Raises DataFileError with a line for each that is one."""
-    axes = [axis for axis in axes if max(base.force(axis, c) for c in (1.0, -1.0)) >= _LEAST_PUSH]  # told elsewhere
+def check_slips(tests: TankTests, axes: Sequence[Axis], base: Rov) -> list[Finding]:
+    """Return doubtful units and signs. Raises DataFileError with a line for each that is certainly wrong."""
+    axes = [axis for axis in axes if max(base.force(axis, c) for c in (1.0, -1.0)) >= _LEAST_PUSH]  # see check_push
     recordings = {axis.name: tests.recordings.get(axis.name, ()) for axis in axes}
     steady, time_constants = (
         {axis.name: _by_file(rows.get(axis.name, ())) for axis in axes} for rows in (tests.steady, tests.time_constants)
     )
     findings = slips(recordings, base, tests.given.known, steady, time_constants)
-    if certain := [f"{tests.folder / finding.file}: {finding.words}" for finding in findings if finding.certain]:
-        raise DataFileError(*certain)
-    return [finding.sentence for finding in findings]
+    if certain := [finding for finding in findings if finding.certain]:
+        raise DataFileError(*refusals(certain, tests.folder))
+    return list(findings)
 
 
 def _by_file(rows: Sequence[Row]) -> dict[str, list[tuple[float, float]]]:

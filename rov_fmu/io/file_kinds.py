@@ -8,10 +8,14 @@ from rov_fmu.io.messages import FileError
 VEHICLE_FILE, PLAN, FMU, PAGE = "a vehicle file (TOML)", "the plan of a study (TOML)", "an FMU", "a page (HTML)"
 TESTS_FILE = "the rov.toml of a folder of tank tests"
 _TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "an autopilot's log"
+DATAFLASH_SUFFIX = ".bin"
+"""The suffix of a DataFlash log, which the autopilot writes."""
+LOG_SUFFIXES = (DATAFLASH_SUFFIX, ".tlog")
+"""The suffixes of an autopilot's logs; a .tlog is the telemetry log of a ground station."""
 _BY_SUFFIX = {
     **{".toml": _TOML, ".fmu": FMU, ".html": PAGE},
     **dict.fromkeys((".csv", ".tsv"), _TABLE),
-    **dict.fromkeys((".bin", ".tlog"), _LOG),
+    **dict.fromkeys(LOG_SUFFIXES, _LOG),
 }
 _BY_KEY = {
     **dict.fromkeys(("stop_time", "vary", "figures"), PLAN),

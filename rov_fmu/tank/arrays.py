@@ -1,4 +1,4 @@
-"""The types of arrays."""
+"""Types of NumPy arrays."""
 
 import numpy as np
 from numpy.typing import NDArray

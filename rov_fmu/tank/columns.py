@@ -1,7 +1,7 @@
-"""The columns of tank tests and logs: units, bounds, and what is certainly a slip.
+"""The columns of tank tests and logs: their units and bounds, and checks of the unit of commands.
 
-Numbers leave them in SI units, commands as fractions of full thrust. The bounds are far beyond any vehicle; what passes
-them is a slip, and numbers without any would overflow in a fit.
+Numbers are converted to SI units, and commands to fractions of full thrust. The bounds are far beyond any vehicle, so a
+number outside is a mistake; without bounds, fits could overflow.
 """
 
 from collections.abc import Callable, Iterable
@@ -13,15 +13,15 @@ from rov_fmu.io.messages import shown
 from rov_fmu.model.layout import Axis
 
 NEUTRAL, SPAN = 1500.0, 400.0
-"""µs: the pulse that stops a thruster, and how far from it is full thrust (ArduSub, T200)."""
+"""The pulse that stops a thruster, and the distance from it to full thrust, µs (ArduSub, T200)."""
 NO_OUTPUT = (0.0, 65535.0)
-"""µs: what autopilots log where they give no pulse."""
+"""The values that autopilots log where they give no pulse, µs."""
 
 
 def pulses(numbers: tuple[float, ...] = ()) -> Callable[[float], float]:
-    """From the width of a pulse (µs) to the command, not yet saturated, by neutral and span. Raises ValueError.
+    """Return the conversion of a pulse (µs) to a command that is not yet saturated. Raises ValueError.
 
-    The span is negative for a thruster that turns the other way round.
+    The numbers are neutral and span. The span is negative for a thruster that turns in the opposite direction.
     """
     neutral, span = numbers if len(numbers) == 2 else (NEUTRAL, 0.0 if numbers else SPAN)
     if span == 0.0 or neutral <= 0.0:
@@ -33,44 +33,45 @@ PULSES = ("us", "µs")
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
 TIMES = {"s": 1.0, "ms": 1000.0}
-VELOCITIES = 1e-5, 1e3  # the least and the most
+VELOCITIES = 1e-5, 1e3
+"""The smallest and the largest velocity, m/s or rad/s."""
 _MOST_POSITION = 1e7
 
 COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
 HELD_COMMAND = replace(COMMAND, least=1e-4)
 LOGGED_COMMAND = replace(COMMAND, conversions=dict.fromkeys(PULSES, pulses))
 FORCE = Column({"N": 1.0}, minimum=-1e6, maximum=1e6)
-TIME = Column(TIMES, minimum=-1e10, maximum=1e10)  # a logger's may count from 1970
+TIME = Column(TIMES, minimum=-1e10, maximum=1e10)  # some loggers count from 1970
 
 
 def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCITIES[0]) -> Column:
-    """A column of velocities along the axis; an optional one may have blanks."""
+    """Return a column of velocities along the axis; an optional column may have blanks."""
     lengths = ANGLES if axis.unit == "rad/s" else LENGTHS
     units = {f"{unit}/s": per for unit, per in lengths.items()}
     return Column(units, optional, optional, -VELOCITIES[1], VELOCITIES[1], least)
 
 
 def position_column(axis: Axis) -> Column:
-    """A column of what a sensor measures along the axis; it may have blanks."""
+    """Return a column of positions along the axis, which may have blanks."""
     units = ANGLES if axis.position_unit == "rad" else LENGTHS
     return Column(units, True, True, -_MOST_POSITION, _MOST_POSITION)
 
 
 def time_constant_column(*, optional: bool = False) -> Column:
-    """A column of time constants; an optional one may have blanks."""
+    """Return a column of time constants; an optional column may have blanks."""
     return Column(TIMES, optional, optional, maximum=1e5, least=1e-4)
 
 
 def refuse_slips(table: Columns, commands: Iterable[str]) -> None:
     """Raise DataFileError where the commands cannot be in the unit of their header: fractions under [%] or [us]."""
     names = [name for name in commands if name in table.values]
-    for units, most, told in (
+    for units, most, mistake in (
         (("%",), 1.0, "no command beyond 1 %: fractions under [%]? Write [1]"),
         (PULSES, 1.0, "no pulse beyond 1 us: fractions under [us]? Write [1]"),
         (PULSES, 100.0, "no pulse beyond 100 us: percent under [us]? Write [%]"),
     ):
-        of = [name for name in names if table.units[name] in units]
-        rows = table.texts(*of) if of else ()
+        columns = [name for name in names if table.units[name] in units]
+        rows = table.texts(*columns) if columns else ()
         if 0.0 < max((abs(float(text)) for row in rows for text in row if text), default=0.0) <= most:
-            titles = ", ".join(shown(table.headers[name]) for name in of)
-            raise DataFileError(f"{table.path}, column {titles}: {told}")
+            titles = ", ".join(shown(table.headers[name]) for name in columns)
+            raise DataFileError(f"{table.path}, column {titles}: {mistake}")

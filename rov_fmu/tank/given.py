@@ -1,7 +1,7 @@
-"""What rov.toml says of a vehicle before any test: what it has, what is known of it, how its tests count.
+"""The description of a vehicle in rov.toml, which stands beside its tests.
 
-What it has comes from one of three places: the vehicle that `base` names, the hardware tables of the vehicle file, or,
-without either, the form of the paper. Coefficients that are to be identified are left out.
+The hardware (axes, thrusters, curves) comes from one of three places: the vehicle file that `base` names, the hardware
+tables of rov.toml, or, without either, the form of the paper. The coefficients to be identified are left out.
 """
 
 import os
@@ -25,7 +25,7 @@ from rov_fmu.io.toml_file import (
     read_toml,
     validate,
 )
-from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Axis, Declaration, Layout, VehicleAxis, coefficient_name
+from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Declaration, Layout, VehicleAxis, coefficient_name
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.form import Head, Validity
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
@@ -35,23 +35,23 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
-_OF_BASE = ("body", "arm", "curves", "thruster", "inputs")
-"""Tables that a base has already."""
+_HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
+"""The tables that must not stand beside `base`, because the base has its own."""
 
 
-# ---- The form --------------------------------------------------------------------------------------------------------
+# ---- The keys of the file --------------------------------------------------------------------------------------------
 
 
-def _window(window: tuple[float, float]) -> tuple[float, float]:
+def _check_window(window: tuple[float, float]) -> tuple[float, float]:
     if not -1.0 <= window[0] < window[1] <= 1.0:
         raise ValueError("must be [low, high] within -1 ... 1, fractions of full thrust: 20 % is 0.2")
     return window
 
 
-_Window = Annotated[tuple[Finite, Finite], BeforeValidator(as_tuple), AfterValidator(_window)]
+_Window = Annotated[tuple[Finite, Finite], BeforeValidator(as_tuple), AfterValidator(_check_window)]
 
 
-def _vehicle(name: str, info: ValidationInfo) -> str:
+def _check_vehicle_name(name: str, info: ValidationInfo) -> str:
     if not _vehicle_file(name, inside(folder_of(info), name)):
         raise ValueError(
             f"must be a vehicle file in this folder, or one of the vehicles that ship: {', '.join(SHIPPED)}"
@@ -61,28 +61,28 @@ def _vehicle(name: str, info: ValidationInfo) -> str:
 
 
 def _vehicle_file(name: str, path: Path) -> Path | None:
-    """The vehicle file at a path, or the one that ships under the name."""
+    """Return the vehicle file at `path`, or the one that ships under `name`, or None."""
     return path if os.path.isfile(path) else SHIPPED.get(name)  # noqa: PTH113 (as in form.py)
 
 
-def _curves(value: object) -> object:
+def _check_curve_names(value: object) -> object:
     if value is not True and not (isinstance(value, list) and all(isinstance(name, str) for name in value)):
         raise ValueError("must be true, or a list of curves, each in quotes")
     return value if value is True else tuple(dict.fromkeys(value))
 
 
 class _Fit(Strict):
-    """What is fitted beside thrust, drag and β."""
+    """The table [fit]: what is fitted in addition to thrust, drag and β."""
 
-    lag: Annotated[Any, AfterValidator(_curves)] = ()
-    """The curves whose thrusters' lag is to be found; true for all."""
+    lag: Annotated[Any, AfterValidator(_check_curve_names)] = ()
+    """The curves whose thrusters' lag is fitted; true for all curves."""
 
 
-class _Readable(OpenHardware):
-    """rov.toml as far as it could be read."""
+class _ReadableFile(OpenHardware):
+    """The parts of rov.toml that could be read."""
 
-    base: Annotated[str, AfterValidator(_vehicle)] | None = None
-    against: Annotated[str, AfterValidator(_vehicle)] | None = None
+    base: Annotated[str, AfterValidator(_check_vehicle_name)] | None = None
+    against: Annotated[str, AfterValidator(_check_vehicle_name)] | None = None
     vehicle: Head | None = None
     known: dict[str, Quantity] = Field(default={})
     windows: dict[str, _Window] = Field(default={})
@@ -90,174 +90,193 @@ class _Readable(OpenHardware):
     fit: _Fit = _Fit()
 
 
-class _RovFile(_Readable):
+class _RovFile(_ReadableFile):
+    """A complete rov.toml."""
+
     vehicle: Head
 
 
-# ---- What it says ----------------------------------------------------------------------------------------------------
+# ---- The description -------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Said:
-    """What rov.toml says."""
+class Description:
+    """The vehicle as rov.toml describes it, before any test is read."""
 
     path: Path
+    """The path of rov.toml."""
     head: Head | None
+    """The table [vehicle]; None where it has a mistake."""
     layout: Layout
-    """What the vehicle may have: every axis that its thrusters drive, with the coefficients that are known besides."""
+    """The largest layout that the vehicle can have: every axis that its thrusters drive, and every coefficient that is
+    known."""
     axes: tuple[str, ...]
-    """Those that it is said to have, tests or not."""
+    """The names of the axes that the base or the file declares, whether or not they are tested."""
     known: Mapping[str, Quantity]
-    """What the file itself gives, by the names in the FMU."""
+    """The coefficients that the file itself gives, by their names in the FMU."""
     named: tuple[str, ...]
-    """What it gives or tries to give."""
-    of_base: Mapping[str, Quantity]
-    """What the base gives: tests stand instead of it."""
+    """The names of all coefficients in the file, including those whose entry has a mistake."""
+    base_quantities: Mapping[str, Quantity]
+    """The coefficients that the base gives; tests replace them."""
     thruster_sources: Mapping[str, Mapping[str, str]]
+    """The sources of each thruster's direction and position."""
     windows: Mapping[str, tuple[float, float]]
+    """The range of commands that count, by axis or by thrust_<curve>."""
     lag: tuple[str, ...]
+    """The curves whose thrusters' lag is fitted."""
     command_range: tuple[float, float] | None
     limits: tuple[str, ...]
+    """Sentences about what the model leaves out."""
     base: Path | None
+    """The vehicle file that `base` names."""
     base_name: str
-    """As it stands in the file."""
+    """The value of `base` as it stands in the file; empty without one."""
     against: Path | None
+    """The vehicle file to compare with."""
 
 
-def read_said(path: Path) -> tuple[Said | None, list[str]]:
-    """What rov.toml says, and a line for every mistake in it; None where it does not tell what the vehicle has.
+def read_description(path: Path) -> tuple[Description | None, list[str]]:
+    """Read rov.toml. Return the description and a line for every mistake.
 
-    Raises VehicleFileError where there is no such file, or it is not TOML.
+    The description is None where a mistake leaves the hardware unknown. Raises VehicleFileError where there is no such
+    file, or where it is not TOML.
     """
     data, context = read_toml(path, VehicleFileError), {"folder": path.parent}
     _, problems = validate(data, _RovFile, **context)
-    file, lost = readable_parts(data, problems, context, _Readable)
-    base, of_base = _base(file, path.parent)
-    of_hardware = [*_hardware(file, lost, data)]
-    said, mistakes = None, of_hardware
-    if not (of_base or of_hardware or lost & {"base", "axes", *_OF_BASE}):
-        said = _said(path, file, data, base)
-        everything = _everything(said.layout)
-        strange = {("known", name) for name in said.named if name not in everything}
-        problems = [problem for problem in problems if problem["loc"][:2] not in strange]
-        mistakes = [*_mistakes(file, lost, said)]
-    return said, lines_on(path, (*problem_lines(problems, data, _RovFile), *mistakes)) + of_base
+    file, lost = readable_parts(data, problems, context, _ReadableFile)
+    base, base_mistakes = _load_base(file, path.parent)
+    hardware_mistakes = [*_hardware_mistakes(file, lost, data)]
+    if base_mistakes or hardware_mistakes or lost & {"base", "axes", *_HARDWARE_TABLES}:
+        lines = lines_on(path, (*problem_lines(problems, data, _RovFile), *hardware_mistakes))
+        return None, lines + base_mistakes
+    description = _describe(path, file, data, base)
+    possible = _possible_coefficients(description.layout)
+    # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
+    unknown = {("known", name) for name in description.named if name not in possible}
+    problems = [problem for problem in problems if problem["loc"][:2] not in unknown]
+    mistakes = _mistakes(file, lost, description)
+    return description, lines_on(path, (*problem_lines(problems, data, _RovFile), *mistakes))
 
 
-def _base(file: _Readable, folder: Path) -> tuple[Vehicle | None, list[str]]:
-    """The vehicle to begin from, and what is wrong with its file."""
-    found = _vehicle_file(file.base, folder / file.base) if file.base else None
+def _load_base(file: _ReadableFile, folder: Path) -> tuple[Vehicle | None, list[str]]:
+    """Load the vehicle that `base` names, and return it with a line for every mistake in its file."""
+    path = _vehicle_file(file.base, folder / file.base) if file.base else None
+    if path is None:
+        return None, []
     try:
-        return load_vehicle(found) if found else None, []
+        return load_vehicle(path), []
     except VehicleFileError as error:
         return None, str(error).splitlines()
 
 
-def _hardware(file: _Readable, lost: set[str], data: Toml) -> Iterator[str]:
-    """A line for what is wrong with the tables that say what the vehicle has."""
-    there = [name for name in _OF_BASE if name in data]
+def _hardware_mistakes(file: _ReadableFile, lost: set[str], data: Toml) -> Iterator[str]:
+    """Yield a line for every mistake in the hardware tables."""
+    present = [name for name in _HARDWARE_TABLES if name in data]
     if "base" in data:
-        for name in there:
+        for name in present:
             yield key_line(name, "must not stand beside base, which has its own; coefficients may be given in [known]")
         return
-    for name in ("curves", "thruster") if there else ():
+    for name in ("curves", "thruster") if present else ():
         if name not in data or data[name] in ({}, []):
             form = "[[thruster]]" if name == "thruster" else "[curves.<name>]"
-            yield key_line(name, f"this table is missing, and there is {there[0]}: write {form}")
+            yield key_line(name, f"this table is missing, and there is {present[0]}: write {form}")
     if {"curves", "thruster"} <= data.keys():
         yield from check_names_and_keys(file, lost, data)
 
 
-def _said(path: Path, file: _Readable, data: Toml, base: Vehicle | None) -> Said:
-    own = file.layout
-    begun = base.layout if base else own if file.thruster else PAPER
-    names = [*(data["known"] if isinstance(data.get("known"), dict) else ())]
-    layout = _widened(begun, {form.axis.name: form.keys for form in own.axes}, names)
-    known = {name: q for name, q in file.quantities(layout).items() if q} | dict(file.known)
-    whose = base.thruster_sources if base else file.thruster_sources if file.thruster else PAPER_SOURCES
-    lag = tuple(curve.name for curve in layout.curves) if file.fit.lag is True else file.fit.lag
-    against = _vehicle_file(file.against, path.parent / file.against) if file.against else None
-    return Said(
+def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None) -> Description:
+    """Put together the description from the parts of the file and the base."""
+    own_layout, folder = file.layout, path.parent
+    if base:
+        start, thruster_sources, limits = base.layout, base.thruster_sources, base.limits
+    elif file.thruster:
+        start, thruster_sources, limits = own_layout, file.thruster_sources, ()
+    else:
+        start, thruster_sources, limits = PAPER, PAPER_SOURCES, ()
+    known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
+    layout = _largest_layout(start, {form.axis.name: form.keys for form in own_layout.axes}, known_names)
+    given = {name: quantity for name, quantity in file.quantities(layout).items() if quantity} | dict(file.known)
+    return Description(
         path=path,
         head=file.vehicle,
         layout=layout,
-        axes=tuple(name for name in AXES if name in {**begun.kinds, **own.kinds}),
-        known={name: q for name, q in known.items() if name in layout.coefficients},
-        named=tuple(dict.fromkeys([*known, *names])),
-        of_base=_quantities(base) if base else {},
-        thruster_sources=whose,
+        axes=tuple(name for name in AXES if name in start.kinds or name in own_layout.kinds),
+        known={name: quantity for name, quantity in given.items() if name in layout.coefficients},
+        named=tuple(dict.fromkeys([*given, *known_names])),
+        base_quantities=_quantities(base) if base else {},
+        thruster_sources=thruster_sources,
         windows=file.windows,
-        lag=lag,
+        lag=tuple(curve.name for curve in layout.curves) if file.fit.lag is True else file.fit.lag,
         command_range=file.validity.command_range if file.validity else None,
-        limits=file.validity.limits if file.validity else base.limits if base else (),
-        base=_vehicle_file(file.base, path.parent / file.base) if file.base else None,
+        limits=file.validity.limits if file.validity else limits,
+        base=_vehicle_file(file.base, folder / file.base) if file.base else None,
         base_name=file.base or "",
-        against=against,
+        against=_vehicle_file(file.against, folder / file.against) if file.against else None,
     )
 
 
 def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
-    """The coefficients of a vehicle that its file gives."""
-    metas = vehicle.layout.coefficients
+    """Return the coefficients that a vehicle's file gives."""
+    declarations = vehicle.layout.coefficients
     return {
         name: Quantity(
-            value=vehicle.rov[name], unit=metas[name].unit, source=source, interval=vehicle.intervals.get(name)
+            value=vehicle.rov[name], unit=declarations[name].unit, source=source, interval=vehicle.intervals.get(name)
         )
         for name, source in vehicle.sources.items()
         if source != NOT_GIVEN
     }
 
 
-def _widened(layout: Layout, tables: Mapping[str, tuple[str, ...]], known: Iterable[str]) -> Layout:
-    """With every axis that the thrusters drive, and the coefficients that are known or in the tables of an axis."""
+def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]], known: Iterable[str]) -> Layout:
+    """Add every axis that the thrusters drive, the keys of the file's own axis tables, and the known coefficients."""
     forms = []
-    for axis in _driven(layout, tables):
-        form = layout.kinds.get(axis.name, VehicleAxis(axis))
-        forms.append(VehicleAxis(axis, (*form.keys, *tables.get(axis.name, ()))))
+    for name, axis in AXES.items():
+        if layout.signs(axis) or name in layout.kinds or name in axis_keys:
+            form = layout.kinds.get(name, VehicleAxis(axis))
+            forms.append(VehicleAxis(axis, (*form.keys, *axis_keys.get(name, ()))))
     return replace(layout, axes=tuple(forms)).extended(known)
 
 
-def _driven(layout: Layout, also: Iterable[str]) -> Iterator[Axis]:
-    """The axes that thrusters drive, and those that the vehicle is said to have."""
-    for name, axis in AXES.items():
-        if layout.signs(axis) or name in layout.kinds or name in also:
-            yield axis
+# ---- Mistakes that depend on the vehicle's hardware ------------------------------------------------------------------
 
 
-# ---- Mistakes that need to know what the vehicle has -----------------------------------------------------------------
-
-
-def _mistakes(file: _Readable, lost: set[str], said: Said) -> Iterator[str]:
-    """A line for every name that the vehicle does not have, number that it cannot have, and half of a pair."""
-    layout, everything = said.layout, _everything(said.layout)
-    strange = [name for name in said.named if name not in everything]
-    for name in strange[:MOST]:
-        yield key_line(f"known.{name}", f"there is no such coefficient of this vehicle{did_you_mean(name, everything)}")
-    yield from ("" for _ in strange[MOST:])
-    yield from check_quantities("known", {name: q for name, q in file.known.items() if name in everything}, everything)
-    tables = dict(where(layout))
-    for name in (name for name, q in file.quantities(layout).items() if q and name in file.known):
-        yield key_line(f"known.{name}", f"is given in [{'.'.join(tables[name][:-1])}] too")
+def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> Iterator[str]:
+    """Yield a line for every unknown name, impossible number, and missing half of a pair."""
+    layout = description.layout
+    yield from _mistakes_in_known(file, description)
     if "known" not in lost:
-        yield from _halves(file, said)
+        yield from _missing_halves(file, description)
     windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.kinds]
     for name in file.windows:
         if name not in windows:
-            yield key_line(
-                f"windows.{name}", f"there is no such key, only {join_names(windows)}{did_you_mean(name, windows)}"
-            )
+            hint = did_you_mean(name, windows)
+            yield key_line(f"windows.{name}", f"there is no such key, only {join_names(windows)}{hint}")
     curves = [curve.name for curve in layout.curves]
-    for name in said.lag:
+    for name in description.lag:
+        T = coefficient_name("T", name)
         if name not in curves:
-            yield key_line(
-                "fit.lag", f"there is no such curve, only {join_names(curves)}{did_you_mean(name, curves)}", name
-            )
-        elif (T := coefficient_name("T", name)) in said.named:
+            hint = did_you_mean(name, curves)
+            yield key_line("fit.lag", f"there is no such curve, only {join_names(curves)}{hint}", name)
+        elif T in description.named:
             yield key_line("fit.lag", f"{T} is given, so it cannot be fitted too", name)
 
 
-def _everything(layout: Layout) -> dict[str, Declaration]:
-    """Every coefficient that the vehicle could have."""
+def _mistakes_in_known(file: _ReadableFile, description: Description) -> Iterator[str]:
+    possible = _possible_coefficients(description.layout)
+    unknown = [name for name in description.named if name not in possible]
+    for name in unknown[:MOST]:
+        yield key_line(f"known.{name}", f"there is no such coefficient of this vehicle{did_you_mean(name, possible)}")
+    for _ in unknown[MOST:]:
+        yield ""  # is only counted
+    yield from check_quantities("known", {name: q for name, q in file.known.items() if name in possible}, possible)
+    tables = dict(where(description.layout))
+    for name, quantity in file.quantities(description.layout).items():
+        if quantity and name in file.known:
+            yield key_line(f"known.{name}", f"is given in [{'.'.join(tables[name][:-1])}] too")
+
+
+def _possible_coefficients(layout: Layout) -> dict[str, Declaration]:
+    """Return every coefficient that a vehicle with these axes and curves could have."""
     return replace(
         layout,
         axes=tuple(VehicleAxis(form.axis, tuple(AXIS)) for form in layout.axes),
@@ -265,22 +284,22 @@ def _everything(layout: Layout) -> dict[str, Declaration]:
     ).coefficients
 
 
-def _halves(file: _Readable, said: Said) -> Iterator[str]:
-    """One coefficient of a pair without the other, where the tables of the file do not tell already."""
-    given, tables = {*said.of_base, *said.known}, dict(where(said.layout))
-    for one, other in _pairs(said.layout):
+def _missing_halves(file: _ReadableFile, description: Description) -> Iterator[str]:
+    """Yield a line for each coefficient without its partner, unless check_names_and_keys reports it already."""
+    given, tables = {*description.base_quantities, *description.known}, dict(where(description.layout))
+    for one, other in _pairs(description.layout):
         if one in given and other not in given and (one in file.known or not one.endswith(REVERSE)):
-            place = "known" if one in file.known else ".".join(tables[one][:-1])
-            yield key_line(place, f"{one} is given, but {other} is not")
+            table = "known" if one in file.known else ".".join(tables[one][:-1])
+            yield key_line(table, f"{one} is given, but {other} is not")
 
 
 def _pairs(layout: Layout) -> Iterator[tuple[str, str]]:
-    """Names of coefficients of which the first needs the second."""
+    """Yield pairs of coefficient names of which the first needs the second."""
     for curve in layout.curves:
         for end in ("", REVERSE):
             a_t, b_t = (coefficient_name(key + end, curve.name) for key in ("a_t", "b_t"))
             yield from ((a_t, b_t), (b_t, a_t))
         yield coefficient_name(f"c_0{REVERSE}", curve.name), coefficient_name("c_0", curve.name)
-    for axis in (form.axis for form in layout.axes):
-        a_d, b_d = (axis.coefficient(key + REVERSE) for key in ("a_d", "b_d"))
+    for form in layout.axes:
+        a_d, b_d = (form.axis.coefficient(key + REVERSE) for key in ("a_d", "b_d"))
         yield from ((a_d, b_d), (b_d, a_d))

@@ -1,7 +1,8 @@
-"""Logs of one test or of a whole dive, as they come: CSV files here, MAVLink logs in mavlink.py.
+"""Read logs of one test or of a whole dive: CSV files here, MAVLink logs in mavlink.py.
 
-A CSV log has a column `time`; commands, as `command` of the axis that the log is of, or as a column for each input of
-the vehicle (`u_<name>`) or for each thruster; and what was measured. What cannot be used is left out, counted and told.
+A CSV log has a column `time`, columns of commands and columns of measured motion. The commands are one column
+`command` in a log of one axis, or a column for each input of the vehicle (`u_<name>`), or a column for each thruster.
+Rows and cells that cannot be used are left out and counted.
 """
 
 from collections import Counter
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.io.csv_table import Column, Columns, DataFileError, read_columns
+from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.model.layout import HEAVE, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
@@ -25,30 +27,32 @@ from rov_fmu.tank.columns import (
     refuse_slips,
     velocity_column,
 )
-from rov_fmu.tank.mavlink import SUFFIXES, read_mavlink
+from rov_fmu.tank.findings import SENTENCES, Finding, refusals
+from rov_fmu.tank.mavlink import read_mavlink
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, recordings_of, unwrapped
 
-_MOST_BACK = 0.2  # of the rows: with more of them out of order the time begins anew
+_MOST_UNORDERED = 0.2
+"""The largest share of rows out of order; with more, the file holds two logs."""
 _COMMAND = "command"
-_STATES = {HEAVE: "z", YAW: "psi"}
-"""What the FMU calls a position."""
+_POSITION_NAMES = {HEAVE: "z", YAW: "psi"}
+"""The names of the positions in the FMU."""
 
 
 @dataclass(frozen=True)
 class Log:
-    """What a log yields."""
+    """The recordings of a log."""
 
     recordings: tuple[Recording, ...]
-    notes: tuple[str, ...] = ()
-    """What was left out and why, with the name of the file; counted."""
+    findings: tuple[Finding, ...] = ()
+    """What was left out, and why."""
 
 
 def read_log(path: Path, layout: Layout, axis: Axis | None = None) -> Log:
-    """Every axis of the vehicle that the log tells of, or the one that it is of. Raises DataFileError."""
-    if path.suffix.lower() in SUFFIXES:
-        commands, signals, notes = read_mavlink(path, layout)
-        return _log(path, layout, commands, signals, notes, axis)
+    """Read a recording of every axis that the log measures, or of `axis` alone. Raises DataFileError."""
+    if path.suffix.lower() in LOG_SUFFIXES:
+        commands, signals, findings = read_mavlink(path, layout)
+        return _log(path, layout, commands, signals, findings, axis)
     sensors = _sensors([axis] if axis else [form.axis for form in layout.axes], of_one=axis is not None)
     kinds = {"inputs": _inputs(layout), "thrusters": _thrusters(layout), "axis": {_COMMAND: _LOGGED} if axis else {}}
     columns = {"time": TIME, **kinds["axis"], **kinds["inputs"], **kinds["thrusters"]}
@@ -57,15 +61,16 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None) -> Log:
     table = read_columns(path, columns, others=True, loose=True, check_header=check_header)
     ((kind, commanding),) = _commanding(table.values, kinds).items()
     refuse_slips(table, commanding)
-    time, values, notes = _cleaned(table, commanding)
+    time, values, findings = _cleaned(table, commanding)
     del table  # a long log is large
     signals = _signals(sensors, time, values)
     if kind == "axis":
-        return Log((_of_one_command(path, signals[0], values[_COMMAND]),), _named(path, notes))
-    notes += tuple(f"no column of {name}, which is taken as 0" for name in kinds[kind] if name not in values)
-    commands = Commands(time, _reaching(layout, values) if kind == "inputs" else _each(layout, values))
+        return Log((_recording_of_axis(path, signals[0], values[_COMMAND]),), tuple(findings))
+    missing = (name for name in kinds[kind] if name not in values)
+    findings += [Finding("missing column", file=path.name, names={"column": name}) for name in missing]
+    thrusters = _mixed_inputs(layout, values) if kind == "inputs" else _thruster_commands(layout, values)
     del values
-    return _log(path, layout, commands, signals, notes)
+    return _log(path, layout, Commands(time, thrusters), signals, findings)
 
 
 def _log(
@@ -73,21 +78,19 @@ def _log(
     layout: Layout,
     commands: Commands,
     signals: Iterable[Signal],
-    notes: Iterable[str],
+    findings: Iterable[Finding],
     axis: Axis | None = None,
 ) -> Log:
-    found, reasons = recordings_of(path.name, layout, commands, signals, axis)
-    if not found:
-        raise DataFileError(*(f"{path}: {reason}" for reason in reasons or ["nothing measured of any axis"]))
-    return Log(found, _named(path, (*notes, *reasons)))
+    """Return the recordings of a log. Raises DataFileError where there are none."""
+    recordings, useless = recordings_of(path.name, layout, commands, signals, axis)
+    if not recordings:
+        reasons = refusals(useless, path.parent, SENTENCES) or [f"{path}: nothing measured of any axis"]
+        raise DataFileError(*reasons)
+    return Log(recordings, (*findings, *useless))
 
 
-def _named(path: Path, notes: Iterable[str]) -> tuple[str, ...]:
-    return tuple(f"{path.name}: {note}" for note in notes)
-
-
-def _of_one_command(path: Path, signal: Signal, command: Array) -> Recording:
-    """Of an axis whose thrusters follow one command."""
+def _recording_of_axis(path: Path, signal: Signal, command: Array) -> Recording:
+    """Return the recording of an axis whose thrusters follow one command. Raises DataFileError."""
     if (count := int(np.isfinite(signal.values).sum())) < LEAST_SAMPLES:
         raise DataFileError(f"{path}: {count} samples of {signal.quantity}, at least {LEAST_SAMPLES} are needed")
     values = unwrapped(signal.values) if signal.quantity == "heading" else signal.values
@@ -101,7 +104,7 @@ _LOGGED = replace(LOGGED_COMMAND, optional=True)
 
 @dataclass(frozen=True)
 class _Sensor:
-    """A column of motion."""
+    """A column of measured motion."""
 
     axis: Axis
     quantity: str
@@ -109,34 +112,38 @@ class _Sensor:
 
 
 def _sensors(axes: Iterable[Axis], *, of_one: bool) -> dict[str, _Sensor]:
-    """By the names of their columns, positions before velocities; in a log of one axis the name needs not say which."""
+    """Return the sensors by column name, positions before velocities.
+
+    In a log of one axis the column need not name the axis.
+    """
     found = {}
     for axis in axes:
         for quantity in (axis.position, "velocity"):
             velocity = quantity == "velocity"
             column = velocity_column(axis, optional=True, least=0.0) if velocity else position_column(axis)
-            long, state = f"{axis.name} {quantity}", axis.velocity if velocity else _STATES.get(axis)
-            name = quantity if of_one or (axis in _STATES and not velocity) else long
-            column = replace(column, also=tuple(filter(None, (long, state))))
+            long_name, state = f"{axis.name} {quantity}", axis.velocity if velocity else _POSITION_NAMES.get(axis)
+            name = quantity if of_one or (axis in _POSITION_NAMES and not velocity) else long_name
+            column = replace(column, also=tuple(filter(None, (long_name, state))))
             found[name] = _Sensor(axis, quantity, column)
     return found
 
 
 def _inputs(layout: Layout) -> dict[str, Column]:
-    """The inputs of the vehicle; where each drives one thruster, by the name of the thruster too."""
+    """Return the columns of inputs; where each drives one thruster, a column may have the thruster's name."""
     names = {f"u_{t.name}": (t.name,) for t in layout.thrusters} if not layout.mix else {}
     return {name: replace(_LOGGED, also=names.get(name, ())) for name in layout.commands}
 
 
 def _thrusters(layout: Layout) -> dict[str, Column]:
-    """The thrusters, where inputs drive several."""
+    """Return the columns of thrusters, of a vehicle whose inputs drive several thrusters."""
     return {f"thruster {t.name}": replace(_LOGGED, also=(t.name,)) for t in layout.thrusters} if layout.mix else {}
 
 
 def _commanding(names: Iterable[str], kinds: Mapping[str, Mapping[str, Column]]) -> dict[str, list[str]]:
-    """The columns of commands that a log has, by the kind of the commands."""
-    has = {*names}
-    return {kind: found for kind, of in kinds.items() if (found := [name for name in of if name in has])}
+    """Return the columns of commands among the names, by the kind of the commands."""
+    names = {*names}
+    found = {kind: [name for name in columns if name in names] for kind, columns in kinds.items()}
+    return {kind: columns for kind, columns in found.items() if columns}
 
 
 def _wrong_columns(
@@ -147,16 +154,17 @@ def _wrong_columns(
     kinds: Mapping[str, Mapping[str, Column]],
     sensors: Mapping[str, _Sensor],
 ) -> Iterator[str]:
-    """What is wrong with the columns of a log, by the headers that are read and the others."""
-    found, others = _commanding(headers, kinds), [*others]
-    of_one = next((title for title in others if title.partition("[")[0].strip().casefold() == _COMMAND), None)
-    if not found and of_one:
-        yield f"column {shown(of_one)} is the command of one axis, but {_of_no_axis(path, layout)}"
+    """Yield a line for every mistake in the columns of a log, from the headers that are read and the others."""
+    found = _commanding(headers, kinds)
+    unread = {title.partition("[")[0].strip(): shown(title) for title in others}
+    command = next((title for name, title in unread.items() if name.casefold() == _COMMAND), None)
+    if not found and command:
+        yield f"column {command} is the command of one axis, but {_no_axis_in_name(path, layout)}"
         return
     if not found:
-        wanted = " or ".join(", ".join(of) for of in kinds.values() if of)
-        unread = {title.partition("[")[0].strip(): shown(title) for title in others}
-        near = dict.fromkeys(unread[name] for of in kinds.values() for column in of for name in similar(column, unread))
+        wanted = " or ".join(", ".join(columns) for columns in kinds.values() if columns)
+        known = [name for columns in kinds.values() for name in columns]
+        near = dict.fromkeys(unread[name] for column in known for name in similar(column, unread))
         hint = f"; is it the column {' or '.join(near)}?" if near else ""
         yield f"no column of commands: {wanted}, each in [%], [1] or [us]{hint}"
     if len(found) > 1:
@@ -167,8 +175,8 @@ def _wrong_columns(
         yield f"column {titles} is missing"
 
 
-def _of_no_axis(path: Path, layout: Layout) -> str:
-    """Why the name of a file does not tell of which axis of the vehicle the log is."""
+def _no_axis_in_name(path: Path, layout: Layout) -> str:
+    """Explain that the name of a file does not contain an axis of the vehicle."""
     axes, word = [*layout.kinds], path.stem.lower().partition("_")[2].partition("_")[0]
     names = " or ".join(f"log_{name}*{path.suffix}" for name in axes)
     hint = did_you_mean(word, axes)
@@ -178,8 +186,8 @@ def _of_no_axis(path: Path, layout: Layout) -> str:
 # ---- Rows ------------------------------------------------------------------------------------------------------------
 
 
-def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Array], tuple[str, ...]]:
-    """Ascending time (s), columns, commands within ±1, and what was left out or changed. Raises DataFileError."""
+def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Array], list[Finding]]:
+    """Return ascending time (s), the columns with commands within ±1, and what was changed. Raises DataFileError."""
     columns = {name: np.frombuffer(values) for name, values in table.values.items()}
     timed = np.isfinite(columns["time"])
     commanded = np.all([np.isfinite(columns[name]) for name in commanding], axis=0)
@@ -187,32 +195,31 @@ def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Ar
     if not rows.size:
         raise DataFileError(f"{table.path}: no row has both a time and a command")
     time = columns["time"][rows]
-    back = np.flatnonzero(time < np.maximum.accumulate(time))
-    if back.size > _MOST_BACK * rows.size:
-        raise table.error(int(rows[back[0]]), "time", "the time goes back, and stays back: two logs in one file?")
+    unordered = np.flatnonzero(time < np.maximum.accumulate(time))
+    if unordered.size > _MOST_UNORDERED * rows.size:
+        raise table.error(int(rows[unordered[0]]), "time", "the time goes back, and stays back: two logs in one file?")
     rows = rows[np.argsort(time, kind="stable")]
     time = columns["time"][rows]
     first = np.concatenate([[True], np.diff(time) > 0.0])
     columns = {name: _merged(values[rows], first, commanded=name in commanding) for name, values in columns.items()}
-    told = (
-        (back.size, "row", "out of order sorted"),
-        (int((~first).sum()), "repeated time stamp", "merged"),
-        (int((~timed).sum()), "row", "without a time left out"),
-        (int((timed & ~commanded).sum()), "row", "without a command left out"),
-        (table.torn, "row", "with more cells than the header left out"),
-        *(
-            (n, "cell", f"of {name} without a number taken as blank")
-            for name, n in table.unread.items()
-            if name != "time" and name not in commanding
-        ),
-    )
-    notes = [", ".join(f"{n} {what}{'s' if n > 1 else ''} {done}" for n, what, done in told if n)]
-    notes += _on_pulses(table, commanding)
-    return time[first], columns, tuple(filter(None, notes))
+    counts = {
+        "rows sorted": unordered.size,
+        "time stamps merged": (~first).sum(),
+        "rows without time": (~timed).sum(),
+        "rows without command": (timed & ~commanded).sum(),
+        "torn rows": table.torn,
+    }
+    file = table.path.name
+    findings = [Finding(kind, file=file, numbers={"count": int(n)}) for kind, n in counts.items() if n]
+    for name, n in table.unread.items():
+        if n and name != "time" and name not in commanding:
+            findings.append(Finding("unread cells", file=file, names={"column": name}, numbers={"count": n}))
+    findings += _pulse_findings(table, commanding)
+    return time[first], columns, findings
 
 
 def _merged(values: Array, first: Array, *, commanded: bool) -> Array:
-    """One value for each time: the last command, which is the one that is held; the last that was measured."""
+    """Return the last value at each time; the last command is the one that is held."""
     groups = np.cumsum(first) - 1
     found = np.full(groups[-1] + 1, np.nan)
     there = np.isfinite(values)
@@ -220,41 +227,41 @@ def _merged(values: Array, first: Array, *, commanded: bool) -> Array:
     return np.clip(found, -1.0, 1.0) if commanded else found
 
 
-def _on_pulses(table: Columns, commanding: Iterable[str]) -> list[str]:
-    """How many were none, and how many are beyond full thrust."""
+def _pulse_findings(table: Columns, commanding: Iterable[str]) -> Iterator[Finding]:
+    """Count the values that stand for no pulse, and the pulses beyond full thrust."""
     pulsed = [name for name in commanding if table.units[name] in PULSES]
-    none: Counter[str] = Counter()
-    for row in table.texts(*pulsed) if pulsed else ():
-        none.update(name for name, text in zip(pulsed, row, strict=True) if text and float(text) in NO_OUTPUT)
-    notes = []
+    if not pulsed:
+        return
+    without_pulse: Counter[str] = Counter()
+    for row in table.texts(*pulsed):
+        without_pulse.update(name for name, text in zip(pulsed, row, strict=True) if text and float(text) in NO_OUTPUT)
     for name in pulsed:
         beyond = sum(abs(value) > 1.0 for value in table.values[name])
-        told = [f"{none[name]} of 0 or 65535 us taken as no command"] if none[name] else []
-        told += [f"{beyond} beyond full thrust taken as full thrust"] if beyond else []
-        notes += [f"pulses of {name}: {', '.join(told)}"] if told else []
-    return notes
+        for kind, count in (("no pulse", without_pulse[name]), ("pulse beyond full thrust", beyond)):
+            if count:
+                yield Finding(kind, file=table.path.name, names={"column": name}, numbers={"count": count})
 
 
 # ---- Commands and motion ---------------------------------------------------------------------------------------------
 
 
-def _reaching(layout: Layout, inputs: Mapping[str, Array]) -> dict[str, Array]:
-    """What reaches each thruster of the inputs, within ±1; an input without a column is 0."""
+def _mixed_inputs(layout: Layout, inputs: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the command of each thruster, within ±1, from the inputs; an input without a column is 0."""
     still = np.zeros_like(inputs["time"])
     return {
-        name: np.clip(sum((gain * inputs.get(of, still) for of, gain in gains.items()), still), -1.0, 1.0)
+        name: np.clip(sum((gain * inputs.get(u, still) for u, gain in gains.items()), still), -1.0, 1.0)
         for name, gains in layout.gains.items()
     }
 
 
-def _each(layout: Layout, columns: Mapping[str, Array]) -> dict[str, Array]:
-    """The columns of the thrusters; one without is at 0."""
+def _thruster_commands(layout: Layout, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the column of each thruster; a thruster without a column has the command 0."""
     still = np.zeros_like(columns["time"])
     return {t.name: columns.get(f"thruster {t.name}", still) for t in layout.thrusters}
 
 
 def _signals(sensors: Mapping[str, _Sensor], time: Array, columns: Mapping[str, Array]) -> list[Signal]:
-    """What was measured of each axis: the position, unless the velocity alone has enough samples."""
+    """Return the signal of each axis: the position, unless only the velocity has enough samples."""
     found: dict[str, Signal] = {}
     for name, sensor in sensors.items():
         if name in columns:

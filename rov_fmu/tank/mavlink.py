@@ -1,6 +1,6 @@
-"""Logs of ArduSub through pymavlink: DataFlash logs of the vehicle (.bin), telemetry logs of a ground station (.tlog).
+"""Read logs of ArduSub with pymavlink: DataFlash logs of the vehicle (.bin), telemetry of a ground station (.tlog).
 
-What is read, in this order; the first that has enough samples and changes is taken:
+The sources of each signal; the first with enough samples that change is used:
 
               .bin                        .tlog
     servos    RCOU                        SERVO_OUTPUT_RAW (port 0)
@@ -8,8 +8,8 @@ What is read, in this order; the first that has enough samples and changes is ta
     heading   ATT.Yaw, XKF1, NKF1         ATTITUDE.yaw
     velocity  XKF1, NKF1                  LOCAL_POSITION_NED, both where the filter knows it (XKF4, EKF_STATUS_REPORT)
 
-Thruster n of the vehicle is motor n of the autopilot: the servo whose SERVOx_FUNCTION says so, or else servo n. A motor
-with MOT_n_DIRECTION = -1 turns the other way round.
+Thruster n of the vehicle is motor n of the autopilot: the servo that SERVOx_FUNCTION assigns to it, or else servo n. A
+motor with MOT_n_DIRECTION = -1 turns in the opposite direction.
 """
 
 import io
@@ -24,18 +24,22 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.file_kinds import DATAFLASH_SUFFIX
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Layout
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.columns import NO_OUTPUT, pulses
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal
 
-SUFFIXES = (".bin", ".tlog")
 _DATAFLASH = b"\xa3\x95\x80"
-"""How a DataFlash log begins: with a message that tells the format of others."""
-_WRAP = 2.0**32 * 1e-6  # s, after which the clock of SERVO_OUTPUT_RAW begins anew
-_WATER = 1000.0 * 9.80665  # Pa/m, fresh water
-_VELOCITY_KNOWN, _STANDS_STILL = 2, 128  # flags of the filter: it knows the velocity; it assumes that nothing moves
+"""The first bytes of a DataFlash log, which begin a message about the format of others."""
+_WRAP = 2.0**32 * 1e-6
+"""The time after which the clock of SERVO_OUTPUT_RAW starts again, s."""
+_PRESSURE_GRADIENT = 1000.0 * 9.80665
+"""The pressure gradient in fresh water, Pa/m."""
+_VELOCITY_KNOWN, _CONSTANT_POSITION = 2, 128
+"""Flags of the filter: it knows the horizontal velocity; it assumes that the vehicle does not move."""
 
 _Samples = list[tuple[float, ...]]
 
@@ -49,7 +53,7 @@ _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
     "RCOU": lambda m: tuple(getattr(m, f"C{n}", 0) for n in range(1, 15)),
     "GLOBAL_POSITION_INT": lambda m: (-m.relative_alt / 1000.0,),
     "VFR_HUD": lambda m: (-m.alt,),
-    "SCALED_PRESSURE2": lambda m: (m.press_abs * 100.0 / _WATER,),
+    "SCALED_PRESSURE2": lambda m: (m.press_abs * 100.0 / _PRESSURE_GRADIENT,),
     "CTUN": lambda m: (-m.Alt,),
     "BARO": lambda m: (-m.Alt,),
     "ATTITUDE": lambda m: (m.yaw,),
@@ -62,7 +66,7 @@ _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
     "NKF4": lambda m: (m.SS,),
 }
 _PARAMETERS = {"PARAM_VALUE": ("param_id", "param_value"), "PARM": ("Name", "Value")}
-# Message, and the first of its numbers that is meant.
+# Each source is a message and the index of the first number used.
 _SERVOS = (("SERVO_OUTPUT_RAW", 0), ("RCOU", 0))
 _DEPTHS = (
     ("GLOBAL_POSITION_INT", 0),
@@ -79,16 +83,21 @@ _STATUS = (("EKF_STATUS_REPORT", 0), ("XKF4", 0), ("NKF4", 0))
 
 
 @dataclass
-class _Found:
-    """What a log holds."""
+class _Content:
+    """The content of a log."""
 
+    file: str
     samples: defaultdict[tuple[str, int], _Samples] = field(default_factory=lambda: defaultdict(list))
-    """By message, and instance of the sensor or system that sent it: time (s) and numbers."""
+    """Time (s) and numbers, by message and by instance of the sensor or system that sent it."""
     parameters: dict[str, float] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
 
-    def take(self, message: Any, instance: int, time: float) -> None:
-        """One message; without a number where a field is missing or none."""
+    def add_finding(self, kind: str, names: dict[str, str] | None = None, **numbers: float) -> None:
+        """Add a finding about this log."""
+        self.findings.append(Finding(kind, file=self.file, names=names or {}, numbers=numbers))
+
+    def add(self, message: Any, instance: int, time: float) -> None:
+        """Add one message, unless a field is missing or not a number."""
         kind = message.get_type()
         if kind in _PARAMETERS:
             name, value = (getattr(message, key) for key in _PARAMETERS[kind])
@@ -96,7 +105,7 @@ class _Found:
             return
         try:
             numbers = tuple(map(float, _NUMBERS[kind](message)))
-        except (AttributeError, TypeError, ValueError):  # of another version of ArduSub
+        except (AttributeError, TypeError, ValueError):  # from another version of ArduSub
             return
         if isfinite(time) and all(map(isfinite, numbers)):
             self.samples[kind, instance].append((time, *numbers))
@@ -104,78 +113,83 @@ class _Found:
     def series(
         self, sources: Iterable[tuple[str, int]], *, width: int = 1, varies: bool = True
     ) -> tuple[str, Array, Array] | None:
-        """Message, time and numbers of the first source that is there; of several sensors, that which sees most."""
+        """Return message, time and numbers of the first source in the log; of several barometers, the liveliest."""
         for kind, first in sources:
-            of = [np.array(rows) for (name, _), rows in sorted(self.samples.items()) if name == kind]
-            if of and kind == "BARO":
-                of = [max(of, key=lambda rows: float(np.ptp(rows[:, 1])))]
-            for rows in of[:1]:
-                rows = rows[np.argsort(rows[:, 0], kind="stable")]  # noqa: PLW2901 (the same, in order)
-                time, numbers = rows[:, 0], rows[:, 1 + first : 1 + first + width]
-                if not varies or (len(rows) >= LEAST_SAMPLES and np.ptp(numbers, axis=0).any()):
-                    return kind, time, numbers
+            instances = [np.array(rows) for (name, _), rows in sorted(self.samples.items()) if name == kind]
+            if not instances:
+                continue
+            rows = max(instances, key=lambda rows: float(np.ptp(rows[:, 1]))) if kind == "BARO" else instances[0]
+            rows = rows[np.argsort(rows[:, 0], kind="stable")]
+            time, numbers = rows[:, 0], rows[:, 1 + first : 1 + first + width]
+            if not varies or (len(rows) >= LEAST_SAMPLES and np.ptp(numbers, axis=0).any()):
+                return kind, time, numbers
         return None
 
 
-def read_mavlink(path: Path, layout: Layout) -> tuple[Commands, list[Signal], tuple[str, ...]]:
-    """What reached the thrusters, what was measured, and what is to be told of the log. Raises DataFileError."""
+def read_mavlink(path: Path, layout: Layout) -> tuple[Commands, list[Signal], list[Finding]]:
+    """Read the commands of the thrusters, the signals, and findings about the log. Raises DataFileError."""
     try:
-        import pymavlink  # noqa: F401 (said here, before it is used)
+        import pymavlink  # noqa: F401 (to give a clear message)
     except ImportError:
         raise DataFileError(f"{path}: MAVLink logs need pymavlink: pip install 'rov-fmu[mavlink]'") from None
     content = read_bytes(path, DataFileError)
     if not content:
         raise DataFileError(f"{path}: the file is empty")
-    said = io.StringIO()
+    printed = io.StringIO()
     try:
-        with redirect_stdout(said), redirect_stderr(said):  # pymavlink prints what it trips over
-            found = _read_bin(path, content[:3]) if path.suffix.lower() == ".bin" else _read_tlog(path)
+        with redirect_stdout(printed), redirect_stderr(printed):  # pymavlink prints about damage
+            is_dataflash = path.suffix.lower() == DATAFLASH_SUFFIX
+            log = _read_dataflash(path, content[:3]) if is_dataflash else _read_telemetry(path)
     except DataFileError:
         raise
-    except Exception as error:  # whatever a parser raises on bytes that are no log
+    except Exception as error:  # a parser may raise anything on bytes that are not a log
         raise DataFileError(f"{path}: cannot be read as a {path.suffix} log: {type(error).__name__}") from error
-    if said.getvalue():
-        found.notes.append("damaged in places: what could be read is used")
-    commands = _commands(path, layout, found)
-    return commands, list(_signals(layout, found)), tuple(found.notes)
+    if printed.getvalue():
+        log.add_finding("damaged log")
+    commands = _commands(path, layout, log)
+    signals = list(_signals(layout, log))
+    return commands, signals, log.findings
 
 
-def _read_bin(path: Path, head: bytes) -> _Found:
+def _read_dataflash(path: Path, head: bytes) -> _Content:
     from pymavlink import DFReader
 
     class Reader(DFReader.DFReader_binary):  # type: ignore[misc]
         def init_clock(self) -> None:
-            """Without a search through the whole log for the time of a GPS."""
+            """Use the time since boot, without a search through the whole log for the time of a GPS."""
             self.init_clock_usec()
 
         def init_arrays(self, progress_callback: Any = None) -> None:
-            """As it is, and closed where that fails."""
+            """Close the file where the base class fails."""
             try:
                 super().init_arrays(progress_callback)
             except Exception:
                 self.close()
                 raise
 
-        init_arrays_fast = init_arrays  # the compiled one prints where no one can keep it from it
+        init_arrays_fast = init_arrays  # the output of the compiled one cannot be redirected
 
     if head != _DATAFLASH:
         raise DataFileError(f"{path}: no DataFlash log: it must begin with the bytes A3 95 80")
-    found, untimed = _Found(), 0
-    with closing(Reader(str(path))) as log:
-        while message := log.recv_match(type=[*_NUMBERS, *_PARAMETERS]):
+    log, untimed = _Content(path.name), 0
+    with closing(Reader(str(path))) as reader:
+        while message := reader.recv_match(type=[*_NUMBERS, *_PARAMETERS]):
             stamp = getattr(message, "TimeUS", nan)
             instance = getattr(message, "I", getattr(message, "C", 0))
             untimed += message.get_type() in _NUMBERS and not isfinite(stamp)
-            found.take(message, int(instance), stamp * 1e-6)
+            log.add(message, int(instance), stamp * 1e-6)
     if untimed:
-        found.notes.append(f"{untimed} messages without a time left out")
-    return found
+        log.add_finding("messages without time", count=untimed)
+    return log
 
 
-def _read_tlog(path: Path) -> _Found:
-    """Times of the vehicle; messages that have none get that of their arrival, less what the others take to arrive."""
-    found, received, damaged = _Found(), [], 0
-    delays: defaultdict[bool, list[float]] = defaultdict(list)  # by whether the clock is that of SERVO_OUTPUT_RAW
+def _read_telemetry(path: Path) -> _Content:
+    """Read a log of a ground station, with times of the vehicle.
+
+    A message without a time gets the time of its arrival, less the usual delay of the other messages.
+    """
+    log, received, damaged = _Content(path.name), [], 0
+    delays: defaultdict[bool, list[float]] = defaultdict(list)  # True: the clock of SERVO_OUTPUT_RAW
     systems: Counter[int] = Counter()
     for message in _messages(path):
         kind, at = message.get_type(), float(message._timestamp)
@@ -195,16 +209,14 @@ def _read_tlog(path: Path) -> _Found:
             untimed += message.get_type() == "VFR_HUD"
             if message.get_type() == "SERVO_OUTPUT_RAW":
                 time += _WRAP * round((at - delay - time) / _WRAP)
-            found.take(message, 0, time)
+            log.add(message, 0, time)
     if damaged:
-        found.notes.append(f"{damaged} damaged piece{'s' if damaged > 1 else ''} left out")
+        log.add_finding("damaged pieces", count=damaged)
     if sum(count > 0 for count in systems.values()) > 1:
-        found.notes.append(f"several vehicles in it: that of system {vehicle} is taken")
+        log.add_finding("several vehicles", {"system": str(vehicle)})
     if untimed:
-        found.notes.append(
-            f"{untimed} messages VFR_HUD have no time of the vehicle: that of their arrival stands for it"
-        )
-    return found
+        log.add_finding("arrival time", count=untimed)
+    return log
 
 
 def _messages(path: Path) -> Iterator[Any]:
@@ -218,60 +230,60 @@ def _messages(path: Path) -> Iterator[Any]:
         log.close()
 
 
-def _commands(path: Path, layout: Layout, found: _Found) -> Commands:
-    """What reached the thrusters, by their order."""
-    series = found.series(_SERVOS, width=16, varies=False)
+def _commands(path: Path, layout: Layout, log: _Content) -> Commands:
+    """Return the commands of the thrusters. Raises DataFileError."""
+    series = log.series(_SERVOS, width=16, varies=False)
     if not series:
         raise DataFileError(f"{path}: no outputs of servos (RCOU, SERVO_OUTPUT_RAW) in this log")
     _, time, outputs = series
-    thrusters, turned, none = {}, [], 0
+    thrusters, reversed_motors, without_pulse = {}, [], 0
     for n, thruster in enumerate(layout.thrusters, start=1):
-        servo = next((s for s in range(1, 17) if found.parameters.get(f"SERVO{s}_FUNCTION") == 32 + n), n)
+        servo = next((s for s in range(1, 17) if log.parameters.get(f"SERVO{s}_FUNCTION") == 32 + n), n)
         if servo > outputs.shape[1]:
             raise DataFileError(f"{path}: no output of thruster {thruster.name}: the log has {outputs.shape[1]} servos")
-        direction = -1.0 if found.parameters.get(f"MOT_{n}_DIRECTION", 1.0) < 0.0 else 1.0
-        turned += [thruster.name] if direction < 0.0 else []
+        direction = -1.0 if log.parameters.get(f"MOT_{n}_DIRECTION", 1.0) < 0.0 else 1.0
+        if direction < 0.0:
+            reversed_motors.append(thruster.name)
         widths = outputs[:, servo - 1]
-        none += int(np.isin(widths, NO_OUTPUT).sum())
+        without_pulse += int(np.isin(widths, NO_OUTPUT).sum())
         thrusters[thruster.name] = np.clip(direction * np.array(list(map(pulses(), widths.tolist()))), -1.0, 1.0)
-    if none:
-        found.notes.append(f"{none} pulses of 0 or 65535 us taken as no command")
-    if turned:
-        found.notes.append(f"MOT_n_DIRECTION turns the thrusters {', '.join(turned)}")
-    elif "MOT_1_DIRECTION" not in found.parameters:
-        found.notes.append("no parameters MOT_n_DIRECTION in it: every thruster is taken to push ahead above 1500 us")
+    if without_pulse:
+        log.add_finding("no servo pulse", count=without_pulse)
+    if reversed_motors:
+        log.add_finding("reversed motors", {"thrusters": ", ".join(reversed_motors)})
+    elif "MOT_1_DIRECTION" not in log.parameters:
+        log.add_finding("unknown direction")
     return Commands(time, thrusters)
 
 
-def _signals(layout: Layout, found: _Found) -> Iterator[Signal]:
-    """Depth, heading and velocities, as far as the vehicle has the axes."""
-    heading = found.series(_HEADINGS, varies=False)
-    if layout.has(SURGE, SWAY) and heading and (series := found.series(_VELOCITIES, width=2)):
+def _signals(layout: Layout, log: _Content) -> Iterator[Signal]:
+    """Yield velocities, depth and heading for the axes of the vehicle."""
+    heading = log.series(_HEADINGS, varies=False)
+    if layout.has(SURGE, SWAY) and heading and (series := log.series(_VELOCITIES, width=2)):
         _, time, numbers = series
         north, east = numbers.T
-        known = _is_known(found, time)
+        known = _is_known(log, time)
         if not known.all():
-            lost = len(time) - np.count_nonzero(known)
-            found.notes.append(f"{lost} velocities left out, which the filter says it does not know")
+            log.add_finding("unknown velocity", count=int((~known).sum()))
         psi = np.interp(time, heading[1], np.unwrap(heading[2][:, 0]))
         along = {SURGE: north * np.cos(psi) + east * np.sin(psi), SWAY: east * np.cos(psi) - north * np.sin(psi)}
         for axis, values in along.items():
             if layout.has(axis):
                 yield Signal(axis, "velocity", time[known], values[known])
-    if layout.has(HEAVE) and (series := found.series(_DEPTHS)):
+    if layout.has(HEAVE) and (series := log.series(_DEPTHS)):
         kind, time, numbers = series
         if kind == "SCALED_PRESSURE2":
-            found.notes.append("depth by the pressure of fresh water, 1000 kg/m3; in the sea it is 2.5 % less")
+            log.add_finding("depth by pressure")
         yield Signal(HEAVE, HEAVE.position, time, numbers[:, 0])
     if layout.has(YAW) and heading:
         yield Signal(YAW, YAW.position, heading[1], heading[2][:, 0])
 
 
-def _is_known(found: _Found, time: Array) -> Flags:
-    """Whether the filter knew the horizontal velocity; where the log does not tell, it did."""
-    series = found.series(_STATUS, varies=False)
+def _is_known(log: _Content, time: Array) -> Flags:
+    """Return True at each time when the filter knew the horizontal velocity; without a status, it always did."""
+    series = log.series(_STATUS, varies=False)
     if not series:
         return np.ones(len(time), bool)
     flags = series[2][np.maximum(np.searchsorted(series[1], time, side="right") - 1, 0), 0].astype(int)
-    known: Flags = (flags & _VELOCITY_KNOWN > 0) & (flags & _STANDS_STILL == 0)
+    known: Flags = (flags & _VELOCITY_KNOWN > 0) & (flags & _CONSTANT_POSITION == 0)
     return known

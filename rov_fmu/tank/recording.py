@@ -1,4 +1,4 @@
-"""A recording: the commands of a log, and the motion along one axis that it measured."""
+"""A recording: the commands of a log, and the measured motion along one axis."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from rov_fmu.tank.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Commands and motion over time, n samples; SI units, the heading unwrapped."""
+    """Commands and motion over time, n samples in SI units; a heading is unwrapped."""
 
     file: str
     axis: Axis
@@ -20,27 +20,27 @@ class Recording:
     time: Array
     """n: s, ascending, from 0."""
     command: Array | None
-    """n: of the axis, a fraction of full thrust, held from its time to the next: every input that drives the axis
-    stands at it, with the sign that drives it to the positive side. None where the thrusters had another pattern."""
+    """n: the command of the axis, a fraction of full thrust, held until the next. Every input that drives the axis has
+    this command, with the sign that drives it to the positive side. None where the thrusters had another pattern."""
     values: Array
-    """n: NaN where the sensor has none."""
+    """n: NaN where the sensor has no value."""
     thrusters: Mapping[str, Array] = field(default_factory=dict)
-    """n each, by thruster: the command that reaches it, where the log tells; otherwise they follow `command`."""
+    """n each, by thruster: the command of the thruster, if logged; otherwise all thrusters follow `command`."""
     beside: Mapping[str, Array] = field(default_factory=dict)
-    """n each, as far as the log tells: u, v, r and psi, smoothed and interpolated; u and v over ground."""
+    """n each: the logged u, v, r and psi, smoothed and interpolated; u and v are over ground."""
 
     @property
     def is_position(self) -> bool:
-        """Whether the velocity is the rate of the values."""
+        """True when the values are positions."""
         return self.quantity != "velocity"
 
     @property
     def unit(self) -> str:
-        """Of the values."""
+        """The unit of the values."""
         return self.axis.position_unit if self.is_position else self.axis.unit
 
     def reaching(self, layout: Layout) -> Array:
-        """n x thrusters of the layout: the command that reaches each, within ±1."""
+        """Return the command of each thruster, within ±1: n x thrusters of the layout."""
         if self.thrusters:
             still = np.zeros(len(self.time))
             return np.column_stack([self.thrusters.get(thruster.name, still) for thruster in layout.thrusters])

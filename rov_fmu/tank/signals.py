@@ -1,33 +1,37 @@
-"""From commands and measured motion, each with times of its own, to a recording of every axis that they tell of."""
+"""Combine commands and measured motion, each with its own times, into a recording of every axis."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rov_fmu.model.layout import SURGE, SWAY, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import velocity, without_spikes
 
 LEAST_SAMPLES = 20
-_SAME = 0.005  # of full thrust: two steps of a pulse of 1 µs
-_LEAST_CHANGE = 0.02  # of full thrust: less is what holds a heading or a depth, or the rounding of a pulse
+_SAME_COMMAND = 0.005
+"""The largest difference of equal commands, as a fraction of full thrust: two steps of a pulse of 1 µs."""
+_LEAST_CHANGE = 0.02
+"""The smallest change of thrust that counts, as a fraction of full thrust. Smaller changes hold a heading or a depth,
+or are the rounding of a pulse."""
 
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """What reaches the thrusters, held from its time to the next."""
+    """The commands of the thrusters; each is held until the next."""
 
     time: Array
     """n: s, ascending."""
     thrusters: Mapping[str, Array]
-    """n each: within ±1."""
+    """n each, by thruster, within ±1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """What a sensor measured along an axis; SI units."""
+    """The measurements of a sensor along an axis, in SI units."""
 
     axis: Axis
     quantity: str
@@ -35,37 +39,43 @@ class Signal:
     time: Array
     """n: s, ascending."""
     values: Array
-    """n: NaN where there is none; a heading may wrap."""
+    """n: NaN where there is no measurement; a heading may wrap."""
 
 
 def recordings_of(
     file: str, layout: Layout, commands: Commands, signals: Iterable[Signal], only: Axis | None = None
-) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """A recording of every signal that can tell something, or of one axis, and why there is none of the others."""
-    found, reasons, signals = [], [], list(signals)
-    for signal in (signal for signal in signals if only in (None, signal.axis)):
-        recording = _recording(file, layout, commands, signal, signals)
-        if reason := useless(recording, layout):
-            reasons.append(f"no recording of {signal.axis.name}: {reason}")
-        else:
-            found.append(recording)
-    return tuple(found), tuple(reasons)
+) -> tuple[tuple[Recording, ...], tuple[Finding, ...]]:
+    """Return a recording of every useful signal, and a finding for each useless one; `only` selects one axis."""
+    recordings, findings, signals = [], [], list(signals)
+    for signal in signals:
+        if only in (None, signal.axis):
+            recording = _recording(file, layout, commands, signal, signals)
+            finding = why_useless(recording, layout)
+            if finding:
+                findings.append(finding)
+            else:
+                recordings.append(recording)
+    return tuple(recordings), tuple(findings)
 
 
-def useless(recording: Recording, layout: Layout) -> str | None:
-    """Why a recording tells nothing of its axis."""
-    there = np.isfinite(recording.values)
-    if there.sum() < LEAST_SAMPLES:
-        return f"{there.sum()} samples of {recording.quantity}, at least {LEAST_SAMPLES} are needed"
-    if np.ptp(recording.values[there]) == 0.0:
-        return f"the {recording.quantity} never changes"
+def why_useless(recording: Recording, layout: Layout) -> Finding | None:
+    """Return the reason why nothing can be identified from a recording, or None."""
+    found = Finding("", axis=recording.axis.name, file=recording.file, names={"quantity": recording.quantity})
+    values = recording.values[np.isfinite(recording.values)]
+    if len(values) < LEAST_SAMPLES:
+        return replace(found, kind="too few samples", numbers={"count": len(values), "least": LEAST_SAMPLES})
+    if np.ptp(values) == 0.0:
+        return replace(found, kind="constant motion")
     if not _is_driven(layout, recording.axis, recording.thrusters):
-        return "what the thrusters do along it never changes"
+        return replace(found, kind="constant push", names={})
     return None
 
 
 def _recording(file: str, layout: Layout, commands: Commands, signal: Signal, others: Iterable[Signal]) -> Recording:
-    """At the times of both, while the commands are known: the last one for as long as they usually are held."""
+    """Return a recording at the times of commands and signal.
+
+    The last command counts for as long as a command is usually held.
+    """
     time = np.union1d(commands.time, signal.time)
     end = commands.time[-1] + (np.median(np.diff(commands.time)) if len(commands.time) > 1 else 0.0)
     time = time[(commands.time[0] <= time) & (time < end)]
@@ -86,7 +96,7 @@ def _recording(file: str, layout: Layout, commands: Commands, signal: Signal, ot
 
 
 def _beside(time: Array, signals: Iterable[Signal]) -> dict[str, Array]:
-    """Velocities along the surface, about the vertical, and the heading, at other times than their own."""
+    """Interpolate the smoothed velocities in surge, sway and yaw, and the heading, at the times of a recording."""
     found = {}
     for signal in (s for s in signals if s.axis in (SURGE, SWAY, YAW)):
         there = np.isfinite(signal.values)
@@ -102,35 +112,38 @@ def _beside(time: Array, signals: Iterable[Signal]) -> dict[str, Array]:
 
 
 def unwrapped(heading: Array) -> Array:
-    """Without jumps of a turn (rad); NaN stays."""
+    """Return the heading (rad) without jumps of a full turn; NaN stays NaN."""
     found, there = heading.copy(), np.isfinite(heading)
     found[there] = np.unwrap(heading[there])
     return found
 
 
 def command_of(layout: Layout, axis: Axis, thrusters: Mapping[str, Array]) -> Array | None:
-    """The command of the axis that gives these of the thrusters; None where their pattern is another at any time."""
+    """Return the command of the axis that leads to these commands of the thrusters; None if there is none."""
     signs = layout.signs(axis)
     gains = {t.name: sum(g * signs.get(u, 0.0) for u, g in layout.gains[t.name].items()) for t in layout.thrusters}
     driven = [name for name, gain in gains.items() if gain]
     if not driven:
         return None
-    last = min(driven, key=lambda name: abs(gains[name]))  # to saturate
-    command = np.clip(thrusters[last] / gains[last], -1.0, 1.0)
-    off = (np.abs(np.clip(command * gain, -1.0, 1.0) - thrusters[name]) for name, gain in gains.items())
-    return command if all((distance <= _SAME).all() for distance in off) else None
+    reference = min(driven, key=lambda name: abs(gains[name]))  # the last thruster to saturate
+    command = np.clip(thrusters[reference] / gains[reference], -1.0, 1.0)
+    errors = (np.abs(np.clip(command * gain, -1.0, 1.0) - thrusters[name]) for name, gain in gains.items())
+    return command if all((error <= _SAME_COMMAND).all() for error in errors) else None
 
 
 def _is_driven(layout: Layout, axis: Axis, thrusters: Mapping[str, Array]) -> bool:
-    """Whether the push along the axis changes, whatever the thrust curves: the sums of both their terms, of thrusters
-    of one curve ahead and in reverse, are not all constant."""
+    """Return True when the push along the axis changes for any thrust curves.
+
+    Thrust has a linear and a quadratic term in each direction. For the thrusters of one curve, the sum of one of these
+    terms must change.
+    """
     drivers = layout.drivers(axis)
     strongest = max(abs(t.effect(axis)) for t in drivers)
     for curve in {t.curve for t in drivers}:
-        of = [(t.effect(axis) / strongest, thrusters[t.name]) for t in drivers if t.curve == curve]
+        pushing = [(t.effect(axis) / strongest, thrusters[t.name]) for t in drivers if t.curve == curve]
         for side in (1.0, -1.0):
             for power in (1, 2):
-                pushes = [effect * np.clip(side * command, 0.0, 1.0) ** power for effect, command in of]
+                pushes = [effect * np.clip(side * command, 0.0, 1.0) ** power for effect, command in pushing]
                 if np.ptp(np.sum(pushes, axis=0)) > _LEAST_CHANGE:
                     return True
     return False

@@ -1,4 +1,4 @@
-"""Smoothed velocity from what a sensor measured, and how much noise is in it, section 4.1.
+"""Smoothed velocity from the measurements of a sensor, and their noise, section 4.1.
 
 The filters are SciPy's: a local cubic (Savitzky-Golay) or the paper's moving average.
 """
@@ -14,18 +14,19 @@ from rov_fmu.tank.arrays import Array
 Method = Literal["savitzky-golay", "moving average"]
 
 WINDOW = 0.5
-"""s, as long as no time constant is known."""
-_MOST = 1_000_000  # samples, evenly spaced
-_ORDER = 3  # of the local polynomials: a quadratic would cut the bend at Tau
+"""The length of the window, s, until a time constant is known."""
+_MOST_SAMPLES = 1_000_000
+_ORDER = 3
+"""The order of the local polynomials. A quadratic would flatten the bend at Tau."""
 
 
 def velocity(
     time: Array, values: Array, *, is_position: bool, window: float = WINDOW, method: Method = "savitzky-golay"
 ) -> tuple[Array, Array]:
-    """Smoothed velocity on evenly spaced times (s), from position or velocity at any times; the window is in s."""
-    from scipy.signal import savgol_filter  # late: it takes long to import, and tables need none of it
+    """Return evenly spaced times (s) and the smoothed velocity, from position or velocity; the window is in s."""
+    from scipy.signal import savgol_filter  # imported here because it is slow, and tables do not need it
 
-    step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST)  # in spite of a gap of days
+    step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST_SAMPLES)  # despite a gap of days
     even = time[0] + step * np.arange(round((time[-1] - time[0]) / step) + 1)
     samples = np.interp(even, time, values)
     n = _odd(window / step, len(samples))
@@ -36,7 +37,7 @@ def velocity(
 
 
 def kernel(even: Array, window: float, *, is_position: bool) -> Array:
-    """The weights of the local cubic on these evenly spaced times (s)."""
+    """Return the weights of the local cubic on these evenly spaced times (s)."""
     from scipy.signal import savgol_coeffs
 
     interval = float(even[1] - even[0])
@@ -45,22 +46,22 @@ def kernel(even: Array, window: float, *, is_position: bool) -> Array:
 
 
 def without_spikes(values: Array) -> Array:
-    """The values, those far off their neighbours replaced by the median of five."""
+    """Return the values with outliers replaced by the median of five neighbours."""
     median = median_filter(values, 5, mode="nearest")
     return np.asarray(np.where(np.abs(values - median) > 8.0 * white_noise(values), median, values))
 
 
 def white_noise(values: Array) -> float:
-    """About the standard deviation of the sensor's noise, from second differences: motion is smooth beside it."""
+    """Estimate the standard deviation of the sensor's noise from second differences, where smooth motion vanishes."""
     return robust_deviation(np.diff(values, 2)) / sqrt(6.0)
 
 
 def robust_deviation(values: Array) -> float:
-    """Standard deviation, robust."""
+    """Return a robust standard deviation, from the median absolute deviation."""
     return float(1.4826 * np.median(np.abs(values - np.median(values))))
 
 
 def _odd(samples: float, most: int) -> int:
-    """An odd number of samples, five at least where there are so many."""
+    """Return an odd number of samples, at least five unless there are fewer."""
     n = min(max(round(samples), 5), most)
     return n if n % 2 else n - 1

@@ -1,4 +1,4 @@
-"""Tables of held commands (CSV): the force, the steady velocity or the time constant at each."""
+"""Read tables (CSV) of the force, the steady velocity or the time constant at held commands."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,7 +7,8 @@ from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.columns import FORCE, HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
 
-_MOST = 10  # rows of a file that are told of
+_MOST_LINES = 10
+"""The number of wrong rows in a file that get a line of their own."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Row:
 
 
 def read_rows(path: Path, kind: str, axis: Axis | None = None) -> list[Row]:
-    """Rows of command, and force (`thrust`), velocity (`steady`, of an axis) or time constant. Raises DataFileError."""
+    """Read rows of a command and a force (`thrust`), velocity (`steady`) or time constant. Raises DataFileError."""
     name = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}[kind]
     column = FORCE if kind == "thrust" else time_constant_column()
     if axis and kind == "steady":
@@ -30,22 +31,25 @@ def read_rows(path: Path, kind: str, axis: Axis | None = None) -> list[Row]:
     refuse_slips(table, ["command"])
     noise = 0.05 * max(map(abs, table.values[name]))
     numbers = [*zip(table.lines, table.values["command"], table.values[name], strict=True)]
-    wrong = [(n, reason) for n, (_, c, value) in enumerate(numbers) if (reason := _wrong(kind, c, value, noise))]
-    if wrong:
-        told = [table.error(n, name if by_value else "command", words) for n, (by_value, words) in wrong[:_MOST]]
-        more = [f"{path}: {len(wrong) - _MOST} more rows like these"] if len(wrong) > _MOST else []
-        raise DataFileError(*map(str, told), *more)
+    mistakes = []
+    for n, (_, command, value) in enumerate(numbers):
+        if kind != "thrust" and command == 0.0:
+            mistakes.append(table.error(n, "command", "must not be zero, for nothing moves"))
+        elif reason := _impossible(kind, command, value, noise):
+            mistakes.append(table.error(n, name, reason))
+    if mistakes:
+        more = len(mistakes) - _MOST_LINES
+        counted = [f"{path}: {more} more rows like these"] if more > 0 else []
+        raise DataFileError(*map(str, mistakes[:_MOST_LINES]), *counted)
     return [Row(path.name, *row) for row in numbers]
 
 
-def _wrong(kind: str, command: float, value: float, noise: float) -> tuple[bool, str] | None:
-    """Whether it is the value rather than the command that cannot be, and why; None where nothing is wrong."""
+def _impossible(kind: str, command: float, value: float, noise: float) -> str | None:
+    """Return the reason why a value cannot have been measured, or None."""
     if kind == "thrust" and command * value < 0.0 and abs(value) > noise:
-        return True, "must have the sign of the command, for a thruster pushes where it is told to"
-    if kind != "thrust" and command == 0.0:
-        return False, "must not be zero, for nothing moves"
+        return "must have the sign of the command, for a thruster pushes where it is told to"
     if kind == "steady" and command * value <= 0.0:
-        return True, "must have the sign of the command: forward, down, to starboard is +"
+        return "must have the sign of the command: forward, down, to starboard is +"
     if kind == "time_constant" and value <= 0.0:
-        return True, "must be above 0"
+        return "must be above 0"
     return None

@@ -1,7 +1,7 @@
-"""A folder of tank tests and what is given beforehand (rov.toml), read and checked.
+"""Read and check a folder of tank tests with its rov.toml.
 
-The name of a file, in small or capital letters, says what it holds and of which thrust curve or axis of the vehicle;
-what follows an underscore is free:
+The name of a file, in small or capital letters, gives the kind of test and the thrust curve or axis that it tests;
+anything may follow another underscore:
 
     thrust_<curve>*.csv                        command, force                  bollard pull, (6)-(10)
     steady_<surge|sway|heave|yaw>*.csv         command, velocity               Tables 3-5
@@ -9,7 +9,7 @@ what follows an underscore is free:
     log_<surge|sway|heave|yaw>*.csv            time, command, and distance, depth or heading, or velocity
     log_*.csv, *.bin, *.tlog                   time, commands, and the motion of several axes
 
-Commands are those of an Axis; a command of a thrust curve is that of all thrusters that were tested together.
+A command is that of an axis, or, in a test of a thrust curve, that of all thrusters that were tested together.
 """
 
 import hashlib
@@ -18,19 +18,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import FileError, did_you_mean
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.model.layout import AXES, Axis, Layout
-from rov_fmu.tank.given import ROV_FILE, Said, read_said
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.given import ROV_FILE, Description, read_description
 from rov_fmu.tank.logs import read_log
-from rov_fmu.tank.narrowing import Given, Tested, narrowed
+from rov_fmu.tank.narrowing import Given, Narrowed, Tested, narrowed
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tables import Row, read_rows
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
 _KINDS = ("thrust", "steady", "time_constant", "log")
-"""What the name of a file begins with."""
-_LOGS = (".bin", ".tlog")
+"""The words that the name of a file begins with."""
 
 
 @dataclass(frozen=True)
@@ -40,47 +41,53 @@ class TankTests:
     folder: Path
     given: Given
     thrust: Mapping[str, tuple[Row, ...]]
-    """By curve of the vehicle."""
+    """Forces by thrust curve."""
     steady: Mapping[str, tuple[Row, ...]]
-    """By axis, as the next two."""
+    """Steady velocities by axis."""
     time_constants: Mapping[str, tuple[Row, ...]]
+    """Time constants by axis."""
     recordings: Mapping[str, tuple[Recording, ...]]
+    """Recordings by axis."""
     inputs: Mapping[str, str]
-    """SHA-256 of every file read, by its name."""
-    notes: tuple[str, ...] = ()
-    """What was left out of the vehicle and of the files, in sentences."""
+    """The SHA-256 hash of every file read, by its name."""
+    findings: tuple[Finding, ...] = ()
+    """What was left out of the vehicle and of the files."""
 
 
 def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> TankTests:
-    """Read a folder. Raises DataFileError, VehicleFileError with a line for everything that is wrong.
+    """Read a folder. Raises DataFileError or VehicleFileError with a line for every mistake.
 
     `check_inputs` is called with every file that the identification reads, before any test is read.
     """
     if not folder.is_dir():
         what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
         raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
-    said, of_vehicle = _said(folder / ROV_FILE)
-    found = _Found(folder, said.layout if said else None)
-    paths = sorted(path for path in folder.iterdir() if path.name.lower().endswith((".csv", *_LOGS)))
+    description, description_mistakes = _read_description(folder / ROV_FILE)
+    paths = sorted(path for path in folder.iterdir() if path.name.lower().endswith((".csv", *LOG_SUFFIXES)))
     if not paths:
-        raise VehicleFileError(*of_vehicle, f"{folder}: there are no tests (*.csv, *.bin, *.tlog) in this folder")
-    check_inputs([folder / ROV_FILE, *paths, *filter(None, (said.against, said.base) if said else ())])
+        patterns = ", ".join(f"*{suffix}" for suffix in (".csv", *LOG_SUFFIXES))
+        raise VehicleFileError(*description_mistakes, f"{folder}: there are no tests ({patterns}) in this folder")
+    named_vehicles = (description.against, description.base) if description else ()
+    check_inputs([folder / ROV_FILE, *paths, *filter(None, named_vehicles)])
+    reader = _Reader(folder, description.layout if description else None)
     for path in paths:
-        found.read(path)
-    given, missing, notes = None, list[str](), list[str]()
-    tested = found.tested(said)
-    if said and (tested.axes or not found.problems):  # otherwise it is a file that cannot be read that has the axes
-        given, missing, notes = narrowed(said, tested, folder)
-    if problems := [*of_vehicle, *found.problems, *missing]:
-        all_of_vehicle = all(line.startswith(str(folder / ROV_FILE)) for line in problems)
-        raise (VehicleFileError if all_of_vehicle else DataFileError)(*problems)
-    assert given
-    return found.tests(given, notes)
+        reader.read(path)
+    vehicle = Narrowed(None)
+    tested = reader.tested(description)
+    # Without any axis, a file that could not be read may be the one with the axes.
+    if description and (tested.axes or not reader.mistakes):
+        vehicle = narrowed(description, tested, folder)
+    in_tests = [*reader.mistakes, *vehicle.test_mistakes]
+    if mistakes := [*description_mistakes, *reader.mistakes, *vehicle.rov_file_mistakes, *vehicle.test_mistakes]:
+        raise (DataFileError if in_tests else VehicleFileError)(*mistakes)
+    assert vehicle.given
+    return reader.tests(vehicle.given, vehicle.findings)
 
 
-def _said(path: Path) -> tuple[Said | None, list[str]]:
+def _read_description(path: Path) -> tuple[Description | None, list[str]]:
+    """Read rov.toml, and explain its purpose where there is none."""
     try:
-        return read_said(path)
+        return read_description(path)
     except VehicleFileError as error:
         if not path.exists():
             words = "No such file: it must tell the vehicle's name and what no test does, such as its mass"
@@ -94,105 +101,114 @@ def _said(path: Path) -> tuple[Said | None, list[str]]:
 
 
 @dataclass
-class _Found:
-    """What the files of a folder hold, one after the other, and what is wrong with them."""
+class _Reader:
+    """Reads the files of a folder one after the other, and collects their tests and mistakes."""
 
     folder: Path
     layout: Layout | None
-    """Of all that the vehicle may have; None where that is not known."""
-    problems: list[str] = field(default_factory=list)
+    """The largest layout that the vehicle can have; None where it is unknown."""
+    mistakes: list[str] = field(default_factory=list)
     files: dict[tuple[str, str], list[str]] = field(default_factory=dict)
-    """By kind of test and what it is of, as the next; those that cannot be read too."""
+    """The names of files by kind of test and by curve or axis, including files that cannot be read."""
     rows: dict[tuple[str, str], list[Row]] = field(default_factory=dict)
+    """The rows of tables by kind of test and by curve or axis."""
     recordings: dict[str, list[Recording]] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    """Recordings by axis."""
+    findings: list[Finding] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
+    """The hash of each file by its name."""
 
     def read(self, path: Path) -> None:
         """Read one file."""
         try:
             self.inputs[path.name] = _hash(path)
-            kind, of = self._name(path)
-            self.files.setdefault((kind, of), []).append(path.name)
+            kind, subject = self._kind_and_subject(path)
+            self.files.setdefault((kind, subject), []).append(path.name)
             if kind == "log":
-                self._log(path, AXES.get(of))
+                self._read_log(path, AXES.get(subject))
             else:
-                self.rows.setdefault((kind, of), []).extend(read_rows(path, kind, AXES.get(of)))
+                self.rows.setdefault((kind, subject), []).extend(read_rows(path, kind, AXES.get(subject)))
         except FileError as error:
-            self.problems += str(error).splitlines()
+            self.mistakes += str(error).splitlines()
 
-    def _log(self, path: Path, axis: Axis | None) -> None:
+    def _read_log(self, path: Path, axis: Axis | None) -> None:
         if not self.layout:
             return
         log = read_log(path, self.layout, axis)
-        self.notes += log.notes
+        self.findings += log.findings
         for recording in log.recordings:
             self.recordings.setdefault(recording.axis.name, []).append(recording)
 
-    def _name(self, path: Path) -> tuple[str, str]:
-        """CoefficientKind of test, and the curve or axis it is of; no axis where a log tells itself."""
+    def _kind_and_subject(self, path: Path) -> tuple[str, str]:
+        """Return the kind of test and the curve or axis; no axis for a log of several. Raises DataFileError."""
         curves = [curve.name for curve in self.layout.curves] if self.layout else None
-        kind, of = _parts(path.stem.lower(), curves)
-        if path.suffix.lower() in _LOGS:
-            kind, of = "log", of if kind == "log" else ""
+        kind, subject = _parts(path.stem.lower(), curves)
+        if path.suffix.lower() in LOG_SUFFIXES:
+            kind, subject = "log", subject if kind == "log" else ""
         axes = [*(self.layout.kinds if self.layout else AXES)]
         known = (curves or []) if kind == "thrust" else axes
-        if not (kind and path.name.isprintable()) or not (of or known):
+        if not (kind and path.name.isprintable()) or not (subject or known):
             hint = did_you_mean(path.stem.lower().partition("_")[0], _KINDS, also={"time": "time_constant"})
             raise DataFileError(
                 f"{path}: no name of a test; thrust_ begins one, then {_either(curves or ['the name of a curve'])}, or "
                 f"steady_, time_constant_ or log_, then {_either(axes)}, then _ and any printable characters{hint}"
             )
-        if not of and kind != "log":
+        if not subject and kind != "log":
             word = path.stem.lower().removeprefix(f"{kind}_").partition("_")[0]
-            what = (
-                f"{'a thrust curve' if kind == 'thrust' else 'an axis'} of {'this' if self.layout else 'any'} vehicle"
-            )
+            what = "a thrust curve" if kind == "thrust" else "an axis"
+            whose = "this" if self.layout else "any"
             hint = did_you_mean(word, known)
-            raise DataFileError(f"{path}: {word or repr('')} is not {what}, only {_either(known, 'and')}{hint}")
-        if self.layout and of in AXES and kind != "thrust" and not self.layout.signs(AXES[of]):
-            raise DataFileError(f"{path}: no thruster of the vehicle drives {of}")
-        return kind, of
+            raise DataFileError(
+                f"{path}: {word or repr('')} is not {what} of {whose} vehicle, only {_either(known, 'and')}{hint}"
+            )
+        if self.layout and subject in AXES and kind != "thrust" and not self.layout.signs(AXES[subject]):
+            raise DataFileError(f"{path}: no thruster of the vehicle drives {subject}")
+        return kind, subject
 
-    def tested(self, said: Said | None) -> Tested:
-        """What there are tests of."""
+    def tested(self, description: Description | None) -> Tested:
+        """Return what the files test."""
+        windows = description.windows if description else {}
 
-        def of(kind: str) -> list[str]:
-            return [what for which, what in self.files if which == kind]
+        def subjects(kind: str) -> list[str]:
+            return [subject for other, subject in self.files if other == kind]
 
-        def backward(kind: str, what: str) -> bool:
-            low = said.windows.get(f"thrust_{what}" if kind == "thrust" else what, (-1.0, 1.0))[0] if said else -1.0
-            return any(low <= row.command < 0.0 for row in self.rows.get((kind, what), ()))
+        def has_backward_rows(kind: str, subject: str) -> bool:
+            low, _ = windows.get(f"thrust_{subject}" if kind == "thrust" else subject, (-1.0, 1.0))
+            return any(low <= row.command < 0.0 for row in self.rows.get((kind, subject), ()))
 
         return Tested(
-            {name: (self.files["thrust", name][0], backward("thrust", name)) for name in of("thrust")},
-            {name: backward("steady", name) for name in of("steady")},
-            of("time_constant"),
-            [*filter(None, of("log")), *self.recordings],
+            {name: (self.files["thrust", name][0], has_backward_rows("thrust", name)) for name in subjects("thrust")},
+            {name: has_backward_rows("steady", name) for name in subjects("steady")},
+            subjects("time_constant"),
+            [*filter(None, subjects("log")), *self.recordings],
         )
 
-    def tests(self, given: Given, notes: Iterable[str]) -> TankTests:
-        """All of it."""
+    def tests(self, given: Given, findings: Iterable[Finding]) -> TankTests:
+        """Return all tests; `findings` are those about the vehicle."""
         curves = {curve.name for curve in given.rov.layout.curves}
-
-        def rows(kind: str) -> dict[str, tuple[Row, ...]]:
-            return {
-                of: tuple(found)
-                for (which, of), found in self.rows.items()
-                if which == kind and (kind != "thrust" or of in curves)
-            }
-
-        recordings = {name: tuple(found) for name, found in self.recordings.items()}
+        rows: dict[str, dict[str, tuple[Row, ...]]] = {kind: {} for kind in _KINDS}
+        for (kind, subject), found in self.rows.items():
+            if kind != "thrust" or subject in curves:
+                rows[kind][subject] = tuple(found)
         inputs = {ROV_FILE: _hash(self.folder / ROV_FILE)}
-        inputs |= {given.base_name: _hash(given.base)} if given.base else {}
-        parts = rows("thrust"), rows("steady"), rows("time_constant"), recordings
-        return TankTests(self.folder, given, *parts, inputs | self.inputs, (*notes, *self.notes))
+        if given.base:
+            inputs[given.base_name] = _hash(given.base)
+        return TankTests(
+            self.folder,
+            given,
+            thrust=rows["thrust"],
+            steady=rows["steady"],
+            time_constants=rows["time_constant"],
+            recordings={name: tuple(found) for name, found in self.recordings.items()},
+            inputs=inputs | self.inputs,
+            findings=(*findings, *self.findings),
+        )
 
 
 def _parts(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
-    """What the name of a file says: kind of test, and the longest name of a curve or axis that follows, if any.
+    """Split the name of a file into the kind of test and the longest curve or axis name that follows, if any.
 
-    Without curves any name may be that of one.
+    Without curves, any name may be that of a curve.
     """
     for kind in _KINDS:
         if (rest := stem.removeprefix(f"{kind}_")) != stem:

@@ -1,4 +1,4 @@
-"""The correlation of what tests tell, as it stands in the vehicle file, against how estimates scatter."""
+"""The correlations in the vehicle file, compared with the scatter of estimates from simulated tests."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -38,7 +38,7 @@ def names_of(axis: Axis) -> list[str]:
 
 
 def measured(k: Rov, random: np.random.Generator, newton: float, share: dict[str, float]) -> dict[str, Array]:
-    """Forces of the rear pair, V_ss and Tau of surge and yaw, at COMMANDS, with noise."""
+    """Return forces of the rear pair, V_ss and Tau of surge and yaw at COMMANDS, with noise."""
     data = {"rear": M @ [k[name] for name in THRUST] + newton * random.standard_normal(7)}
     for axis in (SURGE, YAW):
         exact = np.array([k.response(axis, c) for c in COMMANDS.tolist()])
@@ -59,7 +59,7 @@ def identified(data: dict[str, Array], folder: Path) -> Identification:
 
 
 def refitted(data: dict[str, Array], start: Rov) -> dict[str, float]:
-    """The same estimates by NumPy's and SciPy's own means: forces by (6), then relative errors of V_ss and Tau."""
+    """Fit the data with NumPy and SciPy alone: forces by (6), then relative errors of V_ss and Tau."""
     found = dict(zip(THRUST, np.linalg.lstsq(M, data["rear"], rcond=None)[0].tolist(), strict=True))
     for axis in (SURGE, YAW):
         k, names = start.replaced(found), names_of(axis)
@@ -75,7 +75,7 @@ def refitted(data: dict[str, Array], start: Rov) -> dict[str, float]:
 
 @pytest.mark.parametrize("sets", [150, pytest.param(600, marks=pytest.mark.weekly)])
 def test_drag_and_thrust_scatter_as_the_file_says(sets: int, tmp_path: Path) -> None:
-    """Surge and yaw have the rear curve in common: sets of data, fitted by other means, about what was found."""
+    """Surge and yaw share the rear curve; other fits of data about the result scatter as the file says."""
     found = identified(measured(K, np.random.default_rng(3), 0.2, {"surge": 0.005, "yaw": 0.005}), tmp_path / "tests")
     write_vehicle(found.vehicle, tmp_path / "made.toml")
     vehicle = load_vehicle(tmp_path / "made.toml")
@@ -99,12 +99,12 @@ def test_drag_and_thrust_scatter_as_the_file_says(sets: int, tmp_path: Path) -> 
 
 
 def told_apart(vehicle: Vehicle) -> Uncertainty:
-    """As if nothing were correlated."""
+    """Return the uncertainty without correlations."""
     return replace(vehicle.uncertainty, correlation=np.eye(len(vehicle.uncertainty.names)))
 
 
 def spread(vehicle: Vehicle, names: Sequence[str], numbers: Array, axis: Axis) -> float:
-    """Relative standard deviation of V_ss at half command over n sets of coefficients (n x p)."""
+    """Return the relative standard deviation of V_ss at half command over n sets of coefficients (n x p)."""
     drawn = (vehicle.rov.replaced(dict(zip(names, row, strict=True))) for row in numbers.tolist())
     V_ss = [k.response(axis, 0.5)[0] for k in drawn]
     return float(np.std(V_ss) / np.mean(V_ss))
@@ -114,9 +114,10 @@ def spread(vehicle: Vehicle, names: Sequence[str], numbers: Array, axis: Axis) -
     "seeds", [1, pytest.param(4, marks=pytest.mark.long), pytest.param(12, marks=pytest.mark.weekly)]
 )
 def test_recordings_scatter_as_the_fit_of_all_axes_says(seeds: int) -> None:
-    """Surge and yaw by recordings, their thrust curve as its tests left it: the truth is as far off as the covariance
-    of all coefficients together has it (χ²), in all directions, of which thrust by drag is known a hundred times
-    better than either."""
+    """The errors of all coefficients follow their joint covariance (χ²), with recordings and an uncertain thrust curve.
+
+    The ratio of thrust to drag is known a hundred times better than either.
+    """
     clean_ones = {axis: [clean(K, axis, plan, 5.0) for plan in PLANS[axis.name]] for axis in (SURGE, YAW)}
     of_thrust = 0.3**2 * np.linalg.inv(M.T @ M)
     far = []
@@ -145,7 +146,7 @@ def test_recordings_scatter_as_the_fit_of_all_axes_says(seeds: int) -> None:
 
 
 def test_points_of_one_axis_and_recordings_of_another(tmp_path: Path) -> None:
-    """They have a thrust curve in common: drag of yaw, by points, moves with what recordings of surge made of it."""
+    """They share a thrust curve: drag of yaw, from points, depends on the curve from recordings of surge."""
     random = np.random.default_rng(5)
     data = measured(K, random, 0.4, {"surge": 0.0, "yaw": 0.005})
     folder = tmp_path / "tests"
@@ -185,7 +186,7 @@ def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> N
 
 
 def test_coefficients_without_an_interval_are_no_estimates(tmp_path: Path) -> None:
-    """Two V_ss tell two coefficients, and not how well."""
+    """Two V_ss determine two coefficients, but not their uncertainty."""
     data = measured(K, np.random.default_rng(7), 0.1, {"surge": 0.01, "yaw": 0.0})
     two = "\n".join(table(SPEED, data["surge"][:, 0]).splitlines()[:3]) + "\n"
     found = identify(read(tmp_path, KNOWN, {"thrust_rear.csv": table(FORCE, data["rear"]), "steady_surge.csv": two}))

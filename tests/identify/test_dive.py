@@ -1,4 +1,4 @@
-"""A dive: several axes move at once, the heading turns and the water moves. Truth by an independent integrator."""
+"""Identification from a dive with simultaneous motion in all axes and a current, by an independent integrator."""
 
 from dataclasses import replace
 from functools import cache
@@ -9,7 +9,7 @@ import pytest
 
 from rov_fmu.identify.effects.coupling import EAST, NORTH
 from rov_fmu.identify.effects.extras import EffectKind, Extra
-from rov_fmu.identify.recordings.limits import NoFitError, limits, refuse_nonsense
+from rov_fmu.identify.recordings.limits import NoFitError, check_limits, limits
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.recordings.runs import prepare
@@ -31,7 +31,7 @@ def dived(seconds: float, seed: int = 0) -> Dive:
 
 
 def simulator(recordings: tuple[Recording, ...]) -> tuple[Simulator, np.ndarray]:
-    """Surge, sway and yaw with the current, at the truth."""
+    """Return a simulator of surge, sway and yaw with the current, and x at the truth."""
     data = tuple(prepare(r, TRUTH) for r in recordings if r.axis is not HEAVE)
     model = Simulator(data, TRUTH, NAMES, tuple(FLOW), np.array([0.01, 0.01, 0.005]))
     return model, model.start(dict(TRUTH.coefficients), FLOW)
@@ -51,7 +51,7 @@ def test_derivatives_are_those_of_differences(quantity: str) -> None:
 
 
 def test_what_a_pool_does_is_what_the_simulator_does() -> None:
-    """But for the smoothing of what is beside; without the coupling, or the current, it is something else."""
+    """They differ by the smoothing of the other velocities, and much more without the coupling or the current."""
     model, x = simulator(dived(40.0).recorded(0.0))
     off = float(np.sqrt(np.mean(model.residuals(x) ** 2)))
     alone = tuple(replace(d, recording=replace(d.recording, beside={})) for d in model.data)
@@ -75,16 +75,16 @@ def test_a_short_dive_is_solved_from_afar() -> None:
     assert list(flow.values()) == pytest.approx(CURRENT, abs=0.01)
 
 
-def test_what_only_nonsense_fits_is_one_line() -> None:
-    """A load that no thrust of the vehicle could hold."""
+def test_a_fit_at_a_limit_is_refused_with_one_line() -> None:
+    """The load is larger than any thrust of the vehicle."""
     model, _ = simulator(dived(20.0).recorded())
     extras = (Extra("load", "surge"),)
     x = replace(model, extras=extras).start(dict(TRUTH.coefficients), {})
-    refuse_nonsense(TRUTH, model.data, NAMES, extras, x)
+    check_limits(TRUTH, model.data, NAMES, extras, x)
     _, high = limits(TRUTH, model.data, NAMES, extras, len(x))
     x[len(NAMES)] = high[len(NAMES)]
     with pytest.raises(NoFitError, match=r"^dive\.tlog: no surge of a vehicle .* a load of [0-9.]+ N would do it best"):
-        refuse_nonsense(TRUTH, model.data, NAMES, extras, x)
+        check_limits(TRUTH, model.data, NAMES, extras, x)
 
 
 @pytest.mark.parametrize("kind", get_args(EffectKind))
@@ -93,7 +93,7 @@ def test_every_effect_has_words(kind: EffectKind) -> None:
 
 
 def unknown() -> Rov:
-    """Of the vehicle what a folder with `base = "bluerov2"` leaves."""
+    """Return the vehicle that a folder with `base = "bluerov2"` and a dive leads to."""
     layout = TRUTH.layout
     axes = tuple(replace(f, keys=tuple(k for k in f.keys if k != "F_0")) for f in layout.axes)
     curves = tuple(replace(c, keys=tuple(k for k in c.keys if k != "T")) for c in layout.curves)

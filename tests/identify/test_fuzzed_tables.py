@@ -1,4 +1,4 @@
-"""Folders of tank tests with anything in them: a vehicle with finite numbers, or one clear line and nothing written."""
+"""Fuzzed folders of tank tests lead to a vehicle with finite numbers, or to one clear line without any output."""
 
 import re
 import shutil
@@ -36,7 +36,7 @@ LOG = "log_heave_a.csv"
 
 @pytest.fixture
 def tests(tmp_path: Path) -> Path:
-    """A folder of all kinds of tests, small."""
+    """Return a small folder with all kinds of tests."""
     folder = Path(shutil.copytree(TESTS, tmp_path / "tests"))
     rov = re.sub(r"^(against|[ab]_t_top) .*$", "", (folder / "rov.toml").read_text(encoding="utf-8"), flags=re.M)
     (folder / "rov.toml").write_text(rov, encoding="utf-8")
@@ -49,7 +49,7 @@ def tests(tmp_path: Path) -> Path:
 
 
 def mutated(folder: Path, to: Path, data: st.DataObject) -> None:
-    """A copy of the folder with one of its files changed."""
+    """Copy the folder with one of its files changed."""
     shutil.rmtree(to, ignore_errors=True)
     shutil.copytree(folder, to)
     path = to / data.draw(st.sampled_from(sorted(path.name for path in folder.glob("*.[ct][so][vm]*"))))
@@ -59,7 +59,7 @@ def mutated(folder: Path, to: Path, data: st.DataObject) -> None:
 
 
 def check_line(text: str, folder: Path) -> None:
-    """One line that can be printed, names a file or the folder and is not endless."""
+    """Check that the message is one printable line of limited length that names a file or the folder."""
     assert str(folder) in text
     for line in text.splitlines():
         assert line.isprintable()
@@ -162,7 +162,7 @@ def test_a_strange_recording_is_identified_or_one_clear_line(
 
 
 def tuned_or_one_line(code: int, tuned: Path, capsys: Capsys) -> tuple[str, str]:
-    """A vehicle file that can be read, and is then removed, or one line; what was printed, and on what went wrong."""
+    """Check for a readable vehicle file, which is then removed, or for one line; return both outputs."""
     printed, said = capsys.readouterr()
     assert tuned.exists() == (code == 0)
     if code == 0:

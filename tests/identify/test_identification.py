@@ -21,6 +21,7 @@ from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.report import report_page
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables, untuned
@@ -36,7 +37,7 @@ COMMANDS = np.arange(0.1, 1.01, 0.1)
 
 @pytest.fixture
 def k(vehicle: Vehicle) -> Rov:
-    """The VideoRay with every α and β at 1."""
+    """Return the VideoRay with every α and β at 1."""
     return untuned(vehicle.rov)
 
 
@@ -47,7 +48,7 @@ def k(vehicle: Vehicle) -> Rov:
     ("axis", "a_d", "b_d"), [("surge", 4.99, 8.65), ("heave", 24.7, -0.92), ("yaw", 0.0789, 0.163)]
 )
 def test_unweighted_fits_of_tables_3_to_5(axis: str, a_d: float, b_d: float, vehicle: Vehicle, k: Rov) -> None:
-    """Against (9) and (10) they are not (14)-(16): those have weights, or data that are in figures only."""
+    """The comparison is with (9) and (10); (14)-(16) have weights, or data that are only in figures."""
     table = next(t for t in load_tables(vehicle) if t.axis.name == axis)
     m = table.axis
     commands, V_ss = np.array([(float(c) / 100.0, float(V)) for c, V in table.steady.items()]).T
@@ -64,7 +65,7 @@ def test_unweighted_fits_of_tables_3_to_5(axis: str, a_d: float, b_d: float, veh
 
 
 def test_window_of_weights_gives_the_lower_commands_their_curve() -> None:
-    """(7): forces that follow (9) up to 70 % and fall off above are fitted by (9) within the window."""
+    """Forces that follow (9) up to 70 % and fall off above are fitted by (9) within the window, (7)."""
     forces = 42.9 * COMMANDS**2 + 2.711 * COMMANDS - 30.0 * np.maximum(COMMANDS - 0.7, 0.0)
     weights = (COMMANDS < 0.75).astype(float)
     all_of_them, weighted = fit_quadratic(REAR, COMMANDS, forces), fit_quadratic(REAR, COMMANDS, forces, weights)
@@ -76,7 +77,7 @@ def test_window_of_weights_gives_the_lower_commands_their_curve() -> None:
 
 
 def test_covariance_correlation_and_band_are_those_of_a_straight_line() -> None:
-    """y/x = b + a x is a straight line where the errors grow with x, which weights of 1/x^2 say."""
+    """With weights of 1/x^2, the fit is the straight line y/x = b + a x."""
     forces = 42.9 * COMMANDS**2 + 2.711 * COMMANDS + COMMANDS * np.random.default_rng(0).standard_normal(10)
     fit, line = fit_quadratic(REAR, COMMANDS, forces, COMMANDS**-2.0), linregress(COMMANDS, forces / COMMANDS)
     assert [fit.a, fit.b] == pytest.approx([line.slope, line.intercept])
@@ -89,7 +90,7 @@ def test_covariance_correlation_and_band_are_those_of_a_straight_line() -> None:
 
 
 def test_intervals_and_bands_of_thrust_cover_the_truth() -> None:
-    """500 seeds: 95 % within three standard deviations of their share, 1 % each."""
+    """The share of 500 seeds within the intervals is 95 %, within three standard deviations of 1 %."""
     truth = 42.9 * COMMANDS**2 + 2.711 * COMMANDS
     random = np.random.default_rng(1)
     a, b, band = [], [], []
@@ -123,7 +124,7 @@ def test_two_points_have_a_curve_but_no_interval() -> None:
 
 
 def points_of(m: Axis, k: Rov, commands: tuple[float, ...], scatter: Array | None = None) -> list[Point]:
-    """V_ss and Tau of the model, with relative errors."""
+    """Return V_ss and Tau of the model, with relative errors."""
     found = [Point(q, c, k.response(m, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
     factors = 1.0 + (np.zeros(len(found)) if scatter is None else scatter)
     return [replace(p, value=p.value * f) for p, f in zip(found, factors.tolist(), strict=True)]
@@ -143,7 +144,7 @@ def test_points_of_a_model_give_the_model(m: Axis, vehicle: Vehicle) -> None:
 
 @pytest.mark.long
 def test_intervals_of_points_cover_the_truth(vehicle: Vehicle) -> None:
-    """60 seeds of 1 % scatter: 90-99 % in the intervals, and drag never negative."""
+    """With 1 % scatter, 90-99 % of 60 seeds are within the intervals, and drag is never negative."""
     k, random = vehicle.rov, np.random.default_rng(2)
     hits: dict[str, list[bool]] = {}
     for _ in range(60):
@@ -185,7 +186,7 @@ def test_thrust_that_is_uncertain_makes_drag_uncertain(k: Rov) -> None:
 
 @pytest.mark.long
 def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
-    """Three days, three payloads: drag, which the fit takes as one, is not; its interval and a warning say so."""
+    """Drag differs between three recordings, so the interval is wide and there is a finding."""
     write_rov(tmp_path)
     k, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(1)
     rows = [(c, k.force(HEAVE, c)) for c in (0.1, 0.3, 0.5, 0.7)]
@@ -196,7 +197,8 @@ def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
     found = identify(load_tank_tests(tmp_path))
     (fit,) = (result.recordings for result in found.axes if result.recordings)
     assert fit.disagreement["a_d_w"] > 3.0
-    assert any("heave: the recordings disagree on a_d_w" in warning for warning in found.warnings), found.warnings
+    (disagreement,) = (finding for finding in found.findings if finding.kind == "disagreement")
+    assert (disagreement.axis, "a_d_w" in disagreement.names["coefficients"]) == ("heave", True)
     low, high = found.vehicle.intervals["a_d_w"]
     assert low < k["a_d_w"] < high
 
@@ -206,7 +208,7 @@ def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Thrust tests with noise, and nine recordings of 60 s at 100 Hz of the VideoRay with α = 1."""
+    """Write thrust tests with noise, and nine recordings of 60 s at 50 Hz of the VideoRay with α = 1."""
     folder, random = tmp_path_factory.mktemp("full"), np.random.default_rng(0)
     write_rov(folder)
     k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
@@ -215,14 +217,12 @@ def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
     for m in AXES:
         for n, plan in enumerate(PLANS[m.name], 1):
-            recording = clean(k, m, plan)
-            assert len(recording.time) == 6000
-            write_log(folder, str(n), recording.noisy(random))
+            write_log(folder, str(n), clean(k, m, plan, 50.0).noisy(random))
     return folder
 
 
 def write_rov(folder: Path, **windows: tuple[float, float]) -> None:
-    """rov.toml with mass and geometry of the VideoRay."""
+    """Write rov.toml with mass and geometry of the VideoRay."""
     head, known = (TESTS / "rov.toml").read_text(encoding="utf-8").split("[known]")
     lines = [line for line in known.splitlines() if line.startswith(("m_rov", "I_r", "R ", "gamma"))]
     text = head.replace('against = "videoray"', "") + "[known]\n" + "\n".join(lines) + "\n[windows]\n"
@@ -301,7 +301,7 @@ def axis_of(found: Identification, axis: str) -> AxisResult:
     return next(result for result in found.axes if result.axis.name == axis)
 
 
-# ---- What is not identifiable, in words -----------------------------------------------------------------------------
+# ---- What is not identifiable ----------------------------------------------------------------------------------------
 
 FORCES = [(c, 42.9 * c * c + 2.711 * c) for c in (0.1, 0.3, 0.5, 0.7)]
 TOP = [(c, 6.494 * c * c + 0.0513 * c) for c in (0.1, 0.3, 0.5, 0.7)]
@@ -315,7 +315,7 @@ STEADY = {
 def folder_with(
     folder: Path, tables: Mapping[str, list[tuple[float, float]]] | None = None, **windows: tuple[float, float]
 ) -> Identification:
-    """A small folder, with other tables by file name."""
+    """Identify a small folder, with other tables by file name."""
     write_rov(folder, **windows)
     all_tables = {"thrust_rear": FORCES, "thrust_top": TOP, **{f"steady_{axis}": rows for axis, rows in STEADY.items()}}
     for name, rows in {**all_tables, **(tables or {})}.items():
@@ -326,52 +326,77 @@ def folder_with(
 
 
 Tables = Mapping[str, list[tuple[float, float]]]
-WORDS: dict[str, tuple[Tables, str]] = {
-    "no Tau": ({}, "surge: m_rov/beta_u is not identifiable from V_ss alone"),
-    "no Tau in yaw": ({}, "yaw: I_r/beta_r is not identifiable from V_ss alone"),
+FOUND: dict[str, tuple[Tables, Finding]] = {
+    "no Tau": ({}, Finding("assumed beta", "surge", names={"beta": "beta_u", "inertia": "m_rov"})),
+    "no Tau in yaw": ({}, Finding("assumed beta", "yaw", names={"beta": "beta_r", "inertia": "I_r"})),
     "few points": (
         {"steady_heave": [(0.3, 0.15), (0.5, 0.29), (0.7, 0.38)]},
-        "heave: quadratic and linear drag are",
+        Finding("inseparable drag", "heave", names={"a_d": "a_d_w", "b_d": "b_d_w"}),
     ),
-    "as many as coefficients": ({"steady_yaw": [(0.3, 1.5), (0.6, 3.1)]}, "yaw: as many coefficients as measurements"),
+    "as many as coefficients": (
+        {"steady_yaw": [(0.3, 1.5), (0.6, 3.1)]},
+        Finding("drag without freedom", "yaw"),
+    ),
     "drag at its bound": (
         {"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]},
-        "heave: b_d_w is at its bound",
+        Finding("drag at zero", "heave", names={"coefficient": "b_d_w"}),
     ),
-    "one thrust carries": ({"steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)]}, "leave-one-thrust-out error of V_ss"),
-    "thrust that points backward": ({"thrust_rear": [(0.3, 1.0), (0.5, 11.5), (0.7, 30.0)]}, "backward below 27%"),
-    "weak reverse thrust": ({"thrust_rear": [*FORCES, (-0.5, -8.0)]}, "rear thrust: force differs by -34%"),
-    "slow upward": ({"steady_heave": [*STEADY["heave"], (-0.5, -0.25)]}, "heave: V_ss differs by -11%"),
-    "thrust not tested": ({"thrust_top": TOP[:3]}, "but top thrust was tested from 10% to 50% only"),
+    "one thrust carries": (
+        {"steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)]},
+        Finding("leave-one-out error", "yaw", names={"quantity": "V_ss"}),
+    ),
+    "thrust that points backward": (
+        {"thrust_rear": [(0.3, 1.0), (0.5, 11.5), (0.7, 30.0)]},
+        Finding("backward thrust", curve="rear", numbers={"command": 0.27}),
+    ),
+    "weak reverse thrust": (
+        {"thrust_rear": [*FORCES, (-0.5, -8.0)]},
+        Finding("asymmetry", curve="rear", numbers={"measured": -0.34}),
+    ),
+    "slow upward": (
+        {"steady_heave": [*STEADY["heave"], (-0.5, -0.25)]},
+        Finding("asymmetry", "heave", numbers={"measured": -0.11}),
+    ),
+    "thrust not tested": (
+        {"thrust_top": TOP[:3]},
+        Finding("untested thrust", "heave", curve="top", numbers={"tested_low": 0.1, "tested_high": 0.5}),
+    ),
     "motion in the dead band": (
         {
             "thrust_top": [(0.1, 0.0), (0.2, 0.0), (0.3, 0.42), (0.4, 0.98), (0.5, 1.62), (0.6, 2.37), (0.7, 3.2)],
             "steady_heave": [(0.1, 0.08), *STEADY["heave"]],
         },
-        "heave: what moves at 10% is left out",
+        Finding("no push", "heave", names={"commands": "10%"}),
     ),
-    "two thrusts": ({"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]}, "2 points for two"),
+    "two thrusts": (
+        {"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]},
+        Finding("thrust without freedom", curve="top", numbers={"count": 2}),
+    ),
 }
+"""Tables, and a finding about them with some of its names and numbers."""
 
 
 _SOME = ("no Tau", "few points", "drag at its bound", "one thrust carries", "weak reverse thrust", "two thrusts")
 
 
-@pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in WORDS])
-def test_warnings(case: str, tmp_path: Path) -> None:
-    tables, words = WORDS[case]
-    found = folder_with(tmp_path, tables)
-    assert any(words in warning for warning in found.warnings), found.warnings
-    assert found.vehicle.provenance
-    assert found.vehicle.provenance.warnings == found.warnings
+@pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in FOUND])
+def test_findings(case: str, tmp_path: Path) -> None:
+    tables, expected = FOUND[case]
+    results = folder_with(tmp_path, tables)
+    subject = expected.kind, expected.axis, expected.curve
+    (found,) = (f for f in results.findings if (f.kind, f.axis, f.curve) == subject)
+    assert {name: found.names[name] for name in expected.names} == expected.names
+    assert {name: found.numbers[name] for name in expected.numbers} == pytest.approx(expected.numbers, abs=0.005)
+    assert results.vehicle.provenance
+    assert results.vehicle.provenance.warnings == results.warnings
 
 
-def test_enough_good_data_raise_no_warning(tmp_path: Path, k: Rov) -> None:
+def test_enough_good_data_raise_no_finding(tmp_path: Path, k: Rov) -> None:
     tables: dict[str, list[tuple[float, float]]] = {}
     for m in AXES:
         for quantity, kind in enumerate(("steady", "time_constant")):
             tables[f"{kind}_{m.name}"] = [(c, k.response(m, c)[quantity]) for c in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)]
-    assert folder_with(tmp_path, tables).warnings == ()
+    assert folder_with(tmp_path, tables).findings == ()
 
 
 def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
@@ -387,7 +412,7 @@ def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def by_direction(tmp_path_factory: pytest.TempPathFactory) -> Identification:
-    """Reverse thrust of 60 % on both thrusters; up twice the drag, which slows more than the thrust alone."""
+    """Identify a vehicle with 60 % thrust in reverse, and with twice the drag upward."""
     k = untuned(load_vehicle(VIDEORAY).rov)
     ahead, back = (0.1, 0.2, 0.4, 0.6, 0.8), dict[str, float]()
     tables = {}
@@ -406,7 +431,7 @@ def test_thrust_and_drag_by_direction_reach_the_vehicle_file(
     by_direction: Identification, tmp_path: Path, k: Rov
 ) -> None:
     found = by_direction
-    assert not any("thrust: " in warning or "heave: V_ss differs" in warning for warning in found.warnings)
+    assert not any(f.curve or (f.kind, f.axis) == ("asymmetry", "heave") for f in found.findings)
     write_vehicle(found.vehicle, tmp_path / "made.toml")
     read = load_vehicle(tmp_path / "made.toml").rov
     for name in ("a_t_rear", "b_t_rear", "a_t_top", "b_t_top"):
@@ -443,7 +468,7 @@ def test_tables_are_checked_against_recordings(full_folder: Path, tmp_path: Path
         write_csv(folder / f"steady_{axis}.csv", f"command [1],velocity [{unit}]", STEADY[axis])
     found = identify(load_tank_tests(folder))
     assert [axis.chosen for axis in found.axes] == ["recordings", "points", "points"]
-    assert any("surge: V_ss of the tables is" in warning for warning in found.warnings)
+    assert ("tables against recordings", "surge") in [(finding.kind, finding.axis) for finding in found.findings]
 
 
 def test_known_coefficients_are_kept(tmp_path: Path) -> None:
@@ -451,10 +476,10 @@ def test_known_coefficients_are_kept(tmp_path: Path) -> None:
     rov = tmp_path / "rov.toml"
     known = '[known]\nbeta_u = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
     rov.write_text(rov.read_text(encoding="utf-8").replace("[known]\n", known), encoding="utf-8")
-    vehicle = identify(load_tank_tests(tmp_path)).vehicle
-    assert (vehicle.rov["beta_u"], vehicle.sources["beta_u"]) == (0.8, "a guess")
-    assert vehicle.intervals["beta_u"] == (0.7, 0.9)
-    assert not any("beta_u" in warning for warning in vehicle.provenance.warnings) if vehicle.provenance else False
+    found = identify(load_tank_tests(tmp_path))
+    assert (found.vehicle.rov["beta_u"], found.vehicle.sources["beta_u"]) == (0.8, "a guess")
+    assert found.vehicle.intervals["beta_u"] == (0.7, 0.9)
+    assert not any("beta_u" in warning for warning in found.warnings)
 
 
 def test_estimate_without_freedom_has_no_interval() -> None:

@@ -1,4 +1,4 @@
-"""The spectrum of noise out of the residuals of a fit that took the slow part of it."""
+"""The spectrum of noise from the residuals of a fit that absorbed its slow part."""
 
 import numpy as np
 import pytest
@@ -9,11 +9,11 @@ from rov_fmu.identify.recordings.noise_spectrum import cosines, noise_spectrum
 
 N = 1200
 SLOW = np.asarray(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, N), 8), dtype=np.float64)
-"""Nine numbers of a model."""
+"""The derivatives by nine parameters of a model."""
 
 
 def left(rho: float, white: float, seed: int) -> np.ndarray:
-    """Noise of first order, of variance 1, with white noise on top, less what the model can take of it."""
+    """Return the residuals of a fit to first-order noise of variance 1, with white noise added."""
     random = np.random.default_rng(seed)
     noise = lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], random.standard_normal(N + 500))[500:]
     noise = noise + white * random.standard_normal(N)
@@ -23,7 +23,7 @@ def left(rho: float, white: float, seed: int) -> np.ndarray:
 @pytest.mark.parametrize("white", [0.0, 0.5])
 @pytest.mark.parametrize("rho", [0.8, 0.9])
 def test_the_noise_before_the_fit_is_found(rho: float, white: float) -> None:
-    """The residuals by themselves are less than it by a quarter and more."""
+    """The variance of the residuals alone is at least a quarter too small."""
     residuals = [left(rho, white, seed) for seed in range(40)]
     truth = (1.0 + rho) / (1.0 - rho) + white**2
     found = [noise_spectrum(r, SLOW) for r in residuals]
@@ -32,7 +32,7 @@ def test_the_noise_before_the_fit_is_found(rho: float, white: float) -> None:
 
 
 def test_slow_noise_hardly_disturbs_what_swings_tell() -> None:
-    """The variance of a number that is told by 20 swings, as many seeds say; slow noise has 50 times as much of it."""
+    """The variance of a parameter from 20 oscillations agrees with many seeds, despite much stronger slow noise."""
     rho, swings = 0.98, np.sin(np.linspace(0.0, 40.0 * np.pi, N))
     found = [noise_spectrum(left(rho, 0.0, seed), SLOW) for seed in range(20)]
     told = [float(cosines(swings) ** 2 @ spectrum) for spectrum in found if spectrum is not None]

@@ -1,4 +1,4 @@
-"""Drag and β out of whole recordings: the truth within the intervals, and what disturbs the recordings named."""
+"""Fits of drag and β to whole recordings: the intervals contain the truth, and disturbances are found."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -29,23 +29,23 @@ def k(vehicle: Vehicle) -> Rov:
 
 
 def unknowing(k: Rov, m: Axis) -> Rov:
-    """The vehicle without what is to be found."""
+    """Return the vehicle without the coefficients to be fitted."""
     return k.replaced({m.coefficient(kind): 1.0 for kind in ("a_d", "b_d", "beta")})
 
 
 def only(recordings: Sequence[Recording], base: Rov, **options: Any) -> RecordingsFit:
-    """The fit of one axis."""
+    """Return the fit of one axis."""
     (fit,) = fit_recordings(each_by_itself(recordings), base, **options)
     return fit
 
 
 def each_by_itself(recordings: Sequence[Recording]) -> list[Recording]:
-    """With files of their own."""
+    """Give each recording its own file."""
     return [replace(recording, file=f"log_{n}.csv") for n, recording in enumerate(recordings)]
 
 
 def steady_error(fit: RecordingsFit, k: Rov) -> float:
-    """The largest relative error of V_ss over 20-70 %."""
+    """Return the largest relative error of V_ss over 20-70 %."""
     m = fit.axis
     pairs = [(fit.rov.response(m, c)[0], k.response(m, c)[0]) for c in COMMANDS.tolist()]
     return max(abs(found / true - 1.0) for found, true in pairs)
@@ -57,7 +57,7 @@ def steady_error(fit: RecordingsFit, k: Rov) -> float:
 def round_trip(
     k: Rov, m: Axis, seeds: Sequence[int], disturb: Disturb | None = None, rate: float = 20.0
 ) -> dict[str, float]:
-    """Share of seeds in which the 95 % interval covers the truth; V_ss must be within 2 % in all of them."""
+    """Return the share of seeds whose 95 % interval covers the truth; check that V_ss is within 2 % in all."""
     recordings = [clean(k, m, plan, rate) for plan in PLANS[m.name]]
     names = [m.coefficient(kind) for kind in ("a_d", "b_d", "beta")]
     covered: dict[str, list[bool]] = {name: [] for name in names}
@@ -74,7 +74,7 @@ def round_trip(
 
 @pytest.mark.parametrize("m", [HEAVE, pytest.param(SURGE, marks=pytest.mark.long)], ids=lambda m: m.name)
 def test_intervals_cover_the_truth(m: Axis, k: Rov) -> None:
-    """Of four seeds, which are fixed, a 95 % interval misses more than one in 1.4 % of all cases."""
+    """A 95 % interval misses more than one of four seeds in 1.4 % of all cases; the seeds are fixed."""
     assert min(round_trip(k, m, range(4)).values()) >= 3 / 4
 
 
@@ -84,7 +84,7 @@ def test_intervals_cover_the_truth(m: Axis, k: Rov) -> None:
 )
 @pytest.mark.parametrize("m", AXES, ids=lambda m: m.name)
 def test_intervals_cover_the_truth_of_many_seeds(m: Axis, k: Rov, seeds: int, least: float) -> None:
-    """Of 100 seeds a 95 % interval misses more than 13 once in 1,000 cases, of 20 more than 5."""
+    """A 95 % interval misses more than 13 of 100 seeds, or more than 5 of 20, once in 1,000 cases."""
     shares = round_trip(k, m, range(seeds))
     assert min(shares.values()) >= least, shares
 
@@ -164,7 +164,7 @@ def test_gaps_an_uneven_clock_and_a_start_in_motion(k: Rov) -> None:
 
 
 def test_a_first_stamp_long_before_the_others(k: Rov) -> None:
-    """Halves to predict from one another have as many samples, whatever their time."""
+    """Both halves of a recording have as many samples, but not the same duration."""
     recording = clean(k, HEAVE, PLANS["heave"][0], 10.0).noisy(np.random.default_rng(2))
     early = np.concatenate([[-900.0], recording.time[1:]])
     fit = only([replace(recording, time=early)], unknowing(k, HEAVE))
@@ -173,7 +173,7 @@ def test_a_first_stamp_long_before_the_others(k: Rov) -> None:
 
 
 def test_command_that_never_rests(k: Rov) -> None:
-    """A joystick: another command at every sample."""
+    """A joystick gives another command at every sample."""
     rate, time = 50.0, np.arange(2000) / 50.0
     commands = 0.45 * np.sin(0.4 * time) + 0.25 * np.sin(1.3 * time)
     recording = clean(k, SURGE, [(c, 1.0 / rate) for c in commands.tolist()], rate).noisy(np.random.default_rng(3))
@@ -184,7 +184,7 @@ def test_command_that_never_rests(k: Rov) -> None:
 
 
 def test_sensors_of_two_kinds_weigh_by_their_noise(k: Rov) -> None:
-    """A bad camera beside a good depth gauge hardly changes the fit; the two have their own noise."""
+    """A noisy camera in addition to a good depth gauge hardly changes the fit; each has its own noise."""
     random = np.random.default_rng(4)
     depth = clean(k, HEAVE, PLANS["heave"][0]).noisy(random)
     other = clean(k, HEAVE, PLANS["heave"][1])
@@ -209,7 +209,7 @@ def test_what_is_known_is_kept(k: Rov) -> None:
 
 
 def thrust_test(k: Rov, thruster: str, spread: float, seed: int) -> Estimate:
-    """The thrust curve of a bollard pull with a noisy sensor."""
+    """Return the thrust curve of a bollard pull with a noisy sensor."""
     names = (f"a_t_{thruster}", f"b_t_{thruster}")
     commands = np.arange(0.1, 0.81, 0.1)
     forces = k[names[0]] * commands**2 + k[names[1]] * commands
@@ -218,7 +218,7 @@ def thrust_test(k: Rov, thruster: str, spread: float, seed: int) -> Estimate:
 
 
 def test_scale_of_uncertain_thrust_is_that_of_drag(k: Rov) -> None:
-    """The motion tells A, B and C only: thrust 5 % more uncertain as a whole makes drag and β so, but not V_ss."""
+    """A common error of thrust of 5 % goes into drag and β, but not into V_ss."""
     recordings = [clean(k, YAW, plan, 20.0).noisy(np.random.default_rng(6)) for plan in PLANS["yaw"]]
     values = np.array([k["a_t_rear"], k["b_t_rear"]])
     spread = 0.05**2 * np.outer(values, values) + np.diag((1e-3 * values) ** 2)
@@ -230,7 +230,7 @@ def test_scale_of_uncertain_thrust_is_that_of_drag(k: Rov) -> None:
 
 
 def test_recordings_mend_the_shape_of_the_thrust_curve(k: Rov) -> None:
-    """A sensor of 0.05 N has the weak thrust at 20 % wrong by far; under many commands the motion knows better."""
+    """A force sensor with 0.05 N noise gives a wrong thrust at 20 %; motion under many commands corrects it."""
     recordings = [clean(k, HEAVE, plan, 20.0).noisy(np.random.default_rng(7)) for plan in PLANS["heave"]]
     thrust = thrust_test(k, "top", 0.05, 3)
     base = unknowing(k, HEAVE).replaced(thrust.named)
@@ -260,7 +260,7 @@ def test_surge_and_yaw_share_the_thrust_of_the_rear_pair(k: Rov) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_nothing_is_found_in_clean_recordings(seed: int, k: Rov) -> None:
-    """What is looked for is left at zero, but for one case in twenty each."""
+    """Each effect is left at zero, except in one of twenty cases."""
     recordings = [clean(k, HEAVE, plan, 20.0).noisy(np.random.default_rng(seed)) for plan in PLANS["heave"]]
     fit = only(recordings, unknowing(k, HEAVE))
     assert {effect.kind for effect in fit.effects} == {"load", "delay", "dead band", "reverse thrust", "reverse drag"}

@@ -1,4 +1,4 @@
-"""The pool's own integrator against the exact step. Each is computed in its own way, so each checks the other."""
+"""The independent integrator of the pool, compared with the exact step."""
 
 import random
 
@@ -16,7 +16,7 @@ STEP, PLAN = 0.25, ((0.0, 1.0), (0.6, 2.0), (-0.4, 2.0))
 
 @pytest.mark.parametrize("name", [name for name, k in VEHICLES.items() if not k.layout.mix])
 def test_a_swim_is_that_of_the_exact_step(name: str) -> None:
-    """Random commands, every thruster its own, held for 1 s each; a current; what a vehicle has not has no effect."""
+    """Every thruster has random commands of 1 s in a current; missing degrees of freedom have no effect."""
     k = VEHICLES[name]
     rng = random.Random(name)
     held = {t.name: [0.0, *(rng.uniform(-0.9, 0.9) for _ in range(5))] for t in k.layout.thrusters}

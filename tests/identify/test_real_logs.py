@@ -1,7 +1,7 @@
-"""Tank tests that are not ideal: load, delay, lag, current, weak reverse thrust, a clock that jitters.
+"""Identification from tests with disturbances: load, delay, lag, current, weak reverse thrust, jitter of the clock.
 
-Truth is a pool with an integrator of its own. The 95 % intervals of a_d, b_d and β cover it, β is right in the mean,
-and what was not fitted is predicted.
+The truth comes from an independent integrator. The 95 % intervals of a_d, b_d and β cover it, the mean of β is right,
+and the fit predicts recordings that it was not fitted to.
 """
 
 from collections.abc import Sequence
@@ -26,32 +26,32 @@ CURVE = {"surge": "rear", "heave": "top", "yaw": "rear"}
 KINDS = ("a_d", "b_d", "beta")
 AXES = (SURGE, HEAVE, YAW)
 K = VIDEORAY.replaced({"beta_u": 0.8})
-"""β of surge must not be the 1 from which the fit may begin."""
+"""β of surge differs from 1, where the fit may start."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What is not ideal, and what the fit is asked for."""
+    """The disturbances of a test, and the options of its fit."""
 
     axes: tuple[Axis, ...]
     more: dict[str, float] = field(default_factory=dict)
-    """Coefficients that the vehicle has and the fit is not told."""
+    """Coefficients of the vehicle that the fit does not get."""
     delay: float = 0.0
     currents: tuple[float, ...] = (0.0, 0.0, 0.0)
-    """m/s, one a recording."""
+    """The current of each recording, m/s."""
     lag: tuple[str, ...] = ()
-    """Curves whose lag is to be fitted."""
+    """The curves whose lag is fitted."""
     jitter: float = 0.0
     slow: float = 0.0
-    """Time constant of the sensor's noise, s; 0 where it is white."""
+    """The time constant of the sensor's noise, s; 0 for white noise."""
     sensor: str = ""
-    """Other than the usual one."""
+    """The measured quantity, where it is not the usual one."""
     bias: float = 0.02
-    """What β may be off in the mean."""
+    """The largest mean error of β."""
 
     @property
     def truth(self) -> Rov:
-        """The vehicle in the pool."""
+        """The true vehicle."""
         return with_more(K, **self.more)
 
 
@@ -85,17 +85,17 @@ MAIN = (
     *("delay in surge", "lag in yaw", "lag and delay in heave", "one current", "weak reverse thrust in heave"),
     "jitter in yaw",
 )
-"""Each kind along one axis."""
+"""Scenarios with each disturbance along one axis."""
 SLOW = tuple(f"noise of {slow} s in heave" for slow in (0.2, 1.0, 3.0))
-"""Noise as slow as the vehicle, or slower."""
+"""Scenarios with noise as slow as the vehicle, or slower."""
 BY_DEFAULT = "load of 0.1 N in heave"
-"""One that is quick; the long and the weekly tests try all, MAIN with more seeds."""
+"""A quick scenario; the long and the weekly tests use all, and MAIN with more seeds."""
 # In yaw one thruster of the pair is in reverse whichever way it turns, so yaw alone never tells its strength.
 
 
 @cache
 def runs(name: str) -> tuple[Run, ...]:
-    """What happens in the pool; the noise of the sensors comes on top, another for each seed."""
+    """Return the motion in a scenario, without the noise of sensors, which depends on the seed."""
     scenario = SCENARIOS[name]
     return tuple(
         run(scenario.truth, axis, plan, RATE, delay=scenario.delay, current=current)
@@ -105,7 +105,7 @@ def runs(name: str) -> tuple[Run, ...]:
 
 
 def fitted(name: str, seed: int) -> tuple[RecordingsFit, ...]:
-    """The fit of a scenario, which is told nothing of what is not ideal but the curves that lag."""
+    """Fit a scenario; the fit knows none of the disturbances except the curves with a lag."""
     scenario, random = SCENARIOS[name], np.random.default_rng(seed)
     noise = {"colour": np.exp(-1.0 / (RATE * scenario.slow)) if scenario.slow else 0.0, "jitter": scenario.jitter}
     recordings = [
@@ -121,7 +121,7 @@ def fitted(name: str, seed: int) -> tuple[RecordingsFit, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """Over seeds, one row each: whether intervals cover the truth, and the relative errors of β."""
+    """The coverage of intervals and the relative errors of β, one row per seed."""
 
     names: tuple[str, ...]
     covered: np.ndarray
@@ -164,7 +164,7 @@ OTHERS = [name for name in SCENARIOS if name not in (*MAIN, *SLOW)]
     ],
 )
 def test_intervals_cover_the_truth(name: str, seeds: int) -> None:
-    """Of 20 seeds an interval that covers in 95 % of all cases covers in at least 15, but for one case in 1,000."""
+    """A 95 % interval covers at least 15 of 20 seeds, except once in 1,000 cases."""
     found = shares(name, range(seeds))
     assert (found.covered.sum(axis=0) >= binom.ppf(1e-3, seeds, 0.95)).all(), str(found)
     assert (np.abs(found.off.mean(axis=0)) < SCENARIOS[name].bias).all(), str(found)
@@ -172,7 +172,7 @@ def test_intervals_cover_the_truth(name: str, seeds: int) -> None:
 
 @pytest.mark.long
 def test_intervals_of_all_main_scenarios_together_cover_the_truth_in_90_to_99_percent() -> None:
-    """With 20 seeds of each scenario. The weekly test holds each scenario by itself to the same bounds."""
+    """There are 20 seeds of each scenario. The weekly test checks the same bounds for each scenario."""
     found = {name: shares(name, range(20)) for name in MAIN}
     told = "\n".join(f"{name}: {of}" for name, of in found.items())
     pooled = np.concatenate([of.covered.ravel() for of in found.values()])
@@ -194,7 +194,7 @@ def test_intervals_cover_the_truth_in_90_to_99_percent(name: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["noise of 1.0 s in heave"])
 def test_slow_noise_is_nothing_that_acts(name: str) -> None:
-    """It looks like a load, a delay or another drag up than down; one seed in five had one where it counted as less."""
+    """Slow noise looks like a load, a delay or drag by direction, but such effects are not kept."""
     assert sum(effect.kept for seed in range(8) for (fit,) in [fitted(name, seed)] for effect in fit.effects) <= 1
 
 
@@ -203,9 +203,9 @@ def test_slow_noise_is_nothing_that_acts(name: str) -> None:
 )
 @pytest.mark.parametrize("name", SLOW)
 def test_intervals_cover_the_truth_under_slow_noise(name: str, seeds: int) -> None:
-    """No more seeds have extras than 5 % of all have, but for one case in 1,000; as few miss the truth.
+    """About 5 % of fits keep an effect and as many intervals miss the truth; more do once in 1,000 cases.
 
-    Where noise of 3 s leaves too little to tell there is no interval.
+    Where noise of 3 s makes a coefficient unidentifiable, there is no interval.
     """
     fits = [fit for seed in range(seeds) for fit in fitted(name, seed)]
     assert sum(any(effect.kept for effect in fit.effects) for fit in fits) <= binom.ppf(0.999, len(fits), 0.05)
@@ -217,7 +217,7 @@ def test_intervals_cover_the_truth_under_slow_noise(name: str, seeds: int) -> No
 
 @pytest.mark.parametrize("name", ["another current each time", pytest.param("one current", marks=pytest.mark.long)])
 def test_the_current_is_found(name: str) -> None:
-    """In each recording by itself; it is told from loads and from what differs by direction."""
+    """A current differs by recording, and the fit separates it from loads and effects by direction."""
     (fit,) = fitted(name, 0)
     found = {effect.of: effect for effect in fit.effects if effect.kept}
     assert {effect.kind for effect in found.values()} == {"current"}
@@ -228,11 +228,11 @@ def test_the_current_is_found(name: str) -> None:
 # ---- Prediction ------------------------------------------------------------------------------------------------------
 
 PULSES: Plan = ((0.0, 2.0), (0.55, 2.5), (0.0, 2.5), (-0.35, 3.0), (0.45, 2.0), (-0.65, 1.5), (0.25, 4.0), (0.0, 4.0))
-"""Commands of which the fit has seen none, each for about as long as the vehicle takes to follow."""
+"""Commands that the fit has not seen, each held for about a time constant."""
 
 
 def velocity_fit(measured: np.ndarray, modelled: np.ndarray) -> float:
-    """100 (1 - |v - v_model| / |v - mean v|), percent: 100 is all of it, 0 no better than the mean."""
+    """Return 100 (1 - |v - v_model| / |v - mean v|): 100 is perfect, 0 is no better than the mean."""
     return float(100.0 * (1.0 - np.linalg.norm(measured - modelled) / np.linalg.norm(measured - measured.mean())))
 
 
@@ -240,7 +240,7 @@ def velocity_fit(measured: np.ndarray, modelled: np.ndarray) -> float:
     "axis", [HEAVE, *(pytest.param(a, marks=pytest.mark.long) for a in (SURGE, YAW))], ids=lambda axis: axis.name
 )
 def test_pulses_that_were_not_fitted_are_predicted(axis: Axis) -> None:
-    """After lag and delay, with the vehicle and the delay that the fit gives; the pool moves both."""
+    """The prediction uses the fitted vehicle and delay; the integrator simulates both motions."""
     name = f"lag and delay in {axis.name}"
     (fit,) = fitted(name, 0)
     (delay,) = (effect.value for effect in fit.effects if effect.kind == "delay" and effect.kept)

@@ -1,4 +1,4 @@
-"""Drag and β from points: in the form that the points ask for, of any vehicle, by direction."""
+"""Fits of drag and β to points: the choice of the form, different vehicles, drag by direction."""
 
 from dataclasses import replace
 from math import atanh, exp, inf, sqrt
@@ -27,7 +27,7 @@ def points_of(
     mass: float = 10.0,
     beta: float = 0.8,
 ) -> list[Point]:
-    """V_ss and Tau of one thruster of 20 c^2 + 5 c N that moves 10 kg, written out; with relative errors."""
+    """Return V_ss and Tau of 10 kg under a thrust of 20 c^2 + 5 c N, with relative errors."""
     random, found = np.random.default_rng(seed), []
     for c in commands:
         (a, b), F = drag if c > 0.0 else reverse, 20.0 * c * c + 5.0 * abs(c)
@@ -42,7 +42,7 @@ def points_of(
 
 @pytest.fixture
 def sway() -> Rov:
-    """A vehicle of one axis that is no vehicle of the paper."""
+    """Return a vehicle of one axis, other than the paper's."""
     layout = Layout((VehicleAxis(SWAY),), (Curve("t"),), (Thruster("s", "t", (0.0, 1.0, 0.0)),))
     numbers = dict.fromkeys(layout.coefficients, 1.0) | {"m_rov": 10.0, "a_t_t": 20.0, "b_t_t": 5.0}
     return Rov(layout, numbers)
@@ -59,7 +59,7 @@ def test_any_vehicle_and_axis(sway: Rov) -> None:
 
 
 def test_thrusters_of_a_bluerov2_with_their_curve_by_direction() -> None:
-    """In sway four thrusters push, two of them in reverse."""
+    """Four thrusters drive sway, two of them in reverse."""
     k = load_vehicle(SHIPPED["bluerov2"]).rov
     points = [Point(q, c, k.response(SWAY, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in (0.2, 0.5, 0.8)]
     fit = fit_response(SWAY, points, k.replaced({"a_d_v": 1.0, "b_d_v": 1.0, "beta_v": 1.0}))
@@ -85,7 +85,7 @@ def test_drag_by_direction_where_the_points_tell_it(sway: Rov) -> None:
     ids=len,
 )
 def test_drag_alike_both_ways_stays_so(seeds: range, sway: Rov) -> None:
-    """3 % scatter: drag by direction in one of ten at most."""
+    """With 3 % scatter, at most one of ten fits has drag by direction."""
     fits = [fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0), 0.03, seed), sway) for seed in seeds]
     assert sum("a_d_v_reverse" in fit.estimate.names for fit in fits) <= 0.1 * len(seeds)
 
@@ -133,7 +133,7 @@ def test_known_reverse_drag_stays(sway: Rov) -> None:
 
 
 def test_uncertain_thrust_of_one_direction_makes_its_drag_uncertain(sway: Rov) -> None:
-    """A force in proportion has the drag of its direction in proportion."""
+    """Drag by direction is proportional to thrust by direction."""
     layout = replace(sway.layout, curves=(Curve("t", ("a_t", "b_t", "a_t_reverse", "b_t_reverse")),))
     base = Rov(layout, {**sway.coefficients, "a_t_t_reverse": 20.0, "b_t_t_reverse": 5.0})
     spread = np.outer([20.0, 5.0], [20.0, 5.0]) * 0.1**2
@@ -146,7 +146,7 @@ def test_uncertain_thrust_of_one_direction_makes_its_drag_uncertain(sway: Rov) -
 
 
 def test_upward_points_of_the_paper_ask_for_no_direction(vehicle: Vehicle) -> None:
-    """Table 3: 0.13, 0.17, 0.28, 0.38 down, 0.13, 0.17, 0.25, 0.37 up."""
+    """The data are Table 3: 0.13, 0.17, 0.28, 0.38 down, 0.13, 0.17, 0.25, 0.37 up."""
     down, up = (0.13, 0.17, 0.28, 0.38), (0.13, 0.17, 0.25, 0.37)
     points = [Point("V_ss", c, v, 1.0, "") for c, v in zip((0.2, 0.3, 0.5, 0.7), down, strict=True)]
     points += [Point("V_ss", -c, -v, 1.0, "") for c, v in zip((0.2, 0.3, 0.5, 0.7), up, strict=True)]
@@ -164,10 +164,9 @@ def test_upward_points_of_the_paper_ask_for_no_direction(vehicle: Vehicle) -> No
 def test_intervals_cover_the_truth(
     sway: Rov, drag: tuple[float, float], reverse: float, seeds: int, least: float
 ) -> None:
-    """3 % scatter, whether or not linear drag is left out.
+    """The intervals hold for 3 % scatter, with and without linear drag.
 
-    Of 200 seeds an interval covers in 88 % at least. Of 40 seeds a 95 % interval misses more than 7 once in 1,000
-    cases.
+    An interval covers at least 88 % of 200 seeds. A 95 % interval misses more than 7 of 40 seeds once in 1,000 cases.
     """
     back = drag[0] * reverse, drag[1] * reverse
     hits: dict[str, list[bool]] = {}
@@ -180,7 +179,7 @@ def test_intervals_cover_the_truth(
 
 
 def test_the_band_of_drag_at_its_bound(sway: Rov) -> None:
-    """Without quadratic drag V = F/b_d, and dV/da_d = -F^2/b_d^3."""
+    """Without quadratic drag, V = F/b_d and dV/da_d = -F^2/b_d^3."""
     rov = sway.replaced({"a_d_v": 0.0, "b_d_v": 20.0})
     found = Estimate(("a_d_v",), np.array([0.0]), np.array([[1.0]]), inf, 1.0)
     low, high, *_ = response_band(SWAY, rov, found, np.array([0.5]))

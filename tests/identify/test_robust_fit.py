@@ -1,4 +1,4 @@
-"""What a robust fit makes of outliers: each counts by its side, however far off it is."""
+"""Outliers in a robust fit: only the sign of an outlier counts, not its distance."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from tests.recordings import PLANS, clean
 
 
 def _fit(k: Rov, size: float, loss: Loss = "huber") -> RecordingsFit:
-    """One recording in heave, every fiftieth sample off by so many standard deviations, to either side in turn."""
+    """Fit a recording in heave; every fiftieth sample is off by so many standard deviations, on alternate sides."""
     recording = clean(k, HEAVE, PLANS["heave"][0]).noisy(np.random.default_rng(16))
     values = recording.values.copy()
     values[25::100] += 0.005 * size
@@ -49,7 +49,7 @@ def test_in_a_plain_fit_it_counts_by_its_size(vehicle: Vehicle) -> None:
 
 
 def test_outliers_lie_beyond_two_and_a_half_standard_deviations(vehicle: Vehicle) -> None:
-    """1.24 % of normal noise does."""
+    """With normal noise, 1.24 % of the samples count as outliers."""
     (simulation,) = _fit(vehicle.rov, 0.0).simulations
     assert simulation.outliers / len(simulation.time) == pytest.approx(0.0124, abs=0.004)
     assert simulation.noise == pytest.approx(0.005, rel=0.03)

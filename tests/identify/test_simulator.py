@@ -1,4 +1,4 @@
-"""Recordings as a function of what is fitted: derivatives by everything that can be, and what holds of the output."""
+"""The simulator of recordings: its derivatives by all parameters, and properties of its output."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ PLAN = ((0.0, 1.0), (0.3, 4.0), (-0.5, 3.0), (0.7, 2.0), (0.0, 2.0), (-0.2, 3.0)
 
 
 def simulator(rov: Rov, axis: Axis, quantity: str, extras: dict[Extra, float]) -> tuple[Simulator, np.ndarray]:
-    """Two recordings with everything free: x near the truth, no sample at a change of the command."""
+    """Return a model of two recordings with all parameters, and x near the truth; no sample is at a command change."""
     random = np.random.default_rng(0)
     clean = run(rov, axis, PLAN, 20.0)
     recordings = [clean.recorded(random, quantity, f"log_{n}.csv") for n in range(2)]
@@ -88,7 +88,7 @@ def test_what_a_pool_does_is_what_the_simulator_does() -> None:
 
 
 def test_an_axis_of_a_vehicle_of_any_form() -> None:
-    """Vectored thrusters, sway, a curve of its own in reverse with a dead band: the BlueROV2."""
+    """The BlueROV2 has vectored thrusters, sway, a reverse curve and a dead band."""
     from rov_fmu.vehicle.shipped import SHIPPED
     from rov_fmu.vehicle.vehicle import load_vehicle
 

@@ -1,4 +1,4 @@
-"""V_ss and Tau out of recordings with known coefficients and noise (sections 4.1-4.3, (17))."""
+"""V_ss and Tau from recordings with known coefficients and noise (sections 4.1-4.3, (17))."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ def test_steps_up_and_down_in_both_directions(axis: Axis, vehicle: Vehicle) -> N
 
 
 def test_standard_errors_tell_the_scatter(vehicle: Vehicle) -> None:
-    """Over 8 seeds: about 95 % within two standard errors, and these not far larger than the scatter."""
+    """Over 8 seeds, about 95 % are within two standard errors, which are not much larger than the scatter."""
     for axis in AXES:
         recordings = [clean(vehicle.rov, axis, plan) for plan in PLANS[axis.name]]
         found: list[StepResponse] = []
@@ -65,7 +65,7 @@ def test_standard_errors_tell_the_scatter(vehicle: Vehicle) -> None:
 
 
 def test_coloured_noise_widens_the_standard_error(vehicle: Vehicle) -> None:
-    """Turbulence, correlated over some 40 samples: the error grows with it, about sqrt(39) times."""
+    """Turbulence that is correlated over about 40 samples increases the error about sqrt(39) times."""
     white = record(vehicle, SURGE, (0.0, 3.0), (0.5, 60.0), noise=0.02)
     random = np.random.default_rng(1)
     rest = record(vehicle, SURGE, (0.0, 3.0), (0.5, 60.0), noise=0.0)

@@ -1,4 +1,4 @@
-"""Thrust curves from forces: by direction, with a dead band, or neither, as the forces ask."""
+"""Fits of thrust curves to forces, with or without reverse coefficients and a dead band."""
 
 import csv
 from typing import Any
@@ -21,21 +21,21 @@ NOISE = 0.3  # N, of some 25 N
 
 
 def truth(c: Any, a: float, b: float, reverse: float = 1.0, c_0: float = 0.0, c_0_reverse: float | None = None) -> Any:
-    """Written out: quadratic beyond the dead band, in reverse a share of it."""
+    """Return the force, which is quadratic beyond the dead band, and scaled in reverse."""
     ahead = np.maximum(c - c_0, 0.0)
     back = np.maximum(-c - (c_0 if c_0_reverse is None else c_0_reverse), 0.0)
     return a * ahead**2 + b * ahead - reverse * (a * back**2 + b * back)
 
 
 def fit_of(c: Any, seed: int, noise: float = NOISE, **of_truth: float) -> ThrustFit:
-    """A fit to forces with noise; 20 N and 5 N ahead."""
+    """Fit forces with noise; a_t and b_t are 20 N and 5 N ahead."""
     return fit_thrust(
         CURVE, c, truth(c, 20.0, 5.0, **of_truth) + noise * np.random.default_rng(seed).standard_normal(len(c))
     )
 
 
 def taken(fit: ThrustFit) -> dict[str, bool]:
-    """What was open, and whether it is in."""
+    """Return the possible extensions, and whether each is taken."""
     return {choice.what: choice.kept for choice in fit.choices}
 
 
@@ -43,7 +43,7 @@ REVERSE, DEAD, DEAD_REVERSE = "a curve of its own in reverse", "a dead band", "a
 
 
 def test_the_makers_points_of_a_t200_give_the_curve_of_all_of_them() -> None:
-    """The fit of 201 points, by another program: 29.33, 31.48; 21.74, 25.54; 0.087, RMS 0.30 N and 0.32 N."""
+    """Another program fits the 201 points with 29.33, 31.48; 21.74, 25.54; 0.087, RMS 0.30 N and 0.32 N."""
     with (SHIPPED["bluerov2"].parent / "t200" / "t200_16_v.csv").open(encoding="utf-8", newline="") as file:
         pulse, force = np.array([[float(cell) for cell in row] for row in [*csv.reader(file)][1:]]).T
     c, F = (pulse - 1500.0) / 400.0, 9.80665 * force
@@ -66,7 +66,7 @@ def test_the_makers_points_of_a_t200_give_the_curve_of_all_of_them() -> None:
 
 
 def test_the_curve_is_the_one_that_the_vehicle_flies_with() -> None:
-    """All forms of motion/rov.py, of three thrusters at once."""
+    """The curve has all coefficients, and three thrusters are tested together."""
     curve = Curve("rear", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse"), together=3)
     numbers = dict(zip(map(curve.coefficient, curve.keys), (20.0, 5.0, 12.0, 3.0, 0.05, 0.1), strict=True))
     flown = [3.0 * Rov(PAPER, numbers).curve_force(curve, c) for c in FINE.tolist()]
@@ -112,7 +112,7 @@ def test_dead_band_is_found(c_0: float, c_0_reverse: float) -> None:
 
 
 def test_dead_band_far_below_all_commands_is_not_claimed() -> None:
-    """Forces from 40 % on bend the same for many reasons."""
+    """Forces from 40 % on have the same shape for several forms."""
     fit = fit_of(np.repeat(np.arange(0.4, 1.01, 0.05), 3), 6, noise=0.02, c_0=0.1)
     assert fit.curve.keys == ("a_t", "b_t")
 
@@ -136,7 +136,7 @@ def test_known_coefficients_stay() -> None:
 
 
 def test_a_vehicle_that_has_more_keeps_only_what_the_forces_tell() -> None:
-    """A file that gives reverse coefficients to begin with, and tests ahead alone."""
+    """The file gives the reverse coefficients, and only commands ahead are tested."""
     fit = fit_thrust(Curve("x", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "T")), ONE_WAY, truth(ONE_WAY, 20.0, 5.0))
     assert fit.curve.keys == ("a_t", "b_t", "T")
 
@@ -163,7 +163,7 @@ def test_two_curves_are_measured_together() -> None:
 
 
 def shares(c: Any, seeds: int, noise: float = NOISE, **of_truth: float) -> tuple[dict[str, float], Any, float]:
-    """How often intervals and bands cover the truth, and how often the form is not the true one."""
+    """Return the shares of intervals and bands that cover the truth, and the share of wrong forms."""
     numbers = {"a_t_x": 20.0, "b_t_x": 5.0, "c_0_x": of_truth.get("c_0", 0.0)}
     numbers |= {f"{key}_reverse": of_truth.get("reverse", 1.0) * numbers[key] for key in ("a_t_x", "b_t_x")}
     expected = {"a_t", "b_t"} | ({"a_t_reverse", "b_t_reverse"} if "reverse" in of_truth else set())
@@ -203,9 +203,9 @@ def test_intervals_hold_for_weak_reverse_thrust() -> None:
     ids=["one way", "alike", "weak reverse", "weak reverse and dead band"],
 )
 def test_intervals_cover_the_truth(c: Any, noise: float, of_truth: dict[str, float], seeds: int) -> None:
-    """200 seeds: 90-99 % of them, and a form that is not the true one in a few of a hundred.
+    """Of 200 seeds, 90-99 % are covered, and a few percent have the wrong form.
 
-    Of 50 seeds, an interval that covers in 95 % of all cases may miss more often by chance, or never.
+    With 50 seeds, a 95 % interval may miss more often by chance, or never.
     """
     found, bands, wrong = shares(c, seeds, noise, **of_truth)
     low, high = (0.9, 0.99) if seeds == 200 else (float(binom.ppf(1e-3, seeds, 0.95)) / seeds, 1.0)

@@ -1,4 +1,4 @@
-"""The motion of many steps at once, and its derivatives: against another integrator, and against differences."""
+"""The motion of many steps at once, compared with another integrator, and its derivatives with differences."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ LENGTHS = (1e-4, 0.005, 0.02)
 
 
 def some_steps(seed: int, number: int = 60, lags: int = 1) -> Steps:
-    """Two runs with reversals, drag by direction, and forces that fade."""
+    """Return two runs with reversals, drag by direction and lagging forces."""
     random = np.random.default_rng(seed)
     A, B = (np.outer(10.0 ** random.uniform(-2.0, 0.5, 2), np.ones(number)) for _ in range(2))
     return Steps(
@@ -28,7 +28,7 @@ def some_steps(seed: int, number: int = 60, lags: int = 1) -> Steps:
 
 
 def by_dop853(steps: Steps, n: int, v: float) -> tuple[float, float]:
-    """Velocity and distance after one step."""
+    """Return velocity and distance after one step."""
 
     def rates(t: float, y: Array) -> list[float]:
         side = 0 if y[0] > 0.0 else 1
@@ -50,7 +50,7 @@ def test_motion_is_that_of_another_integrator(seed: int, lags: int) -> None:
             v = starts[list(steps.first).index(n)]
         assert found.v[n] == pytest.approx(v, rel=1e-9, abs=1e-10)
         v, way = by_dop853(steps, n, v)
-        assert found.way[n] == pytest.approx(way, rel=1e-8, abs=1e-10)
+        assert found.distance[n] == pytest.approx(way, rel=1e-8, abs=1e-10)
     assert found.end[-1] == pytest.approx(v, rel=1e-9, abs=1e-10)
 
 
@@ -61,7 +61,7 @@ def test_slopes_are_those_of_differences() -> None:
 
     def at(of: Steps, start: Array) -> tuple[Array, Array]:
         found = motion(of, start, start)
-        return found.end, found.way
+        return found.end, found.distance
 
     slopes = motion(alone, v, v).slopes()
     for key in ("v", "A", "B", "C", "D", "kappa"):

@@ -1,4 +1,4 @@
-"""The tuning guide: α and β in closed form, or over many points, of any vehicle and by direction."""
+"""The tuning guide: α and β in closed form or fitted to many points, for different vehicles and directions."""
 
 import re
 from dataclasses import replace
@@ -33,7 +33,7 @@ def test_heave_at_30_percent_gives_table_9_again(k: Rov) -> None:
 
 
 def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
-    """A yaw to starboard: left ahead, right astern, by the paper's (4)."""
+    """For a turn to starboard, the left thruster pushes ahead and the right one astern, by the paper's (4)."""
     points = [Point("V_ss", command, sign * 0.5, 1.0, "") for command, sign in ((0.3, 1), (-0.4, -1))]
     print_tuning(tune_over(k, YAW, points))
     said = capsys.readouterr().out
@@ -159,7 +159,7 @@ BUOYANT = Rov(
 
 
 def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
-    """Velocity of BUOYANT in heave after so many seconds from rest, its equation written out."""
+    """Return the velocity of BUOYANT in heave after some seconds from rest, by integration of its equation."""
     c = abs(command)
     thrust = 2.0 * (30.0 * (c - 0.08) ** 2 + 31.0 * (c - 0.08))
     if command < 0.0:

@@ -1,4 +1,4 @@
-"""Where the rules of reading begin and end."""
+"""The exact limits of the checks of files."""
 
 import re
 import shutil
@@ -13,7 +13,7 @@ from tests.commands import TESTS
 
 @pytest.mark.parametrize("samples", [19, 20])
 def test_twenty_samples_are_enough(samples: int, tmp_path: Path) -> None:
-    """Blanks not counted."""
+    """Blank cells do not count."""
     shutil.copytree(TESTS, tmp_path / "tests")
     rows = [f"{0.1 * n:g},30,{0.01 * n:g}" for n in range(samples)] + ["5,30,"]
     log = tmp_path / "tests" / "log_heave.csv"

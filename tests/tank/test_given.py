@@ -1,4 +1,4 @@
-"""Folders of tests of vehicles of any form: what rov.toml says, what is left of the vehicle, what is known of it."""
+"""The description of a vehicle in rov.toml, and the vehicle that its tests identify."""
 
 import re
 import shutil
@@ -11,6 +11,7 @@ from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.given import ROV_FILE
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
@@ -39,7 +40,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def read_again(found: Identification, path: Path) -> None:
-    """The vehicle is one that its file can hold."""
+    """Check that the vehicle can be written to a file and read again."""
     write_vehicle(found.vehicle, path)
     assert load_vehicle(path).layout == found.vehicle.layout
     assert load_vehicle(path).thruster_sources == found.vehicle.thruster_sources
@@ -72,7 +73,7 @@ def test_of_a_base_only_what_is_tested_is_found_anew(tmp_path: Path) -> None:
 
 
 def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
-    """F_0 too: another vehicle is trimmed another way."""
+    """The log also replaces F_0, because another vehicle has another trim."""
     base = load_vehicle(SHIPPED["bluerov2"]).rov
     folder = folder_of(tmp_path / "tests", BLUEROV2, {})
     true = base.replaced({"F_0_w": 0.0, "a_d_w": 50.0, "b_d_w": 8.0, "beta_w": 0.9})
@@ -105,7 +106,7 @@ def test_thrust_ahead_leaves_reverse_as_it_is(
 
 
 def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
-    """A bow thruster makes the vehicle sway, which its file does not have."""
+    """The vectored thrusters drive sway, which the file of the base does not have."""
     text = SHIPPED["bluerov2"].read_text(encoding="utf-8").replace("coupling = true", "")
     text = text[: text.index("[axes.sway]")] + text[text.index("[axes.heave]") :]
     folder = folder_of(tmp_path / "tests", HEAD, {})
@@ -163,7 +164,7 @@ def test_one_thruster_down(tmp_path: Path) -> None:
 
 
 def test_inputs_are_narrowed_too(tmp_path: Path) -> None:
-    """Without yaw the input that turns goes."""
+    """Without yaw, the vehicle has no input for turning."""
     mix = (
         "[inputs]\nahead = { 3 = 1.0, 4 = 1.0, 1 = -1.0, 2 = -1.0 }\nturn = { 3 = -1.0, 4 = 1.0, 1 = 1.0, 2 = -1.0 }\n"
     )
@@ -171,7 +172,7 @@ def test_inputs_are_narrowed_too(tmp_path: Path) -> None:
     tests = read(tmp_path, VECTORED + mix, rows)
     assert [*tests.given.rov.layout.mix] == ["ahead"]
     assert len(tests.given.rov.layout.thrusters) == 4
-    assert tests.notes == ("sway: neither tested nor known (a_d_v, b_d_v), so the vehicle has no sway",)
+    assert tests.findings == (Finding("axis left out", axis="sway", names={"drag": "a_d_v, b_d_v"}),)
 
 
 def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:
@@ -180,10 +181,10 @@ def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:
     tables["thrust_t200.csv"] = pulled(30.0, 20.0)
     tests = read(tmp_path, rov, tables)
     assert not tests.given.rov.layout.coupled
-    assert tests.notes == ("surge, sway and yaw are not coupled, which needs all three",)
+    assert tests.findings == (Finding("not coupled"),)
     tests = read(tmp_path, rov, tables | {"steady_yaw.csv": f"{RATE}\n0.3,0.2\n"})
     assert tests.given.rov.layout.coupled
-    assert tests.notes == ()
+    assert tests.findings == ()
 
 
 # ---- The paper's form ------------------------------------------------------------------------------------------------
@@ -200,9 +201,10 @@ def test_a_depth_log_alone_makes_a_vehicle_of_heave(tmp_path: Path) -> None:
     assert [t.name for t in layout.thrusters] == ["t"]
     assert [curve.name for curve in layout.curves] == ["top"]
     assert set(layout.coefficients) == {"m_rov", "a_t_top", "b_t_top", "a_d_w", "b_d_w", "alpha_w", "beta_w"}
-    assert tests.notes == (
-        "surge, yaw: neither tested nor known (a_d_u, b_d_u, a_d_r, b_d_r), so the vehicle has no surge and no yaw",
-    )
+    assert [(finding.kind, finding.axis) for finding in tests.findings] == [
+        ("axis left out", "surge"),
+        ("axis left out", "yaw"),
+    ]
     found = identify(tests)
     assert found.vehicle.rov["beta_w"] == pytest.approx(k["beta_w"], rel=0.1)
     read_again(found, tmp_path / "mine.toml")
@@ -216,7 +218,7 @@ def test_what_no_axis_needs_is_not_used(tmp_path: Path) -> None:
     )
     assert tests.given.known.keys() == {"m_rov", "a_t_top", "b_t_top"}
     assert tests.thrust == {}
-    assert tests.notes[1].startswith("thrust_rear.csv: the thrusters of curve rear act on no axis")
+    assert Finding("unused curve", curve="rear", file="thrust_rear.csv") in tests.findings
 
 
 def test_any_coefficient_may_be_known(tmp_path: Path) -> None:
@@ -259,7 +261,7 @@ a_d_v = { value = 25.0, unit = "N.s2/m2", source = "a tow" }
 
 
 def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:
-    """The force begins at 10 %: the forces ahead are those of the command beyond."""
+    """The force begins at a command of 10 %."""
     curve = "".join(
         f'{key} = {{ value = {value}, unit = "{unit}", source = "s" }}\n'
         for key, value, unit in (("a_t_reverse", 20.0, "N"), ("b_t_reverse", 15.0, "N"), ("c_0", 0.1, "1"))

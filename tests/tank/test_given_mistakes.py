@@ -1,4 +1,4 @@
-"""What rov.toml, the files and both together may not say: a line for each mistake, all in one go."""
+"""Mistakes in rov.toml and in the files of tests: all of them are reported at once, with a line each."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -31,7 +31,6 @@ from tests.folders import (
 
 HEAVE_ALONE = {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n"}
 WITH_THRUST = HEAVE_ALONE | {"thrust_t200.csv": pulled(30.0, 20.0)}
-# rov.toml, the tables, and the lines, as they begin after the name of the folder.
 WRONG: dict[str, tuple[str, Mapping[str, str], tuple[str, ...]]] = {
     "no such base": (
         f'base = "bluerov3"\n{HEAD}',
@@ -168,6 +167,7 @@ WRONG: dict[str, tuple[str, Mapping[str, str], tuple[str, ...]]] = {
         ("/rov.toml: fit.lag = 't200': T_t200 is given, so it cannot be fitted too",),
     ),
 }
+"""rov.toml, the tables, and the beginnings of the lines after the name of the folder."""
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -183,7 +183,7 @@ def test_what_is_wrong_is_told(case: str, tmp_path: Path) -> None:
 
 
 def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
-    """Of rov.toml, of each file each line that is wrong, of names, and what is missing."""
+    """The mistakes are in rov.toml, in rows and in names of files, and files are missing."""
     rov = f"{HEAD}[known]\n{MASS.replace('kg', 'lb')}[windows]\nsway = [0.1, 0.2]\n"
     tables = {
         "log_yaw.csv": "time [s],command [%]\n0,0\n",
@@ -231,7 +231,7 @@ def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
 
 
 def check_lines(text: str, folder: Path) -> None:
-    """Each can be printed, and begins with a file or the folder."""
+    """Check that each line can be printed, and begins with a file or the folder."""
     assert all(line.startswith(str(folder)) and line.isprintable() for line in text.splitlines())
 
 

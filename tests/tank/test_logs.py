@@ -1,4 +1,4 @@
-"""Logs as loggers and spreadsheets save them: what is read, what is left out and told, what is refused."""
+"""CSV logs from loggers and spreadsheets: what is read, what is left out with a finding, and what is refused."""
 
 from collections.abc import Sequence
 from math import radians
@@ -9,6 +9,7 @@ import pytest
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.logs import Log, read_log
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.paper import PAPER
@@ -47,11 +48,16 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
     rows[20:20] = ["1.9,30,", "1.9,25,77", ",30,5", "nan,30,5"]
     log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
     (recording,) = log.recordings
-    assert log.notes == (
-        "log.csv: 1 row out of order sorted, 2 repeated time stamps merged, 2 rows without a time left out, "
-        "3 rows without a command left out, 1 row with more cells than the header left out, "
-        "1 cell of depth without a number taken as blank",
-    )
+    assert [(finding.kind, finding.numbers["count"]) for finding in log.findings] == [
+        ("rows sorted", 1),
+        ("time stamps merged", 2),
+        ("rows without time", 2),
+        ("rows without command", 3),
+        ("torn rows", 1),
+        ("unread cells", 1),
+    ]
+    assert {finding.file for finding in log.findings} == {"log.csv"}
+    assert log.findings[-1].names == {"column": "depth"}
     there = np.isfinite(recording.values)
     assert recording.time[~there] == pytest.approx([2.08])
     expected = 0.01 * np.arange(N)
@@ -62,8 +68,8 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
     assert recording.command[there] == pytest.approx([0.25 if n == 19 else STEP[n] for n in range(N)])
 
 
-def test_a_log_without_fault_has_no_notes(tmp_path: Path) -> None:
-    assert read(tmp_path, "time [s],command [%],depth [cm]", [f"{n},30,{n}" for n in range(N)], HEAVE).notes == ()
+def test_a_log_without_fault_has_no_findings(tmp_path: Path) -> None:
+    assert read(tmp_path, "time [s],command [%],depth [cm]", [f"{n},30,{n}" for n in range(N)], HEAVE).findings == ()
 
 
 def test_two_logs_in_one_file_are_refused(tmp_path: Path) -> None:
@@ -99,7 +105,7 @@ def test_as_a_european_spreadsheet_saves_it(tmp_path: Path) -> None:
 
 
 def test_a_dive_tells_of_every_axis_that_is_driven(tmp_path: Path) -> None:
-    """First down, then ahead, then about, by pulses of 1500 ± 400 µs, fractions and percent."""
+    """The dive goes down, ahead and around; commands are pulses of 1500 ± 400 µs, fractions and percent."""
     rows = []
     for n in range(90):
         left, right, top = 0.4 * (n >= 30), 0.4 * (30 <= n < 60) - 0.4 * (n >= 60), 0.5 * (n < 30)
@@ -115,7 +121,7 @@ def test_a_dive_tells_of_every_axis_that_is_driven(tmp_path: Path) -> None:
     assert heave.thrusters["t"] == pytest.approx([0.5] * 30 + [0.0] * 60)
     assert heave.thrusters["r"] == pytest.approx([0.0] * 30 + [0.4] * 30 + [-0.4] * 30)
     assert {recording.command is None for recording in log.recordings} == {True}, "no axis was driven alone"
-    assert log.notes == ()
+    assert log.findings == ()
 
 
 def test_a_command_of_the_axis_where_the_thrusters_follow_its_pattern(tmp_path: Path) -> None:
@@ -143,10 +149,10 @@ def test_axes_that_the_thrusters_do_nothing_along_are_told(tmp_path: Path) -> No
     rows = [f"{n / 10},{STEP[n]},{STEP[n]},{n},{n},1.5" for n in range(N)]
     log = read(tmp_path, "time [s],u_l [1],u_r [1],surge distance [m],heading [deg],depth [m]", rows)
     assert [recording.axis for recording in log.recordings] == [SURGE]
-    assert log.notes == (
-        "log.csv: no column of u_t, which is taken as 0",
-        "log.csv: no recording of heave: the depth never changes",
-        "log.csv: no recording of yaw: what the thrusters do along it never changes",
+    assert log.findings == (
+        Finding("missing column", file="log.csv", names={"column": "u_t"}),
+        Finding("constant motion", axis="heave", file="log.csv", names={"quantity": "depth"}),
+        Finding("constant push", axis="yaw", file="log.csv"),
     )
 
 
@@ -186,9 +192,8 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
     pulses = [0, 65535, *[1500] * 8, 2000, 900, *[1700] * 28]
     log = read(tmp_path, "time [s],u_t [us],depth [m]", [f"{n},{p},{n}" for n, p in enumerate(pulses)])
     assert of_axis(log, "heave").thrusters["t"][[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
-    assert log.notes[0] == (
-        "log.csv: pulses of u_t: 2 of 0 or 65535 us taken as no command, 2 beyond full thrust taken as full thrust"
-    )
+    for kind in ("no pulse", "pulse beyond full thrust"):
+        assert Finding(kind, file="log.csv", names={"column": "u_t"}, numbers={"count": 2}) in log.findings
 
 
 # ---- What is refused -------------------------------------------------------------------------------------------------

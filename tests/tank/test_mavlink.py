@@ -1,4 +1,4 @@
-"""Logs of ArduSub, written here by pymavlink's own writer (.tlog) and by the DataFlash format (.bin)."""
+"""Logs of ArduSub, which the tests write with pymavlink (.tlog) and in the DataFlash format (.bin)."""
 
 import struct
 import sys
@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SWAY, Layout
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.logs import Log, read_log
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -41,7 +42,7 @@ def of_axis(log: Log, name: str) -> Recording:
 
 
 def tlog(path: Path, messages: Iterable[tuple[float, Any]], system: int = 1) -> Path:
-    """Each message with the time of its arrival: eight bytes, big-endian µs, then the message."""
+    """Write messages with the times of their arrival: eight bytes, big-endian µs, then the message."""
     writer = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
     with path.open("ab") as file:
         for time, message in messages:
@@ -70,7 +71,7 @@ def parameter(name: str, value: float) -> tuple[float, Any]:
 
 
 def dive(start: float = 100.0) -> list[tuple[float, Any]]:
-    """From 1 s on both vertical thrusters push down at half, and it sinks at 0.2 m/s; the heading is held."""
+    """Return messages of a dive: from 1 s on, the vertical thrusters push down and the depth grows at 0.2 m/s."""
     found = []
     for n in range(N):
         time = start + 0.1 * n
@@ -91,13 +92,14 @@ def test_a_telemetry_log_tells_of_a_dive(bluerov2: Layout, tmp_path: Path) -> No
     assert recording.command == pytest.approx(np.where(recording.time < 0.999, 0.0, 0.5))
     assert recording.thrusters["6"] == pytest.approx(recording.command)
     assert not recording.thrusters["1"].any()
-    assert any("no recording of yaw: the heading never changes" in note for note in log.notes)
-    assert any("no parameters MOT_n_DIRECTION" in note for note in log.notes)
-    assert all(note.startswith("Dive.TLOG: ") for note in log.notes)
+    assert [(f.kind, f.axis, f.file) for f in log.findings] == [
+        ("unknown direction", "", "Dive.TLOG"),
+        ("constant motion", "yaw", "Dive.TLOG"),
+    ]
 
 
 def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
-    """Motor 6 is on servo 9 and turns the other way round; on servo 6 are the lights."""
+    """Motor 6 is on servo 9 and turns in the opposite direction; the lights are on servo 6."""
     parameters = [
         parameter("MOT_6_DIRECTION", -1.0),
         parameter("MOT_1_DIRECTION", 1.0),
@@ -110,7 +112,7 @@ def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path
         messages += [altitude(0.1 * n, -0.01 * n)]
     log = read_log(tlog(tmp_path / "dive.tlog", [*parameters, *messages]), bluerov2)
     assert of_axis(log, "heave").thrusters["6"][-1] == 0.5
-    assert log.notes == ("dive.tlog: MOT_n_DIRECTION turns the thrusters 6",)
+    assert log.findings == (Finding("reversed motors", file="dive.tlog", names={"thrusters": "6"}),)
 
 
 def test_a_clock_of_servos_that_begins_anew(bluerov2: Layout, tmp_path: Path) -> None:
@@ -122,7 +124,7 @@ def test_a_clock_of_servos_that_begins_anew(bluerov2: Layout, tmp_path: Path) ->
 
 
 def test_depth_of_messages_without_a_time(bluerov2: Layout, tmp_path: Path) -> None:
-    """VFR_HUD has none; it arrives as late as the others do."""
+    """VFR_HUD has no time; it arrives with the delay of the other messages."""
     messages = []
     for n in range(N):
         hud = mavlink.MAVLink_vfr_hud_message(0.0, 0.0, 0, 0, -0.5 - 0.01 * n, 0.0)
@@ -132,11 +134,11 @@ def test_depth_of_messages_without_a_time(bluerov2: Layout, tmp_path: Path) -> N
     there = np.isfinite(recording.values)
     assert recording.time[there] == pytest.approx(0.1 * np.arange(N) + 0.02, abs=2e-3)
     assert recording.values[there] == pytest.approx(0.5 + 0.01 * np.arange(N), abs=1e-6)
-    assert f"dive.tlog: {N} messages VFR_HUD have no time" in " ".join(log.notes)
+    assert Finding("arrival time", file="dive.tlog", numbers={"count": N}) in log.findings
 
 
 def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -> None:
-    """It sails ahead at 0.01 n m/s while its bow turns through north-west; the first ten velocities are unknown."""
+    """The vehicle moves ahead at 0.01 n m/s while it turns; the first ten velocities are unknown."""
     ahead, messages = pulse(0.4), []
     for n in range(N):
         psi, V = -pi / 4 + 0.01 * n, 0.01 * n
@@ -151,8 +153,8 @@ def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -
     assert surge.command is not None
     assert surge.command[-1] == pytest.approx(0.4)
     assert {recording.axis.name for recording in log.recordings} == {"surge"}
-    assert any("no recording of sway: what the thrusters do along it never changes" in note for note in log.notes)
-    assert "10 velocities left out" in " ".join(log.notes)
+    assert Finding("constant push", axis="sway", file="dive.tlog") in log.findings
+    assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in log.findings
 
 
 def test_another_vehicle_and_another_port_are_left_out(bluerov2: Layout, tmp_path: Path) -> None:
@@ -161,18 +163,18 @@ def test_another_vehicle_and_another_port_are_left_out(bluerov2: Layout, tmp_pat
     tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
     log = read_log(path, bluerov2)
     assert not of_axis(log, "heave").thrusters["1"].any()
-    assert any("system 1 is taken" in note for note in log.notes)
+    assert Finding("several vehicles", file="dive.tlog", names={"system": "1"}) in log.findings
 
 
 def test_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
     path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
     log = read_log(path, bluerov2)
     assert of_axis(log, "heave").thrusters["5"][0] == 0.0
-    assert any("6 pulses of 0 or 65535 us taken as no command" in note for note in log.notes)
+    assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
 
 
 def test_a_damaged_telemetry_log_is_read_around_the_damage(bluerov2: Layout, tmp_path: Path) -> None:
-    """Amid a message of depth, and at the end."""
+    """The damage is inside a message of depth, and at the end."""
     before = tlog(tmp_path / "before.tlog", dive()[:31]).stat().st_size
     path = tlog(tmp_path / "dive.tlog", dive())
     content = bytearray(path.read_bytes())
@@ -183,7 +185,7 @@ def test_a_damaged_telemetry_log_is_read_around_the_damage(bluerov2: Layout, tmp
     assert of_axis(log, "heave").values[there] == pytest.approx(
         [1.0 + 0.02 * max(n - 10, 0) for n in range(N) if n != 10]
     )
-    assert "dive.tlog: 1 damaged piece left out" in log.notes
+    assert Finding("damaged pieces", file="dive.tlog", numbers={"count": 1}) in log.findings
 
 
 # ---- .bin ------------------------------------------------------------------------------------------------------------
@@ -201,14 +203,14 @@ CODES = {"Q": "Q", "H": "H", "h": "h", "f": "f", "c": "h", "C": "H", "B": "B", "
 
 
 def packed(name: str, *values: Any) -> bytes:
-    """One message: A3 95, its type, its numbers; c, C and e are hundredths."""
+    """Pack one message: A3 95, its type, its numbers; c, C and e are hundredths."""
     kind, form, _ = FORMATS[name]
     stored = [round(100 * v) if f in "cCe" else v for f, v in zip(form, values, strict=True)]
     return b"\xa3\x95" + bytes([kind]) + struct.pack("<" + "".join(CODES[f] for f in form), *stored)
 
 
 def dataflash(path: Path, messages: Iterable[bytes]) -> Path:
-    """Formats first, that of the formats at their head."""
+    """Write a log, which begins with the formats of messages."""
     declared = {"FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"), **FORMATS}
     content = b""
     for name, (kind, form, columns) in declared.items():
@@ -237,7 +239,7 @@ def baro(time: float, instance: int, alt: float) -> bytes:
 
 
 def turn() -> list[bytes]:
-    """From 1 s on the bow turns to starboard through north at 20 deg/s, by all four horizontal thrusters."""
+    """Return messages of a turn: from 1 s on, the heading passes north at 20 deg/s, by all horizontal thrusters."""
     messages = [packed("PARM", 1, f"MOT_{n}_DIRECTION".encode(), 1.0, 1.0) for n in range(1, 7)]
     for n in range(N):
         time, c = 50.0 + 0.1 * n, 0.25 * (n >= 10)
@@ -255,11 +257,11 @@ def test_a_dataflash_log_tells_of_a_turn(bluerov2: Layout, tmp_path: Path) -> No
     assert {name: values[-1] for name, values in recording.thrusters.items()} == pytest.approx(
         {"1": 0.25, "2": -0.25, "3": -0.25, "4": 0.25, "5": 0.0, "6": 0.0}
     )
-    assert log.notes == ()
+    assert log.findings == ()
 
 
 def test_depth_of_the_pressure_sensor_that_is_in_the_water(bluerov2: Layout, tmp_path: Path) -> None:
-    """CTUN.Alt stays 0; of two barometers the one in the hull sees centimetres."""
+    """CTUN.Alt stays 0; one of two barometers is inside the hull, and its altitude changes by centimetres only."""
     messages = []
     for n in range(N):
         time, down = 0.1 * n, pulse(0.5 * (n >= 10))
@@ -270,7 +272,7 @@ def test_depth_of_the_pressure_sensor_that_is_in_the_water(bluerov2: Layout, tmp
 
 
 def test_velocities_of_the_filter(bluerov2: Layout, tmp_path: Path) -> None:
-    """At a heading of 90 deg north is to port: it goes to starboard at 0.01 n m/s; the second core says otherwise."""
+    """At a heading of 90 deg, the vehicle moves to starboard at 0.01 n m/s; the second core differs."""
     messages = []
     for n in range(N):
         time, c = 0.1 * n, 0.3 * (n >= 10)
@@ -302,7 +304,7 @@ def test_a_damaged_dataflash_log_is_read_around_the_damage(
     path.write_bytes(content)
     log = read_log(path, bluerov2)
     assert np.flatnonzero(np.isnan(of_axis(log, "yaw").values)).tolist() == [30]
-    assert "a.bin: damaged in places: what could be read is used" in log.notes
+    assert Finding("damaged log", file="a.bin") in log.findings
     assert capfd.readouterr() == ("", "")
 
 

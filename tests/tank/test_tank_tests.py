@@ -1,4 +1,4 @@
-"""A folder of tank tests: what is read from it, and one clear line for whatever is wrong with it."""
+"""A folder of tank tests: what is read, and a clear line for each mistake."""
 
 import hashlib
 import re
@@ -12,6 +12,7 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tables import Row
 from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 from rov_fmu.vehicle.published import load_tables
@@ -23,7 +24,7 @@ from tests.commands import TESTS
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A copy of the VideoRay's tests."""
+    """Copy the VideoRay's tests."""
     return Path(shutil.copytree(TESTS, tmp_path / "tests"))
 
 
@@ -78,7 +79,7 @@ def test_columns_in_any_order_and_unit(folder: Path) -> None:
 
 
 def without_curve(folder: Path, name: str) -> None:
-    """With a thrust curve that is not given."""
+    """Return a folder without a given thrust curve."""
     path = folder / "rov.toml"
     path.write_text(re.sub(rf"^[ab]_t_{name} .*$", "", path.read_text(encoding="utf-8"), flags=re.M), encoding="utf-8")
 
@@ -116,8 +117,8 @@ def test_recording_of_a_camera(folder: Path) -> None:
 
 def test_what_was_left_out_of_logs_is_told(folder: Path) -> None:
     rows = [f"{n},30,{n}" for n in [*range(30), 29]]
-    assert log(folder, "heave", "time [s],command [%],depth [m]", rows).notes == (
-        "log_heave.csv: 1 repeated time stamp merged",
+    assert log(folder, "heave", "time [s],command [%],depth [m]", rows).findings == (
+        Finding("time stamps merged", file="log_heave.csv", numbers={"count": 1}),
     )
 
 
@@ -336,7 +337,7 @@ def test_recordings_that_teach_nothing(
 
 
 def refused(folder: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    """Exit code 2, one line with all that must be named, and what stood in the output file stays."""
+    """The exit code is 2, one line has all the words, and the output file stays as it was."""
     output = folder.parent / "out.toml"
     output.write_text("before", encoding="utf-8")
     there = sorted(folder.parent.rglob("*"))

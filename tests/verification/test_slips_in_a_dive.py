@@ -22,4 +22,4 @@ def test_nothing_is_said_of_a_dive_by_hand_with_all_axes_at_once(seed: int) -> N
         log = Recording("dive.tlog", axis, "velocity", swum.time, None, values, outputs)
         assert not slips({axis.name: [log]}, k)
         (turned,) = slips({axis.name: [replace(log, values=-values)]}, k)
-        assert "sign" in turned.words
+        assert turned.kind == "wrong sign"

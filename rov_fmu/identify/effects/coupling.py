@@ -1,6 +1,6 @@
-"""What the log tells of the other axes acts on an axis: coupling, and water that flows along the surface.
+"""The coupling of surge, sway and yaw, and a horizontal current, computed from the logged motion.
 
-The other velocities are measured, so surge, sway and yaw stay motions of one axis each, with one more held force:
+The velocities of the other axes are measured, so each axis is still fitted by itself, with one more held force:
 M_v v r in surge, -M_u u r in sway, -(M_v - M_u) u v in yaw, M = m/β, u and v through the water.
 """
 
@@ -17,7 +17,7 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 
 Current = tuple[float, float]
-"""Of the water, north and east, m/s."""
+"""The velocity of the water north and east, m/s."""
 NORTH: Final = "current north"
 EAST: Final = "current east"
 
@@ -27,30 +27,30 @@ _BETAS = SURGE.coefficient("beta"), SWAY.coefficient("beta")
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """The force of coupling along an axis (N, N.m), and its derivatives by log β of surge and sway and the current."""
+    """The force of coupling along an axis (N, N.m), and its derivatives by log β of surge and sway and current."""
 
     force: Array
     slopes: Mapping[str, Array]
 
     def at(self, here: Array, time: Array) -> "Coupling":
-        """At other times."""
+        """Interpolate at other times."""
         slopes = {name: np.interp(time, here, slope) for name, slope in self.slopes.items()}
         return Coupling(np.interp(time, here, self.force), slopes)
 
 
 def is_coupled(layout: Layout, axis: Axis) -> bool:
-    """Whether the other axes of the vehicle act on one."""
+    """Return True when other axes of the vehicle act on this one."""
     return layout.coupled and axis.name in _OTHERS
 
 
-def is_told(recording: Recording) -> bool:
-    """Whether the log tells what coupling needs to know."""
+def is_logged(recording: Recording) -> bool:
+    """Return True when the log has the velocities that the coupling depends on."""
     return recording.beside.keys() >= set(_OTHERS.get(recording.axis.name, ()))
 
 
 def coupling(rov: Rov, recording: Recording, current: Current) -> Coupling | None:
-    """At the times of the recording; None where there is none, or the log does not tell."""
-    if not is_coupled(rov.layout, recording.axis) or not is_told(recording):
+    """Return the coupling at the times of the recording; None where there is none, or where it is not logged."""
+    if not is_coupled(rov.layout, recording.axis) or not is_logged(recording):
         return None
     M_u, M_v = (rov.effective_inertia(rov.layout.kinds[axis.name]) for axis in (SURGE, SWAY))
     beside = recording.beside
@@ -71,12 +71,12 @@ def coupling(rov: Rov, recording: Recording, current: Current) -> Coupling | Non
 
 
 def is_in_flow(recording: Recording) -> bool:
-    """Whether a current north and east is seen along the axis, whichever way the vehicle heads."""
+    """Return True when a current north and east can be seen along the axis, because the heading is logged."""
     return recording.axis in (SURGE, SWAY) and "psi" in recording.beside
 
 
 def carried(recording: Recording, time: Array) -> Array:
-    """2 x n: what water at 1 m/s, north and east, adds to the samples at these times."""
+    """Return the change of the samples at these times due to a current of 1 m/s north and east, 2 x n."""
     if not is_in_flow(recording):
         return np.zeros((2, len(time)))
     c, s = _heading(recording)
@@ -88,7 +88,7 @@ def carried(recording: Recording, time: Array) -> Array:
 
 
 def _heading(recording: Recording) -> tuple[Array, Array]:
-    """Its cosine and sine; both 0 where it is not known, as the current is not then."""
+    """Return the cosine and sine of the heading; both are 0 where it is unknown, since the current is then too."""
     psi = recording.beside.get("psi")
     if psi is None:
         return np.zeros(len(recording.time)), np.zeros(len(recording.time))

@@ -1,4 +1,4 @@
-"""What is fitted beside drag and β: what recordings bring with them, and what a vehicle may have besides."""
+"""Optional parameters of a fit to recordings, in addition to drag and β."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,43 +16,45 @@ EffectKind = Literal[
 
 @dataclass(frozen=True)
 class Extra:
-    """One number more: a constant load, the delay from the commands to the motion (or between two clocks), a current
-    along the axis or north and east, the lag or the dead band of a curve's thrusters; thrust or drag in reverse, as a
-    ratio to the other direction's."""
+    """An optional parameter of a fit.
+
+    It is a constant load, the delay from commands to motion (or between two clocks), a current along the axis or north
+    and east, the lag or the dead band of a curve, or the ratio of thrust or drag in reverse to that ahead.
+    """
 
     kind: EffectKind
     of: str
-    """An axis, or one recording by its file, or a curve."""
+    """The name of an axis, a curve, or the file of one recording."""
     axis: str = ""
-    """Of a recording: the axis, for one file may hold several."""
+    """The axis of the recording, since one file may have several."""
 
     @property
     def neutral(self) -> float:
-        """As if it were not there."""
+        """The value without any effect."""
         return 1.0 if self.kind.startswith("reverse") else 0.0
 
     @property
     def is_of_file(self) -> bool:
-        """Whether it belongs to one recording and not to the vehicle."""
+        """True when it belongs to one recording and not to the vehicle."""
         return self.of not in AXES and (self.kind in ("load", "delay") or self.is_current)
 
     @property
     def is_current(self) -> bool:
-        """Whether it is of the water."""
+        """True when it is a velocity of the water."""
         return self.kind.startswith("current")
 
     def unit(self, axis: Axis) -> str:
-        """Of its value."""
+        """Return the unit of its value."""
         return {"load": axis.load, "delay": "s", "lag": "s"}.get(self.kind, axis.unit if self.is_current else "1")
 
     def concerns(self, recording: Recording) -> bool:
-        """Whether it acts in a recording as a number of its own: a load, a delay, a current."""
+        """Return True when it acts in a recording as a load, a delay or a current."""
         if self.kind in (NORTH, EAST):
             return self.of == recording.file and recording.axis is not HEAVE
         return self.of == recording.axis.name or (self.of, self.axis) == (recording.file, recording.axis.name)
 
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Of a ratio: the names of what it scales in reverse, and of what that is the multiple of."""
+        """Return pairs of coefficient names for a ratio: the one in reverse and the one ahead."""
         if self.kind == "reverse thrust":
             return tuple(
                 (coefficient_name(key + REVERSE, self.of), coefficient_name(key, self.of)) for key in ("a_t", "b_t")
@@ -63,7 +65,7 @@ class Extra:
         return ()
 
     def coefficients(self, rov: Rov, value: float) -> dict[str, float]:
-        """What it makes of the coefficients of a vehicle; nothing where it is of a recording alone, or a delay."""
+        """Return the coefficients of the vehicle that it sets; none for one of a recording, or a delay."""
         if self.kind == "load" and self.of in AXES:
             return {AXES[self.of].coefficient("F_0"): value}
         if key := {"lag": "T", "dead band": "c_0"}.get(self.kind):
@@ -72,7 +74,7 @@ class Extra:
 
 
 def with_extras(rov: Rov, extras: Mapping[Extra, float]) -> Rov:
-    """The vehicle with what the extras make of it."""
+    """Return the vehicle with the coefficients that the extras set."""
     added: dict[str, float] = {}
     for extra, value in extras.items():
         added |= extra.coefficients(rov, value)

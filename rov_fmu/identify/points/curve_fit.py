@@ -1,4 +1,4 @@
-"""A curve fitted to measured points, whatever its form: how well it fits, and how well it predicts."""
+"""The base class of curves that are fitted to measured points, with the errors of fit and prediction."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -18,42 +18,42 @@ class CurveFit(ABC):
     x: Array
     y: Array
     weights: Array
-    """W_k of (7)."""
+    """The weights W_k of (7)."""
     estimate: Estimate
     leave_one_out: Array
-    """Leave-one-thrust-out: a fit of the same form without the points of its thrust; NaN where too few are left."""
+    """Leave-one-thrust-out: the prediction by a fit without the points of the same thrust; NaN where too few remain."""
 
     @abstractmethod
     def value(self, x: Array) -> Array:
-        """The curve."""
+        """Return the curve at x."""
 
     @abstractmethod
     def slopes(self, x: Array) -> Array:
-        """n x p: of the curve by what was fitted."""
+        """Return the derivatives of the curve by the fitted coefficients, n x p."""
 
     @property
     def counts(self) -> Flags:
-        """Whether a point has weight."""
+        """True for each point that has a weight."""
         return self.weights > 0.0
 
     def band(self, x: Array) -> tuple[Array, Array]:
-        """95 % confidence band of the curve; infinite where there are too few points."""
+        """Return the 95 % confidence band of the curve; infinite where there are too few points."""
         reach = self.estimate.half_band(self.slopes(x))
         return self.value(x) - reach, self.value(x) + reach
 
     @cached_property
     def residuals(self) -> Array:
-        """Measured less fitted."""
+        """The measured less the fitted values."""
         return self.y - self.value(self.x)
 
     @property
     def residual_rms(self) -> float:
-        """Over the points that count."""
+        """The RMS of the residuals over the points that count."""
         return rms(self.residuals[self.counts])
 
     @property
     def r_squared(self) -> float:
-        """Share of the weighted variance about the mean that the curve explains."""
+        """The share of the weighted variance about the mean that the curve explains."""
         if not self.weights.any():
             return nan
         total = float(self.weights @ (self.y - np.average(self.y, weights=self.weights)) ** 2)
@@ -61,6 +61,6 @@ class CurveFit(ABC):
 
     @property
     def leave_one_out_error(self) -> float:
-        """Leave-one-thrust-out: RMS of measured less predicted, over the points that count and have a prediction."""
+        """The RMS error of leave-one-thrust-out over the points that count and have a prediction."""
         errors = (self.y - self.leave_one_out)[self.counts]
         return rms(errors[np.isfinite(errors)])

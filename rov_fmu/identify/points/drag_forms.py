@@ -1,4 +1,4 @@
-"""The forms that the drag of an axis may have by its points: both parts or one of them, the same both ways or not."""
+"""The possible forms of drag: linear, quadratic or both, with or without a dependence on the direction."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -22,61 +22,62 @@ class Point:
     source: str
     """File and line, or file and time."""
     error: float | None = None
-    """Standard error, of a point from a recording."""
+    """The standard error of a point from a recording."""
 
 
 @dataclass(frozen=True)
 class DragForm:
-    """One form: what is fitted, what is left at zero."""
+    """One form of drag: the coefficients that are fitted, and those that stay zero."""
 
     axis: Axis
     base: Rov
-    """With the keys of the form; holds all that is not fitted."""
+    """The vehicle with the keys of the form and the values of coefficients that are not fitted."""
     names: tuple[str, ...]
     zero: tuple[str, ...]
     assumed: dict[str, str]
-    """Coefficients that are not identifiable, and what is assumed instead."""
+    """Coefficients that are not identifiable, and the assumption about each."""
     what: str = ""
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Of AXIS."""
+        """The keys of the axis's coefficients."""
         return self.base.layout.kinds[self.axis.name].keys
 
     @property
     def is_open(self) -> bool:
-        """Whether it is another than the plain one."""
+        """True when this is not the plain form."""
         return bool(self.what)
 
-    def is_told_by(self, points: Sequence[Point]) -> bool:
-        """Whether so few points would tell it too."""
+    def is_identifiable_from(self, points: Sequence[Point]) -> bool:
+        """Return True when the points suffice for a fit of this form."""
         beta = self.axis.coefficient("beta")
         if beta in self.names and not any(p.quantity == "Tau" for p in points):
             return False
-        ways = (1.0, -1.0) if self.axis.coefficient("a_d" + REVERSE) in self.names else (0.0,)
+        directions = (1.0, -1.0) if self.axis.coefficient("a_d" + REVERSE) in self.names else (0.0,)
         drag = [name for name in self.names if name != beta]
-        return all(len(levels(points, way)) >= min(len(drag) // len(ways), 2) for way in ways)
+        least = min(len(drag) // len(directions), 2)
+        return all(len(levels(points, direction)) >= least for direction in directions)
 
 
 def level(point: Point) -> float:
-    """The strength of the command."""
+    """Return the absolute value of the command, rounded."""
     return round(abs(point.command), 6)
 
 
-def levels(points: Sequence[Point], way: float = 0.0) -> set[float]:
-    """Strengths of the commands, of one direction (1, -1) or both (0)."""
-    return {level(p) for p in points if way * p.command >= 0.0}
+def levels(points: Sequence[Point], direction: float = 0.0) -> set[float]:
+    """Return the absolute values of the commands in one direction (1, -1) or both (0)."""
+    return {level(p) for p in points if direction * p.command >= 0.0}
 
 
 def drag_and_beta(axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:
-    """Names of a_d, b_d and β of an axis, as far as they are not known."""
+    """Return the names of a_d, b_d and β of an axis that are not known."""
     return tuple(name for kind in ("a_d", "b_d", "beta") if (name := axis.coefficient(kind)) not in known)
 
 
 def free_coefficients(
     axis: Axis, used: Sequence[Point], known: Collection[str]
 ) -> tuple[tuple[str, ...], dict[str, tuple[float, str]]]:
-    """Coefficients to fit, and those that are not identifiable: the value assumed, and the reason."""
+    """Return the coefficients to fit, and the assumed value and reason for each that is not identifiable."""
     a_d, b_d, beta = drag_and_beta(axis)
     assumed: dict[str, tuple[float, str]] = {}
     if b_d not in known and a_d not in known and len(levels(used)) < 2:
@@ -87,7 +88,7 @@ def free_coefficients(
 
 
 def candidate_forms(axis: Axis, points: Sequence[Point], base: Rov, known: Collection[str]) -> Iterator[DragForm]:
-    """The plain form first, linear and quadratic drag the same both ways; then what the points could tell beside it."""
+    """Yield the plain form, linear and quadratic drag in both directions alike, then the other identifiable forms."""
     used = [p for p in points if p.weight > 0.0]
     names, held = free_coefficients(axis, used, known)
     assumed = {name: words for name, (_, words) in held.items()}
@@ -98,24 +99,24 @@ def candidate_forms(axis: Axis, points: Sequence[Point], base: Rov, known: Colle
         yield from (_alone(plain, key, "") for key in ("a_d", "b_d"))
         steady = [p for p in used if p.quantity == "V_ss"]
         reverse = tuple(axis.coefficient(key + REVERSE) for key in ("a_d", "b_d"))
-        if not set(reverse) & set(known) and all(len(levels(steady, way)) >= 2 for way in (1.0, -1.0)):
+        if not set(reverse) & set(known) and all(len(levels(steady, side)) >= 2 for side in (1.0, -1.0)):
             base = _having(base, axis, known, by_direction=True)
             both = DragForm(axis, base, (*names, *reverse), (), assumed, "drag by direction")
             yield both
             yield from (_alone(both, key, ", by direction") for key in ("a_d", "b_d"))
 
 
-def _alone(form: DragForm, kind: str, way: str) -> DragForm:
-    """The form with quadratic or linear drag alone."""
+def _alone(form: DragForm, kind: str, suffix: str) -> DragForm:
+    """Return the form with quadratic or linear drag alone."""
     other, words = {"a_d": ("b_d", "quadratic"), "b_d": ("a_d", "linear")}[kind]
     zero = tuple(name for name in form.names if name.startswith(other))
     names = tuple(name for name in form.names if name not in zero)
-    what = f"{words} drag alone{way}"
+    what = f"{words} drag alone{suffix}"
     return replace(form, base=form.base.replaced(dict.fromkeys(zero, 0.0)), names=names, zero=zero, what=what)
 
 
 def _having(base: Rov, axis: Axis, known: Collection[str], *, by_direction: bool) -> Rov:
-    """The vehicle with drag by direction, or the same both ways unless the reverse is known."""
+    """Return the vehicle with drag by direction, or with equal drag unless the drag in reverse is known."""
     if by_direction:
         return base.extended({axis.coefficient(key + REVERSE): base[axis.coefficient(key)] for key in ("a_d", "b_d")})
     form = base.layout.kinds[axis.name]

@@ -1,4 +1,4 @@
-"""Thrust over command and drag over velocity by (weighted) least squares, (6)-(16)."""
+"""Fit thrust over command and drag over velocity by (weighted) least squares, (6)-(16)."""
 
 from dataclasses import dataclass
 
@@ -15,31 +15,31 @@ class QuadraticFit(CurveFit):
     """y = a |x| x + b x: force (N) over command, or force (N, N.m) over velocity."""
 
     unbounded: tuple[float, float]
-    """a and b if they could take any value."""
+    """a and b without bounds."""
 
     @property
     def a(self) -> float:
-        """Quadratic coefficient."""
+        """The quadratic coefficient."""
         return float(self.estimate.values[0])
 
     @property
     def b(self) -> float:
-        """Linear coefficient."""
+        """The linear coefficient."""
         return float(self.estimate.values[1])
 
     def value(self, x: Array) -> Array:
-        """The curve."""
+        """Return the curve at x."""
         return np.asarray(quadratic(x) @ self.estimate.values)
 
     def slopes(self, x: Array) -> Array:
-        """n x 2: of the curve by a and b."""
+        """Return the derivatives of the curve by a and b, n x 2."""
         return quadratic(x)
 
 
 def fit_quadratic(
     names: tuple[str, str], x: Array, y: Array, weights: Array | None = None, groups: Array | None = None
 ) -> QuadraticFit:
-    """(Weighted) least squares (6), (7) of two coefficients within their bounds; a group is left out as a whole."""
+    """Fit two coefficients within their bounds, (6), (7); leave-one-out leaves out one group at a time."""
     weights = np.ones_like(x) if weights is None else weights
     groups = np.abs(x) if groups is None else groups
     low, high = bounds(names)
@@ -57,7 +57,7 @@ def fit_quadratic(
 
 
 def quadratic(x: Array) -> Array:
-    """n x 2: |x| x and x, what a and b are the factors of."""
+    """Return |x| x and x, n x 2."""
     return np.column_stack([np.abs(x) * x, x])
 
 

@@ -1,4 +1,4 @@
-"""Drag and β of one axis from measured V_ss and Tau: least squares of their relative errors, in closed form (17)."""
+"""Fit drag and β of one axis to measured V_ss and Tau: least squares of their relative errors, in closed form (17)."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,51 +25,52 @@ from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.uncertainty import is_factor
 
 _DIGITS = 1e-5
-"""Of a relative error: nothing is measured to more digits."""
+"""The smallest possible relative error of a measurement."""
 
 
 @dataclass(frozen=True, eq=False)
 class ResponseFit:
-    """Drag and β of one axis by least squares of the relative errors of V_ss and Tau over n points."""
+    """Drag and β of one axis, fitted to the relative errors of V_ss and Tau at n points."""
 
     axis: Axis
     points: tuple[Point, ...]
     rov: Rov
     estimate: Estimate
     given_thrust: Estimate
-    """The same, were the thrust curve certain; V_ss and Tau are hardly less so if it is not, for drag bends with it."""
+    """The estimate for an exact thrust curve. An error of the curve hardly changes V_ss and Tau, because the drag
+    compensates for it."""
     assumed: Mapping[str, str]
-    """Coefficients that are not identifiable from the points, and what is assumed instead."""
+    """Coefficients that are not identifiable from the points, and the assumption about each."""
     by_thrust: Mapping[str, Array]
-    """p each: by how much its coefficients move with those of the thrust curves that `thrust` is the estimate of."""
+    """The derivatives of the p fitted coefficients by each coefficient of thrust."""
     leave_one_out: Array
-    """n: prediction of every point by a fit without the points of its thrust; NaN where too few are left."""
+    """n: the prediction of every point by a fit without the points of its thrust; NaN where too few remain."""
     choices: tuple[Choice, ...] = ()
-    """What else the drag could be, beside linear and quadratic and the same both ways; whether it is."""
+    """The other forms of drag, and whether the fit has one of them."""
 
     @property
     def model(self) -> Array:
-        """n: the fitted model at every point."""
+        """The fitted model at every point, n."""
         return predict(self.axis, self.rov, self.points)
 
     def rms(self, quantity: str, *, leave_one_out: bool = False) -> float:
-        """RMS relative error over the points of V_ss or Tau that count."""
+        """Return the RMS relative error over the points of V_ss or Tau that count."""
         return relative_rms(self.points, self.leave_one_out if leave_one_out else self.model, quantity)
 
     def band(self, commands: Array) -> tuple[Array, Array, Array, Array]:
-        """95 % confidence band of the curves over commands: V_ss low and high, Tau low and high."""
+        """Return the 95 % confidence band over commands: V_ss low and high, Tau low and high."""
         return response_band(self.axis, self.rov, self.given_thrust, commands)
 
 
 def fit_response(
     axis: Axis, points: Sequence[Point], base: Rov, known: Collection[str] = (), thrust: Estimate | None = None
 ) -> ResponseFit:
-    """Fit what is not known of a_d, b_d and β of the axis; `base` holds the rest, α included.
+    """Fit the unknown coefficients among a_d, b_d and β of the axis; `base` has the others, including α.
 
-    Drag is linear and quadratic, the same both ways. It is less, or by direction, where both the information criterion
-    and leave-one-thrust-out say so, and clearly more so than of any form with some of its coefficients. What is left
-    out keeps its share in the intervals, which are those of the fit with it.
-    `thrust` is the estimate of coefficients of thrust curves, where they were measured; it widens the intervals.
+    The plain form has linear and quadratic drag, the same in both directions. Another form is chosen where both the
+    information criterion and leave-one-thrust-out prefer it, also to every form with some of its coefficients. The
+    intervals are those of the fit with all coefficients, including the ones that are left out.
+    `thrust` is the estimate of measured thrust curves; its uncertainty widens the intervals.
     """
     data = tuple(points)
     plain, *others = (_Candidate(axis, data, form) for form in candidate_forms(axis, data, base, known))
@@ -102,50 +103,50 @@ class _Candidate:
 
     @cached_property
     def aicc(self) -> float:
-        """Of the points that count."""
+        """The information criterion over the points that count."""
         r = self._solution.residuals
         return aicc(float(r @ r), len(self.used), len(self.form.names), _DIGITS)
 
     def estimate(self, at: Rov, thrust: Estimate | None = None) -> Estimate:
-        """Its uncertainty, around other values."""
+        """Return the uncertainty of the fit, around other values."""
         names = self.form.names
         by_thrust = (self._slopes(at, thrust), thrust.covariance) if thrust is not None and names else None
         found = estimate_alike(names, self._solution, len(self.used), by_thrust)
         return replace(found, values=np.array([at[name] for name in names]))
 
     def gains(self, at: Rov, thrust: Estimate) -> dict[str, Array]:
-        """By how much its coefficients, around other values, move with each of thrust."""
+        """Return the derivatives of the fitted coefficients, around other values, by each coefficient of thrust."""
         found = external(self.form.names, self._solution.x)
         scale = np.array([value if is_factor(name) else 1.0 for name, value in found.items()])
         moved = gain(self._solution.jacobian, self._slopes(at, thrust)) * scale[:, None]
         return dict(zip(thrust.names, moved.T, strict=True))
 
     def _slopes(self, at: Rov, thrust: Estimate) -> Array:
-        """Of the residuals by the coefficients of thrust."""
+        """Return the derivatives of the residuals by the coefficients of thrust."""
         steps = {name: 1e-5 * max(abs(at[name]), 0.1) for name in thrust.names}
         values = external(self.form.names, self._solution.x)
         return _slopes(lambda k: _residuals(self.axis, self.used, k, values), self.form.base, steps)
 
     @cached_property
     def leave_one_out(self) -> Array:
-        """Of every point."""
+        """The prediction of every point by a fit without its thrust."""
         return leave_one_out(np.array([level(p) for p in self.points]), self._without)
 
     def _without(self, out: Flags) -> Array | None:
         rest = [p for p, is_out in zip(self.points, out, strict=True) if not is_out and p.weight > 0.0]
         names = self.form.names
-        if not self.form.is_told_by(rest) or len(rest) < len(names):
+        if not self.form.is_identifiable_from(rest) or len(rest) < len(names):
             return None
         start = external(names, self._solution.x)
         other = self.form.base.replaced(external(names, _solve(self.axis, rest, self.form.base, start).x))
         return predict(self.axis, other, [p for p, is_out in zip(self.points, out, strict=True) if is_out])
 
     def is_part_of(self, other: "_Candidate") -> bool:
-        """Whether the other form has all of its coefficients, and more."""
+        """Return True when the other form has all of its coefficients, and more."""
         return set(self.form.names) < set(other.form.names)
 
     def beats(self, other: "_Candidate") -> bool:
-        """Whether neither criterion misses the other form; more coefficients must explain clearly more."""
+        """Return True when both criteria prefer this form; more coefficients must explain clearly more."""
         margin = MARGIN if len(self.form.names) > len(other.form.names) else 0.0
         if not self.aicc + margin < other.aicc:
             return False
@@ -153,7 +154,7 @@ class _Candidate:
         return own <= theirs
 
     def _errors(self, other: "_Candidate") -> tuple[float, float]:
-        """Leave-one-thrust-out errors of the other form and of this one, of the points that both predict."""
+        """Return the leave-one-thrust-out errors of the other form and this one, over points that both predict."""
         both = [
             n
             for n, p in enumerate(self.points)
@@ -164,30 +165,30 @@ class _Candidate:
         return theirs, own
 
     def choice(self, plain: "_Candidate", kept: bool) -> Choice:
-        """What it would change, and whether it does."""
+        """Return the comparison with the plain form, and whether this form is taken."""
         return Choice(self.form.what, kept, plain.aicc - self.aicc, self._errors(plain))
 
 
 def responses(axis: Axis, rov: Rov, commands: Array) -> Array:
-    """n x 2: V_ss and Tau of the model at n commands."""
+    """Return V_ss and Tau of the model at n commands, n x 2."""
     return np.array([rov.response(axis, c) for c in commands.tolist()])
 
 
 def predict(axis: Axis, rov: Rov, points: Sequence[Point], thrust: Sequence[float] | None = None) -> Array:
-    """V_ss or Tau of the model at every point; the thrust before α at each may be given."""
+    """Return V_ss or Tau of the model at every point; the thrust at each, without α, may be given."""
     form, thrust = rov.layout.kinds[axis.name], thrust or [rov.force(axis, p.command) for p in points]
     motions = zip(points, (rov.acceleration_of(form, F) for F in thrust), strict=True)
     return np.fromiter((m.time_constant() if p.quantity == "Tau" else m.steady_velocity() for p, m in motions), float)
 
 
 def holding_force(rov: Rov, axis: Axis, V: float) -> float:
-    """α F that balances drag and constant load at a velocity, a_d V^2 + b_d V = α F + F_0, by its direction."""
+    """Return α F that balances drag and constant load at a velocity: a_d V^2 + b_d V = α F + F_0."""
     plain, form = rov.replaced({axis.coefficient("beta"): 1.0}), rov.layout.kinds[axis.name]
     return -plain.effective_inertia(form) * plain.acceleration_of(form, 0.0).acceleration(V)
 
 
 def relative_rms(points: Sequence[Point], model: Array, quantity: str) -> float:
-    """RMS relative error over the points of one quantity that count; NaN without any."""
+    """Return the RMS relative error over the points of one quantity that count; NaN without any."""
     errors = [
         m / p.value - 1.0
         for p, m in zip(points, model.tolist(), strict=True)
@@ -197,7 +198,7 @@ def relative_rms(points: Sequence[Point], model: Array, quantity: str) -> float:
 
 
 def response_band(axis: Axis, rov: Rov, found: Estimate, commands: Array) -> tuple[Array, Array, Array, Array]:
-    """95 % confidence band of V_ss and Tau over commands, to first order in the estimate."""
+    """Return the 95 % confidence band of V_ss and Tau over commands, to first order in the estimate."""
     steps = {name: 1e-5 * (found[name] or min(found.errors[name], 1.0)) for name in found.names}
     with np.errstate(invalid="ignore"):  # without any drag both are infinite
         curve = responses(axis, rov, commands)
@@ -207,9 +208,9 @@ def response_band(axis: Axis, rov: Rov, found: Estimate, commands: Array) -> tup
 
 
 def _slopes(numbers: Callable[[Rov], Array], rov: Rov, steps: Mapping[str, float]) -> Array:
-    """... x p: derivative of numbers (...) by p of the coefficients, by differences of the given steps: central ones.
+    """Return the derivatives of numbers (...) by p coefficients, ... x p, by differences of the given steps.
 
-    At 0, where drag has its bound, they go upward.
+    The differences are central, and one-sided at 0, where drag has its bound.
     """
     columns = []
     for name, h in steps.items():
@@ -233,7 +234,7 @@ def _residuals(
 
 
 def _start(axis: Axis, used: Sequence[Point], base: Rov, names: tuple[str, ...]) -> dict[str, float]:
-    """Where to begin: half of the drag linear, half quadratic, at the mean V_ss; then β by the mean Tau."""
+    """Return the start of the fit: half of the drag linear, half quadratic at the mean V_ss; then β from Tau."""
     beta, alpha = axis.coefficient("beta"), base[axis.coefficient("alpha")]
     steady = [p for p in used if p.quantity == "V_ss"]
     drag = [d for p in steady if (d := alpha * base.force(axis, p.command) / p.value) > 0.0]

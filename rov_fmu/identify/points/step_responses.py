@@ -1,8 +1,7 @@
-"""From recordings to V_ss and Tau, sections 4.1-4.3: smooth, differentiate, find the steady state, apply (17).
+"""Find V_ss and Tau in recordings, sections 4.1-4.3: smooth, differentiate, find the steady state, apply (17).
 
-V_ss is read off the raw samples, as the slope of the position over the steady part of a hold, or the mean of the
-velocity: there no filter has correlated the sensor's noise yet, and what correlation is left (turbulence) is measured
-and counted.
+V_ss comes from the raw samples: it is the slope of the position over the steady part of a hold, or the mean of the
+velocity. No filter has correlated the noise there, and the remaining correlation (turbulence) is measured and counted.
 """
 
 from collections.abc import Iterator
@@ -17,37 +16,38 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import WINDOW, kernel, robust_deviation, velocity, without_spikes
 
-AGAINST = "moves against the command: no V_ss"
 _SAME_COMMAND = 0.005  # fraction of full thrust
-_LEAST = 20  # samples of a hold, and of its steady part
-_BIAS = 0.002  # of Tau: what the filter bends off at most
+_LEAST = 20
+"""The smallest number of samples of a hold, and of its steady part."""
+_BIAS = 0.002
+"""The largest relative error of Tau due to the filter."""
 
 
 @dataclass(frozen=True)
 class StepResponse:
-    """One held command of a recording, other than zero, and what it tells. Velocities in m/s or rad/s, signed."""
+    """The response to one held command of a recording, other than zero. Velocities in m/s or rad/s, with sign."""
 
     file: str
     start: float
-    """s, of the hold."""
+    """The start of the hold, s."""
     end: float
     before: float | None
-    """Command before; None at the start of the recording."""
+    """The command before; None at the start of the recording."""
     command: float
     V_ss: float | None = None
     V_ss_error: float | None = None
-    """Standard error."""
+    """The standard error of V_ss."""
     steady: tuple[float, float] | None = None
-    """s, the part that V_ss is taken from."""
+    """The start and end of the part that V_ss is taken from, s."""
     Tau: float | None = None
-    """s by (17), of steps from rest."""
+    """The time constant (17) of a step from rest, s."""
     Tau_error: float | None = None
     note: str = ""
-    """Why there is no V_ss or no Tau."""
+    """The reason why there is no V_ss or no Tau."""
 
 
 def steps(recording: Recording) -> tuple[StepResponse, ...]:
-    """The held commands of a recording, other than zero, one after the other; none where the axis had no command."""
+    """Return the responses to the held commands of a recording; none where the axis had no command of its own."""
     if recording.command is None:
         return ()
     there = np.isfinite(recording.values)
@@ -72,11 +72,11 @@ def steps(recording: Recording) -> tuple[StepResponse, ...]:
 
 
 def correlation_time(residuals: Array) -> float:
-    """How many correlated samples tell as much as one independent: 1 + 2 (sum of autocorrelation), 1 for white noise.
+    """Return the number of samples per independent one: 1 + 2 (sum of autocorrelation), 1 for white noise.
 
-    The sum ends where the autocorrelation falls into what white noise has by chance.
+    The sum ends where the autocorrelation is no larger than that of white noise by chance.
     """
-    from scipy.signal import correlate  # late: it takes long to import, and tables need none of it
+    from scipy.signal import correlate  # imported here because it is slow, and tables do not need it
 
     n = len(residuals)
     centred = residuals - residuals.mean()
@@ -89,7 +89,7 @@ def correlation_time(residuals: Array) -> float:
 
 
 def _holds(time: Array, commands: Array) -> Iterator[tuple[float, float, float | None, float]]:
-    """Start and end (s), the command before, and the command of every stretch over which it stays the same."""
+    """Yield start and end (s), the command before and the command of every stretch with a constant command."""
     changes = np.flatnonzero(np.abs(np.diff(commands)) > _SAME_COMMAND) + 1
     before = None
     for first, last in pairwise([0, *changes.tolist(), len(time)]):
@@ -100,7 +100,7 @@ def _holds(time: Array, commands: Array) -> Iterator[tuple[float, float, float |
 
 
 def _steady(step: StepResponse, time: Array, values: Array, is_position: bool) -> StepResponse:
-    """Take the longest end of the hold over which the velocity does not change, but for noise."""
+    """Find V_ss in the longest final part of the hold over which the velocity changes only by noise."""
     even, v = velocity(time, values, is_position=is_position)
     tail = v[int(0.7 * len(v)) :]
     level = float(np.median(tail))
@@ -116,15 +116,15 @@ def _steady(step: StepResponse, time: Array, values: Array, is_position: bool) -
     if drift_error > 0.05 * abs(V):
         return replace(step, note="too short, or too noisy, to tell whether the velocity still changes: no V_ss")
     if V * step.command <= 0.0:
-        return replace(step, note=AGAINST)
-    hidden = hypot(drift, drift_error) / sqrt(12.0)  # as much as may still change without being seen
+        return replace(step, note="moves against the command: no V_ss")
+    hidden = hypot(drift, drift_error) / sqrt(12.0)  # a change that cannot be seen
     return replace(step, V_ss=V, V_ss_error=hypot(error, hidden), steady=(float(time[first]), float(time[-1])))
 
 
 def _level(time: Array, values: Array, is_position: bool) -> tuple[float, float, float, float]:
-    """Mean velocity and its standard error; the change of velocity from start to end, and its standard error.
+    """Return the mean velocity and the change of velocity from start to end, each with its standard error.
 
-    By regression; the errors count correlated residuals.
+    The numbers come from a regression whose errors include the correlation of residuals.
     """
     half = 0.5 * float(time[-1] - time[0])
     s = (time - 0.5 * (time[-1] + time[0])) / half  # -1 ... 1
@@ -141,13 +141,13 @@ def _level(time: Array, values: Array, is_position: bool) -> tuple[float, float,
 
 
 def _rests(time: Array, values: Array, is_position: bool, V_ss: float) -> bool:
-    """Whether nothing moves before the step, as far as the noise lets one tell."""
+    """Return True when nothing moves before the step, within the noise."""
     V, error, *_ = _level(time, values, is_position)
     return error < 0.1 * abs(V_ss) and abs(V) < max(0.03 * abs(V_ss), 2.0 * error)
 
 
 def _rising(step: StepResponse, time: Array, values: Array, is_position: bool) -> StepResponse:
-    """The time at which the smoothed velocity reaches (1 - 1/e) V_ss, (17); the window follows the time constant."""
+    """Find the time when the smoothed velocity reaches (1 - 1/e) V_ss, (17); the window is about the time constant."""
     assert step.V_ss is not None
     assert step.V_ss_error is not None
     window, Tau = max(WINDOW, 0.1 * (step.end - step.start)), nan
@@ -169,7 +169,7 @@ def _rising(step: StepResponse, time: Array, values: Array, is_position: bool) -
 
 
 def _crossing(time: Array, rise: Array) -> float:
-    """When a noisy rise passes 1 - 1/e: the mean of the first and the last time it does on its way to 1; or NaN."""
+    """Return the time when a noisy rise passes 1 - 1/e, the mean of the first and the last crossing; or NaN."""
     high = np.flatnonzero(rise > 0.95)
     top = int(high[0]) + 1 if high.size else len(rise)
     up = np.maximum.accumulate(rise[:top])

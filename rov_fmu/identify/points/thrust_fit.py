@@ -1,4 +1,4 @@
-"""A thrust curve from measured forces, (6), (7): by direction, and with a dead band, where the forces ask for it."""
+"""Fit a thrust curve to measured forces, (6), (7), with reverse coefficients and a dead band where justified."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -25,42 +25,45 @@ from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import quantile
 
-_DIGITS = 1e-5  # of the strongest force: no scale resolves less
-_GRID = {1: 24, 2: 8}  # dead bands to begin with, by how many are fitted
+_DIGITS = 1e-5
+"""The resolution of a scale, relative to the strongest force."""
+_GRID = {1: 24, 2: 8}
+"""The number of dead bands to start from, by the number of dead bands that are fitted."""
 
 
 @dataclass(frozen=True, eq=False)
 class ThrustFit(CurveFit):
-    """Force (N) of all `together` thrusters of a curve over command; the estimate is of those that were fitted."""
+    """Force (N) of all `together` thrusters of a curve over command; the estimate has the fitted coefficients."""
 
     curve: Curve
-    """With the keys that the forces ask for, and the known ones."""
+    """The curve with the keys that the forces justify, and the known ones."""
     values: Mapping[str, float]
     """Every coefficient of the curve but the lag, by name."""
     choices: tuple[Choice, ...] = ()
-    """What else the curve could have, and whether it has."""
+    """The possible extensions of the curve, and whether it has them."""
 
     def value(self, x: Array) -> Array:
-        """The curve."""
+        """Return the curve at x."""
         return forces(self.curve, self.values, x)
 
     def slopes(self, x: Array) -> Array:
-        """n x p: of the curve by what was fitted."""
+        """Return the derivatives of the curve by the fitted coefficients, n x p."""
         return _slopes(self.curve, self.values, x, self.estimate.names)
 
 
 def fit_thrust(
     curve: Curve, x: Array, y: Array, weights: Array | None = None, known: Mapping[str, float] | None = None
 ) -> ThrustFit:
-    """Least squares (6), (7) of forces y over commands x, of the form that the information criterion chooses.
+    """Fit forces y over commands x by least squares, (6), (7); the information criterion chooses the form.
 
-    `known` are coefficients of the curve that are given, by name: the curve has them, and they stay.
+    `known` has the given coefficients of the curve by name; they are not fitted.
     """
     weights = np.ones_like(x) if weights is None else weights
     data = _Data(x, y, weights, dict(known or {}))
     plain, *others = (_Candidate(data, form) for form in _forms(curve, data.known))
     candidates = [plain, *(other for other in others if other.is_identifiable)]
-    least = min(c.aicc for c in candidates)  # not much worse, a dead band stands for a curve that points backward
+    # A dead band is preferred to a curve that points backward, unless it is much worse.
+    least = min(c.aicc for c in candidates)
     sound = [c for c in candidates if not c.points_backward and c.aicc <= least + 2.0 * MARGIN] or candidates
     best = min(c.aicc for c in sound)
     near = [c for c in sound if c.aicc <= best + MARGIN]
@@ -69,14 +72,14 @@ def fit_thrust(
 
 
 def forces(curve: Curve, values: Mapping[str, float], x: Array) -> Array:
-    """n: the forces of all `together` thrusters at once (N), (2)."""
+    """Return the forces of all `together` thrusters (N), (2)."""
     return _slopes(curve, values, x, _linear(curve)) @ [values[name] for name in _linear(curve)]
 
 
 def measured(fits: Iterable[ThrustFit]) -> Estimate | None:
-    """The coefficients of curves as measured; None where there is no telling how well, or they are exact.
+    """Return the joint estimate of curves; None where their uncertainty is unknown or zero.
 
-    Few forces tell their own scatter badly, which Student's distribution counts; from here on the normal one is used.
+    Student's distribution accounts for few forces; here the errors are increased for the normal distribution instead.
     """
     found = []
     for estimate in (fit.estimate for fit in fits):
@@ -98,28 +101,28 @@ _DEAD_BANDS = ((), ("c_0",), ("c_0", "c_0" + REVERSE))
 
 
 def _forms(curve: Curve, known: Collection[str]) -> Iterable[Curve]:
-    """The plain form first: known keys, a_t and b_t; then those with more."""
+    """Return the plain form (known keys, a_t and b_t) and then those with more keys."""
     given = {key for key in curve.keys if key == "T" or curve.coefficient(key) in known}
-    sets = (given | {"a_t", "b_t", *way, *dead} for way, dead in product(((), _BY_DIRECTION), _DEAD_BANDS))
+    sets = (given | {"a_t", "b_t", *reverse, *dead} for reverse, dead in product(((), _BY_DIRECTION), _DEAD_BANDS))
     return [with_keys(curve, keys) for keys in dict.fromkeys(map(frozenset, sets))]
 
 
 def _linear(curve: Curve) -> list[str]:
-    """Names of the coefficients that the force is linear in."""
+    """Return the names of the coefficients that the force is linear in."""
     return [curve.coefficient(key) for key in curve.keys if key.startswith(("a_t", "b_t"))]
 
 
 def _slopes(curve: Curve, values: Mapping[str, float], x: Array, names: Iterable[str]) -> Array:
-    """n x p: derivative of the forces by named coefficients of the curve."""
+    """Return the derivatives of the forces by named coefficients of the curve, n x p."""
     columns = {name: np.zeros(len(x)) for name in names}
     for side, end in ((x > 0.0, ""), (x < 0.0, REVERSE)):
         a_t, b_t, c_0 = (curve.coefficient(key + end) for key in ("a_t", "b_t", "c_0"))
-        m, way = np.maximum(np.abs(x[side]) - values.get(c_0, 0.0), 0.0), np.sign(x[side])
+        m, sign = np.maximum(np.abs(x[side]) - values.get(c_0, 0.0), 0.0), np.sign(x[side])
         for name, slope in ((a_t, m * m), (b_t, m)):
             if name in columns:
-                columns[name][side] += way * slope
+                columns[name][side] += sign * slope
         if c_0 in columns:
-            columns[c_0][side] -= way * (m > 0.0) * (2.0 * values[a_t] * m + values[b_t])
+            columns[c_0][side] -= sign * (m > 0.0) * (2.0 * values[a_t] * m + values[b_t])
     return np.column_stack([*columns.values()])
 
 
@@ -134,7 +137,7 @@ class _Data:
     known: Mapping[str, float]
 
     def levels(self, *ends: str) -> Array:
-        """Strengths of the commands that count, forward (""), in reverse, or both."""
+        """Return the absolute values of the commands that count, forward (""), in reverse, or both."""
         signs = [-1.0 if end else 1.0 for end in ends]
         return np.unique(np.round(np.abs(self.x[(self.weights > 0.0) & np.isin(np.sign(self.x), signs)]), 6))
 
@@ -152,14 +155,14 @@ class _Candidate:
 
     @cached_property
     def aicc(self) -> float:
-        """Of the forces that count."""
+        """The information criterion over the forces that count."""
         r, count = self._solution.residuals, int((self.data.weights > 0.0).sum())
         least = _DIGITS * float(np.abs(np.sqrt(self.data.weights) * self.data.y).max(initial=1e-300))
         return aicc(float(r @ r), count, len(self.names), least)
 
     @property
     def is_identifiable(self) -> bool:
-        """Whether the forces tell all its coefficients, and these are a thruster's."""
+        """True when all coefficients are identifiable and plausible for a thruster."""
         if not np.isfinite(self._estimate.covariance).all() or [*no_thrust(self.curve, self.values, "")]:
             return False
         ends = ("", REVERSE) if "a_t" + REVERSE in self.curve.keys or "c_0" + REVERSE in self.curve.keys else None
@@ -176,7 +179,7 @@ class _Candidate:
 
     @property
     def points_backward(self) -> bool:
-        """Whether weak commands push the other way, which no thruster does: a dead band takes its place."""
+        """True when weak commands push in the opposite direction, which no thruster does."""
         pairs = ((self.curve.coefficient("a_t" + end), self.curve.coefficient("b_t" + end)) for end in ("", REVERSE))
         return any(self.values[b_t] < 0.0 < self.values[a_t] for a_t, b_t in pairs)
 
@@ -186,14 +189,14 @@ class _Candidate:
 
     @cached_property
     def fit(self) -> ThrustFit:
-        """What it tells."""
+        """The result."""
         data = self.data
         groups: Array = np.abs(data.x).round(6)
         out = leave_one_out(groups, self._without)
         return ThrustFit(data.x, data.y, data.weights, self._estimate, out, self.curve, self.values)
 
     def _without(self, out: Flags) -> Array | None:
-        """Prediction of some points by the fit to the others."""
+        """Predict some points by the fit to the others."""
         rest = ~out & (self.data.weights > 0.0)
         J = _slopes(self.curve, self.values, self.data.x[rest], self.names)
         if np.linalg.matrix_rank(J) < len(self.names):
@@ -205,18 +208,18 @@ class _Candidate:
         return {**self.data.known, **dict(zip(self.names, free.tolist(), strict=True))}
 
     def _starts(self) -> list[dict[str, float]]:
-        """Dead bands to begin with: the best of a grid."""
+        """Return the dead bands to start from: the best of a grid."""
         names = [name for name in self.names if name.startswith("c_0")]
         if not names:
             return [{}]
         weakest = self.data.levels("", REVERSE)[:-1]
         grid = np.linspace(0.0, min(float(weakest.max(initial=0.1)), 0.85), _GRID[len(names)])
         starts = [dict(zip(names, dead, strict=True)) for dead in product(grid.tolist(), repeat=len(names))]
-        left = [float(np.sum(self._linear(self._everything, dead).residuals ** 2)) for dead in starts]
-        return [starts[n] for n in np.argsort(left)[:3]]
+        costs = [float(np.sum(self._linear(self._everything, dead).residuals ** 2)) for dead in starts]
+        return [starts[n] for n in np.argsort(costs)[:3]]
 
     def _linear(self, used: Flags, dead: Mapping[str, float]) -> Solution:
-        """All coefficients with the dead bands held."""
+        """Fit all other coefficients with the dead bands held."""
         x, root = self.data.x[used], np.sqrt(self.data.weights[used])
         fixed, free = {**self.data.known, **dead}, [n for n in _linear(self.curve) if n in self.names]
         zero = {**dict.fromkeys(_linear(self.curve), 0.0), **fixed}
@@ -226,7 +229,7 @@ class _Candidate:
         return Solution(np.array([found[n] for n in self.names]), r + J @ [found[n] for n in free], J)
 
     def _solve(self, used: Flags, dead: Mapping[str, float]) -> Solution:
-        """Where dead bands are fitted, from these, and a force begins with its command: b_t is not below 0."""
+        """Fit all coefficients, starting from these dead bands; with a dead band, b_t must not be negative."""
         start = self._linear(used, dead)
         if not dead:
             return start
@@ -242,7 +245,7 @@ class _Candidate:
 
 
 def _choices(chosen: _Candidate, candidates: list[_Candidate]) -> Iterable[Choice]:
-    """What was open, with the best form that has it and the best that has it not."""
+    """Compare the best form with and the best without each extension."""
     for key, what in (
         ("a_t" + REVERSE, "a curve of its own in reverse"),
         ("c_0", "a dead band"),

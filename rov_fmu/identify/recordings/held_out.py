@@ -1,4 +1,4 @@
-"""How well a fit predicts what it has not seen: each recording by a fit to the others."""
+"""How well a fit predicts data it was not fitted to: each recording is predicted by a fit to the others."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,45 +14,45 @@ from rov_fmu.tank.smoothing import velocity, without_spikes
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """One recording that the fit has not seen, n samples evenly spaced."""
+    """The prediction of one recording by a fit to the others, at n evenly spaced samples."""
 
     recording: Recording
     time: Array
     measured: Array
-    """Velocity, smoothed, as the sensor tells it; the prediction is smoothed alike."""
+    """The smoothed velocity of the sensor; the prediction is smoothed in the same way."""
     predicted: Array
     fitted: Array
-    """By the fit to all recordings."""
+    """The velocity by the fit to all recordings."""
     coefficients: Mapping[str, float]
-    """Of the vehicle by the fit to the others."""
+    """The coefficients of the vehicle by the fit to the others."""
 
     @property
     def fit(self) -> float:
-        """Time-domain fit, see `fit_percent`."""
+        """The time-domain fit, see `fit_percent`."""
         return fit_percent(self.measured, self.predicted)
 
     @property
     def error(self) -> float:
-        """Mean square error of the velocity, relative to its own mean square."""
+        """The mean square error of the velocity, relative to its mean square."""
         spread = float(np.mean(self.measured**2))
         return float(np.mean((self.measured - self.predicted) ** 2)) / spread if spread > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """All recordings of an axis, each predicted by a fit to the others, or the halves of a single one."""
+    """The predictions of all recordings of an axis, or of the two halves of a single one."""
 
     predictions: tuple[Prediction, ...]
     by_halves: bool
 
     @property
     def fit(self) -> float:
-        """Over all of them, percent."""
+        """The time-domain fit over all predictions, percent."""
         return self._percent("predicted")
 
     @property
     def possible(self) -> float:
-        """The same of the fit to all recordings: the sensor's noise, differentiated, keeps it below 100."""
+        """The time-domain fit of the fit to all recordings; the sensor's noise keeps it below 100."""
         return self._percent("fitted")
 
     def _percent(self, key: str) -> float:
@@ -61,16 +61,16 @@ class HeldOut:
 
 
 def fit_percent(measured: Array, predicted: Array) -> float:
-    """100 (1 - |v - v_predicted| / |v - mean v|): 100 is perfect, 0 is no better than the mean."""
+    """Return 100 (1 - |v - v_predicted| / |v - mean v|): 100 is perfect, 0 is no better than the mean."""
     spread = float(np.linalg.norm(measured - measured.mean()))
     return 100.0 * (1.0 - float(np.linalg.norm(measured - predicted)) / spread) if spread > 0.0 else float("nan")
 
 
 def hold_out(model: Simulator, x: Array) -> HeldOut:
-    """Every recording of a model of one axis, from near its solution. Raises MotionError.
+    """Predict every recording of a model of one axis, starting near its solution. Raises MotionError.
 
-    The first velocity and position of what is predicted, and the current there, are its own: they tell nothing of the
-    vehicle.
+    The initial velocity and position of a predicted recording, and its current, are fitted to it, because they are
+    independent of the vehicle.
     """
     by_halves = len(model.data) == 1
     parts = _halves(model.data[0]) if by_halves else model.data
@@ -105,5 +105,7 @@ def _prediction(
 
 
 def _halves(data: PreparedRecording) -> tuple[PreparedRecording, PreparedRecording]:
-    first = np.arange(len(data.time)) < len(data.time) // 2  # of its samples: a gap may take most of its time
+    first = (
+        np.arange(len(data.time)) < len(data.time) // 2
+    )  # half of the samples, since a gap may take most of the time
     return data.part(first), data.part(~first)

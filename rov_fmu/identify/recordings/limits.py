@@ -1,4 +1,4 @@
-"""Within which numbers a fit is sought: beyond them no vehicle is, and what ends there is nonsense."""
+"""The limits of a fit. No vehicle is beyond them, so a fit that ends at a limit is refused."""
 
 from collections.abc import Iterator, Sequence
 from math import exp, log
@@ -14,8 +14,10 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 
 _LEAST_BETA = 1e-3
-_LOAD = 1.5  # of the strongest thrust: against more no vehicle is driven
-_DRAG = 20.0  # of what would hold the strongest thrust at the highest velocity seen
+_LOAD = 1.5
+"""The largest load, relative to the strongest thrust."""
+_DRAG = 20.0
+"""The largest drag, relative to the one that balances the strongest thrust at the highest velocity."""
 
 _EXTRAS: dict[EffectKind, tuple[float, float]] = {
     "delay": (-2.0, 5.0),
@@ -23,20 +25,20 @@ _EXTRAS: dict[EffectKind, tuple[float, float]] = {
     "current north": (-3.0, 3.0),
     "current east": (-3.0, 3.0),
     "lag": (0.05, 10.0),
-    "dead band": (-0.2, 0.3),  # below 0 is none: a search that ends at a bound is slow
+    "dead band": (-0.2, 0.3),  # a value below 0 means no dead band; a search that ends at a bound is slow
     "reverse thrust": (0.05, 20.0),
     "reverse drag": (0.05, 20.0),
 }
 
 
 class NoFitError(ValueError):
-    """Recordings that no vehicle fits: one line, that names the axis and its files."""
+    """Recordings that no vehicle fits; the message is one line with the axis and its files."""
 
 
 def limits(
     base: Rov, data: Sequence[PreparedRecording], names: Sequence[str], extras: Sequence[Extra], size: int
 ) -> tuple[Array, Array]:
-    """Lower and upper limits of x: coefficients (internal), extras, and what may be anything."""
+    """Return lower and upper limits of x: coefficients (internal), extras, and unlimited initial values."""
     low, high = bounds(names, size - len(names))
     for axis in axes_of(data):
         strongest, fastest = _strongest(base, axis), max(d.speed for d in data if d.axis is axis)
@@ -46,7 +48,7 @@ def limits(
                     high[names.index(name)] = min(high[names.index(name)], _DRAG * strongest / fastest**power)
         if (beta := axis.coefficient("beta")) in names:
             low[names.index(beta)] = log(_LEAST_BETA)
-    for curve in base.layout.curves:  # beyond a dead band the force begins with the command
+    for curve in base.layout.curves:  # with a dead band, b_t must not be negative
         if curve.coefficient("c_0") in names or Extra("dead band", curve.name) in extras:
             for name in {curve.coefficient("b_t"), curve.coefficient("b_t" + REVERSE)} & {*names}:
                 low[names.index(name)] = 0.0
@@ -59,14 +61,14 @@ def limits(
     return low, high
 
 
-def refuse_nonsense(
+def check_limits(
     base: Rov, data: Sequence[PreparedRecording], names: Sequence[str], extras: Sequence[Extra], x: Array
 ) -> None:
-    """Nothing may end at a limit that only nonsense reaches. Raises NoFitError."""
+    """Check that no drag, β or load is at its limit. Raises NoFitError."""
     low, high = limits(base, data, names, extras, len(x))
     for axis in axes_of(data):
         own = [d.recording for d in data if d.axis is axis]
-        if what := next(_ends(axis, own, names, extras, x, low, high), None):
+        if what := next(_at_limit(axis, own, names, extras, x, low, high), None):
             files = ", ".join(dict.fromkeys(r.file for r in own))
             raise NoFitError(
                 f"{files}: no {axis.name} of a vehicle with this thrust and mass moves so: {what} would do it best. "
@@ -74,7 +76,7 @@ def refuse_nonsense(
             )
 
 
-def _ends(
+def _at_limit(
     axis: Axis,
     own: Sequence[Recording],
     names: Sequence[str],
@@ -83,7 +85,7 @@ def _ends(
     low: Array,
     high: Array,
 ) -> Iterator[str]:
-    """What stops at a limit, in words."""
+    """Yield a phrase for each coefficient or load at its limit."""
     near = np.where(np.isfinite(high - low), 1e-6 * (high - low), 0.0)
     at_low, at_high = x <= low + near, x >= high - near
     drag = [axis.coefficient(key + end) for key in ("a_d", "b_d") for end in ("", REVERSE)]
@@ -97,6 +99,6 @@ def _ends(
 
 
 def _strongest(base: Rov, axis: Axis) -> float:
-    """Thrust along an axis, N or N.m."""
+    """Return the strongest thrust along an axis, N or N.m."""
     force = base[axis.coefficient("alpha")] * base.strongest(axis)
     return force if force > 0.0 else 1e6

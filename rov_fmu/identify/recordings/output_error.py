@@ -1,10 +1,10 @@
-"""Drag, β and what else acts, from whole recordings: the simulated output against the measured one (output error).
+"""Fit drag, β and optional effects to whole recordings: simulated against measured output (output error).
 
-What the sensor measures is fitted, depth or heading and not its derivative, so white noise of the sensor stays white.
-Commands and motion tell A, B and C of v' = C - B v - A |v| v: with thrust, inertia and α given, a_d, b_d and β; and the
-load, the delay, the current, the lag, and what differs in reverse, as far as they show. Motion under many commands
-tells the shape of the thrust curve too, so a curve from tests takes part, as uncertain as they left it; then all axes
-that share it are fitted at once. Each recording adds its first velocity and position.
+The fit compares what the sensor measures, such as a depth and not its derivative, so white noise stays white. Commands
+and motion determine A, B and C of v' = C - B v - A |v| v, and with given thrust, inertia and α also a_d, b_d and β.
+Load, delay, current, lag and different coefficients in reverse are fitted where they are identifiable. Motion under
+many commands also determines the shape of the thrust curve, so a tested curve takes part with its uncertainty, and all
+axes that share it are fitted at once. Each recording adds its initial velocity and position.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -19,7 +19,7 @@ from rov_fmu.identify.effects.coupling import EAST, NORTH, is_in_flow
 from rov_fmu.identify.effects.extras import Extra
 from rov_fmu.identify.least_squares import Estimate, Loss, external
 from rov_fmu.identify.recordings.held_out import HeldOut, hold_out
-from rov_fmu.identify.recordings.limits import refuse_nonsense
+from rov_fmu.identify.recordings.limits import check_limits
 from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit, effects_of, estimate_of, part_of
 from rov_fmu.identify.recordings.residual_analysis import ResidualAnalysis
 from rov_fmu.identify.recordings.runs import PreparedRecording, axes_of, prepare
@@ -32,13 +32,17 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation, white_noise
 
-_BETAS = (0.03, 0.1, 0.3, 1.0, 3.0)  # to begin with
+_BETAS = (0.03, 0.1, 0.3, 1.0, 3.0)  # starts
 _DELAYS = (0.0, 0.3)
 _STARTS = 3
-_BEYOND_DOUBT = 100.0  # of Wald's statistic: no recording has to be left out to see it
-_GOOD = 1.5  # cost of a sample: white noise has 1.36, so there is nothing better to find
-_FEW = 200  # samples of a recording, to begin with
-_LONG = 100.0  # s of a recording, to begin with
+_BEYOND_DOUBT = 100.0
+"""The value of Wald's statistic from which no held-out prediction is needed."""
+_GOOD = 1.5
+"""The cost per sample of a fit that cannot become much better; white noise has 1.36."""
+_FEW = 200
+"""The number of samples of a recording in the search for a start."""
+_LONG = 100.0
+"""The length of a recording in the search for a start, s."""
 
 
 def fit_recordings(
@@ -49,20 +53,19 @@ def fit_recordings(
     loss: Loss = "huber",
     lag: Collection[str] = (),
 ) -> tuple[RecordingsFit, ...]:
-    """Fit what is not known of drag and β of every axis recorded, and what else acts; `base` holds the rest, and α.
+    """Fit the unknown drag and β of every recorded axis, and optional effects; `base` has the other coefficients.
 
-    `thrust` is the estimate of curves by tests, where they are not known; `lag` has the curves whose lag is sought.
-    The intervals count the correlation that the residuals have beyond white noise. Raises MotionError,
-    NoFitError.
+    `thrust` is the estimate of tested curves; `lag` has the curves whose lag is fitted. The intervals account for the
+    correlation of the residuals. Raises MotionError or NoFitError.
     """
     order = list(base.layout.kinds)
     data = tuple(prepare(r, base) for r in sorted(recordings, key=lambda r: order.index(r.axis.name)))
-    with threadpool_limits(1, user_api="blas"):  # for systems this small threads only get in each other's way
+    with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
         return _Fit(data, base, known, thrust, loss).choose(tuple(candidates(data, base, known, lag)))
 
 
 def drag_and_beta(base: Rov, axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:
-    """Names of the coefficients of drag and β of an axis, as far as they are not known."""
+    """Return the names of the unknown coefficients of drag and β of an axis."""
     form = base.layout.kinds[axis.name]
     names = (form.coefficient(key) for key in ("a_d", "b_d", "a_d_reverse", "b_d_reverse", "beta"))
     return tuple(name for name in dict.fromkeys(names) if name not in known)
@@ -70,7 +73,7 @@ def drag_and_beta(base: Rov, axis: Axis, known: Collection[str] = ()) -> tuple[s
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """The recordings of some axes, to fit one model or another to."""
+    """The recordings of some axes, and the fits of different models to them."""
 
     data: tuple[PreparedRecording, ...]
     base: Rov
@@ -80,17 +83,17 @@ class _Fit:
 
     @property
     def axes(self) -> list[Axis]:
-        """Those recorded."""
+        """The recorded axes."""
         return axes_of(self.data)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The coefficients to find: of thrust, then of each axis."""
+        """The coefficients to fit: those of thrust, then those of each axis."""
         drag = (name for axis in self.axes for name in drag_and_beta(self.base, axis, self.known))
         return (*(self.thrust.names if self.thrust else ()), *drag)
 
     def choose(self, extras: tuple[Extra, ...]) -> tuple[RecordingsFit, ...]:
-        """Begin near, look for every extra, and leave out what does not earn its place."""
+        """Find a start, fit all extras, and leave out those that the data do not justify."""
         coefficients, values = dict(self.thrust.named if self.thrust else {}), {e: _begin(e) for e in extras}
         noise = np.array([_at_least(white_noise(d.values), d) for d in self.data])
         for axis in self.axes:
@@ -98,14 +101,16 @@ class _Fit:
             near, found = alone.near(axis, extras, noise[[d.axis is axis for d in self.data]])
             coefficients |= near
             values |= found
-        model = replace(self, data=tuple(d.thinned() for d in self.data)).model(extras, noise, said=True)
+        model = replace(self, data=tuple(d.thinned() for d in self.data)).model(extras, noise, with_prior=True)
         x = solve(model, model.start(coefficients, values), "linear", 1e-4).x
-        refuse_nonsense(self.base, model.data, model.names, extras, x)
+        check_limits(self.base, model.data, model.names, extras, x)
         noise = self.noise(extras, x)
-        whole = self.analysed(self.model(extras, noise, said=True), x, 1e-5)  # what cannot be told is slow to settle
+        whole = self.analysed(
+            self.model(extras, noise, with_prior=True), x, 1e-5
+        )  # unidentifiable extras settle slowly
         kept, x = earn_their_place(whole)
         chosen = self.analysed(self.model(kept, noise), x)
-        while (fewer := earn_their_place(chosen))[0] != kept:  # what was dropped was so to first order
+        while (fewer := earn_their_place(chosen))[0] != kept:  # extras were dropped to first order only
             kept, x = fewer
             chosen = self.analysed(self.model(kept, noise), x)
         chosen = self.simplest(chosen, noise)
@@ -113,22 +118,22 @@ class _Fit:
         if (better := self.voted(chosen)) != kept:
             x = chosen.x[chosen.model.places_of(better)]
             kept, chosen = better, self.analysed(self.model(better, noise), x)
-        refuse_nonsense(self.base, self.data, chosen.model.names, kept, chosen.x)
+        check_limits(self.base, self.data, chosen.model.names, kept, chosen.x)
         effects = effects_of(whole, kept) | effects_of(chosen, kept)
         return tuple(self._result(axis, chosen, effects) for axis in self.axes)
 
     def simplest(self, analysis: ResidualAnalysis, noise: Array) -> ResidualAnalysis:
-        """Without extras that together tell too little, by the Bayesian criterion.
+        """Drop groups of extras that are not justified together, by the Bayesian criterion.
 
-        Load, current and what differs by direction stand in for each other, so each may pass alone and yet all of them
-        tell nothing: motion one way is the same with more current, more load and less linear drag.
+        Load, current and coefficients by direction can replace each other, so each may be significant although all of
+        them explain nothing: motion in one direction is the same with more current, more load and less linear drag.
         """
         kept = analysis.model.extras
         currents = {e for e in kept if e.kind == "current"}
         others = {e for e in kept if e.kind == "load" or e.pairs()} if currents else set()
         each = np.log(max(analysis.degrees_of_freedom, 8.0))
         for dropped in dict.fromkeys(map(frozenset, (currents | others, others, currents))):
-            if len(dropped) > 1:  # Wald's statistic will not do: what stands in for each other is far from linear
+            if len(dropped) > 1:  # the effect of such extras is not linear, so Wald's statistic does not hold
                 without = tuple(e for e in kept if e not in dropped)
                 start = analysis.x[analysis.model.places_of(without)]
                 other = self.analysed(self.model(without, noise), start, 1e-4)
@@ -137,7 +142,7 @@ class _Fit:
         return analysis
 
     def voted(self, analysis: ResidualAnalysis) -> tuple[Extra, ...]:
-        """The extras without those that differ by direction and do not help to predict a recording by the others."""
+        """Return the extras without ratios by direction that do not improve the held-out predictions."""
         kept = analysis.model.extras
         for extra in (e for e in kept if e.pairs() and analysis.significance(e) < _BEYOND_DOUBT):
             without = tuple(e for e in kept if e != extra)
@@ -149,7 +154,7 @@ class _Fit:
         return kept
 
     def held_out(self, axis: Axis, analysis: ResidualAnalysis, extras: Collection[Extra]) -> HeldOut:
-        """Each recording of an axis by the others, the thrust curve as all of them have it."""
+        """Predict each recording of an axis by the others, with the thrust curve of the fit to all."""
         rov, values = analysis.model.rov(analysis.x), analysis.model.extra_values(analysis.x)
         data = tuple(_in_flow(d, values) for d in self.data if d.axis is axis)
         alone = replace(self, data=data, base=self.base.replaced(_common(rov, self.base)), thrust=None)
@@ -167,19 +172,19 @@ class _Fit:
         return hold_out(model, np.concatenate([x[: model.shared], *initial]))
 
     def near(self, axis: Axis, extras: Sequence[Extra], noise: Array) -> tuple[dict[str, float], dict[Extra, float]]:
-        """Coefficients of one axis and the extras that act on it, thrust as it is, from many starts."""
+        """Find coefficients of one axis and the extras that act on it from many starts, with fixed thrust."""
         own = {axis.name, *(curve.name for curve in curves_of(self.base.layout, axis))}
         concerned = tuple(
             e
             for e in extras
             if e.of in own
-            # what flows is felt along the surface
+            # a current acts horizontally
             or (e.is_current and axis is not YAW and any(e.concerns(d.recording) for d in self.data))
         )
-        model = self.model(concerned, noise, said=True)
+        model = self.model(concerned, noise, with_prior=True)
         delay = Extra("delay", axis.name)
         begin = {e: _begin(e) for e in concerned}
-        starts = [model.start(self.guess(axis, beta), {**begin, delay: late}) for beta in _BETAS for late in _DELAYS]
+        starts = [model.start(self.guess(axis, beta), {**begin, delay: s}) for beta in _BETAS for s in _DELAYS]
         costs = sorted(((_cost(model, x), n) for n, x in enumerate(starts)))
         near = [starts[n] for cost, n in costs[:_STARTS] if np.isfinite(cost)]
         if not near:
@@ -188,14 +193,14 @@ class _Fit:
         for start in near:
             try:
                 x = min(x, solve(model, start, "linear", 1e-4).x, key=lambda x: _cost(model, x))
-            except MotionError:  # a start too far off; the others are not
+            except MotionError:  # this start is too far off
                 continue
             if _cost(model, x) < _GOOD * len(model.residuals(x)):
                 break
         return external(model.names, x), model.extra_values(x)
 
     def guess(self, axis: Axis, beta: float) -> dict[str, float]:
-        """Drag half linear, half quadratic, such that the strongest force gives about the highest speed."""
+        """Return a start with half linear, half quadratic drag, so that the strongest force gives the highest speed."""
         data = [d for d in self.data if d.axis is axis]
         fastest = max(data, key=lambda d: d.speed)
         force = self.base.strongest(axis)
@@ -209,21 +214,21 @@ class _Fit:
         }
 
     def first_in(self, recording: Recording) -> Axis | None:
-        """The axis that tells of the current in a file."""
+        """Return the first axis in a file along which the current is seen."""
         file = recording.file
         return next((d.axis for d in self.data if d.recording.file == file and is_in_flow(d.recording)), None)
 
-    def model(self, extras: tuple[Extra, ...], noise: Array, *, said: bool = False) -> Simulator:
-        """With these extras; `said` whether they are likely to be none."""
-        far = likely(extras, self.data, self.base) if said else None
-        return Simulator(self.data, self.base, self.names, extras, noise, self.thrust, far)
+    def model(self, extras: tuple[Extra, ...], noise: Array, *, with_prior: bool = False) -> Simulator:
+        """Return the model with these extras; the prior pulls them to their neutral values."""
+        deviations = likely(extras, self.data, self.base) if with_prior else None
+        return Simulator(self.data, self.base, self.names, extras, noise, self.thrust, deviations)
 
     def analysed(self, model: Simulator, start: Array, tolerance: float = 1e-8) -> ResidualAnalysis:
-        """The best fit."""
+        """Fit the model and analyse the residuals."""
         return ResidualAnalysis(model, solve(model, start, self.loss, tolerance), robust=self.loss == "huber")
 
     def noise(self, extras: tuple[Extra, ...], x: Array) -> Array:
-        """Standard deviation of each recording's residuals, robust."""
+        """Return the robust standard deviation of each recording's residuals."""
         plain = self.model(extras, np.ones(len(self.data)))
         residuals = plain.residuals(x)
         return np.array([_at_least(robust_deviation(residuals[rows]), d) for d, rows, *_ in plain.places])
@@ -250,7 +255,7 @@ class _Fit:
 
 
 def _cost(model: Simulator, x: Array) -> float:
-    """Of a robust fit; infinite where the motion cannot be computed."""
+    """Return the cost of a robust fit; infinite where the motion cannot be computed."""
     cost = float(np.sum(np.sqrt(1.0 + model.residuals(x) ** 2)))
     return cost if np.isfinite(cost) else float("inf")
 
@@ -260,18 +265,18 @@ def _ends(command: Array) -> tuple[float, float]:
 
 
 def _in_flow(data: PreparedRecording, values: Mapping[Extra, float]) -> PreparedRecording:
-    """With the current of its file, which is found by several axes and tells nothing of the vehicle."""
+    """Set the current of the recording's file to the fitted one, which is independent of the vehicle."""
     of: dict[str, float] = {e.kind: value for e, value in values.items() if e.concerns(data.recording)}
     return replace(data, current=(of.get(NORTH, 0.0), of.get(EAST, 0.0)))
 
 
 def _glimpse(data: PreparedRecording) -> PreparedRecording:
-    """A little of a recording, to begin with."""
+    """Return a short part of a recording, to search for a start."""
     return data.liveliest(_LONG).thinned(_FEW)
 
 
 def _begin(extra: Extra) -> float:
-    """Where the search for an extra starts."""
+    """Return the start of the search for an extra."""
     return {"lag": 0.1, "dead band": 0.02}.get(extra.kind, extra.neutral)
 
 
@@ -280,5 +285,5 @@ def _at_least(noise: float, data: PreparedRecording) -> float:
 
 
 def _common(rov: Rov, base: Rov) -> dict[str, float]:
-    """The numbers of a vehicle that another one has too."""
+    """Return the coefficients of `rov` that `base` has too."""
     return {name: rov[name] for name in base.coefficients}

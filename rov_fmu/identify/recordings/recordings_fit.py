@@ -1,4 +1,4 @@
-"""What the recordings of an axis tell: coefficients with their uncertainty, and what else acts."""
+"""The fit to the recordings of an axis: coefficients with their uncertainty, and other effects."""
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -18,12 +18,13 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 _DISAGREEMENT = 3.0
-"""Times a standard error: three recordings of what the model has differ by more once in 10,000 cases."""
+"""The ratio to the standard error that counts as disagreement. If the model holds, three recordings differ by more once
+in 10,000 cases."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Something beside thrust, drag and β that acts in the recordings, or was looked for in vain."""
+    """An effect in addition to thrust, drag and β that was fitted to the recordings, whether or not it is kept."""
 
     kind: EffectKind
     of: str
@@ -31,37 +32,38 @@ class Effect:
     unit: str
     value: float
     interval: tuple[float, float] | None
-    """95 %; None where it cannot be told."""
+    """The 95 % interval; None where the effect is not identifiable."""
     kept: bool
-    """Whether it earns its place in the fit; if not, it is as if it were not there."""
+    """True when the data justify the effect; otherwise the fit is without it."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordingsFit:
-    """What the recordings of one axis tell."""
+    """The fit to the recordings of one axis."""
 
     axis: Axis
     rov: Rov
-    """With the coefficients that were found, and those that came with them: F_0, T, reverse."""
+    """The vehicle with the fitted coefficients, including those of effects: F_0, T, reverse."""
     together: Estimate
-    """Of all that the axes recorded have, and their thrust curves; those standard errors are not widened."""
+    """The estimate of all axes that were fitted at once and their thrust curves; its errors are not widened."""
     estimate: Estimate
-    """Of what concerns this axis."""
+    """The estimate of the coefficients of this axis."""
     simulations: tuple[Simulation, ...]
     effects: tuple[Effect, ...]
     hold_out: Callable[[], HeldOut] = field(repr=False)
     disagreement: Mapping[str, float] = field(default_factory=dict)
-    """By how much standard errors were widened, since the recordings disagree: see `spread`."""
+    """The factors by which standard errors were widened because the recordings disagree, see `spread`."""
 
     @cached_property
     def held_out(self) -> HeldOut:
-        """Each recording predicted by the others; takes its time when it is first asked for. Raises MotionError."""
+        """The prediction of each recording by the others, computed at the first use. Raises MotionError."""
         return self.hold_out()
 
     def spread(self) -> dict[str, float]:
-        """How far the recordings disagree on a coefficient: its jackknife standard error by that of the fit.
+        """Return the ratio of the jackknife standard error to that of the fit, by coefficient.
 
-        Of those that differ by more than chance explains; there must be three recordings. Raises MotionError.
+        Only ratios that chance does not explain are returned, and none for less than three recordings. Raises
+        MotionError.
         """
         found, n = {}, len(self.held_out.predictions)
         if n < 3 or self.held_out.by_halves:
@@ -75,31 +77,30 @@ class RecordingsFit:
         return found
 
     def delay_of(self, file: str) -> float:
-        """By how much the commands of a recording act late, s."""
-        late = (e.value for e in self.effects if e.kept and e.kind == "delay" and e.of in (self.axis.name, file))
-        return sum(late)
+        """Return the delay from the commands of a recording to the motion, s."""
+        delays = (e.value for e in self.effects if e.kept and e.kind == "delay" and e.of in (self.axis.name, file))
+        return sum(delays)
 
     def widened(self) -> "RecordingsFit":
-        """With standard errors as large as the recordings disagree. Raises MotionError."""
-        by = self.spread()
-        factors = np.array([by.get(name, 1.0) for name in self.estimate.names])
+        """Increase the standard errors to the disagreement of the recordings. Raises MotionError."""
+        spread = self.spread()
+        factors = np.array([spread.get(name, 1.0) for name in self.estimate.names])
         wide = replace(self.estimate, covariance=self.estimate.covariance * np.outer(factors, factors))
-        other = replace(self, estimate=wide, disagreement=by)
-        other.__dict__["held_out"] = self.held_out  # it took its time
-        return other
+        held_out = self.held_out  # is slow, so the copy must not compute it again
+        return replace(self, estimate=wide, disagreement=spread, hold_out=lambda: held_out)
 
     @property
     def method(self) -> str:
-        """In words."""
+        """A phrase about the method."""
         return f"output error over {count(len(self.simulations), 'recording')}"
 
     def band(self, commands: Array) -> tuple[Array, Array, Array, Array]:
-        """95 % confidence band of the curves over commands: V_ss low and high, Tau low and high."""
+        """Return the 95 % confidence band over commands: V_ss low and high, Tau low and high."""
         return response_band(self.axis, self.rov, self.estimate, commands)
 
 
 def estimate_of(analysis: ResidualAnalysis) -> Estimate:
-    """Of the coefficients of the vehicle, those that come with extras among them."""
+    """Return the estimate of the vehicle's coefficients, including those that extras set."""
     model = analysis.model
     rov, p = model.rov(analysis.x), len(model.names)
     slopes: dict[str, Array] = {}
@@ -123,7 +124,7 @@ def estimate_of(analysis: ResidualAnalysis) -> Estimate:
 
 
 def part_of(together: Estimate, axis: Axis, rov: Rov) -> Estimate:
-    """The part of the coefficients that concern an axis."""
+    """Return the estimate of the coefficients of an axis and its thrust curves."""
     form = rov.layout.kinds[axis.name]
     concerned = {form.coefficient(key) for key in (*form.keys, "beta")}
     concerned |= {c.coefficient(key) for c in curves_of(rov.layout, axis) for key in c.keys}
@@ -131,7 +132,7 @@ def part_of(together: Estimate, axis: Axis, rov: Rov) -> Estimate:
 
 
 def effects_of(analysis: ResidualAnalysis, kept: Collection[Extra]) -> dict[Extra, Effect]:
-    """Each extra of a fit with its 95 % interval, and whether it is among those kept."""
+    """Return the effect of each extra of a fit, with its 95 % interval."""
     model, found, reach = analysis.model, analysis.covariance(), quantile(max(analysis.degrees_of_freedom, 1.0))
     effects = {}
     for n, (extra, value) in enumerate(model.extra_values(analysis.x).items(), len(model.names)):
@@ -143,6 +144,6 @@ def effects_of(analysis: ResidualAnalysis, kept: Collection[Extra]) -> dict[Extr
 
 
 def count(n: int, what: str) -> str:
-    """1 force, 2 forces."""
+    """Return a count with its noun, such as "1 force" or "2 forces"."""
     many = f"{what.removesuffix('y')}ies" if what.endswith("y") else f"{what}s"
     return f"{n} {what if n == 1 else many}"

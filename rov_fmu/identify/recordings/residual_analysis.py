@@ -1,4 +1,4 @@
-"""Noise, correlation and outliers of a solution's residuals, and the uncertainty of the parameters that follows."""
+"""Noise, correlation and outliers of the residuals, and the resulting uncertainty of the parameters."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation
 
-_COLOURED = 2.0  # samples of correlation; below, a fit takes nothing to speak of from the noise
+_COLOURED = 2.0
+"""The correlation time in samples from which a fit absorbs a relevant part of the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,22 +26,22 @@ class Simulation:
     measured: Array
     modelled: Array
     velocity: Array
-    """Of the model, through the water."""
+    """The velocity of the model through the water."""
     noise: float
-    """Standard deviation of the residuals, robust."""
+    """The robust standard deviation of the residuals."""
     correlation_time: float
-    """Of the noise, in samples; 1 where it is white."""
+    """The correlation time of the noise in samples; 1 for white noise."""
     outliers: int
-    """Samples farther off than 2.5 standard deviations, which count less than their square."""
+    """The number of samples beyond 2.5 standard deviations, which count less than their square."""
 
     @property
     def residuals(self) -> Array:
-        """Measured less modelled."""
+        """The measured less the modelled values."""
         return self.measured - self.modelled
 
 
 class ResidualAnalysis:
-    """Of a solution of a simulator's recordings."""
+    """The analysis of the residuals of a fit to recordings."""
 
     def __init__(self, model: Simulator, solution: Solution, *, robust: bool) -> None:
         self.x, self.model = solution.x, model
@@ -50,7 +51,7 @@ class ResidualAnalysis:
         self.simulations: list[Simulation] = []
         self.degrees_of_freedom = float(len(model.thrust.names) if model.thrust else 0) - len(self.x)
         excess = len(r) / (len(r) - len(self.x))
-        rest = slice(sum(len(d.time) for d in model.data), None)  # the thrust curve and what extras are likely to be
+        rest = slice(sum(len(d.time) for d in model.data), None)  # the priors of the thrust curve and of the extras
         self.gram, self.meat = (J * inside[:, None]).T @ J, J[rest].T @ J[rest]
         size = np.abs(r)
         losses = np.where(inside, r * r, (2.0 * size - HUBER) * HUBER)
@@ -71,21 +72,21 @@ class ResidualAnalysis:
                 Simulation(d.recording, d.time, d.values, output.values, output.velocity, noise, correlation, outliers)
             )
         self.cost = np.array(cost)
-        """Of each recording: the sum of what is minimized."""
+        """The contribution of each recording to the cost."""
 
     def gain(self, other: "ResidualAnalysis") -> float:
-        """By how much the cost is lower than another model's, correlated residuals counting as so many fewer.
+        """Return the reduction of the cost relative to another model, for the number of independent residuals.
 
-        How far they are correlated is told by this model, the larger one: misfit makes another's more so.
+        The correlation is that of this model, the larger one, because misfit increases it.
         """
         correlation = np.array([s.correlation_time for s in self.simulations])
         return float(np.sum((other.cost - self.cost) / correlation))
 
     def significance(self, extra: Extra) -> float:
-        """Wald's statistic: about what the cost would rise by without it."""
+        """Return Wald's statistic, about the increase of the cost without the extra."""
         n = len(self.model.names) + self.model.extras.index(extra)
         return float((self.x[n] - extra.neutral) ** 2 / self.covariance()[n, n])
 
     def covariance(self) -> Array:
-        """Of the parameters of a robust fit; correlated residuals count as so many fewer."""
+        """Return the covariance of the parameters of a robust fit, increased for correlated residuals."""
         return covariance(self.gram, self.meat)

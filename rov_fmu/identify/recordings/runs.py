@@ -1,4 +1,4 @@
-"""Recordings cut into steps that the series can take, with the forces of the thrusters in each."""
+"""Cut recordings into steps for the series, with the forces of the thrusters in each step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,55 +16,58 @@ from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import velocity, without_spikes
 
-_MOST_PARTS = 64  # of an interval between two samples
-_FEW = 500  # samples of a recording that is thinned
-_FEWEST = 50  # samples of a part of one
+_MOST_PARTS = 64
+"""The largest number of steps between two samples."""
+_FEW = 500
+"""The number of samples of a thinned recording."""
+_FEWEST = 50
+"""The smallest number of samples of a part of a recording."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedRecording:
-    """A recording ready to be simulated: J holds of the commands, and the n measured samples."""
+    """A recording that is ready to be simulated, with J holds of the commands and n measured samples."""
 
     recording: Recording
     switches: Array
-    """J: the time from which each is held, s."""
+    """J: the time at which each hold begins, s."""
     commands: Array
-    """J x thrusters: what reaches each."""
+    """J x thrusters: the command of each."""
     time: Array
     values: Array
     velocity: Array
-    """n: about the velocity, smoothed."""
+    """n: the smoothed velocity."""
     current: Current = (0.0, 0.0)
-    """Of the water as far as it is known before."""
+    """The known part of the current."""
     reach: float = REACH
-    """Of its steps."""
+    """The largest rate times length of its steps."""
 
     @property
     def axis(self) -> Axis:
-        """Its axis."""
+        """The axis of the recording."""
         return self.recording.axis
 
     @property
     def initial_count(self) -> int:
-        """Number of its initial values: of the velocity, of the position where that is measured."""
+        """The number of initial values: the velocity, and the position where that is measured."""
         return 2 if self.recording.is_position else 1
 
     @cached_property
     def speed(self) -> float:
-        """About the highest."""
+        """About the highest speed."""
         return float(np.quantile(np.abs(self.velocity), 0.95))
 
     @cached_property
     def carried(self) -> Array:
-        """2 x n: what a current of 1 m/s, north and east, adds to the samples."""
+        """The change of the samples due to a current of 1 m/s north and east, 2 x n."""
         return carried(self.recording, self.time)
 
     def part(self, which: slice | Flags) -> "PreparedRecording":
-        """With some of its samples."""
+        """Return the recording with some of its samples."""
         return replace(self, time=self.time[which], values=self.values[which], velocity=self.velocity[which])
 
     def liveliest(self, seconds: float) -> "PreparedRecording":
-        """The part of at most so many seconds over which the velocity varies most."""
+        """Return the part of at most so many seconds in which the velocity varies most."""
         if self.time[-1] - self.time[0] <= seconds:
             return self
         starts = np.arange(self.time[0], self.time[-1] - seconds, 0.25 * seconds)
@@ -77,18 +80,18 @@ class PreparedRecording:
         return self.part(part)
 
     def thinned(self, few: int = _FEW) -> "PreparedRecording":
-        """With some of its samples, without spikes, and computed with less precision."""
+        """Return the recording with fewer samples, without spikes, for computations with less precision."""
         some = slice(None, None, max(1, len(self.time) // few))
         return replace(self, values=without_spikes(self.values), reach=ROUGH).part(some)
 
 
 def axes_of(data: Sequence[PreparedRecording]) -> list[Axis]:
-    """The axes of recordings."""
+    """Return the axes of recordings."""
     return list({d.axis.name: d.axis for d in data}.values())
 
 
 def prepare(recording: Recording, base: Rov) -> PreparedRecording:
-    """Find the holds, from the one of the first measured sample on."""
+    """Prepare a recording: find the holds, the measured samples and the smoothed velocity."""
     there = np.isfinite(recording.values)
     time, values = recording.time[there], recording.values[there]
     reaching = recording.reaching(base.layout)
@@ -99,14 +102,14 @@ def prepare(recording: Recording, base: Rov) -> PreparedRecording:
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """What the thrusters of a curve give along an axis, before α, and its derivatives: J each, by coefficient."""
+    """The force of a curve's thrusters along an axis without α, and its derivatives by coefficient, J each."""
 
     force: Array
     slopes: dict[str, Array]
 
 
 def push(rov: Rov, axis: Axis, curve: Curve, commands: Array) -> Push:
-    """Steady thrust (2) of the thrusters of a curve along an axis under J commands, J x thrusters of the layout."""
+    """Return the steady thrust (2) of a curve along an axis, for commands of J x thrusters of the layout."""
     force = np.zeros(len(commands))
     slopes: dict[str, Array] = {}
     for n, thruster in enumerate(rov.layout.thrusters):
@@ -128,14 +131,14 @@ def push(rov: Rov, axis: Axis, curve: Curve, commands: Array) -> Push:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One recording cut into steps: when each begins, under which hold, and which step begins at each sample."""
+    """One recording cut into steps: the start, length and hold of each, and the step that begins at each sample."""
 
     start: Array
     h: Array
     hold: NDArray[np.intp]
     sample: NDArray[np.intp]
     switched: NDArray[np.intp]
-    """The steps at whose start the commands change, but the first."""
+    """The steps at whose start the commands change, except the first."""
 
 
 def _cut(data: PreparedRecording, delay: float, longest: float) -> Run:
@@ -154,19 +157,19 @@ def _cut(data: PreparedRecording, delay: float, longest: float) -> Run:
 
 @dataclass(frozen=True, eq=False)
 class ForcedRun:
-    """The forces of a run: of each curve over its holds, and what lags behind them at the start of each step."""
+    """The forces of a run: of each curve in its holds, and the lagging forces at the start of each step."""
 
     run: Run
     form: VehicleAxis
     pushes: list[tuple[Curve, Push]]
     lags: list[tuple[int, Array]]
-    """Place of each curve that lags, and its force at the start of each step, N."""
+    """The index of each curve with a lag, and its force at the start of each step, N."""
     coupling: Coupling | None
-    """In the middle of each step."""
+    """The coupling in the middle of each step."""
 
 
 def forced_run(rov: Rov, data: PreparedRecording, delay: float, v0: float, current: Current = (0.0, 0.0)) -> ForcedRun:
-    """The run of a recording whose commands act late, from a velocity on, in a current."""
+    """Return the run of a recording with delayed commands, an initial velocity and a current."""
     layout = rov.layout
     form = layout.kinds[data.axis.name]
     pushes = [(c, push(rov, data.axis, c, data.commands)) for c in curves_of(layout, data.axis)]
@@ -183,7 +186,7 @@ def forced_run(rov: Rov, data: PreparedRecording, delay: float, v0: float, curre
 
 
 def _rate(rov: Rov, form: VehicleAxis, pushes: Sequence[tuple[Curve, Push]], v0: float, besides: float) -> float:
-    """How fast anything changes, at most, 1/s, under thrust, load and other forces besides."""
+    """Return an upper bound of all rates, 1/s, under thrust, load and the forces `besides`."""
     gain, alpha = rov.gain(form), abs(rov[form.axis.coefficient("alpha")])
     A, B = (gain * max(rov[form.coefficient(key + end)] for end in ("", REVERSE)) for key in ("a_d", "b_d"))
     thrust = sum(float(np.abs(p.force).max()) for _, p in pushes)
@@ -193,14 +196,14 @@ def _rate(rov: Rov, form: VehicleAxis, pushes: Sequence[tuple[Curve, Push]], v0:
 
 
 def lagging(run: Run, steady: Array, kappa: float) -> Array:
-    """The force at the start of each step that follows a steady one late, steady at the start."""
+    """Return the lagging force at the start of each step; it begins at the steady force."""
     fall = np.exp(-kappa * run.h)
     target = steady[run.hold]
     return recursion(fall, np.concatenate([target[:1], ((1.0 - fall) * target)[:-1]]))
 
 
 def steps_of(rov: Rov, forced: ForcedRun, load: float) -> Steps:
-    """The steps of a run, with a load (N, N.m) besides."""
+    """Return the steps of a run, with an additional load (N, N.m)."""
     form, run = forced.form, forced.run
     N, gain = len(run.h), rov.gain(form)
     by_force = gain * rov[form.axis.coefficient("alpha")]
@@ -208,16 +211,16 @@ def steps_of(rov: Rov, forced: ForcedRun, load: float) -> Steps:
     A, B = (np.outer(sides, np.ones(N)) for sides in drag)
     steady = np.sum([p.force[run.hold] for _, p in forced.pushes], axis=0)
     D, kappa = np.zeros((len(forced.lags), N)), np.zeros((len(forced.lags), N))
-    for line, (n, late) in enumerate(forced.lags):
+    for line, (n, lagging_force) in enumerate(forced.lags):
         curve, found = forced.pushes[n]
-        D[line] = by_force * (late - found.force[run.hold])
+        D[line] = by_force * (lagging_force - found.force[run.hold])
         kappa[line] = 1.0 / rov[curve.coefficient("T")]
     held = gain * (rov.load(form) + load + (forced.coupling.force if forced.coupling else 0.0))
     return Steps(run.h, np.array([0]), A, B, by_force * steady + held, D, kappa)
 
 
 def joined(runs: Sequence[Steps]) -> Steps:
-    """All runs, one after the other; those without lag have nothing that fades."""
+    """Join all runs; those without lag get terms of zero."""
     most = max(len(run.D) for run in runs)
     first = np.cumsum([0, *(len(run.h) for run in runs)])[:-1]
 
@@ -231,6 +234,6 @@ def joined(runs: Sequence[Steps]) -> Steps:
 
 
 def at_samples(run: Run, adds: Array) -> Array:
-    """The sum of what the steps add, N or N x P, at the samples."""
+    """Return the cumulative sum of what the steps add (N or N x P) at the samples."""
     total = np.concatenate([np.zeros((1, *adds.shape[1:])), np.cumsum(adds, axis=0)])
     return np.asarray(total[run.sample])

@@ -1,4 +1,4 @@
-"""Which extras a fit takes: those that the recordings can tell, and that earn their place."""
+"""Select the extras of a fit: those that are identifiable and that the data justify."""
 
 from collections.abc import Collection, Iterator, Sequence
 from math import log
@@ -16,9 +16,9 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 
 _SIGNIFICANT = 6.63
-"""What a load, a delay, a current or a lag must lower the sum of squares by, in variances: chance does in 1 % of cases.
+"""The reduction of the sum of squares, in variances, that a load, a delay, a current or a lag needs: 1 % by chance.
 
-Akaike's criterion asks for 2, the Bayesian one for the logarithm of the number of independent samples, 6 to 10.
+Akaike's criterion needs 2, the Bayesian one the logarithm of the number of independent samples, 6 to 10.
 """
 _ORDER = ("", "reverse drag", "", "reverse thrust", "current", "dead band", "load", "lag", "delay")
 
@@ -26,7 +26,7 @@ _ORDER = ("", "reverse drag", "", "reverse thrust", "current", "dead band", "loa
 def candidates(
     data: Sequence[PreparedRecording], base: Rov, known: Collection[str], lag: Collection[str]
 ) -> Iterator[Extra]:
-    """All that might act in the recordings, whose files differ."""
+    """Yield all extras that might act in the recordings."""
     axes = axes_of(data)
     curves = {curve.name: curve for axis in axes for curve in curves_of(base.layout, axis)}
     yield from (Extra("lag", name) for name in curves if name in lag)
@@ -51,7 +51,7 @@ def candidates(
 
 
 def likely(extras: Sequence[Extra], data: Sequence[PreparedRecording], base: Rov) -> Array:
-    """How far each extra is likely to be from none: what the recordings cannot tell stays there while it is sought."""
+    """Return the prior standard deviation of each extra; it keeps unidentifiable extras near their neutral values."""
     found = []
     for extra in extras:
         axis: Axis = next((d.axis for d in data if extra.concerns(d.recording)), data[0].axis)
@@ -63,9 +63,9 @@ def likely(extras: Sequence[Extra], data: Sequence[PreparedRecording], base: Rov
 
 
 def _order(extra: Extra) -> int:
-    """Which one goes first where several may: what is least likely.
+    """Return the order of elimination: the least likely extra is dropped first.
 
-    Ballast is a load in heave; in a pool the water moves along the surface, so there a current is likelier.
+    Ballast is a load in heave. In surge and sway a current is more likely than a load.
     """
     if extra.is_current:
         return _ORDER.index("current")
@@ -77,10 +77,10 @@ def _order(extra: Extra) -> int:
 
 
 def earn_their_place(analysis: ResidualAnalysis) -> tuple[tuple[Extra, ...], Array]:
-    """Backward elimination by Wald's statistic; the extras left, and x of the fit without the others, to first order.
+    """Eliminate extras backward by Wald's statistic; return the remaining ones and x without the others.
 
-    An extra of the whole axis must be significant at 1 %, one of a single recording, of a direction or
-    of a curve, of which there are many, must pass the Bayesian information criterion.
+    x is of first order. An extra of the whole axis must be significant at 1 %. One of a recording, a direction or a
+    curve must pass the Bayesian information criterion, because there are many of them.
     """
     model = analysis.model
     x, places = analysis.x.copy(), list(range(len(analysis.x)))

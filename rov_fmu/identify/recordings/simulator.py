@@ -1,4 +1,4 @@
-"""Recordings as a function of what is fitted: what the model's sensors would have measured, and its derivatives."""
+"""Simulate recordings as a function of the fitted parameters, with derivatives."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -19,28 +19,28 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 
 HUBER = 2.5
-"""Residuals beyond so many standard deviations count by their size, not its square."""
+"""Residuals beyond so many standard deviations count linearly, not by their square."""
 
 Slopes = dict[str | Extra | int, Array]
-"""By coefficient (internal), extra, and initial value (0: velocity, 1: position); n each."""
+"""Derivatives by coefficient (internal), extra, and initial value (0: velocity, 1: position), n each."""
 
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """What a recording would have measured, n each; and its derivatives."""
+    """The simulated values of a recording, n each, and their derivatives."""
 
     values: Array
     velocity: Array
-    """Through the water."""
+    """The velocity through the water."""
     slopes: Slopes = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Simulator:
-    """Recordings as a function of x: named coefficients (internal parameters), extras, then initial values.
+    """Recordings as a function of x: coefficients (internal parameters), extras, then initial values.
 
-    Residuals are modelled less measured, in standard deviations (sigma, one a recording), one recording after the
-    other; behind them stand the thrust coefficients that were measured, as residuals of their estimate, and the extras.
+    The residuals are modelled less measured values of one recording after the other, in standard deviations (sigma, one
+    per recording). They are followed by the residuals of the measured thrust coefficients, and by those of the extras.
     """
 
     data: tuple[PreparedRecording, ...]
@@ -50,12 +50,12 @@ class Simulator:
     sigma: Array
     thrust: Estimate | None = None
     likely: Array | None = None
-    """How far each extra is likely to be from none at all (standard deviation); None where nothing is said of that."""
+    """The prior standard deviation of each extra; None without a prior."""
     _last: dict[str, tuple[Array, list[ForcedRun], Motion]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def places(self) -> list[tuple[PreparedRecording, slice, slice, float]]:
-        """Each recording, its rows of the residuals, its initial values in x, its standard deviation."""
+        """Each recording with its rows of the residuals, its initial values in x and its standard deviation."""
         rows = np.cumsum([0, *(len(d.time) for d in self.data)]).tolist()
         initial = np.cumsum([self.shared, *(d.initial_count for d in self.data)]).tolist()
         slices = ([slice(*ends) for ends in pairwise(bounds)] for bounds in (rows, initial))
@@ -63,25 +63,25 @@ class Simulator:
 
     @property
     def shared(self) -> int:
-        """How many of x are not initial values."""
+        """The number of parameters in x that are not initial values."""
         return len(self.names) + len(self.extras)
 
     def rov(self, x: Array) -> Rov:
-        """The vehicle with the coefficients of x, and with what the extras make of it."""
+        """Return the vehicle with the coefficients and extras of x."""
         return with_extras(self.base.replaced(external(self.names, x)), self.extra_values(x))
 
     def extra_values(self, x: Array) -> dict[Extra, float]:
-        """The extras of x."""
+        """Return the extras of x."""
         return dict(zip(self.extras, x[len(self.names) : self.shared].tolist(), strict=True))
 
     def start(self, coefficients: dict[str, float], extras: dict[Extra, float]) -> Array:
-        """x with these numbers, the first measured positions, and the velocities there."""
+        """Return x with these numbers, the first measured positions, and the velocities there."""
         shared = [*internal(self.names, coefficients), *(extras.get(extra, extra.neutral) for extra in self.extras)]
         initial = (np.array([d.velocity[0], d.values[0]][: d.initial_count]) for d in self.data)
         return np.concatenate([np.array(shared), *initial])
 
     def places_of(self, extras: Collection[Extra]) -> list[int]:
-        """Where in x all stands but the other extras."""
+        """Return the indices in x of everything except the other extras."""
         p = len(self.names)
         other = {n for n, extra in enumerate(self.extras, p) if extra not in extras}
         return [n for n in range(self.shared + sum(d.initial_count for d in self.data)) if n not in other]
@@ -89,28 +89,28 @@ class Simulator:
     # ---- Forward ----
 
     def run(self, x: Array, *, slopes: bool = False) -> list[Output]:
-        """Every recording. Raises MotionError."""
+        """Simulate every recording. Raises MotionError."""
         rov, values = self.rov(x), self.extra_values(x)
         forced, moved = self._moved(x, rov)
-        by_end, by_way = moved.slopes() if slopes else (None, None)
+        by_end, by_distance = moved.slopes() if slopes else (None, None)
         outputs, ends = [], pairwise([*moved.steps.first.tolist(), len(moved.steps.h)])
         for f, (d, _, initial, _), place in zip(forced, self.places, ends, strict=True):
             here, current = slice(*place), self._sum(values, d.recording, "current")
             v = np.append(moved.v[here], moved.end[here][-1])[f.run.sample]
             found: Slopes = {}
             if d.recording.is_position:
-                output = x[initial][1] + at_samples(f.run, moved.way[here]) + current * (d.time - d.time[0])
+                output = x[initial][1] + at_samples(f.run, moved.distance[here]) + current * (d.time - d.time[0])
             else:
                 output = v + current
             output = output + self._flow(values, d) @ d.carried
-            if by_end is not None and by_way is not None:
-                sensitivity = Sensitivity(rov, f, moved.steps.part(here), by_end.part(here), by_way.part(here))
+            if by_end is not None and by_distance is not None:
+                sensitivity = Sensitivity(rov, f, moved.steps.part(here), by_end.part(here), by_distance.part(here))
                 found = self._slopes(rov, x, d, sensitivity)
             outputs.append(Output(output, v, found))
         return outputs
 
     def _moved(self, x: Array, rov: Rov) -> tuple[list[ForcedRun], Motion]:
-        """The last one is kept: its derivatives are asked for next, and the motion for another x is near it."""
+        """Compute the motion, and keep it for its derivatives and as a guess for the next x."""
         last = self._last.get("last")
         if last is not None and np.array_equal(last[0], x):
             return last[1], last[2]
@@ -131,17 +131,17 @@ class Simulator:
         return forced, moved
 
     def _sum(self, values: dict[Extra, float], recording: Recording, kind: str) -> float:
-        """Of the extras of a kind in a recording, but for the load of an axis, which is among the coefficients."""
+        """Add the extras of a kind in a recording, without the load of an axis, which is a coefficient."""
         found = (extra for extra in self.extras if extra.kind == kind and extra.concerns(recording))
         return sum(values[extra] for extra in found if kind != "load" or extra.is_of_file)
 
     def _flow(self, values: dict[Extra, float], data: PreparedRecording) -> Current:
-        """The current north and east in a recording."""
+        """Return the current north and east in a recording."""
         north, east = (self._sum(values, data.recording, kind) for kind in (NORTH, EAST))
         return data.current[0] + north, data.current[1] + east
 
     def _slopes(self, rov: Rov, x: Array, data: PreparedRecording, sensitivity: Sensitivity) -> Slopes:
-        """A ratio in reverse changes what it scales, and so does what that is the multiple of."""
+        """Return the derivatives; a coefficient in reverse depends on its ratio and on the coefficient ahead."""
         ratios = {extra: value for extra, value in self.extra_values(x).items() if extra.pairs()}
         own_names = ("lag", "dead band")
         named = {e: next(iter(e.coefficients(rov, 0.0))) for e in self.extras if e.kind in own_names}
@@ -160,7 +160,7 @@ class Simulator:
         return found
 
     def residuals(self, x: Array) -> Array:
-        """See the class. NaN where the motion cannot be computed: the search steps back from there."""
+        """Return the residuals, see the class; NaN where the motion cannot be computed: the search steps back."""
         try:
             outputs = self.run(x)
         except MotionError:
@@ -176,7 +176,7 @@ class Simulator:
         return np.concatenate(parts)
 
     def jacobian(self, x: Array) -> Array:
-        """Of the residuals."""
+        """Return the Jacobian of the residuals."""
         J = np.zeros((self._size, len(x)))
         shared: list[str | Extra] = [*self.names, *self.extras]
         columns = {key: n for n, key in enumerate(shared)}
@@ -192,9 +192,9 @@ class Simulator:
 
     @property
     def _size(self) -> int:
-        """How many residuals there are."""
-        said = len(self.extras) if self.likely is not None else 0
-        return sum(len(d.time) for d in self.data) + (len(self.thrust.names) if self.thrust else 0) + said
+        """The number of residuals."""
+        with_prior = len(self.extras) if self.likely is not None else 0
+        return sum(len(d.time) for d in self.data) + (len(self.thrust.names) if self.thrust else 0) + with_prior
 
     @cached_property
     def _of_thrust(self) -> list[int]:
@@ -208,7 +208,7 @@ class Simulator:
 
 
 def solve(model: Simulator, start: Array, loss: Loss, tolerance: float = 1e-8) -> Solution:
-    """The best fit within the limits; with much tolerance one that is near it. Raises MotionError."""
+    """Return the best fit within the limits; a large tolerance gives a fit near it. Raises MotionError."""
     inside = limits(model.base, model.data, model.names, model.extras, len(start))
     start = np.clip(start, *inside)
     if not np.isfinite(model.residuals(start)).all():

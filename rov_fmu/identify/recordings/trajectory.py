@@ -1,12 +1,12 @@
 """The exact motion of axes over many short steps at once, and its derivatives (NumPy).
 
-Within a step v' = C + sum of D_k e^(-κ_k t) - B v - A |v| v: drag on a constant inertia, a held force, and what lagging
-thrusters still have to give. Each step is a Taylor series, as in rov_fmu/model/step.py, and so are its derivatives
-by the velocity at its start and by A, B, C, D_k and κ_k. A reversal is a root of the series, and the step goes on from
-there with the drag of the other direction.
+Within a step v' = C + sum of D_k e^(-κ_k t) - B v - A |v| v: drag on a constant inertia, a held force, and lagging
+forces. Each step is a Taylor series, as in rov_fmu/model/step.py, and so are its derivatives by the velocity at its
+start and by A, B, C, D_k and κ_k. A reversal is a root of the series, and the step continues from there with the drag
+of the other direction.
 
-The steps hang together by their velocities only, v_(n+1) = Φ_n(v_n): Newton's method over all of them at once takes a
-linear recursion, a triangular system with two diagonals.
+The steps depend on each other through their velocities only, v_(n+1) = Φ_n(v_n), so Newton's method over all of them at
+once needs a linear recursion: a triangular system with two diagonals.
 """
 
 from dataclasses import dataclass, replace
@@ -19,72 +19,73 @@ from rov_fmu.tank.arrays import Array, Flags
 
 ORDER = 8
 REACH = 0.25
-"""Rate times length of a step, at most: the error of its series is then below 1e-9 of its velocity."""
+"""The largest rate times length of a step; the error of its series is then below 1e-9 of its velocity."""
 ROUGH = 0.4
-"""The same for a start: the error is then below 1e-4, and the steps are a third."""
+"""The largest rate times length in the search for a start; the error is then below 1e-4, with a third of the steps."""
 _ITERATIONS = 60
 
 
 class MotionError(ArithmeticError):
-    """Coefficients so far off that the motion cannot be computed."""
+    """The motion cannot be computed with these coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """N steps of one or more runs, one run after the other; SI units."""
+    """N steps of one or more successive runs, in SI units."""
 
     h: Array
-    """N: length, s."""
+    """N: the length, s."""
     first: NDArray[np.intp]
     """The step that each run begins with."""
     A: Array
-    """2 x N: ahead and in reverse; so is B."""
+    """2 x N: quadratic drag ahead and in reverse."""
     B: Array
+    """2 x N: linear drag ahead and in reverse."""
     C: Array
-    """N: acceleration by the held forces."""
+    """N: the acceleration by the held forces."""
     D: Array
-    """K x N: acceleration that is still to fade at the start of the step."""
+    """K x N: the acceleration of lagging forces at the start of the step, which decays."""
     kappa: Array
-    """K x N: by which rate, 1/s."""
+    """K x N: the rates of decay, 1/s."""
 
     def part(self, which: Flags | slice) -> "Steps":
-        """Some of them, as one run."""
+        """Return some of the steps as one run."""
         lines = {key: getattr(self, key)[..., which] for key in ("h", "A", "B", "C", "D", "kappa")}
         return replace(self, first=np.array([0]), **lines)
 
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Derivatives of what a step gives, N each: by v at its start, A and B ahead and in reverse, C, D_k, κ_k."""
+    """Derivatives of the end velocity or distance of N steps by v at the start, A, B, C, D_k and κ_k."""
 
     v: Array
     A: Array
-    """2 x N, as B."""
+    """2 x N, like B."""
     B: Array
     C: Array
     D: Array
-    """K x N, as κ."""
+    """K x N, like kappa."""
     kappa: Array
 
     def part(self, which: slice) -> "Slopes":
-        """Those of some of the steps."""
+        """Return the derivatives of some of the steps."""
         return Slopes(*(getattr(self, key)[..., which] for key in ("v", "A", "B", "C", "D", "kappa")))
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Where the steps lead."""
+    """The motion over the steps."""
 
     steps: Steps
     v: Array
-    """N: velocity at the start of each."""
+    """N: the velocity at the start of each step."""
     end: Array
-    """N: velocity at its end."""
-    way: Array
-    """N: distance covered in it."""
+    """N: the velocity at its end."""
+    distance: Array
+    """N: the distance covered in it."""
 
     def slopes(self) -> tuple[Slopes, Slopes]:
-        """Of the velocity at the end of each step, and of the distance."""
+        """Return the derivatives of the velocity at the end of each step, and of the distance."""
         _, _, *found = _flow(self.steps, self.v, tangents=True)
         assert found[0] is not None
         assert found[1] is not None
@@ -92,7 +93,7 @@ class Motion:
 
 
 def motion(steps: Steps, starts: Array, *guesses: Array, precision: float = 1e-12) -> Motion:
-    """The motion of every run from its velocity at the start; each guess is about the velocity at each step (N).
+    """Compute the motion of every run from its initial velocity; a guess is about the velocity at each step (N).
 
     Raises MotionError.
     """
@@ -104,14 +105,14 @@ def motion(steps: Steps, starts: Array, *guesses: Array, precision: float = 1e-1
 
 
 def _newton(steps: Steps, starts: Array, guess: Array, precision: float) -> Motion | None:
-    """Newton's method over all steps at once; None where it does not settle."""
+    """Solve for all steps at once by Newton's method; return None where it does not converge."""
     v = guess.copy()
     v[steps.first] = starts
     weaker = {key: np.broadcast_to(getattr(steps, key).min(axis=0), steps.A.shape) for key in ("A", "B")}
     all_of = replace(steps, C=np.abs(steps.C) + np.abs(steps.D).sum(axis=0), **weaker)
     most = 1.2 * max(float(_steady(all_of).max()), float(np.abs(starts).max()))  # no motion goes beyond
     for _ in range(_ITERATIONS):
-        end, way, slopes, _ = _flow(steps, v, tangents=False)
+        end, distance, slopes, _ = _flow(steps, v, tangents=False)
         assert slopes is not None
         gap = np.zeros_like(v)
         gap[1:] = end[:-1] - v[1:]
@@ -122,12 +123,12 @@ def _newton(steps: Steps, starts: Array, guess: Array, precision: float) -> Moti
         if not np.isfinite(size):
             return None
         if np.abs(change).max() <= precision * size or size == 0.0:
-            return Motion(steps, v, end, way)
+            return Motion(steps, v, end, distance)
     return None
 
 
 def _steady(steps: Steps) -> Array:
-    """The velocity at which drag balances the held force of each step: from above, Newton's method always settles."""
+    """Return the velocity at which drag balances the held force; from above, Newton's method always converges."""
     forward = steps.C >= 0.0
     A, B = (np.where(forward, of[0], of[1]) for of in (steps.A, steps.B))
     size = np.abs(steps.C)
@@ -136,7 +137,7 @@ def _steady(steps: Steps) -> Array:
 
 
 def recursion(factor: Array, terms: Array, first: NDArray[np.intp] | None = None) -> Array:
-    """x_(n+1) = factor_n x_n + terms_(n+1), x_0 = terms_0, begun anew at `first`; terms is N, or N x P."""
+    """Solve x_(n+1) = factor_n x_n + terms_(n+1), x_0 = terms_0, which starts again at `first`; terms is N or N x P."""
     ab = np.ones((2, len(factor)))
     ab[1] = -factor
     if first is not None:
@@ -146,15 +147,15 @@ def recursion(factor: Array, terms: Array, first: NDArray[np.intp] | None = None
 
 
 def _flow(steps: Steps, v: Array, *, tangents: bool) -> tuple[Array, Array, Slopes | None, Slopes | None]:
-    """Velocity at the end of each step, distance, and the derivatives of both: by v alone, or by everything."""
+    """Return the end velocity and distance of each step, and the derivatives of both, by v alone or by everything."""
     forward = (v > 0.0) | ((v == 0.0) & (steps.C + steps.D.sum(axis=0) >= 0.0))
     c = _series(steps, v, forward)
     found = _Piece(steps, c, forward, tangents)
     end = found.end
     turned = np.where(forward, end < 0.0, end > 0.0) & (v != 0.0)
     if not turned.any():
-        return end, found.way, *found.slopes
-    part, way = steps.part(turned), found.way
+        return end, found.distance, *found.slopes
+    part, distance = steps.part(turned), found.distance
     share = _root(c[:, turned])
     early = replace(part, h=share * part.h)
     before = _Piece(early, _series(early, v[turned], forward[turned]), forward[turned], tangents)
@@ -162,20 +163,20 @@ def _flow(steps: Steps, v: Array, *, tangents: bool) -> tuple[Array, Array, Slop
     late = replace(part, h=part.h - early.h, D=part.D * fall)
     rest, back = np.zeros(len(share)), ~forward[turned]
     after = _Piece(late, _series(late, rest, back), back, tangents)
-    end[turned], way[turned] = after.end, before.way + after.way
+    end[turned], distance[turned] = after.end, before.distance + after.distance
     for whole, one, two in zip(found.slopes, before.slopes, _of_start(after, early, fall, part), strict=True):
         if whole is None or one is None or two is None:
             continue
-        way_of = whole is found.slopes[1]
+        is_distance = whole is found.slopes[1]
         for key in ("v", "A", "B", "C", "D", "kappa"):
             direct = 0.0 if key == "v" else getattr(two, key)
             through = two.v * getattr(before.slopes[0], key)
-            getattr(whole, key)[..., turned] = through + direct + (getattr(one, key) if way_of else 0.0)
-    return end, way, *found.slopes
+            getattr(whole, key)[..., turned] = through + direct + (getattr(one, key) if is_distance else 0.0)
+    return end, distance, *found.slopes
 
 
 def _of_start(after: "_Piece", early: Steps, fall: Array, part: Steps) -> list[Slopes | None]:
-    """The slopes of the second part of a step by D and κ at the start of the whole one."""
+    """Convert the slopes of the second part of a step to derivatives by D and κ at the start of the whole step."""
 
     def moved(slopes: Slopes) -> Slopes:
         return replace(slopes, D=slopes.D * fall, kappa=slopes.kappa - slopes.D * early.h * part.D * fall)
@@ -184,7 +185,7 @@ def _of_start(after: "_Piece", early: Steps, fall: Array, part: Steps) -> list[S
 
 
 def _series(steps: Steps, v: Array, forward: Flags) -> Array:
-    """Coefficients of v over t/h: ORDER + 1 x N."""
+    """Return the coefficients of v over t/h, ORDER + 1 x N."""
     a, b = _drag(steps, forward)
     x, falling = -steps.kappa * steps.h, steps.D * steps.h
     c = np.zeros((ORDER + 1, len(v)))
@@ -201,17 +202,17 @@ def _series(steps: Steps, v: Array, forward: Flags) -> Array:
 
 
 def _drag(steps: Steps, forward: Flags) -> tuple[Array, Array]:
-    """A and B of the direction, for time in parts of the step, A with the direction's sign."""
+    """Return h A and h B of the direction, A with the sign of the direction."""
     a = np.where(forward, steps.A[0], -steps.A[1]) * steps.h
     return a, np.where(forward, steps.B[0], steps.B[1]) * steps.h
 
 
 class _Piece:
-    """What a series gives at the end of its step."""
+    """The end velocity, distance and derivatives of a series."""
 
     def __init__(self, steps: Steps, c: Array, forward: Flags, tangents: bool) -> None:
         self.end = np.asarray(c.sum(axis=0))
-        self.way = np.asarray(steps.h * (_MEANS @ c))
+        self.distance = np.asarray(steps.h * (_MEANS @ c))
         self._steps, self._c, self._drag = steps, c, _drag(steps, forward)
         self.slopes = self._all(forward) if tangents else (self._by_start(), None)
 
@@ -243,7 +244,7 @@ class _Piece:
         return found[0], found[1]
 
     def _tangent(self, terms: Array | None, start: Array) -> Array:
-        """The linear equation beside the series: ORDER + 1 x Q x N, from Q x N at the start."""
+        """Return the solution of the linearized equation, ORDER + 1 x Q x N, from Q x N at the start."""
         c, (a, b) = self._c, self._drag
         g = np.zeros((ORDER + 1, *start.shape))
         g[0] = start
@@ -259,12 +260,12 @@ _MEANS = 1.0 / np.arange(1.0, ORDER + 2.0)
 
 
 def _product(a: Array, b: Array, n: int) -> Array:
-    """Coefficient n of a product of two series."""
+    """Return coefficient n of a product of two series."""
     return np.asarray(np.einsum("kn,kn->n", a[: n + 1], b[n::-1]))
 
 
 def _root(c: Array) -> Array:
-    """Where between 0 and 1 polynomials become 0 that have another sign at 1: Newton's method within bounds."""
+    """Return the root between 0 and 1 of polynomials that change their sign there: Newton's method within bounds."""
     low, high = np.zeros_like(c[0]), np.ones_like(c[0])
     new = t = 0.5 * (low + high)
     for _ in range(60):

@@ -1,12 +1,14 @@
-"""Which slip of unit explains best what the files of one axis tell, each by itself.
+"""Find the wrong scale that best explains the files of one axis, from the analysis of each file by itself.
 
-A file that says k times what was measured tells of m/β / k, a_d / k^2, b_d / k and k times the speed: one look at it
-tells all scales. Of the files' vehicles, undone by a slip or not, the one is sought that agrees with all of them, is
-like a vehicle, and needs the fewest slips. Costs are squares of standard deviations, in decades.
+A file with k times the measured values leads to m/β / k, a_d / k^2, b_d / k and k times the speed, so one analysis of
+the file gives the results for all scales. The best explanation is the vehicle that agrees with all files, with or
+without correction, has plausible proportions, and needs the fewest corrections. Costs are squares of standard
+deviations, in decades.
 
-What is like a vehicle comes from those that ship, the Otter of the examples and the paper: drag by ½ρ(m/ρ)^(2/3) v^2 is
-0.4 to 11 from 20 to 100 % of thrust, the torque in yaw by ½ρ(6 I/ρ) r^2, the same of a box, 0.4 to 3.4; and m/β is 1.0
-to 2.4 times m, in yaw up to 8. Each is taken as spread about the middle of these by a factor of some 3, or 2.
+The plausible proportions come from the vehicles that ship, the Otter of the examples and the paper: drag divided by
+½ρ(m/ρ)^(2/3) v^2 is 0.4 to 11 from 20 to 100 % of thrust; the torque in yaw divided by ½ρ(6 I/ρ) r^2, as for a box, is
+0.4 to 3.4; and m/β is 1.0 to 2.4 times m, in yaw up to 8. The assumed spread about the middle of these ranges is a
+factor of about 3, or 2.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,29 +20,32 @@ from rov_fmu.model.layout import YAW, Axis
 from rov_fmu.model.rov import Rov
 
 FASTEST = {"m/s": 4.0, "rad/s": 8.0}
-"""No ROV is faster."""
+"""The highest speed of an ROV, by unit."""
 CERTAIN = 15.0
-"""A slip that lowers the costs by so much is certain,"""
+"""A wrong scale that lowers the cost by so much is certain."""
 LIKELY = 4.0
-"""by so much worth a word."""
+"""A wrong scale that lowers the cost by so much is worth a warning."""
 _RHO = 1000.0
-_ALIKE = 0.15  # decades within which two files of one vehicle agree: loads, currents, curves that are not quite so
-_MOST = 25.0  # cost of one number, at most
-_SLIP, _ONE_MORE = 5.0, 0.5  # cost of a slip, and of each file that has it
+_ALIKE = 0.15
+"""The standard deviation between two files of one vehicle in decades, due to loads, currents and inexact curves."""
+_MOST = 25.0
+"""The largest cost of one number."""
+_SLIP, _ONE_MORE = 5.0, 0.5
+"""The cost of a wrong scale, and of each file that has it."""
 _LENGTHS = (0.001, 0.01, 0.1, 10.0, 100.0, 1000.0)
 _ANGLES = (pi / 180.0, 0.1, 10.0, 180.0 / pi, 100.0)
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a file tells by itself."""
+    """The analysis of one file by itself."""
 
     file: str
     quantity: str
     alone: Alone
 
     def undone(self, factor: float) -> "Evidence":
-        """Had it not said `factor` times what was measured."""
+        """Correct the analysis for a file with `factor` times the measured values."""
         k, one = factor, self.alone
         true = replace(one, inertia=k * one.inertia, a=k * k * one.a, b=k * one.b, speed=one.speed / k)
         return replace(self, alone=true)
@@ -48,10 +53,10 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Explanation:
-    """A slip and the files that have it; none where all is well."""
+    """A wrong scale and the files that have it; no files where all scales are right."""
 
     factor: float
-    """What they say, as a multiple of what was measured."""
+    """The values in the files relative to the measured ones."""
     files: frozenset[str]
     cost: float
     vehicle: Alone
@@ -59,7 +64,7 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class Files:
-    """All evidence of one axis; `given` is what is known of the vehicle beforehand."""
+    """The evidence of all files of one axis; `given` is the vehicle where it is known."""
 
     axis: Axis
     base: Rov
@@ -67,7 +72,7 @@ class Files:
     given: Alone | None = None
 
     def explanations(self) -> list[Explanation]:
-        """The best one of every slip and every vehicle, the best of all first; that without slip is among them."""
+        """Return the best explanation for each scale and set of files, sorted by cost, including that without files."""
         factors = _ANGLES if self.axis is YAW else _LENGTHS
         found = {(e.factor, e.files): e for e in sorted(self._all((1.0, *factors)), key=lambda e: -e.cost)}
         return sorted(found.values(), key=lambda e: e.cost)
@@ -88,7 +93,7 @@ class Files:
                     yield Explanation(factor, frozenset(files), cost + _SLIP * bool(files), vehicle)
 
     def _apart(self, one: Alone, vehicle: Alone) -> float:
-        """How much a file contradicts a vehicle; and what is sensible in any vehicle."""
+        """Return the cost of the difference between a file and a vehicle, and of an impossible speed."""
         v = sqrt(one.speed * vehicle.speed)
         cost = max(log10(one.speed / FASTEST[self.axis.unit]), 0.0) ** 2 / 0.01
         for ratio, errors in (
@@ -100,7 +105,7 @@ class Files:
         return min(cost, 2.0 * _MOST)
 
     def _unlike(self, vehicle: Alone) -> float:
-        """How little it is like a vehicle."""
+        """Return the cost of implausible proportions."""
         inertia, drag = proportions(self.axis, self.base, vehicle)
         typical, spread = (1.0, 0.25) if self._added else (2.0, 0.3)
         cost = (log10(drag / (1.0 if self.axis is YAW else 1.5)) / 0.45) ** 2 if drag > 0.0 else _MOST
@@ -112,21 +117,21 @@ class Files:
 
 
 def proportions(axis: Axis, base: Rov, vehicle: Alone) -> tuple[float, float]:
-    """m/β by the mass and the added mass that are given, and drag by size and speed; see the module."""
+    """Return m/β relative to the given mass and added mass, and drag relative to size and speed; see the module."""
     mass, v = base[axis.inertia], vehicle.speed
     size = 0.5 * _RHO * (6.0 * mass / _RHO if axis is YAW else (mass / _RHO) ** (2.0 / 3.0))
     return vehicle.inertia / base.inertia(base.layout.kinds[axis.name]), vehicle.drag(v) / (size * v * v)
 
 
 def contradict(explanations: Sequence[Explanation]) -> Explanation | None:
-    """Another explanation about as good as the first, which blames other files."""
+    """Return another explanation about as good as the first, with other files, or None."""
     first = explanations[0]
     others = (e for e in explanations[1:] if e.files and not e.files & first.files)
     return next((e for e in others if e.cost < first.cost + LIKELY), None)
 
 
 def _ratio(one: float, other: float) -> float:
-    """In decades."""
+    """Return the ratio in decades."""
     if one <= 0.0 or other <= 0.0:
         return inf if (one > 0.0) != (other > 0.0) else 0.0
     return log10(one / other)

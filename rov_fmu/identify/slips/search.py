@@ -1,12 +1,11 @@
-"""Slips of a hand or a script in recordings: a unit, a scale, a sign, each with its file and likely cause.
+"""Find wrong units, scales and signs in recordings and tables, with the file and the likely cause.
 
-Every recording is looked at by itself first (rov_fmu/identify/slips/single_recording.py), then all of an axis together
-(rov_fmu/identify/slips/explanation.py). Where there is no doubt a recording is refused; else there is a warning.
+Every recording is examined by itself first (rov_fmu/identify/slips/single_recording.py), then all recordings of an axis
+together (rov_fmu/identify/slips/explanation.py). A finding that is certain refuses the file; others become warnings.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from math import inf, isclose, isfinite, nan, pi
+from math import inf, isfinite, nan
 
 import numpy as np
 from scipy.optimize import nnls
@@ -16,49 +15,18 @@ from rov_fmu.identify.slips.explanation import CERTAIN, FASTEST, LIKELY, Evidenc
 from rov_fmu.identify.slips.single_recording import Alone, alone
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
 
 Tables = Mapping[str, Sequence[tuple[float, float]]]
-"""Rows by file: command and a number."""
+"""Rows of a command and a number, by file."""
 BETA = 0.05, 1.2
-"""Without added mass: m/β is between about the mass alone and 20 times of it."""
+"""The range of β without added mass: m/β is between about the mass alone and 20 times the mass."""
 BETA_WITH_ADDED_MASS = 0.3, 3.0
-_FRACTIONS = 0.01  # commands within are fractions of a percent, or fractions taken for percent
-
-_FAR, _VERY_FAR = 20.0, 100.0  # from a time constant
-_UNIT = "fits thrust, size and other files only"
-_TOO_FAST = "which no ROV reaches: is its unit right, and that of time?"
-
-_LENGTH_CAUSES = {
-    1000.0: "is it in mm",
-    100.0: "is it in cm",
-    10.0: "is it in dm, or the scale of the sensor wrong",
-    0.1: "is the unit or the scale of the sensor wrong",
-    0.01: "are metres taken for cm",
-    0.001: "are metres taken for mm",
-}
-_ANGLE_CAUSES = {
-    pi / 180.0: "are radians taken for degrees",
-    180.0 / pi: "are degrees taken for radians",
-    10.0: "is it in tenths of a degree, or the scale of the sensor wrong",
-    100.0: "is it in hundredths of a degree",
-    0.1: "is the unit or the scale of the sensor wrong",
-}
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something wrong with a recording or a table."""
-
-    file: str
-    words: str
-    certain: bool
-    """Whether to refuse it."""
-
-    @property
-    def sentence(self) -> str:
-        """With its file."""
-        return f"{self.file}: {self.words}"
+_WEAKEST_COMMANDS = 0.01
+"""Commands that never exceed this are fractions taken for percent."""
+_FAR, _VERY_FAR = 20.0, 100.0
+"""The ratio of time constants from which a file is doubtful, and from which it is refused."""
 
 
 def slips(
@@ -68,71 +36,72 @@ def slips(
     steady: Mapping[str, Tables] | None = None,
     time_constants: Mapping[str, Tables] | None = None,
 ) -> tuple[Finding, ...]:
-    """What is wrong with the recordings, by axis name; `base` holds thrust and inertia, and what else is known.
+    """Return the wrong units, scales and signs in recordings and tables, which are given by axis name.
 
-    The tables have commands and velocities (m/s, rad/s), commands and time constants (s), by axis name.
+    `base` has the thrust, the inertia and the other known coefficients. The tables have commands and velocities
+    (m/s, rad/s), and commands and time constants (s).
     """
     found: list[Finding] = []
     for axis in (form.axis for form in base.layout.axes):
         name, evidence = axis.name, list[Evidence]()
-        found += _of_recordings(axis, recordings.get(name, ()), base, evidence)
+        found += _examine_each(axis, recordings.get(name, ()), base, evidence)
         tables = [e for file, rows in (steady or {}).get(name, {}).items() if (e := _table(axis, base, file, rows))]
         found += [
-            Finding(e.file, _too_fast(e.quantity, axis, e.alone.speed), certain=True)
-            for e in tables
-            if e.alone.speed > FASTEST[axis.unit]
+            _too_fast(e.file, e.quantity, axis, e.alone.speed) for e in tables if e.alone.speed > FASTEST[axis.unit]
         ]
         evidence += tables
         vehicle = _given(axis, base, known)
         if evidence:
             explanations = Files(axis, base, evidence, vehicle).explanations()
             vehicle = explanations[0].vehicle
-            found += _units(axis, evidence, explanations)
+            found += _wrong_scales(axis, evidence, explanations)
         if vehicle:
             for file, rows in (time_constants or {}).get(name, {}).items():
-                found += _slow(axis, base, vehicle, file, rows)
-    refused = {finding.file for finding in found if finding.certain and _UNIT in finding.words}
-    return tuple(f for f in found if not (f.words.endswith(_TOO_FAST) and f.file in refused))
+                found += _wrong_time_constants(axis, base, vehicle, file, rows)
+    wrong_scale = {finding.file for finding in found if finding.kind == "wrong scale" and finding.certain}
+    return tuple(f for f in found if f.kind != "too fast" or f.file not in wrong_scale)
 
 
 def beta_range(rov: Rov, axis: Axis) -> tuple[float, float, str]:
-    """The least and the greatest β of vehicles that are known, and in words the inertia that this vehicle's β means."""
+    """Return the range of β of known vehicles, and a phrase for the inertia that this vehicle's β means."""
     beta, has_added = axis.coefficient("beta"), "m_a" in rov.layout.kinds[axis.name].keys
     inertia = f"{1.0 / max(rov[beta], 1e-9):.3g} times {axis.inertia}{' and the added one' if has_added else ''}"
     return (*(BETA_WITH_ADDED_MASS if has_added else BETA), inertia)
 
 
-def beta_out_of_range(rov: Rov, axis: Axis) -> str | None:
-    """Of the final fit: what may cause a β that no vehicle has."""
+def beta_out_of_range(rov: Rov, axis: Axis) -> Finding | None:
+    """Return a finding about a fitted β that no known vehicle has, or None."""
     beta, (low, high, inertia) = axis.coefficient("beta"), beta_range(rov, axis)
     if low <= rov[beta] <= high:
         return None
-    return (
-        f"{axis.name}: {beta} = {rov[beta]:.3g} is not within {low:g} ... {high:g}, as of any vehicle known: it moves "
-        f"as if its inertia were {inertia}. A wrong unit or scale (of the motion, the commands, the thrust, "
-        f"{axis.inertia}) may cause it, or a delay or a lag that the fit does not have"
+    names = {"beta": beta, "inertia": inertia, "mass": axis.inertia}
+    return Finding(
+        "implausible beta", axis=axis.name, names=names, numbers={"value": rov[beta], "low": low, "high": high}
     )
 
 
-def _of_recordings(
+def _examine_each(
     axis: Axis, recordings: Sequence[Recording], base: Rov, evidence: list[Evidence]
 ) -> Iterator[Finding]:
-    """What is wrong with single ones; what they tell goes to the evidence."""
+    """Yield what is wrong with single recordings, and append to the evidence what each shows about the vehicle."""
     for recording in recordings:
         data = prepare(recording, base)
         strongest = float(np.abs(data.commands).max(initial=0.0))
-        if 0.0 < strongest <= _FRACTIONS:
-            yield Finding(recording.file, _fractions(strongest), certain=True)
+        if 0.0 < strongest <= _WEAKEST_COMMANDS:
+            numbers = {"percent": 100.0 * strongest}
+            yield Finding("fractions as percent", axis.name, file=recording.file, numbers=numbers, certain=True)
             continue
         if data.speed > FASTEST[axis.unit]:
-            yield Finding(recording.file, _too_fast(recording.quantity, axis, data.speed), certain=True)
+            yield _too_fast(recording.file, recording.quantity, axis, data.speed)
         if (found := alone(data, base)) is not None:
             evidence.append(Evidence(recording.file, recording.quantity, found))
             if found.turned:
-                yield Finding(recording.file, _turned(recording), found.is_clear)
+                names = {"quantity": recording.quantity, "positive": axis.positive.capitalize()}
+                yield Finding("wrong sign", axis.name, file=recording.file, names=names, certain=found.is_clear)
 
 
-def _units(axis: Axis, evidence: Sequence[Evidence], explanations: Sequence[Explanation]) -> Iterator[Finding]:
+def _wrong_scales(axis: Axis, evidence: Sequence[Evidence], explanations: Sequence[Explanation]) -> Iterator[Finding]:
+    """Yield the files whose numbers are a multiple of what was measured, by the best explanation."""
     best = explanations[0]
     gained = next(e.cost for e in explanations if not e.files) - best.cost
     if not best.files or gained < LIKELY:
@@ -140,14 +109,23 @@ def _units(axis: Axis, evidence: Sequence[Evidence], explanations: Sequence[Expl
     other = contradict(explanations)
     for one in evidence:
         if one.file in best.files:
-            words = _scale(one, axis, best)
-            if other:
-                words += f" Or else are those wrong that it contradicts: {', '.join(sorted(other.files))}?"
-            yield Finding(one.file, words, gained >= CERTAIN and one.alone.is_clear)
+            names = {
+                "quantity": one.quantity,
+                "unit": _unit(one.quantity, axis),
+                "factor": repr(best.factor),
+                "others": ", ".join(sorted(other.files)) if other else "",
+            }
+            certain = gained >= CERTAIN and one.alone.is_clear
+            yield Finding("wrong scale", axis.name, file=one.file, names=names, certain=certain)
 
 
-def _slow(axis: Axis, base: Rov, vehicle: Alone, file: str, rows: Sequence[tuple[float, float]]) -> Iterator[Finding]:
-    """Time constants far from those of the vehicle; where its inertia is not told, of one with a typical inertia."""
+def _wrong_time_constants(
+    axis: Axis, base: Rov, vehicle: Alone, file: str, rows: Sequence[tuple[float, float]]
+) -> Iterator[Finding]:
+    """Yield a finding where time constants are far from those of the vehicle.
+
+    Where the inertia of the vehicle is unknown, a typical one is used.
+    """
     inertia = vehicle.inertia if isfinite(vehicle.inertia) else 2.0 * base.inertia(base.layout.kinds[axis.name])
     alpha = base[axis.coefficient("alpha")]
     ratios = [
@@ -157,43 +135,22 @@ def _slow(axis: Axis, base: Rov, vehicle: Alone, file: str, rows: Sequence[tuple
     ]
     ratio = float(np.median(ratios)) if ratios else 1.0
     if not 1.0 / _FAR < ratio < _FAR:
-        cause = "is it in ms" if ratio > 1.0 else "are seconds taken for ms"
-        words = f"time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: {cause}?"
-        yield Finding(file, words, not 1.0 / _VERY_FAR < ratio < _VERY_FAR)
+        kind = "slow time constants" if ratio > 1.0 else "fast time constants"
+        certain = not 1.0 / _VERY_FAR < ratio < _VERY_FAR
+        yield Finding(kind, axis.name, file=file, numbers={"ratio": ratio}, certain=certain)
 
 
-def _scale(one: Evidence, axis: Axis, best: Explanation) -> str:
-    causes = _ANGLE_CAUSES if axis.position_unit == "rad" else _LENGTH_CAUSES
-    cause = next(words for factor, words in causes.items() if isclose(factor, best.factor))
-    times = f"x {1.0 / best.factor:.4g}" if best.factor < 1.0 else f"/ {best.factor:.4g}"
-    return f"{_named(one.quantity, axis)} {_UNIT} {times}: {cause}?"
+def _unit(quantity: str, axis: Axis) -> str:
+    return axis.unit if quantity == "velocity" else axis.position_unit
 
 
-def _named(quantity: str, axis: Axis) -> str:
-    return f"{quantity} [{axis.position_unit if quantity != 'velocity' else axis.unit}]"
-
-
-def _too_fast(quantity: str, axis: Axis, speed: float) -> str:
-    return f"{_named(quantity, axis)} tells of {speed:.3g} {axis.unit}, {_TOO_FAST}"
-
-
-def _turned(recording: Recording) -> str:
-    axis = recording.axis
-    return (
-        f"moves against the command: is the sign of {recording.quantity} or of the commands turned? "
-        f"{axis.positive.capitalize()} is +"
-    )
-
-
-def _fractions(strongest: float) -> str:
-    return (
-        f"no command is beyond {100.0 * strongest:.2g} % of full thrust, which moves no ROV: "
-        "are fractions [1] taken for percent [%]?"
-    )
+def _too_fast(file: str, quantity: str, axis: Axis, speed: float) -> Finding:
+    names = {"quantity": quantity, "unit": _unit(quantity, axis), "speed_unit": axis.unit}
+    return Finding("too fast", axis.name, file=file, names=names, numbers={"speed": speed}, certain=True)
 
 
 def _given(axis: Axis, base: Rov, known: Collection[str]) -> Alone | None:
-    """The vehicle, where all of drag and β is known."""
+    """Return the vehicle where all of drag and β is known, or None."""
     form = base.layout.kinds[axis.name]
     names = [axis.coefficient("beta"), form.coefficient("a_d"), form.coefficient("b_d")]
     if not set(names) <= set(known):
@@ -202,13 +159,13 @@ def _given(axis: Axis, base: Rov, known: Collection[str]) -> Alone | None:
 
 
 def _table(axis: Axis, base: Rov, file: str, rows: Sequence[tuple[float, float]]) -> Evidence | None:
-    """Drag by the force at each velocity, in relative errors; the inertia is not told."""
+    """Fit the drag to the force at each velocity, with relative errors; a table does not show the inertia."""
     force = base[axis.coefficient("alpha")] * np.array([abs(base.force(axis, command)) for command, _ in rows])
     v = np.abs(np.array([velocity for _, velocity in rows]))
-    there = (force > 0.0) & (v > 0.0)
-    if not there.any():
+    usable = (force > 0.0) & (v > 0.0)
+    if not usable.any():
         return None
-    F, v = force[there], v[there]
+    F, v = force[usable], v[usable]
     top = float(v.max())
     (A, B), _ = nnls(np.column_stack([(v / top) ** 2, v / top]) / F[:, None], np.ones(len(F)))
     return Evidence(file, "velocity", Alone(False, nan, A / top**2, B / top, top, (inf, 0.1), 1.0))

@@ -1,10 +1,10 @@
-"""What one recording tells by itself, of any scale and sign: how its velocity follows the force.
+"""Analyse one recording by itself, whatever its scale and sign: how its velocity follows the force.
 
-The velocity is taken as a delayed first-order lag of v_ss(F), v_ss the steady velocity by linear or by quadratic drag
-alone, whichever tells more of it. But for the rate and the delay, which are tried one after the other, this is a
-linear fit: it has one best answer whatever the scale, where a search would need a start near it; and where the motion
-is turned round its gain is negative. Other forces (coupling, swell) that do not follow the commands leave it as it is.
-It is good to some 30 %, enough to tell a unit or a sign and not to be printed as a result.
+The velocity is modelled as a delayed first-order lag of v_ss(F), where v_ss is the steady velocity by linear or by
+quadratic drag alone, whichever explains more. Rate and delay are tried from a list; the rest is a linear fit, which has
+one solution for any scale, while a search would need a start near it. A wrong sign leads to a negative gain. Forces
+that do not follow the commands (coupling, swell) hardly change it. The result is accurate to about 30 %, which is
+enough to recognize a wrong unit or sign, but not to be reported.
 """
 
 from dataclasses import dataclass
@@ -21,44 +21,46 @@ _DELAYS = (0.0, 0.1, 0.2, 0.4, 0.8)  # s, from the commands to the motion
 _RATES = np.geomspace(0.03, 20.0, 27)  # 1/s
 _POWERS = (1.0, 0.5)  # v_ss ~ F^power of linear and of quadratic drag
 _MOST = 2000  # samples of the grid
-_LEAST = 0.3  # share of the variance that the commands must explain, or there is no telling
-_CLEAR, _CLEAR_ERROR = 0.5, 0.2  # share, and error of drag
+_LEAST = 0.3
+"""The smallest share of the variance that the commands must explain."""
+_CLEAR, _CLEAR_ERROR = 0.5, 0.2
+"""The share of the variance, and the error of drag, of a clear result."""
 
 
 @dataclass(frozen=True)
 class Alone:
-    """Motion along one axis by one recording; SI units."""
+    """The motion along one axis from one recording, in SI units."""
 
     turned: bool
-    """Whether it moves against its commands."""
+    """True when it moves against its commands."""
     inertia: float
-    """m/β: force by acceleration."""
+    """m/β: force divided by acceleration."""
     a: float
-    """Drag on the vehicle in N: a v^2 + b v."""
+    """Quadratic drag; the whole drag in N is a v^2 + b v."""
     b: float
     speed: float
-    """About the highest."""
+    """About the highest speed."""
     errors: tuple[float, float]
     """Relative standard errors of the inertia, and of drag at the highest speed."""
     share: float
-    """Of the variance of the velocity that it explains."""
+    """The share of the variance of the velocity that it explains."""
 
     @property
     def is_clear(self) -> bool:
-        """Whether it is beyond doubt that it moves by its commands."""
+        """True when the motion clearly follows the commands."""
         return self.share > _CLEAR and self.errors[1] < _CLEAR_ERROR
 
     def drag(self, v: float) -> float:
-        """N, at a velocity of 0 or more."""
+        """Return the drag at a velocity of 0 or more, N."""
         return (self.a * v + self.b) * v
 
     def steady(self, force: float) -> float:
-        """The velocity at which drag is this force, of 0 or more."""
+        """Return the velocity at which drag balances a force of 0 or more."""
         return 2.0 * force / (self.b + sqrt(self.b**2 + 4.0 * self.a * force))
 
 
 def alone(data: PreparedRecording, base: Rov) -> Alone | None:
-    """The motion by this recording; None where it tells none: at rest, or not by its commands."""
+    """Analyse the motion of a recording; return None at rest, or where the motion does not follow the commands."""
     count, speed = min(len(data.time), _MOST), data.speed
     time = np.linspace(data.time[0], data.time[-1], count)
     v = np.interp(time, data.time, data.velocity)
@@ -91,21 +93,21 @@ def alone(data: PreparedRecording, base: Rov) -> Alone | None:
 
 
 def _held(data: PreparedRecording, force: Array, time: Array) -> Array:
-    """The force at these times."""
+    """Return the force at these times."""
     return np.asarray(force[np.maximum(np.searchsorted(data.switches, time, side="right") - 1, 0)])
 
 
 def _fits(time: Array, v: Array, steady: Array, rate: float) -> tuple[Array, Array, Array]:
-    """The velocity as a gain times a lag of each of k steady ones (k x n), from rest, and a constant.
+    """Fit the velocity by a gain times a lag of each of k steady velocities (k x n), from rest, and a constant.
 
-    The gains, the sums of squares that are left, and the residuals of the best.
+    Return the gains, the remaining sums of squares, and the residuals of the best fit.
     """
-    from scipy.signal import lfilter  # late: it takes long to import, and tables need none of it
+    from scipy.signal import lfilter  # imported here because it is slow, and tables do not need it
 
     fall = np.exp(-rate * float(time[1] - time[0]))
     lagging = lfilter([1.0 - fall], [1.0, -fall], np.pad(steady[:, :-1], ((0, 0), (1, 0))), axis=1)
-    left, lagging = v - v.mean(), lagging - lagging.mean(axis=1, keepdims=True)
-    gains = lagging @ left / np.maximum(np.sum(lagging**2, axis=1), 1e-300)
-    residuals = left - gains[:, None] * lagging
+    centred, lagging = v - v.mean(), lagging - lagging.mean(axis=1, keepdims=True)
+    gains = lagging @ centred / np.maximum(np.sum(lagging**2, axis=1), 1e-300)
+    residuals = centred - gains[:, None] * lagging
     sums = np.sum(residuals**2, axis=1)
     return gains, sums, residuals[int(sums.argmin())]

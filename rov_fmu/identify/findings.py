@@ -1,0 +1,209 @@
+"""The sentences about an identification, by kind of finding."""
+
+from collections.abc import Callable, Iterable, Mapping
+from math import pi
+from pathlib import Path
+from typing import Any
+
+from rov_fmu.tank import findings
+from rov_fmu.tank.findings import Finding, SentenceForm
+
+
+def sentences(found: Iterable[Finding]) -> tuple[str, ...]:
+    """Return the sentences of findings; similar findings share one sentence."""
+    return findings.sentences(found, _SENTENCES)
+
+
+def refusals(found: Iterable[Finding], folder: Path) -> list[str]:
+    """Return a sentence for each finding, with the whole path of its file."""
+    return findings.refusals(found, folder, _SENTENCES)
+
+
+def _inseparable_drag(values: Mapping[str, Any]) -> str:
+    """List the coefficients of drag that are not identifiable, or whose intervals are wide."""
+    coefficients = []
+    for key in ("a_d", "b_d"):
+        if key in values:
+            reason = "may lie anywhere from {low:.3g} to {high:.3g}" if f"{key} low" in values else ""
+            interval = {end: values.get(f"{key} {end}") for end in ("low", "high")}
+            coefficients.append(f"{values[key]} {reason.format(**interval) or 'is not identifiable at all'}")
+    together = f" (correlation {values['correlation']:.2f})" if "correlation" in values else ""
+    return (
+        f"{values['axes']}: quadratic and linear drag are hardly identifiable apart: {', '.join(coefficients)}"
+        f"{together}; identifiable is their sum at the velocities tested"
+    )
+
+
+def _drag_at_zero(values: Mapping[str, Any]) -> str:
+    unbounded = f" (by (11)-(13) alone {values['unbounded']:.3g})" if "unbounded" in values else ""
+    return (
+        f"{values['axes']}: {values['coefficient']} is at its bound of 0, the fit without bounds is "
+        f"negative{unbounded}, which drag cannot be"
+    )
+
+
+def _asymmetry(values: Mapping[str, Any]) -> str:
+    whose = f"{values['curve']} thrust" if values["curve"] else values["axes"]
+    by_model = f"to differ by {values['modelled']:+.0%}" if "modelled" in values else "as equal"
+    return (
+        f"{whose}: {values['quantity']} differs by {values['measured']:+.0%} from positive to negative commands at "
+        f"{values['command']:.0%}, which the model takes {by_model}; windows.{values['window']} picks a direction"
+    )
+
+
+def _disagreement(values: Mapping[str, Any]) -> str:
+    low, high = f"{values['low']:.2g}", f"{values['high']:.2g}"
+    factors = low if low == high else f"{low} to {high}"
+    return (
+        f"{values['axes']}: the recordings disagree on {values['coefficients']} by more than their residuals explain, "
+        f"so the model misses something; intervals are {factors} times as wide for it"
+    )
+
+
+def _effect(form: str) -> Callable[[Mapping[str, Any]], str]:
+    """Return a form that also has {interval}, which may be empty, and {of}: an axis, a curve or the files."""
+
+    def sentence(values: Mapping[str, Any]) -> str:
+        interval = " ({low:.4g} to {high:.4g})".format(**values) if "low" in values else ""
+        return form.format(**{"of": values["files"], **values}, interval=interval)
+
+    return sentence
+
+
+_LENGTH_CAUSES = {
+    1000.0: "is it in mm",
+    100.0: "is it in cm",
+    10.0: "is it in dm, or the scale of the sensor wrong",
+    0.1: "is the unit or the scale of the sensor wrong",
+    0.01: "are metres taken for cm",
+    0.001: "are metres taken for mm",
+}
+_ANGLE_CAUSES = {
+    pi / 180.0: "are radians taken for degrees",
+    180.0 / pi: "are degrees taken for radians",
+    10.0: "is it in tenths of a degree, or the scale of the sensor wrong",
+    100.0: "is it in hundredths of a degree",
+    0.1: "is the unit or the scale of the sensor wrong",
+}
+
+
+def _wrong_scale(values: Mapping[str, Any]) -> str:
+    """Explain that the numbers of a file are a multiple of what was measured."""
+    factor = float(values["factor"])
+    causes = _ANGLE_CAUSES if values["unit"].startswith("rad") else _LENGTH_CAUSES
+    cause = causes[min(causes, key=lambda other: abs(other / factor - 1.0))]
+    correction = f"x {1.0 / factor:.4g}" if factor < 1.0 else f"/ {factor:.4g}"
+    others = f" Or else are those wrong that it contradicts: {values['others']}?" if values["others"] else ""
+    return (
+        f"{values['files']}: {values['quantity']} [{values['unit']}] fits thrust, size and other files only "
+        f"{correction}: {cause}?{others}"
+    )
+
+
+_OWN_SENTENCES: dict[str, SentenceForm] = {
+    # Thrust curves
+    "thrust without freedom": (
+        "{curve} thrust: {count:g} points for two coefficients leave no degree of freedom, so there are no intervals"
+    ),
+    "backward thrust": (
+        "{curve} thrust: the curve points backward below {command:.0%}; weigh high commands out (windows)"
+    ),
+    "backward thrust in reverse": (
+        "{curve} thrust: the curve in reverse points backward below {command:.0%}; weigh high commands out (windows)"
+    ),
+    "asymmetry": _asymmetry,
+    # Drag and beta from points
+    "assumed beta": (
+        "{axes}: {inertia}/{beta} is not identifiable from V_ss alone; {beta} = 1 is assumed, and every Tau follows "
+        "from it. A time constant or a recording of a step from rest makes it identifiable"
+    ),
+    "no push": (
+        "{axes}: what moves at {commands} is left out: the thrust curve gives no push there (its dead band, or a slip "
+        "in one of the tables)"
+    ),
+    "untested thrust": (
+        "{axes}: commands of {low:.0%} to {high:.0%} are used, but {curve} thrust was tested from {tested_low:.0%} to "
+        "{tested_high:.0%} only"
+    ),
+    "drag without freedom": (
+        "{axes}: as many coefficients as measurements leave no degree of freedom, so there are no intervals"
+    ),
+    "inseparable drag": _inseparable_drag,
+    "drag at zero": _drag_at_zero,
+    "leave-one-out error": (
+        "{axes}: the leave-one-thrust-out error of {quantity} is {predicted:.1%} (RMS), the residual of the fit "
+        "{fitted:.1%}: single thrusts carry much of it"
+    ),
+    "tables against recordings": "{axes}: {quantity} of the tables is {error:.0%} (RMS) off what the recordings give",
+    # Recordings
+    "coupling left out": (
+        "{axes}: {files} does not tell how fast the vehicle moves along or about the other axes, so their coupling "
+        "with {axes} is left out of the fit"
+    ),
+    "correlated residuals": (
+        "{axes}: the residuals of {files} are correlated over {samples:.0f} samples, so more than the sensor's noise "
+        "(turbulence, tether, or the model); the intervals are widened for it"
+    ),
+    "outliers": "{axes}: {share:.0%} of the samples of {files} are outliers and count less",
+    "disagreement": _disagreement,
+    "poor prediction": (
+        "{axes}: each recording is predicted by {others} with a fit of {fit:.0f} % only: do not trust this axis"
+    ),
+    "recordings against thrust": (
+        "{axes}: the recordings ask for {coefficient} = {value:.3g}, while the thrust tests gave {tested:.3g} +- "
+        "{error:.1g}: a thruster in motion is not one that is held"
+    ),
+    # Effects
+    "load": _effect(
+        "{axes}: a constant load of {value:.4g} {unit}{interval} acts in {of} (net weight, tether), and is in the model"
+    ),
+    "delay": _effect(
+        "{axes}: the motion of {of} follows the commands {value:.4g} s late{interval}; the delay is not in the model "
+        "but told with it"
+    ),
+    "current": _effect("{axes}: the water moved at {value:.4g} {unit}{interval} in {of}, which is taken out"),
+    "current north": _effect(
+        "{axes}: the water moved north at {value:.4g} {unit}{interval} in {of}, which is taken out"
+    ),
+    "current east": _effect("{axes}: the water moved east at {value:.4g} {unit}{interval} in {of}, which is taken out"),
+    "dead band": _effect(
+        "{axes}: thrust of {of} begins at a command of {value:.4g}{interval}, and that is in the model"
+    ),
+    "lag": _effect("{axes}: the thrust of {of} lags by {value:.4g} s{interval}, and is in the model"),
+    "reverse thrust": _effect(
+        "{axes}: {of} thrust in reverse is {value:.4g} times that ahead{interval}, and is in the model"
+    ),
+    "reverse drag": _effect(
+        "{axes}: drag of {of} in reverse is {value:.4g} times that ahead{interval}, and is in the model"
+    ),
+    "delay not modelled": _effect(
+        "The motion in {axes} followed the commands {value:.4g} s late{interval}: the model has no delay, put one in "
+        "front of the commands."
+    ),
+    # Units and signs
+    "implausible beta": (
+        "{axes}: {beta} = {value:.3g} is not within {low:g} ... {high:g}, as of any vehicle known: it moves as if its "
+        "inertia were {inertia}. A wrong unit or scale (of the motion, the commands, the thrust, {mass}) may cause it, "
+        "or a delay or a lag that the fit does not have"
+    ),
+    "wrong scale": _wrong_scale,
+    "too fast": (
+        "{files}: {quantity} [{unit}] tells of {speed:.3g} {speed_unit}, which no ROV reaches: is its unit right, and "
+        "that of time?"
+    ),
+    "wrong sign": (
+        "{files}: moves against the command: is the sign of {quantity} or of the commands turned? {positive} is +"
+    ),
+    "fractions as percent": (
+        "{files}: no command is beyond {percent:.2g} % of full thrust, which moves no ROV: are fractions [1] taken for "
+        "percent [%]?"
+    ),
+    "slow time constants": (
+        "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: is it in ms?"
+    ),
+    "fast time constants": (
+        "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: are seconds taken "
+        "for ms?"
+    ),
+}
+_SENTENCES = findings.SENTENCES | _OWN_SENTENCES

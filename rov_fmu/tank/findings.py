@@ -1,0 +1,130 @@
+"""Findings about data: what was left out, what the data cannot determine, and what contradicts the model.
+
+A finding is data. Its sentence comes from a table of sentences by kind: SENTENCES below for reading files, and another
+one in rov_fmu/identify/findings.py.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+SentenceForm = str | Callable[[Mapping[str, Any]], str]
+"""A format string, or a function that makes the sentence. Both get {axes}, {files}, {curve}, the names and the numbers
+of the finding. The format `{count:#row}` gives "1 row" or "2 rows"."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something worth telling the user."""
+
+    kind: str
+    axis: str = ""
+    curve: str = ""
+    file: str = ""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """The words that the sentence needs: names of coefficients, units, formatted factors."""
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    """The numbers that the sentence needs. In a sentence about several files they become ranges."""
+    certain: bool = False
+    """True when the data cannot be right, so the file must be refused."""
+
+
+def sentences(findings: Iterable[Finding], forms: Mapping[str, SentenceForm]) -> tuple[str, ...]:
+    """Return the sentences of the findings; similar findings share one sentence.
+
+    Findings about files share a sentence when they differ only in the file, the axis and the numbers; other findings,
+    when they differ only in the axis. Each axis in a sentence belongs to each of its files.
+    """
+    by_file: dict[tuple[object, ...], list[Finding]] = {}
+    for finding in findings:
+        numbers = [*finding.numbers] if finding.file else [*finding.numbers.items()]
+        key = (finding.kind, finding.curve, finding.file, *finding.names.items(), *numbers)
+        by_file.setdefault(key, []).append(finding)
+    groups: dict[tuple[object, ...], list[Finding]] = {}
+    for (kind, curve, file, *rest), found in by_file.items():
+        axes = tuple(dict.fromkeys(finding.axis for finding in found))
+        groups.setdefault((kind, curve, bool(file), axes, *rest), []).extend(found)
+    return tuple(_sentence(group, forms) for group in groups.values())
+
+
+def refusals(findings: Iterable[Finding], folder: Path, forms: Mapping[str, SentenceForm]) -> list[str]:
+    """Return a sentence for each finding, with the whole path of its file."""
+    return [_sentence([replace(finding, file=str(folder / finding.file))], forms) for finding in findings]
+
+
+def _sentence(group: Sequence[Finding], forms: Mapping[str, SentenceForm]) -> str:
+    first, form = group[0], forms[group[0].kind]
+    values = {
+        "axes": _listed(finding.axis for finding in group),
+        "files": _listed(finding.file for finding in group),
+        "curve": first.curve,
+        **first.names,
+        **{name: _Range([finding.numbers[name] for finding in group]) for name in first.numbers},
+    }
+    return form.format(**values) if isinstance(form, str) else form(values)
+
+
+def _listed(words: Iterable[str]) -> str:
+    """Join different words as in "a, b and c"."""
+    *others, last = dict.fromkeys(words)
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+class _Range:
+    """A number, or the range of several numbers, in a format string."""
+
+    def __init__(self, numbers: Sequence[float]) -> None:
+        self.low, self.high = min(numbers), max(numbers)
+
+    def __format__(self, spec: str) -> str:
+        _, is_count, noun = spec.partition("#")
+        number_format = "g" if is_count else spec
+        low, high = format(self.low, number_format), format(self.high, number_format)
+        words = low if low == high else f"{low} ... {high}"
+        if not is_count:
+            return words
+        plural = f"{noun.removesuffix('y')}ies" if noun.endswith("y") else f"{noun}s"
+        return f"{words} {noun if self.high == 1 else plural}"
+
+
+SENTENCES: dict[str, SentenceForm] = {
+    # Rows of a log
+    "rows sorted": "{files}: {count:#row} out of order sorted",
+    "time stamps merged": "{files}: {count:#repeated time stamp} merged",
+    "rows without time": "{files}: {count:#row} without a time left out",
+    "rows without command": "{files}: {count:#row} without a command left out",
+    "torn rows": "{files}: {count:#row} with more cells than the header left out",
+    "unread cells": "{files}: {count:#cell} of {column} without a number taken as blank",
+    "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",
+    "pulse beyond full thrust": "{files}: {count:#pulse} of {column} beyond full thrust taken as full thrust",
+    "missing column": "{files}: no column of {column}, which is taken as 0",
+    # Recordings
+    "too few samples": (
+        "{files}: no recording of {axes}: {count:#sample} of {quantity}, at least {least:g} are needed"
+    ),
+    "constant motion": "{files}: no recording of {axes}: the {quantity} never changes",
+    "constant push": "{files}: no recording of {axes}: what the thrusters do along it never changes",
+    # MAVLink logs
+    "damaged log": "{files}: damaged in places: what could be read is used",
+    "damaged pieces": "{files}: {count:#damaged piece} left out",
+    "messages without time": "{files}: {count:#message} without a time left out",
+    "arrival time": (
+        "{files}: {count:#message} VFR_HUD have no time of the vehicle: that of their arrival stands for it"
+    ),
+    "several vehicles": "{files}: several vehicles in it: that of system {system} is taken",
+    "no servo pulse": "{files}: {count:#pulse} of 0 or 65535 us taken as no command",
+    "reversed motors": "{files}: MOT_n_DIRECTION turns the thrusters {thrusters}",
+    "unknown direction": (
+        "{files}: no parameters MOT_n_DIRECTION in it: every thruster is taken to push ahead above 1500 us"
+    ),
+    "unknown velocity": "{files}: {count:#velocity} left out, which the filter says it does not know",
+    "depth by pressure": ("{files}: depth by the pressure of fresh water, 1000 kg/m3; in the sea it is 2.5 % less"),
+    # The vehicle
+    "axis left out": "{axes}: neither tested nor known ({drag}), so the vehicle has no {axes}",
+    "not coupled": "surge, sway and yaw are not coupled, which needs all three",
+    "unused curve": (
+        "{files}: the thrusters of curve {curve} act on no axis that is tested or known, so it is not used"
+    ),
+}
+"""The sentences about reading tests, by kind of finding."""
