@@ -72,7 +72,8 @@ class Command:
     def workers(self) -> list[psutil.Process]:
         with suppress(psutil.Error):
             children = psutil.Process(self.process.pid).children(recursive=True)
-            return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+            kinds = ("spawn_main", "child_process")  # of a study, of a proof
+            return [child for child in children if any(kind in " ".join(child.cmdline()) for kind in kinds)]
         return []
 
     def press_ctrl_c(self) -> str:

@@ -24,8 +24,8 @@ from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
 from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.apart import Apart
 from rov_fmu.study.run.run_study import run_study
+from rov_fmu.study.run.separate_simulator import SeparateSimulator
 from rov_fmu.study.run.simulator import LoadError, RunError, Simulator
 from tests.commands import start
 from tests.folders import beside
@@ -184,21 +184,22 @@ def test_workers_that_nobody_starts_again_outlive_an_fmu(foreign: Foreign, tmp_p
 
 
 @posix
-def test_a_process_apart_is_a_simulator(foreign: Foreign, tmp_path: Path) -> None:
-    """And tells what has become of it, and goes on with the next run."""
+def test_a_separate_simulator_gives_the_reason_when_its_process_ends_and_continues(
+    foreign: Foreign, tmp_path: Path
+) -> None:
     path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 3, 4]", limit=LIMIT)
     model = read_model(foreign())
     job = prepare(load_plan(path), path, model).job
     model.unpack(tmp_path / "fmu")
-    apart = Apart(str(tmp_path / "fmu"), model, job.manoeuvre, job.time_limit)
+    simulator = SeparateSimulator(str(tmp_path / "fmu"), model, job.manoeuvre, job.time_limit)
     y = []
     for mode in (0, 2, 3, 4, 1, 0):
         try:
-            y.append(apart.run([1.0, 0.0, 0.0, mode])["y"][10])
-            apart.reset()
+            y.append(simulator.run([1.0, 0.0, 0.0, mode])["y"][10])
+            simulator.reset()
         except RunError as error:
             y.append(str(error))
-    apart.free()
+    simulator.free()
     end = pytest.approx(1.0 - np.exp(-2.0), rel=1e-12)
     assert y == [end, *UNKIND.values(), "the step at 1 s: error; the FMU: the pump is blocked", end]
 

@@ -24,7 +24,7 @@ from distributed.diagnostics.plugin import WorkerPlugin
 
 from rov_fmu.study.plan.figures import Figures
 from rov_fmu.study.plan.model import Model
-from rov_fmu.study.run.apart import Apart
+from rov_fmu.study.run.separate_simulator import SeparateSimulator
 from rov_fmu.study.run.simulator import Manoeuvre, RunError, Simulator
 
 Array = npt.NDArray[np.float64]
@@ -89,7 +89,7 @@ class InstancePool:
         self.job = job
         self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=folder))
         self._description = job.model.unpack(self._folder)
-        self._idle: dict[bool, list[tuple[Simulator | Apart, Figures]]] = {False: [], True: []}
+        self._idle: dict[bool, list[tuple[Simulator | SeparateSimulator, Figures]]] = {False: [], True: []}
         self._one_only = Lock() if job.model.once_per_process else None
         self._is_watched = is_watched
         self._ends: dict[int, float] = {}
@@ -98,7 +98,7 @@ class InstancePool:
             Thread(target=self._watch, daemon=True).start()
 
     @contextmanager
-    def lent(self, apart: bool) -> Iterator[tuple[Simulator | Apart, Figures]]:
+    def lent(self, apart: bool) -> Iterator[tuple[Simulator | SeparateSimulator, Figures]]:
         """An instance, ready for a run; in a process of its own where asked for. Raises LoadError.
 
         A worker that nobody starts again when its process ends has all of them so.
@@ -127,12 +127,12 @@ class InstancePool:
             simulator.free()
         shutil.rmtree(self._folder, ignore_errors=True)
 
-    def _tools(self, apart: bool) -> tuple[Simulator | Apart, Figures]:
+    def _tools(self, apart: bool) -> tuple[Simulator | SeparateSimulator, Figures]:
         if self._idle[apart]:
             return self._idle[apart].pop()
         job, folder = self.job, str(self._folder)
         simulator = (
-            Apart(folder, replace(job.model, content=b""), job.manoeuvre, job.time_limit)
+            SeparateSimulator(folder, replace(job.model, content=b""), job.manoeuvre, job.time_limit)
             if apart
             else Simulator(folder, self._description, job.model, job.manoeuvre)
         )
