@@ -47,7 +47,7 @@ class Design:
             yield f"runs = {self._planned} becomes {self.runs}, which are {self.runs // block} whole blocks of {block}"
 
     def rows(self, first: int, end: int) -> Array:
-        """Return the values from run `first` to the one before `end`: a row for each run, a column for each variable."""
+        """Return the values from run `first` to the one before `end`: a row per run, a column per variable."""
         drawn, together = self._draw(first, end), len(self._known.names)
         found = np.empty_like(drawn)
         found[:, :together] = self._known.drawn(drawn[:, :together])
