@@ -94,7 +94,9 @@ def _end_interrupted(program: str) -> None:
         try:
             _kill_children()
             _print_error(program, "; ".join([_INTERRUPTED, *clean_up_everything()]), 130)
-            _kill_children()  # Dask restarts workers that have ended
+            # Dask restarts the workers. One that starts now prints a traceback when this process ends in between.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+            _kill_children()  # those that started before, with the terminal as their stderr
         finally:
             os._exit(130)
 

@@ -1,53 +1,51 @@
-"""An FMU proved by the experiments that it carries, run by FMPy."""
+"""Prove an FMU: run the experiments that it contains with FMPy, and compare the results with the expected ones."""
 
 import io
 import os
-import signal
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rov_fmu.engine.child_process import ChildError, ChildProcess
 from rov_fmu.fmu.experiments import Carried, Experiment
 from rov_fmu.fmu.unpacking import unpack_fmu
 from rov_fmu.io.file_kinds import FMU, check_suffix
-from rov_fmu.io.interrupts import UNINTERRUPTED, ctrl_c_withheld, temporary_folder
+from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, ProofError, brief, one_line
 from rov_fmu.io.time_series import Series
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
-"""By the name that a person gives: FMPy's."""
+"""FMPy's name of each interface, by the name on the command line."""
 _SAME = 1e-9
-"""Relative: two times that are one."""
+"""The relative difference below which two times are the same."""
 _OF_NOMINAL = 0.01
-"""A deviation is relative to the largest expected value, or to this share of the nominal one, which FMI advises for
-absolute tolerances (2.0, section 2.2.7)."""
+"""A deviation is divided by the largest expected value, but at least by this share of the nominal value, which FMI
+recommends for absolute tolerances (2.0, section 2.2.7)."""
 _OF_A_SOLVER = 1e-3
-"""What the solver of Model Exchange may take of the tolerance at each step."""
+"""The share of the tolerance that the solver of Model Exchange may use at each step."""
 _WARNING = 1
-"""The status of a message, in every version of FMI; what is worse comes after it."""
+"""The status `warning` in every version of FMI; more serious ones are greater."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One variable of an experiment, or an experiment that does not end."""
+    """The result for one variable of an experiment, or for an experiment that does not end."""
 
     experiment: str
     variable: str
     deviation: float
-    """The largest, relative."""
+    """The largest relative deviation."""
     tolerance: float
     error: str = ""
 
     @property
     def passed(self) -> bool:
-        """Whether it is as expected."""
+        """True when the variable is as expected."""
         return self.deviation <= self.tolerance
 
 
@@ -57,12 +55,12 @@ def prove(
     tolerance: float | None = None,
     on_experiment: Callable[[str, float], None] = lambda *_: None,
 ) -> list[Finding]:
-    """Run the experiments of an FMU and compare. Raises FileError, and ProofError where the FMU ends its process.
+    """Run the experiments of an FMU in a child process and compare the results with the expected ones.
 
-    That is another one than this, so a script that calls this has its `if __name__ == "__main__":`.
+    `interface` is one of INTERFACES; the default is the first one that the FMU has. `tolerance` replaces the tolerances
+    of the experiments. `on_experiment` is called before each experiment with its name and the share that is done.
 
-    `interface` is one of INTERFACES; the first that the FMU has by default. A tolerance stands in place of those of the
-    experiments. `on_experiment` is told of the one that comes next, and of the share that is done.
+    Raises FileError, and ProofError if the FMU ends its process.
     """
     import fmpy
 
@@ -82,70 +80,43 @@ def prove(
                 f"{fmu}: has no {interface or 'interface that can be run'}, only {', '.join(has) or 'none'}"
             )
         chosen = [replace(x, tolerance=tolerance or x.tolerance) for x in experiments]
-        found: list[Finding] = []
-        with closing(_apart(folder, interface or has[0], chosen)) as runs:
-            for n, experiment in enumerate(chosen):
-                on_experiment(experiment.name, n / len(chosen))
-                try:
-                    found += next(runs)
-                except _DiedError as died:
-                    where = one_line(f"{fmu}: experiment {experiment.name!r}")
-                    raise ProofError(f"{where}: the FMU ended its process: {died}") from died
+        experiment, found = chosen[0], list[Finding]()
+        try:
+            with closing(ChildProcess(_Experiments, folder, interface or has[0])) as child:
+                for n, experiment in enumerate(chosen):
+                    on_experiment(experiment.name, n / len(chosen))
+                    found += child.call("findings", experiment)
+        except ChildError as error:
+            where = one_line(f"{fmu}: experiment {experiment.name!r}")
+            raise ProofError(f"{where}: {error}") from error
     return found
 
 
-class _DiedError(Exception):
-    """The process that ran the FMU is no more."""
+class _Experiments:
+    """The experiments of an unpacked FMU. A child process runs them, because a damaged FMU may end its process."""
 
+    def __init__(self, folder: str, interface: str) -> None:
+        import fmpy
 
-def _apart(folder: str, interface: str, experiments: Sequence[Experiment]) -> Generator[list[Finding]]:
-    """The findings of each experiment, from a process of its own, which ends with the generator. Raises _DiedError.
+        self._folder, self._interface = folder, interface
+        self._description = fmpy.read_model_description(folder, validate=False)
 
-    A damaged library ends the process that loads it, and no interrupt ends a call that hangs.
-    """
-    spawn = get_context("spawn")
-    here, there = spawn.Pipe(duplex=False)
-    process = spawn.Process(target=_send_findings, args=(there, folder, interface, experiments), daemon=True)
-    with UNINTERRUPTED, ctrl_c_withheld():
-        process.start()
-    there.close()
-    try:
-        for _ in experiments:
-            while not here.poll(0.1):  # on Windows an interrupt comes between two waits
-                pass
-            yield here.recv()
-    except (EOFError, OSError) as error:  # at the end, or amid an answer
-        process.join()
-        code = process.exitcode or 0
-        raise _DiedError(f"signal {-code} ({signal.strsignal(-code)})" if code < 0 else f"exit code {code}") from error
-    finally:
-        process.kill()
-        process.join()
-        here.close()
-
-
-def _send_findings(to: Connection, folder: str, interface: str, experiments: Sequence[Experiment]) -> None:
-    """The other side: what the FMU prints goes nowhere, and an interrupt is for the process that this one answers."""
-    import fmpy
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    description = fmpy.read_model_description(folder, validate=False)
-    for experiment in experiments:
-        to.send(list(_findings(folder, description, interface, experiment)))
+    def findings(self, experiment: Experiment) -> list[Finding]:
+        """Run an experiment and compare its results."""
+        return list(_findings(self._folder, self._description, self._interface, experiment))
 
 
 def _findings(folder: str, description: Any, interface: str, experiment: Experiment) -> Iterator[Finding]:
-    """A line a variable, or one where the experiment has no expected results or fails."""
+    """Yield a finding for each variable, or a single one if the experiment fails or has no expected results."""
     import fmpy
 
     names = [*(experiment.references or ())][1:]
     kind = INTERFACES[interface]
     reasons: list[bytes] = []
 
-    def keep(*told: Any) -> None:
-        """A message of the FMU: its last arguments are the same in every version of FMI."""
-        status, _, text = told[-3:]
+    def keep(*arguments: Any) -> None:
+        """Keep the last warning or error. The last three arguments are the same in every version of FMI."""
+        status, _, text = arguments[-3:]
         if status >= _WARNING:
             reasons[:] = [text or b""]
 
@@ -168,9 +139,9 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
                 logger=keep,
             )
     except Exception as error:  # FMPy raises that itself, and the FMU may fail in any way
-        told = "".join(f"; the FMU: {text.decode(errors='replace')}" for text in reasons)
-        what = str(error).replace(folder + os.sep, "").rstrip(".")  # the cause stands after the library's path
-        yield Finding(experiment.name, "-", inf, experiment.tolerance, brief(what + told, 240))
+        messages = "".join(f"; the FMU: {text.decode(errors='replace')}" for text in reasons)
+        what = str(error).replace(folder + os.sep, "").rstrip(".")  # the cause follows the library's path
+        yield Finding(experiment.name, "-", inf, experiment.tolerance, brief(what + messages, 240))
         return
     if not experiment.references:
         yield Finding(experiment.name, "-", 0.0, experiment.tolerance)
@@ -184,7 +155,7 @@ def _findings(folder: str, description: Any, interface: str, experiment: Experim
 
 
 def _signals(stimuli: Series | None) -> Any:
-    """As FMPy takes them."""
+    """Return the stimuli as the structured array that FMPy takes."""
     if stimuli is None:
         return None
     _, *names = stimuli
@@ -192,7 +163,7 @@ def _signals(stimuli: Series | None) -> Any:
 
 
 def _deviation(times: Any, values: Any, at: Sequence[float], expected: Sequence[float]) -> float:
-    """The largest; at a time that is there twice, before and after an event, from the nearer value."""
+    """Return the largest deviation. At an event, which has two values at one time, the nearer value counts."""
     values = np.asarray(values, dtype=np.float64)
     worst = 0.0
     for t, value in zip(at, expected, strict=True):

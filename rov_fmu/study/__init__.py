@@ -1,4 +1,4 @@
-"""Studies: many runs of an FMU over what is uncertain, and their results as data frames.
+"""Studies: many runs of an FMU with uncertain parameters, and their results as data frames.
 
     from rov_fmu.study import study
 

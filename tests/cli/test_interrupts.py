@@ -72,7 +72,8 @@ class Command:
     def workers(self) -> list[psutil.Process]:
         with suppress(psutil.Error):
             children = psutil.Process(self.process.pid).children(recursive=True)
-            return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+            kinds = ("spawn_main", "child_process")  # of a study, of a proof
+            return [child for child in children if any(kind in " ".join(child.cmdline()) for kind in kinds)]
         return []
 
     def press_ctrl_c(self) -> str:
@@ -144,6 +145,41 @@ def test_a_study_that_runs_ends_with_one_line(
         study.wait_until(lambda: [*results.glob("runs/part-*.parquet")])
         assert end(study) == LINE_OF_A_STUDY
     assert not [*results.glob("*/.*")]
+
+
+_SLOW_RESTARTS = """
+import os, sys, time
+from multiprocessing import util
+from rov_fmu import process
+from rov_fmu.__main__ import run
+class Slow:
+    def __getattr__(self, name):
+        return end if name == "_exit" else getattr(os, name)
+def end(code):
+    time.sleep(0.5)
+    os._exit(code)
+def start(*arguments, start=util.spawnv_passfds):
+    pid = start(*arguments)
+    if interrupted:
+        time.sleep(3.0)
+    return pid
+def kill(kill=process._kill_children):
+    interrupted.append(True)
+    kill()
+interrupted, slow = [], Slow()
+process.os, process._kill_children, util.spawnv_passfds = slow, kill, start
+sys.exit(run())
+"""
+"""The command, but a worker that is restarted after the interrupt waits for its data until the process has ended."""
+
+
+@pytest.mark.long
+def test_a_worker_that_dask_restarts_prints_nothing(videoray_fmu: Path, tmp_path: Path) -> None:
+    plan, results = _plan(tmp_path, videoray_fmu), tmp_path / "results"
+    arguments = ["-c", _SLOW_RESTARTS, "study", str(plan), "-o", str(results), "--workers", "2"]
+    with command(arguments, tmp_path, is_controlled=False) as study:
+        study.wait_until(lambda: [*results.glob("runs/part-*.parquet")])
+        assert study.terminate() == LINE_OF_A_STUDY
 
 
 def _endless_compiler(folder: Path) -> str:

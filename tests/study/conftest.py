@@ -1,4 +1,4 @@
-"""An FMU that is not of this house, and plans over it."""
+"""An FMU that this project did not build, and Dask workers for studies of it."""
 
 import zipfile
 from collections.abc import Callable, Iterator
@@ -48,7 +48,7 @@ def _description() -> str:
 
 @pytest.fixture(scope="session")
 def foreign(made_once: Made) -> Callable[..., Path]:
-    """The FMU by what its fmi2Reset does."""
+    """A function that builds the FMU; the argument selects what its fmi2Reset does (see foreign.c)."""
 
     def fill(folder: Path, reset: int) -> None:
         name = f"foreign{fmpy.sharedLibraryExtension}"
@@ -67,7 +67,7 @@ def foreign(made_once: Made) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
-    """Workers for studies that are not about their workers: to start some for each takes seconds."""
+    """Workers that tests share, because starting some for each test takes seconds."""
     folder = tmp_path_factory.mktemp("cluster")
     places = {"dashboard_address": "127.0.0.1:0", "local_directory": folder}
     with LocalCluster(n_workers=2, threads_per_worker=2, **places) as started:
@@ -76,5 +76,5 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
 
 @pytest.fixture(scope="session")
 def scheduler(cluster: LocalCluster) -> str:
-    """Where they are."""
+    """The address of the shared workers' scheduler."""
     return str(cluster.scheduler_address)

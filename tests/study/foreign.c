@@ -1,8 +1,8 @@
-/* An FMU of another make, in FMI 2.0: what it does right, and what it does wrong, is for studies to bear.
+/* An FMU of FMI 2.0 that this project did not generate. Studies must cope with its faults.
 
    y' = (a + 2 b + 3 c + u - y)/0.5; gain is an integer that multiplies u. mode: 1 fails at 1 s, 2 ends the process, 3 reads
-   where nothing is, 4 does not return, 5 waits for a millisecond each step. RESET says what fmi2Reset does: 0 its work,
-   1 nothing while it says that it did, 2 nothing, with an error. */
+   a null pointer, 4 does not return, 5 waits for a millisecond in each step. RESET selects what fmi2Reset does: 0 resets,
+   1 does nothing and returns OK, 2 returns an error. */
 #ifdef _WIN32
 #include <windows.h>
 #define WAIT() Sleep(1)
@@ -100,7 +100,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no) {
     return fmi2OK;
 }
 
-/* What an importer looks for and a study does not call. */
+/* Functions that an importer looks up and a study does not call. */
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }
 #define NOT_THERE(name, ...) \

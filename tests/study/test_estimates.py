@@ -1,4 +1,4 @@
-"""What identification wrote into a vehicle file, in a study: drawn together, told, and its Sobol indices."""
+"""The estimates of a vehicle file in a study: they are drawn together, and are on the page with their Sobol indices."""
 
 from collections.abc import Mapping
 from contextlib import redirect_stderr

@@ -1,4 +1,4 @@
-"""Figures of responses whose figures are known."""
+"""The figures of responses whose figures are known in closed form."""
 
 import warnings
 from math import exp, log, nan, pi, sqrt

@@ -1,4 +1,4 @@
-"""Studies of every kind of FMU, on workers of any number and place: the same rows."""
+"""Every kind of FMU, and any number of workers anywhere, give the same rows."""
 
 import builtins
 import errno
@@ -60,7 +60,7 @@ def _close(one: Results, other: Results) -> None:
 
 
 def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
-    """Run by run in Python, which the FMU is not made of."""
+    """Each run is repeated in Python, which shares no code with the FMU."""
     rov = load_vehicle(VIDEORAY).rov
     for number, run in native.runs.iterrows():
         own = type(rov)(rov.layout, {**rov.coefficients, "alpha_u": run.alpha_u, "m_rov": run.m_rov})
@@ -121,7 +121,7 @@ def test_workers_of_a_scheduler_are_left_as_they_were(
 
 
 def test_the_tables_open_in_other_tools(native: Results) -> None:
-    """A folder of Parquet files is a data set."""
+    """A folder of Parquet files is a data set for pandas."""
     runs = pd.read_parquet(native.folder / "runs")
     assert sorted(runs.columns) == ["V_N", "alpha_u", "drift", "final_x", "m_rov", "reason", "run", "status"]
     assert len(runs) == RUNS

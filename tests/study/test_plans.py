@@ -1,4 +1,4 @@
-"""What is wrong with a plan is told in a line each, before anything is run."""
+"""Every mistake in a plan is reported in one line before anything is run."""
 
 import shutil
 from collections.abc import Callable

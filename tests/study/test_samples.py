@@ -1,4 +1,4 @@
-"""What varies: by the run's number and the seed alone, and distributed as the plan says."""
+"""The parameters of a run depend only on its number and the seed, and are distributed as the plan says."""
 
 import numpy as np
 import pytest

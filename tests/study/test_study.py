@@ -1,4 +1,4 @@
-"""Studies done: the rows are those of the closed form, whoever does them, whatever happens to whom."""
+"""Complete studies: the rows are those of the closed form, also after workers, FMUs or the study itself have died."""
 
 import os
 import signal
@@ -24,8 +24,8 @@ from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
 from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.apart import Apart
 from rov_fmu.study.run.run_study import run_study
+from rov_fmu.study.run.separate_simulator import SeparateSimulator
 from rov_fmu.study.run.simulator import LoadError, RunError, Simulator
 from tests.commands import start
 from tests.folders import beside
@@ -63,7 +63,7 @@ sooner = "at(y, 1)"
 
 
 def _expected(runs: pd.DataFrame, t: Any) -> Any:
-    """y of the foreign FMU, whose input is 0 before 1 s and 0.5 after."""
+    """Return y of the foreign FMU, whose input is 0 before 1 s and 0.5 after."""
     to = runs.a + 2.0 * runs.b + 3.0 * runs.c
     return to * (1.0 - np.exp(-t / 0.5)) + 0.5 * (1.0 - np.exp(-max(t - 1.0, 0.0) / 0.5))
 
@@ -75,7 +75,7 @@ def _same(one: Results, other: Results) -> None:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
-    """By one worker."""
+    """The results of one worker."""
     folder = tmp_path_factory.mktemp("whole")
     return study(_plan(folder, foreign()), folder / "results", workers=1)
 
@@ -146,16 +146,16 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
 
 LIMIT = 4.0
 """Seconds for runs that take thousandths, for a busy machine may hold a process for long."""
-UNKIND = {2: "the FMU ended its process: SIGABRT", 3: "the FMU ended its process: SIGSEGV"} | {
+HARMFUL = {2: "the FMU ended its process: SIGABRT", 3: "the FMU ended its process: SIGSEGV"} | {
     4: f"the FMU did not return within time_limit = {LIMIT:g} s"
 }
 
 
-def _unkind(plan: Path, folder: Path, **where: Any) -> None:
-    """One run of sixteen is of each unkind mode, on the average."""
+def _harmful(plan: Path, folder: Path, **where: Any) -> None:
+    """Run a plan in which one of sixteen runs, on average, has each of the harmful modes."""
     runs = study(plan, folder, **where).runs
     assert runs.index.tolist() == [*range(64)]
-    for mode, reason in UNKIND.items():
+    for mode, reason in HARMFUL.items():
         of_mode = runs[runs["mode"] == mode]
         assert len(of_mode) >= 2
         assert {*of_mode.status} == {"failed"}
@@ -165,46 +165,47 @@ def _unkind(plan: Path, folder: Path, **where: Any) -> None:
     assert others.end.to_numpy() == pytest.approx(_expected(others, 2.0).to_numpy(), rel=1e-12)
 
 
-def _unkind_plan(folder: Path, fmu: Path) -> Path:
-    return _plan(folder, fmu, runs=64, vary=f"mode.values = {[0] * 13 + [*UNKIND]}", limit=LIMIT)
+def _harmful_plan(folder: Path, fmu: Path) -> Path:
+    return _plan(folder, fmu, runs=64, vary=f"mode.values = {[0] * 13 + [*HARMFUL]}", limit=LIMIT)
 
 
 @posix
 @pytest.mark.long
 @pytest.mark.parametrize("reset", [0, 2])
 def test_a_run_that_ends_its_process_or_does_not_return_is_a_row(reset: int, foreign: Foreign, tmp_path: Path) -> None:
-    _unkind(_unkind_plan(tmp_path, foreign(reset)), tmp_path / "results", workers=2)
+    _harmful(_harmful_plan(tmp_path, foreign(reset)), tmp_path / "results", workers=2)
 
 
 @posix
 @pytest.mark.long
 def test_workers_that_nobody_starts_again_outlive_an_fmu(foreign: Foreign, tmp_path: Path) -> None:
     with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0") as cluster:
-        _unkind(_unkind_plan(tmp_path, foreign()), tmp_path / "results", scheduler=cluster.scheduler_address)
+        _harmful(_harmful_plan(tmp_path, foreign()), tmp_path / "results", scheduler=cluster.scheduler_address)
 
 
 @posix
-def test_a_process_apart_is_a_simulator(foreign: Foreign, tmp_path: Path) -> None:
-    """And tells what has become of it, and goes on with the next run."""
+def test_a_separate_simulator_gives_the_reason_when_its_process_ends_and_continues(
+    foreign: Foreign, tmp_path: Path
+) -> None:
     path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 3, 4]", limit=LIMIT)
     model = read_model(foreign())
     job = prepare(load_plan(path), path, model).job
     model.unpack(tmp_path / "fmu")
-    apart = Apart(str(tmp_path / "fmu"), model, job.manoeuvre, job.time_limit)
+    simulator = SeparateSimulator(str(tmp_path / "fmu"), model, job.manoeuvre, job.time_limit)
     y = []
     for mode in (0, 2, 3, 4, 1, 0):
         try:
-            y.append(apart.run([1.0, 0.0, 0.0, mode])["y"][10])
-            apart.reset()
+            y.append(simulator.run([1.0, 0.0, 0.0, mode])["y"][10])
+            simulator.reset()
         except RunError as error:
             y.append(str(error))
-    apart.free()
+    simulator.free()
     end = pytest.approx(1.0 - np.exp(-2.0), rel=1e-12)
-    assert y == [end, *UNKIND.values(), "the step at 1 s: error; the FMU: the pump is blocked", end]
+    assert y == [end, *HARMFUL.values(), "the step at 1 s: error; the FMU: the pump is blocked", end]
 
 
 def test_what_loads_an_fmu_or_cannot_leaves_the_process_where_it_was(foreign: Foreign, tmp_path: Path) -> None:
-    """Many threads at once."""
+    """The working directory stays, also when many threads load at once."""
     path, model, here = _plan(tmp_path, foreign()), read_model(foreign()), Path.cwd()
     job = prepare(load_plan(path), path, model).job
     whole, broken = tmp_path / "whole", tmp_path / "broken"
@@ -322,7 +323,7 @@ SLOW: dict[str, Any] = {"runs": 1500, "more": "[set]\nmode = 5"}
 
 @pytest.fixture(scope="module")
 def slow(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
-    """Undisturbed."""
+    """The results of an undisturbed study."""
     folder = tmp_path_factory.mktemp("slow")
     return study(_plan(folder, foreign(), **SLOW), folder / "results", workers=4)
 
@@ -332,7 +333,7 @@ def _parts(results: Path) -> list[Path]:
 
 
 def _begun(plan: Path, results: Path) -> "subprocess.Popen[str]":
-    """A study under way, of which some is done."""
+    """Start a study and return its process when some runs are done."""
     process = start(
         ["study", str(plan), "-o", str(results), "--workers", "2"],
         stdout=subprocess.DEVNULL,
@@ -362,7 +363,7 @@ def _workers(pid: int) -> list[psutil.Process]:
 def test_a_script_that_workers_cannot_import_is_told_of_its_guard(
     script: str, told: str, foreign: Foreign, tmp_path: Path
 ) -> None:
-    """And no worker says a word."""
+    """Only the process that started the workers prints something."""
     _plan(tmp_path, foreign())
     text = "from rov_fmu.study import study\nstudy('plan.toml', 'results', workers=2)\n"
     (tmp_path / "script.py").write_text(text)
@@ -436,7 +437,7 @@ def test_a_scheduler_that_is_not_there_is_a_line(
 def test_a_scheduler_that_goes_takes_nothing_with_it(
     wait: float, foreign: Foreign, tmp_path: Path, slow: Results, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Noticed at once, or when the client has given it up."""
+    """The study notices it at once, or when the client has given up the scheduler."""
     monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 4.0)
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
     with LocalCluster(n_workers=1, dashboard_address="127.0.0.1:0", local_directory=tmp_path / "cluster") as cluster:

@@ -1,4 +1,4 @@
-"""What `vary_from` brings to a study: the estimates of a vehicle file, drawn together."""
+"""The key `vary_from` of a plan: the estimated coefficients of a vehicle file vary together in a study."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ _SHOWN = 5
 
 
 class Estimates:
-    """Of the coefficients to which a vehicle file gives an interval, but those that the plan itself gives."""
+    """The estimated coefficients: they have an interval in the vehicle file, and the plan does not give them itself."""
 
     def __init__(self, plan: Plan, vehicle: Vehicle | None, has: Mapping[str, Variable]) -> None:
         self._plan, self._vehicle, self._has = plan, vehicle, has
@@ -25,24 +25,24 @@ class Estimates:
         errors = zip(self._whole.names, self._whole.errors.tolist(), strict=True)
         self._part = self._whole.part([name for name, error in errors if error and not self._given(name)])
         self.names = self._part.names
-        """What varies."""
+        """The names of the coefficients that vary."""
 
     @property
     def known(self) -> Uncertainty:
-        """What they are drawn by: within what the FMU takes, too."""
+        """The distribution that they are drawn from, also within the bounds of the FMU's variables."""
         own = np.array([(self._has[name].minimum, self._has[name].maximum) for name in self.names]).reshape(-1, 2)
         bounds = [np.maximum(self._part.bounds, own)[:, 0], np.minimum(self._part.bounds, own)[:, 1]]
         return replace(self._part, bounds=np.column_stack(bounds))
 
     @property
     def mark(self) -> dict[str, object]:
-        """What results depend on, in a form that JSON has."""
+        """The estimates that the results depend on, as JSON values."""
         numbers = zip(self.names, self._part.values.tolist(), self._part.errors.tolist(), strict=True)
-        told = {name: {"value": value, "error": error} for name, value, error in numbers}
-        return {_KEY: {"estimates": told, "correlation": self._part.correlation.tolist()}} if told else {}
+        estimates = {name: {"value": value, "error": error} for name, value, error in numbers}
+        return {_KEY: {"estimates": estimates, "correlation": self._part.correlation.tolist()}} if estimates else {}
 
     def check(self) -> Iterator[str]:
-        """What does not fit the plan or the FMU, a line each."""
+        """Yield a line for each estimate that does not fit the plan or the FMU."""
         plan, groups = self._plan, self._part.groups
         if self._vehicle and not self._vehicle.intervals:
             yield key_line(_KEY, "no coefficient of this vehicle has an interval", plan.vary_from)
@@ -60,7 +60,7 @@ class Estimates:
             yield key_line("sampler", reason, plan.sampler)
 
     def warnings(self) -> Iterator[str]:
-        """What the results have in them that a reader may not expect, a sentence each."""
+        """Yield a sentence for each property of the results that a reader may not expect."""
         if not self._vehicle:
             return
         file, has = self._plan.vary_from, self._has
@@ -91,7 +91,7 @@ class Estimates:
             yield f"what is correlated has one Sobol index together: {'; '.join(together)}"
 
     def _given(self, name: str) -> bool:
-        """Whether the plan itself says what a variable is."""
+        """True when the plan itself gives the variable."""
         return name in self._plan.vary or name in self._plan.set
 
 

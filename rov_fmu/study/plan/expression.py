@@ -27,7 +27,7 @@ from rov_fmu.io.messages import brief, shown
 TIME = "t"
 """The times of the communication points, in an expression."""
 BY_NAME = "out"
-"""Gives variables whose name is not a valid Python identifier, in an expression: out["der(u)"]."""
+"""The name by which an expression gets variables whose name is not a valid Python identifier: out["der(u)"]."""
 CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": pi, "e": e, "nan": nan, "inf": inf})
 """Numbers by their names in an expression."""
 _DEEPEST = 100
@@ -69,7 +69,7 @@ class Function:
 
 
 def _of_all(of_one: Callable[[_Value], _Value], of_two: Callable[[_Value, _Value], _Value]) -> Function:
-    """NumPy's function of an array, or of several values as in Python."""
+    """Return a function that reduces one array as in NumPy, or several values as in Python."""
     return Function(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100)
 
 
@@ -161,7 +161,7 @@ _COMPARED: Mapping[type[ast.cmpop], Callable[[_Value, _Value], _Value]] = {
     ast.Eq: np.equal,
     ast.NotEq: np.not_equal,
 }
-"""NumPy's, for two of Python's true add up to a whole number, which would grow without end."""
+"""NumPy's comparisons, because Python's True + True is an integer, and integers would grow without end."""
 
 
 # ---- Reading ---------------------------------------------------------------------------------------------------------
@@ -196,7 +196,7 @@ class _Reader:
 
     def __init__(self, functions: Mapping[str, Function]) -> None:
         self.names: list[str] = []
-        """Each time that one is named."""
+        """The variables and constants, once for each time that they occur."""
         self.constant_values: list[dict[str, _Value]] = []
         self._functions = functions
         self._depth = 0
@@ -277,7 +277,7 @@ class _Reader:
         return lambda values: compute(left(values), right(values))
 
     def _compare(self, node: ast.Compare) -> _Term | None:
-        """Also of several, as in 0 < y < 1, element by element."""
+        """Compare two values, or several element by element, as in 0 < y < 1."""
         operators = [_COMPARED[type(op)] for op in node.ops if type(op) in _COMPARED]
         if len(operators) < len(node.ops):
             return None
@@ -327,7 +327,7 @@ class _Reader:
             named = len(self.names)
             terms.append(self.term(part))
             if function.parameters and len(self.names) == named:
-                with suppress(Exception):  # the run tells it
+                with suppress(Exception):  # the run gives the reason
                     if not isinstance(value := terms[n]({}), np.ndarray):
                         numbers[given[n]] = value
         if function.parameters:
@@ -367,7 +367,7 @@ def _array(value: _Value) -> _Value:
 
 
 def _index(value: _Value) -> _Value:
-    """As NumPy takes it: a whole number, an array of them, or an array of true and false."""
+    """Return the index that NumPy takes: an integer, an array of integers, or an array of Booleans."""
     if not isinstance(value, np.ndarray):
         return _whole_number(value)
     if value.dtype.kind == "b":

@@ -1,4 +1,4 @@
-"""The unit of a figure, where its expression says it."""
+"""The unit of a figure, as far as it follows from the expression."""
 
 import ast
 from collections.abc import Mapping
@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from rov_fmu.study.plan.expression import BY_NAME, TIME
 
 _OWN = {"Tau": "s", "settling_time": "s", "overshoot": "1"}
-"""Units that functions bring."""
+"""The units of functions that have their own."""
 _SAME = ("V_ss", "at", "final", "abs", "max", "min", "mean", "median", "std", "ptp", "sum", "percentile")
-"""Functions whose value has the unit of what they are given first."""
+"""The functions whose value has the unit of their first argument."""
 
 
 def figure_unit(expression: str, units: Mapping[str, str]) -> str:
-    """By the units of the variables; nothing where it is not plain, as with a product."""
+    """Return the unit that follows from those of the variables, or an empty text, for example for a product."""
     return _unit(ast.parse(expression.strip(), mode="eval").body, {TIME: "s", **units}) or ""
 
 

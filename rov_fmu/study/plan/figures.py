@@ -14,16 +14,16 @@ from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, E
 
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
-"""The last part of a window, over which the mean is what is steady."""
+"""The last part of a window; the mean over it is the steady value."""
 _NEVER = ("must be one number", "TypeError")
-"""How the reasons begin that hold for every run."""
+"""The beginnings of the reasons that hold for every run."""
 _MOST_WINDOWS = 1000
 _BAND = 0.05
-"""Of the way from the beginning: within it a response is settled."""
+"""The share of the whole change within which a response has settled."""
 
 
 class Responses:
-    """What an expression may call: functions of an output over the times of a run (s)."""
+    """The functions of an output over the times of a run (s) that an expression may call."""
 
     def __init__(self, times: Array) -> None:
         self._times = times
@@ -38,11 +38,11 @@ class Responses:
             "final": self.final,
         }
         self.functions = {name: Function.by_name(method) for name, method in own.items()}
-        """By the name in an expression."""
+        """The functions by their names in an expression."""
 
     def at(self, y: Array, time: float) -> float:
-        """y at a time, straight between two points."""
-        self._see(time)
+        """y at a time, interpolated linearly."""
+        self._check_times(time)
         return float(np.interp(time, self._times, y))
 
     def final(self, y: Array) -> float:
@@ -54,36 +54,36 @@ class Responses:
         return float(y[self._window(start, end)[1]].mean())
 
     def time_constant(self, y: Array, start: float | None = None, end: float | None = None) -> float:
-        """Time from `start` until y has gone 1 - 1/e of its way to the steady value; NaN where it goes nowhere."""
-        way, t = self._way(y, start, end)
-        n = int((way >= RISE).argmax())
-        if not way[n] >= RISE:
+        """Time from `start` until y has made 1 - 1/e of its change to the steady value; NaN without a change."""
+        change, t = self._change(y, start, end)
+        n = int((change >= RISE).argmax())
+        if not change[n] >= RISE:
             return nan
-        share = (RISE - way[n - 1]) / (way[n] - way[n - 1])  # n is not 0, where the way is 0
+        share = (RISE - change[n - 1]) / (change[n] - change[n - 1])  # n is not 0, because the first change is 0
         return float(t[n - 1] + share * (t[n] - t[n - 1]) - t[0])
 
     def overshoot(self, y: Array, start: float | None = None, end: float | None = None) -> float:
-        """How far y goes beyond its steady value, by its way there: 0.1 is 10 %. NaN where it goes nowhere."""
-        way, _ = self._way(y, start, end)
-        return float(np.maximum(way.max() - 1.0, 0.0))
+        """How far y goes beyond its steady value, divided by its change: 0.1 is 10 %. NaN without a change."""
+        change, _ = self._change(y, start, end)
+        return float(np.maximum(change.max() - 1.0, 0.0))
 
     def settling_time(
         self, y: Array, start: float | None = None, end: float | None = None, band: float = _BAND
     ) -> float:
-        """Time from `start` until y stays within a band of its steady value; NaN where it never does.
+        """Time from `start` until y stays within a band around its steady value; NaN if it never does.
 
-        A band of 0.05 is 5 % of its way there.
+        A band of 0.05 is 5 % of the change to the steady value.
         """
-        way, t = self._way(y, start, end)
-        outside = np.flatnonzero(~(np.abs(way - 1.0) <= band))
+        change, t = self._change(y, start, end)
+        outside = np.flatnonzero(~(np.abs(change - 1.0) <= band))
         n = int(outside[-1]) + 1 if outside.size else 0
-        return float(t[n] - t[0]) if n < len(way) else nan
+        return float(t[n] - t[0]) if n < len(change) else nan
 
     def _window(self, start: float | None, end: float | None) -> tuple[slice, slice]:
-        """The points between two times, both included but for rounding, and those of their last tenth."""
+        """Return the points from one time to another, within rounding, and those of the last tenth of that time."""
         if (start, end) not in self._windows:
             t, slack = self._times, self._slack
-            self._see(*(time for time in (start, end) if time is not None))
+            self._check_times(*(time for time in (start, end) if time is not None))
             begin, finish = t[0] if start is None else start, t[-1] if end is None else end
             first, last = int(np.searchsorted(t, begin - slack)), int(np.searchsorted(t, finish + slack))
             if first >= last:
@@ -94,8 +94,8 @@ class Responses:
             self._windows[start, end] = slice(first, last), slice(int(np.searchsorted(t, steady)), last)
         return self._windows[start, end]
 
-    def _see(self, *times: float) -> None:
-        """That they are times of the run."""
+    def _check_times(self, *times: float) -> None:
+        """Raise ValueError if a time is not in the run."""
         first, last = self._times[0], self._times[-1]
         for time in times:
             if not first - self._slack <= time <= last + self._slack:
@@ -110,8 +110,8 @@ class Responses:
             return str(error)
         return ""
 
-    def _way(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
-        """How far y has come, 0 where it is first and 1 where it is steady; NaN where that is the same. The times."""
+    def _change(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
+        """Return y scaled to 0 at the start and 1 when steady, or NaN if these are the same, and the times."""
         window, steady = self._window(start, end)
         part = y[window]
         whole = y[steady].mean() - part[0]
@@ -119,12 +119,12 @@ class Responses:
 
 
 def read_expression(text: str) -> Expression:
-    """Read an expression apart from any run. Raises ExpressionError with the reason if it is not allowed."""
+    """Read an expression without a run. Raises ExpressionError with the reason if it is not allowed."""
     return Expression(text, {**FUNCTIONS, **Responses(np.zeros(1)).functions})
 
 
 def meaning(name: str) -> str:
-    """What a name is that is not a variable of the FMU, if an expression cannot use it as a value."""
+    """Return a hint about a name that an expression cannot use as a value, or an empty text."""
     if name in {**FUNCTIONS, **Responses(np.zeros(1)).functions}:
         return f"{name} is a function: write {name}(...)"
     if name == BY_NAME:
@@ -141,7 +141,7 @@ class Figures:
         self._constants = {**CONSTANTS, TIME: times}
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
-        """The figures in order, for a run's outputs and parameters; NaN, and the reason, for one that has no value."""
+        """Compute the figures from a run's outputs and parameters: NaN, and the reason, for one without a value."""
         values = {**self._constants, **run}
         found, reasons = [], []
         with np.errstate(all="ignore"):
@@ -156,7 +156,7 @@ def _number(expression: Expression, values: Mapping[str, Any]) -> tuple[float, s
     """The value of an expression, or NaN with the reason why it is not one finite number."""
     try:
         value = expression.value(values)
-    except ZeroDivisionError:  # Python's words for it differ between versions
+    except ZeroDivisionError:  # Python's message differs between versions
         return nan, "ZeroDivisionError: division by zero"
     except Exception as error:  # NumPy raises many kinds
         return nan, brief(f"{type(error).__name__}: {error}")
@@ -167,9 +167,9 @@ def _number(expression: Expression, values: Mapping[str, Any]) -> tuple[float, s
 
 
 def unusable(text: str, variables: Iterable[str], varied: Iterable[str], run_times: Array) -> str:
-    """Why an expression cannot be a figure of any run; an empty text if that depends on the run.
+    """Return why an expression cannot be a figure of any run, or an empty text if that depends on the run.
 
-    `run_times` may be empty if the plan does not say them properly.
+    `run_times` is empty if the plan does not give valid times.
     """
     expression = read_expression(text)
     if run_times.size:
@@ -179,7 +179,7 @@ def unusable(text: str, variables: Iterable[str], varied: Iterable[str], run_tim
                 return reason
     times = np.linspace(0.0, 1.0, 11)
     run = {**dict.fromkeys(variables, times), **dict.fromkeys(varied, 1.0)}
-    with warnings.catch_warnings():  # of NumPy, on numbers that do not come from the FMU
+    with warnings.catch_warnings():  # from NumPy, about values that do not come from the FMU
         warnings.simplefilter("ignore", RuntimeWarning)
         reason = Figures({"": text}, times).of(run)[1].removeprefix(": ")
     is_constant = expression.names <= CONSTANTS.keys()

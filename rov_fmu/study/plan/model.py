@@ -1,4 +1,4 @@
-"""The FMU that a study runs, as its description has it."""
+"""The FMU that a study runs, and its variables."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,37 +29,37 @@ TYPES = {
         "UInt64": "u8",
     },
 }
-"""NumPy's type of each type of variable that is a number, by the version of FMI."""
+"""The NumPy type of each numeric type of variable, by the version of FMI."""
 _WHOLE = ("Integer", "Enumeration", "Int")
 _FUNCTIONS = {2: {"Enumeration": "Integer"}, 3: {"Enumeration": "Int64"}}
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable that is a number."""
+    """A numeric variable of an FMU."""
 
     name: str
     reference: int
     type: str
-    """FMI's name of it."""
+    """The name of its type in FMI."""
     causality: str
     can_be_set: bool
-    """Before a run."""
+    """True when it can be set before a run."""
     is_continuous: bool
     minimum: float
     maximum: float
     unit: str
     start: float
-    """0 where the FMU tells none."""
+    """The start value, or 0 if the FMU gives none."""
     description: str = ""
 
     @property
     def is_whole(self) -> bool:
-        """Whether it holds whole numbers alone."""
+        """True when it holds only whole numbers."""
         return self.type.removeprefix("U").startswith(_WHOLE)
 
     def wrong(self, value: float) -> str:
-        """Why it cannot have a value; nothing where it can."""
+        """Return why the variable cannot have this value, or an empty text."""
         if self.type == "Boolean" and value not in (0.0, 1.0):
             return "must be true or false, or 1 or 0"
         if self.is_whole and value != int(value):
@@ -69,11 +69,11 @@ class Variable:
         return ""
 
     def dtype(self, version: int) -> str:
-        """NumPy's name of its type."""
+        """Return the NumPy name of its type."""
         return TYPES[version][self.type]
 
     def function(self, version: int) -> str:
-        """The end of the names of the functions that get and set it."""
+        """Return the end of the names of the functions that get and set it."""
         return _FUNCTIONS[version].get(self.type, self.type)
 
 
@@ -82,17 +82,17 @@ class Model:
     """An FMU for Co-Simulation."""
 
     name: str
-    """Of its file."""
+    """The name of its file."""
     content: bytes
     version: int
-    """Of FMI: 2 or 3."""
+    """The version of FMI, 2 or 3."""
     once_per_process: bool
-    """Whether a process holds one instance at most."""
+    """True when a process can hold only one instance."""
     variables: Mapping[str, Variable]
-    """By name."""
+    """The numeric variables, by name."""
 
     def unpack(self, folder: Path) -> Any:
-        """Put the FMU's files into a folder; FMPy's description of it. Raises FileError."""
+        """Unpack the FMU into a folder and return FMPy's model description. Raises FileError."""
         return unpack_fmu(BytesIO(self.content), Path(self.name), folder)
 
 
@@ -114,14 +114,14 @@ def read_model(path: Path) -> Model:
 
 
 def unsettable(name: str, has: Mapping[str, Variable]) -> str:
-    """Why no variable of this name can be given a value; nothing where one can."""
+    """Return why no variable of this name can be set, or an empty text."""
     if name not in has:
         return unknown(name, has)
     return "" if has[name].can_be_set else "the FMU computes it, and it cannot be set"
 
 
 def unknown(name: str, names: Mapping[str, object]) -> str:
-    """What is wrong with a name that the FMU has not."""
+    """Return the message about a name that the FMU does not have."""
     return f"the FMU has no variable {shown(name)} that is a number{did_you_mean(name, names, 3)}"
 
 
@@ -145,7 +145,7 @@ def _variable(v: Any) -> Variable:
 
 
 def _number(start: Any) -> float:
-    """Of what FMPy read of a start value."""
+    """Return a start value that FMPy read as a number, or 0."""
     try:
         return float({"true": 1.0, "false": 0.0}.get(str(start), start))
     except (TypeError, ValueError):

@@ -22,13 +22,13 @@ from rov_fmu.vehicle.quantity import Finite, not_blank
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
 _MOST_NAMED = 10_000
-"""Variables that a table of a plan gives something of."""
+"""The largest number of variables in a table of a plan."""
 _ALWAYS = -1e300
 """A time before any start."""
 
 
 class PlanError(FileError):
-    """A plan that cannot be carried out: a line for each reason."""
+    """A plan cannot be carried out; the text has a line for each reason."""
 
 
 def _increasing(limits: tuple[float, float]) -> tuple[float, float]:
@@ -78,9 +78,9 @@ class Range(Strict):
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All of them."""
-        ways = self.count - 1
-        return tuple(((ways - n) * self.first + n * self.last) / ways for n in range(self.count))
+        """All numbers of the range."""
+        intervals = self.count - 1
+        return tuple(((intervals - n) * self.first + n * self.last) / intervals for n in range(self.count))
 
 
 class Varied(Strict):
@@ -99,8 +99,8 @@ class Varied(Strict):
 
     @model_validator(mode="after")
     def _in_one_way(self) -> Self:
-        ways = [key for key in type(self).model_fields if getattr(self, key) is not None]
-        if len(ways) != 1:
+        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
+        if len(given) != 1:
             raise ValueError(f"must have one of {', '.join(type(self).model_fields)}")
         return self
 
@@ -111,7 +111,7 @@ class Varied(Strict):
 
 
 def _held(given: Any) -> Any:
-    """A number alone is held from the start to the end; true and false are 1 and 0."""
+    """Turn a number into a signal that holds it from the start to the end; true and false are 1 and 0."""
     if isinstance(given, int | float):
         return {"steps": [[_ALWAYS, float(given)]]}
     if not isinstance(given, dict | Signal):
@@ -120,7 +120,7 @@ def _held(given: Any) -> Any:
 
 
 def _as_number(given: Any) -> Any:
-    """true and false are 1 and 0, as a Boolean variable has them."""
+    """Turn true and false into 1 and 0, the values of a Boolean variable."""
     return float(given) if isinstance(given, bool) else given
 
 
@@ -163,11 +163,11 @@ class Signal(Strict):
 
     @property
     def points(self) -> tuple[tuple[float, float], ...]:
-        """Of either."""
+        """The points of either kind."""
         return self.steps or self.ramps or ()
 
     def jumps(self, before: float) -> Iterator[int]:
-        """The numbers of the points at which the value is another at once; `before` the first one it is this."""
+        """Yield the numbers of the points at which the value jumps; `before` is the value before the first point."""
         last: tuple[float, float] | None = None
         for n, (time, value) in enumerate(self.points):
             if value != (last[1] if last else before) and (self.steps or last is None or time == last[0]):
@@ -194,7 +194,7 @@ class InputFile(Strict):
 
     @property
     def is_held(self) -> bool:
-        """Whether rows are held."""
+        """True when each row is held until the next one."""
         return self.between == "steps"
 
 
@@ -283,34 +283,35 @@ class Plan(Strict):
 
     @property
     def steps(self) -> int:
-        """Of a run."""
+        """The number of steps of a run."""
         return round((self.stop_time - self.start_time) / self.step)
 
     def step_at(self, time: float) -> int | None:
-        """The number of steps to a time of a run; None where it is not a multiple of the step."""
+        """Return the number of steps until a time of the run, or None if it is not a multiple of the step."""
         steps = (time - self.start_time) / self.step
         return round(steps) if _whole(steps) and 0 <= round(steps) <= self.steps else None
 
     @property
     def mark(self) -> dict[str, Any]:
-        """What results depend on: the plan in a form that JSON has, without the number of runs where it matters not.
+        """The part of the plan that the results depend on, as JSON values.
 
-        The numbers of a Latin hypercube depend on how many there are; those of the other samplers do not.
+        The number of runs is included for a Latin hypercube only, because it does not change the values of the other
+        samplers.
         """
-        told: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True, exclude_none=True))
+        mark: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True, exclude_none=True))
         runs = [] if self.sampler == "latin-hypercube" else ["runs"]
         for key in ("fmu", "vehicle", "vary_from", "time_limit", *runs):
-            told.pop(key, None)
-        return told
+            mark.pop(key, None)
+        return mark
 
 
 def _whole(steps: float) -> bool:
-    """Whether a quotient is a whole number, but for rounding."""
+    """True when a quotient is a whole number, within rounding."""
     return abs(steps - round(steps)) <= 1e-9 * max(1.0, abs(steps))
 
 
 def load_plan(path: Path) -> Plan:
-    """Read a plan; what does not go together in it is told with what does not fit its FMU. Raises PlanError."""
+    """Read a plan. Contradictions between its keys are left to `prepare`. Raises PlanError."""
     check_suffix(path, PLAN, PlanError)
     plan = read_checked(path, PLAN, Plan, PlanError)
     if (plan.fmu is None) == (plan.vehicle is None):
@@ -319,7 +320,7 @@ def load_plan(path: Path) -> Plan:
 
 
 def check_plan(plan: Plan) -> Iterator[str]:
-    """What does not go together, in a line each."""
+    """Yield a line for each contradiction between keys of the plan."""
     if plan.stop_time <= plan.start_time:
         yield key_line("stop_time", f"must be after start_time = {plan.start_time:g}", plan.stop_time)
     elif not _whole((plan.stop_time - plan.start_time) / plan.step):
@@ -332,7 +333,10 @@ def check_plan(plan: Plan) -> Iterator[str]:
         yield from _unreachable(plan, plan.keep)
     if plan.sampler == "grid" and plan.runs is not None:
         yield key_line("runs", "a grid has as many as it has points; leave this out", plan.runs)
-    if plan.sampler == "grid" and (points := prod(len(way.choices or ()) for way in plan.vary.values())) > _MOST_RUNS:
+    if (
+        plan.sampler == "grid"
+        and (points := prod(len(varied.choices or ()) for varied in plan.vary.values())) > _MOST_RUNS
+    ):
         yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {points:.3g}")
     if plan.sampler != "grid" and plan.runs is None:
         yield "runs: this key is missing"
@@ -341,18 +345,18 @@ def check_plan(plan: Plan) -> Iterator[str]:
 
 
 def _unreachable(plan: Plan, keep: Keep) -> Iterator[str]:
-    """Times to keep that no step ends at."""
+    """Yield a line if a time to keep is not the end of a step."""
     if keep.every is not None and not _whole(keep.every / plan.step):
         yield key_line("keep.every", f"must be a multiple of step = {plan.step:g}", keep.every)
     elif keep.every is not None and keep.every > plan.stop_time - plan.start_time:
         yield key_line("keep.every", "must not be longer than a run", keep.every)
     for time in keep.at or ():
         if plan.step_at(time) is None:
-            told = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
-            yield key_line("keep.at", told, list(keep.at or ()))
+            rule = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
+            yield key_line("keep.at", rule, list(keep.at or ()))
             return
 
 
 def digest(content: bytes) -> str:
-    """SHA-256."""
+    """Return the SHA-256 digest in hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()

@@ -1,4 +1,4 @@
-"""A plan put together with its FMU: what does not fit in words, and what the workers must know."""
+"""Combine a plan with its FMU: report what does not fit, and collect what the workers must know."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,13 +36,13 @@ class Prepared:
     job: Job
     design: Design
     mark: Mapping[str, Any]
-    """What results depend on."""
+    """Everything that the results depend on."""
     warnings: Sequence[str]
-    """What they have in them that a reader may not expect, in sentences."""
+    """Sentences about properties of the results that a reader may not expect."""
 
 
 def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
-    """See that a plan, read from a path, fits an FMU. Raises PlanError with every reason."""
+    """Check that a plan, read from `path`, fits an FMU. Raises PlanError with every reason."""
     vehicle = load_vehicle(vehicle_file("vary_from", plan.vary_from, path)) if plan.vary_from else None
     estimates = Estimates(plan, vehicle, model.variables)
     own, from_file, unread = [*check_plan(plan)], {}, []
@@ -55,7 +55,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     wrong = lines_on(path, words) + unread
     if plan.input_file:
         file = path.parent / plan.input_file.path
-        wrong += [f"{file}: {told}" for told in _wrong_rows(plan, model.variables, from_file)]
+        wrong += [f"{file}: {line}" for line in _check_rows(plan, model.variables, from_file)]
     if wrong:
         raise PlanError(*wrong)
     design = Design(plan, model.variables, estimates.known)
@@ -72,7 +72,8 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
         **plan.mark,
         **estimates.mark,
         "vary": [
-            [name, way.model_dump(by_alias=True, mode="json", exclude_none=True)] for name, way in plan.vary.items()
+            [name, varied.model_dump(by_alias=True, mode="json", exclude_none=True)]
+            for name, varied in plan.vary.items()
         ],
         "inputs": {name: signal.model_dump(mode="json", exclude_none=True) for name, signal in signals.items()},
     }
@@ -82,14 +83,14 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
 
 
 def vehicle_file(key: str, given: str, path: Path) -> Path:
-    """What a key of the plan at a path names: a vehicle file beside the plan, or one that ships. Raises PlanError."""
+    """Return the vehicle file that a key names: one in the folder of the plan, or one that ships. Raises PlanError."""
     beside = path.parent / given
     if beside.is_file():
         return beside
     if given not in SHIPPED:
         ships = ", ".join(SHIPPED)
-        told = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
-        raise PlanError(f"{path}: {key_line(key, told, given)}{did_you_mean(given, SHIPPED)}")
+        reason = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
+        raise PlanError(f"{path}: {key_line(key, reason, given)}{did_you_mean(given, SHIPPED)}")
     return SHIPPED[given]
 
 
@@ -114,15 +115,15 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
     return found
 
 
-# ---- What does not fit -----------------------------------------------------------------------------------------------
+# ---- Checks ----------------------------------------------------------------------------------------------------------
 
 
 def _check(
     plan: Plan, model: Model, known: Sequence[str], from_file: Mapping[str, Signal], times: Array
 ) -> Iterator[str]:
-    """A line each; `known` varies besides [vary]."""
+    """Yield a line for each part of the plan that does not fit; `known` names what varies in addition to [vary]."""
     has = model.variables
-    for name, way in plan.vary.items():
+    for name, varied in plan.vary.items():
         key = f"vary.{name}"
         if reason := unsettable(name, has):
             yield key_line(key, reason)
@@ -130,34 +131,34 @@ def _check(
             yield key_line(key, "is given in [set] or [inputs] too")
         else:
             yield from (
-                key_line(key, reason, value) for reason, value in _beyond(way, has[name], plan.sampler == "grid")
+                key_line(key, reason, value) for reason, value in _impossible(varied, has[name], plan.sampler == "grid")
             )
     if not (known or plan.vary or plan.vary_from) and plan.sampler != "grid":
         yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
     for name, value in plan.set.items():
         if reason := unsettable(name, has) or has[name].wrong(value):
             yield key_line(f"set.{name}", reason, value)
-    yield from _wrong_inputs(plan, has)
+    yield from _check_inputs(plan, has)
     for name in plan.keep.outputs if plan.keep else ():
         if name not in has:
             yield key_line("keep.outputs", unknown(name, has))
-    yield from _wrong_figures(plan, has, {*known, *plan.vary}, times)
+    yield from _check_figures(plan, has, {*known, *plan.vary}, times)
 
 
-def _beyond(way: Varied, variable: Variable, is_grid: bool) -> Iterator[tuple[str, Any]]:
-    """What cannot be of a distribution: the reason and the value."""
-    if is_grid and way.choices is None:
-        yield "a grid needs values or a range", way.model_dump(exclude_none=True)
+def _impossible(varied: Varied, variable: Variable, is_grid: bool) -> Iterator[tuple[str, Any]]:
+    """Yield the reason and the value if a distribution is not possible."""
+    if is_grid and varied.choices is None:
+        yield "a grid needs values or a range", varied.model_dump(exclude_none=True)
         return
-    numbers = way.choices or way.uniform or ((way.normal.mean,) if way.normal else ())
-    numbers = numbers or ((way.lognormal.median,) if way.lognormal else ())
+    numbers = varied.choices or varied.uniform or ((varied.normal.mean,) if varied.normal else ())
+    numbers = numbers or ((varied.lognormal.median,) if varied.lognormal else ())
     for value in numbers:
         if reason := variable.wrong(value):
             yield reason, value
             return
 
 
-def _wrong_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
+def _check_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
     for name, signal in plan.inputs.items():
         key = f"inputs.{name}"
         if name not in has:
@@ -168,18 +169,20 @@ def _wrong_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
             yield key_line(key, "must be steps, for it is not continuous")
         else:
             points = signal.points
-            yield from (key_line(key, reason, points[n][1]) for n, reason in _beyond_bounds(signal, has[name]))
-            yield from (key_line(key, reason, [*points[n]]) for n, reason in _between(signal, plan, has[name].start))
+            yield from (key_line(key, reason, points[n][1]) for n, reason in _out_of_bounds(signal, has[name]))
+            yield from (
+                key_line(key, reason, [*points[n]]) for n, reason in _misplaced_jumps(signal, plan, has[name].start)
+            )
 
 
-def _wrong_rows(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
-    """The same of the inputs in a file, by its columns and rows."""
+def _check_rows(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
+    """Yield a line for each input in a file that does not fit, with its column and row."""
     for name, signal in from_file.items():
         column, points = f"column {shown(name)}", signal.points
         if reason := "is given in [inputs] too" if name in plan.inputs else _no_input(name, plan, has):
             yield f"{column}: {reason}"
         else:
-            for n, reason in (*_beyond_bounds(signal, has[name]), *_between(signal, plan, has[name].start)):
+            for n, reason in (*_out_of_bounds(signal, has[name]), *_misplaced_jumps(signal, plan, has[name].start)):
                 yield f"row {n + 1}, {column} = {points[n][1]:g} at {points[n][0]:g} s: {reason}"
 
 
@@ -189,36 +192,36 @@ def _no_input(name: str, plan: Plan, has: Mapping[str, Variable]) -> str:
     return "is given in [set] too" if name in plan.set else ""
 
 
-def _beyond_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, str]]:
-    """The number of the first point whose value cannot be, and why."""
+def _out_of_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, str]]:
+    """Yield the number of the first point whose value is not possible, and the reason."""
     for n, (_, value) in enumerate(signal.points):
         if reason := variable.wrong(value):
             yield n, reason
             return
 
 
-def _between(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, str]]:
-    """The number of the first point with a jump that no step begins with, for it would come late, and why not."""
+def _misplaced_jumps(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, str]]:
+    """Yield the number of the first jump that would come late, because no step begins there, and the rule."""
     for n in signal.jumps(before):
         time = signal.points[n][0]
         if plan.start_time < time < plan.stop_time and plan.step_at(time) is None:
             was = signal.points[n - 1][1] if n else before
-            told = (
+            rule = (
                 f"a jump, as from {was:g} here, must be at a communication point, a multiple of step = {plan.step:g} s"
             )
-            yield n, f"{told} after the start"
+            yield n, f"{rule} after the start"
             return
 
 
-def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], times: Array) -> Iterator[str]:
+def _check_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], times: Array) -> Iterator[str]:
     for name, text in plan.figures.items():
         if name in {RUN, STATUS, REASON} | varied:
             yield key_line(f"figures.{name}", "the results have another column of this name")
             continue
         names = read_expression(text).names
         if strange := sorted(names - CONSTANTS.keys() - {TIMES} - has.keys()):
-            told = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
-            yield key_line(f"figures.{name}", meaning(strange[0]) or told, text)
+            reason = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
+            yield key_line(f"figures.{name}", meaning(strange[0]) or reason, text)
         elif reason := unusable(text, has, varied, times):
             if reason.startswith("TypeError") and (numbers := names & varied):
                 reason += f"; {min(numbers)} varies, and what varies is a number"
@@ -231,7 +234,7 @@ def _wrong_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], ti
 
 
 def _times(plan: Plan) -> Array:
-    """Of the communication points, s."""
+    """Return the times of the communication points, s."""
     return plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
 
 
@@ -245,7 +248,7 @@ def _kept_points(plan: Plan) -> Sequence[int]:
 
 
 def _sampled(signal: Signal, times: Array, before: float) -> Array:
-    """The signal at the middle of each step, which held over the step is exact to second order of it."""
+    """Return the signal at the middle of each step. Held over the step, it is exact to the second order of the step."""
     at, values = np.array(signal.points, np.float64).T
     place = np.searchsorted(at, times, side="right") - 1
     found: Array = np.where(place >= 0, values[np.maximum(place, 0)], before)

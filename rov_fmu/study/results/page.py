@@ -1,4 +1,4 @@
-"""The page on a study: bands, distributions, sensitivities, failures; one HTML file."""
+"""The page about a study, one HTML file: bands, distributions, sensitivities and failures."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -21,45 +21,45 @@ from rov_fmu.study.run.worker import REASON, STATUS
 
 PAGE = "study.html"
 _KIND = b'<p class="kind">Study</p>'
-"""Which every page has."""
+"""A line that every page about a study contains."""
 _PLOT = (3.7, 2.6)  # inches
 _BINS = 40
 _POINTS = 400
-"""Points of a band that are drawn; more are not seen."""
+"""The number of points of a band that are drawn; more would not be visible."""
 _REASONS = 50
 _ROWS = 60
-"""Of a grid, that are shown."""
+"""The number of rows of a grid that are shown."""
 _MARKED = 40
-"""Points of a line that are marked."""
+"""A line with at most so many points has markers."""
 _FEW = 16
-"""Blocks of runs from which not even the intervals of indices are known: of 2, that of 0.5 was 0.6 to 1.1."""
+"""Below so many blocks, even the intervals of Sobol indices are unreliable: with 2, that of 0.5 was 0.6 to 1.1."""
 _SURE = 0.1
-"""Half width of an interval that tells that an index is small."""
-_STILL = 1e-6
-"""Of the greatest number: what varies by less does not vary."""
+"""An interval with a smaller half width is narrow enough to show that an index is small."""
+_CONSTANT = 1e-6
+"""Values that vary by less than this share of the largest one count as constant."""
 _NARROW = 1e-3
-"""Where numbers vary by less, those at an axis are long, and so fewer."""
+"""Below this relative variation, the numbers at an axis are long, so there are fewer of them."""
 
 
 def page_output(results: Results) -> Output:
-    """The page of what is done of a study, to write into its folder. Raises FileError."""
+    """Return the page about the finished runs as a file in the folder of the study. Raises FileError."""
     return Output(results.folder / PAGE, study_page(results).encode())
 
 
 def see_place(folder: Path) -> None:
-    """That the page overwrites nothing else in a folder. Raises FileError."""
+    """Raise FileError if the page would overwrite another file."""
     path = folder / PAGE
     if path.exists() and _KIND not in path.read_bytes():
         raise FileError(f"{path}: is no page of this tool and would be overwritten: choose another folder")
 
 
 def study_page(results: Results) -> str:
-    """The page as HTML, the same for the same results."""
+    """Return the page as HTML. It is the same for the same results."""
     runs, plan = results.runs, results.plan
     reasons = [*_failures(runs)]
     grid = _grid(results)
     indices = _sensitivities(results) if plan["sampler"] == "saltelli" else {}
-    rows = [row for told in indices.values() if not isinstance(told, str) for row in told]
+    rows = [row for found in indices.values() if not isinstance(found, str) for row in found]
     return page(
         "study.html.j2",
         title=results.model.removesuffix(".fmu"),
@@ -90,7 +90,7 @@ def study_page(results: Results) -> str:
 
 
 def _grid(results: Results) -> Sequence[str]:
-    """The one or two variables of a grid, that with more values first; nothing of what is no such grid."""
+    """Return the one or two variables of a grid, the one with more values first; none for any other study."""
     if results.plan["sampler"] != "grid" or len(results.parameters) not in (1, 2):
         return ()
     return sorted(results.parameters, key=lambda name: -results.runs[name].nunique())
@@ -104,25 +104,25 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
         return {**found, "quantiles": [None] * len(QUANTILES), "mean": None, "sd": None, "plot": "", "is_still": False}
     quantiles = np.quantile(there, QUANTILES).tolist()
     sd = float(there.std(ddof=1)) if there.size > 1 else None
-    told = {**found, "quantiles": quantiles, "mean": float(there.mean()), "sd": sd}
-    if _is_still(there):
-        return {**told, "plot": "", "is_still": True}
+    found |= {"quantiles": quantiles, "mean": float(there.mean()), "sd": sd}
+    if _is_constant(there):
+        return {**found, "plot": "", "is_still": True}
     if grid:
         draw: Draw = partial(_draw_lines, name=name, results=results, grid=grid)
         title = f"{name} over {' and '.join(grid)}"
     else:
         draw = partial(_draw_distribution, values=there, quantiles=quantiles, label=_axis("", unit))
         title = f"Distribution of {name}"
-    return {**told, "plot": inline_svg(title, draw, _PLOT), "is_still": False}
+    return {**found, "plot": inline_svg(title, draw, _PLOT), "is_still": False}
 
 
-def _is_still(values: Any) -> bool:
-    """Whether numbers are the same, but for what no one sees."""
-    return bool(np.ptp(values) <= _STILL * np.abs(values).max())
+def _is_constant(values: Any) -> bool:
+    """True when values are practically constant."""
+    return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
 
 
 def _axis(name: str, unit: str) -> str:
-    """What is written at an axis."""
+    """Return the label of an axis."""
     return name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
 
 
@@ -138,7 +138,7 @@ def _draw_distribution(figure: Figure, values: Any, quantiles: list[float], labe
 
 
 def _draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str]) -> None:
-    """Over what has more values; a line for some values of the other."""
+    """Draw a figure over the variable with more values, with a line for some values of the other one."""
     ax = figure.subplots()
     along, *others = grid
     runs = results.runs.sort_values(along, kind="stable")
@@ -157,7 +157,7 @@ def _draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str]
 
 
 def _set_ticks(ax: Axes, along: int = 6) -> None:
-    """Numbers as they are, and not what they are above another."""
+    """Print the full numbers at the axes, without an offset."""
     ax.ticklabel_format(useOffset=False)
     ax.locator_params("x", nbins=along)
     ax.locator_params("y", nbins=6)
@@ -181,11 +181,11 @@ def _draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
 
 
 def _sensitivities(results: Results) -> dict[str, Any]:
-    """Rows by figure, or why there are none."""
+    """Return the rows of Sobol indices by figure, or the reason why there are none."""
     found: dict[str, Any] = {}
     for figure in results.figures:
         there = results.runs[figure].dropna().to_numpy(float)
-        if there.size and _is_still(there):
+        if there.size and _is_constant(there):
             found[figure] = "does not vary"
             continue
         try:
@@ -199,13 +199,15 @@ def _sensitivities(results: Results) -> dict[str, Any]:
 
 
 def _tells(index: "pd.Series[float]", half_width: "pd.Series[float]") -> "pd.Series[bool]":
-    """Whether an index is known: its interval is narrower than itself, or narrow anyway, as that of a small one is."""
+    """True for an index whose interval is narrower than the index itself, or narrower than a fixed width."""
     return (2.0 * half_width < index.abs()) | (half_width < _SURE)
 
 
 def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], results: Results) -> dict[str, Any]:
-    ways = dict(plan["vary"])
-    ((kind, told),) = (ways[name] if name in ways else {"estimate": plan["vary_from"]["estimates"][name]}).items()
+    distributions = dict(plan["vary"])
+    ((kind, told),) = (
+        distributions[name] if name in distributions else {"estimate": plan["vary_from"]["estimates"][name]}
+    ).items()
     numbers = told.items() if isinstance(told, dict) else [("", value) for value in told]
     some = [f"{key} {number(value, 4)}".strip() for key, value in numbers]
     words = ", ".join([*some[:6], *(["…"] if len(some) > 6 else [])])
@@ -224,7 +226,7 @@ def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], resu
 
 
 def _failures(runs: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """By reason, the most frequent first."""
+    """Yield the failures by reason, the most frequent first."""
     there = runs[runs[REASON].notna()]
     for (status, reason), some in sorted(there.groupby([STATUS, REASON]), key=lambda found: -len(found[1])):
         first = ", ".join(str(n) for n in some.index[:5])

@@ -1,4 +1,4 @@
-"""The results of a study as data frames of pandas."""
+"""The results of a study as pandas data frames."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -16,65 +16,65 @@ from rov_fmu.study.run.worker import FAILED, INCOMPLETE, RUN, STATUS, TIME
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _AT_ONCE = 20_000_000
-"""Numbers of a trajectory that are in memory at a time."""
+"""The number of trajectory values in memory at a time."""
 
 
 class Results:
-    """What a study has come to, as far as it is done. Raises FileError where the folder holds none.
+    """The results of the finished runs of a study. Raises FileError if the folder holds no study.
 
-    As data frames: `runs`, `failed`, `incomplete`, `trajectories()`, `bands()`, `sensitivity()`. What they are of:
-    `parameters` (what was varied), `figures`, `outputs` (what was kept), `units`, `figure_units`, `descriptions`,
-    `groups` (correlated together), `planned` (runs), `plan`, `model` (the FMU's file) and its digest `fmu`,
-    `warnings`, `made_by`, `folder`.
+    Data frames: `runs`, `failed`, `incomplete`, `trajectories()`, `bands()`, `sensitivity()`. What they describe:
+    `parameters` (the varied variables), `figures`, `outputs` (the kept variables), `units`, `figure_units`,
+    `descriptions`, `groups` (of correlated parameters), `planned` (number of runs), `plan`, `model` (the FMU's file)
+    and its digest `fmu`, `warnings`, `made_by`, `folder`.
     """
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
         self._store = Store(self.folder)
-        told = self._store.description()
-        self.parameters: tuple[str, ...] = tuple(told["columns"]["parameters"])
-        """What was varied; columns of `runs`."""
-        self.figures: tuple[str, ...] = tuple(told["columns"]["figures"])
-        """What was computed; columns of `runs`."""
-        self.outputs: tuple[str, ...] = tuple(told["columns"]["outputs"])
-        """What was kept; columns of `trajectories`."""
-        self.planned: int = told["runs"]
-        """Runs of the whole study."""
-        self.plan: dict[str, Any] = told["plan"]
-        """As the results depend on it."""
-        self.units: dict[str, str] = told["units"]
-        """Of parameters and outputs."""
+        study = self._store.description()
+        self.parameters: tuple[str, ...] = tuple(study["columns"]["parameters"])
+        """The varied variables, columns of `runs`."""
+        self.figures: tuple[str, ...] = tuple(study["columns"]["figures"])
+        """The figures, columns of `runs`."""
+        self.outputs: tuple[str, ...] = tuple(study["columns"]["outputs"])
+        """The kept outputs, columns of `trajectories`."""
+        self.planned: int = study["runs"]
+        """The number of runs of the whole study."""
+        self.plan: dict[str, Any] = study["plan"]
+        """The part of the plan that the results depend on."""
+        self.units: dict[str, str] = study["units"]
+        """The units of parameters and outputs."""
         self.figure_units: dict[str, str] = {
             name: figure_unit(text, self.units) for name, text in self.plan["figures"].items()
         }
-        """Nothing where a figure's expression does not tell it."""
-        self.descriptions: dict[str, str] = told["descriptions"]
-        """Of parameters and outputs, as the FMU has them."""
-        self.model: str = told["model"]
+        """The units of figures; an empty text where it does not follow from the expression."""
+        self.descriptions: dict[str, str] = study["descriptions"]
+        """The FMU's descriptions of parameters and outputs."""
+        self.model: str = study["model"]
         """The name of the FMU's file."""
-        self.fmu: str = told["fmu"]
+        self.fmu: str = study["fmu"]
         """SHA-256 of the FMU."""
-        self.groups: tuple[tuple[str, ...], ...] = tuple(map(tuple, told["groups"]))
-        """The parameters; those that are correlated together."""
-        self.warnings: tuple[str, ...] = tuple(told["warnings"])
-        """What the results have in them that a reader may not expect, in sentences."""
-        self.made_by: str = told["made_by"]
-        self._points: int = told["points"]
+        self.groups: tuple[tuple[str, ...], ...] = tuple(map(tuple, study["groups"]))
+        """The parameters; correlated ones form one group."""
+        self.warnings: tuple[str, ...] = tuple(study["warnings"])
+        """Sentences about properties of the results that a reader may not expect."""
+        self.made_by: str = study["made_by"]
+        self._points: int = study["points"]
 
     @cached_property
     def runs(self) -> pd.DataFrame:
-        """A row a run, in order, by its number: parameters, figures, status, reason."""
+        """The runs in order, indexed by their number: parameters, figures, status, reason."""
         table = self._dataset(RUNS).to_table()
         return table.to_pandas().sort_values(RUN).set_index(RUN)  # type: ignore[no-any-return]
 
     def trajectories(self, runs: Sequence[int] | None = None) -> pd.DataFrame:
-        """A row a run and time (s, columns `run` and `t`), of all runs that ended or of these: the kept outputs."""
+        """Return the kept outputs with a row for each `run` and time `t` (s), of all runs that ended or of these."""
         rows = None if runs is None else ds.field(RUN).isin([*runs])
         table = self._dataset(TRAJECTORIES).to_table(filter=rows)
         return table.to_pandas().sort_values([RUN, TIME], kind="stable").reset_index(drop=True)  # type: ignore[no-any-return]
 
     def bands(self, output: str, quantiles: Sequence[float] = QUANTILES) -> pd.DataFrame:
-        """Quantiles of an output over the runs (columns) at each time (s, the index). Raises FileError."""
+        """Return quantiles of an output over the runs (columns) at each time (s, the index). Raises FileError."""
         if output not in self.outputs:
             others = f", only {', '.join(self.outputs)}" if self.outputs else ", nor any other: the plan has no [keep]"
             raise FileError(f"{self.folder}: no trajectory of {shown(output)} is kept{others}")
@@ -88,16 +88,16 @@ class Results:
             part = trajectories.to_table(
                 columns=[TIME, output], filter=(ds.field(TIME) >= low) & (ds.field(TIME) <= high)
             )
-            values = part[output].to_numpy().reshape(ended, -1)  # times go through from run to run
+            values = part[output].to_numpy().reshape(ended, -1)  # each run has all times, one after another
             found.append(np.quantile(values, quantiles, axis=0).T)
         return pd.DataFrame(np.concatenate(found), pd.Index(times, name=TIME), pd.Index(quantiles, name="quantile"))
 
     def sensitivity(self, figure: str, seed: int = 1) -> pd.DataFrame:
-        """Sobol indices of a figure by parameter: S1, ST, and the half widths of their 95 % intervals (seed not 0).
+        """Return the Sobol indices of a figure by parameter: S1, ST, and the half widths of their 95 % intervals.
 
-        A study by sampler saltelli has them. Parameters that are correlated have one together, for the variance that
-        is due to one of them alone is not defined. A block of runs counts where the figure is known in all of it.
-        Raises FileError.
+        The sampler must be saltelli; `seed` must not be 0. Correlated parameters have one index together, because the
+        variance that is due to one of them alone is not defined. A block of runs counts if all of its runs have the
+        figure. Raises FileError.
         """
         from SALib.analyze import sobol
 
@@ -128,11 +128,11 @@ class Results:
 
     @property
     def incomplete(self) -> pd.DataFrame:
-        """The runs that ended, and have not all figures, with their reasons."""
+        """The runs that ended but lack a figure, with their reasons."""
         return self.runs[self.runs[STATUS] == INCOMPLETE]
 
     def _dataset(self, name: str) -> Any:
-        """Files in the order of their runs."""
+        """Open the files of a table in the order of their runs."""
         if not (paths := sorted(str(path) for path in (self.folder / name).glob("part-*.parquet"))):
             raise FileError(f"{self.folder / name}: holds no results yet")
         return ds.dataset(paths)

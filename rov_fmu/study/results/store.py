@@ -1,4 +1,4 @@
-"""The folder of a study's results: what it belongs to, and Parquet files, each of them whole."""
+"""The folder of a study's results: a description of the study, and Parquet files that are written whole."""
 
 import json
 import re
@@ -21,14 +21,14 @@ _PART = re.compile(r"part-(\d{9,})-(\d{9,})\.parquet")
 
 
 class Store:
-    """A folder of results; a range of runs is there as soon as its file in runs/ is."""
+    """A folder of results. A range of runs is done as soon as its file in runs/ exists."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Make the folder, for this process alone; it goes where no run came into it. Raises FileError, WriteError."""
+        """Make and lock the folder; remove a new one at the end if no run is done. Raises FileError, WriteError."""
         import locket
 
         is_new = not self.folder.exists()
@@ -60,19 +60,19 @@ class Store:
         columns: Mapping[str, Sequence[str]],
         **more: Any,
     ) -> None:
-        """See that what is there is of this plan and FMU (its digest), and write down that it is, with more on it.
+        """Check that existing results belong to this plan and FMU (a digest), and write the description of the study.
 
-        A vehicle is what the FMU was built of for the study. Raises FileError, WriteError.
+        `vehicle` is what the FMU was built from, if it was. Raises FileError, WriteError.
         """
         path = self.folder / STUDY
         mark = {"plan": dict(plan), "fmu": fmu}
         if self.done() and path.exists():
-            there = self.description()
-            if there["fmu"] != fmu:
+            old = self.description()
+            if old["fmu"] != fmu:
                 why = f", for the vehicle {vehicle} has changed, or rov-fmu, which builds it" if vehicle else ""
                 raise FileError(f"{self.folder}: holds runs of another FMU{why}: choose another folder")
-            keys = {*there["plan"], *plan}
-            if changed := sorted(key for key in keys if there["plan"].get(key) != plan.get(key)):
+            keys = {*old["plan"], *plan}
+            if changed := sorted(key for key in keys if old["plan"].get(key) != plan.get(key)):
                 raise FileError(
                     f"{self.folder}: holds runs of another plan ({', '.join(changed)} changed): choose another folder"
                 )
@@ -86,7 +86,7 @@ class Store:
         write_whole(Output(path, f"{text}\n".encode()))
 
     def description(self) -> dict[str, Any]:
-        """What the folder belongs to. Raises FileError."""
+        """Return the description of the study. Raises FileError."""
         path = self.folder / STUDY
         if not self.folder.is_dir():
             raise FileError(f"{self.folder}: there is no such folder")
@@ -100,12 +100,12 @@ class Store:
         return dict(found)
 
     def done(self) -> list[tuple[int, int]]:
-        """The ranges of runs that are there, from the first to the one after the last, in order."""
+        """Return the ranges of finished runs in order, each from the first to the one after the last."""
         names = (_PART.fullmatch(path.name) for path in (self.folder / RUNS).iterdir())
         return sorted((int(name[1]), int(name[2]) + 1) for name in names if name)
 
     def missing(self, runs: int) -> list[tuple[int, int]]:
-        """The ranges that are not there."""
+        """Return the ranges of runs that are not done."""
         found, begin = [], 0
         for first, end in [*self.done(), (runs, runs)]:
             if first > begin:
@@ -114,13 +114,13 @@ class Store:
         return found
 
     def write(self, first: int, end: int, runs: bytes, trajectories: bytes | None) -> None:
-        """Put the rows of some runs there, whole or not at all. Raises WriteError."""
+        """Write the rows of some runs, whole or not at all. Raises WriteError."""
         name = f"part-{first:09d}-{end - 1:09d}.parquet"
         outputs = [Output(self.folder / TRAJECTORIES / name, trajectories)] if trajectories is not None else []
         write_whole(*outputs, Output(self.folder / RUNS / name, runs))
 
     def _clean(self) -> None:
-        """Without what a process left that was killed as it wrote."""
+        """Remove what a process left that was killed while it was writing."""
         there = {path.name for path in (self.folder / RUNS).iterdir()}
         for folder in (self.folder / RUNS, self.folder / TRAJECTORIES):
             for path in folder.iterdir():

@@ -1,4 +1,4 @@
-"""What the command line tells of a study when it has ended."""
+"""The summary that the command line prints after a study."""
 
 import numpy as np
 from rich.text import Text
@@ -11,11 +11,11 @@ from rov_fmu.study.run.worker import REASON
 
 _SHOWN = (0.05, 0.5, 0.95)
 _FAILURES = 5
-"""Reasons that are shown, the most frequent first."""
+"""The number of reasons that are shown, the most frequent first."""
 
 
 def print_summary(results: Results, spent: Spent) -> None:
-    """How many runs, how fast, the figures' quantiles, and why runs failed or figures are missing."""
+    """Print the number of runs, the speed, the quantiles of the figures, and why runs failed or figures are missing."""
     out, runs = console(), results.runs
     counts = f"{len(runs)} runs, {len(results.failed)} failed, {len(results.incomplete)} incomplete"
     out.print(Text.assemble((str(results.folder), "bold"), f"  {counts}"))
@@ -30,8 +30,8 @@ def print_summary(results: Results, spent: Spent) -> None:
             there = values[np.isfinite(values)]
             numbers = [*np.quantile(there, _SHOWN), there.mean()] if there.size else [np.nan] * (len(_SHOWN) + 1)
             unit = results.figure_units[name]
-            told = name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})"
-            shown.add_row(told, *(text(number, ".5g") for number in numbers), str(there.size))
+            label = name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})"
+            shown.add_row(label, *(text(number, ".5g") for number in numbers), str(there.size))
         out.print(shown)
     reasons = runs[REASON].value_counts()
     for reason, count in reasons.head(_FAILURES).items():

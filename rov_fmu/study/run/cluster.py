@@ -1,4 +1,4 @@
-"""The runs of a study on workers of Dask: in tasks of about a second, and their rows written as they come."""
+"""Do the runs of a study on Dask workers, in tasks of about a second, and write the rows of each task as it ends."""
 
 import asyncio
 import logging
@@ -27,47 +27,47 @@ from rov_fmu.study.run.simulator import LoadError
 from rov_fmu.study.run.worker import Delivery, Job, Part, Trial, do_runs, lost_runs, try_out
 
 _TASK = 1.0
-"""Seconds that a task shall take."""
+"""The seconds that a task should take."""
 _LEAST = 0.2
-"""Seconds that a task takes at least, where the runs come to their end."""
+"""The least seconds of a task, also when few runs remain."""
 _AHEAD = 3
-"""Tasks by thread that are given out, so that none waits for the next one."""
+"""The number of tasks submitted for each thread, so that no thread waits for the next one."""
 _CHANCES = 3
-"""How often workers may die until all runs are done apart from them, and then those of a task until it is given up."""
+"""After so many deaths of workers, all runs are done in child processes; one that then fails so often is given up."""
 _GONE = (CancelledError, CommClosedError)
-"""What Dask raises where there is no scheduler any more."""
+"""What Dask raises when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
 _WAIT = 10.0
-"""Seconds until a scheduler, or a worker of it, must have answered."""
+"""The seconds within which a scheduler or a worker must answer."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a study is."""
+    """The progress of a study."""
 
     done: int
-    """Runs, those of before included."""
+    """The number of runs that are done, including those of earlier calls."""
     total: int
     failed: int
-    """Of those that were done this time."""
+    """The number of runs that failed in this call."""
     dashboard: str
-    """Dask's page on what its workers do; nothing where there is none."""
+    """The address of Dask's page about its workers, or an empty text."""
 
 
 @dataclass
 class Spent:
-    """Where the time went."""
+    """The time that a study took, and for what."""
 
     runs: int = 0
     failed: int = 0
     started: float = 0.0
-    """Seconds that it took to start the workers."""
+    """The seconds until the workers had started."""
     elapsed: float = 0.0
-    """Seconds from then until the last run was done."""
+    """The seconds from then until the last run was done."""
     working: float = 0.0
-    """Seconds of all workers together."""
+    """The seconds that all workers together spent on tasks."""
     simulating: float = 0.0
-    """Seconds of these that the FMU took."""
+    """The part of these seconds that the FMU took."""
 
 
 def execute(
@@ -91,7 +91,7 @@ def execute(
             _Runs(client, job, design, store, missing, spent, on_progress).do()
         except (FileError, StudyError, WriteError):
             raise
-        except Exception as error:  # of a client that is closed, for it has lost its scheduler, this and that
+        except Exception as error:  # a client that has lost its scheduler raises various exceptions
             if isinstance(error, _GONE) or client.status != "running":
                 raise StudyError("the scheduler is gone; what is done is kept") from error
             raise
@@ -104,7 +104,7 @@ def execute(
 
 
 class _Runs:
-    """The runs that are under way."""
+    """Gives the missing runs to the workers and writes their rows."""
 
     def __init__(
         self,
@@ -117,28 +117,28 @@ class _Runs:
         on_progress: Callable[[Progress], None],
     ) -> None:
         self._client, self._job, self._design, self._store = client, job, design, store
-        self._missing, self._spent, self._tell = missing, spent, on_progress
-        self._there = design.runs - sum(end - first for first, end in missing)
+        self._missing, self._spent, self._on_progress = missing, spent, on_progress
+        self._done_before = design.runs - sum(end - first for first, end in missing)
         self._futures: dict[Any, tuple[int, int, bool]] = {}
-        """First run, the one after the last, whether they are done apart from their worker."""
+        """By future: the first run, the one after the last, and True when they are done in a child process."""
         self._lost: deque[tuple[int, int]] = deque()
-        """Runs whose worker died, to be done apart."""
+        """The runs whose worker died; they are repeated in a child process."""
         self._deaths = 0
         self._chances: Counter[int] = Counter()
         self._resets, self._seconds = False, _TASK
 
     def do(self) -> None:
-        """All of them."""
+        """Do all missing runs."""
         self._report()
         trial = self._trial()
         self._resets, self._seconds = trial.resets, max(trial.seconds, 1e-6)
         coming = as_completed(loop=self._client.loop, raise_errors=False)
         try:
-            self._give(coming)
+            self._submit_tasks(coming)
             for future in coming:
                 self._take(future)
-                del future  # or its rows would stay
-                self._give(coming)
+                del future  # otherwise its rows stay in memory
+                self._submit_tasks(coming)
         finally:
             with suppress(Exception):  # a client that is closed raises
                 self._client.cancel(list(self._futures), force=True)
@@ -146,62 +146,62 @@ class _Runs:
     def _trial(self) -> Trial:
         first = self._missing[0][0]
         rows = self._design.rows(first, min(first + 8, self._design.runs))
-        for apart in (False, True):
+        for separate in (False, True):
             try:
-                return self._client.submit(try_out, self._job.key, rows, apart, pure=False).result()
+                return self._client.submit(try_out, self._job.key, rows, separate, pure=False).result()
             except LoadError as error:
                 raise FileError(f"{self._job.model.name}: cannot be run: {error}") from error
             except KilledWorker:
                 self._deaths += 1
         return Trial(False, _TASK)
 
-    def _give(self, coming: Any) -> None:
-        """Have enough under way."""
+    def _submit_tasks(self, coming: Any) -> None:
+        """Submit tasks until every thread has enough."""
         try:
             threads = sum(self._client.nthreads().values()) or 1
         except OSError as error:
             raise CommClosedError("no answer") from error
         while (self._lost or self._missing) and len(self._futures) < _AHEAD * threads:
             if self._lost:
-                self._submit(coming, *self._lost.popleft(), apart=True)
+                self._submit(coming, *self._lost.popleft(), separate=True)
                 continue
             first, end = self._missing.popleft()
-            left = sum(b - a for a, b in self._missing) + end - first
-            size = max(min(ceil(_TASK / self._seconds), ceil(left / threads)), ceil(_LEAST / self._seconds))
+            remaining = sum(b - a for a, b in self._missing) + end - first
+            size = max(min(ceil(_TASK / self._seconds), ceil(remaining / threads)), ceil(_LEAST / self._seconds))
             if end - first > size:
                 self._missing.appendleft((first + size, end))
                 end = first + size
-            self._submit(coming, first, end, apart=self._deaths >= _CHANCES)
+            self._submit(coming, first, end, separate=self._deaths >= _CHANCES)
 
-    def _submit(self, coming: Any, first: int, end: int, apart: bool) -> None:
+    def _submit(self, coming: Any, first: int, end: int, separate: bool) -> None:
         rows = self._design.rows(first, end)
-        future = self._client.submit(do_runs, self._job.key, first, rows, self._resets, apart, pure=False)
-        self._futures[future] = first, end, apart
+        future = self._client.submit(do_runs, self._job.key, first, rows, self._resets, separate, pure=False)
+        self._futures[future] = first, end, separate
         coming.add(future)
 
     def _take(self, future: Any) -> None:
-        """Write what has come; what was lost is done again."""
-        first, end, apart = self._futures.pop(future)
+        """Write the rows of a task, or submit it again if its worker died."""
+        first, end, separate = self._futures.pop(future)
         try:
             part: Part = future.result()
         except KilledWorker as error:
-            self._again(first, end, apart, error)
+            self._repeat(first, end, separate, error)
             return
         except LoadError as error:
             raise FileError(f"{self._job.model.name}: cannot be run on a worker: {error}") from error
         except _GONE:
             raise
-        except Exception as error:  # of the cluster
+        except Exception as error:  # the cluster raises various exceptions
             raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
         self._write(first, end, part)
         self._spent.working += part.seconds
         self._spent.simulating += part.simulating
         self._seconds = max(part.seconds / (end - first), 1e-6)
 
-    def _again(self, first: int, end: int, apart: bool, error: KilledWorker) -> None:
-        """Runs whose worker died are done apart from it: it is told then which of them is the cause, and why."""
+    def _repeat(self, first: int, end: int, separate: bool, error: KilledWorker) -> None:
+        """Repeat the runs of a worker that died in a child process, which shows the run that is the cause."""
         self._deaths += 1
-        self._chances[first] += apart
+        self._chances[first] += separate
         if self._chances[first] < _CHANCES:
             self._lost.append((first, end))
             return
@@ -216,22 +216,26 @@ class _Runs:
 
     def _report(self) -> None:
         link = self._client.dashboard_link
-        self._tell(Progress(self._there + self._spent.runs, self._design.runs, self._spent.failed, link or ""))
+        self._on_progress(
+            Progress(self._done_before + self._spent.runs, self._design.runs, self._spent.failed, link or "")
+        )
 
 
 def _deliver(client: Client, delivery: Delivery) -> None:
     try:
         client.register_plugin(delivery)
     except Exception as error:  # whatever a worker may raise
-        told = brief(str(error))
-        raise StudyError(f"a worker cannot take the study; it needs the same rov-fmu[study] as here: {told}") from error
+        reason = brief(str(error))
+        raise StudyError(
+            f"a worker cannot take the study; it needs the same rov-fmu[study] as here: {reason}"
+        ) from error
 
 
 @contextmanager
 def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
-    """Workers of this machine, a process and a thread each, or those of a scheduler. Raises FileError."""
+    """Connect to a scheduler, or start workers on this machine with one thread each. Raises FileError."""
     if scheduler is not None:
-        _see(scheduler)
+        _check_scheduler(scheduler)
         with silence_logging_cmgr(logging.CRITICAL), Client(scheduler, timeout=_WAIT, set_as_default=False) as client:
             try:
                 client.wait_for_workers(1, timeout=_WAIT)
@@ -240,9 +244,9 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
             yield client
         return
     settings = {
-        "distributed.scheduler.allowed-failures": 0,  # a task is divided then, until the run is found
+        "distributed.scheduler.allowed-failures": 0,  # its runs are repeated in child processes instead
         "distributed.worker.memory.terminate": False,
-        "distributed.worker.profile.enabled": False,  # it takes the interpreter from the steps a hundred times a second
+        "distributed.worker.profile.enabled": False,  # it interrupts the steps a hundred times a second
     }
     with (
         temporary_folder("study-") as folder,
@@ -260,7 +264,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
 
 
 def _started(**options: Any) -> LocalCluster:
-    """Start the workers. Raises StudyError."""
+    """Start workers on this machine. Raises StudyError."""
     script = getattr(sys.modules["__main__"], "__file__", None)
     if script and not Path(script).exists():
         raise StudyError(f"workers cannot be started of {script}, which is no file; {_GUARD}")
@@ -271,17 +275,17 @@ def _started(**options: Any) -> LocalCluster:
         raise StudyError(f"the workers do not start; {_GUARD}") from None
 
 
-def _see(scheduler: str) -> None:
-    """That a scheduler answers: a client without one waits, and says more than a line. Raises FileError."""
+def _check_scheduler(scheduler: str) -> None:
+    """Raise FileError if no scheduler answers. A client without one would wait, and print more than a line."""
 
     async def ask() -> bool:
         async with rpc(scheduler, connection_args=Security().get_connection_args("client")) as there:
             return bool((await asyncio.wait_for(there.identity(), _WAIT))["type"] == "Scheduler")
 
     try:
-        with ThreadPoolExecutor(1) as other:  # a notebook has a loop of its own in this thread
+        with ThreadPoolExecutor(1) as other:  # in a notebook, this thread already has an event loop
             is_there = other.submit(asyncio.run, ask()).result()
-    except Exception:  # whatever else is there may answer
+    except Exception:  # another kind of server may answer anything
         is_there = False
     if not is_there:
         raise FileError(f"--scheduler {scheduler}: no scheduler of Dask answers there")

@@ -25,18 +25,17 @@ def study(
     scheduler: str | None = None,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> Results:
-    """Do what is missing of a study, and open its results.
+    """Do the missing runs of a study, and open its results.
 
-    `workers` are processes on this machine, as many as it has cores by default; `scheduler` is the address of a
-    scheduler of Dask in place of them. On this machine other processes are started, so a script that calls this has
-    its `if __name__ == "__main__":`.
+    `workers` is the number of processes on this machine, by default the number of cores; `scheduler` is the address of
+    a Dask scheduler that is used instead. Worker processes import the calling script, so a script must call this below
+    `if __name__ == "__main__":`.
 
-    Raises FileError with a line for each reason, BuildError where the FMU of a vehicle cannot be built, StudyError
-    where the workers are lost, WriteError, KeyboardInterrupt; what is done is kept, and the same call goes on from
-    there.
+    Raises FileError with a line for each reason, BuildError if the FMU of a vehicle cannot be built, StudyError if the
+    workers are lost, WriteError, and KeyboardInterrupt. Finished runs are kept, and the same call continues from there.
     """
     if getattr(current_process(), "_inheriting", False):
-        sys.exit(1)  # in a worker that imports a script without it: the process that has started this one tells why
+        sys.exit(1)  # this is a worker that imports a script without that line; the process that started it says why
     _, results = run_study(Path(plan), Path(folder), workers, scheduler, on_progress)
     return results
 
@@ -49,7 +48,7 @@ def run_study(
     on_progress: Callable[[Progress], None],
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> tuple[Spent, Results]:
-    """The same, and where the time went; warnings are told before the first run."""
+    """Do the missing runs; return their times and the results. `on_warning` is called before the first run."""
     plan = load_plan(path)
     store = Store(folder)
     model = _model(plan, path)
@@ -59,11 +58,11 @@ def run_study(
     with store.held():
         job, design = prepared.job, prepared.design
         columns = {"parameters": design.names, "figures": [*job.figures], "outputs": job.kept}
-        told = {"groups": design.groups, "warnings": prepared.warnings}
+        notes = {"groups": design.groups, "warnings": prepared.warnings}
         named = [model.variables[name] for name in (*design.names, *job.manoeuvre.recorded)]
-        words = {"units": {v.name: v.unit for v in named}, "descriptions": {v.name: v.description for v in named}}
-        more = {"points": len(job.kept_points), "model": model.name, **words}
-        store.belongs_to(prepared.mark, digest(model.content), plan.vehicle, design.runs, columns, **more, **told)
+        texts = {"units": {v.name: v.unit for v in named}, "descriptions": {v.name: v.description for v in named}}
+        more = {"points": len(job.kept_points), "model": model.name, **texts}
+        store.belongs_to(prepared.mark, digest(model.content), plan.vehicle, design.runs, columns, **more, **notes)
         if plan.vehicle:
             write_whole(Output(folder / model.name, model.content))
         spent = execute(job, design, store, workers, scheduler, on_progress)
@@ -71,7 +70,7 @@ def run_study(
 
 
 def _model(plan: Plan, path: Path) -> Model:
-    """The FMU that the plan names, or that of its vehicle."""
+    """Read the FMU that the plan names, or build that of its vehicle."""
     if plan.fmu:
         return read_model(path.parent / plan.fmu)
     assert plan.vehicle

@@ -1,4 +1,4 @@
-"""Runs of an FMU for Co-Simulation, many in one instance, by the functions of its library and arrays made once."""
+"""Run an FMU for Co-Simulation many times in one instance, calling its library with arrays that are allocated once."""
 
 import ctypes
 import os
@@ -20,44 +20,44 @@ Array = npt.NDArray[np.float64]
 _WARNING = 1
 _FATAL = 4
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
-"""By number, in every version of FMI."""
+"""The name of each status, in every version of FMI."""
 
 
 class RunError(Exception):
-    """A run that the FMU does not do: the reason in a line."""
+    """The FMU did not do a run; the text is the reason in one line."""
 
 
 class LoadError(Exception):
-    """An FMU of which there is no instance on this machine."""
+    """The FMU cannot be instantiated on this machine."""
 
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """What every run has in common."""
+    """The simulation that all runs have in common."""
 
     start: float
     step: float
-    """Communication step, s."""
+    """The communication step, s."""
     steps: int
     tolerance: float | None
     set: Mapping[str, float]
-    """Start values by variable."""
+    """The start values, by variable."""
     varied: Sequence[str]
-    """Variables that are set to other values in each run."""
+    """The variables that get other values in each run."""
     inputs: Mapping[str, Array]
-    """By variable: a value for each step, set at its beginning."""
+    """By variable: the value that is set at the beginning of each step."""
     recorded: Sequence[str]
-    """Variables that are read after every step, and once before."""
+    """The variables that are read before the first step and after every step."""
 
     @property
     def times(self) -> Array:
-        """Of the communication points, s."""
+        """The times of the communication points, s."""
         return self.start + self.step * np.arange(self.steps + 1, dtype=np.float64)
 
 
 @dataclass(frozen=True)
 class _Group:
-    """Variables of one type, and numbers for them: a row of the table for each point of time, or one row."""
+    """Variables of one type with a table of their values: one row, or a row for each point in time."""
 
     get: Callable[..., int]
     set: Callable[..., int]
@@ -67,7 +67,7 @@ class _Group:
 
     @property
     def call(self) -> tuple[int, int, int, int]:
-        """Address of the references, their number, address of the first row, bytes a row."""
+        """The address of the references, their number, the address of the first row, and the bytes per row."""
         return self.references.ctypes.data, len(self.names), self.table.ctypes.data, self.table.strides[0]
 
 
@@ -96,9 +96,9 @@ class Simulator:
         self._changes = self._changing()
 
     def run(self, values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
-        """Every recorded variable at every communication point, for these values of what varies.
+        """Run once and return every recorded variable at every communication point.
 
-        The arrays are those of the next run too. Raises RunError.
+        `values` are those of the varied variables. The next run overwrites the returned arrays. Raises RunError.
         """
         try:
             self._run(values)
@@ -111,18 +111,18 @@ class Simulator:
         return {name: group.table[:, n] for group in self._reads for n, name in enumerate(group.names)}
 
     def reset(self) -> None:
-        """Make ready for the next run; with an instance of its own where the FMU cannot be reset."""
+        """Make ready for the next run, with a new instance if the FMU cannot be reset."""
         reset, terminate = self._functions["Reset"], self._functions["Terminate"]
         if terminate(self._fmu.component) > _WARNING or reset(self._fmu.component) > _WARNING:
             self.renew()
 
     def renew(self) -> None:
-        """Go on with another instance."""
+        """Continue with a new instance."""
         self.free()
         self._fmu = self._instantiate()
 
     def free(self) -> None:
-        """End the instance. The library stays: to load one again has crashed processes."""
+        """Free the instance. The library stays loaded, because loading one again has crashed processes."""
         if self._fmu.component is not None:
             self._functions["FreeInstance"](self._fmu.component)
             self._fmu.component = None
@@ -153,7 +153,7 @@ class Simulator:
     def _initialize(self) -> None:
         m, component = self._manoeuvre, self._fmu.component
         has_tolerance, tolerance = m.tolerance is not None, m.tolerance or 0.0
-        enter, leave = (self._functions[f"{way}InitializationMode"] for way in ("Enter", "Exit"))
+        enter, leave = (self._functions[f"{verb}InitializationMode"] for verb in ("Enter", "Exit"))
         if self._version == 2:
             setup = self._functions["SetupExperiment"]
             _check(setup(component, has_tolerance, tolerance, m.start, True, self._times[-1]), "setting it up")
@@ -165,7 +165,7 @@ class Simulator:
         _check(leave(component), "initialization")
 
     def _changing(self) -> dict[int, list[tuple[Callable[..., int], int, int, int]]]:
-        """By step: the inputs that are another then than before, as the calls that set them."""
+        """Return, by step, the calls that set the inputs which change at the beginning of this step."""
         found = defaultdict(list)
         for group in self._inputs:
             references, count, address, row = group.call
@@ -192,7 +192,7 @@ class Simulator:
     def _instantiate(self) -> Any:
         import fmpy.simulation
 
-        _TOLD.last = ""
+        _MESSAGES.last = ""
         try:
             with _loading():
                 return fmpy.simulation.instantiate_fmu(
@@ -203,11 +203,11 @@ class Simulator:
             raise LoadError(brief(f"{what}{self._message()}", 240)) from error
 
     def _message(self) -> str:
-        """The FMU's last warning, or nothing."""
-        return f"; the FMU: {_TOLD.last}" if getattr(_TOLD, "last", "") else ""
+        """Return the FMU's last warning, or an empty text."""
+        return f"; the FMU: {_MESSAGES.last}" if getattr(_MESSAGES, "last", "") else ""
 
     def _with_message(self, values: Sequence[float]) -> str:
-        """Why a run fails, with the FMU's last warning: it is done once more, with messages on."""
+        """Repeat a failed run with logging on, and return the reason with the FMU's last warning."""
         self._logs = True
         self.renew()
         try:
@@ -219,13 +219,13 @@ class Simulator:
         return ""
 
 
-_ONE_ONLY = Lock()
+_LOAD_LOCK = Lock()
 
 
 @contextmanager
 def _loading() -> Iterator[None]:
-    """One thread at a time: FMPy takes the process to the library's folder, and not back where it cannot be loaded."""
-    with _ONE_ONLY:
+    """Admit one thread at a time, and restore the working directory, which FMPy changes and may not change back."""
+    with _LOAD_LOCK:
         here = Path.cwd()
         try:
             yield
@@ -233,19 +233,19 @@ def _loading() -> Iterator[None]:
             os.chdir(here)
 
 
-_TOLD = local()
-"""The last warning of an FMU, by the thread that called it: FMPy hands those of all to whom it was asked to last."""
+_MESSAGES = local()
+"""The FMU's last warning in each thread. It is global because FMPy passes all messages to the latest logger."""
 
 
-def _keep(*told: Any) -> None:
-    """A message of an FMU: its last arguments are the same in every version of FMI."""
-    status, _, text = told[-3:]
+def _keep(*arguments: Any) -> None:
+    """Keep a warning. The last three arguments of a logger are the same in every version of FMI."""
+    status, _, text = arguments[-3:]
     if status >= _WARNING:
-        _TOLD.last = (text or b"").decode(errors="replace")
+        _MESSAGES.last = (text or b"").decode(errors="replace")
 
 
 class _FailedError(Exception):
-    """A call of the FMU that did not do what was asked."""
+    """A call of the FMU failed."""
 
 
 def _check(status: int, what: str, time: float | None = None) -> None:
@@ -255,12 +255,12 @@ def _check(status: int, what: str, time: float | None = None) -> None:
 
 
 def _functions(library: Any, version: int) -> dict[str, Callable[..., int]]:
-    """By name without the version: arrays are given by their address, which FMPy's prototypes would not take."""
+    """Return the FMU's functions by name without the version. Unlike with FMPy, arrays are passed by address."""
     pointer, number, size, whole = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
     flag = whole if version == 2 else ctypes.c_bool
 
     def typed(name: str, *arguments: Any, result: Any = whole) -> Any:
-        function = library[f"fmi{version}{name}"]  # another object at each look, whose prototype is its own
+        function = library[f"fmi{version}{name}"]  # each look-up gives a new object, so FMPy's prototype is not changed
         function.argtypes, function.restype = (pointer, *arguments), result
         return function
 
@@ -273,18 +273,18 @@ def _functions(library: Any, version: int) -> dict[str, Callable[..., int]]:
         found["DoStep"] = typed("DoStep", number, number, whole)
         kinds = ("Real", "Integer", "Boolean")
         return found | {
-            f"{way}{kind}": typed(f"{way}{kind}", pointer, size, pointer) for way in ("Get", "Set") for kind in kinds
+            f"{verb}{kind}": typed(f"{verb}{kind}", pointer, size, pointer) for verb in ("Get", "Set") for kind in kinds
         }
     found["EnterInitializationMode"] = typed("EnterInitializationMode", *experiment)
     found["DoStep"] = _step_of_3(typed("DoStep", number, number, flag, *[pointer] * 4))
     for kind in TYPES[3].keys() - {"Enumeration"}:
-        for way in ("Get", "Set"):
-            found[f"{way}{kind}"] = _sized(typed(f"{way}{kind}", pointer, size, pointer, size))
+        for verb in ("Get", "Set"):
+            found[f"{verb}{kind}"] = _sized(typed(f"{verb}{kind}", pointer, size, pointer, size))
     return found
 
 
 def _sized(function: Callable[..., int]) -> Callable[..., int]:
-    """A function of FMI 3.0 for scalars, which have as many values as references."""
+    """Wrap a function of FMI 3.0 for scalars, which have as many values as references."""
     return lambda component, references, count, values: function(component, references, count, values, count)
 
 

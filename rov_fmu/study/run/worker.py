@@ -1,4 +1,4 @@
-"""What a worker does: it has the FMU unpacked, an instance a thread, and makes the rows of many runs at a time."""
+"""The work of a Dask worker: it unpacks the FMU, has an instance for each thread, and returns the rows of many runs."""
 
 import io
 import os
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd  # noqa: F401 (PyArrow does, which takes a third of a second, at the first table)
+import pandas as pd  # noqa: F401 (PyArrow would import it at the first table, which takes a third of a second)
 import pyarrow as pa
 import pyarrow.parquet as pq
 from distributed import Worker
@@ -24,72 +24,72 @@ from distributed.diagnostics.plugin import WorkerPlugin
 
 from rov_fmu.study.plan.figures import Figures
 from rov_fmu.study.plan.model import Model
-from rov_fmu.study.run.apart import Apart
+from rov_fmu.study.run.separate_simulator import SeparateSimulator
 from rov_fmu.study.run.simulator import Manoeuvre, RunError, Simulator
 
 Array = npt.NDArray[np.float64]
 RUN, STATUS, REASON, TIME = "run", "status", "reason", "t"
-"""Columns that every study has."""
+"""The columns that every study has."""
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
-"""Statuses: all there; the run was done, and a figure cannot be computed; the run was not done to its end."""
+"""The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
 _TRIED = 8
-"""Runs of which one that ends is sought, to try the FMU with."""
+"""The number of runs that are tried until one ends."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """All that workers must know of a study; it travels to each of them once."""
+    """Everything that a worker must know about a study; it is sent to each worker once."""
 
     key: str
-    """Of this study among others on the same workers."""
+    """Distinguishes this study from others on the same workers."""
     model: Model
     manoeuvre: Manoeuvre
     figures: Mapping[str, str]
     kept: Sequence[str]
-    """Outputs of which the trajectory is kept."""
+    """The outputs whose trajectories are kept."""
     kept_points: Sequence[int]
-    """At which communication points."""
+    """The numbers of the communication points at which they are kept."""
     time_limit: float
-    """Seconds that a run may take."""
+    """The seconds that a run may take."""
 
     @property
     def runs_schema(self) -> pa.Schema:
-        """Of the table with a row a run."""
+        """The schema of the table with one row for each run."""
         numbers = [(name, pa.float64()) for name in (*self.manoeuvre.varied, *self.figures)]
         return pa.schema([(RUN, pa.int64()), *numbers, (STATUS, pa.string()), (REASON, pa.string())])
 
 
 @dataclass(frozen=True)
 class Part:
-    """The rows of some runs, one after another, as Parquet files."""
+    """The rows of consecutive runs, as Parquet files."""
 
     runs: bytes
     trajectories: bytes | None
     failed: int
     seconds: float
-    """How long a worker had to do with it."""
+    """The time that the worker took."""
     simulating: float
-    """How much of that the FMU took."""
+    """The part of this time that the FMU took."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What was found of the FMU before the study."""
+    """The properties of an FMU that are measured before the study."""
 
     resets: bool
-    """Whether a run after a reset is to the bit the one in a new instance."""
+    """True when a run after a reset equals the run of a new instance to the bit."""
     seconds: float
-    """That a run takes."""
+    """The time that a run takes."""
 
 
 class InstancePool:
-    """The FMU on one worker. Instances are lent to a thread at a time, and used again."""
+    """The instances of the FMU on one worker. Each is lent to one thread at a time, and then used again."""
 
     def __init__(self, job: Job, folder: Path, is_watched: bool) -> None:
         self.job = job
         self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=folder))
         self._description = job.model.unpack(self._folder)
-        self._idle: dict[bool, list[tuple[Simulator | Apart, Figures]]] = {False: [], True: []}
+        self._idle: dict[bool, list[tuple[Simulator | SeparateSimulator, Figures]]] = {False: [], True: []}
         self._one_only = Lock() if job.model.once_per_process else None
         self._is_watched = is_watched
         self._ends: dict[int, float] = {}
@@ -98,42 +98,42 @@ class InstancePool:
             Thread(target=self._watch, daemon=True).start()
 
     @contextmanager
-    def lent(self, apart: bool) -> Iterator[tuple[Simulator | Apart, Figures]]:
-        """An instance, ready for a run; in a process of its own where asked for. Raises LoadError.
+    def lent(self, separate: bool) -> Iterator[tuple[Simulator | SeparateSimulator, Figures]]:
+        """Lend an instance that is ready for a run; a separate one lives in a child process. Raises LoadError.
 
-        A worker that nobody starts again when its process ends has all of them so.
+        On a worker that Dask does not restart, all instances are separate.
         """
-        apart = apart or not self._is_watched
-        if self._one_only and not apart:
+        separate = separate or not self._is_watched
+        if self._one_only and not separate:
             self._one_only.acquire()
         try:
-            self.begin(apart)
-            yield (tools := self._tools(apart))
-            self._idle[apart].append(tools)
+            self.begin(separate)
+            yield (tools := self._tools(separate))
+            self._idle[separate].append(tools)
         finally:
             self._ends.pop(get_ident(), None)
-            if self._one_only and not apart:
+            if self._one_only and not separate:
                 self._one_only.release()
 
-    def begin(self, apart: bool) -> None:
-        """A run begins: the worker's process ends where it takes too long, for nothing else ends such a run."""
-        if self._is_watched and not apart:
+    def begin(self, separate: bool) -> None:
+        """Start the time limit of a run. A worker ends its own process when a run exceeds it; nothing else would."""
+        if self._is_watched and not separate:
             self._ends[get_ident()] = monotonic() + self.job.time_limit
 
     def close(self) -> None:
-        """End the instances; the files go."""
+        """Free the instances and delete the files."""
         self._closed.set()
         for simulator, _ in (*self._idle[False], *self._idle[True]):
             simulator.free()
         shutil.rmtree(self._folder, ignore_errors=True)
 
-    def _tools(self, apart: bool) -> tuple[Simulator | Apart, Figures]:
-        if self._idle[apart]:
-            return self._idle[apart].pop()
+    def _tools(self, separate: bool) -> tuple[Simulator | SeparateSimulator, Figures]:
+        if self._idle[separate]:
+            return self._idle[separate].pop()
         job, folder = self.job, str(self._folder)
         simulator = (
-            Apart(folder, replace(job.model, content=b""), job.manoeuvre, job.time_limit)
-            if apart
+            SeparateSimulator(folder, replace(job.model, content=b""), job.manoeuvre, job.time_limit)
+            if separate
             else Simulator(folder, self._description, job.model, job.manoeuvre)
         )
         return simulator, Figures(job.figures, job.manoeuvre.times)
@@ -145,37 +145,37 @@ class InstancePool:
                 os._exit(1)
 
 
-_SHOPS: dict[str, InstancePool] = {}
-"""Of this process, by the key of the study."""
+_POOLS: dict[str, InstancePool] = {}
+"""The pools of this process, by the key of the study."""
 
 
 class Delivery(WorkerPlugin):
-    """Brings a study to every worker, those that come later or anew among them."""
+    """Brings a study to every worker, including those that are started or restarted later."""
 
     def __init__(self, job: Job, own_cluster: bool) -> None:
         self.name = job.key
         self._job, self._own = job, own_cluster
 
     def setup(self, worker: Worker) -> None:
-        """Called on a worker as it comes."""
+        """Prepare a worker; Dask calls this when the worker starts."""
         if self._own and current_thread() is main_thread():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has started these
-            warnings.simplefilter("ignore", RuntimeWarning)  # of NumPy: what is NaN is told of the run
-        _SHOPS[self.name] = InstancePool(self._job, Path(worker.local_directory), is_watched=worker.nanny is not None)
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the process that started the workers handles Ctrl-C
+            warnings.simplefilter("ignore", RuntimeWarning)  # from NumPy: a NaN becomes the reason of its run
+        _POOLS[self.name] = InstancePool(self._job, Path(worker.local_directory), is_watched=worker.nanny is not None)
 
-    def teardown(self, worker: Worker) -> None:  # noqa: ARG002 (as it is called)
-        """Called as the study ends."""
-        if shop := _SHOPS.pop(self.name, None):
-            shop.close()
+    def teardown(self, worker: Worker) -> None:  # noqa: ARG002 (Dask passes it)
+        """Clean up; Dask calls this when the study ends."""
+        if pool := _POOLS.pop(self.name, None):
+            pool.close()
 
 
-def try_out(key: str, rows: Array, apart: bool) -> Trial:
-    """Whether a run after a reset, which came after another run, is as the first one. Raises LoadError."""
-    shop = _SHOPS[key]
-    with shop.lent(apart) as (simulator, _):
+def try_out(key: str, rows: Array, separate: bool) -> Trial:
+    """Measure a run, and find out whether the FMU can be reset between runs. Raises LoadError."""
+    pool = _POOLS[key]
+    with pool.lent(separate) as (simulator, _):
         start = perf_counter()
         for values in rows[:_TRIED]:
-            shop.begin(apart)
+            pool.begin(separate)
             simulator.renew()
             try:
                 first = _copied(simulator.run(values))
@@ -193,20 +193,20 @@ def try_out(key: str, rows: Array, apart: bool) -> Trial:
         return Trial(False, (perf_counter() - start) / len(rows[:_TRIED]))
 
 
-def do_runs(key: str, first: int, rows: Array, resets: bool, apart: bool) -> Part:
-    """Do the runs from this number on, a row of values each; in a process of their own or not. Raises LoadError."""
+def do_runs(key: str, first: int, rows: Array, resets: bool, separate: bool) -> Part:
+    """Do the runs from number `first` on, one for each row of values. Raises LoadError."""
     began, simulating, failed = perf_counter(), 0.0, 0
-    shop = _SHOPS[key]
-    job = shop.job
+    pool = _POOLS[key]
+    job = pool.job
     m = job.manoeuvre
     figures = np.full((len(rows), len(job.figures)), np.nan)
     points = np.array(job.kept_points, int)
-    every = len(points) == m.steps + 1
+    all_points = len(points) == m.steps + 1
     kept = [np.empty((len(rows), len(points)), job.model.variables[name].dtype(job.model.version)) for name in job.kept]
     statuses, reasons, ended = [], [], np.ones(len(rows), bool)
-    with shop.lent(apart) as (simulator, figures_of):
+    with pool.lent(separate) as (simulator, figures_of):
         for n, values in enumerate(rows):
-            shop.begin(apart)
+            pool.begin(separate)
             start = perf_counter()
             try:
                 run = simulator.run(values)
@@ -218,7 +218,7 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, apart: bool) -> Par
             finally:
                 simulating += perf_counter() - start
             for place, name in zip(kept, job.kept, strict=True):
-                place[n] = run[name] if every else run[name][points]
+                place[n] = run[name] if all_points else run[name][points]
             reason = ""
             if job.figures:
                 figures[n], reason = figures_of.of({**dict(zip(m.varied, values.tolist(), strict=True)), **run})
@@ -234,7 +234,7 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, apart: bool) -> Par
     table = _runs_table(job, first, rows, figures, statuses, reasons)
     trajectories = None
     if job.kept:
-        whole = slice(None) if ended.all() else ended  # which is no copy
+        whole = slice(None) if ended.all() else ended  # a slice makes no copy
         times = np.tile(m.times[points], int(ended.sum()))
         long = {RUN: np.repeat(numbers[whole], len(points)), TIME: times}
         long |= {name: place[whole].ravel() for name, place in zip(job.kept, kept, strict=True)}
@@ -244,7 +244,7 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, apart: bool) -> Par
 
 
 def lost_runs(job: Job, first: int, rows: Array, reason: str) -> Part:
-    """The rows of runs that came to no end."""
+    """Return the rows of runs that did not end."""
     count = len(rows)
     none = np.full((count, len(job.figures)), np.nan)
     table = _runs_table(job, first, rows, none, [FAILED] * count, [reason] * count)
@@ -254,7 +254,7 @@ def lost_runs(job: Job, first: int, rows: Array, reason: str) -> Part:
 def _runs_table(
     job: Job, first: int, rows: Array, figures: Array, statuses: Sequence[str], reasons: Sequence[str]
 ) -> pa.Table:
-    """What is not there is null, which a median of DuckDB or Polars leaves out; NaN it takes for a great number."""
+    """Missing figures become null, because DuckDB and Polars skip it in a median but treat NaN as a large number."""
     columns = [
         np.arange(first, first + len(rows)),
         *rows.T,
@@ -270,7 +270,7 @@ def _copied(run: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
 
 
 def _parquet(table: pa.Table, repeated: Sequence[str]) -> bytes:
-    """A file; columns in which values come again and again are written as a dictionary."""
+    """Return a table as a Parquet file; the columns with repeated values are encoded as a dictionary."""
     doubles = [field.name for field in table.schema if pa.types.is_floating(field.type) and field.name not in repeated]
     file = io.BytesIO()
     pq.write_table(
