@@ -16,7 +16,6 @@ typedef struct {
 } motion;
 
 /* Return the sum of the sizes of the states in a group. */
-
 static inline double group_size(const double x[N_SERIES], int group)
 {
     double size = 0.0;

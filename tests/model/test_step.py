@@ -24,12 +24,12 @@ BACK = {"F_1": -10.0, "F_2": -10.0, "F_3": 10.0, "F_4": 10.0}
 M, I_R = FREE["m_rov"], FREE["I_r"]
 
 CASES: dict[str, tuple[Rov, Values, Values, tuple[float, ...]]] = {
-    "from rest, late": (HEAVY, AHEAD, {}, (1e-6, 1e-3, 0.1, 1.0)),
-    "from rest, by one late thruster, which turns and thereby sways": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
+    "from rest, with a lag": (HEAVY, AHEAD, {}, (1e-6, 1e-3, 0.1, 1.0)),
+    "from rest, by one thruster with a lag, which turns the vehicle and thereby causes sway": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
     "from rest, coupled": (COUPLED, {"Y_ext": 3.0, "N_ext": 0.1}, {}, (1e-5, 1e-2, 1.0)),
     "the thrust changes its sign": (HEAVY, AHEAD, {**BACK, "u": -0.3}, (1e-3, 0.1, 0.5)),
     "a load cancels the present thrust": (HEAVY, {"X_ext": 28.284271247461902}, BACK, (1e-5, 0.1, 1.0)),
-    "surge and sway without yaw turn it": (COUPLED, {}, {"u": 1.0, "v": 0.5}, (1e-3, 0.3, 2.0)),
+    "surge and sway turn the vehicle": (COUPLED, {}, {"u": 1.0, "v": 0.5}, (1e-3, 0.3, 2.0)),
     "sway alone": (COUPLED, {}, {"v": 0.5}, (0.1, 2.0)),
     "coasting": (HEAVY, {}, {"u": 1.0, "v": 0.1, "r": 0.3}, (0.1, 1.0)),
     "a spin": (COUPLED, {}, {"u": 1.0, "r": 100.0}, (0.01, 0.05)),
@@ -136,7 +136,7 @@ def test_a_pendulum_with_a_stop_that_pushes_back_harder_reverses_at_the_exact_ti
 # ---- Reversals ----
 
 
-@pytest.mark.parametrize("rov", [HEAVY, LAGGING, COUPLED], ids=["Heavy", "late", "coupled"])
+@pytest.mark.parametrize("rov", [HEAVY, LAGGING, COUPLED], ids=["Heavy", "lag", "coupled"])
 def test_a_step_that_ends_at_a_reversal_or_near_it_is_exact(rov: Rov) -> None:
     """The time at which surge reverses is found by bisection."""
     rov, inputs, state = case(rov, {"X_ext": -20.0}, {"u": 0.4, "r": 0.5})
