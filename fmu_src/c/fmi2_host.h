@@ -28,15 +28,15 @@ enum {
 
 typedef fmi2CallbackFunctions host;
 
-static bool has_event_mode(const host *of)
+static bool has_event_mode(const host *callbacks)
 {
-    (void)of; /* Co-Simulation of FMI 2.0 has none */
+    (void)callbacks; /* Co-Simulation of FMI 2.0 has none */
     return false;
 }
 
-static void send_to_log(const host *to, const char *name, int status, const char *category, const char *text)
+static void send_to_log(const host *callbacks, const char *name, int status, const char *category, const char *text)
 {
-    if (to->logger != NULL) {
-        to->logger(to->componentEnvironment, name, (fmi2Status)status, category, text);
+    if (callbacks->logger != NULL) {
+        callbacks->logger(callbacks->componentEnvironment, name, (fmi2Status)status, category, text);
     }
 }

@@ -17,10 +17,11 @@ FMI3_Export fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, f
                                                       fmi3InstanceEnvironment instanceEnvironment,
                                                       fmi3LogMessageCallback logMessage)
 {
-    const host of = {instanceEnvironment, logMessage, NULL, false, false};
+    const host callbacks = {instanceEnvironment, logMessage, NULL, false, false};
     (void)resourcePath; /* everything is in the binary, whatever the path says */
     (void)visible;
-    return instantiate("fmi3InstantiateModelExchange", &of, instanceName, instantiationToken, TYPE_MODEL_EXCHANGE, loggingOn);
+    return instantiate("fmi3InstantiateModelExchange", &callbacks, instanceName, instantiationToken, TYPE_MODEL_EXCHANGE,
+                       loggingOn);
 }
 
 FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
@@ -33,17 +34,18 @@ FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fm
                                                      fmi3IntermediateUpdateCallback intermediateUpdate)
 {
     const bool wanted = nRequiredIntermediateVariables > 0 || earlyReturnAllowed;
-    const host of = {instanceEnvironment, logMessage, wanted ? intermediateUpdate : NULL, eventModeUsed, earlyReturnAllowed};
+    const host callbacks = {instanceEnvironment, logMessage, wanted ? intermediateUpdate : NULL, eventModeUsed,
+                            earlyReturnAllowed};
     const char *const function = "fmi3InstantiateCoSimulation";
     (void)resourcePath;
     (void)visible;
     for (size_t i = 0; i < nRequiredIntermediateVariables; i++) {
         if (requiredIntermediateVariables == NULL || place_of(requiredIntermediateVariables[i]) > TIME) {
-            REJECT(&of, instanceName, function, loggingOn,
+            REJECT(&callbacks, instanceName, function, loggingOn,
                    "requiredIntermediateVariables is NULL or has a value reference of no variable.");
         }
     }
-    return instantiate(function, &of, instanceName, instantiationToken, TYPE_CO_SIMULATION, loggingOn);
+    return instantiate(function, &callbacks, instanceName, instantiationToken, TYPE_CO_SIMULATION, loggingOn);
 }
 
 FMI3_Export fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -55,14 +57,14 @@ FMI3_Export fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceNa
                                                            fmi3LockPreemptionCallback lockPreemption,
                                                            fmi3UnlockPreemptionCallback unlockPreemption)
 {
-    const host of = {instanceEnvironment, logMessage, NULL, false, false};
+    const host callbacks = {instanceEnvironment, logMessage, NULL, false, false};
     (void)instantiationToken;
     (void)resourcePath;
     (void)visible;
     (void)clockUpdate;
     (void)lockPreemption;
     (void)unlockPreemption;
-    REJECT(&of, instanceName, "fmi3InstantiateScheduledExecution", loggingOn, "this FMU has no Scheduled Execution.");
+    REJECT(&callbacks, instanceName, "fmi3InstantiateScheduledExecution", loggingOn, "this FMU has no Scheduled Execution.");
 }
 
 FMI3_Export void fmi3FreeInstance(fmi3Instance instance)

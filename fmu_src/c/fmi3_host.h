@@ -25,15 +25,15 @@ typedef struct {
     bool uses_events, may_return_early;    /* for Co-Simulation */
 } host;
 
-static bool has_event_mode(const host *of)
+static bool has_event_mode(const host *callbacks)
 {
-    return of->uses_events;
+    return callbacks->uses_events;
 }
 
-static void send_to_log(const host *to, const char *name, int status, const char *category, const char *text)
+static void send_to_log(const host *callbacks, const char *name, int status, const char *category, const char *text)
 {
     (void)name; /* FMI 3.0 identifies the instance by its environment */
-    if (to->log != NULL) {
-        to->log(to->environment, (fmi3Status)status, category, text);
+    if (callbacks->log != NULL) {
+        callbacks->log(callbacks->environment, (fmi3Status)status, category, text);
     }
 }

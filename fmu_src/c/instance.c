@@ -33,32 +33,32 @@ static void start(fmu *f)
 }
 
 /* Write a line that explains why there is no instance, and return NULL. */
-#define REJECT(of, name, function, logging_on, ...)                         \
-    do {                                                                    \
-        if (LOGS_PROBLEMS_ALWAYS || (logging_on)) {                         \
-            emit(of, name, function, REFUSED, logStatusError, __VA_ARGS__); \
-        }                                                                   \
-        return NULL;                                                        \
+#define REJECT(callbacks, name, function, logging_on, ...)                         \
+    do {                                                                           \
+        if (LOGS_PROBLEMS_ALWAYS || (logging_on)) {                                \
+            emit(callbacks, name, function, REFUSED, logStatusError, __VA_ARGS__); \
+        }                                                                          \
+        return NULL;                                                               \
     } while (0)
 
 /* Return a new instance, or NULL with a line in the log when it is refused. The token must be that of modelDescription.xml. */
-static fmu *instantiate(const char *function, const host *of, const char *name, const char *token, interface_type type,
-                        bool logging_on)
+static fmu *instantiate(const char *function, const host *callbacks, const char *name, const char *token,
+                        interface_type type, bool logging_on)
 {
     const char *const shown = name == NULL ? "" : name;
     if (shown[strspn(shown, " \t\r\n\f\v")] == '\0') {
-        REJECT(of, shown, function, logging_on, "the instance name is missing or blank.");
+        REJECT(callbacks, shown, function, logging_on, "the instance name is missing or blank.");
     }
     if (token == NULL || strcmp(token, MODEL_TOKEN) != 0) {
-        REJECT(of, shown, function, logging_on, "the " TOKEN_NAME " %s is not that of this binary, %s.",
+        REJECT(callbacks, shown, function, logging_on, "the " TOKEN_NAME " %s is not that of this binary, %s.",
                token == NULL ? "NULL" : token, MODEL_TOKEN);
     }
     fmu *const f = (fmu *)calloc(1, sizeof *f + strlen(shown) + 1);
     if (f == NULL) {
-        REJECT(of, shown, function, logging_on, "out of memory.");
+        REJECT(callbacks, shown, function, logging_on, "out of memory.");
     }
     strcpy(f->name, shown);
-    memcpy(&f->host, of, sizeof f->host); /* its members are const in the headers of FMI 2.0.0 */
+    memcpy(&f->host, callbacks, sizeof f->host); /* its members are const in the headers of FMI 2.0.0 */
     f->logging_on = logging_on;
     f->now.type = type;
     start(f);
@@ -221,7 +221,8 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
             WARN_ONCE(f, place, "%s = %.15g saturates at %g; said once.", info->name, value[i],
                       value[i] < 0.0 ? info->minimum : info->maximum);
         } else if (info->kind == TUNABLE && is_for_event_mode(f)) {
-            WARN_ONCE(f, TUNED_BETWEEN_EVENTS, "%s is set, though the standard wants Event Mode for it; said once.", info->name);
+            WARN_ONCE(f, TUNED_BETWEEN_EVENTS, "%s is set, though the standard wants Event Mode for it; said once.",
+                      info->name);
         }
     }
     if (coefficient) {

@@ -62,7 +62,7 @@ typedef enum { TYPE_MODEL_EXCHANGE, TYPE_CO_SIMULATION } interface_type;
 /* The result of a call. The numbers are those of fmi2Status and fmi3Status. */
 typedef enum { DONE, WARNED, DISCARDED, REFUSED } outcome;
 
-/* The data that an FMU state saves: everything that a run depends on. Calculated variables are not restored from it. */
+/* The data that an FMU state saves: everything that a run depends on. Calculated variables follow from it. */
 typedef struct {
     interface_type type;
     lifecycle mode;
@@ -92,7 +92,7 @@ typedef struct {
 #if defined __GNUC__
 __attribute__((format(printf, 6, 7)))
 #endif
-static void emit(const host *to, const char *name, const char *function, outcome status, log_category category,
+static void emit(const host *callbacks, const char *name, const char *function, outcome status, log_category category,
                  const char *format, ...)
 {
     char text[320], message[2 * sizeof text];
@@ -114,7 +114,7 @@ static void emit(const host *to, const char *name, const char *function, outcome
         }
     }
     message[doubled] = '\0';
-    send_to_log(to, name, (int)status, LOG_CATEGORIES[category], message);
+    send_to_log(callbacks, name, (int)status, LOG_CATEGORIES[category], message);
 }
 
 /* SAY writes a line if its category is enabled. The other macros write a line about an event (REPORT), warn (WARN_ONCE), or end
