@@ -25,7 +25,7 @@ M, I_R = FREE["m_rov"], FREE["I_r"]
 
 CASES: dict[str, tuple[Rov, Values, Values, tuple[float, ...]]] = {
     "from rest, with a lag": (HEAVY, AHEAD, {}, (1e-6, 1e-3, 0.1, 1.0)),
-    "from rest, by one thruster with a lag, which turns the vehicle and thereby causes sway": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
+    "from rest, by one lagging thruster, which turns and sways": (HEAVY, {"u_1": 0.5}, {}, (1e-5, 1e-2, 1.0)),
     "from rest, coupled": (COUPLED, {"Y_ext": 3.0, "N_ext": 0.1}, {}, (1e-5, 1e-2, 1.0)),
     "the thrust changes its sign": (HEAVY, AHEAD, {**BACK, "u": -0.3}, (1e-3, 0.1, 0.5)),
     "a load cancels the present thrust": (HEAVY, {"X_ext": 28.284271247461902}, BACK, (1e-5, 0.1, 1.0)),
