@@ -1,4 +1,4 @@
-"""Motions of one axis to try laws on, over the whole range of doubles; and what rounding may do."""
+"""Random motions of one axis over the whole range of doubles, and bounds of their rounding errors."""
 
 from collections.abc import Callable, Sequence
 from math import copysign, inf
@@ -11,12 +11,13 @@ from tests.vehicles import VEHICLES, still
 from verification.references.closed_form import Axis, advance, time_to_rest
 
 Case = tuple[float, float, float, float, float]
-"""A, B, C, v0, h of an axis."""
+"""The coefficients A, B, C of an axis, the initial velocity v0, and the step size h."""
 
-# Of the largest velocity on the way and of the length of the path, which is the distance where the motion does not
-# turn. Over 100,000 random cases the largest errors are 5.7e-16 and 1.1e-15.
+# Over 100,000 random cases, the largest errors are 5.7e-16 of the velocity and 1.1e-15 of the distance.
 VELOCITY = 2e-15
+"""The allowed error of a velocity, relative to the largest velocity of the motion."""
 DISTANCE = 4e-15
+"""The allowed error of a distance, relative to the length of the path (without a reversal, this is the distance)."""
 SMALLEST = 5e-324
 TINY = 2.0 * SMALLEST
 
@@ -24,10 +25,10 @@ TINY = 2.0 * SMALLEST
 def hold(
     law: Callable[..., None], examples: int, *strategies: st.SearchStrategy[Any], at: Sequence[tuple[Any, ...]] = ()
 ) -> None:
-    """Try a law at these places and on examples."""
+    """Check a law for the arguments in `at` and for a number of random examples."""
     check = given(*strategies)(law)
-    for place in at:
-        check = example(*place)(check)
+    for arguments in at:
+        check = example(*arguments)(check)
     slow = [HealthCheck.too_slow, HealthCheck.filter_too_much]
     settings(max_examples=examples, suppress_health_check=slow)(check)()
 
@@ -36,7 +37,7 @@ def hold(
 
 
 def _spread(n: int) -> float:
-    """Numbers to [0, 1), neighbours far apart: Hypothesis likes few, this makes the most of each."""
+    """Map an integer to [0, 1) so that neighbours are far apart. Hypothesis prefers small integers."""
     return abs(n) * 0.6180339887498949 % 1.0
 
 
@@ -44,17 +45,17 @@ _NUMBERS = st.integers(0, 2**16)
 
 
 def power(low: float, high: float) -> st.SearchStrategy[float]:
-    """10^low ... 10^high, all powers alike."""
+    """Return numbers from 10^low to 10^high with evenly distributed logarithms."""
     return _NUMBERS.map(lambda n: 10.0 ** (low + (high - low) * _spread(n)))
 
 
 def size(low: float, high: float) -> st.SearchStrategy[float]:
-    """The same, and now and then zero."""
+    """Return numbers from 10^low to 10^high, and sometimes zero."""
     return _NUMBERS.map(lambda n: 10.0 ** (low + (high - low) * _spread(n)) if n % 10 else 0.0)
 
 
 def signed(low: float, high: float) -> st.SearchStrategy[float]:
-    """The same of either sign."""
+    """Return numbers of both signs with sizes from 10^low to 10^high, and sometimes zero."""
     return st.integers(-(2**16), 2**16).map(
         lambda n: copysign(10.0 ** (low + (high - low) * _spread(n)), n) if n % 10 else 0.0
     )
@@ -63,13 +64,13 @@ def signed(low: float, high: float) -> st.SearchStrategy[float]:
 PURE, SIGNED = size(-3.0, 3.0), signed(-3.0, 3.0)
 OFFSET = st.sampled_from((0.0, 2.0**-52, -(2.0**-52), 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6))
 
-# The smallest double and some more are 10^-323.
+# The smallest double is about 10^-323.
 WIDE = st.tuples(size(-323.0, 15.0), size(-323.0, 15.0), signed(-323.0, 18.0), signed(-323.0, 18.0), power(-9.0, 9.0))
 
 
 @st.composite
 def similar(draw: st.DrawFn) -> Case:
-    """Drag, force and time that matter to each other, whatever the units: pure numbers times those of V and h."""
+    """Draw motions in which drag, force and initial velocity all matter within the time, for any size of the units."""
     V, h = draw(power(-3.0, 3.0)), draw(power(-9.0, 9.0))
     A, B, C, v0 = draw(PURE), draw(PURE), draw(SIGNED), draw(SIGNED)
     return A / (V * h), B / h, C * V / h, v0 * V, h
@@ -77,14 +78,14 @@ def similar(draw: st.DrawFn) -> Case:
 
 @st.composite
 def faint(draw: st.DrawFn) -> Case:
-    """Drag that is lost in the last digits, or nearly."""
+    """Draw motions whose drag affects only the last digits."""
     (A, B, C, v0, h), share = draw(similar()), draw(power(-18.0, -3.0))
     return A * share, B * share, C, v0, h
 
 
 @st.composite
 def coinciding(draw: st.DrawFn) -> Case:
-    """At and beside D^2 = 0, where tanh becomes tan; a force of -B^2/(4 A) without rounding."""
+    """Draw motions at and near D^2 = 0, where tanh becomes tan. The force -B^2/(4 A) has no rounding error."""
     A, B = 2.0 ** draw(st.integers(-20, 20)), draw(st.integers(1, 1023)) * 2.0 ** draw(st.integers(-20, 20))
     C = -B * B / (4.0 * A) * (1.0 + draw(OFFSET))
     return A, B, C, draw(PURE) * B / A, draw(power(-3.0, 3.0)) / B
@@ -92,7 +93,7 @@ def coinciding(draw: st.DrawFn) -> Case:
 
 @st.composite
 def at_the_fractions(draw: st.DrawFn) -> Case:
-    """At and beside q = -0.8, 0.8 and 3.2, where the fractions end."""
+    """Draw motions at and near q = -0.8, 0.8 and 3.2, where the closed form changes its continued fraction."""
     A, B, _, v0, h = draw(similar())
     A = A or 1.0 / h
     q = draw(st.sampled_from((0.8, -0.8, 3.2))) * (1.0 + draw(OFFSET))
@@ -101,7 +102,7 @@ def at_the_fractions(draw: st.DrawFn) -> Case:
 
 @st.composite
 def turning(draw: st.DrawFn) -> Case:
-    """A force against the motion, for the time to the turn, twice that, or a little less or more."""
+    """Draw motions against the force that last until the reversal, or multiples of that, or slightly less or more."""
     A, B, C, v0, h = draw(similar())
     C, v0 = -(abs(C) or 1.0 / h), abs(v0) or 1.0
     h = time_to_rest(A, B, C, v0) * draw(st.sampled_from((1.0, 2.0, 2.0**10))) * (1.0 + draw(OFFSET))
@@ -110,8 +111,8 @@ def turning(draw: st.DrawFn) -> Case:
 
 CASES: st.SearchStrategy[Case] = st.one_of(similar(), faint(), WIDE, coinciding(), at_the_fractions(), turning())
 BOUNDARIES: list[Case] = [
-    (1.0, 2.0, -1.0, 1.0, 1.0),  # D^2 = 0, and turns at half the time
-    (0.0, 0.0, -1.0, 1.0, 2.0),  # no drag, turns at half the time
+    (1.0, 2.0, -1.0, 1.0, 1.0),  # D^2 = 0, and reverses at half the time
+    (0.0, 0.0, -1.0, 1.0, 2.0),  # no drag, and reverses at half the time
     (1.0, 0.0, 0.8, 0.0, 1.0),  # q = 0.8
     (1.0, 0.0, -0.8, 1.0, 1.0),  # q = -0.8
     (1.0, 0.0, 3.2, 0.0, 1.0),  # q = 3.2
@@ -127,7 +128,7 @@ BOUNDARIES: list[Case] = [
 
 
 def step_alone(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
-    """Return the velocity after h seconds and the distance covered, from the step of a vehicle of this axis alone."""
+    """Return the velocity and the distance after h seconds by a step of a vehicle that has only this axis."""
     rov = VEHICLES["heave only"]
     rov = rov.replaced(
         dict.fromkeys(rov.coefficients, 1.0) | {"a_d_w": A, "b_d_w": B, "a_d_w_reverse": A, "b_d_w_reverse": B}
@@ -136,11 +137,11 @@ def step_alone(A: float, B: float, C: float, v0: float, h: float) -> tuple[float
     return after["w"], after["z"]
 
 
-# ---- What rounding may do ----
+# ---- Rounding errors ----
 
 
 def path(A: float, B: float, C: float, v0: float, h: float) -> float:
-    """There and back."""
+    """Return the length of the path, on which the motion may reverse."""
     against = C < 0.0 < v0 or v0 < 0.0 < C
     rest = time_to_rest(A, B, -abs(C), abs(v0)) if against else inf
     forth = advance(A, B, C, v0, rest)[1] if rest < h else 0.0
@@ -148,21 +149,21 @@ def path(A: float, B: float, C: float, v0: float, h: float) -> float:
 
 
 def path_of(axis: Axis, v0: float, h: float) -> float:
-    """There and back on one axis of the vehicle."""
+    """Return the length of the path of one axis of a vehicle."""
     return path(axis.A, axis.B, axis.C, v0, h)
 
 
 def rounding_of_velocity(*velocities: float) -> float:
-    """What test_riccati.py promises: relative to the largest velocity on the way, which is the first or the last."""
+    """Return the error that test_riccati.py allows for a velocity. The largest is the first or the last one."""
     return VELOCITY * max(map(abs, velocities)) + TINY
 
 
 def rounding_of_distance(case: Case) -> float:
-    """What test_riccati.py promises: relative to the path; a velocity that is subnormal is off by TINY all the time."""
+    """Return the error that test_riccati.py allows for a distance. A subnormal velocity always has the error TINY."""
     return DISTANCE * path(*case) + TINY * max(1.0, case[4])
 
 
 def memory(A: float, B: float, h: float, slowest: float = 0.0) -> float:
-    """For how long (s) a change of the velocity is felt: it dies out at the rate B + 2 A |v| at least."""
+    """Return for how long (s) a change of the velocity has an effect. It fades at least at the rate B + 2 A |v|."""
     rate = B + 2.0 * A * slowest
     return min(h, 1.0 / rate) if rate * h > 1.0 else h

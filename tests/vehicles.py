@@ -1,4 +1,4 @@
-"""Vehicles of every kind to try laws on, and random ones; random inputs and states for them."""
+"""Vehicles of every kind for tests, random vehicles, and random inputs and states for them."""
 
 import random
 from collections.abc import Mapping
@@ -14,13 +14,13 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 Values = Mapping[str, float]
 State = dict[str, float]
 Case = tuple[Rov, State, State, float]
-"""A vehicle, its inputs and state, and the length of a step."""
+"""A vehicle, its inputs and states, and the length of a step."""
 
 _DRAG = ("a_d", "b_d")
 _EITHER = (*_DRAG, "a_d_reverse", "b_d_reverse")
 _ALL = ("m_a", *_EITHER, "F_0")
 _T200 = Curve("t200", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0"))
-_LATE = Curve("t200", (*_T200.keys, "T"))
+_LAGGING = Curve("t200", (*_T200.keys, "T"))
 _S = sqrt(0.5)
 _PLANAR = (  # four vectored thrusters, as ArduSub numbers them
     Thruster("1", "t200", (_S, -_S, 0.0), (0.156, 0.111, 0.0)),
@@ -40,7 +40,7 @@ _MIX = {
     "aside": {"1": -1.0, "2": 1.0, "3": -1.0, "4": 1.0},
     "turn": {"1": -0.5, "2": 0.5, "3": 0.5, "4": -0.5},
 }
-_NUMBERS = {  # of a BlueROV2 Heavy, and what it has not
+_NUMBERS = {  # the coefficients of a BlueROV2 Heavy, and plausible values for those that it does not have
     "m_rov": 13.5,
     "I_r": 0.37,
     "R": 0.2,
@@ -70,7 +70,7 @@ _NUMBERS = {  # of a BlueROV2 Heavy, and what it has not
     "F_0_w": -1.5,
     "F_0_r": 0.01,
 }
-_OF_A_CURVE = {
+_CURVE_NUMBERS = {
     "a_t": 29.33,
     "b_t": 31.48,
     "a_t_reverse": 21.74,
@@ -79,12 +79,12 @@ _OF_A_CURVE = {
     "c_0_reverse": 0.1,
     "T": 0.15,
 }
-assert _OF_A_CURVE.keys() == CURVE.keys()
+assert _CURVE_NUMBERS.keys() == CURVE.keys()
 
 
 def numbered(layout: Layout, **values: float) -> Rov:
-    """With the Heavy's numbers unless others are given; without tuning."""
-    numbers = {curve.coefficient(key): _OF_A_CURVE[key] for curve in layout.curves for key in curve.keys}
+    """Return a vehicle with the Heavy's numbers, except for the given values, and without tuning."""
+    numbers = {curve.coefficient(key): _CURVE_NUMBERS[key] for curve in layout.curves for key in curve.keys}
     numbers |= _NUMBERS | values
     return Rov(layout, {name: 1.0 if meta.tunable else numbers[name] for name, meta in layout.coefficients.items()})
 
@@ -111,40 +111,40 @@ VEHICLES = {
     "Heavy": HEAVY,
     "neither lag nor coupling": _rov("uvwr", _T200, _ALL_ROUND, ("m_a", *_DRAG)),
     "with an input mix": _rov("uvwr", _T200, _ALL_ROUND, _ALL, mix={**_MIX, "down": {"5": -1.0, "6": -1.0}}),
-    "drag by direction, coupled, late": _rov("uvwr", _LATE, _ALL_ROUND, _ALL, coupled=True),
+    "drag by direction, coupled, late": _rov("uvwr", _LAGGING, _ALL_ROUND, _ALL, coupled=True),
     "coupled without lag, three commands, no heave": _rov(
         "uvr", Curve("t200", ("a_t", "b_t", "c_0", "c_0_reverse")), _PLANAR, _ALL, coupled=True, mix=_MIX
     ),
-    "lag without coupling": _rov("uwr", _LATE, (*_PAIR, *_VERTICAL), _ALL),
+    "lag without coupling": _rov("uwr", _LAGGING, (*_PAIR, *_VERTICAL), _ALL),
     "an arm with lag beside a swift thruster": numbered(
         Layout(_axes("uwr", ("m_a", *_DRAG)), (Curve("rear", ("a_t", "b_t", "T"), 2), Curve("top")), PAPER.thrusters)
     ),
     "sway and yaw": _rov("vr", _T200, (_BOW,)),
     "heave only": _rov("w", _T200, _VERTICAL, _EITHER),
     "yaw only": _rov("r", _T200, _PAIR),
-    "yaw only, late": _rov("r", _LATE, _PAIR),
+    "yaw only, late": _rov("r", _LAGGING, _PAIR),
     "surge and sway without yaw": _rov("uv", _T200, _PLANAR, _EITHER),
     "surge without drag": numbered(Layout(_axes("ur"), (_T200,), _PAIR), a_d_u=0.0, b_d_u=0.0),
-    "linear drag alone, late": numbered(Layout(_axes("ur"), (_LATE,), _PAIR), a_d_u=0.0, a_d_r=0.0, b_d_r=0.3),
+    "linear drag alone, late": numbered(Layout(_axes("ur"), (_LAGGING,), _PAIR), a_d_u=0.0, a_d_r=0.0, b_d_r=0.3),
 }
 
 
 def a_vehicle(rov: Rov) -> Vehicle:
-    """With nothing but its numbers."""
+    """Return a vehicle file's content with these coefficients and placeholders for all texts."""
     sources = dict.fromkeys(rov.coefficients, "A tank test")
     return Vehicle("An ROV", "an_rov", "1", "A test", "A tank", rov, sources, (0.1, 1.0), {}, None)
 
 
-# ---- Random ones ----
+# ---- Random vehicles ----
 
 
 def spread(rng: random.Random, low: float, high: float, zero: float = 0.0) -> float:
-    """10^low ... 10^high, all powers alike, and a share of zeros."""
+    """Return a number from 10^low to 10^high with an evenly distributed logarithm, or 0 with the probability `zero`."""
     return 0.0 if rng.random() < zero else float(10.0 ** rng.uniform(low, high))
 
 
 def random_layout(rng: random.Random) -> Layout:
-    """Any axes, one or two curves, thrusters in any direction and place."""
+    """Return a layout with any axes, one or two curves, and thrusters in any direction and place."""
     axes = rng.choice(["u", "v", "w", "r", "ur", "uv", "vr", "uwr", "uvr", "uvwr", "uvwr"])
     curves = []
     for name in ("main", "aux")[: rng.choice([1, 2])]:
@@ -166,7 +166,7 @@ def random_layout(rng: random.Random) -> Layout:
 
 
 def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Rov:
-    """Of masses and drags that matter to each other; one drag in six is zero."""
+    """Return a vehicle whose mass and drag both matter. One drag coefficient in six is zero."""
     layout = layout or random_layout(rng)
     numbers = {}
     for name, meta in layout.coefficients.items():
@@ -189,7 +189,7 @@ def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Rov:
 
 
 def random_inputs(rng: random.Random, rov: Rov) -> State:
-    """Commands of either sign and beyond full, zeros, loads, current."""
+    """Return commands of both signs, some beyond full thrust and some zero, loads, and a current."""
     found = {}
     for name in rov.layout.inputs:
         if name in rov.layout.commands:
@@ -202,7 +202,7 @@ def random_inputs(rng: random.Random, rov: Rov) -> State:
 
 
 def random_state(rng: random.Random, rov: Rov) -> State:
-    """Velocities of the size that a vehicle has, zeros; a pose anywhere near; forces of before."""
+    """Return velocities of a vehicle's usual size, some of them zero, a pose near the origin, and lagging forces."""
     sizes = {"x": 20.0, "y": 20.0, "z": 20.0, "psi": 3.0, "r": 1.5}
     found = {}
     for name in rov.layout.state:
@@ -215,16 +215,16 @@ def random_state(rng: random.Random, rov: Rov) -> State:
 
 
 def random_case(rng: random.Random, rov: Rov, shortest: float = -6.0, longest: float = 0.3) -> Case:
-    """A step of 10^shortest ... 10^longest seconds, one in six from rest."""
+    """Return a step of 10^shortest to 10^longest seconds. One in six begins at rest."""
     state = at_rest(rov) if rng.random() < 1 / 6 else random_state(rng, rov)
     return rov, random_inputs(rng, rov), state, spread(rng, shortest, longest)
 
 
 def at_rest(rov: Rov) -> State:
-    """All states zero."""
+    """Return all states, each 0."""
     return dict.fromkeys(rov.layout.state, 0.0)
 
 
 def still(rov: Rov) -> State:
-    """All inputs zero."""
+    """Return all inputs, each 0."""
     return dict.fromkeys(rov.layout.inputs, 0.0)

@@ -1,6 +1,6 @@
 /* Co-Simulation (FMI 2.0, section 4.2). */
 
-static outcome holds_inputs(fmu *f, size_t n)
+static outcome check_no_derivatives(fmu *f, size_t n)
 {
     REQUIRE(n == 0, "inputs are held over a step (canInterpolateInputs = false).");
     return DONE;
@@ -13,7 +13,7 @@ FMI2_Export fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2Va
     (void)vr;
     (void)order;
     (void)value;
-    return (fmi2Status)holds_inputs(f, nvr);
+    return (fmi2Status)check_no_derivatives(f, nvr);
 }
 
 FMI2_Export fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -31,7 +31,7 @@ FMI2_Export fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunication
     return (fmi2Status)step(f, currentCommunicationPoint, communicationStepSize);
 }
 
-static outcome has_no_pending_step(fmu *f)
+static outcome refuse_to_cancel(fmu *f)
 {
     FAIL(f, "no step is pending.");
 }
@@ -39,25 +39,25 @@ static outcome has_no_pending_step(fmu *f)
 FMI2_Export fmi2Status fmi2CancelStep(fmi2Component c)
 {
     OPEN(fmi2CancelStep, MAY_LOG);
-    return (fmi2Status)has_no_pending_step(f);
+    return (fmi2Status)refuse_to_cancel(f);
 }
 
-static outcome has_no_status(fmu *f, int kind)
+static outcome discard_status(fmu *f, int kind)
 {
     DISCARD(f, "status kind %d is not available, steps are never pending.", kind);
 }
 
-/* fmi2GetXXXStatus: steps are never pending, so most of what can be asked for does not exist. */
-#define STATUS(function, type, exists, answer)                                                                       \
-    FMI2_Export fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value)                            \
-    {                                                                                                                \
-        OPEN_FOR(TYPE_CO_SIMULATION, function, MAY_ASK_STATUS);                                                           \
-        GIVEN(value != NULL, "value");                                                                               \
-        if (!(exists)) {                                                                                             \
-            return (fmi2Status)has_no_status(f, (int)s);                                                             \
-        }                                                                                                            \
-        *value = answer;                                                                                             \
-        return fmi2OK;                                                                                               \
+/* The functions fmi2Get<Type>Status. Steps are never pending, so most kinds of status do not exist. */
+#define STATUS(function, type, exists, answer)                                            \
+    FMI2_Export fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value) \
+    {                                                                                     \
+        OPEN_FOR(TYPE_CO_SIMULATION, function, MAY_ASK_STATUS);                           \
+        GIVEN(value != NULL, "value");                                                    \
+        if (!(exists)) {                                                                  \
+            return (fmi2Status)discard_status(f, (int)s);                                 \
+        }                                                                                 \
+        *value = answer;                                                                  \
+        return fmi2OK;                                                                    \
     }
 
 STATUS(fmi2GetStatus, fmi2Status, false, fmi2OK)

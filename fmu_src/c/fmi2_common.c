@@ -88,13 +88,13 @@ FMI2_Export fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[
     return (fmi2Status)set_values(f, vr, nvr, value);
 }
 
-#define NO_VARIABLES(function, type, values, modes)                                                                 \
-    FMI2_Export fmi2Status function(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, values value[])     \
-    {                                                                                                               \
-        OPEN(function, modes);                                                                                      \
-        (void)vr;                                                                                                   \
-        (void)value;                                                                                                \
-        return (fmi2Status)has_none(f, nvr, type);                                                                  \
+#define NO_VARIABLES(function, type, values, modes)                                                             \
+    FMI2_Export fmi2Status function(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, values value[]) \
+    {                                                                                                           \
+        OPEN(function, modes);                                                                                  \
+        (void)vr;                                                                                               \
+        (void)value;                                                                                            \
+        return (fmi2Status)check_none(f, nvr, type);                                                            \
     }
 
 NO_VARIABLES(fmi2GetInteger, "Integer", fmi2Integer, MAY_READ_LATER)

@@ -1,4 +1,4 @@
-/* Co-Simulation (FMI 3.0, section 4), and what of Scheduled Execution must be there. */
+/* Co-Simulation (FMI 3.0, section 4), and the one function of Scheduled Execution that a library must have. */
 
 FMI3_Export fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
@@ -11,15 +11,16 @@ FMI3_Export fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi
                                                 size_t nValues)
 {
     OPEN_FOR(TYPE_CO_SIMULATION, fmi3GetOutputDerivatives, MAY_ASK_OUTPUTS);
-    const outcome counted = is_counted(f, nValueReferences, nValues);
+    const outcome counted = check_count(f, nValueReferences, nValues);
     return (fmi3Status)(counted == DONE ? get_output_rates(f, valueReferences, nValueReferences, orders, values) : counted);
 }
 
-/* Between two intermediate updates the inputs are held. */
-static const double PIECE = 1e-4; /* s, or as long as MOST_PIECES to a step are */
+/* The time between two intermediate updates, in s. Inputs are held for so long. It is longer where a step would otherwise have
+ * more than MOST_PIECES pieces. */
+static const double PIECE = 1e-4;
 
-/* The callback of intermediate update where the state now is, `gone` seconds from t: it may read, and set inputs. Where the
- * step shall end early, *length becomes shorter. */
+/* Call the callback of intermediate update at the current state, `gone` seconds after t. The callback may read variables and set
+ * inputs. If it ends the step early, *length becomes shorter. */
 static void update(fmu *f, double t, double gone, double *length, bool is_inside)
 {
     const char *const function = f->function;
@@ -36,13 +37,13 @@ static void update(fmu *f, double t, double gone, double *length, bool is_inside
     }
 }
 
-/* A step in pieces, each with the inputs of the update at its beginning. *last is where it ends. */
+/* Step in pieces, each with the inputs of the update at its beginning. *last becomes the time at which the step ends. */
 static outcome step_in_pieces(fmu *f, double t, double h, double *last)
 {
     const double pieces = fmin(fmax(1.0, ceil(h / PIECE * (1.0 - 1e-9))), MOST_PIECES);
     int cuts = 0;
-    double length = h, gone = 0.0; /* counted from t: beside a late t a piece may be less than a digit */
-    TRY(is_step(f, t, h));
+    double length = h, gone = 0.0; /* measured from t: a piece may be shorter than the last digit of a large t */
+    TRY(check_step(f, t, h));
     warn_of_jump(f, f->now.time, t, h);
     f->now.time = t;
     update(f, t, gone, &length, false);
@@ -50,7 +51,7 @@ static outcome step_in_pieces(fmu *f, double t, double h, double *last)
         const double from = gone;
         gone = n < pieces ? fmin(length, h * (n / pieces)) : length;
         TRY(advance(f, t + from, gone - from, &cuts));
-        f->now.time = *last = t + gone; /* to the digit */
+        f->now.time = *last = t + gone; /* without the rounding of a sum over pieces */
         update(f, t, gone, &length, gone < length);
     }
     return DONE;
@@ -83,5 +84,5 @@ FMI3_Export fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3Val
     OPEN(fmi3ActivateModelPartition, MAY_LOG);
     (void)clockReference;
     (void)activationTime;
-    return (fmi3Status)lacks(f, "Scheduled Execution");
+    return (fmi3Status)refuse_missing(f, "Scheduled Execution");
 }

@@ -17,10 +17,11 @@ FMI3_Export fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, f
                                                       fmi3InstanceEnvironment instanceEnvironment,
                                                       fmi3LogMessageCallback logMessage)
 {
-    const host of = {instanceEnvironment, logMessage, NULL, false, false};
+    const host callbacks = {instanceEnvironment, logMessage, NULL, false, false};
     (void)resourcePath; /* everything is in the binary, whatever the path says */
     (void)visible;
-    return instantiate("fmi3InstantiateModelExchange", &of, instanceName, instantiationToken, TYPE_MODEL_EXCHANGE, loggingOn);
+    return instantiate("fmi3InstantiateModelExchange", &callbacks, instanceName, instantiationToken, TYPE_MODEL_EXCHANGE,
+                       loggingOn);
 }
 
 FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
@@ -33,17 +34,18 @@ FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fm
                                                      fmi3IntermediateUpdateCallback intermediateUpdate)
 {
     const bool wanted = nRequiredIntermediateVariables > 0 || earlyReturnAllowed;
-    const host of = {instanceEnvironment, logMessage, wanted ? intermediateUpdate : NULL, eventModeUsed, earlyReturnAllowed};
+    const host callbacks = {instanceEnvironment, logMessage, wanted ? intermediateUpdate : NULL, eventModeUsed,
+                            earlyReturnAllowed};
     const char *const function = "fmi3InstantiateCoSimulation";
     (void)resourcePath;
     (void)visible;
     for (size_t i = 0; i < nRequiredIntermediateVariables; i++) {
         if (requiredIntermediateVariables == NULL || place_of(requiredIntermediateVariables[i]) > TIME) {
-            REJECT(&of, instanceName, function, loggingOn,
+            REJECT(&callbacks, instanceName, function, loggingOn,
                    "requiredIntermediateVariables is NULL or has a value reference of no variable.");
         }
     }
-    return instantiate(function, &of, instanceName, instantiationToken, TYPE_CO_SIMULATION, loggingOn);
+    return instantiate(function, &callbacks, instanceName, instantiationToken, TYPE_CO_SIMULATION, loggingOn);
 }
 
 FMI3_Export fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -55,14 +57,14 @@ FMI3_Export fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceNa
                                                            fmi3LockPreemptionCallback lockPreemption,
                                                            fmi3UnlockPreemptionCallback unlockPreemption)
 {
-    const host of = {instanceEnvironment, logMessage, NULL, false, false};
+    const host callbacks = {instanceEnvironment, logMessage, NULL, false, false};
     (void)instantiationToken;
     (void)resourcePath;
     (void)visible;
     (void)clockUpdate;
     (void)lockPreemption;
     (void)unlockPreemption;
-    REJECT(&of, instanceName, "fmi3InstantiateScheduledExecution", loggingOn, "this FMU has no Scheduled Execution.");
+    REJECT(&callbacks, instanceName, "fmi3InstantiateScheduledExecution", loggingOn, "this FMU has no Scheduled Execution.");
 }
 
 FMI3_Export void fmi3FreeInstance(fmi3Instance instance)
@@ -89,15 +91,15 @@ FMI3_Export fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
     return (fmi3Status)run(f);
 }
 
-/* There are no structural parameters, which alone are set in Configuration Mode. */
-#define NO_CONFIGURATION(function)                                                    \
-    FMI3_Export fmi3Status function(fmi3Instance instance)                            \
-    {                                                                                 \
-        OPEN(function, MAY_LOG);                                                      \
-        return (fmi3Status)lacks(f, "structural parameters");                         \
+/* The functions of Configuration Mode, in which only structural parameters may be set. The FMU has none. */
+#define NO_CONFIGURATION(function)                                     \
+    FMI3_Export fmi3Status function(fmi3Instance instance)             \
+    {                                                                  \
+        OPEN(function, MAY_LOG);                                       \
+        return (fmi3Status)refuse_missing(f, "structural parameters"); \
     }
 
-static outcome lacks(fmu *f, const char *what)
+static outcome refuse_missing(fmu *f, const char *what)
 {
     FAIL(f, "this FMU has no %s.", what);
 }
@@ -123,7 +125,7 @@ FMI3_Export fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
     OPEN(fmi3EnterEventMode, MAY_MEET_EVENTS);
     if (f->now.mode == STEP && !f->host.uses_events) {
-        return (fmi3Status)lacks(f, "Event Mode, for it was made with eventModeUsed = false");
+        return (fmi3Status)refuse_missing(f, "Event Mode, for it was made with eventModeUsed = false");
     }
     return (fmi3Status)enter(f, EVENT);
 }
@@ -153,7 +155,7 @@ FMI3_Export fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boole
 
 /* ---- Getting and setting values ---- */
 
-static outcome is_counted(fmu *f, size_t references, size_t values)
+static outcome check_count(fmu *f, size_t references, size_t values)
 {
     REQUIRE(references == values, "%zu value references and %zu values, though every variable is a scalar.", references,
             values);
@@ -164,7 +166,7 @@ FMI3_Export fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueRefe
                                       size_t nValueReferences, fmi3Float64 values[], size_t nValues)
 {
     OPEN(fmi3GetFloat64, MAY_READ);
-    const outcome counted = is_counted(f, nValueReferences, nValues);
+    const outcome counted = check_count(f, nValueReferences, nValues);
     return (fmi3Status)(counted == DONE ? get_values(f, valueReferences, nValueReferences, values) : counted);
 }
 
@@ -172,23 +174,23 @@ FMI3_Export fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueRefe
                                       size_t nValueReferences, const fmi3Float64 values[], size_t nValues)
 {
     OPEN(fmi3SetFloat64, MAY_WRITE);
-    const outcome counted = is_counted(f, nValueReferences, nValues);
+    const outcome counted = check_count(f, nValueReferences, nValues);
     return (fmi3Status)(counted == DONE ? set_values(f, valueReferences, nValueReferences, values) : counted);
 }
 
-/* There is nothing of what these functions are for: to ask for none is all that can be asked. */
-#define NONE_OF(what, function, modes, count, unused, ...)                            \
-    FMI3_Export fmi3Status function(fmi3Instance instance, __VA_ARGS__)               \
-    {                                                                                 \
-        OPEN(function, modes);                                                        \
-        unused;                                                                       \
-        return (fmi3Status)has_none(f, count, what);                                  \
+/* Functions for variables that the FMU does not have. A call for none of them is legal. */
+#define NONE_OF(what, function, modes, count, unused, ...)              \
+    FMI3_Export fmi3Status function(fmi3Instance instance, __VA_ARGS__) \
+    {                                                                   \
+        OPEN(function, modes);                                          \
+        unused;                                                         \
+        return (fmi3Status)check_none(f, count, what);                  \
     }
-#define NO_VARIABLES(type, may_write)                                                                                        \
-    NONE_OF(#type, fmi3Get##type, MAY_READ_LATER, nValueReferences, ((void)valueReferences, (void)values, (void)nValues),   \
-            const fmi3ValueReference valueReferences[], size_t nValueReferences, fmi3##type values[], size_t nValues)       \
-    NONE_OF(#type, fmi3Set##type, may_write, nValueReferences,                                                              \
-            ((void)valueReferences, (void)values, (void)nValues), const fmi3ValueReference valueReferences[],               \
+#define NO_VARIABLES(type, may_write)                                                                                     \
+    NONE_OF(#type, fmi3Get##type, MAY_READ_LATER, nValueReferences, ((void)valueReferences, (void)values, (void)nValues), \
+            const fmi3ValueReference valueReferences[], size_t nValueReferences, fmi3##type values[], size_t nValues)     \
+    NONE_OF(#type, fmi3Set##type, may_write, nValueReferences,                                                            \
+            ((void)valueReferences, (void)values, (void)nValues), const fmi3ValueReference valueReferences[],             \
             size_t nValueReferences, const fmi3##type values[], size_t nValues)
 
 NO_VARIABLES(Float32, MAY_WRITE)
@@ -209,7 +211,7 @@ NONE_OF("Binary", fmi3SetBinary, MAY_WRITE_DISCRETE, nValueReferences,
         ((void)valueReferences, (void)valueSizes, (void)values, (void)nValues), const fmi3ValueReference valueReferences[],
         size_t nValueReferences, const size_t valueSizes[], const fmi3Binary values[], size_t nValues)
 
-/* Clocks. */
+/* Functions for clocks, which the FMU does not have. */
 #define NO_CLOCKS(function, modes, unused, ...)                                                                       \
     NONE_OF("Clock", function, modes, nValueReferences, ((void)valueReferences, unused),                              \
             const fmi3ValueReference valueReferences[], size_t nValueReferences, __VA_ARGS__)
@@ -241,13 +243,13 @@ FMI3_Export fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const
     return (fmi3Status)differentiate(f, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity);
 }
 
-/* sensitivity = seed J, a column after the other: a tangent costs so little that no reverse mode is worth its code. */
+/* Compute sensitivity = seed J, one column after the other. A tangent is so cheap that a reverse mode is not worth its code. */
 static outcome differentiate_adjoint(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
                                      size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],
                                      size_t n_sensitivity)
 {
-    TRY(are_partial(f, unknowns, n_unknowns, knowns, n_knowns, seed, n_seed, sensitivity, n_sensitivity, true));
-    for (int pass = 0; pass < 2; pass++) { /* nothing is written unless all are finite */
+    TRY(check_partial(f, unknowns, n_unknowns, knowns, n_knowns, seed, n_seed, sensitivity, n_sensitivity, true));
+    for (int pass = 0; pass < 2; pass++) { /* results are written only after all of them have been found finite */
         for (size_t k = 0; k < n_knowns; k++) {
             double d[N_VARIABLES] = {0.0}, sum = 0.0;
             d[place_of(knowns[k])] = 1.0;
@@ -274,14 +276,14 @@ FMI3_Export fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi
                                              nSensitivity);
 }
 
-/* Of scalars the dependencies of modelDescription.xml say all (providesPerElementDependencies is not declared). */
+/* All variables are scalars, so modelDescription.xml lists all dependencies (providesPerElementDependencies is not declared). */
 FMI3_Export fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference valueReference,
                                                            size_t *nDependencies)
 {
     OPEN(fmi3GetNumberOfVariableDependencies, MAY_LOG);
     (void)valueReference;
     (void)nDependencies;
-    return (fmi3Status)lacks(f, "dependencies by element");
+    return (fmi3Status)refuse_missing(f, "dependencies by element");
 }
 
 FMI3_Export fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent,
@@ -296,7 +298,7 @@ FMI3_Export fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3Va
     (void)elementIndicesOfIndependents;
     (void)dependencyKinds;
     (void)nDependencies;
-    return (fmi3Status)lacks(f, "dependencies by element");
+    return (fmi3Status)refuse_missing(f, "dependencies by element");
 }
 
 /* ---- States ---- */

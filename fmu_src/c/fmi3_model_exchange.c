@@ -59,13 +59,13 @@ FMI3_Export fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, 
 }
 
 /* How many of something the model has. */
-#define COUNT(function, name, number)                                             \
-    FMI3_Export fmi3Status function(fmi3Instance instance, size_t *name)          \
-    {                                                                             \
-        OPEN_FOR(TYPE_MODEL_EXCHANGE, function, MAY_COUNT);                            \
-        GIVEN(name != NULL, #name);                                               \
-        *name = number;                                                           \
-        return fmi3OK;                                                            \
+#define COUNT(function, name, number)                                    \
+    FMI3_Export fmi3Status function(fmi3Instance instance, size_t *name) \
+    {                                                                    \
+        OPEN_FOR(TYPE_MODEL_EXCHANGE, function, MAY_COUNT);              \
+        GIVEN(name != NULL, #name);                                      \
+        *name = number;                                                  \
+        return fmi3OK;                                                   \
     }
 
 COUNT(fmi3GetNumberOfEventIndicators, nEventIndicators, 0)

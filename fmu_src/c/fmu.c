@@ -1,8 +1,8 @@
-/* The one file to compile: everything but the FMI functions stays internal to it. */
+/* The only file to compile. It includes the others, so that only the FMI functions are visible from outside. */
 
-/* Importers compile for processors that multiply and add with one rounding; the results are those of two. */
+/* Some processors can multiply and add with a single rounding. The results must not depend on this, so it is switched off. */
 #if defined __GNUC__ && !defined __clang__
-#pragma GCC optimize("fp-contract=off", "no-tree-slp-vectorize") /* which in GCC 12 contracts all the same */
+#pragma GCC optimize("fp-contract=off", "no-tree-slp-vectorize") /* in GCC 12 that vectorizer contracts nevertheless */
 #elif defined _MSC_VER && !defined __clang__
 #pragma fp_contract(off)
 #else

@@ -1,4 +1,4 @@
-/* What an instance does, whichever version of FMI asks for it. References are checked here, pointers to arrays too. */
+/* The functions of an instance, which all versions of FMI share. They check value references and pointers to arrays. */
 
 /* ---- Life ---- */
 
@@ -9,10 +9,10 @@ static outcome enter(fmu *f, lifecycle mode)
     return DONE;
 }
 
-/* Whether all that a function writes to is there. */
-static outcome given(fmu *f, bool there, const char *names)
+/* Refuse a call whose arguments `names` are NULL. */
+static outcome check_not_null(fmu *f, bool exist, const char *names)
 {
-    REQUIRE(there, "%s is NULL.", names);
+    REQUIRE(exist, "%s is NULL.", names);
     return DONE;
 }
 
@@ -27,38 +27,38 @@ static void start(fmu *f)
     }
     memset(f->warned, 0, sizeof f->warned);
     for (int i = 0; i < N_LOG_CATEGORIES; i++) {
-        f->log_enabled[i] = f->logging_on || (TROUBLE_IS_TOLD && i != logEvents);
+        f->log_enabled[i] = f->logging_on || (LOGS_PROBLEMS_ALWAYS && i != logEvents);
     }
     model_prepare(f->now.values, &f->numbers);
 }
 
-/* Makes no instance, and says why. */
-#define REJECT(of, name, function, logging_on, ...)                                  \
-    do {                                                                             \
-        if (TROUBLE_IS_TOLD || (logging_on)) {                                       \
-            emit(of, name, function, REFUSED, logStatusError, __VA_ARGS__);          \
-        }                                                                            \
-        return NULL;                                                                 \
+/* Write a line that explains why there is no instance, and return NULL. */
+#define REJECT(callbacks, name, function, logging_on, ...)                         \
+    do {                                                                           \
+        if (LOGS_PROBLEMS_ALWAYS || (logging_on)) {                                \
+            emit(callbacks, name, function, REFUSED, logStatusError, __VA_ARGS__); \
+        }                                                                          \
+        return NULL;                                                               \
     } while (0)
 
-/* A new instance; NULL, and a line that says why, where it is refused. The token is that of modelDescription.xml. */
-static fmu *instantiate(const char *function, const host *of, const char *name, const char *token, interface_type type,
-                        bool logging_on)
+/* Return a new instance, or NULL with a line in the log when it is refused. The token must be that of modelDescription.xml. */
+static fmu *instantiate(const char *function, const host *callbacks, const char *name, const char *token,
+                        interface_type type, bool logging_on)
 {
     const char *const shown = name == NULL ? "" : name;
     if (shown[strspn(shown, " \t\r\n\f\v")] == '\0') {
-        REJECT(of, shown, function, logging_on, "the instance name is missing or blank.");
+        REJECT(callbacks, shown, function, logging_on, "the instance name is missing or blank.");
     }
     if (token == NULL || strcmp(token, MODEL_TOKEN) != 0) {
-        REJECT(of, shown, function, logging_on, "the " TOKEN_NAME " %s is not that of this binary, %s.",
+        REJECT(callbacks, shown, function, logging_on, "the " TOKEN_NAME " %s is not that of this binary, %s.",
                token == NULL ? "NULL" : token, MODEL_TOKEN);
     }
     fmu *const f = (fmu *)calloc(1, sizeof *f + strlen(shown) + 1);
     if (f == NULL) {
-        REJECT(of, shown, function, logging_on, "out of memory.");
+        REJECT(callbacks, shown, function, logging_on, "out of memory.");
     }
     strcpy(f->name, shown);
-    memcpy(&f->host, of, sizeof f->host); /* its members are const in the headers of FMI 2.0.0 */
+    memcpy(&f->host, callbacks, sizeof f->host); /* its members are const in the headers of FMI 2.0.0 */
     f->logging_on = logging_on;
     f->now.type = type;
     start(f);
@@ -125,13 +125,13 @@ static outcome reset(fmu *f)
 
 /* ---- Values ---- */
 
-/* Thrust and derivatives follow from the rest; only who reads them needs them. */
+/* Compute the thrust and the derivatives, which is done only when they are read. */
 static void calculate(fmu *f)
 {
     model_calculate(f->now.values, &f->numbers);
 }
 
-/* The value of a variable by its place, with that of the time where it is a variable; NULL where there is none. */
+/* Return the value at a place, or the time where FMI declares it as a variable. Return NULL when there is no such variable. */
 static const double *variable(const fmu *f, unsigned place)
 {
     return place < N_VARIABLES ? &f->now.values[place] : HAS_TIME && place == TIME ? &f->now.time : NULL;
@@ -166,8 +166,9 @@ static outcome get_values(fmu *f, const unsigned vr[], size_t n, double value[])
     return DONE;
 }
 
-/* FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4, FMI 3.0, sections 2.4.7.4 and 4.2.1, and what importers do: inputs before
- * initialization, and parameters between the integrator's steps. */
+/* True when a variable of this kind may be set now (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and
+ * 4.2.1). Two more calls are allowed because importers make them: inputs before initialization, and parameters between the
+ * steps of an integrator. */
 static bool may_set(const fmu *f, variable_kind kind)
 {
     switch (f->now.mode) {
@@ -183,7 +184,8 @@ static bool may_set(const fmu *f, variable_kind kind)
     return false;
 }
 
-/* Where a parameter may change in Event Mode alone; of Step Mode FMI 3.0 says so in 2.4.7.4, and not in 4.2.1. */
+/* True when the standard wants Event Mode for a change of a parameter. For Step Mode, FMI 3.0 demands it in 2.4.7.4, but not in
+ * 4.2.1. */
 static bool is_for_event_mode(const fmu *f)
 {
     return f->now.mode == CONTINUOUS || (f->now.mode == STEP && has_event_mode(&f->host));
@@ -193,7 +195,7 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
 {
     REQUIRE(n == 0 || (vr != NULL && value != NULL), "vr or value is NULL.");
     bool coefficient = false;
-    for (size_t i = 0; i < n; i++) { /* all are checked before any is set */
+    for (size_t i = 0; i < n; i++) { /* all values are checked before any is set */
         const unsigned place = place_of(vr[i]);
         REQUIRE(place < N_VARIABLES, "there is no " REAL " with value reference %u%s.", vr[i],
                 HAS_TIME && place == TIME ? " to be set" : "");
@@ -219,7 +221,8 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
             WARN_ONCE(f, place, "%s = %.15g saturates at %g; said once.", info->name, value[i],
                       value[i] < 0.0 ? info->minimum : info->maximum);
         } else if (info->kind == TUNABLE && is_for_event_mode(f)) {
-            WARN_ONCE(f, TUNED_LATE, "%s is set, though the standard wants Event Mode for it; said once.", info->name);
+            WARN_ONCE(f, TUNED_BETWEEN_EVENTS, "%s is set, though the standard wants Event Mode for it; said once.",
+                      info->name);
         }
     }
     if (coefficient) {
@@ -228,8 +231,8 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
     return DONE;
 }
 
-/* There are no variables of the other types: reading or writing none of them is all that can be asked for. */
-static outcome has_none(fmu *f, size_t n, const char *type)
+/* Refuse variables of a type that the FMU does not have. A call for none of them is legal. */
+static outcome check_none(fmu *f, size_t n, const char *type)
 {
     REQUIRE(n == 0, "this FMU has no %s variables.", type);
     return DONE;
@@ -250,7 +253,7 @@ static outcome set_states(fmu *f, const double x[], size_t n)
     return DONE;
 }
 
-static outcome is_for_states(fmu *f, const double to[], size_t n)
+static outcome check_state_array(fmu *f, const double to[], size_t n)
 {
     REQUIRE(n == N_STATES && to != NULL, "%zu states asked for, or NULL; it has %d.", n, N_STATES);
     return DONE;
@@ -258,14 +261,14 @@ static outcome is_for_states(fmu *f, const double to[], size_t n)
 
 static outcome get_states(fmu *f, double x[], size_t n)
 {
-    TRY(is_for_states(f, x, n));
+    TRY(check_state_array(f, x, n));
     memcpy(x, &f->now.values[FIRST_STATE], N_STATES * sizeof x[0]);
     return DONE;
 }
 
 static outcome get_rates(fmu *f, double rates[], size_t n)
 {
-    TRY(is_for_states(f, rates, n));
+    TRY(check_state_array(f, rates, n));
     calculate(f);
     for (size_t i = 0; i < N_STATES; i++) {
         if (!isfinite(f->now.values[FIRST_CALCULATED + i])) {
@@ -278,7 +281,7 @@ static outcome get_rates(fmu *f, double rates[], size_t n)
 
 static outcome get_nominals(fmu *f, double nominals[], size_t n)
 {
-    TRY(is_for_states(f, nominals, n));
+    TRY(check_state_array(f, nominals, n));
     for (size_t i = 0; i < N_STATES; i++) {
         nominals[i] = VARIABLES[FIRST_STATE + i].nominal;
     }
@@ -291,8 +294,8 @@ static outcome get_indicators(fmu *f, size_t n)
     return DONE;
 }
 
-/* A time beyond stopTime is taken: solvers look past the end before they interpolate back to it, CasADi tells stopTime 1
- * whatever it integrates over, and the model, which does not depend on time, is as valid there. */
+/* A time beyond stopTime is allowed. Solvers pass the end before they interpolate back to it, and CasADi sets stopTime to 1
+ * whatever it integrates over. The model does not depend on time, so it is valid there too. */
 static outcome set_time(fmu *f, double time)
 {
     REQUIRE(isfinite(time), "time = %g is not a finite number.", time);
@@ -308,7 +311,8 @@ static const char *name_of(unsigned reference)
     return place < N_VARIABLES ? VARIABLES[place].name : "an unknown value reference";
 }
 
-/* Parameters are knowns of the initialization (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.12). */
+/* True for a variable that a partial derivative may be taken with respect to. Parameters are such knowns during initialization
+ * only (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.12). */
 static bool is_known(const fmu *f, unsigned reference)
 {
     const unsigned place = place_of(reference);
@@ -322,7 +326,7 @@ static bool is_unknown(unsigned reference)
     return place < N_VARIABLES && (VARIABLES[place].kind == STATE || VARIABLES[place].kind == CALCULATED);
 }
 
-static outcome are_partial(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[], size_t n_knowns,
+static outcome check_partial(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[], size_t n_knowns,
                            const double seed[], size_t n_seed, double sensitivity[], size_t n_sensitivity, bool adjoint)
 {
     const size_t from = adjoint ? n_unknowns : n_knowns, to = adjoint ? n_knowns : n_unknowns;
@@ -340,12 +344,12 @@ static outcome are_partial(fmu *f, const unsigned unknowns[], size_t n_unknowns,
     return DONE;
 }
 
-/* sensitivity = J seed. */
+/* Compute sensitivity = J seed. */
 static outcome differentiate(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
                              size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],
                              size_t n_sensitivity)
 {
-    TRY(are_partial(f, unknowns, n_unknowns, knowns, n_knowns, seed, n_seed, sensitivity, n_sensitivity, false));
+    TRY(check_partial(f, unknowns, n_unknowns, knowns, n_knowns, seed, n_seed, sensitivity, n_sensitivity, false));
     double d[N_VARIABLES] = {0.0};
     for (size_t i = 0; i < n_knowns; i++) {
         d[place_of(knowns[i])] += seed[i];
@@ -367,7 +371,7 @@ static bool is_output(unsigned reference)
     return is_unknown(reference) && !rate;
 }
 
-/* First time derivatives of outputs, while the inputs are held. */
+/* Return the first time derivatives of outputs while the inputs are held. */
 static outcome get_output_rates(fmu *f, const unsigned vr[], size_t n, const int order[], double value[])
 {
     REQUIRE(n == 0 || (vr != NULL && order != NULL && value != NULL), "vr, order or value is NULL.");
@@ -378,7 +382,7 @@ static outcome get_output_rates(fmu *f, const unsigned vr[], size_t n, const int
     double rates[N_VARIABLES] = {0.0};
     calculate(f);
     memcpy(rates + FIRST_STATE, f->now.values + FIRST_CALCULATED, N_STATES * sizeof rates[0]);
-    model_tangent(f->now.values, rates); /* of the thrust, which changes with the forces that lag */
+    model_tangent(f->now.values, rates); /* the derivatives of the thrust, which changes with the forces that lag */
     for (size_t i = 0; i < n; i++) {
         REQUIRE(isfinite(rates[place_of(vr[i])]), "the derivative of %s overflows.", name_of(vr[i]));
     }
@@ -390,14 +394,14 @@ static outcome get_output_rates(fmu *f, const unsigned vr[], size_t n, const int
 
 /* ---- Steps ---- */
 
-/* Rounding of communication points, relative to their size, but never more than half a step. */
+/* Return how far rounding may move a communication point: relative to its size, and at most half a step. */
 static double time_tolerance(double t, double h)
 {
     return fmin(1e-9 * (fabs(t) + h), 0.5 * h);
 }
 
-/* Whether a step from t over h seconds may be asked for. */
-static outcome is_step(fmu *f, double t, double h)
+/* Refuse a step from t over h seconds that is not a step forward or passes stopTime. */
+static outcome check_step(fmu *f, double t, double h)
 {
     REQUIRE(h > 0.0 && isfinite(t + h), "communicationStepSize = %g at t = %g is not a step forward.", h, t);
     REQUIRE(!f->now.stop_defined || t + h <= f->now.stop + time_tolerance(f->now.stop, h),
@@ -413,10 +417,11 @@ static void warn_of_jump(fmu *f, double time, double t, double h)
     }
 }
 
-/* h seconds pass from t with the inputs held. *cuts: those of the step so far, each of which made a piece more. */
+/* Advance the states by h seconds from t with the inputs held. *cuts counts the pieces that the step needed in addition to one
+ * piece for each call. */
 static outcome advance(fmu *f, double t, double h, int *cuts)
 {
-    double next[N_STATES], sum = 0.0; /* not finite if one is not: zero times it is NaN */
+    double next[N_STATES], sum = 0.0; /* zero times a number that is not finite is NaN, and so is the sum */
     const int pieces = model_step(f->now.values, &f->numbers, h, next);
     *cuts += pieces - 1;
     if (pieces == 0 || *cuts >= MOST_PIECES) {
@@ -440,7 +445,7 @@ static outcome step(fmu *f, double t, double h)
 {
     const double time = f->now.time;
     int cuts = 0;
-    TRY(is_step(f, t, h));
+    TRY(check_step(f, t, h));
     TRY(advance(f, t, h, &cuts));
     warn_of_jump(f, time, t, h);
     return DONE;

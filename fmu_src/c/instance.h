@@ -1,8 +1,8 @@
-/* An instance of the FMU, and what every FMI function begins with, in every version of FMI.
+/* An instance of the FMU, its log, and the checks at the beginning of every FMI function, for all versions of FMI.
  *
  * A call that is refused (illegal in the mode, bad argument, value out of bounds) changes nothing. Only a step whose
- * result overflows puts the instance into error mode: with the state from before it, or, of a step in pieces, from the
- * end of the last piece. */
+ * result overflows puts the instance into error mode. The instance then keeps the state from before the step, or from
+ * the end of the last piece when intermediate updates divide the step into pieces. */
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -29,10 +29,11 @@ static unsigned place_of(unsigned reference)
 
 enum { TIME = N_VARIABLES }; /* the place of the independent variable, which only FMI 3.0 declares: after all others */
 
-/* What is legal when: the tables of FMI 2.0, sections 3.2.3 and 4.2.4, and of FMI 3.0, 2.3.1 and 4.2. */
+/* The modes in which a kind of call is legal, after the tables of FMI 2.0, sections 3.2.3 and 4.2.4, and of FMI 3.0, sections
+ * 2.3.1 and 4.2. */
 enum {
     RUNNING = EVENT | CONTINUOUS | STEP,
-    BETWEEN = INSTANTIATED | INITIALIZATION | RUNNING | TERMINATED | FAILED, /* everywhere but inside a step */
+    BETWEEN = INSTANTIATED | INITIALIZATION | RUNNING | TERMINATED | FAILED, /* all modes, except inside a step */
     MAY_LOG = BETWEEN | INTERMEDIATE,
     MAY_RESET = BETWEEN,
     MAY_SAVE = BETWEEN,
@@ -54,14 +55,14 @@ enum {
     MAY_ASK_STATUS = STEP | TERMINATED
 };
 
-/* As fmi2Type numbers them. They are not called MODEL_EXCHANGE and CO_SIMULATION, because the projects that
+/* The numbers are those of fmi2Type. The names are not MODEL_EXCHANGE and CO_SIMULATION, because the projects that
  * `fmpy create-cmake-project` makes define macros with these names. */
 typedef enum { TYPE_MODEL_EXCHANGE, TYPE_CO_SIMULATION } interface_type;
 
-/* As fmi2Status and fmi3Status number them. */
+/* The result of a call. The numbers are those of fmi2Status and fmi3Status. */
 typedef enum { DONE, WARNED, DISCARDED, REFUSED } outcome;
 
-/* What an FMU state saves: all that a run depends on. Calculated variables are not kept, they follow. */
+/* The data that an FMU state saves: everything that a run depends on. Calculated variables follow from it. */
 typedef struct {
     interface_type type;
     lifecycle mode;
@@ -70,12 +71,13 @@ typedef struct {
     double values[N_VARIABLES]; /* by place */
 } fmu_state;
 
-/* What is warned of once: a command that saturates, by place, and what importers do against the standard. */
-enum { READ_EARLY = FIRST_STATE, TUNED_LATE, ENDED_EARLY, TIME_JUMPED, N_WARNINGS };
+/* The warnings that an instance gives once. Inputs that saturate come first, each at its place; the others are calls of
+ * importers that the standard does not allow. */
+enum { READ_EARLY = FIRST_STATE, TUNED_BETWEEN_EVENTS, ENDED_EARLY, TIME_JUMPED, N_WARNINGS };
 
 typedef struct {
-    host host;            /* who made it: the callbacks of a version of FMI */
-    const char *function; /* the FMI function that works on it */
+    host host;            /* the callbacks of the importer */
+    const char *function; /* the FMI function that is running */
     bool logging_on;      /* as given at instantiation */
     bool log_enabled[N_LOG_CATEGORIES];
     bool warned[N_WARNINGS];
@@ -86,11 +88,11 @@ typedef struct {
 
 /* ---- Logging ---- */
 
-/* One line, which begins with the function where there is one. */
+/* Write one line to the log. It begins with the function, unless that is NULL. */
 #if defined __GNUC__
 __attribute__((format(printf, 6, 7)))
 #endif
-static void emit(const host *to, const char *name, const char *function, outcome status, log_category category,
+static void emit(const host *callbacks, const char *name, const char *function, outcome status, log_category category,
                  const char *format, ...)
 {
     char text[320], message[2 * sizeof text];
@@ -112,10 +114,11 @@ static void emit(const host *to, const char *name, const char *function, outcome
         }
     }
     message[doubled] = '\0';
-    tell(to, name, (int)status, LOG_CATEGORIES[category], message);
+    send_to_log(callbacks, name, (int)status, LOG_CATEGORIES[category], message);
 }
 
-/* One line in a category, if enabled; of the function that is called, or of an event. */
+/* SAY writes a line if its category is enabled. The other macros write a line about an event (REPORT), warn (WARN_ONCE), or end
+ * the function with a status and a line that explains it. */
 #define SAY(f, function, status, category, ...)                                          \
     do {                                                                                 \
         if ((f)->log_enabled[category]) {                                                \
@@ -143,7 +146,7 @@ static void emit(const host *to, const char *name, const char *function, outcome
             FAIL(f, __VA_ARGS__);                                                        \
         }                                                                                \
     } while (0)
-/* Ends where a part of the work was refused. */
+/* Return from the function if a part of its work was not done. */
 #define TRY(work)                                                                        \
     do {                                                                                 \
         const outcome tried = (work);                                                    \
@@ -167,11 +170,11 @@ static const char *mode_name(lifecycle mode)
     return "an unknown mode";
 }
 
-/* ---- What every function begins with ---- */
+/* ---- The beginning of every function ---- */
 
-/* An instance for one interface alone, where `wanted` is one; legal in some modes. */
 enum { ANY_INTERFACE = -1 };
 
+/* Check that a function is legal in the mode of the instance, and for its interface type unless `wanted` is ANY_INTERFACE. */
 static outcome open_instance(fmu *f, const char *function, int modes, int wanted)
 {
     f->function = function;
@@ -181,15 +184,15 @@ static outcome open_instance(fmu *f, const char *function, int modes, int wanted
     return DONE;
 }
 
-/* Opens a function: the instance f, or an error where there is none or the call is illegal in its mode or interface. */
+/* Begin a function: define the instance f, or return an error when there is none or the call is illegal. */
 #define OPEN_FOR(interface, function, modes)                                                    \
     fmu *const f = (fmu *)INSTANCE;                                                             \
     if (f == NULL || open_instance(f, #function, modes, interface) != DONE) {                   \
         return (FMI_STATUS)REFUSED;                                                             \
     }
 #define OPEN(function, modes) OPEN_FOR(ANY_INTERFACE, function, modes)
-/* Refuses a call without somewhere to write to. */
-#define GIVEN(there, names)                            \
-    if (given(f, there, names) != DONE) {              \
-        return (FMI_STATUS)REFUSED;                    \
+/* Return an error unless the arguments that a function writes to are there. */
+#define GIVEN(exist, names)                        \
+    if (check_not_null(f, exist, names) != DONE) { \
+        return (FMI_STATUS)REFUSED;                \
     }

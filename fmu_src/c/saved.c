@@ -1,6 +1,7 @@
-/* The complete state: get, set, serialize (FMI 2.0, section 2.1.8; FMI 3.0, section 2.2.7.4). */
+/* Saving, restoring and serializing the complete state (FMI 2.0, section 2.1.8; FMI 3.0, section 2.2.7.4). */
 
-/* Bytes, least significant first: magic, token, type, mode, flags, time, stop, settable values, checksum. */
+/* The serialized state consists of: magic, token, type, mode, flags, time, stop, values, checksum. Each number has its least
+ * significant byte first. */
 enum {
     MAGIC_SIZE = 8,
     TOKEN_SIZE = sizeof MODEL_TOKEN - 1,
@@ -50,8 +51,8 @@ static uint64_t checksum(const unsigned char *bytes, size_t size) /* FNV-1a */
     return hash;
 }
 
-/* Whether an instance can be in the mode of a state, with Event Mode in Co-Simulation or without. */
-static outcome knows_mode_of(fmu *f, const fmu_state *s)
+/* Refuse a state in a mode that this instance does not have. In Co-Simulation, Event Mode is optional. */
+static outcome check_mode_of(fmu *f, const fmu_state *s)
 {
     const int stepping = STEP | FAILED | (has_event_mode(&f->host) ? EVENT : 0), mode = (int)s->mode;
     const int modes = s->type == TYPE_MODEL_EXCHANGE ? EVENT | CONTINUOUS : stepping;
@@ -60,7 +61,7 @@ static outcome knows_mode_of(fmu *f, const fmu_state *s)
     return DONE;
 }
 
-/* Whether a state read from bytes could have been reached by calls. */
+/* True when calls of FMI functions could have led to this state. */
 static bool is_valid(const fmu_state *s)
 {
     bool valid = isfinite(s->time) && !isnan(s->stop)
@@ -74,9 +75,9 @@ static bool is_valid(const fmu_state *s)
     return valid;
 }
 
-/* What an FMU state points to. */
+/* The memory that an FMU state points to. */
 typedef struct {
-    const void *owner; /* tells a state of this FMU from other memory */
+    const void *owner; /* the address of VARIABLES, by which a state of this FMU is recognized */
     fmu_state state;
 } saved_state;
 
@@ -86,7 +87,7 @@ static saved_state *as_saved(void *state)
     return saved != NULL && saved->owner == VARIABLES ? saved : NULL;
 }
 
-/* Memory for a state: the one given, or new where none is. */
+/* Return the memory of the given state, or new memory when *state is NULL. */
 static saved_state *state_memory(void **state)
 {
     if (*state == NULL) {
@@ -114,7 +115,7 @@ static outcome restore(fmu *f, void *state)
     const saved_state *const saved = as_saved(state);
     REQUIRE(saved != NULL, "the state is NULL or no state of this FMU.");
     REQUIRE(saved->state.type == f->now.type, "the state is of the other interface type.");
-    TRY(knows_mode_of(f, &saved->state));
+    TRY(check_mode_of(f, &saved->state));
     f->now = saved->state;
     model_prepare(f->now.values, &f->numbers);
     REPORT(f, "Restored %s at t = %g s.", mode_name(f->now.mode), f->now.time);
@@ -184,7 +185,7 @@ static outcome deserialize(fmu *f, const unsigned char bytes[], size_t size, voi
     for (size_t i = 0; i < N_VARIABLES; i++) {
         s.values[i] = get_double(&from);
     }
-    TRY(knows_mode_of(f, &s));
+    TRY(check_mode_of(f, &s));
     REQUIRE(is_valid(&s), "the bytes hold values that no run can reach.");
     saved_state *const saved = state_memory(state);
     REQUIRE(saved != NULL, "out of memory, or *state is no state of this FMU.");

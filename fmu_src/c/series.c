@@ -1,6 +1,7 @@
-/* Taylor series of the states of equation.h, in time by tau: y(t tau) = sum of c[n] t^n. Every product of two states is a Cauchy
- * product, so a coefficient follows from those before it. The coefficients tell how far the series may be used (Jorba and
- * Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, 2005). */
+/* The Taylor series of the states of equation.h: y(t tau) = sum of c[n] t^n, with the unit of time tau. Every product of two
+ * states is a Cauchy product, so each coefficient follows from those before it. The last coefficients show how far the series
+ * may be used (Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
+ * 2005). */
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
@@ -16,20 +17,20 @@
 enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save */
 
 typedef struct {
-    int order;                     /* of the highest coefficient that is known */
-    unsigned moving;               /* components whose states are not constant, a bit each */
-    unsigned blocks;               /* the same of the blocks of equation.h */
-    double size[N_SERIES];         /* of each state's group */
-    double tau;                    /* unit of time, s */
+    int order;                     /* the order of the highest coefficient that is known */
+    unsigned moving;               /* one bit for each component; it is set where the states are not constant */
+    unsigned blocks;               /* one bit for each block of equation.h; it is set where the states are not constant */
+    double size[N_SERIES];         /* for each state, the size of its group */
+    double tau;                    /* the unit of time, s */
     double pace[N_SERIES];         /* tau, or 0 for the states that are constant */
-    double c[ORDER + 1][N_SERIES]; /* coefficients */
+    double c[ORDER + 1][N_SERIES]; /* the coefficients */
 } series;
 
 static const double INVERSE[ORDER + 1] = {0.0,        1.0,        1.0 / 2.0,  1.0 / 3.0,  1.0 / 4.0,  1.0 / 5.0,  1.0 / 6.0,
                                           1.0 / 7.0,  1.0 / 8.0,  1.0 / 9.0,  1.0 / 10.0, 1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0,
                                           1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0};
 
-/* Coefficient m > 0 of the products of state a with the states from b on. The bit of a block tells whether its states move. */
+/* Compute coefficient m > 0 of the products of state a with `lanes` states, from b on. Blocks that do not move are skipped. */
 INLINE void series_products(const double c[ORDER + 1][N_SERIES], unsigned blocks, int a, int b, int lanes, int m,
                             double product[])
 {
@@ -56,7 +57,7 @@ INLINE void series_products(const double c[ORDER + 1][N_SERIES], unsigned blocks
     }
 }
 
-/* Coefficient m > 0 of the squares of the states from a on. */
+/* Compute coefficient m > 0 of the squares of `lanes` states, from a on. */
 INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int m, double square[])
 {
     for (int i = 0; i < lanes; i++) {
@@ -73,31 +74,32 @@ INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int 
     }
 }
 
-/* How equation.h writes the coefficients of a block of states, and of all of them. */
-#define SERIES_BLOCK(name)                                                                                    \
+/* The functions of equation.h: SERIES_BLOCK computes coefficient m + 1 of one block of states, SERIES_TERMS of all states. GROW
+ * calls a block, or sets its coefficients to 0 where the block does not move. */
+#define SERIES_BLOCK(name)                                                                                      \
     INLINE void name(const model_numbers *n, const model_held *q, unsigned blocks, const double pace[N_SERIES], \
                      double c[ORDER + 1][N_SERIES], int m)
 #define SERIES_TERMS INLINE void series_terms(const model_numbers *n, const model_held *q, series *s, int m)
-#define GROW(bit, block, first, size)                       \
-    if (s->blocks >> (bit) & 1U) {                        \
-        block(n, q, s->blocks, s->pace, s->c, m);                      \
-    } else {                                                \
-        for (int i = first; i < (first) + (size); i++) {    \
-            s->c[m + 1][i] = 0.0;                           \
-        }                                                   \
+#define GROW(bit, block, first, size)                    \
+    if (s->blocks >> (bit) & 1U) {                       \
+        block(n, q, s->blocks, s->pace, s->c, m);        \
+    } else {                                             \
+        for (int i = first; i < (first) + (size); i++) { \
+            s->c[m + 1][i] = 0.0;                        \
+        }                                                \
     }
 
 #include "equation.h"
 
-/* A series of order n may be used where its last two coefficients, against the size of their state, are below the powers n - 1
- * and n of a ratio of which the power n + 1 is a quarter of a rounding. What is left out then falls from there, if they
- * decrease like this, or are rounding themselves. The limits are for n from 4 on. */
+/* A series of order n may be used when its last two coefficients, relative to the size of their state, are below the powers
+ * n - 1 and n of a ratio whose power n + 1 is a quarter of a rounding error. The terms that are left out are then negligible,
+ * provided that the coefficients decrease at this ratio or are rounding errors themselves. The first entry is for n = 4. */
 static const double SMALL_BEFORE[] = {1.8e-10, 1.5e-11, 2.4e-12, 6.4e-13, 2.3e-13, 9.9e-14, 5.0e-14, 2.8e-14,
                                       1.8e-14, 1.2e-14, 8.2e-15, 6.0e-15, 4.5e-15, 3.6e-15, 2.9e-15, 2.3e-15};
 static const double SMALL_LAST[] = {9.9e-14, 2.8e-14, 1.2e-14, 6.0e-15, 3.6e-15, 2.3e-15, 1.7e-15, 1.3e-15,
                                       9.9e-16, 8.0e-16, 6.7e-16, 5.8e-16, 5.0e-16, 4.4e-16, 4.0e-16, 3.6e-16};
 
-/* The first coefficient that is not 0; order + 1 where there is none. */
+/* Return the order of the first coefficient that is not 0, or order + 1 when all are 0. */
 static int series_first(const series *s, int i)
 {
     int first = 0;
@@ -107,7 +109,7 @@ static int series_first(const series *s, int i)
     return first;
 }
 
-/* Whether the series may be used up to t = 1. States that no term contains are integrals of the others, and converge with them. */
+/* True when the series may be used up to t = 1. The states from N_USED on are integrals of the others and converge with them. */
 INLINE bool series_converges(const series *s)
 {
     const double before = SMALL_BEFORE[s->order - 4];
@@ -116,14 +118,14 @@ INLINE bool series_converges(const series *s)
         const double size = s->size[i], a = fabs(s->c[s->order - 1][i]), b = fabs(s->c[s->order][i]);
         done &= a + 0.01 * b <= before * size + DBL_MIN; /* b may be infinite */
         done &= b * b <= 0.25 * DBL_EPSILON * size * (a + 8.0 * b);
-        if (s->order == ORDER) { /* of a motion that begins as a power of time, two coefficients of three may be 0 */
+        if (s->order == ORDER) { /* in a motion that begins as a power of time, two coefficients out of three may be 0 */
             done &= fabs(s->c[ORDER - 2][i]) <= 6.0 * before * size + DBL_MIN;
         }
     }
     return done;
 }
 
-/* The largest power of two that is not above x > 0, as its exponent; subnormal numbers count as 0. */
+/* Return the exponent of the largest power of two that is not above x > 0. Subnormal numbers are treated as 0. */
 INLINE int exponent_of(double x)
 {
     uint64_t bits;
@@ -131,8 +133,8 @@ INLINE int exponent_of(double x)
     return (int)(bits >> 52 & 0x7ff) - 1023;
 }
 
-/* The logarithm to base 2 of how far the last three coefficients may be followed, from order `first` on, until they are as
- * large as a size allows. */
+/* Return the logarithm to base 2 of the largest t at which the last three terms are still within their limits, relative to
+ * `size` t^first. */
 static double series_bound(const series *s, int i, int first, double size)
 {
     const double a = fabs(s->c[ORDER - 1][i]), b = fabs(s->c[ORDER][i]);
@@ -144,11 +146,11 @@ static double series_bound(const series *s, int i, int first, double size)
                 fmax((double)decrease / (ORDER + 1 - first), (double)rounding / (ORDER - first)));
 }
 
-/* How far a series of ORDER may be used, at most up to t = 1; 0 where its unit of time is so long that coefficients overflow
- * or quotients of them underflow. */
+/* Return the largest t, at most 1, up to which a series of order ORDER may be used. Return 0 when its unit of time is so long
+ * that coefficients overflow or quotients of them underflow. */
 static double series_reach(const series *s, const double scale[N_SERIES])
 {
-    double reach = 0.0; /* as its logarithm to base 2 */
+    double reach = 0.0; /* its logarithm to base 2 */
     for (int i = 0; i < N_USED; i++) {
         const double sum = fabs(s->c[ORDER][i]) + fabs(s->c[ORDER - 1][i]) + fabs(s->c[ORDER - 2][i]);
         if (!(sum <= DBL_MAX)) {
@@ -157,7 +159,7 @@ static double series_reach(const series *s, const double scale[N_SERIES])
         if (sum == 0.0) {
             continue;
         }
-        /* against its size, or against its first coefficient, whichever lets it go further */
+        /* relative to the size of the state, or to its first coefficient, whichever allows the larger t */
         double own = series_bound(s, i, 0, scale[GROUP[i]]);
         const int first = s->c[0][i] != 0.0 ? 1 : series_first(s, i);
         if (own < reach && first < ORDER - 2) {
@@ -171,7 +173,7 @@ static double series_reach(const series *s, const double scale[N_SERIES])
     return pow(2.0, reach);
 }
 
-/* What a state changes by up to t. */
+/* Return the change of a state from 0 to t. */
 static double series_change(const series *s, int i, double t)
 {
     double change = 0.0;
@@ -181,7 +183,8 @@ static double series_change(const series *s, int i, double t)
     return change;
 }
 
-/* The one root of a polynomial whose slope stays within a quarter of its first one, by Newton's method. */
+/* Return the time at which a state is 0, by Newton's method. Its slope must stay within a quarter of the first slope, so there
+ * is only one such time. */
 static double series_root(const series *s, int i)
 {
     double t = 0.0, next = -s->c[0][i] / s->c[1][i];
@@ -196,10 +199,10 @@ static double series_root(const series *s, int i)
     return next;
 }
 
-/* How long a velocity keeps its sign, at most `length`; *reverses tells whether it is 0 at the end of that time. */
+/* Return how long a velocity certainly keeps its sign, at most `length`. *reverses becomes true when it is 0 at that time. */
 static double series_sign_kept(const series *s, int i, double length, bool *reverses)
 {
-    const double shortest = 0x1p-20 * length; /* there the drag of a velocity that just touches zero does not matter */
+    const double shortest = 0x1p-20 * length; /* within this time, the drag of a velocity that just touches 0 is negligible */
     const int k = series_first(s, i);
     *reverses = false;
     for (; k <= s->order && length > shortest; length *= 0.5) {
@@ -220,7 +223,7 @@ static double series_sign_kept(const series *s, int i, double length, bool *reve
     return length;
 }
 
-/* Whether the sizes of the coefficients show that no velocity reverses before t = 1. */
+/* True when the sizes of the coefficients prove that no velocity reverses before t = 1. */
 INLINE bool series_keeps_directions(const series *s)
 {
     double others[N_MONITORED] = {0.0};
@@ -238,7 +241,7 @@ INLINE bool series_keeps_directions(const series *s)
     return keeps;
 }
 
-/* Shorten a piece to the first reversal. Returns the velocity that reverses, or NONE. */
+/* Shorten a piece to the first reversal. Return the velocity that reverses, or NONE. */
 static int series_cut(const series *s, double *length)
 {
     int reversed = NONE;

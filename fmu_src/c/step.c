@@ -1,4 +1,4 @@
-/* The step: from piece to piece, each a Taylor series (series.c) up to the first reversal of a velocity. */
+/* The step. It consists of pieces; each piece is a Taylor series (series.c) that ends at the first reversal of a velocity. */
 
 enum { MOST_PIECES = 10000 }; /* of a step */
 
@@ -6,15 +6,16 @@ typedef struct {
     const model_numbers *n;
     model_held q;
     double y[N_SERIES];       /* the states at the start of a piece */
-    double lost[N_SERIES];    /* what rounding has taken from each of them */
-    double gone[N_SERIES];    /* what the states that no term contains have changed by */
-    double scale[N_SERIES];   /* of each group of states: its size, or what is left of a larger size in earlier pieces */
-    double largest[N_SERIES]; /* the largest size so far */
-    double covered[N_USED];   /* an integral over time of each state's size, to within a factor of two */
-    unsigned settled;         /* components that have settled, a bit each */
-    int reverse[N_MONITORED]; /* whether the coefficients are those of a negative velocity */
+    double lost[N_SERIES];    /* the rounding error of each state, to be added to its next change */
+    double gone[N_SERIES];    /* the changes so far of the integrals, which are the states from N_USED on */
+    double scale[N_SERIES];   /* the size of each group of states; an earlier larger size decays by 4 from piece to piece */
+    double largest[N_SERIES]; /* the largest size of each group so far */
+    double covered[N_USED];   /* the integral of each state's size over time, to within a factor of two */
+    unsigned settled;         /* one bit for each component; it is set once the component has settled */
+    int reverse[N_MONITORED]; /* 1 for each velocity whose coefficients are those of the negative direction */
 } motion;
 
+/* Return the sum of the sizes of the states in a group. */
 static inline double group_size(const double x[N_SERIES], int group)
 {
     double size = 0.0;
@@ -24,8 +25,8 @@ static inline double group_size(const double x[N_SERIES], int group)
     return size;
 }
 
-/* Whether a velocity that is 0, and whose acceleration is 0, may begin to move: through a term that is not 0 once all states
- * in it move. */
+/* True when a velocity that is 0, and whose acceleration is 0, may still begin to move. This happens through a term that is no
+ * longer 0 once all states in it move. */
 static bool motion_may_begin(const motion *m, const series *s)
 {
     double moves[N_SERIES], size[N_SERIES];
@@ -47,14 +48,14 @@ static bool motion_may_begin(const motion *m, const series *s)
     return found;
 }
 
-/* Grow the series one coefficient at a time, and give each velocity that begins to move its direction. */
+/* Compute the coefficients one by one, and choose the direction of each velocity when it begins to move. */
 static void motion_grow_slowly(motion *m, series *s)
 {
     for (int n = 1; n < ORDER; n++) {
         bool turned = false;
         s->order = n - 1;
         for (int i = 0; i < N_MONITORED; i++) {
-            const int reverse = s->c[series_first(s, i)][i] < 0.0; /* coefficient n where all before it are 0 */
+            const int reverse = s->c[series_first(s, i)][i] < 0.0; /* this is coefficient n when all before it are 0 */
             turned |= reverse != m->reverse[i];
             m->reverse[i] = reverse;
         }
@@ -66,7 +67,7 @@ static void motion_grow_slowly(motion *m, series *s)
     s->order = ORDER;
 }
 
-/* Begin a series at the states of now: its first two coefficients, the directions, and which components move. */
+/* Begin a series at the current states: compute its first two coefficients, the directions, and which components move. */
 INLINE void motion_begin(motion *m, double tau, series *s)
 {
     double rate[N_SERIES];
@@ -87,8 +88,8 @@ INLINE void motion_begin(motion *m, double tau, series *s)
     for (int k = 0; k < N_COMPONENTS; k++) {
         s->moving |= COMPONENT_INPUTS[k] & s->moving ? 1U << k : 0U;
     }
-    if (N_DYNAMIC < N_COMPONENTS) { /* what has no effect does not have to move */
-        unsigned still = 0U; /* states that stay 0 */
+    if (N_DYNAMIC < N_COMPONENTS) { /* a component without an effect need not be computed */
+        unsigned still = 0U; /* one bit for each velocity that stays 0 */
         for (int i = 0; i < N_MONITORED; i++) {
             still |= m->y[i] == 0.0 && !(s->moving >> COMPONENT_OF[i] & 1U) ? 1U << i : 0U;
         }
@@ -113,7 +114,7 @@ INLINE void motion_begin(motion *m, double tau, series *s)
     }
 }
 
-/* Grow the series until it reaches t = 1, but not beyond a low order. Returns whether it does. */
+/* Compute coefficients up to a low order. Return true when the series may be used up to t = 1. */
 INLINE bool motion_grow_short(motion *m, series *s)
 {
     bool waits = false;
@@ -124,7 +125,7 @@ INLINE bool motion_grow_short(motion *m, series *s)
         motion_grow_slowly(m, s);
         return series_converges(s);
     }
-    series_terms(m->n, &m->q, s, 1); /* constant orders, so that their loops are unrolled */
+    series_terms(m->n, &m->q, s, 1); /* the orders are constants so that the compiler unrolls the loops */
     series_terms(m->n, &m->q, s, 2);
     series_terms(m->n, &m->q, s, 3);
     series_terms(m->n, &m->q, s, 4);
@@ -144,7 +145,8 @@ INLINE bool motion_grow_short(motion *m, series *s)
     return series_converges(s);
 }
 
-/* Grow the series to t = 1, or to ORDER. Returns how far it may be used; 0 where it overflows. */
+/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return the largest usable t, at most 1; 0 when
+ * the series overflows. */
 static double motion_grow_long(const motion *m, series *s)
 {
     while (s->order < ORDER) {
@@ -158,7 +160,7 @@ static double motion_grow_long(const motion *m, series *s)
     return series_reach(s, m->scale);
 }
 
-/* Add to a state, and what rounding took from it before. */
+/* Add a change to a state, together with its earlier rounding error (compensated summation). */
 static inline void motion_add(double *to, double change, double *lost)
 {
     const double whole = change + *lost, sum = *to + whole;
@@ -166,7 +168,7 @@ static inline void motion_add(double *to, double change, double *lost)
     *to = sum;
 }
 
-/* Move to the end of a piece, t = length. */
+/* Move the states to the end of a piece, t = length. */
 INLINE void motion_move(motion *m, const series *s, double length, double change[N_SERIES])
 {
     memset(change, 0, sizeof(double[N_SERIES]));
@@ -184,8 +186,8 @@ INLINE void motion_move(motion *m, const series *s, double length, double change
     }
 }
 
-/* Whether all states of a component have faded to nothing, and nothing drives them: then they come to rest. In the rest of the
- * step they would change neither themselves nor their integrals. */
+/* Put a component to rest when its states have faded to nothing and nothing drives them. Return true when that was done. In the
+ * remaining `rest` seconds these states would change neither themselves nor their integrals. */
 static bool motion_fades(motion *m, int component, double rest)
 {
     double y[N_SERIES], lost[N_SERIES], rate[N_SERIES];
@@ -208,12 +210,13 @@ static bool motion_fades(motion *m, int component, double rest)
     return true;
 }
 
-/* Find the components that have settled: those that they depend on have, and each rate is a rounding error of its terms. */
+/* Find the components that have settled. A component has settled when those that it depends on have settled, and when each of
+ * its rates is a rounding error of the terms. */
 static void motion_settle(motion *m, double rest)
 {
     double rate[N_SERIES], size[N_SERIES];
     m->settled = 0;
-    for (int i = 0; i < N_MONITORED; i++) { /* the direction of a velocity that is 0 does not matter, and stays */
+    for (int i = 0; i < N_MONITORED; i++) { /* a velocity that is 0 keeps its direction, which does not matter */
         m->reverse[i] = m->y[i] != 0.0 ? m->y[i] < 0.0 : m->reverse[i];
     }
     model_direct(m->n, m->reverse, &m->q);
@@ -231,7 +234,7 @@ static void motion_settle(motion *m, double rest)
     }
 }
 
-/* Whether a dynamic component moved so little in a piece that it may have settled. */
+/* True when a dynamic component changed so little in a piece that it may have settled. */
 static bool motion_is_slow(const motion *m, const series *s, const double change[N_SERIES])
 {
     bool moves[N_COMPONENTS] = {false}, all = true;
@@ -244,8 +247,8 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
     return !all;
 }
 
-/* The states after h > 0 seconds with the inputs held; not finite only where a result overflows. Returns the number of
- * pieces, or 0 where they would be more than MOST_PIECES. */
+/* Compute the states after h > 0 seconds with the inputs held. They are not finite only when a result overflows. Return the
+ * number of pieces, or 0 when more than MOST_PIECES would be needed. */
 static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES])
 {
     const double *const state = at + FIRST_STATE;
@@ -268,7 +271,7 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
         motion_begin(&m, fmin(rest, tau), &s);
         double reach = 1.0;
         if (!motion_grow_short(&m, &s)) {
-            if (pieces == 1) { /* the step is long, and some of the states may have settled before it */
+            if (pieces == 1) { /* the step is long, and some states may have settled before it */
                 motion_settle(&m, h);
                 if (m.settled == (1U << N_DYNAMIC) - 1U) {
                     model_coast(n, &m.q, h, m.y, m.gone);
@@ -290,12 +293,12 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
         if (reach < 1.0 || !series_keeps_directions(&s)) {
             reversed = series_cut(&s, &length);
         }
-        if (length == 1.0) { /* a constant, which leaves out the multiplications */
+        if (length == 1.0) { /* with a constant, the compiler leaves out the multiplications */
             motion_move(&m, &s, 1.0, change);
         } else {
             motion_move(&m, &s, length, change);
         }
-        if (reversed != NONE) { /* at rest to the last digit, so that the next piece has the other direction */
+        if (reversed != NONE) { /* exactly at rest, so that the next piece has the other direction */
             m.y[reversed] = m.lost[reversed] = 0.0;
         }
         for (int i = 0; i < N_USED; i++) {
@@ -317,7 +320,7 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
             break;
         }
     }
-    if (!(tau > 0.0)) { /* it overflows however short the piece is */
+    if (!(tau > 0.0)) { /* even the shortest piece overflows */
         for (int i = 0; i < N_STATES; i++) {
             next[i] = INFINITY;
         }

@@ -1,4 +1,4 @@
-/* Simulates vehicles for Python (rov_fmu/engine/): many of one layout at once, each over the same table of times. */
+/* Simulation for Python (rov_fmu/engine/): many vehicles of the same layout, all at the same times. */
 #include <stddef.h>
 
 #include "model.h"
@@ -13,7 +13,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* A table of numbers by vehicle and by time, with its strides; a stride is 0 where the numbers do not depend on it. */
+/* A table of numbers by vehicle and time, with its strides. A stride is 0 when the numbers do not depend on that index. */
 typedef struct {
     const double *at;
     ptrdiff_t per_vehicle, per_time;
@@ -28,11 +28,12 @@ static inline double number(const table *t, ptrdiff_t vehicle, ptrdiff_t time)
     return t->at[vehicle * t->per_vehicle + time * t->per_time];
 }
 
-/* Simulate the vehicles from `first` to `last` - 1, until *stop is not 0.
+/* Simulate the vehicles from `first` to `last` - 1. The simulation ends early when *stop becomes nonzero.
  *
- * `given` holds the inputs, held from each time to the next, the states at the first time, and the coefficients, each at the
- * place of its variable. `recorded` has the places of the variables to record at every time, in result[record][vehicle][time].
- * failed[vehicle] becomes the number of the first time that cannot be computed, or `times`; records stay as they are from there. */
+ * `given` contains at the place of each variable the values of the inputs, which are held from each time to the next, of the
+ * states at the first time, and of the coefficients. `recorded` contains the places of the variables that are recorded at every
+ * time in result[record][vehicle][time]. failed[vehicle] becomes the index of the first time that cannot be computed, or `times`.
+ * From that time on, nothing is recorded. */
 void simulate(const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,
               ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,
               const volatile int *stop)

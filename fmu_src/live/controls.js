@@ -1,18 +1,18 @@
-// The page's controls: sliders, keys, a gamepad, step tests, a recording; and the loop that flies and draws.
+// The page's controls (sliders, keys, a gamepad, step tests, recordings), and the loop that steps and draws.
 
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
 const SPAN = 20; // s, of the charts
 const LONGEST_FRAME = 0.1; // s; a page that was hidden does not fly what it missed
 const DEAD_ZONE = 0.12;
 
-/** Keys by their place on the keyboard: the axis that they drive, and which way. @type {Record<string, [string, number]>} */
+/** The axis that each key drives, and the direction. Keys are known by their place. @type {Record<string, [string, number]>} */
 const KEYS = {
   KeyW: ["surge", 1], ArrowUp: ["surge", 1], KeyS: ["surge", -1], ArrowDown: ["surge", -1],
   KeyD: ["yaw", 1], ArrowRight: ["yaw", 1], KeyA: ["yaw", -1], ArrowLeft: ["yaw", -1],
   KeyE: ["sway", 1], KeyQ: ["sway", -1], KeyF: ["heave", 1], KeyR: ["heave", -1],
 }; // biome-ignore format: pairs
 
-/** Sticks of a standard gamepad, as pilots of ROVs have them. @type {[string, number, number][]} */
+/** The sticks of a standard gamepad, assigned as on ROVs: axis, stick, direction. @type {[string, number, number][]} */
 const STICKS = [
   ["yaw", 0, 1],
   ["heave", 1, 1],
@@ -25,7 +25,7 @@ function part(id) {
   return /** @type {HTMLElement} */ (document.getElementById(`live-${id}`));
 }
 
-/** What a hand sets on a slider: to a hundredth or so of its range. @param {number} value @param {number} most */
+/** Returns a value of a slider rounded to about a hundredth of its range. @param {number} value @param {number} most */
 function rounded(value, most) {
   const step = 10 ** (Math.floor(Math.log10(most)) - 2);
   return Number((Math.round(value / step) * step).toPrecision(12));
@@ -38,9 +38,9 @@ class Live {
     this.vehicle = pilot.vehicle;
     this.paused = false;
     this.speed = 1;
-    /** How long the charts are, in s. */
+    /** The time span of the charts, in s. */
     this.span = SPAN;
-    /** Demands along axes, by keys that are down and by the gamepad. @type {Map<string, [string, number]>} */
+    /** The keys that are down, with their axes and directions. @type {Map<string, [string, number]>} */
     this.keys = new Map();
     /** @type {Map<string, number>} */
     this.sticks = new Map();
@@ -133,7 +133,7 @@ class Live {
     );
   }
 
-  /** A recording that flies gives way to the pilot. */
+  /** Ends a recording that is being flown, so that the pilot has control. */
   takeOver() {
     if (!this.flight.playback) return;
     this.flight.playback = null;
@@ -142,7 +142,7 @@ class Live {
     this.say("You have control; the recording has ended.");
   }
 
-  /** What a slider says stands beside it. */
+  /** Shows the value of each slider, and the state of the buttons. */
   show() {
     for (const slider of this.sliders) {
       const output = /** @type {HTMLElement} */ (slider.parentElement?.querySelector("output"));
@@ -195,7 +195,7 @@ class Live {
     this.show();
   }
 
-  /** All commands to zero. */
+  /** Sets all commands to zero. */
   still() {
     this.takeOver();
     this.slideCommands({});
@@ -218,7 +218,7 @@ class Live {
     }
   }
 
-  /** A step test of the list. */
+  /** Runs the step test that is chosen in the list. */
   run() {
     const test = this.vehicle.tests[Number(/** @type {HTMLSelectElement} */ (part("test")).value)];
     const { signs, name, unit } = this.vehicle.axes[test.axis];
@@ -235,7 +235,7 @@ class Live {
     this.show();
   }
 
-  /** A recording; what is wrong with it is told, and the flight goes on. @param {File} file */
+  /** Flies a recording. If it cannot be read, the page says why, and the flight goes on. @param {File} file */
   async open(file) {
     try {
       if (file.size > MOST_BYTES) throw new Unreadable(`it is larger than ${MOST_BYTES / 1e6} MB`);
@@ -269,7 +269,7 @@ class Live {
 
   // ---- The loop ----
 
-  /** What keys and sticks ask along each axis, beside the sliders. */
+  /** Returns the demands of keys and gamepad along each axis. */
   demands() {
     const strength = Number(/** @type {HTMLInputElement} */ (part("strength")).value);
     /** @type {Map<string, number>} */
@@ -284,7 +284,7 @@ class Live {
     return demands;
   }
 
-  /** Commands by the sliders, keys and gamepad. */
+  /** Sets the commands from sliders, keys and gamepad. */
   command() {
     const demands = this.demands();
     if (this.flight.playback) {
@@ -302,7 +302,7 @@ class Live {
     this.show();
   }
 
-  /** @param {number} now In ms. */
+  /** Draws a frame, and steps the flight up to it. @param {number} now The time in ms. */
   frame(now) {
     requestAnimationFrame((next) => this.frame(next));
     const passed = Math.min(LONGEST_FRAME, (now - this.last) / 1000);
@@ -343,10 +343,10 @@ class Live {
   }
 }
 
-/** What flies in this page, once it does. @type {Live | undefined} */
+/** The flight of this page, once it is loaded. @type {Live | undefined} */
 let live;
 
-/** Shows what a browser without WebAssembly or scripts never sees. */
+/** Loads the vehicles and shows the section, which stays hidden in a browser without WebAssembly or scripts. */
 async function start() {
   /** @type {Vehicle[]} */
   const vehicles = JSON.parse(part("vehicles").textContent ?? "");

@@ -1,20 +1,20 @@
-// A flight: the pilot's vehicle and a ghost under the same commands, and what they left behind.
+// A flight: the pilot's vehicle and a ghost under the same commands, with their tracks.
 
 const LONGEST_STEP = 0.05; // s, so that curves and the track are smooth at any speed
 const MOST_KEPT = 4000;
 
-/** A vehicle on its way. */
+/** A vehicle with its track and the history of its velocities and positions. */
 class Craft {
   /** @param {Model} model */
   constructor(model) {
     this.model = model;
-    /** North and east of places on the track, one after the other. @type {number[]} */
+    /** The points of the track: north and east in turn. @type {number[]} */
     this.track = [];
-    /** By axis, at the times of the flight. @type {number[][]} */
+    /** The velocities by axis, at the times of the flight. @type {number[][]} */
     this.velocities = model.vehicle.axes.map(() => []);
-    /** Depth, heading, or what was gone along the axis. @type {number[][]} */
+    /** Depth, heading, or the distance along the axis. @type {number[][]} */
     this.positions = model.vehicle.axes.map(() => []);
-    /** What was gone along each axis. */
+    /** The distance covered along each axis. */
     this.ways = model.vehicle.axes.map(() => 0);
   }
 
@@ -27,7 +27,7 @@ class Craft {
     this.keep();
   }
 
-  /** @param {number} h */
+  /** Steps h seconds. Returns false when the step fails. @param {number} h */
   step(h) {
     const { model, ways } = this;
     const { axes } = model.vehicle;
@@ -39,7 +39,7 @@ class Craft {
     return true;
   }
 
-  /** Remembers where it is and how fast. */
+  /** Adds the current velocities and positions to the history. */
   keep() {
     const { model, track } = this;
     model.vehicle.axes.forEach(({ velocity }, a) => {
@@ -53,25 +53,25 @@ class Craft {
     if (n > 2 * MOST_KEPT) track.splice(0, MOST_KEPT);
   }
 
-  /** The number of an axis; -1 where the vehicle has no such one. @param {string} name */
+  /** Returns the number of an axis, or -1 if the vehicle does not have it. @param {string} name */
   axis(name) {
     return this.model.vehicle.axes.findIndex((axis) => axis.name === name);
   }
 
-  /** Depth, heading, or what was gone along an axis. @param {number} a */
+  /** Returns depth, heading, or the distance along an axis. @param {number} a */
   position(a) {
     const { position } = this.model.vehicle.axes[a];
     return position ? this.model.get(position) : this.ways[a];
   }
 
-  /** @param {number} n */
+  /** Removes the oldest n entries of the history. @param {number} n */
   forget(n) {
     for (const trace of [...this.velocities, ...this.positions]) trace.splice(0, n);
   }
 }
 
 class Flight {
-  /** @param {Model} pilot @param {Model | null} other Another vehicle beside it; by default its own with the file's tuning. */
+  /** @param {Model} pilot @param {Model | null} other The ghost's vehicle; by default the pilot's, with the file's tuning. */
   constructor(pilot, other) {
     this.pilot = new Craft(pilot);
     this.isOther = other !== null;
@@ -80,18 +80,18 @@ class Flight {
     this.time = 0;
     /** @type {number[]} */
     this.times = [];
-    /** Of the last change of an input, by axis: when, and how fast it was. */
+    /** By axis: the time of the last change of an input, and the velocity at that time. */
     this.since = pilot.vehicle.axes.map(() => ({ time: 0, velocity: 0 }));
     /** @type {StepTest | null} */
     this.test = null;
     /** @type {Playback | null} */
     this.playback = null;
-    /** Whether anything was ever asked of it: until then time stands. */
+    /** True after the first input. Until then, time stands still. */
     this.begun = false;
     this.reset();
   }
 
-  /** Back to the start; commands and loads stay. */
+  /** Returns to the start. Commands and loads stay as they are. */
   reset() {
     this.time = 0;
     this.times = [0];
@@ -102,7 +102,7 @@ class Flight {
     for (const since of this.since) Object.assign(since, { time: 0, velocity: 0 });
   }
 
-  /** Gives inputs by name, to both. @param {Record<string, number>} given */
+  /** Sets inputs of both vehicles by name. @param {Record<string, number>} given */
   set(given) {
     const { model } = this.pilot;
     const changed = Object.entries(given).filter(([name, value]) => model.get(name) !== value);
@@ -121,7 +121,7 @@ class Flight {
     this.begun = true;
   }
 
-  /** α and β of the pilot. @param {Record<string, number>} given */
+  /** Sets α and β of the pilot's vehicle. @param {Record<string, number>} given */
   tune(given) {
     const { model } = this.pilot;
     for (const [name, value] of Object.entries(given)) model.set(name, value);
@@ -133,7 +133,7 @@ class Flight {
     this.ghost.model.observe();
   }
 
-  /** h seconds; false, and back at the start, where a step overflows. @param {number} h */
+  /** Steps h seconds. Returns false, and returns to the start, when a step overflows. @param {number} h */
   advance(h) {
     let left = h;
     while (left > 0) {
@@ -172,7 +172,7 @@ class Flight {
     }
   }
 
-  /** A recording from its start; the ghost is what was measured. @param {Recording} recording */
+  /** Flies a recording from its start. The ghost shows the measured motion. @param {Recording} recording */
   play(recording) {
     this.reset();
     this.playback = new Playback(recording, this);
@@ -180,7 +180,7 @@ class Flight {
     this.begun = true;
   }
 
-  /** A step test of the paper: from rest, with all else at zero. @param {StepTest} test */
+  /** Flies a published step test: from rest, with all other inputs at zero. @param {StepTest} test */
   run(test) {
     const { vehicle } = this.pilot.model;
     const { signs } = vehicle.axes[test.axis];
@@ -193,7 +193,7 @@ class Flight {
 }
 
 /**
- * The inputs of one vehicle for another: those of the same names; where its commands are others, by the axes that they drive.
+ * Returns the inputs of one vehicle for another. Commands of other names follow from the demands along the axes.
  * @param {Vehicle} from @param {Vehicle} to @param {(name: string) => number} get
  * @returns {Record<string, number>}
  */
@@ -212,7 +212,7 @@ function handedOver(from, to, get) {
 }
 
 /**
- * Commands along axes: each drives its inputs with their signs.
+ * Returns the commands for demands along axes. Each axis drives its commands with their signs.
  * @param {Vehicle} vehicle @param {Map<string, number>} demands @returns {Record<string, number>}
  */
 function commandsOf(vehicle, demands) {

@@ -1,4 +1,4 @@
-/* What the mathematics asks of <math.h>, where there is no library: instructions of WebAssembly, and the browser's Math. */
+/* The part of <math.h> that the model needs, without a library: instructions of WebAssembly, and the browser's Math. */
 #ifndef MATH_H
 #define MATH_H
 
@@ -15,7 +15,7 @@ IMPORTED(pow) double pow(double x, double y);
 #define fabs(x) __builtin_fabs(x)
 #define sqrt(x) __builtin_sqrt(x)
 
-/* As ISO C has them, a number rather than NaN: those of WebAssembly are NaN then. */
+/* If one argument is NaN, ISO C returns the other one. The instructions of WebAssembly would return NaN. */
 static inline double fmin(double x, double y)
 {
     return x < y || y != y ? x : y;

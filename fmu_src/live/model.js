@@ -1,8 +1,8 @@
 "use strict";
-// The vehicle of a page: the module that a build compiled from the C of the FMU, by the names of the FMU's variables.
+// The vehicle of a page: the module that a build has compiled from the FMU's C, with the names of the FMU's variables.
 
 /**
- * An axis: names of its velocity, load and tuning; the commands that drive it with their signs; the position that follows.
+ * An axis: the names of its velocity, load and position, their units, and the commands that drive it with their signs.
  * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string,
  *   signs: Record<string, number>}} Axis
  */
@@ -11,16 +11,16 @@
  * @typedef {{force: string, at: [number, number], along: [number, number, number], most: number}} Thruster
  */
 /**
- * A published step test: a command along an axis from rest, with what was measured of it.
+ * A published step test: a command along an axis from rest, with the measured V_ss and Tau.
  * @typedef {{axis: number, command: number, V: number | null, Tau: number | null}} StepTest
  */
 /**
- * What a page is told of a vehicle. Variables stand by their place among all variables, with their start values; the module is deflated, in Base64.
+ * The data of a vehicle in a page. Variables are listed by their places, with their start values. The module is deflated, in Base64.
  * @typedef {{name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[], mixed: boolean,
  *   axes: Axis[], thrusters: Thruster[], tunable: string[], tests: StepTest[], size: number}} Vehicle
  */
 /**
- * What fmu_src/live/module.c exports.
+ * The exports of fmu_src/live/module.c.
  * @typedef {{memory: WebAssembly.Memory, variables: () => number, marks: () => number, tune: () => void, step: (h: number) => number,
  *   observe: () => void}} Exports
  */
@@ -33,7 +33,7 @@ class Model {
     this.module = module;
     this.exports = /** @type {Exports} */ (/** @type {unknown} */ (instance.exports));
     const { memory, variables, marks } = this.exports;
-    /** By place. */
+    /** The values of the variables, by their places. */
     this.values = new Float64Array(memory.buffer, variables(), vehicle.variables.length);
     /** V_ss and Tau of each axis. */
     this.marks = new Float64Array(memory.buffer, marks(), 2 * vehicle.axes.length);
@@ -49,7 +49,7 @@ class Model {
     return new Model(vehicle, await WebAssembly.compile(await new Response(stream).arrayBuffer()));
   }
 
-  /** Another of the same vehicle, with the coefficients of its file. */
+  /** Returns another instance of the vehicle, with the coefficients of its file. */
   twin() {
     return new Model(this.vehicle, this.module);
   }
@@ -59,37 +59,37 @@ class Model {
     return this.places.has(name);
   }
 
-  /** A variable; 0 where the vehicle does not have it. @param {string} name */
+  /** Returns the value of a variable, or 0 if the vehicle does not have it. @param {string} name */
   get(name) {
     const place = this.places.get(name);
     return place === undefined ? 0 : this.values[place];
   }
 
-  /** An input or a state, where the vehicle has it. @param {string} name @param {number} value */
+  /** Sets a variable if the vehicle has it. @param {string} name @param {number} value */
   set(name, value) {
     const place = this.places.get(name);
     if (place !== undefined) this.values[place] = value;
   }
 
-  /** Takes over coefficients that were set. */
+  /** Takes over changed coefficients. */
   tune() {
     this.exports.tune();
     this.exports.observe();
   }
 
-  /** All states as at the start. */
+  /** Sets all states to their start values. */
   reset() {
     const { inputs, states, variables } = this.vehicle;
     for (let i = inputs; i < inputs + states; i++) this.values[i] = variables[i][1];
     this.exports.observe();
   }
 
-  /** h seconds with the inputs held; false, with all as it was, where that overflows. @param {number} h */
+  /** Steps h seconds with the inputs held. Returns false, and changes nothing, when that overflows. @param {number} h */
   step(h) {
     return this.exports.step(h) !== 0;
   }
 
-  /** Has what is calculated follow. */
+  /** Updates the calculated variables. */
   observe() {
     this.exports.observe();
   }

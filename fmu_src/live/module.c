@@ -1,4 +1,4 @@
-/* The model for a page, compiled to WebAssembly: the mathematics of the FMU as it is, and what a page asks of it. */
+/* The model for a page, compiled to WebAssembly: the unchanged mathematics of the FMU, and functions for the page's scripts. */
 #pragma STDC FP_CONTRACT OFF
 
 #include "model.h"
@@ -8,9 +8,9 @@
 
 #define EXPORT(name) __attribute__((export_name(name)))
 
-static double at[N_VARIABLES];       /* by place */
+static double at[N_VARIABLES];       /* the variables, by their places */
 static double marks[N_MONITORED][2]; /* V_ss and Tau of each velocity */
-static model_numbers numbers;        /* follow from the coefficients */
+static model_numbers numbers;        /* these follow from the coefficients */
 
 EXPORT("variables") double *variables_start(void);
 EXPORT("marks") double *marks_start(void);
@@ -28,13 +28,13 @@ double *marks_start(void)
     return &marks[0][0];
 }
 
-/* To be called after a change of coefficients. */
+/* Take over changed coefficients. */
 void tune(void)
 {
     model_prepare(at, &numbers);
 }
 
-/* h > 0 seconds with the inputs held; 0, with all as it was, where the step is refused or its result overflows. */
+/* Step h > 0 seconds with the inputs held. Return 0, and change nothing, when the step is refused or its result overflows. */
 int step(double h)
 {
     double next[N_STATES];
@@ -48,8 +48,8 @@ int step(double h)
     return done;
 }
 
-/* What is calculated: thrust and derivatives; and of each axis alone under the inputs of now, once the thrust is steady, V_ss
- * by C = B V + A V^2 and Tau (17), the time from rest to p V, p = 1 - 1/e. */
+/* Compute thrust and derivatives, and V_ss and Tau of each axis alone under the current inputs, once the thrust is steady.
+ * C = B V + A V^2 gives V_ss; Tau (17) is the time from rest to p V, p = 1 - 1/e. */
 void observe(void)
 {
     double C[N_MONITORED], A[N_MONITORED], B[N_MONITORED];

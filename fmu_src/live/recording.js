@@ -1,11 +1,11 @@
-// A recording of tank tests (docs/identify.md, "Logs") flown again: measured beside predicted.
+// A recording of tank tests (docs/identify.md, "Logs") that is flown again, to compare the prediction with the measurements.
 
 const MOST_BYTES = 20e6;
 const MOST_ROWS = 200000;
 const MOST_BACK = 0.2; // of the rows: with more of them out of order the time begins anew
 const MOST_POSITION = 1e7; // m, rad
 const MOST_VELOCITY = 1e3; // m/s, rad/s
-/** To SI, by what a column holds. @type {Record<string, Record<string, number>>} */
+/** The factors from units to SI, by the quantity of a column. @type {Record<string, Record<string, number>>} */
 const FACTORS = {
   s: { s: 1, ms: 0.001 },
   command: { "%": 0.01, 1: 1 },
@@ -13,19 +13,19 @@ const FACTORS = {
   rad: { rad: 1, deg: Math.PI / 180 },
 };
 
-/** A file that is no recording of this vehicle, in words. */
+/** The error of a file that is not a recording of this vehicle. Its text says why. */
 class Unreadable extends Error {}
 
 /**
- * What an axis was measured by: positions, or velocities. Not a number where a row has none.
+ * The measurements of an axis: positions or velocities. They are NaN in rows without a measurement.
  * @typedef {{axis: number, isPosition: boolean, values: number[]}} Signal
  */
 /**
- * Times in s, commands by row and name, signals.
+ * A recording: times in s, commands by row and name, signals, and the number of rows that were left out.
  * @typedef {{name: string, times: number[], commands: Record<string, number>[], signals: Signal[], left: number}} Recording
  */
 
-/** @param {string} text @param {string} name Of the file. @param {Vehicle} vehicle @returns {Recording} */
+/** Reads a recording. @param {string} text @param {string} name The file's name. @param {Vehicle} vehicle @returns {Recording} */
 function readRecording(text, name, vehicle) {
   const lines = text
     .replace(/^\uFEFF/, "")
@@ -112,7 +112,7 @@ function readRecording(text, name, vehicle) {
 /** @typedef {{what: "time" | "command" | "signal", axis: number, isPosition: boolean, drives: Record<string, number>,
  *   convert: (x: number) => number}} Column */
 
-/** What a column is, by its header; null of what is not used.
+/** Returns the kind of a column by its header, or null for a column that is not used.
  * @param {string} header @param {string} file @param {Vehicle} vehicle @returns {Column | null} */
 function columnOf(header, file, vehicle) {
   const parts = /^(.*?)\s*\[(.*)\]$/.exec(header);
@@ -154,7 +154,7 @@ function columnOf(header, file, vehicle) {
   return null;
 }
 
-/** To SI; null where the name is as short as another column's may be, such as “v [V]”, and the unit says that it is one.
+/** Returns the conversion to SI. It is null for a short name with a foreign unit, such as “v [V]”, which is another quantity.
  * @param {string} header @param {Record<string, number>} factors @param {string} unit @param {boolean} isShort
  * @returns {((x: number) => number) | null} */
 function converter(header, factors, unit, isShort) {
@@ -165,7 +165,7 @@ function converter(header, factors, unit, isShort) {
   return (x) => x * factors[unit];
 }
 
-/** From the pulse that a speed controller gets; null of another unit. @param {string} unit */
+/** Returns the conversion from the pulse of a speed controller, or null for another unit. @param {string} unit */
 function pulses(unit) {
   const parts = /^[u\u00b5\u03bc]s(?:\s+([\d.]+)\s+(-?[\d.]+))?$/.exec(unit);
   if (!parts) return null;
@@ -180,7 +180,7 @@ function saturated(command) {
 
 const TURN = 2 * Math.PI;
 
-/** Angles without jumps of a turn. @param {number[]} angles */
+/** Returns angles without jumps of a full turn. @param {number[]} angles */
 function unwrapped(angles) {
   let last = Number.NaN;
   return angles.map((angle) => {
@@ -190,16 +190,16 @@ function unwrapped(angles) {
   });
 }
 
-/** A recording as it is flown: the pilot's vehicle gets its commands, the ghost goes as it was measured. */
+/** A recording that is being flown. The pilot's vehicle gets its commands, and the ghost shows the measured motion. */
 class Playback {
   /** @param {Recording} recording @param {Flight} flight */
   constructor(recording, flight) {
     this.recording = recording;
     this.row = 0;
     const { axes } = flight.pilot.model.vehicle;
-    /** Of each signal: its axis, by name, for the ghost may be of another vehicle. */
+    /** The name of each signal's axis, which the ghost, possibly another vehicle, may have elsewhere. */
     this.names = recording.signals.map(({ axis }) => axes[axis].name);
-    /** Of each signal: what was last measured and when, its rate, the sum of squares and number of deviations. */
+    /** For each signal: the last measurement, its time and rate, the sum of squares and the number of deviations. */
     this.measured = recording.signals.map(({ values }) => {
       const now = values.find(Number.isFinite) ?? 0;
       return { now, time: 0, rate: 0, start: now, sum: 0, n: 0 };
@@ -220,17 +220,17 @@ class Playback {
     this.arrive(flight);
   }
 
-  /** Whether the ghost has a track: where surge was measured. */
+  /** Returns true when the ghost has a track, which needs measurements of surge. */
   hasTrack() {
     return this.names.includes("surge");
   }
 
-  /** When the next row begins; null at the end. */
+  /** Returns the time of the next row, or null at the end. */
   next() {
     return this.row < this.recording.times.length ? this.recording.times[this.row] : null;
   }
 
-  /** Takes a row: compares, and hands its commands on. @param {Flight} flight */
+  /** Takes the next row: compares the prediction with it, and sets its commands. @param {Flight} flight */
   arrive(flight) {
     const { signals, commands, times } = this.recording;
     signals.forEach(({ axis, isPosition, values }, n) => {
@@ -250,7 +250,7 @@ class Playback {
     this.row += 1;
   }
 
-  /** The ghost h seconds on. @param {Craft} ghost @param {number} h */
+  /** Moves the ghost h seconds along the measured motion. @param {Craft} ghost @param {number} h */
   move(ghost, h) {
     const { model, ways } = ghost;
     this.recording.signals.forEach(({ isPosition }, n) => {
@@ -269,7 +269,7 @@ class Playback {
     return true;
   }
 
-  /** How far the prediction is from what was measured, root mean square. @param {Vehicle} vehicle */
+  /** Returns a sentence about the deviations (root mean square) of the prediction. @param {Vehicle} vehicle */
   verdict(vehicle) {
     const deviations = this.recording.signals.map(({ axis, isPosition }, n) => {
       const { name, unit, positionUnit } = vehicle.axes[axis];

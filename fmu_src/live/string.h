@@ -1,4 +1,4 @@
-/* What the mathematics asks of <string.h>, where there is no library. */
+/* The part of <string.h> that the model needs, without a library. */
 #ifndef STRING_H
 #define STRING_H
 

@@ -1,4 +1,4 @@
-// What is seen of a flight: the track from above, depth and heading, strip charts. SVG, in the colours of the page.
+// The views of a flight as SVG in the colours of the page: the track from above, depth, heading, and strip charts.
 
 /** @param {Element} parent @param {string} tag @param {Record<string, string | number>} [attributes] @returns {SVGElement} */
 function drawn(parent, tag, attributes = {}) {
@@ -13,7 +13,7 @@ function place(element, attributes) {
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
 }
 
-/** The least of 1, 2, 5 times a power of ten that is not below a number. @param {number} x */
+/** Returns the smallest of 1, 2, 5 times a power of ten that is not below x. @param {number} x */
 function roundUp(x) {
   const decade = 10 ** Math.floor(Math.log10(x));
   return decade * ([1, 2, 5].find((n) => n * decade >= x * (1 - 1e-9)) ?? 10);
@@ -25,7 +25,7 @@ function shown(x, digits) {
   return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
 }
 
-/** An arrow of a length along a direction, from a place: in the body frame seen from above, x up and y to the right.
+/** Returns the path of an arrow from a point, in the body frame seen from above: x up and y to the right.
  * @param {[number, number]} at @param {number} dx @param {number} dy */
 function arrow([x, y], dx, dy) {
   const [u, v] = [x + dx, y + dy];
@@ -34,7 +34,7 @@ function arrow([x, y], dx, dy) {
   return `M${y} ${-x}L${v} ${-u}M${head(1)}L${v} ${-u}L${head(-1)}`;
 }
 
-/** A vehicle from above: its thrusters on a body as wide as they are apart, round at the bow. */
+/** A vehicle from above. The body is as wide as the distance of the thrusters, and round at the bow. */
 class Figure {
   /** @param {Element} parent @param {Vehicle} vehicle @param {string} kind */
   constructor(parent, vehicle, kind) {
@@ -52,7 +52,7 @@ class Figure {
     });
   }
 
-  /** @param {Model} model @param {number} east @param {number} north Of its centre, in px. @param {number} scale px per m */
+  /** @param {Model} model @param {number} east The centre in px. @param {number} north @param {number} scale px per m */
   draw(model, east, north, scale) {
     const angle = (model.get("psi") * 180) / Math.PI;
     place(this.group, {
@@ -66,7 +66,7 @@ class Figure {
   }
 }
 
-/** The force of a thruster: an arrow, a growing cross where it points away from who looks (down), a diamond where toward (up).
+/** Returns the path for a thruster's force: an arrow, a cross for a force down, or a diamond for a force up.
  * @param {[number, number]} at @param {[number, number, number]} along @param {number} share @param {number} size */
 function forceOf(at, along, share, size) {
   const flat = Math.hypot(along[0], along[1]);
@@ -102,7 +102,7 @@ class TrackView {
     this.scale = Math.max(0.05, Math.min(5000, this.scale * factor));
   }
 
-  /** Takes over its size on the screen, so that text has that of the page. */
+  /** Takes over the size on the screen, so that text has the page's size. */
   fit() {
     this.width = this.svg.clientWidth || this.width;
     this.height = this.svg.clientHeight || this.height;
@@ -127,7 +127,7 @@ class TrackView {
     this.pilot.draw(pilot.model, px(y), py(x), this.scale);
   }
 
-  /** The grid and its scale. @param {(east: number) => number} px @param {(north: number) => number} py */
+  /** Draws the grid and its scale. @param {(east: number) => number} px @param {(north: number) => number} py */
   lay(px, py) {
     const step = roundUp(60 / this.scale);
     const [left, top] = [this.centre[1] - this.width / 2 / this.scale, this.centre[0] - this.height / 2 / this.scale];
@@ -155,7 +155,7 @@ function pathOf({ track, model }, px, py) {
   return `M${places.join("L")}`;
 }
 
-/** Heading: a rose with a needle. */
+/** A compass rose with a needle for the heading. */
 class Compass {
   /** @param {Element} svg */
   constructor(svg) {
@@ -189,7 +189,7 @@ class Compass {
   }
 }
 
-/** Depth: a tape that runs past a mark. */
+/** A tape of depths that runs past a mark. */
 class DepthTape {
   /** @param {Element} svg */
   constructor(svg) {
@@ -219,7 +219,7 @@ class DepthTape {
 
 const CHART = { left: 40, right: 296, top: 26, bottom: 132 };
 
-/** An axis over time: velocity with V_ss and Tau, or the position that was measured. */
+/** A chart of an axis over time: the velocity with V_ss and Tau, or the measured position. */
 class Chart {
   /** @param {Element} svg @param {Axis} axis @param {number} number */
   constructor(svg, axis, number) {
@@ -238,7 +238,7 @@ class Chart {
     this.point = drawn(svg, "circle", { class: "point", r: 4.5 });
   }
 
-  /** @param {Flight} flight @param {number} span Of time, in s. @param {boolean} ghost */
+  /** @param {Flight} flight @param {number} span The time span in s. @param {boolean} ghost */
   draw(flight, span, ghost) {
     const { number, axis } = this;
     const { times, time, pilot, playback, test } = flight;
@@ -299,7 +299,7 @@ class Chart {
     this.title.textContent = `${axis.name}: ${what}${marks}`;
   }
 
-  /** The ghost's trace of the same axis, which may be another one of its axes. @param {Flight} flight @param {boolean} isPosition */
+  /** Returns the ghost's trace of the same axis, which may have another number. @param {Flight} flight @param {boolean} isPosition */
   ghostTrace(flight, isPosition) {
     const number = flight.ghost.axis(this.axis.name);
     const traces = isPosition ? flight.ghost.positions : flight.ghost.velocities;

@@ -1,4 +1,4 @@
-"""Compile C sources with the compiler of the ziglang package: the FMU's libraries, the page's module, the engine."""
+"""Compile C with the compiler of the ziglang package: the FMU's libraries, the page's module, and the engine."""
 
 import importlib.util
 import os
@@ -23,7 +23,7 @@ UNITY_FILE = "fmu.c"
 MODULE_SOURCES = FMU_SRC / "live"
 MODULE_FILE = "module.c"
 ENGINE_FILE = FMU_SRC / "engine" / "engine.c"
-# What the numbers depend on, and their cost: the same rounding on every processor, no errno in the mathematics.
+# The numbers and their cost depend on these flags: the same rounding on every processor, no errno in the mathematics.
 # LLVM's vectorizer of straight-line code is off, because it does not come to an end for a few equations.
 C_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-slp-vectorize")
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
@@ -37,37 +37,39 @@ _MODULE_FLAGS = (
 
 
 class BuildError(Exception):
-    """A build that cannot go on: one line, and the compiler's own output below it where it has one."""
+    """An error that ends a build. Its text is one line, possibly followed by the compiler's own output."""
 
 
 class OptionError(BuildError):
-    """Options that do not go together: there is nothing to build."""
+    """An error for options that do not go together."""
 
 
 @dataclass(frozen=True)
 class Platform:
-    """A folder of binaries/ and what the compiler is asked for."""
+    """A platform: its folder in binaries/, and the compiler's options for it."""
 
     folder: str
-    """Its folder in FMI 3.0 (section 2.5.1.4.1); in FMI 2.0 (section 2.3) that is the platform's name."""
+    """The folder in FMI 3.0 (section 2.5.1.4.1). In FMI 2.0 (section 2.3) it is the platform's name."""
     suffix: str
+    """The suffix of a shared library."""
     target: str
+    """The compiler's name for the platform."""
     flags: Sequence[str] = ()
     also: str | None = None
-    """A target that is joined to it in FMI 2.0, to one universal file."""
+    """A second target, whose library is joined with the first one in FMI 2.0 to one universal file."""
 
     def targets(self, fmi: int) -> list[str]:
-        """What the file in an archive of this version is made of."""
+        """Return the targets of the library for a version of FMI."""
         return [self.target, *([self.also] if self.also and fmi == 2 else [])]
 
 
-# GLIBC 2.17 is that of CentOS 7 (2012); 4 KiB pages in the file keep it small.
+# GLIBC 2.17 is as old as CentOS 7 (2012). Pages of 4 KiB keep the file small.
 _LINUX = ("-lm", "-Wl,-z,max-page-size=4096", "-Wl,-z,common-page-size=4096")
 _APPLE_SILICON = "aarch64-macos.11.0"
 
-# In FMI 2.0, FMPy and FMILibrary load darwin64 on Apple Silicon too, hence both processors in one file; the standard
-# has a folder of its own for it (2.3). No importer known looks for x86_64-linux, -windows or -darwin there. In FMI 3.0
-# FMPy, FMILibrary since 3.0.2, CasADi and the Rust crates load aarch64-darwin there.
+# In FMI 2.0, FMPy and FMILibrary load darwin64 on Apple Silicon too, so that file has both processors. The standard
+# also has a separate folder (2.3). No known importer looks for x86_64-linux, -windows or -darwin in FMI 2.0. On Apple
+# Silicon, FMPy, FMILibrary since 3.0.2, CasADi and the Rust crates load aarch64-darwin in FMI 3.0.
 PLATFORMS: dict[str, Platform] = {
     "linux64": Platform("x86_64-linux", ".so", "x86_64-linux-gnu.2.17", _LINUX),
     "linux32": Platform("x86-linux", ".so", "x86-linux-gnu.2.17", _LINUX),
@@ -84,11 +86,11 @@ OTHER_NAMES = {
     **dict.fromkeys(("windows", "win"), "win64"),
     **dict.fromkeys(("macos", "mac", "osx", "darwin", "apple"), "darwin64 or aarch64-darwin"),
 }
-"""What people call the platforms besides, FMI 3.0 among them, and the names here that this stands for."""
+"""Other names of the platforms, such as those of FMI 3.0, and the names used here for them."""
 
 
 def host_platform(fmi: int = 2) -> str | None:
-    """The platform that importers of this version look for on this machine; None where there is no binary for it."""
+    """Return the platform that importers of this version look for on this machine, or None if it is not supported."""
     processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     return {
         ("Linux", "x86_64"): "linux64",
@@ -100,18 +102,18 @@ def host_platform(fmi: int = 2) -> str | None:
 
 
 def compiler() -> list[str]:
-    """The C compiler's command. Raises BuildError where it is not installed."""
+    """Return the C compiler's command. Raises BuildError when it is not installed."""
     zig = "zig.exe" if os.name == "nt" else "zig"
-    return [str(_beside("ziglang", "the C compiler is missing: pip install ziglang") / zig), "cc"]
+    return [str(_package_folder("ziglang", "the C compiler is missing: pip install ziglang") / zig), "cc"]
 
 
 def fmi_headers() -> Path:
-    """The folder with the FMI headers, which come with FMPy. Raises BuildError where it is not installed."""
-    return _beside("fmpy", "the package fmpy, which has the FMI headers, is not installed") / "c-code"
+    """Return the folder with the FMI headers, which come with FMPy. Raises BuildError when it is not installed."""
+    return _package_folder("fmpy", "the package fmpy, which has the FMI headers, is not installed") / "c-code"
 
 
-def _beside(package: str, missing: str) -> Path:
-    """The folder of a package, which is not imported."""
+def _package_folder(package: str, missing: str) -> Path:
+    """Return the folder of a package without importing it. Raises BuildError with the text `missing`."""
     spec = importlib.util.find_spec(package)
     if spec is None or spec.origin is None:
         raise BuildError(missing)
@@ -125,20 +127,20 @@ def compile_all(
     on_done: Callable[[str], None] = lambda _: None,
     fmi: int = 2,
 ) -> dict[str, bytes]:
-    """Compile sources (file name to text) for all platforms side by side; the bytes of the libraries for this version.
+    """Compile sources (file name to text) for all platforms in parallel, and return the bytes of the libraries.
 
-    Raises BuildError. Interrupted or failed, it leaves no process and no file behind.
+    Raises BuildError. No process and no file is left behind when it is interrupted or fails.
     """
     return _side_by_side({name: partial(_compile, name, sources, identifier, fmi) for name in platforms}, on_done)
 
 
 def compile_module(sources: Mapping[str, str]) -> bytes:
-    """Compile sources (file name to text) to the WebAssembly module of a page. Raises BuildError, as compile_all."""
+    """Compile sources (file name to text) to the WebAssembly module of a page. Raises BuildError."""
     return _side_by_side({MODULE_FILE: partial(_compile_module, sources)})[MODULE_FILE]
 
 
 def engine_flags() -> list[str]:
-    """Return the compiler's arguments for the engine: those of the FMU on this machine, which give the same numbers."""
+    """Return the compiler's arguments for the engine. They are those of the FMU, so the numbers are the same."""
     name = host_platform(fmi=3)
     target = ["-target", PLATFORMS[name].target] if name else ["-mcpu=baseline"]
     libraries = PLATFORMS[name].flags if name else ("-lm",)
@@ -146,13 +148,14 @@ def engine_flags() -> list[str]:
 
 
 def compile_engine(sources: Mapping[str, str]) -> bytes:
-    """Compile sources (file name to text) to the engine's library for this machine. Raises as compile_all."""
+    """Compile sources (file name to text) to the engine's library for this machine. Raises BuildError."""
     return _side_by_side({ENGINE_FILE.name: partial(_compile_engine, sources)})[ENGINE_FILE.name]
 
 
 def _side_by_side(
     work: Mapping[str, Callable[["_Compilers"], bytes]], on_done: Callable[[str], None] = lambda _: None
 ) -> dict[str, bytes]:
+    """Run compilations in parallel and return their results by name. Raises BuildError."""
     compilers = _Compilers()
     try:
         with ThreadPoolExecutor(os.cpu_count()) as pool, cleaned_up(compilers.end):
@@ -175,21 +178,21 @@ def _kill(process: "subprocess.Popen[bytes]") -> None:
 
 
 class _Compilers:
-    """The compilers that are running, each of them waited for by a thread."""
+    """The compilers that are running. A thread waits for each of them."""
 
     def __init__(self) -> None:
         self._running: set[subprocess.Popen[bytes]] = set()
         self._ended = False
 
     def end(self) -> None:
-        """Kill them, with the processes that they have started, and start no more."""
+        """Kill the compilers, with the processes that they have started, and start no more."""
         with UNINTERRUPTED:
             self._ended = True
             for process in self._running:
                 _kill(process)
 
     def run(self, command: Sequence[str], folder: str) -> tuple[int, str]:
-        """Return the exit code and the output, when no process is left that might write into the folder."""
+        """Run a compiler, and return its exit code and output. Afterwards no process may write into the folder."""
         with UNINTERRUPTED:
             if self._ended:
                 raise BuildError("interrupted")
@@ -202,7 +205,7 @@ class _Compilers:
             )
             self._running.add(process)
         try:
-            output, _ = process.communicate()  # until all that can write have ended
+            output, _ = process.communicate()  # waits for the compiler's child processes too
         finally:
             with UNINTERRUPTED:
                 self._running.remove(process)
@@ -211,6 +214,7 @@ class _Compilers:
 
 @contextmanager
 def _folder_of(sources: Mapping[str, str]) -> Iterator[str]:
+    """Provide a temporary folder with these files (file name to text)."""
     with temporary_folder("fmu-") as folder:
         for file, text in sources.items():
             Path(folder, file).write_text(text, encoding="utf-8")
@@ -247,7 +251,7 @@ def _compile(name: str, sources: Mapping[str, str], identifier: str, fmi: int, c
                 *_LIBRARY_FLAGS,
                 *WARNINGS,
                 *(f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX" for fmi in (2, 3)),
-                *("-isystem", str(fmi_headers())),  # their own warnings are not ours
+                *("-isystem", str(fmi_headers())),  # without warnings about the headers
                 UNITY_FILE,
                 *target_platform.flags,
                 *install_name,

@@ -1,4 +1,4 @@
-"""The compiled engine of a vehicle: loaded from the user's cache folder, and compiled where it is not there yet."""
+"""The compiled engine of a vehicle. It is loaded from the user's cache folder, or compiled if it is not there yet."""
 
 import ctypes
 import hashlib
@@ -24,9 +24,9 @@ _LOADING = Lock()
 
 
 def load_library(rov: Rov) -> ctypes.CDLL:
-    """Return the library of a vehicle. It depends on what the vehicle has, and not on its numbers.
+    """Return the library of a vehicle. It depends on the vehicle's layout, but not on its coefficients.
 
-    Raises BuildError where it cannot be compiled or loaded.
+    Raises BuildError when it cannot be compiled or loaded.
     """
     layout = repr(rov.layout)
     with _LOADING:
@@ -40,7 +40,7 @@ def load_library(rov: Rov) -> ctypes.CDLL:
 
 
 def _load(texts: dict[str, str]) -> ctypes.CDLL:
-    """Load the library of these sources from the cache folder, or from a temporary one where that fails."""
+    """Load the library of these sources from the cache folder, or from a temporary one when that fails."""
     key = _key(texts)
     content = None
     with suppress(OSError):
@@ -55,18 +55,18 @@ def _load(texts: dict[str, str]) -> ctypes.CDLL:
 
 
 def _key(texts: dict[str, str]) -> str:
-    """Return a digest of all that the library depends on."""
+    """Return a digest of everything that the library depends on."""
     try:
         compiler = version("ziglang")
     except PackageNotFoundError:
-        compiler = ""  # then only a compiler that is not installed as a package can be there
+        compiler = ""  # the compiler is not installed as a package
     machine = sys.platform, platform.machine(), ctypes.sizeof(ctypes.c_void_p)
-    made_of = json.dumps([texts, engine_flags(), compiler, machine], sort_keys=True)
-    return hashlib.sha256(made_of.encode()).hexdigest()[:32]
+    inputs = json.dumps([texts, engine_flags(), compiler, machine], sort_keys=True)
+    return hashlib.sha256(inputs.encode()).hexdigest()[:32]
 
 
 def _find(folder: Path, key: str) -> Path | None:
-    """Return the library in a folder whose content is still what its name says."""
+    """Return the library with this key in a folder, or None. A library is damaged if its digest is not in its name."""
     for path in folder.glob(f"{key}-*"):
         if path.name == _name(key, path.read_bytes()):
             return path
@@ -74,12 +74,12 @@ def _find(folder: Path, key: str) -> Path | None:
 
 
 def _write(folder: Path, key: str, content: bytes) -> Path:
-    """Write a library, whole or not at all; another process may write the same one at the same time."""
+    """Write a library whole or not at all. Another process may write the same library at the same time."""
     path = folder / _name(key, content)
     write_whole(Output(path, content))
     return path
 
 
 def _name(key: str, content: bytes) -> str:
-    """Return the name of a library, which tells whether its content is damaged."""
+    """Return the name of a library, which contains a digest of its content."""
     return f"{key}-{hashlib.sha256(content).hexdigest()[:32]}"

@@ -16,23 +16,22 @@ from rov_fmu.model.rov import Rov
 
 Array = NDArray[np.float64]
 _POLL = 0.5
-"""Seconds after which the waiting thread looks for Ctrl-C: on Windows it does not end a wait."""
+"""The waiting thread looks for Ctrl-C after this number of seconds, because Ctrl-C does not end a wait on Windows."""
 _SHORT = 30
-"""Steps that take less time than a thread to start; even the slowest are over before anyone waits for Ctrl-C."""
+"""Up to this number of steps take less time than starting a thread, and are over before anyone presses Ctrl-C."""
 _SHARES = 8
-"""Parts of the vehicles that each worker computes on average, so that no worker waits long for another."""
-
+"""The number of parts that each worker computes on average. Small parts keep workers from waiting for each other."""
 
 _TABLE = np.dtype([("at", np.uintp), ("per_vehicle", np.intp), ("per_time", np.intp)])
-"""An array by vehicle and time as engine.c reads it: its address, and its strides in numbers; they may be 0."""
+"""The struct `table` of engine.c: the address of an array by vehicle and time, and its strides in numbers."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """What was recorded of one vehicle or many."""
+    """The recorded variables of one vehicle or many."""
 
     values: Array
-    """Recorded variables x vehicles x times; NaN from the first time on that cannot be computed."""
+    """An array of recorded variables x vehicles x times. It is NaN from the first time on that cannot be computed."""
     failed: NDArray[np.intp]
     """For each vehicle, the index of the first time that cannot be computed, or the number of times."""
 
@@ -53,11 +52,11 @@ def simulate(
 ) -> Trajectories:
     """Simulate vehicles over the same rising times (s), with all inputs held from each time to the next.
 
-    `values` are those of inputs, states at the first time, and coefficients, by name; each broadcasts to vehicles x
-    times. Inputs and states that are not given are 0, coefficients are those of the vehicle. `record` names the
-    variables to record, the states by default. The results do not depend on the number of workers.
+    `values` contains inputs, states at the first time, and coefficients by name. Each broadcasts to vehicles x times.
+    By default, inputs and states are 0, and coefficients are those of the vehicle. `record` names the variables to
+    record, by default the states. The results do not depend on the number of workers.
 
-    Raises BuildError where the engine cannot be compiled. The arguments are not checked.
+    Raises BuildError when the engine cannot be compiled. The arguments are not checked.
     """
     layout = rov.layout
     record = list(layout.state) if record is None else record
@@ -67,7 +66,7 @@ def simulate(
     numbers = np.zeros(len(places))
     tables = np.zeros(len(places), _TABLE)
     tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(places))
-    arrays = []  # which must live as long as their addresses are in use
+    arrays = []  # keeps the arrays alive while C uses their addresses
     for name, value in {**rov.coefficients, **values}.items():
         array = np.require(value, np.float64, ["C", "A"])
         if array.ndim == 0:
@@ -101,14 +100,14 @@ def simulate(
 
 
 def _run_parts(part: Callable[[int], None], firsts: range, workers: int, stop: ctypes.c_int) -> None:
-    """Run the parts in threads, which C does without Python's lock. Ctrl-C ends them."""
+    """Run the parts in threads. C runs without Python's lock, so they run at the same time. Ctrl-C ends them."""
     with ThreadPoolExecutor(workers) as pool:
         parts = [pool.submit(part, first) for first in firsts]
         try:
             while wait(parts, _POLL).not_done:
                 pass
         except BaseException:
-            stop.value = 1  # the parts end after their step, and those that have not begun do nothing
+            stop.value = 1  # running parts end after their current step, and the others do nothing
             raise
     for done in parts:
         done.result()

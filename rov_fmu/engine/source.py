@@ -1,4 +1,4 @@
-"""The equation of motion of a vehicle in C: model.h and equation.h, generated from its table of terms."""
+"""The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -11,7 +11,7 @@ from rov_fmu.model.rov import Rov
 
 
 class EquationSource:
-    """The parts of equation.h in C. `variables` are the names of the variables in the array `at`."""
+    """The parts of model.h and equation.h in C. `variables` are the names of the variables in the array `at`."""
 
     def __init__(self, layout: Layout, variables: Iterable[str]) -> None:
         self.layout = layout
@@ -21,7 +21,7 @@ class EquationSource:
     # ---- Names ----
 
     def _in_c(self, local: Iterable[str] = ()) -> dict[str, str]:
-        """Return the C expression of every name that a formula may contain, with names of local constants."""
+        """Return the C expression for every name that a formula may contain. `local` are names of local constants."""
         equation = self.equation
         found = {name: f"at[REF_{name}]" for name in self.variables}
         found |= {name: f"n->{name}" for name in equation.parameters}
@@ -30,11 +30,12 @@ class EquationSource:
         return found | {name: name for name in local}
 
     def _c(self, formula: str, local: Iterable[str] = ()) -> str:
+        """Write a formula in C."""
         known = self._in_c(local)
         return to_c(formula, lambda name: known[name])
 
     def held_names(self) -> list[str]:
-        """Return the names of the values that are held during a piece of a step."""
+        """Return the names of the numbers that are constant during a piece of a step."""
         equation = self.equation
         later = [*equation.forces.values(), *(formula for both in equation.lagging.values() for formula in both)]
         used = {name for formula in later for name in names(formula)} | {*self.layout.thrust}
@@ -44,7 +45,7 @@ class EquationSource:
     # ---- Coefficients ----
 
     def parameters(self) -> list[str]:
-        """Return statements that assign what follows from the parameters."""
+        """Return statements that compute the numbers that follow from the coefficients alone."""
         lines = [f"n->{name} = {self._c(formula)};" for name, formula in self.equation.parameters.items()]
         for name, directed in self.equation.directed.items():
             lines += [f"n->{name}[0] = {self._c(directed.forward)};", f"n->{name}[1] = {self._c(directed.reverse)};"]
@@ -65,7 +66,7 @@ class EquationSource:
         return lines
 
     def forces(self) -> list[str]:
-        """Return statements that compute what is held for the forces of the thrusters."""
+        """Return statements that compute the accelerations by the forces of the thrusters and the loads."""
         return [f"q->{name} = {self._c(formula)};" for name, formula in self.equation.forces.items()]
 
     def directions(self) -> list[tuple[str, int]]:
@@ -77,28 +78,26 @@ class EquationSource:
         starts = self.equation.starts
         return [f"y[Y_{name}] = {self._c(starts[name]) if name in starts else '0.0'};" for name in self.equation.states]
 
-    def lag_settled(self) -> list[tuple[str, list[str]]]:
+    def lagging_curves(self) -> list[tuple[str, list[str]]]:
         """Return each curve with lag, and the names of its thrusters."""
-        return [
-            (c.name, [t.name for t in self.layout.thrusters if t.curve == c.name])
-            for c in self.layout.curves
-            if c.has_lag
-        ]
+        layout = self.layout
+        lagging = [curve.name for curve in layout.curves if curve.has_lag]
+        return [(curve, [t.name for t in layout.thrusters if t.curve == curve]) for curve in lagging]
 
     def coasting(self) -> list[str]:
         """Return the integrals whose rates are constant while all velocities are steady: all but x and y of a turn."""
-        return [name for name in self.equation.states if not self.used(name) and not self.turns(name)]
+        return [name for name in self.equation.states if not self.used(name) and not self._turns(name)]
 
-    def turns(self, name: str) -> bool:
-        """Tell whether the rate of a state depends on the heading."""
+    def _turns(self, name: str) -> bool:
+        """Return True when the rate of a state depends on the heading."""
         return "cos_psi" in self.equation.inputs_of[name] or "sin_psi" in self.equation.inputs_of[name]
 
     def group(self, name: str) -> str:
-        """Return the first state of a group whose sizes count together: the heading, the horizontal position."""
+        """Return the first state of a state's group. The heading and the horizontal position are groups of two."""
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
 
     def dynamic(self) -> int:
-        """Return the number of components that are not kinematic; they come first."""
+        """Return the number of components that are not kinematic. These components come first."""
         kinematic = {"cos_psi", "sin_psi", "x", "y", "z", "psi"}
         return sum(not kinematic & set(group) for group in self.equation.components)
 
@@ -118,7 +117,7 @@ class EquationSource:
     # ---- Rates and terms ----
 
     def rate(self, name: str) -> str:
-        """Write the rate of a state of the table in terms of the states y."""
+        """Write the rate of a state in terms of the states y of the table."""
         return self._rate(self.equation.rows[name])
 
     def size(self, name: str) -> str:
@@ -129,12 +128,12 @@ class EquationSource:
         return self._by_states(rate_formula(terms))
 
     def _by_states(self, formula: str) -> str:
-        """Write a formula in C in which every state of the table is that of y, and not that of `at`."""
+        """Write a formula in C in which every state is taken from y, and not from `at`."""
         known = {**self._in_c(), **{state: f"y[Y_{state}]" for state in self.equation.states}}
         return to_c(formula, lambda name: known[name])
 
     def blocks(self) -> list[tuple[str, ...]]:
-        """Return the states in groups whose coefficients are computed together: none depends on a later group."""
+        """Return groups of states whose coefficients are computed together. No group depends on a later one."""
         depth: dict[str, int] = {}
         for group in self.equation.components:
             level = 1 + max((depth[name] for name in self._inputs(group)), default=0)
@@ -147,16 +146,16 @@ class EquationSource:
         """Return the place of a state's block."""
         return next(i for i, block in enumerate(self.blocks()) if name in block)
 
-    def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, str], str]]:
-        """Return the products of a block as runs over neighbouring states, and where each product stands in C.
+    def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, ...], str]]:
+        """Return the products of a block as runs over neighbouring states, and the C expression of each product.
 
-        A run is (first factor, first of the second factors, length); the first factor is "" for squares.
+        A run is (first factor, first of the second factors, length). The first factor of squares is "".
         """
         states = self.equation.states
         pairs = {term.factors for name in block for term in self.equation.rows[name] if len(term.factors) == 2}
         wanted = {("", a) if a == b else (a, b) for a, b in pairs}
         runs: list[tuple[str, str, int]] = []
-        places: dict[tuple[str, str], str] = {}
+        places: dict[tuple[str, ...], str] = {}
         while wanted:
             candidates = {*wanted, *((b, a) for a, b in wanted if a)}
             best: tuple[str, str, int] = ("", "", 0)
@@ -174,23 +173,20 @@ class EquationSource:
             runs.append(best)
         return runs, places
 
-    def next_term(self, name: str, places: Mapping[tuple[str, str], str]) -> str:
-        """Write coefficient m > 0 of the rate of a state."""
-        parts = []
+    def next_term(self, name: str, places: Mapping[tuple[str, ...], str]) -> str:
+        """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""
+        text = ""
         for term in self.equation.rows[name]:
             if not term.factors:
-                continue
-            factors = (
-                f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors[0], term.factors[1]]
-            )
-            sign, coefficient = (
-                ("-", term.coefficient[1:]) if term.coefficient.startswith("-") else ("", term.coefficient)
-            )
-            parts.append((sign, factors if coefficient == "1" else f"{self._c(coefficient)} * {factors}"))
-        if not parts:
-            return "0.0"
-        first = parts[0][0] + parts[0][1]
-        return first + "".join(f" {sign or '+'} {text}" for sign, text in parts[1:])
+                continue  # a constant occurs in coefficient 0 only
+            factors = f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors]
+            coefficient = term.coefficient.removeprefix("-")
+            product = factors if coefficient == "1" else f"{self._c(coefficient)} * {factors}"
+            if term.coefficient.startswith("-"):
+                text += f" - {product}" if text else f"-{product}"
+            else:
+                text += f" + {product}" if text else product
+        return text or "0.0"
 
     def component_of(self, name: str) -> int:
         """Return the place of a state's component."""
@@ -201,15 +197,15 @@ class EquationSource:
         return {other for name in group for other in self.equation.inputs_of[name]} - set(group)
 
     def input_bits(self, group: Sequence[str]) -> int:
-        """Return the other components that a component depends on, a bit each."""
+        """Return one bit for each other component that a component depends on."""
         return sum(1 << other for other in {self.component_of(name) for name in self._inputs(group)})
 
     def used(self, name: str) -> bool:
-        """Tell whether a term contains a state."""
+        """Return True when a term contains the state."""
         return any(name in inputs for inputs in self.equation.inputs_of.values())
 
     def needed_with(self, group: Sequence[str]) -> int:
-        """Return the states that make a component matter to others, a bit each; all bits if it always matters."""
+        """Return one bit for each state that makes a component matter to others, or all bits if it always matters."""
         always, partners = 2**32 - 1, 0
         if not any(map(self.used, group)) or set(group) & set(self.equation.monitored):
             return always
@@ -222,7 +218,7 @@ class EquationSource:
         return partners
 
     def n_used(self) -> int:
-        """Return the number of states that a term contains; they come first."""
+        """Return the number of states that terms contain. These states come first."""
         return sum(map(self.used, self.equation.states))
 
     def lagging_ends(self) -> list[tuple[str, str]]:
@@ -232,7 +228,7 @@ class EquationSource:
     # ---- Derivatives of the vehicle's states ----
 
     def derivative_lines(self) -> list[str]:
-        """Return statements that assign the derivatives; `q` holds the coefficients for the directions."""
+        """Return statements that assign the derivatives. Before them, the directions must have been chosen in `q`."""
         equation = self.equation
         known = self._in_c(equation.heading)
         lines = [f"const double {name} = {self._c(formula)};" for name, formula in equation.heading.items()]
@@ -241,7 +237,7 @@ class EquationSource:
         return lines
 
     def tangent_lines(self) -> list[str]:
-        """Return statements that write into d the changes of what is calculated, from those of what it depends on."""
+        """Return statements that write the changes of the calculated variables to d, which has those of the others."""
         equation = self.equation
         given = self.variables - {*self.layout.thrust}
         text = {name: f"at[REF_{name}]" for name in given}
@@ -268,7 +264,7 @@ class EquationSource:
 
 
 def generated_sources(layout: Layout) -> dict[str, str]:
-    """Return model.h and equation.h, the files that are generated for a vehicle, by their names."""
+    """Return the generated files of a vehicle, model.h and equation.h, by their names."""
     source = EquationSource(layout, layout.places)
     formulas = {name: rate_formula(terms) for name, terms in source.equation.rows.items()}
     sizes = {
@@ -283,6 +279,6 @@ def generated_sources(layout: Layout) -> dict[str, str]:
 
 
 def sources(rov: Rov) -> dict[str, str]:
-    """Return the C files of a vehicle's motion, by their names: those generated for it, and those that all share."""
+    """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
     shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in ("series.c", "step.c")}
     return generated_sources(rov.layout) | shared

@@ -1,8 +1,8 @@
-"""What the rates and calculated variables of a vehicle depend on, derived from its equation (standard library only).
+"""The dependencies of rates and calculated variables, derived from the equation of a vehicle (standard library only).
 
-FMI asks for each output and each derivative of a state: on which inputs and states it depends, and in which way
-(dependenciesKind). The formulas of the equation are differentiated symbolically, one after the other. The names that
-remain in a derivative tell the kind: no name at all means that the factor is constant.
+FMI wants to know on which inputs and states each output and each derivative depends, and of which kind the dependency
+is (dependenciesKind). The formulas of the equation are differentiated symbolically, one after the other. The names that
+remain in a derivative give the kind: without any name, the factor is constant.
 """
 
 from collections.abc import Mapping
@@ -12,13 +12,13 @@ from .formula import names, tangent
 from .layout import Layout
 
 KINDS = ("constant", "fixed", "tunable", "dependent")
-"""Kinds of factors (FMI 2.0, section 2.2.8), from the most to the least that an importer knows about the factor."""
+"""The kinds of factors (FMI 2.0, section 2.2.8). An importer knows most about a constant factor, then less and less."""
 
 
 def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
-    """Return for each rate and calculated variable the inputs and states that it depends on, and in which way.
+    """Return for each rate and calculated variable the inputs and states that it depends on, each with its kind.
 
-    The rate of a state is called `der(<state>)`. An input or state that has no influence is left out.
+    The rate of a state is called `der(<state>)`. Inputs and states without influence are left out.
     """
     formulas = _formulas(layout)
     slopes: dict[str, dict[str, int]] = {name: {} for name in formulas}
@@ -48,13 +48,13 @@ def _calculated(layout: Layout) -> tuple[str, ...]:
 
 
 def _formulas(layout: Layout) -> dict[str, str]:
-    """All formulas of a vehicle; each uses only inputs, states, parameters and formulas before it."""
+    """Return all formulas of a vehicle. Each uses only inputs, states, parameters and formulas before it."""
     equation = equation_of(layout)
     return equation.program | {f"der({name})": equation.rates[name] for name in layout.state}
 
 
 def _kinds(layout: Layout, formulas: Mapping[str, str]) -> dict[str, int]:
-    """The kind of each name as a factor, as an index of KINDS."""
+    """Return for each name its kind as a factor, which is an index of KINDS."""
     found = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
     for name, meta in layout.coefficients.items():
         found[name] = KINDS.index("tunable" if meta.tunable else "fixed")

@@ -5,7 +5,7 @@ Between reversals, and while the inputs are held, the motion is a quadratic syst
     y_i' = k_i + sum of L_ij y_j + sum of Q_ijk y_j y_k.
 
 `equation_of` derives this table from the layout of a vehicle: the states y, the terms in the rate of each state, and a
-formula for each coefficient. `step.py` moves a vehicle with it in Python, and the C code is generated from it. A new
+formula for each coefficient. `step.py` computes a step from it in Python, and the C code is generated from it. A new
 effect is a new term with its formula.
 """
 
@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from .layout import HEAVE, REVERSE, SURGE, SWAY, YAW, Curve, Layout, Thruster, VehicleAxis
+from .layout import HEAVE, REVERSE, SURGE, SWAY, YAW, Curve, Layout, VehicleAxis
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,9 @@ class Term:
     """A term in the rate of a state: a coefficient, which is multiplied by one or two states or stands alone."""
 
     coefficient: str
-    """A number, or the name of a formula; a minus may precede it."""
+    """A number or the name of a formula, possibly with a minus before it."""
     factors: tuple[str, ...] = ()
+    """The states that are multiplied with the coefficient."""
 
     @property
     def formula(self) -> str:
@@ -38,37 +39,35 @@ class Directed:
 
     velocity: str
     forward: str
-    """Formula of the parameters for a positive velocity."""
+    """The formula for a positive velocity."""
     reverse: str
-    """The same for a negative velocity."""
+    """The formula for a negative velocity."""
 
     @property
     def formula(self) -> str:
         """One formula for both directions."""
-        return (
-            self.forward
-            if self.forward == self.reverse
-            else f"{self.reverse} if {self.velocity} < 0 else {self.forward}"
-        )
+        if self.forward == self.reverse:
+            return self.forward
+        return f"{self.reverse} if {self.velocity} < 0 else {self.forward}"
 
 
 @dataclass(frozen=True)
 class Equation:
-    """The equation of motion of a vehicle. Formulas are evaluated in their order; each may use those before it."""
+    """The equation of motion of a vehicle. Formulas are evaluated in their order, and each may use those before it."""
 
     parameters: Mapping[str, str]
-    """Formulas of the parameters."""
+    """Formulas for the numbers that follow from the coefficients alone."""
     directed: Mapping[str, Directed]
-    """Coefficients that depend on the direction of a velocity."""
+    """The coefficients that depend on the direction of a velocity."""
     thrust: Mapping[str, str]
-    """Formulas of the commands and the parameters that lead to the steady thrust of every thruster."""
+    """Formulas from the commands to the steady thrust of every thruster."""
     forces: Mapping[str, str]
-    """Formulas of the thrust, the loads and the parameters that lead to what is held while the inputs are held."""
+    """Formulas from the thrust and the loads to the accelerations that are constant while the inputs are held."""
     rows: Mapping[str, tuple[Term, ...]]
     """The terms in the rate of every state of the table."""
     starts: Mapping[str, str]
-    """Formulas of the vehicle's states for the value of a state of the table at the start of a step. The other states
-    of the table start at 0: the integrals, which no term contains, and the progress of the lags."""
+    """Formulas from the vehicle's states to the states of the table at the start of a step. The states without a
+    formula start at 0: the integrals, which no term contains, and the progress of the lags."""
     lags: Mapping[str, Mapping[str, str]]
     """For the progress of each lag: the forces that lag, each with the name of the steady thrust that it approaches.
 
@@ -81,7 +80,7 @@ class Equation:
 
     @cached_property
     def lagging(self) -> dict[str, tuple[str, str]]:
-        """For each force that lags: formulas of its rate, and of its value after a piece of a step."""
+        """For each force that lags: the formulas of its rate, and of its value after a piece of a step."""
         return {
             force: (
                 f"{self.rows[progress][0].coefficient} * ({steady} - {force})",
@@ -100,7 +99,7 @@ class Equation:
 
     @cached_property
     def components(self) -> tuple[tuple[str, ...], ...]:
-        """Groups of states that depend on each other. Each group stands after those that it depends on."""
+        """Groups of states that depend on each other. Each group comes after those that it depends on."""
         reach = {name: set(inputs) for name, inputs in self.inputs_of.items()}
         for middle in self.states:
             for name in self.states:
@@ -121,14 +120,15 @@ class Equation:
 
     @cached_property
     def heading(self) -> dict[str, str]:
-        """Formulas of the states of the table that are not states of the vehicle: cosine and sine of the heading."""
+        """Formulas for the states of the table that are not states of the vehicle: cosine and sine of the heading."""
         return {name: formula for name, formula in self.starts.items() if name != formula}
 
     @cached_property
     def program(self) -> dict[str, str]:
-        """All formulas that lead from the inputs, states and parameters of a vehicle to its thrust and derivatives."""
+        """All formulas from the inputs, states and coefficients of a vehicle to the numbers in its thrust and rates."""
         directed = {name: d.formula for name, d in self.directed.items()}
-        forces = {name: formula for name, formula in self.forces.items() if not name.startswith("late_")}
+        by_lag = {term.coefficient for terms in self.rows.values() for term in terms if self._is_lag(term)}
+        forces = {name: formula for name, formula in self.forces.items() if name not in by_lag}
         return {**self.parameters, **directed, **self.heading, **self.thrust, **forces}
 
     @cached_property
@@ -136,8 +136,12 @@ class Equation:
         """The time derivative of each state of the vehicle, as a formula of its states and of `program`."""
         found = {name: rate for name, (rate, _) in self.lagging.items()}
         for name, terms in self.rows.items():
-            found[name] = rate_formula(term for term in terms if self.lags.keys().isdisjoint(term.factors))
+            found[name] = rate_formula(term for term in terms if not self._is_lag(term))
         return found
+
+    def _is_lag(self, term: Term) -> bool:
+        """Return True for a term with the progress of a lag, which is 0 at the start of a piece."""
+        return not self.lags.keys().isdisjoint(term.factors)
 
     @cached_property
     def monitored(self) -> tuple[str, ...]:
@@ -151,7 +155,7 @@ def rate_formula(terms: Iterable[Term]) -> str:
 
 
 def equation_of(layout: Layout) -> Equation:
-    """Derive the equation of motion of a vehicle, (18) with the coupling, the lags and the kinematics."""
+    """Derive the equation of motion of a vehicle: (18) with the coupling, the lags and the kinematics."""
     parameters = _parameters(layout)
     directed: dict[str, Directed] = {}
     rows: dict[str, tuple[Term, ...]] = {}
@@ -161,21 +165,21 @@ def equation_of(layout: Layout) -> Equation:
         quadratic = [f"{sign}gain_{v} * {form.coefficient('a_d' + end)}" for sign, end in (("-", ""), ("", REVERSE))]
         directed[f"linear_{v}"] = Directed(v, *linear)
         directed[f"quadratic_{v}"] = Directed(v, *quadratic)
-        late = [Term(f"late_{v}_{curve.name}", (f"progress_{curve.name}",)) for curve in _lagging(layout, form)]
+        remaining = [
+            Term(f"remaining_{v}_{curve.name}", (f"progress_{curve.name}",)) for curve in _lagging(layout, form)
+        ]
         drag = Term(f"linear_{v}", (v,)), Term(f"quadratic_{v}", (v, v))
-        rows[v] = (Term(f"held_{v}"), *late, *drag, *_coupling(layout, form))
-    for curve in (c for c in layout.curves if c.has_lag):
-        name = f"progress_{curve.name}"
-        rows[name] = (Term(f"rate_{curve.name}"), Term(f"-rate_{curve.name}", (name,)))
+        rows[v] = (Term(f"held_{v}"), *remaining, *drag, *_coupling(layout, form))
+    lags = {}
+    for curve in layout.curves:
+        if curve.has_lag:
+            progress = f"progress_{curve.name}"
+            rows[progress] = (Term(f"rate_{curve.name}"), Term(f"-rate_{curve.name}", (progress,)))
+            lags[progress] = {f"F_{t.name}": f"steady_{t.name}" for t in layout.thrusters if t.curve == curve.name}
     rows |= _kinematics(layout)
     starts = {form.axis.velocity: form.axis.velocity for form in layout.axes}
     if "cos_psi" in rows:
         starts |= {"cos_psi": "cos(psi)", "sin_psi": "sin(psi)"}
-    lags = {
-        f"progress_{curve.name}": {f"F_{t.name}": f"steady_{t.name}" for t in layout.thrusters if t.curve == curve.name}
-        for curve in layout.curves
-        if curve.has_lag
-    }
     return Equation(parameters, directed, _thrust(layout), _forces(layout), rows, starts, lags)
 
 
@@ -183,20 +187,18 @@ def equation_of(layout: Layout) -> Equation:
 
 
 def _parameters(layout: Layout) -> dict[str, str]:
-    """Acceleration per load β/m (18), the arm of (4), the rates of the lags, and the ratios of the coupling."""
+    """Return formulas for the acceleration per load β/m (18), the arm (4), the rates of the lags, and the coupling."""
     found = {}
     for form in layout.axes:
         axis = form.axis
-        inertia = axis.inertia + (f" + {form.coefficient('m_a')}" if "m_a" in form.keys else "")
-        found[f"gain_{axis.velocity}"] = (
-            f"{axis.coefficient('beta')} / ({inertia})" if "+" in inertia else f"{axis.coefficient('beta')} / {inertia}"
-        )
+        inertia = f"({axis.inertia} + {form.coefficient('m_a')})" if "m_a" in form.keys else axis.inertia
+        found[f"gain_{axis.velocity}"] = f"{axis.coefficient('beta')} / {inertia}"
     if layout.has_arm:
         found["arm"] = "R * sin(gamma)"
     for curve in layout.curves:
         if curve.has_lag:
             found[f"rate_{curve.name}"] = f"1 / {curve.coefficient('T')}"
-    if layout.coupled:  # with the effective inertias M = m/β: M_v/M_u, M_u/M_v, (M_v - M_u)/M_r
+    if layout.coupled:  # with M = m/β, these are M_v/M_u, -M_u/M_v and (M_u - M_v)/M_r
         found["coupling_u"] = "gain_u / gain_v"
         found["coupling_v"] = "-(gain_v / gain_u)"
         found["coupling_r"] = "gain_r / gain_u - gain_r / gain_v"
@@ -204,16 +206,16 @@ def _parameters(layout: Layout) -> dict[str, str]:
 
 
 def _coupling(layout: Layout, form: VehicleAxis) -> tuple[Term, ...]:
-    """Coriolis and Munk terms of a diagonal mass matrix."""
+    """Return the Coriolis and Munk terms of an axis, for a diagonal mass matrix."""
     products = {"u": ("v", "r"), "v": ("u", "r"), "r": ("u", "v")}
     v = form.axis.velocity
     return (Term(f"coupling_{v}", products[v]),) if layout.coupled and v in products else ()
 
 
 def _thrust(layout: Layout) -> dict[str, str]:
-    """The steady thrust (2), (9), (10): a_t m^2 + b_t m with m beyond the dead band, by the curve of the direction.
+    """Return formulas for the steady thrust (2), (9), (10) of every thruster.
 
-    Each input saturates at ±1, and so does what is mixed from them.
+    Each input saturates at ±1, and so does each sum of inputs.
     """
     found: dict[str, str] = {}
     for thruster in layout.thrusters:
@@ -232,7 +234,7 @@ def _thrust(layout: Layout) -> dict[str, str]:
 
 
 def curve_formulas(curve: Curve) -> dict[str, str]:
-    """Write the steady thrust of one thruster: formulas from its command u_one to its thrust, which is the last one."""
+    """Return formulas for the steady thrust of one thruster: from its command u_one to the thrust, the last formula."""
     return {"command_one": _saturated("u_one"), **_steady_thrust("one", curve)}
 
 
@@ -241,7 +243,10 @@ def _saturated(name: str) -> str:
 
 
 def _steady_thrust(name: str, curve: Curve) -> dict[str, str]:
-    """The steady thrust of one thruster for its command. Adding 0 turns a negative zero into a positive one."""
+    """Return formulas from the command of a thruster to its steady thrust, a_t m^2 + b_t m with m beyond the dead band.
+
+    The coefficients are those of the direction. Adding 0 turns a negative zero into a positive one.
+    """
     is_reverse = f"command_{name} < 0"
 
     def chosen(key: str) -> str:
@@ -262,7 +267,10 @@ def _steady_thrust(name: str, curve: Curve) -> dict[str, str]:
 
 
 def _forces(layout: Layout) -> dict[str, str]:
-    """The torque of every curve, (4); the held acceleration of every axis, (18), and how far a lag still changes it."""
+    """Return formulas for the torque of every curve, (4), and for the held accelerations of every axis, (18).
+
+    A lag gives the axis a second one: the change of acceleration that remains until the thrust is steady.
+    """
     found: dict[str, str] = {}
     for curve in layout.turning_curves:
         found[f"tau_{curve.name}"] = _weighted(_torques(layout, curve, "F_{}"))
@@ -278,10 +286,11 @@ def _forces(layout: Layout) -> dict[str, str]:
         for curve in _lagging(layout, form):
             change = "(steady_{0} - F_{0})"
             if axis is YAW:
-                late = _torques(layout, curve, change)
+                changes = _torques(layout, curve, change)
             else:
-                late = [(t.effect(axis), change.format(t.name)) for t in layout.drivers(axis) if t.curve == curve.name]
-            found[f"late_{v}_{curve.name}"] = f"gain_{v} * ({axis.coefficient('alpha')} * ({_weighted(late)}))"
+                drivers = [t for t in layout.drivers(axis) if t.curve == curve.name]
+                changes = [(t.effect(axis), change.format(t.name)) for t in drivers]
+            found[f"remaining_{v}_{curve.name}"] = f"gain_{v} * ({axis.coefficient('alpha')} * ({_weighted(changes)}))"
     for name, current in (("x", "V_N"), ("y", "V_E")):
         if name in layout.pose:
             found[f"held_{name}"] = current
@@ -289,21 +298,26 @@ def _forces(layout: Layout) -> dict[str, str]:
 
 
 def _torques(layout: Layout, curve: Curve, force: str) -> list[tuple[float, str]]:
-    def part(thruster: Thruster) -> tuple[float, str]:
-        by_arm = thruster.position is None and thruster.arm
-        return thruster.effect(YAW), f"arm * {force.format(thruster.name)}" if by_arm else force.format(thruster.name)
-
-    return [part(t) for t in layout.drivers(YAW) if t.curve == curve.name]
+    """Return the torques of a curve's thrusters: weights and formulas. `force` has {} for the thruster's name."""
+    found = []
+    for thruster in layout.drivers(YAW):
+        if thruster.curve == curve.name:
+            by_arm = thruster.position is None and thruster.arm
+            found.append((thruster.effect(YAW), ("arm * " if by_arm else "") + force.format(thruster.name)))
+    return found
 
 
 def _lagging(layout: Layout, form: VehicleAxis) -> list[Curve]:
-    """The curves with lag whose thrusters act on an axis."""
+    """Return the curves with lag whose thrusters act on an axis."""
     drivers = {t.curve for t in layout.drivers(form.axis)}
     return [curve for curve in layout.curves if curve.has_lag and curve.name in drivers]
 
 
 def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
-    """How the velocities and a steady current move the pose. Heading north is cos_psi = 1, sin_psi = 0."""
+    """Return the rows of the pose, which follows from the velocities and a steady current.
+
+    Heading north is cos_psi = 1, sin_psi = 0.
+    """
     rows: dict[str, tuple[Term, ...]] = {}
     if layout.has(SURGE, SWAY):
         turns = layout.has(YAW)
@@ -329,7 +343,7 @@ def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
 
 
 def _joined(parts: Iterable[str]) -> str:
-    """Write a sum; the sign of a part that begins with a minus becomes a difference."""
+    """Write a sum as one formula. A part that begins with a minus is subtracted."""
     text = ""
     for part in parts:
         if not text:
@@ -342,7 +356,7 @@ def _joined(parts: Iterable[str]) -> str:
 
 
 def _weighted(parts: Sequence[tuple[float, str]]) -> str:
-    """Write a weighted sum of formulas, each of which binds at least as strongly as a product."""
+    """Write a weighted sum as one formula. Each part must have at least the precedence of a product."""
     return _joined(
         part if weight == 1.0 else f"-{part}" if weight == -1.0 else f"{weight!r} * {part}" for weight, part in parts
     )

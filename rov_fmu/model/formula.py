@@ -1,4 +1,4 @@
-"""Formulas as text: written once, evaluated in Python, and turned into C and into their derivatives.
+"""Formulas as text. They are evaluated in Python, differentiated, and translated to C.
 
 A formula is a Python expression of names, numbers, + - * /, comparisons, `and`, `or`, a choice `a if test else b`, and
 the functions sin, cos and abs. Its value is a float.
@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 
 FUNCTIONS = {"sin": "sin", "cos": "cos", "abs": "fabs"}
+"""The functions that a formula may call, with their names in C."""
 _OPERATORS: Mapping[type[ast.AST], str] = {
     ast.Add: "+",
     ast.Sub: "-",
@@ -23,24 +24,12 @@ _OPERATORS: Mapping[type[ast.AST], str] = {
     ast.And: "&&",
     ast.Or: "||",
 }
-_STRENGTH: Mapping[str, int] = {
-    "||": 1,
-    "&&": 2,
-    "<": 3,
-    "<=": 3,
-    ">": 3,
-    ">=": 3,
-    "==": 3,
-    "+": 4,
-    "-": 4,
-    "*": 5,
-    "/": 5,
-}
+_PRECEDENCE = {"||": 1, "&&": 2, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 3, "+": 4, "-": 4, "*": 5, "/": 5}
 
 
 @cache
 def parsed(formula: str) -> ast.expr:
-    """Return the syntax tree of a formula; its numbers are floats. Raises SyntaxError."""
+    """Return the syntax tree of a formula, in which all numbers are floats. Raises SyntaxError."""
     tree = ast.parse(formula, mode="eval")
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant):
@@ -50,7 +39,7 @@ def parsed(formula: str) -> ast.expr:
 
 @cache
 def names(formula: str) -> tuple[str, ...]:
-    """Return the names in a formula, functions excluded, each once and in the order of their first use."""
+    """Return the names in a formula without functions, each once, in the order of their first use."""
     found = sorted(
         (node for node in ast.walk(parsed(formula)) if isinstance(node, ast.Name) and node.id not in FUNCTIONS),
         key=lambda node: (node.lineno, node.col_offset),
@@ -64,13 +53,14 @@ _IN_PYTHON = {"__builtins__": {}, "sin": math.sin, "cos": math.cos, "abs": abs}
 
 
 def compiled(formulas: Mapping[str, str]) -> Callable[[Mapping[str, float]], dict[str, float]]:
-    """Compile formulas into one function, which adds their values to the values of the names that it is given.
+    """Compile formulas into one function from values by name to these values and those of the formulas.
 
-    The formulas are evaluated in their order; each may use those before it. Raises ValueError where one is no formula.
+    The formulas are evaluated in their order, and each may use those before it. Raises ValueError when one of the texts
+    is not a formula.
     """
     lines: list[ast.stmt] = []
     for name, formula in formulas.items():
-        to_c(formula, str)  # only what C has, too: no other call, no attribute
+        to_c(formula, str)  # raises ValueError for any syntax that a formula may not have
         lines.append(ast.Assign([ast.Name(name, ast.Store())], parsed(formula)))
     code = compile(ast.fix_missing_locations(ast.Module(lines, [])), "<formulas>", "exec")
 
@@ -91,11 +81,11 @@ def to_c(formula: str, name_in_c: Callable[[str], str]) -> str:
 
 
 def _c(node: ast.expr, name_in_c: Callable[[str], str]) -> tuple[str, int]:  # noqa: PLR0911 - a case for each syntax
-    """Return C text, and how strongly it binds: 9 for what needs no parentheses anywhere."""
+    """Return an expression in C, and its precedence. It is 9 for expressions that never need parentheses."""
 
     def part(node: ast.expr, least: int) -> str:
-        text, strength = _c(node, name_in_c)
-        return text if strength >= least else f"({text})"
+        text, precedence = _c(node, name_in_c)
+        return text if precedence >= least else f"({text})"
 
     match node:
         case ast.Constant():
@@ -106,15 +96,14 @@ def _c(node: ast.expr, name_in_c: Callable[[str], str]) -> tuple[str, int]:  # n
             return f"-{part(node.operand, 6)}", 6
         case ast.BinOp():
             operator = _OPERATORS[type(node.op)]
-            strength = _STRENGTH[operator]
-            return f"{part(node.left, strength)} {operator} {part(node.right, strength + 1)}", strength
+            precedence = _PRECEDENCE[operator]
+            return f"{part(node.left, precedence)} {operator} {part(node.right, precedence + 1)}", precedence
         case ast.Compare(ops=[operation], comparators=[right]):
             operator = _OPERATORS[type(operation)]
             return f"{part(node.left, 4)} {operator} {part(right, 4)}", 3
         case ast.BoolOp():
             operator = _OPERATORS[type(node.op)]
-            strength = _STRENGTH[operator]
-            return f" {operator} ".join(part(value, 3) for value in node.values), strength
+            return f" {operator} ".join(part(value, 3) for value in node.values), _PRECEDENCE[operator]
         case ast.IfExp():
             return f"{part(node.test, 1)} ? {part(node.body, 1)} : {part(node.orelse, 0)}", 0
         case ast.Call(func=ast.Name(id=function), args=[argument]):
@@ -128,8 +117,8 @@ def _c(node: ast.expr, name_in_c: Callable[[str], str]) -> tuple[str, int]:  # n
 def tangent(formula: str, change_of: Callable[[str], str | None]) -> str | None:
     """Return the change of a formula as a formula: the sum of its partial derivatives times the changes of its names.
 
-    `change_of` gives the formula of the change of a name, or None where the name does not change. The result is None
-    where the formula does not change. A choice keeps its side: its derivative is that of the side it takes.
+    `change_of` gives the formula of the change of a name, or None for a name that does not change. The result is None
+    when the formula does not change. The derivative of a choice is that of the alternative it takes.
     """
     node = _tangent(parsed(formula), change_of)
     return ast.unparse(node) if node is not None else None

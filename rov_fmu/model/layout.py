@@ -1,10 +1,12 @@
-"""What a vehicle has, and every coefficient and variable that follows from it, declared once (standard library only).
+"""The layout of a vehicle, and the declarations of its coefficients and variables (standard library only).
+
+A layout says which axes, thrust curves and thrusters a vehicle has, without the numbers.
 
 Signs and symbols follow Fossen/SNAME and the paper: body frame x forward, y starboard, z down; earth frame
 north-east-down; u, v, w, r are surge, sway, heave and yaw velocity through the water. Heave is positive down.
 
-A coefficient is declared by its key in the vehicle file; its name in the FMU is the key with what it belongs to: a_d of
-surge is a_d_u, a_t_reverse of the curve t200 is a_t_t200_reverse.
+A coefficient is declared by its key in the vehicle file. Its name in the FMU also contains the axis or the curve to
+which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the curve t200 gives a_t_t200_reverse.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,35 +19,37 @@ from math import inf, pi, sin
 
 @dataclass(frozen=True)
 class Axis:
-    """One kind of axis: the single declaration of its symbols, units and words."""
+    """A kind of axis: its symbols, units and texts."""
 
     name: str
     velocity: str
-    """Symbol: u, v, w or r. The coefficients of the axis are a_d_<velocity> ... beta_<velocity>."""
+    """The symbol of the velocity: u, v, w or r. The names of the axis's coefficients end in it."""
     unit: str
-    """Of the velocity."""
+    """The unit of the velocity."""
     positive: str
-    """Direction of a positive velocity, force or torque."""
+    """The direction of a positive velocity, force or torque."""
     negative: str
+    """The opposite direction."""
     position: str
-    """What a sensor measures along the axis; its rate is the velocity."""
+    """The name of the position along the axis, as a sensor measures it. Its rate is the velocity."""
     position_unit: str
+    """The unit of that position."""
     load: str
-    """Unit of force or torque."""
+    """The unit of force or torque."""
     external: str
-    """The input that acts on it beside the thrust."""
+    """The name of the input for a force or torque from outside."""
     inertia: str
-    """The coefficient that resists acceleration, beside the added mass: m_rov or I_r."""
+    """The coefficient that resists acceleration, together with the added mass: m_rov or I_r."""
     equations: tuple[str, str]
-    """Of the paper: drag, motion."""
+    """The numbers of the paper's equations of drag and motion."""
 
     def coefficient(self, key: str) -> str:
-        """Name of a coefficient of the axis, by its key: a_d, b_d_reverse, alpha ..."""
+        """Return the name of a coefficient of the axis by its key: a_d, b_d_reverse, alpha ..."""
         return coefficient_name(key, self.velocity)
 
     @property
     def push(self) -> str:
-        """What its thrusters give."""
+        """The word for the effect of thrusters along the axis: thrust or torque."""
         return "thrust" if self.load == "N" else "torque"
 
 
@@ -56,24 +60,24 @@ YAW = Axis(
     "yaw", "r", "rad/s", "bow to starboard", "bow to port", "heading", "rad", "N.m", "N_ext", "I_r", ("(16)", "(18c)")
 )
 AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, YAW)}
-"""All kinds, in the order of their states."""
+"""All kinds of axes by name, in the order of their states."""
 
 
 # ---- Kinds of coefficients -------------------------------------------------------------------------------------------
 
 REVERSE = "_reverse"
-"""End of the key of what holds for commands or velocities below zero."""
+"""The end of the keys of coefficients for negative commands or velocities."""
 
 
 def coefficient_name(key: str, of: str) -> str:
-    """Name in the FMU of a coefficient of a curve or of an axis."""
+    """Return the name in the FMU of a coefficient of a curve or of an axis."""
     stem = key.removesuffix(REVERSE)
     return f"{stem}_{of}{key[len(stem) :]}"
 
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a coefficient or a variable is: SI unit, words, the values allowed (both ends included), a typical size."""
+    """The declaration of a coefficient or a variable: SI unit, description, bounds (included), and a typical size."""
 
     unit: str
     description: str
@@ -85,7 +89,7 @@ class Declaration:
 
 @dataclass(frozen=True)
 class CoefficientKind:
-    """One kind of coefficient. In `unit` and `words` stands {...} for what it belongs to."""
+    """A kind of coefficient. `unit` and `words` contain fields {...} for the texts of an axis or a curve."""
 
     unit: str
     words: str
@@ -95,7 +99,7 @@ class CoefficientKind:
     tunable: bool = False
 
     def meta(self, **of: str) -> Declaration:
-        """Of one curve or axis."""
+        """Return the declaration of this coefficient of one axis or curve, whose texts are `of`."""
         words = self.words.format(**of)
         return Declaration(self.unit.format(**of), words, self.minimum, self.maximum, tunable=self.tunable)
 
@@ -141,51 +145,53 @@ TUNING = {
     "alpha": CoefficientKind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
     "beta": CoefficientKind("1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}", 0.0, 1e3, False, True),
 }
-"""1 where the file does not give it."""
+"""The tuning factors of every axis; each is 1 unless the file gives it."""
 LEAST_BETA = 1e-3
-"""Of axes that are coupled."""
+"""The least β of coupled axes."""
 
 
-# ---- What a vehicle has ----------------------------------------------------------------------------------------------
+# ---- Layout ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A thrust curve: F(c) = a_t (c - c_0)^2 + b_t (c - c_0) of `together` thrusters at once, mirrored for c < 0."""
+    """A thrust curve: F(c) = a_t (c - c_0)^2 + b_t (c - c_0) for `together` thrusters in sum, mirrored for c < 0."""
 
     name: str
     keys: tuple[str, ...] = ("a_t", "b_t")
-    """Of CURVE, those that the vehicle has."""
+    """The keys of CURVE that the vehicle has."""
     together: int = 1
     description: str = ""
     equation: str = "(2)"
+    """The number of the paper's equation."""
 
     def coefficient(self, key: str) -> str:
-        """Name of one of its coefficients; forward's where there is none for reverse."""
+        """Return the name of a coefficient by its key: that of forward when the curve has none for reverse."""
         return coefficient_name(key if key in self.keys else key.removesuffix(REVERSE), self.name)
 
     @property
     def has_lag(self) -> bool:
-        """Whether the force follows the command late."""
+        """True when the force follows the command with a lag."""
         return "T" in self.keys
 
 
 @dataclass(frozen=True)
 class Thruster:
-    """A thruster and its place. The torque about z is that of its position, or ±R sin γ F by the arm, (4)."""
+    """A thruster and its place. Its torque about z follows from its position, or is ±R sin γ F by its arm, (4)."""
 
     name: str
     curve: str
+    """The name of its thrust curve."""
     direction: tuple[float, float, float]
-    """Of a positive force, a unit vector in the body frame."""
+    """The direction of a positive force: a unit vector in the body frame."""
     position: tuple[float, float, float] | None = None
-    """From the centre of mass, m."""
+    """The position relative to the centre of mass, m."""
     arm: int = 0
-    """1 on the port side, where a force ahead turns the bow to starboard, -1 on the starboard side; 0 without."""
+    """1 on the port side, where a force ahead turns the bow to starboard; -1 on the starboard side; 0 without arm."""
     description: str = ""
 
     def effect(self, axis: Axis) -> float:
-        """Force along an axis, or torque, of a force of 1 N; that of an arm by R sin γ."""
+        """Return the force along an axis, or the torque, of a force of 1 N. An arm's torque is in units of R sin γ."""
         if axis is not YAW:
             return self.direction[(SURGE, SWAY, HEAVE).index(axis)]
         if self.position is None:
@@ -196,35 +202,35 @@ class Thruster:
 
 @dataclass(frozen=True)
 class VehicleAxis:
-    """An axis that a vehicle has."""
+    """An axis of a vehicle."""
 
     axis: Axis
     keys: tuple[str, ...] = ("a_d", "b_d")
-    """Of AXIS, those that the vehicle has; α and β it always has."""
+    """The keys of AXIS that the vehicle has. It always has α and β."""
 
     def coefficient(self, key: str) -> str:
-        """Name of one of its coefficients; forward's where there is none for reverse."""
+        """Return the name of a coefficient by its key: that of forward when the axis has none for reverse."""
         return self.axis.coefficient(key if key in self.keys else key.removesuffix(REVERSE))
 
 
-_FAINT = 1e-9  # m, or per newton: an effect below is rounding of a direction
+_FAINT = 1e-9  # a smaller effect, in m or N per N, is a rounding error of a direction
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What a vehicle has, but for the numbers."""
+    """The axes, curves and thrusters of a vehicle, without numbers."""
 
     axes: tuple[VehicleAxis, ...]
-    """In the order of AXES."""
+    """The axes in the order of AXES."""
     curves: tuple[Curve, ...]
     thrusters: tuple[Thruster, ...]
     mix: Mapping[str, Mapping[str, float]] = field(default_factory=dict, hash=False)
-    """Input to the thrusters that it drives, with gains; each thruster has an input of its own where this is empty."""
+    """For each input, the gains of the thrusters that it drives. If this is empty, each thruster has its own input."""
     coupled: bool = False
-    """Whether surge, sway and yaw are coupled: Coriolis and Munk terms of a diagonal mass matrix."""
+    """True when surge, sway and yaw are coupled by the Coriolis and Munk terms of a diagonal mass matrix."""
 
     def extended(self, names: Iterable[str]) -> "Layout":
-        """With these coefficients besides, of its curves and axes."""
+        """Return the layout with additional coefficients of its curves and axes, by their names."""
         wanted = set(names)
 
         def keys(kinds: Iterable[str], has: tuple[str, ...], of: str) -> tuple[str, ...]:
@@ -236,7 +242,7 @@ class Layout:
             curves=tuple(replace(curve, keys=keys(CURVE, curve.keys, curve.name)) for curve in self.curves),
         )
 
-    # -- looked up --
+    # -- lookup --
 
     @cached_property
     def kinds(self) -> dict[str, VehicleAxis]:
@@ -250,17 +256,17 @@ class Layout:
         return {thruster.name: curves[thruster.curve] for thruster in self.thrusters}
 
     def has(self, *axes: Axis) -> bool:
-        """Whether it has one of the axes."""
+        """Return True when the vehicle has one of these axes."""
         return any(axis.name in self.kinds for axis in axes)
 
     @cached_property
     def has_arm(self) -> bool:
-        """Whether R and γ are among its coefficients."""
+        """True when R and γ are among the coefficients."""
         return self.has(YAW) and any(t.position is None and t.arm for t in self.thrusters)
 
     @cached_property
     def gains(self) -> dict[str, dict[str, float]]:
-        """Of each thruster, the inputs that drive it, with gains."""
+        """For each thruster, the gains of the inputs that drive it."""
         if not self.mix:
             return {t.name: {f"u_{t.name}": 1.0} for t in self.thrusters}
         return {
@@ -269,13 +275,13 @@ class Layout:
         }
 
     def drivers(self, axis: Axis) -> list[Thruster]:
-        """The thrusters that act on an axis."""
+        """Return the thrusters that act on an axis."""
         return [t for t in self.thrusters if abs(t.effect(axis)) > _FAINT]
 
     def signs(self, axis: Axis) -> dict[str, float]:
-        """The commands that drive an axis: every input that acts on it, to its positive side.
+        """Return the commands that drive an axis in its positive direction: 1 or -1 for every input that acts on it.
 
-        Other axes stay at rest where the thrusters are symmetric.
+        When the thrusters are symmetric, these commands leave the other axes at rest.
         """
         effects: dict[str, float] = {}
         for thruster in self.drivers(axis):
@@ -283,11 +289,11 @@ class Layout:
                 effects[name] = effects.get(name, 0.0) + gain * thruster.effect(axis)
         return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > _FAINT}
 
-    # -- declared --
+    # -- declarations --
 
     @cached_property
     def coefficients(self) -> dict[str, Declaration]:
-        """Name to what it is, in the order of the FMU's variables."""
+        """The coefficients, in the order of the FMU's variables."""
         found: dict[str, Declaration] = {}
         if self.has(SURGE, SWAY, HEAVE):
             found["m_rov"] = BODY["m_rov"].meta()
@@ -304,7 +310,7 @@ class Layout:
         for form in self.axes:
             metas = metas_of(form.axis)
             found |= {form.axis.coefficient(key): metas[key] for key in TUNING}
-        if self.coupled:  # the effective inertia m/β of each must be finite
+        if self.coupled:  # all effective inertias m/β must be finite
             for beta in (axis.coefficient("beta") for axis in (SURGE, SWAY, YAW)):
                 found[beta] = replace(found[beta], minimum=LEAST_BETA)
         return found
@@ -321,7 +327,7 @@ class Layout:
 
     @cached_property
     def inputs(self) -> dict[str, Declaration]:
-        """Commands, loads from outside, current."""
+        """The inputs: commands, loads from outside, current."""
         found = dict(self.commands)
         for form in self.axes:
             axis = form.axis
@@ -329,13 +335,13 @@ class Layout:
             words = f"Load from outside in {axis.name} (tether, {example}), positive {axis.positive}"
             found[axis.external] = Declaration(axis.load, words, nominal=1.0 if axis is YAW else 10.0)
         if self.has(SURGE, SWAY):
-            for name, way in (("V_N", "northward"), ("V_E", "eastward")):
-                found[name] = Declaration("m/s", f"Velocity of a steady horizontal current, {way}")
+            for name, direction in (("V_N", "northward"), ("V_E", "eastward")):
+                found[name] = Declaration("m/s", f"Velocity of a steady horizontal current, {direction}")
         return found
 
     @cached_property
     def velocities(self) -> dict[str, Declaration]:
-        """The first states: velocities through the water."""
+        """The velocities through the water, which are the first states."""
         found = {}
         for axis in (form.axis for form in self.axes):
             through = "" if axis is YAW else " through the water"
@@ -345,7 +351,7 @@ class Layout:
 
     @cached_property
     def pose(self) -> dict[str, Declaration]:
-        """The states that follow: position and heading, as far as the axes move them."""
+        """The position and heading, as far as the axes change them; these states follow the velocities."""
         found = {}
         if self.has(SURGE, SWAY):
             found["x"] = Declaration("m", "Position north x", nominal=10.0)
@@ -358,20 +364,22 @@ class Layout:
 
     @cached_property
     def lagging(self) -> dict[str, Declaration]:
-        """The last states: forces that follow the commands late."""
+        """The forces that follow the commands with a lag, which are the last states."""
         return {
             f"F_{t.name}": _thrust(t, self.curve_of[t.name]) for t in self.thrusters if self.curve_of[t.name].has_lag
         }
 
     @cached_property
     def state(self) -> dict[str, Declaration]:
-        """All states."""
+        """All states in their order."""
         return self.velocities | self.pose | self.lagging
 
     @cached_property
     def thrust(self) -> dict[str, Declaration]:
-        """What is calculated of the thrusters, before the tuning α: their forces, unless they are states, and the
-        torque of the thrusters of each curve."""
+        """The calculated variables of the thrusters, before the tuning α.
+
+        They are the forces that are not states, and the torque of the thrusters of each curve.
+        """
         found = {
             f"F_{t.name}": _thrust(t, self.curve_of[t.name])
             for t in self.thrusters
@@ -386,7 +394,7 @@ class Layout:
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Where each variable stands in the arrays of the C code, by name; der(x) stands len(state) after x."""
+        """The place of each variable in the arrays of the C code. The place of der(x) is len(state) after that of x."""
         found = {name: place for place, name in enumerate([*self.inputs, *self.state])}
         first = len(found) + len(self.state)
         return found | {name: first + place for place, name in enumerate([*self.thrust, *self.coefficients])}
@@ -399,7 +407,7 @@ class Layout:
 
 
 def metas_of(axis: Axis) -> dict[str, Declaration]:
-    """Every coefficient that an axis can have, by its key."""
+    """Return the declarations of all coefficients that an axis can have, by their keys."""
     drag, motion = axis.equations
     words = {
         "axis": axis.name,
@@ -423,7 +431,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _pushes(direction: tuple[float, float, float]) -> str:
-    """The direction of a positive force in words."""
+    """Return the direction of a positive force in words."""
     words = [
         axis.positive if part > 0.0 else axis.negative
         for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True)
@@ -444,5 +452,5 @@ def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
 
 
 def arm(R: float, gamma: float) -> float:
-    """R sin γ: torque per difference of thrust (m), (4)."""
+    """Return R sin γ, the torque per difference of thrust (m), (4)."""
     return R * sin(gamma)

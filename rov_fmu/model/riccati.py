@@ -1,6 +1,6 @@
 """One axis under a held force: steady velocity and time constant in closed form (standard library only).
 
-Thrust, quadratic and linear drag on a constant inertia, equation (18), make every axis a scalar Riccati equation
+With thrust, quadratic and linear drag and a constant inertia, equation (18) of each axis is a scalar Riccati equation
 
     v' = C - B v - A |v| v,        A >= 0, B >= 0,
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import atanh, e, hypot, inf, isinf, sqrt
 
 RISE = 1.0 - 1.0 / e
-"""Share of V_ss that is reached after Tau, (17)."""
+"""The share of V_ss that is reached after Tau, (17)."""
 
 
 def steady_velocity(A: float, B: float, C: float) -> float:
@@ -25,7 +25,7 @@ def steady_velocity(A: float, B: float, C: float) -> float:
 
 
 def time_constant(A: float, B: float, C: float) -> float:
-    """Return Tau of (17): the time in which a start from rest reaches (1 - 1/e) V_ss. Infinite without drag.
+    """Return Tau of (17), the time from rest until the velocity is (1 - 1/e) V_ss; infinite without drag.
 
     With D = B + 2 A V_ss and p = 1 - 1/e, Tau = (2/D) artanh(p D / (D + (1 - p) B)).
     """
@@ -44,7 +44,7 @@ class Riccati:
     B: float
     C: float
     reverse: tuple[float, float] | None = None
-    """A and B for v < 0, where they differ."""
+    """A and B for v < 0, if they differ."""
 
     def drag(self, sign: float) -> tuple[float, float]:
         """Return A and B for velocities of this sign."""

@@ -1,6 +1,6 @@
-"""A vehicle in motion: thrust, derivatives and the exact step by its table of terms; the closed form of one axis.
+"""A vehicle with its coefficients: thrust, derivatives, the exact step, and the closed form of one axis.
 
-Values are known by name, as rov_fmu/model/layout.py declares them: inputs, states, coefficients. Standard library only.
+Inputs, states and coefficients have the names that rov_fmu/model/layout.py declares. Standard library only.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ Values = Mapping[str, float]
 
 
 class _Formulas:
-    """The equation of a layout, compiled."""
+    """The compiled equation of a layout."""
 
     def __init__(self, layout: Layout) -> None:
         equation = equation_of(layout)
@@ -49,7 +49,7 @@ class Rov:
         return Rov(self.layout, {**self.coefficients, **values})
 
     def extended(self, values: Values) -> "Rov":
-        """Return the vehicle with these coefficients, which its layout may not have yet."""
+        """Return the vehicle with other or additional coefficients."""
         return Rov(self.layout.extended(values), {**self.coefficients, **values})
 
     @cached_property
@@ -58,7 +58,7 @@ class Rov:
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """What follows from the coefficients, by the names of rov_fmu/model/equation.py: gain_u, coupling_u ..."""
+        """The numbers that follow from the coefficients, by their names in rov_fmu/model/equation.py: gain_u ..."""
         return self._formulas.parameters(self.coefficients)
 
     # ---- Thrust ----
@@ -70,14 +70,14 @@ class Rov:
 
     def commanded(self, inputs: Values) -> dict[str, float]:
         """Return the steady thrust of every thruster (N), by its name, for the commands."""
-        found, lagging = self._formulas.thrust({**self.coefficients, **inputs}), self.layout.lagging
-        return {
-            t.name: found[f"steady_{t.name}" if f"F_{t.name}" in lagging else f"F_{t.name}"]
-            for t in self.layout.thrusters
-        }
+        found = self._formulas.thrust({**self.coefficients, **inputs})
+        thrust = {}
+        for name, curve in self.layout.curve_of.items():
+            thrust[name] = found[f"steady_{name}" if curve.has_lag else f"F_{name}"]
+        return thrust
 
     def _values(self, inputs: Values, state: Values) -> dict[str, float]:
-        """Return the coefficients, the inputs and the states by name; either mapping may have other names, too."""
+        """Return the coefficients, the inputs and the states by name. Other names in the mappings are left out."""
         return {
             **self.coefficients,
             **{name: inputs[name] for name in self.layout.inputs},
@@ -103,9 +103,9 @@ class Rov:
         return {name: found[f"der_{name}"] for name in self.layout.state}
 
     def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
-        """Return the states after h > 0 seconds with the inputs held, exact up to rounding however long that is.
+        """Return the states after h > 0 seconds with the inputs held. The result is exact up to rounding for any h.
 
-        They are not finite where the motion overflows or takes too many pieces (rov_fmu/model/step.py).
+        It is not finite when the motion overflows or takes too many pieces (rov_fmu/model/step.py).
         """
         after = step(self._formulas.table, self._values(inputs, state), h)
         return {name: after[name] for name in self.layout.state}
@@ -118,22 +118,22 @@ class Rov:
         return self[form.axis.inertia] + added
 
     def gain(self, form: VehicleAxis) -> float:
-        """Return β/m: acceleration by force."""
+        """Return β/m, the acceleration per force."""
         return self[form.axis.coefficient("beta")] / self.inertia(form)
 
     def effective_inertia(self, form: VehicleAxis) -> float:
-        """Return m/β, which resists acceleration."""
+        """Return the effective inertia m/β."""
         beta = self[form.axis.coefficient("beta")]
         return self.inertia(form) / beta if beta > 0.0 else inf
 
     def load(self, form: VehicleAxis) -> float:
-        """Return the constant load F_0 (N, N.m), where the axis has one."""
+        """Return the constant load F_0 (N, N.m), or 0 when the axis has none."""
         return self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0
 
     def acceleration_of(self, form: VehicleAxis, thrust: float, load: float = 0.0) -> Riccati:
-        """Return the equation of an axis under a held thrust (before α) and load, without coupling, (18).
+        """Return the equation of an axis alone, (18), under a held thrust (before α) and load.
 
-        It is m v' = β (α F + F_ext + F_0 - a_d |v| v - b_d v).
+        The equation is m v' = β (α F + F_ext + F_0 - a_d |v| v - b_d v).
         """
         gain = self.gain(form)
         A, B = (gain * self[form.coefficient(key)] for key in ("a_d", "b_d"))
@@ -143,7 +143,7 @@ class Rov:
         return Riccati(A, B, gain * (self[form.axis.coefficient("alpha")] * thrust + load + self.load(form)), reverse)
 
     def axes(self, inputs: Values) -> tuple[Riccati, ...]:
-        """Return the equation of every axis under held inputs once the thrust is steady, without coupling."""
+        """Return the equation of each axis alone under held inputs, once the thrust is steady."""
         F = self.commanded(inputs)
         return tuple(
             self.acceleration_of(form, self._along(form.axis, F), inputs[form.axis.external])
@@ -151,26 +151,26 @@ class Rov:
         )
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
-        """Return all inputs, with the commands that drive an axis at a fraction of full thrust."""
+        """Return all inputs: the commands that drive an axis at a fraction of full thrust, the others 0."""
         signs = self.layout.signs(axis)
         return {name: command * signs.get(name, 0.0) for name in self.layout.inputs}
 
     def force(self, axis: Axis, command: float) -> float:
-        """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α, by (9), (10) and (4)."""
+        """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α: (9), (10), (4)."""
         return self._along(axis, self.commanded(self.held_inputs(axis, command)))
 
     def _along(self, axis: Axis, F: Values) -> float:
         return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
 
     def strongest(self, axis: Axis) -> float:
-        """Return the strongest thrust or torque along an axis, before the tuning α, in either direction."""
+        """Return the larger of the thrusts or torques at full command in both directions, before the tuning α."""
         return max(abs(self.force(axis, c)) for c in (1.0, -1.0))
 
     def held(self, axis: Axis, command: float) -> Riccati:
-        """Return the equation of an axis under a held command, (18), once the thrust is steady."""
+        """Return the equation of an axis alone, (18), under a held command, once the thrust is steady."""
         return self.acceleration_of(self.layout.kinds[axis.name], self.force(axis, command))
 
     def response(self, axis: Axis, command: float) -> tuple[float, float]:
-        """Return the signed V_ss, and Tau (17) in s from rest, in closed form."""
+        """Return the signed V_ss, and Tau (17) from rest in s, in closed form."""
         motion = self.held(axis, command)
         return motion.steady_velocity(), motion.time_constant()

@@ -1,4 +1,4 @@
-"""A step with a table of terms by Taylor series, exact up to rounding however long it is (standard library only).
+"""A step of a vehicle by Taylor series, exact up to rounding for any length (standard library only).
 
 Between reversals the motion is y_i' = k_i + sum of L_ij y_j + sum of Q_ijk y_j y_k (equation.py). In the series
 y(t) = sum of c_n t^n, a product of two states is a Cauchy product. So each coefficient follows from those before it:
@@ -19,21 +19,22 @@ from .equation import Equation
 from .formula import compiled, names
 
 ORDER = 20
-"""The order of the series: a higher one costs more than its longer pieces save."""
+"""The order of the series. A higher order costs more than its longer pieces save."""
 MOST_PIECES = 10_000
 """The most pieces of a step, enough for 1,000 s at rates of 10/s that never settle. A longer step is not computed."""
 
 _EPSILON = 2.0**-53  # half a unit in the last place of 1
-_FADED = 1e-40  # of the largest size of a state: whatever the drag, what is left of its distance does not matter
-_RATIO = 2.0 ** (-57 / (ORDER + 1))  # its powers after ORDER are below rounding
-_SMALLEST = 1e-322  # rounding keeps numbers below it from fading any further
-_SHORTEST = 2.0**-20  # of a piece: within it, the drag of a velocity that just touches 0 does not matter
+_FADED = 1e-40  # a state below this share of its largest size has no influence any more, whatever the drag
+_RATIO = 2.0 ** (-57 / (ORDER + 1))  # its powers beyond ORDER are below rounding
+_SMALLEST = 1e-322  # rounding keeps smaller numbers from fading any further
+_SHORTEST = 2.0**-20  # within this share of a piece, the drag of a velocity that just touches 0 is negligible
 
-Series = Sequence[Sequence[float]]  # the coefficients of each state
+Series = Sequence[Sequence[float]]
+"""The coefficients of each state."""
 
 
 class Table:
-    """An equation in the form that a step computes with: states and coefficients are known by their places."""
+    """An equation in the form that a step needs: states and coefficients have places instead of names."""
 
     def __init__(self, equation: Equation) -> None:
         self.equation, self.states = equation, equation.states
@@ -42,7 +43,7 @@ class Table:
         self.rows: list[list[tuple[int, tuple[int, ...]]]] = []
         """For each state, the terms of its rate: the place of the coefficient, and the places of the factors."""
         self.velocities: list[int | None] = []
-        """For each coefficient, the place of the velocity on whose direction it depends."""
+        """For each coefficient, the place of the velocity on whose direction it depends, or None."""
         formulas: dict[str, str] = {}
         for terms in equation.rows.values():
             self.rows.append([])
@@ -60,7 +61,7 @@ class Table:
         """The states that a term contains. The others are integrals of them."""
         self.heading = {place[name] for name in equation.heading}
         self.dynamic: list[tuple[set[int], set[int]]] = []
-        """The components that may settle, in their order: the states of each, and those that it depends on."""
+        """The components that may settle, in their order: the states of each, and the other states it depends on."""
         for component in equation.components:
             group = {place[name] for name in component}
             if group & (self.used - self.heading):
@@ -71,11 +72,11 @@ class Table:
 def step(table: Table, values: Mapping[str, float], h: float) -> dict[str, float]:
     """Return the states after h > 0 seconds with the inputs held.
 
-    `values` are the parameters, inputs and states by their names. The result is not finite where the motion overflows
+    `values` are the coefficients, inputs and states by their names. The result is not finite when the motion overflows
     or would take more than MOST_PIECES pieces.
     """
     motion = _Motion(table, values)
-    done, lost, unit = 0.0, 0.0, h  # seconds, what rounding has left out of them, and the unit of time of the series
+    done, lost, unit = 0.0, 0.0, h  # elapsed seconds, their rounding error, and the unit of time of the series
     for _ in range(MOST_PIECES):
         motion.settle()
         if motion.has_settled():
@@ -100,7 +101,7 @@ def step(table: Table, values: Mapping[str, float], h: float) -> dict[str, float
 
 
 class _Motion:
-    """The states of a table during a step, and what is held until its next piece. `series` are in units of time."""
+    """The states of a table during a step, and the coefficients of the current piece."""
 
     def __init__(self, table: Table, values: Mapping[str, float]) -> None:
         self.table, self.values = table, dict(values)
@@ -108,14 +109,17 @@ class _Motion:
         self.steady = {name: found[name] for forces in table.equation.lags.values() for name in forces.values()}
         starts = {**found, **values}
         self.y = [float(starts[name]) if name in table.equation.starts else 0.0 for name in table.states]
-        self.rest = [0.0] * len(self.y)  # what rounding has left out of each state: it would add up over many pieces
+        self.lost = [0.0] * len(self.y)  # the rounding error of each state, which would add up over many pieces
         self.scale = [0.0] * len(self.y)  # the largest size of each state so far
         self.start = dict(self.values)
-        self.still: set[int] = set()  # states that have settled
+        self.settled: set[int] = set()
         self.hold()
 
     def hold(self) -> None:
-        """Compute the coefficients, for either direction of the velocities. A force that has arrived is steady."""
+        """Compute the coefficients for both directions of the velocities.
+
+        Before that, the lags whose forces have all arrived are ended: each force becomes exactly the steady thrust.
+        """
         table, values = self.table, self.values
         for progress, forces in table.equation.lags.items():
             gaps = {force: abs(self.steady[steady] - values[force]) for force, steady in forces.items()}
@@ -124,55 +128,58 @@ class _Motion:
             if has_arrived:
                 values.update({force: self.steady[steady] for force, steady in forces.items()})
             self.put(table.place[progress], 1.0 if has_arrived else 0.0)
-        ways = (table.hold({**values, **dict.fromkeys(table.equation.monitored, sign)}) for sign in (1.0, -1.0))
-        self.forward, self.reverse = ([found[name] for name in table.coefficients] for found in ways)
+        forward = table.hold({**values, **dict.fromkeys(table.equation.monitored, 1.0)})
+        reverse = table.hold({**values, **dict.fromkeys(table.equation.monitored, -1.0)})
+        self.forward = [forward[name] for name in table.coefficients]
+        self.reverse = [reverse[name] for name in table.coefficients]
         self.direct(self.y)
 
     def put(self, state: int, value: float) -> None:
-        """Give a state an exact value."""
-        self.y[state], self.rest[state] = value, 0.0
+        """Set a state to an exact value."""
+        self.y[state], self.lost[state] = value, 0.0
 
     def direct(self, signs: Sequence[float]) -> None:
-        """Choose the coefficients for the directions of the velocities, of which the signs count."""
+        """Choose the coefficients for the signs of the velocities."""
         both = zip(self.table.velocities, self.forward, self.reverse, strict=True)
-        self.k = [back if v is not None and signs[v] < 0.0 else ahead for v, ahead, back in both]
+        self.k = [reverse if v is not None and signs[v] < 0.0 else forward for v, forward, reverse in both]
 
     def rates(self, y: Sequence[float]) -> tuple[list[float], list[float]]:
         """Return the rate of each state, and the sum of the sizes of its terms."""
         rows = [[self.k[n] * prod(y[i] for i in factors) for n, factors in row] for row in self.table.rows]
         return [_sum(row) for row in rows], [_sum(map(abs, row)) for row in rows]
 
-    # ---- What has settled ----
+    # ---- Settled states ----
 
     def settle(self) -> None:
-        """Find the components that have settled: those that they depend on have, and their rates are rounding errors.
+        """Find the components that have settled.
 
-        A component that has faded to nothing, and that nothing drives, comes to rest.
+        A component has settled when those that it depends on have settled and its rates are rounding errors. A
+        component that has faded to nothing, and that nothing drives, is put to rest.
         """
         y = self.y
         self.direct(y)
         self.scale = [max(size, abs(x)) for size, x in zip(self.scale, y, strict=True)]
         rates, sizes = self.rates(y)
-        self.still = set()
+        self.settled = set()
         for group, inputs in self.table.dynamic:
-            if inputs <= self.still:
+            if inputs <= self.settled:
                 if all(abs(rates[i]) <= 8.0 * _EPSILON * sizes[i] for i in group):
-                    self.still |= group
+                    self.settled |= group
                 elif all(abs(y[i]) <= _FADED * self.scale[i] + _SMALLEST for i in group):
                     at_rest, _ = self.rates([0.0 if i in group else x for i, x in enumerate(y)])
                     if not any(at_rest[i] for i in group):
-                        self.still |= group
+                        self.settled |= group
                         for i in group:
                             self.put(i, 0.0)
 
     def has_settled(self) -> bool:
-        """Tell whether all states are constant, but for the heading and the integrals."""
-        return self.table.used - self.table.heading <= self.still
+        """Return True when all states are constant, except for the heading and the integrals."""
+        return self.table.used - self.table.heading <= self.settled
 
     def coast(self, h: float) -> None:
-        """Move on for h seconds once all has settled.
+        """Move for h seconds of straight or circular motion, once all has settled.
 
-        Only the heading still moves, by a rotation y' = L y with L^3 = -w^2 L. The integrals rise by h times their
+        Only the heading still changes, by a rotation y' = L y with L^3 = -w^2 L. The integrals rise by h times their
         rates at the mean of y, which is y + (1 - cos wh)/(w^2 h) L y + (1 - sin(wh)/(wh))/w^2 L^2 y.
         """
         table, mean = self.table, list(self.y)
@@ -191,9 +198,9 @@ class _Motion:
     # ---- A piece ----
 
     def series(self, unit: float) -> Series:
-        """Grow the series of all states in time by `unit`.
+        """Return the series of all states, with time in units of `unit` seconds.
 
-        A velocity that is 0 has the direction of its first coefficient that is not; until then its terms are 0.
+        The direction of a velocity that is 0 is that of its first nonzero coefficient. Until then its terms are 0.
         """
         table, c = self.table, [[x] for x in self.y]
         signs = [0.0] * len(c)
@@ -210,29 +217,30 @@ class _Motion:
             factor[()] = 1.0 if n == 0 else 0.0
             for i, row in enumerate(table.rows):
                 rate = 0.0
-                for place, factors in row if i not in self.still else ():
-                    rate += self.k[place] * factor[factors]
+                if i not in self.settled:
+                    for place, factors in row:
+                        rate += self.k[place] * factor[factors]
                 c[i].append(unit * rate / (n + 1))
         return c
 
     def reach(self, series: Series) -> float:
-        """Return how far the series hold, at most 1; 0 where they overflow."""
+        """Return the time up to which the series may be used, at most 1; 0 when they overflow."""
         if not all(isfinite(x) for c in series for x in c[-3:]):
             return 0.0
         return min(1.0, *(_reach(series[i]) for i in self.table.used))
 
     def move(self, series: Series, length: float) -> float:
-        """Move to the end of a piece, `length` or the first reversal, and return how long it is."""
-        turned = None
+        """Move to the end of a piece, which is at `length` or at the first reversal, and return that time."""
+        reversed_velocity = None
         for v in self.table.monitored:
             end, is_reversal = _sign_kept(series[v], length)
             if is_reversal or end < length:
-                length, turned = end, v if is_reversal else None
-        changes = [_change(c, length) + rest for c, rest in zip(series, self.rest, strict=True)]
+                length, reversed_velocity = end, v if is_reversal else None
+        changes = [_change(c, length) + lost for c, lost in zip(series, self.lost, strict=True)]
         before, self.y = self.y, [x + change for x, change in zip(self.y, changes, strict=True)]
-        self.rest = [change - (x - y) for change, x, y in zip(changes, self.y, before, strict=True)]
-        if turned is not None:
-            self.put(turned, 0.0)  # so that the next piece has the other direction
+        self.lost = [change - (x - y) for change, x, y in zip(changes, self.y, before, strict=True)]
+        if reversed_velocity is not None:
+            self.put(reversed_velocity, 0.0)  # so that the next piece has the other direction
         if self.steady:
             progress = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
             found = self.table.arrive({**self.values, **self.steady, **progress})
@@ -241,10 +249,10 @@ class _Motion:
         return length
 
     def end(self) -> dict[str, float]:
-        """Return the vehicle's states by their names. Those of the integrals are changes until here."""
+        """Return the vehicle's states by their names."""
         equation, found = self.table.equation, {force: self.values[force] for force in self.table.equation.lagging}
         for name, x in zip(self.table.states, self.y, strict=True):
-            if name in self.start:
+            if name in self.start:  # an integral has only counted the change
                 found[name] = x if name in equation.starts else self.start[name] + x
         return found
 
@@ -253,7 +261,7 @@ class _Motion:
 
 
 def _sum(terms: Iterable[float]) -> float:
-    """Return a sum that is the same in all versions of Python, unlike that of sum()."""
+    """Return a sum that is the same in all versions of Python, unlike sum()."""
     total = 0.0
     for x in terms:
         total += x
@@ -261,7 +269,7 @@ def _sum(terms: Iterable[float]) -> float:
 
 
 def _change(c: Sequence[float], t: float) -> float:
-    """Return the change up to t."""
+    """Return the change of a state from 0 to t."""
     change = 0.0
     for x in c[:0:-1]:
         change = (change + x) * t
@@ -269,9 +277,9 @@ def _change(c: Sequence[float], t: float) -> float:
 
 
 def _reach(c: Sequence[float]) -> float:
-    """Return how far the terms fall like the powers of _RATIO, from the largest of the first three to the last three.
+    """Return the time at which the terms decrease like the powers of _RATIO from the first three to the last three.
 
-    Every second or third coefficient of a series may be 0.
+    Of three neighbours, the largest counts, because every second or third coefficient of a series may be 0.
     """
     first = next((n for n, x in enumerate(c) if x != 0.0), len(c))
     reach = inf
@@ -283,14 +291,14 @@ def _reach(c: Sequence[float]) -> float:
 
 
 def _sign_kept(c: Sequence[float], length: float) -> tuple[float, bool]:
-    """Return how far a velocity goes before its sign changes, at most `length`, and whether it is 0 there."""
+    """Return how long a velocity certainly keeps its sign, at most `length`, and whether it is 0 at that time."""
     first = next((n for n, x in enumerate(c) if x != 0.0), None)
     shortest = _SHORTEST * length
     while first is not None and length > shortest:
         sizes = [abs(x) * length**n for n, x in enumerate(c)]
         if sizes[first] >= sum(sizes[first + 1 :]):
             break
-        if first == 0 and sizes[1] > 4.0 * sum(n * size for n, size in enumerate(sizes[2:], 2)):  # one way only
+        if first == 0 and sizes[1] > 4.0 * sum(n * size for n, size in enumerate(sizes[2:], 2)):  # monotonic
             end = c[0] + _change(c, length)
             is_reversal = end == 0.0 or (end > 0.0) != (c[0] > 0.0)  # a product could underflow
             return (min(length, _root(c)), True) if is_reversal else (length, False)
@@ -299,7 +307,7 @@ def _sign_kept(c: Sequence[float], length: float) -> tuple[float, bool]:
 
 
 def _root(c: Sequence[float]) -> float:
-    """Return the root of a series whose slope stays within a quarter of its first one, by Newton's method."""
+    """Return the root of a series by Newton's method. The slope must stay within a quarter of the first slope."""
     t, following = 0.0, -c[0] / c[1]
     for _ in range(60):
         if abs(following - t) <= 2.0 * _EPSILON * following:

@@ -1,4 +1,4 @@
-"""The engine's library is compiled once for a kind of vehicle, kept in the cache folder, and never loaded damaged."""
+"""The engine's library is compiled once for each layout, kept in the cache folder, and never loaded when damaged."""
 
 import ctypes
 import importlib.util
@@ -19,11 +19,11 @@ from tests.vehicles import VEHICLES
 
 ROV = load_vehicle(BARE).rov
 _MADE: dict[str, bytes] = {}
-"""What was compiled in these tests, by its sources."""
+"""The libraries that these tests have compiled, by their sources."""
 
 
 class Cache:
-    """A cache folder of its own, and how often something was compiled for it."""
+    """A separate cache folder, and the number of compilations for it."""
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self.folder = folder / "engine"
@@ -34,7 +34,7 @@ class Cache:
         self.restart()
 
     def restart(self) -> None:
-        """Forget what this process has loaded."""
+        """Forget the libraries that this process has loaded."""
         self._monkeypatch.setattr(library, "_LOADED", {})
 
     def files(self) -> list[Path]:
@@ -68,7 +68,7 @@ def test_a_damaged_library_is_compiled_again(cache: Cache, damage: Callable[[byt
     load_library(ROV)
     (file,) = cache.files()
     content = file.read_bytes()
-    file.unlink()  # it is loaded
+    file.unlink()  # the old file is still loaded and must not change
     file.write_bytes(damage(content))
     cache.restart()
     load_library(ROV)
@@ -85,7 +85,7 @@ def test_without_a_cache_folder_it_is_compiled_for_this_process(
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
     assert isinstance(load_library(ROV), ctypes.CDLL)
     assert cache.compiled == 1
-    if os.name == "posix":  # Windows removes no library that is loaded
+    if os.name == "posix":  # Windows does not remove a library that is loaded
         assert list((tmp_path / "temporary").iterdir()) == []
 
 
@@ -113,7 +113,7 @@ print(rov_fmu.load({str(BARE)!r}).simulate([0, 1, 2], {{}}, start={{"w": 1.0}})[
 """
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="XDG_CACHE_HOME is of Linux")
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux uses XDG_CACHE_HOME")
 def test_two_processes_at_once_do_not_clash(tmp_path: Path) -> None:
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}
     both = [

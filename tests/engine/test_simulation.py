@@ -1,4 +1,4 @@
-"""The engine computes what the FMU computes, to the last bit, for any number of vehicles and threads."""
+"""The engine computes the same bits as the FMU, for any number of vehicles and threads."""
 
 import os
 import random
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 def fmu_states(folder: Path, rov: Rov, times: Array, inputs: dict[str, Array], start: dict[str, float]) -> Array:
-    """The states of an FMU that FMPy steps, and its thrust, by the variable and the time."""
+    """Return the states and the thrust of an FMU that FMPy steps, as an array of variables x times."""
     description = fmpy.read_model_description(str(folder))
     references = {v.name: v.valueReference for v in description.modelVariables}
     outputs = [references[name] for name in (*rov.layout.state, *rov.layout.thrust)]
@@ -56,7 +56,7 @@ def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureReque
     folder = request.getfixturevalue(f"{name}_dir")
     rng = random.Random(7)
     lengths = [rng.choice([2.0**-10, 2.0**-6, 2.0**-3, 1.0, 16.0]) for _ in range(200)]
-    times = np.cumsum([0.0, *lengths])  # without rounding
+    times = np.cumsum([0.0, *lengths])  # all sums are exact
     drawn = [random_inputs(rng, rov) for _ in times]
     inputs = {name: np.array([each[name] for each in drawn]) for name in rov.layout.inputs}
     start = random_state(rng, rov)
@@ -68,8 +68,8 @@ def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureReque
 def _variations(vehicles: int, times: int) -> dict[str, Array]:
     rng = np.random.default_rng(3)
     return {
-        "u_l": rng.uniform(-1.0, 1.0, times),  # one for all
-        "u_r": rng.uniform(-1.0, 1.0, (vehicles, times))[:, ::-1],  # with strides of its own
+        "u_l": rng.uniform(-1.0, 1.0, times),  # the same for all vehicles
+        "u_r": rng.uniform(-1.0, 1.0, (vehicles, times))[:, ::-1],  # with a negative stride
         "u_t": rng.uniform(-1.0, 1.0, (times, vehicles)).T,
         "a_d_u": rng.uniform(5.0, 20.0, (vehicles, 1)),
         "psi": rng.uniform(-3.0, 3.0, (vehicles, 1)),
@@ -88,7 +88,7 @@ def test_the_number_of_threads_and_vehicles_changes_no_bit() -> None:
         np.testing.assert_array_equal(simulate(VIDEORAY, times, alone).values[:, 0], expected[:, vehicle])
 
 
-def test_what_is_calculated_is_that_of_python() -> None:
+def test_calculated_variables_agree_with_python() -> None:
     times = np.linspace(0.0, 2.0, 5)
     record = [*VIDEORAY.layout.inputs, "der(u)", "der(psi)", *VIDEORAY.layout.thrust]
     values = {"u_l": np.linspace(0.1, 0.9, 5), "u_r": 0.4, "X_ext": -1.0}
@@ -102,7 +102,7 @@ def test_what_is_calculated_is_that_of_python() -> None:
     assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-12, abs=1e-14)
 
 
-def test_a_motion_that_cannot_be_computed_ends_with_nan_and_spoils_no_other() -> None:
+def test_a_motion_that_cannot_be_computed_ends_with_nan_and_affects_no_other() -> None:
     times = np.array([0.0, 1.0, 2.0])
     found = simulate(VIDEORAY, times, {"u": 1.0, "r": [[0.1], [1e300], [0.1]]}, ["u", "psi"], vehicles=3)
     assert found.failed.tolist() == [3, 1, 3]
@@ -147,7 +147,7 @@ def test_ctrl_c_ends_it() -> None:
 
 @pytest.mark.long
 def test_threads_cost_no_processor_time() -> None:
-    """So two cores are nearly twice as fast as one; their wall time depends on what else runs on them."""
+    """Two cores are therefore nearly twice as fast as one. Wall time would also depend on other programs."""
     times, vehicles = np.arange(1001.0) / 10.0, 200
     values = {"u_l": 0.5, "u_r": 0.3, "a_d_u": np.linspace(5.0, 20.0, vehicles)[:, np.newaxis]}
 

@@ -1,9 +1,9 @@
-/* Counts bytes: many instances at once, long lives, and the FMU's shared library loaded again and again (glibc).
+/* Measure memory (glibc): with many instances at once, during many calls, and when the FMU's library is loaded many times.
  *
  * Usage: numbers LIBRARY INSTANCES CYCLES LOADS. Each line of output is a name and a number.
  *
- * Memory is counted twice, neither estimated: bytes allocated, and pages of address space, where all that does not come
- * from malloc shows. Growth is what is there after the last of several equal rounds, less that after the first. */
+ * Memory is measured as allocated bytes and as pages of address space, which include memory that does not come from malloc.
+ * Growth is the difference between the memory after the last of several equal rounds and after the first. */
 #define _GNU_SOURCE
 #include "fmu.h"
 
@@ -11,7 +11,7 @@
 
 enum {
     N_ROUNDS = 4,
-    N_STEPS = 5 /* of each of many instances */
+    N_STEPS = 5 /* steps of each of many instances */
 };
 
 static const char *path;
@@ -62,7 +62,7 @@ static fmi2Component instance(int number)
     return new_instance(name, &callbacks);
 }
 
-/* A step with inputs of its own for every instance and step; the command beyond 1 saturates. */
+/* Step once. The inputs differ between instances and steps; a command beyond 1 saturates. */
 static void step(fmi2Component c, int number, int n)
 {
     fmi2ValueReference vr[N_INPUTS];
@@ -125,7 +125,7 @@ static void crowd(int n)
     report_growth("instances", freed[0], freed[N_ROUNDS - 1]);
 }
 
-/* ---- One instance for long ---- */
+/* ---- Many calls to one instance ---- */
 
 static void steps(fmi2Component c, int n)
 {
@@ -139,7 +139,7 @@ static void resets(fmi2Component c, int n)
     step(c, n % 100, n);
 }
 
-/* Saved, serialized, read into a second state, restored, both freed. */
+/* Save and serialize a state, read it into a second state, restore that, and free both. */
 static void saves(fmi2Component c, int n)
 {
     fmi2FMUstate saved = NULL, read = NULL;
@@ -156,7 +156,7 @@ static void saves(fmi2Component c, int n)
     CHECK(fmi2.FreeFMUstate(c, &saved) == fmi2OK && fmi2.FreeFMUstate(c, &read) == fmi2OK);
 }
 
-/* Each of them logged. */
+/* Make calls that are refused. Each of them writes to the log. */
 static void refusals(fmi2Component c, int n)
 {
     const fmi2ValueReference coefficient = FIRST_COEFFICIENT, derivative = FIRST_CALCULATED, input = 0;
@@ -195,7 +195,7 @@ static void endure(const char *name, void (*cycle)(fmi2Component, int), int cycl
     report_growth(name, after[0], after[N_ROUNDS - 1]);
 }
 
-/* ---- Loaded again and again ---- */
+/* ---- Many loads of the library ---- */
 
 static void reload(int loads)
 {
@@ -217,7 +217,7 @@ int main(int argc, char *argv[])
     path = argv[1];
     const int instances = atoi(argv[2]), cycles = atoi(argv[3]), loads = atoi(argv[4]);
     CHECK(instances > 0 && cycles >= 10 * N_ROUNDS && loads >= N_ROUNDS);
-    memory_now(); /* what it allocates itself for good is there before anything is counted */
+    memory_now(); /* its own allocations must not be counted later */
     reload(loads);
     load_fmu(path);
     crowd(instances);

@@ -1,4 +1,4 @@
-/* The motion of a vehicle for Python, without FMI: all variables by place. */
+/* The motion of a vehicle for Python, without FMI. The arrays have all variables by their places. */
 #include "model.h"
 
 #include "series.c"
@@ -9,7 +9,7 @@ int step(double at[N_VARIABLES], double h);
 void calculate(double at[N_VARIABLES]);
 void tangent(const double at[N_VARIABLES], double d[N_VARIABLES]);
 
-/* Returns the number of pieces, or 0 where they would be too many. */
+/* Step h seconds. Return the number of pieces, or 0 when there would be too many. */
 int step(double at[N_VARIABLES], double h)
 {
     model_numbers n;

@@ -1,4 +1,4 @@
-"""A step of a vehicle in Python and in C, and how far it is from the exact one."""
+"""Steps of a vehicle in Python and in C, and their errors."""
 
 import ctypes
 from collections.abc import Callable, Mapping
@@ -20,7 +20,7 @@ ROUNDING = 2.0**-52
 
 
 class Motion:
-    """The generated C of a vehicle, without FMI."""
+    """The generated C of a vehicle, compiled without FMI."""
 
     def __init__(self, rov: Rov, folder: Path) -> None:
         self.rov = rov
@@ -50,14 +50,14 @@ class Motion:
 
 
 def in_python(rov: Rov, inputs: Values, state: Values, h: float, steps: int = 1) -> State:
-    """The state after equal steps that last h together."""
+    """Return the states after h seconds in equal steps."""
     for _ in range(steps):
         state = rov.step(inputs, state, h / steps)
     return dict(state)
 
 
 def in_fmu(fmu: Fmu, rov: Rov, inputs: Values, state: Values, h: float, steps: int = 1) -> State:
-    """The state of a new instance after equal steps that last h together."""
+    """Return the states of a new instance of an FMU after h seconds in equal steps."""
     with fmu.instance() as instance:
         instance.start({**rov.coefficients, **inputs, **state})
         for n in range(steps):
@@ -66,7 +66,10 @@ def in_fmu(fmu: Fmu, rov: Rov, inputs: Values, state: Values, h: float, steps: i
 
 
 def errors(found: Values, exact: Mapping[str, Any], scale: Mapping[str, Any], before: Values) -> tuple[float, float]:
-    """Largest error of velocities and forces, and of the pose beyond the rounding of a pose that is far from zero."""
+    """Return the largest relative errors of velocities and forces, and of the pose.
+
+    The rounding error of a pose that is far from zero does not count.
+    """
     largest = [0.0, 0.0]
     for name, value in found.items():
         error = abs(value - exact[name])
@@ -79,6 +82,6 @@ def errors(found: Values, exact: Mapping[str, Any], scale: Mapping[str, Any], be
 
 
 def worst(step: Step, rov: Rov, inputs: Values, state: Values, h: float) -> tuple[float, float]:
-    """Errors of a step against the exact one, by the largest velocity on the way and by the length of the path."""
+    """Return the errors of a step, relative to the largest velocity and to the length of the path."""
     exact = reference.step(rov, inputs, state, h)
     return errors(step(rov, inputs, state, h), exact.state, exact.scale, state)

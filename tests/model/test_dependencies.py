@@ -1,4 +1,4 @@
-"""Dependencies follow from the equation alone: a term that is added to it appears in them, with the right kind."""
+"""Dependencies follow from the equation alone: a new term of the equation appears in them with the right kind."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ ADDED = {
     "a choice by a state": (Term("(2 if psi < 0 else 1)", ("z",)), "dependent", ()),
     "a coefficient of zero": (Term("0", ()), None, ()),
 }
-"""A term that is added to the rate of u, the kind of the dependency on z, and the parameters that it brings."""
+"""For each case: a term that is added to the rate of u, the expected kind of dependency on z, and its parameters."""
 
 
 @pytest.mark.parametrize("case", ADDED)
@@ -46,7 +46,7 @@ def test_a_term_that_is_added_to_the_equation_is_found(case: str, monkeypatch: p
 
 
 def test_every_kind_of_dependency_of_a_vehicle_with_lag() -> None:
-    """As one reads them off the equations of the BlueROV2 Heavy."""
+    """The expected kinds can be read off the equations of the BlueROV2 Heavy."""
     found = dependencies_of(HEAVY.layout)
     assert found["der(z)"] == {"w": "constant"}
     assert found["der(F_1)"]["F_1"] == "fixed"

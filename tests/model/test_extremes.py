@@ -1,4 +1,4 @@
-"""Steps and loads beyond all reason end soon, with a finite result or an error that keeps the state of before."""
+"""Steps with absurd sizes and loads end soon, with a finite result or with an error that keeps the state."""
 
 import math
 import random
@@ -16,7 +16,7 @@ _DRAG = [("a_d_u", "b_d_u"), ("a_d_r", "b_d_r")]
 
 
 def _cases() -> list[tuple[float, dict[str, float]]]:
-    """Step sizes and what is set: where no drag bounds the motion, where forces overflow, and at random."""
+    """Return step sizes and values to set: motions without drag, forces that overflow, and random values."""
     ahead = {"u_l": 0.3}
     cases = [(10.0**power, ahead | {a: 0.0, b: 0.0}) for power in (140, 160, 300) for a, b in _DRAG]
     cases += [(6e-6, {"N_ext": 1.1e118, "u": 1e90}), (2.0, {"N_ext": -2.4e108, "u": 1e100}), (1e308, ahead)]
@@ -31,7 +31,7 @@ def _cases() -> list[tuple[float, dict[str, float]]]:
 
 
 def step_them_all(folder: str) -> None:
-    """Every case in an instance of its own; AssertionError names the one that fails."""
+    """Step an instance for each case. An AssertionError names the case that fails."""
     fmu = Fmu(Path(folder))
     states = fmu.states
     for h, values in _cases():
@@ -49,8 +49,8 @@ def step_them_all(folder: str) -> None:
             assert seconds < 1.0, case
 
 
-def test_steps_beyond_all_reason_end(videoray_dir: Path) -> None:
-    # in a process of its own: a step that does not end could not be interrupted
+def test_steps_of_absurd_size_end(videoray_dir: Path) -> None:
+    # in a separate process, because a step that does not end cannot be interrupted
     code = f"from tests.model.test_extremes import step_them_all; step_them_all({str(videoray_dir)!r})"
     root = Path(__file__).parent.parent.parent
     try:

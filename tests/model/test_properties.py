@@ -1,4 +1,4 @@
-"""Laws of the step of one axis, for every drag, force, velocity and time: the step in Python judged by itself."""
+"""Laws that the step of one axis obeys for every drag, force, velocity and time, tested without a reference."""
 
 from collections.abc import Callable, Sequence
 from math import e, inf
@@ -33,11 +33,11 @@ from verification.references.closed_form import time_to_rest
 def for_every(
     *strategies: st.SearchStrategy[Any], at: Sequence[tuple[Any, ...]] = ()
 ) -> Callable[[Callable[..., None]], Callable[[int], None]]:
-    """Make a law a test: at these places, on some hundred motions, and on many more in the long and weekly tests."""
+    """Make a test of a law: for the cases in `at`, and for random motions, many more of them in the long tests."""
 
     def decorate(law: Callable[..., None]) -> Callable[[int], None]:
         @pytest.mark.parametrize(
-            "motions", [150, pytest.param(750, marks=pytest.mark.long), pytest.param(3000, marks=pytest.mark.weekly)]
+            "motions", [60, pytest.param(750, marks=pytest.mark.long), pytest.param(3000, marks=pytest.mark.weekly)]
         )
         def test(motions: int) -> None:
             hold(law, motions, *strategies, at=at)
@@ -63,13 +63,13 @@ def test_units_of_powers_of_two_change_no_bit(case: Case, metres: int, seconds: 
     A, B, C, v0, h = case
     m, s = 2.0**metres, 2.0**seconds
     velocity, distance = step_alone(*case)
-    assume(abs(velocity) > 1e-290 or C == v0 == 0.0)  # not what has died out to some last digits
+    assume(abs(velocity) > 1e-290 or C == v0 == 0.0)  # a subnormal velocity has fewer digits
     assert step_alone(A / m, B / s, C * m / s / s, v0 * m / s, h * s) == (velocity * m / s, distance * m)
 
 
 @for_every(CASES, st.just(0.5) | st.floats(0.5, 1.0), st.booleans(), at=[(case, 0.5, True) for case in BOUNDARIES])
 def test_two_parts_of_a_step_are_the_step(case: Case, fraction: float, longer_first: bool) -> None:
-    """Half steps above all. The second part takes the first one's rounding on: never enlarged, for drag only damps."""
+    """Many of the parts are half steps. Drag only damps the rounding error of the first part."""
     A, B, C, v0, h = case
     parts = [fraction * h, h - fraction * h]  # the difference is exact
     assume(parts[1] > 0.0)
@@ -79,7 +79,7 @@ def test_two_parts_of_a_step_are_the_step(case: Case, fraction: float, longer_fi
     end, second = step_alone(A, B, C, middle, t2)
     rounding = rounding_of_velocity(v0, velocity)
     assert abs(end - velocity) <= 3.0 * rounding
-    # Where the force does not brake, nothing cancels, and a velocity is good to its own last digits.
+    # Without a braking force nothing cancels, and the rounding error is relative to the velocity itself.
     passed_on = rounding if C < 0.0 < v0 or v0 < 0.0 < C else rounding_of_velocity(middle)
     slowest = min(abs(middle), abs(end)) if middle * end > 0.0 else 0.0
     allowed = 2.0 * rounding_of_distance(case) + passed_on * memory(A, B, t2, slowest)
@@ -117,21 +117,21 @@ def test_without_force_and_drag_no_bit_of_the_velocity_changes(v0: float, h: flo
 
 @for_every(CASES, at=[(case,) for case in [*BOUNDARIES, (0.0, 1e-280, 1e-280, 0.0, 1.0)]])
 def test_after_the_time_constant_a_start_from_rest_has_63_percent_of_the_steady_velocity(case: Case) -> None:
-    """Rounding of Tau counts by the acceleration, C at most, and C Tau is V_ss at most."""
+    """The rounding error of Tau is multiplied by the acceleration, which is at most C, and C Tau is at most V_ss."""
     A, B, C, _, _ = case
     V, Tau = steady_velocity(A, B, C), time_constant(A, B, C)
     assume(0.0 < abs(V) < inf and 0.0 < Tau < inf)
-    assume(abs(C) > 1e-290 and abs(V) < 1e150)  # what is subnormal has fewer digits; the square of V must not overflow
-    assume(abs(V) * Tau < inf)  # nor the distance: such a step is refused
+    assume(abs(C) > 1e-290 and abs(V) < 1e150)  # no subnormal numbers, and the square of V does not overflow
+    assume(abs(V) * Tau < inf)  # the distance does not overflow: such a step is refused
     velocity = step_alone(A, B, C, 0.0, Tau)[0]
     assert abs(velocity - (1.0 - 1.0 / e) * V) <= 2.0 * rounding_of_velocity(V)
 
 
 @for_every(CASES, at=[((0.0, 1e-170, -1e-300, 1.0, 1.0),), ((1e-200, 0.0, -1e-200, 1.0, 1.0),)])
 def test_a_motion_against_the_force_is_at_rest_after_the_time_to_rest(case: Case) -> None:
-    """Rounding of that time counts by the force alone, and |C| times the time is |v0| at most: drag brakes, too.
+    """The rounding error of the time is multiplied by |C|, and |C| times the time is at most |v0| because drag brakes.
 
-    An acceleration that is subnormal is off by its last digit all that time.
+    A subnormal acceleration has an error of its last digit all that time.
     """
     A, B, C, v0, _ = case
     assume(C != 0.0 != v0)
@@ -146,17 +146,17 @@ def test_a_motion_against_the_force_is_at_rest_after_the_time_to_rest(case: Case
 
 @for_every(CASES, at=[(case,) for case in BOUNDARIES])
 def test_drag_takes_no_less_energy_than_at_an_even_speed_and_gives_none(case: Case) -> None:
-    """Of the work C s what v^2/2 did not gain: integral of B v^2 + A |v|^3.
+    """The lost energy is the work C s minus the gain of v^2/2. It is the integral of B v^2 + A |v|^3.
 
-    Over a given path that is least at an even speed (Jensen) and most at the largest; without drag it is zero.
+    Over a given path it is least at an even speed (Jensen) and at most that at the largest speed.
     """
     A, B, C, v0, h = case
     velocity, distance = step_alone(*case)
-    fastest, way = max(abs(v0), abs(velocity)), path(*case)
+    fastest, length = max(abs(v0), abs(velocity)), path(*case)
     lost = C * distance - 0.5 * (velocity - v0) * (velocity + v0)
-    even, most = (B * way / h + A * (way / h) ** 2) * way, (B + A * fastest) * fastest * way
+    even, most = (B * length / h + A * (length / h) ** 2) * length, (B + A * fastest) * fastest * length
     rounding = 2.0 * fastest * rounding_of_velocity(fastest) + abs(C) * rounding_of_distance(case)
-    rounding += 4.0 * (B * way / h + A * (way / h) ** 2) * rounding_of_distance(case) + 1e-15 * most + TINY
+    rounding += 4.0 * (B * length / h + A * (length / h) ** 2) * rounding_of_distance(case) + 1e-15 * most + TINY
     assert even - rounding <= lost <= most + rounding
 
 
@@ -165,41 +165,42 @@ def test_drag_takes_no_less_energy_than_at_an_even_speed_and_gives_none(case: Ca
 
 @for_every(CASES, st.tuples(*[OFFSET] * 5), at=[(case, (1e-9, -1e-9, 1e-9, -1e-9, 1e-9)) for case in BOUNDARIES])
 def test_motions_that_begin_alike_stay_alike(case: Case, offsets: tuple[float, float, float, float, float]) -> None:
-    """Across a change of sign, of D^2, of formula, across the turn: by how much follows from the equation.
+    """This holds across a change of sign, of D^2 or of formula, and across a reversal.
 
     The difference of two motions grows by the difference of their accelerations at one velocity, and drag only damps
-    it. Acceleration is largest at the start.
+    it. The acceleration is largest at the start.
     """
     A, B, C, v0, h = case
     velocity, distance = step_alone(*case)
     fastest = max(abs(v0), abs(velocity))
     assume(fastest > 1e-140)  # its square, a product of the table of terms, is not subnormal
-    # relative, and relative to what matters within the time, so that zeros are crossed, too
+    # offsets relative to each number and to a typical size, so that zeros are crossed, too
     units = (1.0 / (fastest * h), 1.0 / h, fastest / h, fastest, 0.0)
     A2, B2, C2, v2, h2 = (
         number + offset * (abs(number) + unit) for number, offset, unit in zip(case, offsets, units, strict=True)
     )
     A2, B2 = max(A2, 0.0), max(B2, 0.0)
     near: Case = (A2, B2, C2, v2, h2)
-    other, way = step_alone(*near)
-    apart = abs(C2 - C) + (abs(B2 - B) + abs(A2 - A) * fastest) * fastest
-    felt = memory(A2, B2, h)
-    difference = abs(v2 - v0) + apart * felt
+    near_velocity, near_distance = step_alone(*near)
+    acceleration = abs(C2 - C) + (abs(B2 - B) + abs(A2 - A) * fastest) * fastest
+    time = memory(A2, B2, h)
+    difference = abs(v2 - v0) + acceleration * time
     later = abs(C2 - (B2 + A2 * abs(v2)) * v2) * abs(h2 - h)
-    assert abs(other - velocity) <= difference + later + 2.0 * rounding_of_velocity(fastest, v2, other)
-    along = abs(v2 - v0) * felt + apart * felt * h + max(abs(v2), abs(other), fastest + difference) * abs(h2 - h)
-    assert abs(way - distance) <= along + rounding_of_distance(case) + rounding_of_distance(near)
+    assert abs(near_velocity - velocity) <= difference + later + 2.0 * rounding_of_velocity(fastest, v2, near_velocity)
+    largest = max(abs(v2), abs(near_velocity), fastest + difference)
+    moved = abs(v2 - v0) * time + acceleration * time * h + largest * abs(h2 - h)
+    assert abs(near_distance - distance) <= moved + rounding_of_distance(case) + rounding_of_distance(near)
 
 
 # ---- Limits ----
 
 
-def agree(case: Case, exact: tuple[Any, Any], apart: float) -> None:
-    """The motion and an elementary one, whose accelerations are `apart` at most."""
+def agree(case: Case, exact: tuple[Any, Any], difference: float) -> None:
+    """Compare a motion with an elementary one. Their accelerations differ at most by `difference`."""
     velocity, distance = step_alone(*case)
     A, B, _, v0, h = case
-    assert abs(velocity - exact[0]) <= apart * memory(A, B, h) + rounding_of_velocity(v0, velocity)
-    assert abs(distance - exact[1]) <= apart * memory(A, B, h) * h + rounding_of_distance(case)
+    assert abs(velocity - exact[0]) <= difference * memory(A, B, h) + rounding_of_velocity(v0, velocity)
+    assert abs(distance - exact[1]) <= difference * memory(A, B, h) * h + rounding_of_distance(case)
 
 
 FAINT = st.just(0.0) | st.just(SMALLEST) | power(-300.0, -6.0)

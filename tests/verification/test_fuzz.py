@@ -116,8 +116,8 @@ PLANTED = {
     "overflow is not looked at": ("instance.c", "if (sum != 0.0) {", "if (sum > 0.0) {", "broken property"),
     "a failed step moves the time": (
         "instance.c",
-        "    TRY(is_step(f, t, h));\n    TRY(advance",
-        "    TRY(is_step(f, t, h));\n    f->now.time = t;\n    TRY(advance",
+        "    TRY(check_step(f, t, h));\n    TRY(advance",
+        "    TRY(check_step(f, t, h));\n    f->now.time = t;\n    TRY(advance",
         "fmi2DoStep changes instance",
     ),
     "a rate of an output is not that of the motion": (
