@@ -5,7 +5,13 @@ from typing import Any
 
 import pytest
 from fmpy.fmi2 import fmi2CallbackFunctions
-from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
+from fmpy.fmi3 import (
+    fmi3ClockUpdateCallback,
+    fmi3IntermediateUpdateCallback,
+    fmi3LockPreemptionCallback,
+    fmi3LogMessageCallback,
+    fmi3UnlockPreemptionCallback,
+)
 
 from tests import fmi2, fmi3
 from tests.fmi import CO_SIMULATION, ERROR, MODEL_EXCHANGE, OK, Message, references, room
@@ -156,8 +162,9 @@ def test_intermediate_variables_without_a_callback_are_those_of_some_importers(f
 def test_there_is_no_scheduled_execution(fmu3: fmi3.Fmu) -> None:
     log: list[Message] = []
     logger = fmi3.recorder(log)
+    callbacks = fmi3ClockUpdateCallback(), fmi3LockPreemptionCallback(), fmi3UnlockPreemptionCallback()  # NULL
     for logging in (False, True):
-        arguments = (b"rov", fmu3.token, None, False, logging, None, logger, None, None, None)
+        arguments = (b"rov", fmu3.token, None, False, logging, None, logger, *callbacks)
         assert fmu3.dll.fmi3InstantiateScheduledExecution(*arguments) is None
     (message,) = log
     assert (message.status, message.text) == (
