@@ -1,4 +1,4 @@
-"""From a vehicle to its FMU: page and content made, compiled, written, validated and run."""
+"""Build the FMU of a vehicle: make its content, compile, write, validate and run it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,20 +23,20 @@ BACKENDS = ("native", "pythonfmu")
 
 @dataclass(frozen=True)
 class Built:
-    """What a build made."""
+    """The result of a build."""
 
     path: Path
     size: int
-    """Of the archive in bytes."""
+    """The size of the archive in bytes."""
     guid: str
     binaries: Mapping[str, int]
-    """Size in bytes by platform; none in the flavour in pure Python."""
+    """The size of each binary in bytes by platform; none in pure Python."""
     seconds: Mapping[str, float]
-    """Until each platform was compiled."""
+    """The time until each platform was compiled."""
     note: str
-    """What was found when the FMU was validated and run."""
+    """The result of validating and running the FMU."""
     beside: Sequence[Path]
-    """What was written beside it."""
+    """The other files that were written."""
 
 
 def build(
@@ -50,18 +50,18 @@ def build(
     inputs: Sequence[Path] = (),
     on_compiled: Callable[[str], None] = lambda _: None,
 ) -> Built:
-    """Build the FMU of a vehicle, validate it and run it; it is written whole or not at all.
+    """Build the FMU of a vehicle, validate it and run it. After a failure no file is written.
 
-    `output` is the file to write: by default <identifier>.fmu in this folder, for FMI 3.0 <identifier>.fmi3.fmu.
-    `platforms` names one or several of PLATFORMS, or `host`, which is this machine; all by default. `backend` is
-    `native`, or `pythonfmu` for the flavour in pure Python, which is the same for all platforms. `fmi` is the version
-    of FMI, 2 or 3. `osp` also writes <identifier>_OspModelDescription.xml beside the FMU. `pythonfmu` and `osp` need
-    FMI 2.0. `inputs` are files that must not be overwritten, besides those that the vehicle names. `on_compiled` is
-    called with the name of each platform when it is done.
+    `output` is the file to write, by default <identifier>.fmu or <identifier>.fmi3.fmu in the current folder.
+    `platforms` names one or several of PLATFORMS, or `host` for this machine; by default it is all. `backend` is
+    `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms. `fmi` is the version
+    of FMI, 2 or 3. `osp` also writes <identifier>_OspModelDescription.xml to the folder of the FMU. `pythonfmu` and
+    `osp` need FMI 2.0. `inputs` are further files that must not be overwritten, like those that the vehicle names.
+    `on_compiled` is called with the name of each platform that has been compiled.
 
-    Raises InputError where `vehicle` is not a vehicle, or has coefficients that it cannot have; OptionError about the
-    other arguments; BuildError where the build fails; VehicleFileError where a file of the vehicle cannot be read;
-    WriteError, an OSError, about a path that cannot be written.
+    Raises InputError if `vehicle` is not a vehicle or its coefficients are invalid; OptionError if another argument
+    is; BuildError if the build fails; VehicleFileError if a file of the vehicle cannot be read; WriteError, an
+    OSError, if a path cannot be written.
     """
     if not isinstance(vehicle, Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
@@ -109,14 +109,14 @@ def build(
 
 
 def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[str]:
-    """Platforms by name, `host` resolved for this version of FMI; all where none is named. Raises BuildError."""
+    """Return the platforms with these names, with `host` resolved; all if there are no names. Raises BuildError."""
     if not names:
         return list(PLATFORMS)
     names = [names] if isinstance(names, str) else names
     if unknown := set(names) - {"host", *PLATFORMS}:
         hint = did_you_mean(min(unknown), ["host", *PLATFORMS], also=OTHER_NAMES)
-        names_of_all = ", ".join(["host", *PLATFORMS])
-        raise BuildError(f"there is no platform {', '.join(sorted(unknown))}, only {names_of_all}{hint}")
+        all_names = ", ".join(["host", *PLATFORMS])
+        raise BuildError(f"there is no platform {', '.join(sorted(unknown))}, only {all_names}{hint}")
     host = host_platform(fmi)
     if "host" in names and host is None:
         raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")
@@ -124,19 +124,19 @@ def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[st
 
 
 def _folder(name: str, fmi: int) -> str:
-    """Of binaries/."""
+    """Return the folder of a platform in binaries/."""
     return name if fmi == 2 else PLATFORMS[name].folder
 
 
 def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: int) -> str:
-    """Validate and run an FMU; what to tell. Raises BuildError."""
+    """Validate and run an FMU, and return a summary of the result. Raises BuildError."""
     import fmpy
     from fmpy.validation import validate_fmu
 
     if problems := validate_fmu(str(path)):
         raise BuildError(f"the FMU is not valid: {problems[0]}")
     loaded = fmpy.platform if fmi == 2 else fmpy.platform_tuple
-    # FMPy runs nothing without a binary for a platform that it knows, even where it loads another one
+    # FMPy refuses to run an FMU without a binary in a folder that it knows, although it may load another folder
     known = fmpy.platform in fmpy.supported_platforms(str(path))
     if platforms is not None and not (known and loaded in [_folder(name, fmi) for name in platforms]):
         return "valid; not run, for it has no binary that FMPy loads on this machine"

@@ -1,4 +1,4 @@
-"""Every command that writes a file, to run in this process or, many of them, in one other."""
+"""Every command that writes a file, and functions that run commands in this process or in another."""
 
 import json
 import os
@@ -18,23 +18,23 @@ REFIT = SHIPPED["videoray_refit"]
 TESTS = REFIT.parent / "tank_tests"
 """The tank tests that ship."""
 BARE = ROOT / "verification" / "fuzzing" / "bare.toml"
-"""A vehicle that is built soon: one axis, one thruster."""
+"""A vehicle that builds quickly, with one axis and one thruster."""
 ALONE = re.sub(r"^(data|pictures) = .*\n", "", VIDEORAY.read_text(encoding="utf-8"), flags=re.M)
-"""The VideoRay's vehicle file without the folders beside it."""
+"""The VideoRay's vehicle file without references to the folders of its data and pictures."""
 _TUNE = ["tune", str(VIDEORAY), "--axis", "heave", "--command", "0.3", "--v-ss", "0.2"]
 
 
 @dataclass(frozen=True)
 class Command:
-    """How a command is told what to write."""
+    """A command that writes a file."""
 
     name: str
-    """Of the file that it writes."""
+    """The name of the file that it writes."""
     arguments: Callable[[Path], Sequence[str]]
-    """By the path of that file."""
+    """A function that returns the arguments for the path of that file."""
 
     def run(self, target: Path) -> int:
-        """Run it in this process."""
+        """Run the command in this process, and return its exit code."""
         return main(list(self.arguments(target)))
 
 
@@ -67,10 +67,10 @@ print(json.dumps(ends))
 def run_elsewhere(
     commands: Sequence[tuple[Command, Path]], folder: Path, prefix: Sequence[str] = (), **how: Any
 ) -> list[tuple[int, str]]:
-    """Run commands in one other process, its temporary files in a folder: their exit codes and what they say."""
-    asked = json.dumps([list(command.arguments(target)) for command, target in commands])
+    """Run commands in another process with its temporary files in a folder. Return their exit codes and errors."""
+    arguments = json.dumps([list(command.arguments(target)) for command, target in commands])
     result = subprocess.run(
-        [*prefix, sys.executable, "-c", _DRIVER, asked],
+        [*prefix, sys.executable, "-c", _DRIVER, arguments],
         cwd=ROOT,
         env=os.environ | {"TMPDIR": str(folder)},
         capture_output=True,
@@ -84,7 +84,7 @@ def run_elsewhere(
 def start(
     arguments: Sequence[str], *, environment: Mapping[str, str] | None = None, **how: Any
 ) -> subprocess.Popen[str]:
-    """Start a command line as a process of its own."""
+    """Start a command line in another process."""
     inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.Popen(
         [sys.executable, "-m", "rov_fmu", *arguments],

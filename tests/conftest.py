@@ -1,4 +1,4 @@
-"""The FMU under test: built once a run by the exporter's own command line, for this machine."""
+"""The FMUs under test, built for this machine once in a run, by the command line of the exporter."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -29,7 +29,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Take a weekly test out of the long ones, to which another of its parameters may belong."""
+    """Remove the marker `long` from a weekly test, which it may have from another of its parameters."""
     if item.get_closest_marker("weekly"):
         item.own_markers = [mark for mark in item.own_markers if mark.name != "long"]
 
@@ -45,20 +45,21 @@ def heavy() -> Vehicle:
 
 
 Made = Callable[[str, Callable[[Path], object]], Path]
-"""A folder of this name, and what fills it."""
+"""A function that returns the folder with a name, and calls another function to fill it if it is new."""
 
 
 @pytest.fixture(scope="session")
 def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFactory) -> Made:
-    """A folder that is made once a run, by the worker that needs it first; tests only read it."""
-    own = tmp_path_factory.getbasetemp()
-    of_run = own.parent if hasattr(pytestconfig, "workerinput") else own  # a run inside a worker is a run of its own
-    of_all = of_run / "made once"  # apart from the folders that mktemp() names
-    of_all.mkdir(exist_ok=True)
+    """Make a folder once in a run, by the worker that needs it first. Tests only read it."""
+    base = tmp_path_factory.getbasetemp()
+    if hasattr(pytestconfig, "workerinput"):  # all workers of a run share the parent folder
+        base = base.parent
+    shared = base / "made once"  # a name that mktemp() does not use
+    shared.mkdir(exist_ok=True)
 
     def made(name: str, fill: Callable[[Path], object]) -> Path:
-        folder, draft = of_all / name, tmp_path_factory.mktemp("draft")
-        with FileLock(of_all / f"{name}.lock"):
+        folder, draft = shared / name, tmp_path_factory.mktemp("draft")
+        with FileLock(shared / f"{name}.lock"):
             if not folder.exists():
                 fill(draft)
                 draft.rename(folder)
@@ -68,7 +69,7 @@ def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFact
 
 
 def _videoray(folder: Path, fmi: int) -> None:
-    """The VideoRay's FMU, and what is in it."""
+    """Build the VideoRay's FMU into a folder, and unzip it there."""
     path = folder / f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"
     assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(path)]) == 0
     fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
@@ -96,7 +97,7 @@ def videoray3_dir(videoray3_fmu: Path) -> Path:
 
 
 def unzipped(vehicle: Path, folder: Path, fmi: int = 2) -> Path:
-    """The folder of the FMU of a vehicle, without its page."""
+    """Write the unzipped FMU of a vehicle, without its page, to a folder, and return the folder."""
     content = native_content(load_vehicle(vehicle), fmi=fmi)
     (library,) = compile_all(chosen_platforms(["host"], fmi), content.sources, content.identifier, fmi=fmi).values()
     host = fmpy.platform if fmi == 2 else fmpy.platform_tuple
@@ -109,23 +110,23 @@ def unzipped(vehicle: Path, folder: Path, fmi: int = 2) -> Path:
 
 @pytest.fixture(scope="session")
 def heavy_dir(made_once: Made) -> Path:
-    """The FMU of the BlueROV2 Heavy, which has sway, lag and coupling."""
+    """Return the unzipped FMU of the BlueROV2 Heavy, which has sway, lag and coupling."""
     return made_once("heavy", lambda folder: unzipped(SHIPPED["bluerov2_heavy"], folder))
 
 
 @pytest.fixture(scope="session")
 def everything_dir(made_once: Made) -> Path:
-    """The FMU of a vehicle that has all that one can have."""
+    """Return the unzipped FMU of a vehicle with every effect."""
     return made_once("everything", lambda folder: unzipped(EVERYTHING, folder))
 
 
 @pytest.fixture(scope="session")
 def heavy3_dir(made_once: Made) -> Path:
-    """The FMU of FMI 3.0 of the BlueROV2 Heavy."""
+    """Return the unzipped FMU of FMI 3.0 of the BlueROV2 Heavy."""
     return made_once("heavy3", lambda folder: unzipped(SHIPPED["bluerov2_heavy"], folder, fmi=3))
 
 
 @pytest.fixture(scope="module")
 def fmu(videoray_dir: Path) -> Fmu:
-    """The shared library, loaded for one file of tests."""
+    """Return the VideoRay's FMU, with its shared library loaded for one file of tests."""
     return Fmu(videoray_dir)

@@ -1,28 +1,30 @@
-"""What the wrappers of both versions of FMI share: functions return a status, nothing raises.
+"""Call the functions of an FMU of either version of FMI with any arguments, and get their status.
 
-Functions can be called by the name that both versions have, which is that of FMI 3.0 without its prefix.
+FMPy's classes raise an exception for an error and replace some arguments, so only their prototypes are used here.
+A function can be called by a common name, which is the name in FMI 3.0 without its prefix.
 """
 
 import ctypes
+import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from ctypes import POINTER, c_char, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import c_char, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
-from types import TracebackType
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+from types import TracebackType, UnionType
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar, get_args
 
 import fmpy
 
 OK, WARNING, DISCARD, ERROR = range(4)
 MODEL_EXCHANGE, CO_SIMULATION, WITH_EVENTS = range(3)
-"""Kinds of instances; of FMI 3.0 alone is Co-Simulation with Event Mode."""
+"""The kinds of instances. Only FMI 3.0 has Co-Simulation with Event Mode."""
 INTERFACES = {
     CO_SIMULATION: "Co-Simulation",
     MODEL_EXCHANGE: "Model Exchange",
     WITH_EVENTS: "Co-Simulation with Event Mode",
 }
 
-# The modes as the log names them.
+# The names of the modes in the log.
 INSTANTIATED = "Instantiated"
 INITIALIZATION = "Initialization Mode"
 STEP = "Step Mode"
@@ -31,39 +33,36 @@ CONTINUOUS = "Continuous-Time Mode"
 INTERMEDIATE = "Intermediate Update Mode"
 TERMINATED = "Terminated"
 FAILED = "Error"
-# Nothing that a call computes puts Model Exchange into error mode.
 MODES = {
     CO_SIMULATION: (INSTANTIATED, INITIALIZATION, STEP, TERMINATED, FAILED),
     MODEL_EXCHANGE: (INSTANTIATED, INITIALIZATION, EVENT, CONTINUOUS, TERMINATED),
 }
+"""The modes of the kinds that both versions have. No call puts an instance of Model Exchange into error mode."""
 EVERY_MODE = [(kind, mode) for kind, modes in MODES.items() for mode in modes]
-"""In both versions."""
 
-REALS, INTEGERS, STRINGS, SIZES = POINTER(c_double), POINTER(c_int), POINTER(c_char_p), POINTER(c_size_t)
-REFERENCES, BYTES, STATE = POINTER(c_uint), POINTER(c_char), POINTER(c_void_p)
-
+Prototypes = Mapping[str, tuple[Any, list[Any]]]
+"""The type of the result and of the arguments of each function of an FMU."""
 Signatures = Mapping[str, tuple[Any, ...]]
-"""Functions whose first argument is the instance and whose result a status: their further arguments."""
-ALIKE: Signatures = {
-    "ExitInitializationMode": (),
-    "Terminate": (),
-    "Reset": (),
-    "GetFMUState": (STATE,),
-    "SetFMUState": (c_void_p,),
-    "FreeFMUState": (STATE,),
-    "SerializedFMUStateSize": (c_void_p, SIZES),
-    "SerializeFMUState": (c_void_p, BYTES, c_size_t),
-    "DeserializeFMUState": (BYTES, c_size_t, STATE),
-    "EnterEventMode": (),
-    "EnterContinuousTimeMode": (),
-    "SetTime": (c_double,),
-    "SetContinuousStates": (REALS, c_size_t),
-    "GetContinuousStateDerivatives": (REALS, c_size_t),
-    "GetEventIndicators": (REALS, c_size_t),
-    "GetContinuousStates": (REALS, c_size_t),
-    "GetNominalsOfContinuousStates": (REALS, c_size_t),
-}
-"""By their common names."""
+"""The types of the arguments after the instance, for functions that return a status."""
+
+
+def prototypes(version: int, *classes: type) -> Prototypes:
+    """Return the prototypes of the functions of a version of FMI, as FMPy's classes annotate them."""
+    result_types = {int: c_int, bytes: c_char_p}
+    found = {}
+    for wrapper in classes:
+        for name in (name for name in dir(wrapper) if name.startswith(f"fmi{version}")):
+            signature = inspect.signature(getattr(wrapper, name))
+            _, *annotations = (parameter.annotation for parameter in signature.parameters.values())
+            arguments = [get_args(a)[0] if isinstance(a, UnionType) else a for a in annotations]
+            returned = signature.return_annotation
+            found[name] = result_types.get(returned, returned), arguments
+    return found
+
+
+def signatures(of: Prototypes) -> dict[str, tuple[Any, ...]]:
+    """Return the signatures of the functions that return a status."""
+    return {name: tuple(arguments[1:]) for name, (returned, arguments) in of.items() if returned is c_int}
 
 
 def reals(*values: float) -> Any:
@@ -83,18 +82,18 @@ def strings(*values: bytes | None) -> Any:
 
 
 def room(n: int = 1) -> Any:
-    """For numbers, filled with one that nothing is."""
+    """Return an array for results, filled with a number that is no result of any test."""
     return reals(*[-7.0] * n)
 
 
 def contents(arguments: Sequence[Any]) -> list[bytes]:
-    """What arguments point to."""
+    """Return the bytes of the arrays and structures that arguments are or point to."""
     pointed = [a.contents if hasattr(a, "contents") else a for a in arguments]
     return [bytes(a) for a in pointed if isinstance(a, (ctypes.Array, ctypes.Structure, ctypes._SimpleCData))]
 
 
 class Message(NamedTuple):
-    """What the logger was given; of FMI 2.0 the text is still a printf format, of FMI 3.0 there is no instance."""
+    """The arguments of the logger. In FMI 2.0 the text is a printf format; in FMI 3.0 the instance is empty."""
 
     status: int
     category: str
@@ -103,13 +102,14 @@ class Message(NamedTuple):
 
 
 class Fmu(ABC):
-    """An unzipped FMU: its description as FMPy reads it, and its shared library for this machine."""
+    """An unzipped FMU with its description and its shared library for this machine."""
 
+    PROTOTYPES: ClassVar[Prototypes]
     SIGNATURES: ClassVar[Signatures]
     VERSION: ClassVar[int]
     PLATFORM: ClassVar[str]
     RENAMED: ClassVar[Mapping[str, str]] = {}
-    """Names that differ from those of FMI 3.0."""
+    """The names without prefix that differ from those of FMI 3.0, by the common name."""
 
     def __init__(self, folder: Path, library: Path | None = None) -> None:
         self.folder = folder
@@ -125,17 +125,18 @@ class Fmu(ABC):
             "binaries", self.PLATFORM, self.description.coSimulation.modelIdentifier + fmpy.sharedLibraryExtension
         )
         self.dll = ctypes.CDLL(str(self.library))
-        for name, arguments in self.SIGNATURES.items():
-            getattr(self.dll, name).argtypes = (c_void_p, *arguments)
+        for name, (returned, arguments) in self.PROTOTYPES.items():
+            function = getattr(self.dll, name)
+            function.restype, function.argtypes = returned, arguments
 
     @classmethod
     def name(cls, function: str) -> str:
-        """The full name of a function, which may be given by the common one."""
+        """Return the full name of a function, given by its full or its common name."""
         prefix = f"fmi{cls.VERSION}"
         return function if function.startswith(prefix) else prefix + cls.RENAMED.get(function, function)
 
     def call(self, function: str, component: int | None, *arguments: Any) -> int:
-        """The status of a function of `SIGNATURES`."""
+        """Call a function of `SIGNATURES`, and return its status."""
         status: int = getattr(self.dll, self.name(function))(component, *arguments)
         return status
 
@@ -143,13 +144,13 @@ class Fmu(ABC):
         return references(*(self.vr[name] for name in names))
 
     def number(self, name: str, attribute: str) -> float | None:
-        """The `min`, `max` or `nominal` of a variable, which in FMI 3.0 is that of its declared type."""
+        """Return the `min`, `max` or `nominal` of a variable, which in FMI 3.0 stands in its declared type."""
         variable = self.variables[name]
         value = getattr(variable if self.VERSION == 2 else variable.declaredType, attribute)
         return None if value is None else float(value)
 
     def bounds(self, name: str) -> tuple[float, float]:
-        """The range of a variable that has one."""
+        """Return the minimum and the maximum of a variable that has both."""
         low, high = self.number(name, "min"), self.number(name, "max")
         assert low is not None
         assert high is not None
@@ -163,8 +164,10 @@ class Fmu(ABC):
         return found
 
     def settable(self, mode: str) -> list[str]:
-        """What may be set when; beyond the standard, inputs of FMI 2.0 before initialization, and tuning between the
-        integrator's steps."""
+        """Return the variables that can be set in a mode.
+
+        Beyond the standard these are inputs of FMI 2.0 in Instantiated, and tunable parameters in Continuous-Time Mode.
+        """
         chosen = [] if mode in (TERMINATED, FAILED) else [*self.inputs]
         if mode in (INSTANTIATED, INITIALIZATION):
             return chosen + self.states + self.parameters
@@ -174,25 +177,25 @@ class Fmu(ABC):
 
     @property
     def token(self) -> bytes:
-        """The GUID, or the instantiation token."""
+        """The GUID or the instantiation token."""
         token: str = self.description.guid
         return token.encode()
 
     @abstractmethod
     def instance(self, kind: int = CO_SIMULATION, name: str = "rov", logging: bool | None = None) -> "AnyInstance":
-        """A new instance with a recorded log; without `logging` of what is no mere event."""
+        """Return a new instance that records its log. By default all messages except events are logged."""
 
     def unload(self) -> None:
         fmpy.freeLibrary(self.dll._handle)
 
 
-Of = TypeVar("Of", bound=Fmu)
+AnyFmu = TypeVar("AnyFmu", bound=Fmu)
 
 
-class Instance(ABC, Generic[Of]):
-    """An instance with a recorded log, freed at the end of its `with` block."""
+class Instance(ABC, Generic[AnyFmu]):
+    """An instance that records its log, and is freed at the end of its `with` block."""
 
-    def __init__(self, fmu: Of, kind: int) -> None:
+    def __init__(self, fmu: AnyFmu, kind: int) -> None:
         self.fmu = fmu
         self.kind = kind
         self.log: list[Message] = []
@@ -212,18 +215,18 @@ class Instance(ABC, Generic[Of]):
         return self.fmu.call(function, self.component, *arguments)
 
     def expect(self, function: str, *arguments: Any) -> None:
-        """Call, where nothing but OK is possible."""
+        """Call a function that must return OK."""
         assert self.call(function, *arguments) == OK, (function, self.log)
 
     # ---- The common sequence ----
 
     @abstractmethod
     def initialize(self, start: float = 0.0, stop: float | None = None) -> int:
-        """From Instantiated to Initialization Mode."""
+        """Go from Instantiated to Initialization Mode."""
 
     @abstractmethod
     def update(self) -> None:
-        """Update the discrete states: there are none."""
+        """Update the discrete states, as every importer does in Event Mode."""
 
     @abstractmethod
     def step(self, t: float, h: float) -> int: ...
@@ -254,7 +257,7 @@ class Instance(ABC, Generic[Of]):
         self.expect("ExitInitializationMode")
 
     def mode(self) -> str:
-        """The mode, as a call that is refused in every mode tells it."""
+        """Return the mode, which the message about a call names that is refused in every mode."""
         before = len(self.log)
         assert self.initialize(float("nan")) == ERROR
         message = self.log[before]
@@ -265,13 +268,17 @@ class Instance(ABC, Generic[Of]):
 
     # ---- Values ----
 
-    @abstractmethod
-    def set_by(self, vr: Any, values: Any) -> int:
-        """Set as many values as there are references."""
+    def _sized(self, values: Any) -> tuple[Any, ...]:
+        """Return the arguments that pass an array of values: FMI 3.0 also takes its length."""
+        return (values,) if self.fmu.VERSION == 2 else (values, len(values))
 
-    @abstractmethod
+    def set_by(self, vr: Any, values: Any) -> int:
+        """Set variables by value reference."""
+        return self.call("SetFloat64", vr, len(vr), *self._sized(values))
+
     def get_by(self, vr: Any, values: Any) -> int:
-        """Get as many values as there are references."""
+        """Get variables by value reference."""
+        return self.call("GetFloat64", vr, len(vr), *self._sized(values))
 
     def set(self, values: Mapping[str, float]) -> int:
         return self.set_by(self.fmu.references(list(values)), reals(*values.values()))
@@ -286,24 +293,25 @@ class Instance(ABC, Generic[Of]):
 
     # ---- Derivatives ----
 
-    @abstractmethod
-    def differentiate(self, unknowns: Any, knowns: Any, seed: Any, sensitivity: Any) -> int:
-        """Of references to unknowns by references to knowns, a seed each."""
-
     def derivatives(self, unknowns: Sequence[str], knowns: Mapping[str, float] | str) -> list[float]:
-        """The change of unknowns with those of knowns; or by one known."""
+        """Return the directional derivatives of unknowns for seeds of knowns, or for the seed 1 of one known."""
         seeds = {knowns: 1.0} if isinstance(knowns, str) else knowns
-        change = room(len(unknowns))
-        of = self.fmu.references
-        assert self.differentiate(of(unknowns), of(list(seeds)), reals(*seeds.values()), change) == OK, self.log
+        change, references = room(len(unknowns)), self.fmu.references
+        self.expect(
+            "GetDirectionalDerivative",
+            *(references(unknowns), len(unknowns)),
+            *(references(list(seeds)), len(seeds)),
+            *self._sized(reals(*seeds.values())),
+            *self._sized(change),
+        )
         return list(change)
 
-    @abstractmethod
     def rates_by(self, vr: Any, orders: Any, values: Any) -> int:
-        """Time derivatives of references to outputs."""
+        """Get time derivatives of outputs by value reference."""
+        return self.call("GetOutputDerivatives", vr, len(vr), orders, *self._sized(values))
 
     def rates(self, names: Sequence[str]) -> list[float]:
-        """First time derivatives of outputs."""
+        """Return the first time derivatives of outputs."""
         values = room(len(names))
         assert self.rates_by(self.fmu.references(names), integers(*[1] * len(names)), values) == OK, self.log
         return list(values)
@@ -311,7 +319,7 @@ class Instance(ABC, Generic[Of]):
     # ---- State ----
 
     def save(self, state: c_void_p | None = None) -> bytes:
-        """The serialized state: of a saved one, or of now."""
+        """Return a serialized state: the given one, or the current state of the instance."""
         saved = c_void_p() if state is None else state
         if state is None:
             self.expect("GetFMUState", ctypes.byref(saved))
@@ -324,12 +332,12 @@ class Instance(ABC, Generic[Of]):
         return buffer.raw
 
     def deserialize(self, serialized: bytes, state: c_void_p) -> int:
-        """Bytes to a saved state."""
+        """Deserialize bytes to a saved state."""
         buffer = (c_char * len(serialized)).from_buffer_copy(serialized)
         return self.call("DeserializeFMUState", buffer, len(serialized), ctypes.byref(state))
 
     def load(self, serialized: bytes) -> int:
-        """Restore a serialized state; the first status that is not OK, if any."""
+        """Restore a serialized state, and return the first status that is not OK, if any."""
         state = c_void_p()
         if (status := self.deserialize(serialized, state)) != OK:
             return status

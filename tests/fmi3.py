@@ -1,129 +1,46 @@
-"""FMI 3.0: the FMU's shared library function by function; any argument may be NULL."""
+"""Call the functions of an FMU of FMI 3.0 with any arguments, and get their status."""
 
+import re
 from collections.abc import Callable, Sequence
-from ctypes import (
-    POINTER,
-    c_bool,
-    c_char_p,
-    c_double,
-    c_float,
-    c_int,
-    c_int8,
-    c_int16,
-    c_int64,
-    c_size_t,
-    c_uint,
-    c_uint8,
-    c_uint16,
-    c_uint64,
-    c_void_p,
-)
-from pathlib import Path
+from ctypes import POINTER, c_bool, c_char
 from typing import Any, NamedTuple
 
 import fmpy
-from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
+from fmpy.fmi3 import FMU3Slave, fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
 from tests import fmi
 from tests.fmi import (
-    ALIKE,
     CO_SIMULATION,
     EVENT,
     FAILED,
     INITIALIZATION,
     INSTANTIATED,
-    INTEGERS,
     MODEL_EXCHANGE,
-    OK,
-    REALS,
-    REFERENCES,
-    SIZES,
     STEP,
-    STRINGS,
     TERMINATED,
     WITH_EVENTS,
     Message,
-    Signatures,
     reals,
     room,
     strings,
 )
 
 MODES = {**fmi.MODES, WITH_EVENTS: (INSTANTIATED, INITIALIZATION, EVENT, STEP, TERMINATED, FAILED)}
-"""By kind; those of intermediate update are inside a step."""
+"""The modes by kind. Intermediate Update Mode exists only inside a step."""
 EVERY_MODE = [(kind, mode) for kind, modes in MODES.items() for mode in modes]
 
-FLAGS, COUNTS = POINTER(c_bool), POINTER(c_uint64)
-_NONE_OF = {
-    "Float32": c_float,
-    "Int8": c_int8,
-    "UInt8": c_uint8,
-    "Int16": c_int16,
-    "UInt16": c_uint16,
-    "Int32": c_int,
-    "UInt32": c_uint,
-    "Int64": c_int64,
-    "UInt64": c_uint64,
-    "Boolean": c_bool,
-    "String": c_char_p,
-}
-_BINARY = (REFERENCES, c_size_t, SIZES, POINTER(c_void_p), c_size_t)
-_PARTIAL = (REFERENCES, c_size_t, REFERENCES, c_size_t, REALS, c_size_t, REALS, c_size_t)
-TYPES: Signatures = {
-    **{
-        f"fmi3{do}{name}": (REFERENCES, c_size_t, POINTER(of), c_size_t)
-        for do in ("Get", "Set")
-        for name, of in _NONE_OF.items()
-    },
-    "fmi3GetBinary": _BINARY,
-    "fmi3SetBinary": _BINARY,
-}
-"""Getters and setters of the types of which there are no variables."""
-CLOCKS: Signatures = {
-    "fmi3GetClock": (REFERENCES, c_size_t, FLAGS),
-    "fmi3SetClock": (REFERENCES, c_size_t, FLAGS),
-    "fmi3GetIntervalDecimal": (REFERENCES, c_size_t, REALS, INTEGERS),
-    "fmi3GetIntervalFraction": (REFERENCES, c_size_t, COUNTS, COUNTS, INTEGERS),
-    "fmi3GetShiftDecimal": (REFERENCES, c_size_t, REALS),
-    "fmi3GetShiftFraction": (REFERENCES, c_size_t, COUNTS, COUNTS),
-    "fmi3SetIntervalDecimal": (REFERENCES, c_size_t, REALS),
-    "fmi3SetIntervalFraction": (REFERENCES, c_size_t, COUNTS, COUNTS),
-    "fmi3SetShiftDecimal": (REFERENCES, c_size_t, REALS),
-    "fmi3SetShiftFraction": (REFERENCES, c_size_t, COUNTS, COUNTS),
-}
-SIGNATURES: Signatures = {
-    **{f"fmi3{name}": arguments for name, arguments in ALIKE.items()},
-    **TYPES,
-    **CLOCKS,
-    "fmi3SetDebugLogging": (c_bool, c_size_t, STRINGS),
-    "fmi3EnterInitializationMode": (c_bool, c_double, c_double, c_bool, c_double),
-    "fmi3EnterConfigurationMode": (),
-    "fmi3ExitConfigurationMode": (),
-    "fmi3GetFloat64": (REFERENCES, c_size_t, REALS, c_size_t),
-    "fmi3SetFloat64": (REFERENCES, c_size_t, REALS, c_size_t),
-    "fmi3GetNumberOfVariableDependencies": (c_uint, SIZES),
-    "fmi3GetVariableDependencies": (c_uint, SIZES, REFERENCES, SIZES, INTEGERS, c_size_t),
-    "fmi3GetDirectionalDerivative": _PARTIAL,
-    "fmi3GetAdjointDerivative": _PARTIAL,
-    "fmi3EvaluateDiscreteStates": (),
-    "fmi3UpdateDiscreteStates": (FLAGS, FLAGS, FLAGS, FLAGS, FLAGS, REALS),
-    "fmi3CompletedIntegratorStep": (c_bool, FLAGS, FLAGS),
-    "fmi3GetNumberOfEventIndicators": (SIZES,),
-    "fmi3GetNumberOfContinuousStates": (SIZES,),
-    "fmi3EnterStepMode": (),
-    "fmi3GetOutputDerivatives": (REFERENCES, c_size_t, INTEGERS, REALS, c_size_t),
-    "fmi3DoStep": (c_double, c_double, c_bool, FLAGS, FLAGS, FLAGS, REALS),
-    "fmi3ActivateModelPartition": (c_uint, c_double),
-}
-_LOGGED = (c_char_p, c_char_p, c_char_p, c_bool, c_bool)
-_INSTANTIATE: Signatures = {
-    "fmi3InstantiateModelExchange": (*_LOGGED, c_void_p, fmi3LogMessageCallback),
-    "fmi3InstantiateCoSimulation": (
-        *(*_LOGGED, c_bool, c_bool, REFERENCES, c_size_t),
-        *(c_void_p, fmi3LogMessageCallback, fmi3IntermediateUpdateCallback),
-    ),
-    "fmi3InstantiateScheduledExecution": (*_LOGGED, c_void_p, fmi3LogMessageCallback, *[c_void_p] * 3),
-}
+_PROTOTYPES = fmi.prototypes(3, FMU3Slave)
+SIGNATURES = fmi.signatures(_PROTOTYPES)
+_ABSENT = re.compile(r"fmi3[GS]et(Float32|U?Int\d+|Boolean|String|Binary)")
+TYPES = {name: arguments for name, arguments in SIGNATURES.items() if _ABSENT.fullmatch(name)}
+"""The getters and setters of types that no variable has."""
+_OF_CLOCKS = re.compile(r"fmi3[GS]et(Clock|(Interval|Shift)(Decimal|Fraction))")
+CLOCKS = {name: arguments for name, arguments in SIGNATURES.items() if _OF_CLOCKS.fullmatch(name)}
+"""The getters and setters of clocks, which the FMU does not have."""
+_STRING_BUFFERS = {"fmi3SerializeFMUState": 2, "fmi3DeserializeFMUState": 1}
+"""Arguments that FMPy declares as arrays of c_uint8, for which ctypes accepts no string buffer."""
+for _name, _position in _STRING_BUFFERS.items():
+    _PROTOTYPES[_name][1][_position] = POINTER(c_char)
 
 
 def flags(*values: bool) -> Any:
@@ -131,7 +48,7 @@ def flags(*values: bool) -> Any:
 
 
 class Update(NamedTuple):
-    """What intermediate update is told."""
+    """The arguments of the callback for intermediate update."""
 
     time: float
     set_requested: bool
@@ -141,7 +58,7 @@ class Update(NamedTuple):
 
 
 class Stepped(NamedTuple):
-    """What a step gives back."""
+    """The results of a step."""
 
     event_handling_needed: bool
     terminate_simulation: bool
@@ -150,22 +67,14 @@ class Stepped(NamedTuple):
 
 
 OnUpdate = Callable[["Instance", Update], float | None]
-"""Called inside a step; may give the time at which it shall end early."""
+"""A function that is called inside a step, and may return the time at which the step shall end early."""
 
 
 class Fmu(fmi.Fmu):
+    PROTOTYPES = _PROTOTYPES
     SIGNATURES = SIGNATURES
     VERSION = 3
     PLATFORM = fmpy.platform_tuple
-
-    def __init__(self, folder: Path, library: Path | None = None) -> None:
-        super().__init__(folder, library)
-        for name, arguments in _INSTANTIATE.items():
-            function = getattr(self.dll, name)
-            function.argtypes, function.restype = arguments, c_void_p
-        self.dll.fmi3FreeInstance.argtypes = (c_void_p,)
-        self.dll.fmi3FreeInstance.restype = None
-        self.dll.fmi3GetVersion.restype = c_char_p
 
     def instance(
         self,
@@ -180,7 +89,7 @@ class Fmu(fmi.Fmu):
 
 
 def recorder(log: list[Message]) -> Any:
-    """A logger that appends to a list. It must outlive the instance."""
+    """Return a logger that appends to a list. It must outlive the instance."""
 
     def record(_environment: int, status: int, category: bytes, text: bytes) -> None:
         log.append(Message(status, category.decode(), text.decode(), ""))
@@ -189,7 +98,7 @@ def recorder(log: list[Message]) -> Any:
 
 
 class Instance(fmi.Instance[Fmu]):
-    """`on_update` is called in intermediate update, where variables are registered for it or a step may end early."""
+    """An instance. The FMU calls `on_update` if intermediate variables are registered or early return is allowed."""
 
     def __init__(
         self,
@@ -218,11 +127,12 @@ class Instance(fmi.Instance[Fmu]):
         if logging is None:
             self.expect("SetDebugLogging", False, 1, strings(b"logEvents"))
 
-    def _inside(self, _: int, time: float, *told: Any) -> None:
-        *booleans, early, wanted = told
+    def _inside(self, _: int, time: float, *rest: Any) -> None:
+        """Call `on_update`, and pass the time at which the step shall end to the FMU."""
+        *booleans, early, wanted = rest
         try:
             end = self.on_update(self, Update(time, *booleans)) if self.on_update else None
-        except BaseException as error:  # nothing can be raised through C
+        except BaseException as error:  # no exception can pass through C
             self._raised = error
             return
         if end is not None:
@@ -235,36 +145,20 @@ class Instance(fmi.Instance[Fmu]):
         self.expect("fmi3UpdateDiscreteStates", *(flags(True) for _ in range(5)), room())
 
     def step(self, t: float, h: float) -> int:
-        told, last = [flags(True) for _ in range(3)], room()
-        status = self.call("fmi3DoStep", t, h, True, *told, last)
-        needed, terminate, early = (bool(flag[0]) for flag in told)
+        results, last = [flags(True) for _ in range(3)], room()
+        status = self.call("fmi3DoStep", t, h, True, *results, last)
+        needed, terminate, early = (bool(flag[0]) for flag in results)
         self.stepped = Stepped(needed, terminate, early, float(last[0]))
         if self._raised is not None:
             raise self._raised
         return status
 
-    def set_by(self, vr: Any, values: Any) -> int:
-        return self.call("fmi3SetFloat64", vr, len(vr), values, len(values))
-
-    def get_by(self, vr: Any, values: Any) -> int:
-        return self.call("fmi3GetFloat64", vr, len(vr), values, len(values))
-
     def time(self) -> float:
         return self.get(["time"])[0]
 
-    def differentiate(self, unknowns: Any, knowns: Any, seed: Any, sensitivity: Any) -> int:
-        return self._partial("fmi3GetDirectionalDerivative", unknowns, knowns, seed, sensitivity)
-
-    def _partial(self, function: str, unknowns: Any, knowns: Any, seed: Any, sensitivity: Any) -> int:
-        pairs = [(array, len(array)) for array in (unknowns, knowns, seed, sensitivity)]
-        return self.call(function, *(argument for pair in pairs for argument in pair))
-
     def adjoint(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> list[float]:
-        """The seed's combination of unknowns by each known."""
-        found, of = room(len(knowns)), self.fmu.references
-        status = self._partial("fmi3GetAdjointDerivative", of(unknowns), of(knowns), reals(*seed), found)
-        assert status == OK, self.log
+        """Return the adjoint derivatives: by each known, the derivative of the unknowns' combination by the seed."""
+        found = room(len(knowns))
+        arrays = self.fmu.references(unknowns), self.fmu.references(knowns), reals(*seed), found
+        self.expect("fmi3GetAdjointDerivative", *(argument for array in arrays for argument in (array, len(array))))
         return list(found)
-
-    def rates_by(self, vr: Any, orders: Any, values: Any) -> int:
-        return self.call("fmi3GetOutputDerivatives", vr, len(vr), orders, values, len(values))

@@ -1,4 +1,4 @@
-"""Everything that goes into the FMU, and the archive: the same bytes for the same inputs."""
+"""Collect everything that goes into an FMU and zip it. The same inputs give the same bytes."""
 
 import hashlib
 import zipfile
@@ -22,8 +22,8 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 REPORT = "identification.html"
-"""The report in documentation/, where the vehicle file names one."""
-_NEEDED = """What the binaries need of the system, and nothing else:
+"""The name of the report in documentation/, if the vehicle file names one."""
+_EXTERNAL_DEPENDENCIES = """What the binaries need of the system, and nothing else:
 
 Linux    GLIBC 2.17 or newer (libc.so.6, libm.so.6)
 Windows  the Universal C Runtime, which is part of Windows since 10
@@ -33,37 +33,37 @@ macOS    11 or newer
 
 @dataclass(frozen=True)
 class Content:
-    """What an FMU is made of but its compiled binaries."""
+    """Everything in an FMU except its compiled binaries."""
 
     identifier: str
     guid: str
     files: Mapping[str, bytes]
-    """Path in the archive to content."""
+    """The content of each file by its path in the archive."""
     sources: Mapping[str, str]
-    """The C files to compile; none in pure Python."""
+    """The C files to compile by name; none in pure Python."""
 
 
 def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2) -> Content:
-    """The FMU in C, for Co-Simulation and Model Exchange, of FMI 2.0 or 3.0; `pages` go into it by their path."""
+    """Return the FMU in C, for Co-Simulation and Model Exchange. `pages` are further files by their path."""
     declared = variables(vehicle.rov)
-    others = f"fmi{5 - fmi}_"
-    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(others)]
+    other_version = f"fmi{5 - fmi}_"
+    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(other_version)]
     sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
     sources |= generated_sources(vehicle.layout)
-    named = (UNITY_FILE,) if fmi == 2 else ()
-    describe = partial(model_description, vehicle, declared, interfaces=NATIVE[fmi], source_files=named, fmi=fmi)
+    source_files = (UNITY_FILE,) if fmi == 2 else ()
+    describe = partial(model_description, vehicle, declared, interfaces=NATIVE[fmi], source_files=source_files, fmi=fmi)
     guid = _guid(describe(guid=""), sources)
     sources["interface.h"] = interface_header(vehicle.rov, vehicle.identifier, guid, fmi)
     files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if fmi == 3:
         files["sources/buildDescription.xml"] = build_description(vehicle.identifier)
-        files["documentation/externalDependencies.txt"] = _NEEDED.encode()
+        files["documentation/externalDependencies.txt"] = _EXTERNAL_DEPENDENCIES.encode()
     return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, sources)
 
 
 def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
-    """The FMU in pure Python, for Co-Simulation."""
+    """Return the FMU in pure Python, for Co-Simulation. `pages` are further files by their path."""
     declared = variables(vehicle.rov)
     sources = python_sources(vehicle, declared)
     describe = partial(model_description, vehicle, declared, interfaces=PYTHON, note=PYTHON_NOTE)
@@ -73,7 +73,7 @@ def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
 
 
 def _guid(description: bytes, sources: Mapping[str, str]) -> str:
-    """A GUID that stands for the interface and the code behind it, so a binary refuses another one's description."""
+    """Return a GUID computed from the interface and the code, so that a binary refuses the description of another."""
     digest = hashlib.sha256(description)
     for name, text in sorted(sources.items()):
         digest.update(name.encode() + b"\0" + text.encode() + b"\0")
@@ -81,11 +81,12 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
 
 
 def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the files that FMUs in C and in Python both have, by their path."""
     report = vehicle.provenance.report if vehicle.provenance else None
     files = {"documentation/licenses/license.txt": LICENSE, f"documentation/{REPORT}": report}
     read = {name: read_bytes(path, VehicleFileError) for name, path in files.items() if path}
-    if own := vehicle.picture("model.png"):
-        read["model.png"] = read_png(own)
+    if picture := vehicle.picture("model.png"):
+        read["model.png"] = read_png(picture)
     elif ICON in pages:
         read["model.png"] = pages[ICON]
     terminals = {f"{FOLDER}/terminalsAndIcons.xml": terminals_and_icons(vehicle.layout)}
@@ -93,7 +94,7 @@ def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, byte
 
 
 def _fmi_license(fmi: int) -> bytes:
-    """The licence in the comment of the FMI headers that the binaries are compiled with."""
+    """Return the licence of the FMI headers, which stands in a comment in them."""
     text = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
     start = text.index("Copyright (C)")
     lines = text[start : text.index("*/", start)].splitlines()
@@ -101,13 +102,13 @@ def _fmi_license(fmi: int) -> bytes:
 
 
 def archive(files: Mapping[str, bytes]) -> bytes:
-    """The FMU: path in the archive to content, zipped, the same bytes for the same files."""
+    """Return the FMU that contains these files, given by their path. The same files give the same bytes."""
     packed = BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as zipped:
         # the description comes first, so that importers which stream find it at once
         for member in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
             entry = zipfile.ZipInfo(member, _EPOCH)
-            entry.create_system = 3  # the same on Windows
+            entry.create_system = 3  # Unix, also when built on Windows
             entry.external_attr = 0o644 << 16
             zipped.writestr(entry, files[member], zipfile.ZIP_DEFLATED, compresslevel=9)
     return packed.getvalue()

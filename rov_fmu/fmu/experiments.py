@@ -1,4 +1,4 @@
-"""The experiments that an FMU carries by the layered standard FMI-LS-REF, read from the archive; any FMU's."""
+"""Read the experiments that any FMU may contain by the layered standard FMI-LS-REF."""
 
 import posixpath
 import zipfile
@@ -16,19 +16,19 @@ from rov_fmu.io.time_series import Series, number, series
 NAME = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{NAME}"
 MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
-_LOOSE = 1e-3
-"""The tolerance where neither experiment nor FMU has one."""
-_STEPS = 500
-"""Communication steps where nothing tells their length."""
+_DEFAULT_TOLERANCE = 1e-3
+"""The tolerance if neither the experiment nor the FMU has one."""
+_DEFAULT_STEPS = 500
+"""The number of communication steps if neither the experiment nor the FMU has a step size."""
 _MOST_STEPS = 1_000_000
-"""Communication steps of an experiment; FMPy takes minutes for so many."""
-_NOT_READ = ("String", "Binary", "Clock")
-"""Types of variables that no column of numbers holds."""
+"""The largest number of communication steps of an experiment; FMPy takes minutes for so many."""
+_NON_NUMERIC = ("String", "Binary", "Clock")
+"""The types whose variables cannot be columns of numbers."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is done, and what it must come to."""
+    """A simulation to run, and the expected results."""
 
     name: str
     start: float
@@ -50,8 +50,8 @@ class _Place:
     def error(self, reason: str) -> FileError:
         return FileError(f"{self.fmu}: {self.member}: {reason}")
 
-    def beside(self, source: str | None) -> "_Place":
-        """What a URI in this file leads to."""
+    def resolve(self, source: str | None) -> "_Place":
+        """Return the file to which a relative URI in this file leads."""
         try:
             parts = urlsplit(source or "")
         except ValueError:
@@ -61,8 +61,8 @@ class _Place:
         return _Place(self.fmu, posixpath.normpath(posixpath.join(posixpath.dirname(self.member), unquote(parts.path))))
 
 
-class Carried:
-    """What an FMU that can be unpacked carries beside its model. Raises FileError."""
+class ReferenceResults:
+    """The reference results in an FMU that can be unpacked. All methods raise FileError."""
 
     def __init__(self, fmu: Path) -> None:
         self._manifest = _Place(fmu, MANIFEST)
@@ -75,26 +75,27 @@ class Carried:
             raise self._manifest.error("there is no such file: the FMU carries no reference results")
 
     def experiments(self, description: Any) -> list[Experiment]:
-        """All but those for uncertainty; `description` is FMPy's of the FMU."""
+        """Return all experiments but those of uncertainty analyses. `description` is FMPy's description of the FMU."""
         variables = {v.name: v for v in description.modelVariables}
         found: list[Experiment] = []
         for related in _children(self._xml(self._manifest, "fmiReferences"), "Related"):
             role, _, purpose = related.get("role", "").partition("/")
             if role == "experiment" and purpose != "uncertainty-analysis":
-                place = self._manifest.beside(related.get("source"))
+                place = self._manifest.resolve(related.get("source"))
                 found += self._read(place, description.defaultExperiment, variables)
         if not any(experiment.references for experiment in found):
             raise self._manifest.error("names no experiment with expected results")
         return found
 
     def _read(self, place: _Place, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
+        """Read a file of experiments."""
         for element in _children(self._xml(place, "Experiments"), "Experiment"):
             name = element.get("name", "")
             parts = {etree.QName(child).localname: child for child in element if isinstance(child.tag, str)}
-            kinds = parts.keys() - {"TransientSimulation", "Parameters", "Stimuli", "References", "Annotations"}
-            if kinds:
-                raise place.error(f"experiment {shown(name)}: {', '.join(sorted(kinds))} cannot be run")
-            # the times stand in a child of their own in drafts after 1.0.0-beta.1
+            unknown = parts.keys() - {"TransientSimulation", "Parameters", "Stimuli", "References", "Annotations"}
+            if unknown:
+                raise place.error(f"experiment {shown(name)}: {', '.join(sorted(unknown))} cannot be run")
+            # drafts after 1.0.0-beta.1 have the times in a child element
             given = dict(element.attrib) | dict(getattr(parts.get("TransientSimulation"), "attrib", {}))
 
             def setting(key: str, fallback: float, given: Mapping[str, str] = given, name: str = name) -> float:
@@ -105,16 +106,16 @@ class Carried:
 
             start = setting("startTime", 0.0)
             stop = setting("stopTime", start + 1.0)
-            step = setting("stepSize", (stop - start) / _STEPS)
-            tolerance = setting("tolerance", _LOOSE)
+            step = setting("stepSize", (stop - start) / _DEFAULT_STEPS)
+            tolerance = setting("tolerance", _DEFAULT_TOLERANCE)
             if not (stop > start and step > 0.0 and tolerance > 0.0):
                 raise place.error(f"experiment {shown(name)}: must go on from its start, in steps, with a tolerance")
             steps = (stop - start) / step
             if not steps <= _MOST_STEPS:
-                told = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
-                raise place.error(f"experiment {shown(name)}: {told}; at most {_MOST_STEPS} are run")
+                reason = f"stepSize = {step:g} s takes {steps:.3g} steps from {start:g} to {stop:g} s"
+                raise place.error(f"experiment {shown(name)}: {reason}; at most {_MOST_STEPS} are run")
             files = {
-                part: place.beside(parts[part].get("source"))
+                part: place.resolve(parts[part].get("source"))
                 for part in ("Parameters", "Stimuli", "References")
                 if part in parts
             }
@@ -124,7 +125,7 @@ class Carried:
             yield Experiment(name, start, stop, step, tolerance, parameters, stimuli, references)
 
     def _parameters(self, place: _Place, variables: Mapping[str, Any]) -> dict[str, str]:
-        """A parameter set in the format of SSP."""
+        """Read a parameter set in the format of SSP, and return its values as text by name."""
         found = {}
         for element in self._xml(place, "ParameterSet").iter("{*}Parameter"):
             name, value = element.get("name", ""), next(iter(element), None)
@@ -139,11 +140,11 @@ class Carried:
         return found
 
     def _series(self, place: _Place, variables: Mapping[str, Any]) -> Series:
-        """A CSV file: the time in the first column, a variable of the FMU in each other."""
+        """Read a CSV file whose first column is the time and whose other columns are variables of the FMU."""
 
         def check_column(name: str) -> None:
             variable = _variable(place, name, variables)
-            if variable.type in _NOT_READ or getattr(variable, "dimensions", None):
+            if variable.type in _NON_NUMERIC or getattr(variable, "dimensions", None):
                 raise place.error(f"column {shown(name)}: the variable is no single number")
 
         return series(self._text(place), place.error, check_column)
@@ -157,7 +158,7 @@ class Carried:
             raise place.error(f"not UTF-8 text, at byte {error.start}") from error
 
     def _xml(self, place: _Place, root: str) -> Any:
-        """The root element of an XML file."""
+        """Return the root element of an XML file, which must have the name `root`."""
         try:
             found = etree.fromstring(
                 self._text(place).encode(), etree.XMLParser(resolve_entities=False, no_network=True)

@@ -1,4 +1,4 @@
-"""modelDescription.xml from the variables (FMI 2.0, section 2.2; FMI 3.0, section 2.4)."""
+"""Write modelDescription.xml (FMI 2.0, section 2.2; FMI 3.0, section 2.4)."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from rov_fmu.model.dependencies import parameters_of
 from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 
-# What is false is written out too, for FMI++ ends where it is absent.
+# Attributes that are false are also written, because FMI++ stops when they are missing.
 _COMMON = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canNotUseMemoryManagementFunctions": "true",
@@ -31,7 +31,6 @@ _COMMON_3 = {
     "providesAdjointDerivatives": "true",
 }
 
-# The interfaces of each flavour and what they can do, as it really is.
 NATIVE = {
     2: {
         "ModelExchange": {**_COMMON, "providesDirectionalDerivative": "true"},
@@ -54,13 +53,14 @@ NATIVE = {
         },
     },
 }
-"""By version of FMI."""
+"""The interfaces of the FMU in C and their capabilities, by version of FMI."""
 PYTHON = {"CoSimulation": {"needsExecutionTool": "true", **_CO_SIMULATION}}
+"""The interface of the FMU in pure Python and its capabilities."""
 PYTHON_NOTE = (
     "Needs a Python on this machine. On Linux an importer that is not itself a Python process must be started with "
     "LD_PRELOAD=/path/to/libpython3.x.so, or it cannot load the library (undefined symbol: _Py_NoneStruct)."
 )
-"""What the description of the Python flavour says beside what the vehicle is."""
+"""The text that follows the vehicle's summary in the description of the FMU in pure Python."""
 
 _EXPERIMENT = {"startTime": 0.0, "stopTime": 10.0, "tolerance": 1e-6, "stepSize": 0.01}
 
@@ -75,9 +75,9 @@ def model_description(
     fmi: int = 2,
     note: str = "",
 ) -> bytes:
-    """The XML document of a version of FMI, UTF-8, indented, the same bytes for the same arguments.
+    """Return the XML document for a version of FMI. The same arguments give the same bytes.
 
-    The description of the model is that of the vehicle, and then the note.
+    `note` follows the vehicle's summary in the description of the model.
     """
     head = {
         "fmiVersion": f"{fmi}.0",
@@ -112,12 +112,12 @@ def model_description(
 
 
 def build_description(identifier: str) -> bytes:
-    """sources/buildDescription.xml (FMI 3.0, section 2.5.1.3.1): how the sources become the library."""
+    """Return sources/buildDescription.xml, which says how to compile the sources (FMI 3.0, section 2.5.1.3.1)."""
     return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
 
 
-# In FMI 3.0 a variable has its unit, nominal value and bounds from its declared type and has none of its own. FMI
-# Library loses the unit of a variable that has bounds of its own beside a type; fmi-sim refuses a unit on a variable.
+# In FMI 3.0 the unit, the nominal value and the bounds of a variable stand in its declared type only. FMI Library loses
+# the unit of a variable that has a type and also bounds of its own; fmi-sim refuses a unit on a variable.
 
 
 def _type(variable: Variable) -> dict[str, str | float | None]:
@@ -149,7 +149,7 @@ _LISTS = {
 def _structure(
     variables: tuple[Variable, ...], layout: Layout, names: tuple[str, str, str]
 ) -> dict[str, dict[str, dict[str, str]]]:
-    """The lists of <ModelStructure>: by name of an unknown, the kinds of the knowns it depends on, by name."""
+    """Return the lists of <ModelStructure> by name: for each unknown the dependenciesKind of each known."""
     parameters, order = parameters_of(layout), {v.name: v.index for v in variables}
     lists: dict[str, dict[str, dict[str, str]]] = {name: {} for name in names}
     outputs, derivatives, initial = lists.values()
@@ -165,7 +165,7 @@ def _structure(
         if v.derivative_of:
             add(derivatives, v, v.dependencies)
         if v.initial == "calculated":
-            # Initialization knows no parameters that are fixed: a factor is constant or not (2.2.8).
+            # In Initialization Mode no parameter is fixed, so the only kinds are constant and dependent (2.2.8).
             at_start = {n: "constant" if kind == "constant" else "dependent" for n, kind in v.dependencies.items()}
             add(initial, v, at_start | dict.fromkeys(parameters.get(v.name, ()), "dependent"))
     return lists

@@ -1,4 +1,4 @@
-"""The model as a WebAssembly module: the C of the FMU's motion, unchanged, for the page that flies it."""
+"""Compile the C of the FMU's motion, unchanged, to a WebAssembly module for the page that flies the vehicle."""
 
 from rov_fmu.engine.compile import MODULE_SOURCES, compile_module
 from rov_fmu.engine.source import sources
@@ -6,6 +6,6 @@ from rov_fmu.model.rov import Rov
 
 
 def module(rov: Rov) -> bytes:
-    """Compile the module of a vehicle; the page gives it the numbers. Raises BuildError."""
+    """Return the module of a vehicle. The page passes the coefficients to it. Raises BuildError."""
     page = {path.name: path.read_text(encoding="utf-8") for path in sorted(MODULE_SOURCES.glob("*.[ch]"))}
     return compile_module(page | sources(rov))

@@ -1,6 +1,6 @@
-"""<modelName>_OspModelDescription.xml: the variables in groups that are connected as one (OSP-IS 1.0.1).
+"""Write <modelName>_OspModelDescription.xml, which groups variables that are connected together (OSP-IS 1.0.1).
 
-libcosim and the OSP tools look for it beside the FMU. The variables stay what modelDescription.xml says they are.
+libcosim and the OSP tools look for it in the folder of the FMU. It changes nothing in modelDescription.xml.
 """
 
 from collections.abc import Iterator, Mapping
@@ -9,7 +9,6 @@ from pathlib import Path
 from rov_fmu.io.templates import render
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, Layout
 
-# The element of a group by the unit of its variables, in the order that the schema prescribes.
 _ELEMENTS = {
     "1": "Generic",
     "N": "Force",
@@ -19,21 +18,24 @@ _ELEMENTS = {
     "m": "LinearDisplacement",
     "rad": "AngularDisplacement",
 }
-_MOST = 3  # variables of a group
+"""The element of a group by the unit of its variables, in the order of the schema."""
+_MAX_MEMBERS = 3
+"""The largest number of variables in a group."""
 
 Members = Mapping[str, str | None]
-"""Variables of a group, at most one an axis, and their axes: of the body, or north, east, down."""
+"""The variables of a group, each with its axis in the body frame or in NED; at most one variable for an axis."""
 
 
 def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
-    """The groups by name, those too of which the vehicle has nothing.
+    """Yield the name and members of every group, including members that this vehicle does not have.
 
-    There is no mechanical port of force and velocity: velocities are through the water, power needs them over ground.
+    No group is a mechanical port of force and velocity: power needs velocities over ground, and the outputs are
+    velocities through the water.
     """
     commands = list(layout.commands)
-    for n in range(0, len(commands), _MOST):
-        number = f"_{n // _MOST + 1}" if len(commands) > _MOST else ""
-        yield f"thruster_commands{number}", dict.fromkeys(commands[n : n + _MOST])
+    for n in range(0, len(commands), _MAX_MEMBERS):
+        number = f"_{n // _MAX_MEMBERS + 1}" if len(commands) > _MAX_MEMBERS else ""
+        yield f"thruster_commands{number}", dict.fromkeys(commands[n : n + _MAX_MEMBERS])
     along = tuple(zip((SURGE, SWAY, HEAVE), "xyz", strict=True))
     yield "external_force", {axis.external: letter for axis, letter in along}
     for thruster in layout.thrusters:
@@ -51,12 +53,12 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
 
 
 def osp_model_description(layout: Layout) -> bytes:
-    """The XML document: every input and output in one group. UTF-8, indented, the same bytes for the same vehicle."""
+    """Return the XML document, with every input and output in one group. The same vehicle gives the same bytes."""
     unit_of = {name: meta.unit for name, meta in (layout.inputs | layout.state | layout.thrust).items()}
     groups = []
     for name, candidates in _groups(layout):
         if members := {variable: axis for variable, axis in candidates.items() if variable in unit_of}:
-            (unit,) = {unit_of[variable] for variable in members}  # which they share
+            (unit,) = {unit_of[variable] for variable in members}
             groups.append((_ELEMENTS[unit], name, unit, members))
     order = list(_ELEMENTS.values())
     groups.sort(key=lambda group: order.index(group[0]))
@@ -64,5 +66,5 @@ def osp_model_description(layout: Layout) -> bytes:
 
 
 def osp_path(fmu: Path, identifier: str) -> Path:
-    """Where the tools look for the description of an FMU."""
+    """Return the path at which the tools look for the description of an FMU."""
     return fmu.with_name(f"{identifier}_OspModelDescription.xml")

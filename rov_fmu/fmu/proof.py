@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.engine.child_process import ChildError, ChildProcess
-from rov_fmu.fmu.experiments import Carried, Experiment
+from rov_fmu.fmu.experiments import Experiment, ReferenceResults
 from rov_fmu.fmu.unpacking import unpack_fmu
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
@@ -65,11 +65,11 @@ def prove(
     import fmpy
 
     check_suffix(fmu, FMU)
-    carried = Carried(fmu)
+    reference_results = ReferenceResults(fmu)
     with temporary_folder("fmu-") as folder:
         description = unpack_fmu(fmu, fmu, Path(folder))
         platforms = fmpy.supported_platforms(folder)
-        experiments = carried.experiments(description)
+        experiments = reference_results.experiments(description)
         if fmpy.platform not in platforms:
             raise FileError(
                 f"{fmu}: has no binary for this machine ({fmpy.platform}): {', '.join(platforms) or 'none'}"

@@ -1,4 +1,4 @@
-"""The files of the FMU in pure Python, as pythonfmu's FmuBuilder packs them, with our modelDescription.xml."""
+"""Collect the files of the FMU in pure Python, as the FmuBuilder of pythonfmu packs them."""
 
 import json
 import sys
@@ -19,9 +19,9 @@ _MODEL = _HERE.parent / "model"
 
 
 def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping[str, str]:
-    """What is ours in resources/, name to text: the slave, the declaration, the model.
+    """Return our files in resources/ by name: the slave, the declaration of the variables, the model.
 
-    The modules bear the vehicle's name, because those of all FMUs and of the user share one interpreter.
+    The modules are named after the vehicle, because all FMUs and the user's own code share one interpreter.
     """
     package = f"{vehicle.identifier}_model"
     slave = (_HERE / "slave.py").read_text(encoding="utf-8")
@@ -39,7 +39,7 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
 
 
 def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, bytes]:
-    """Everything FmuBuilder packs, path in the archive to content, but its modelDescription.xml."""
+    """Return the files that FmuBuilder packs, by their path, except its modelDescription.xml."""
     with temporary_folder("fmu-") as folder:
         for name, text in sources.items():
             path = Path(folder, "sources", name)
@@ -59,7 +59,7 @@ def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, byte
 
 @contextmanager
 def _imports_restored() -> Iterator[None]:
-    """FmuBuilder imports the slave, and leaves it on sys.path and in sys.modules."""
+    """Restore sys.path and sys.modules, because FmuBuilder imports the slave and leaves it in both."""
     path, modules, bytecode = list(sys.path), set(sys.modules), sys.dont_write_bytecode
     sys.dont_write_bytecode = True
     try:

@@ -1,8 +1,8 @@
-"""Reference results inside the FMU, by the layered standard FMI-LS-REF: experiments, and what they must come to.
+"""Write the experiments and expected results that the FMU contains by the layered standard FMI-LS-REF.
 
-The experiments follow from the vehicle: steps of each axis from rest, by the published tables where it has them, with
-and without its tuning; and a manoeuvre of all axes. The expected results come from the step in plain Python, and not
-from the C code that they are to prove.
+The experiments are steps of each axis from rest, with and without the vehicle's tuning, at the commands of the
+published tables if the vehicle has them; and a manoeuvre of all axes. The expected results are computed in plain
+Python, and not with the C code that they prove.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,29 +21,29 @@ VERSION = "1.0.0-beta.1"
 EXPERIMENTS = "application/x-ma-hs-experiments"
 PARAMETERS = "application/x-ssp-parameter-set"
 TOLERANCE = 1e-9
-"""Of the largest value of a variable in an experiment; the expected values have some 11 digits."""
+"""The tolerance relative to the largest value of a variable in an experiment; expected values have 11 digits."""
 
 _DIGITS = ".11g"
 _MULTIPLES = (1, 2, 4, 8)
-"""Of Tau: where a step response is looked at."""
+"""The times at which a step response is compared, in multiples of Tau."""
 _STEPS = 10
-"""Communication steps of a Tau, and of a phase of the manoeuvre."""
-_LONGEST = 10.0
-"""s, of a Tau."""
-_OF_COUPLING = 4.0
-"""How much sooner a coupled motion is out of sight: small differences grow in it."""
+"""The number of communication steps in Tau, and in a phase of the manoeuvre."""
+_LONGEST_TAU = 10.0
+"""The longest Tau that an experiment uses (s)."""
+_COUPLING_FACTOR = 4.0
+"""The factor by which a coupled motion is observed for a shorter time, because small differences grow in it."""
 _NEGLIGIBLE = 1e-8
-"""Of its nominal value: a variable that stays below does not move."""
+"""A variable that stays below this share of its nominal value does not move."""
 _PHASE = 2.0
-"""s, of the manoeuvre."""
+"""The longest phase of the manoeuvre (s)."""
 
 Values = Mapping[str, float]
 _Row = tuple[float, Values]
 
 
 @dataclass(frozen=True)
-class Experiment:
-    """What is done and what it must come to: the names of its files."""
+class ExperimentFiles:
+    """An experiment and the names of its files."""
 
     name: str
     description: str
@@ -61,14 +61,14 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
         sets["untuned"] = untuned(vehicle.rov)
     files: dict[str, str] = {}
     experiments = [*_step_responses(vehicle, sets, files), *_manoeuvre(vehicle, files)]
-    words = {"tuned": "alpha and beta as identified", "untuned": "alpha = beta = 1: without tuning"}
+    descriptions = {"tuned": "alpha and beta as identified", "untuned": "alpha = beta = 1: without tuning"}
     related = []
     if len(sets) > 1:
         for name, rov in sets.items():
             files[f"{name}.ssv"] = render(
                 "parameters.ssv.j2", name=name, values={key: repr(rov[key]) for key in _tunable(rov)}
             )
-            related.append(_related(f"{name}.ssv", PARAMETERS, "parameter", words[name]))
+            related.append(_related(f"{name}.ssv", PARAMETERS, "parameter", descriptions[name]))
     files["experiments.exp"] = render(
         "experiments.exp.j2",
         experiments=experiments,
@@ -102,31 +102,31 @@ def _tunable(rov: Rov) -> list[str]:
 # ---- Steps from rest -------------------------------------------------------------------------------------------------
 
 
-def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str]) -> Iterator[Experiment]:
-    """A step of each axis to some commands."""
+def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, str]) -> Iterator[ExperimentFiles]:
+    """Write the experiments in which one axis steps to a constant command from rest."""
     tables = {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
-    for form in vehicle.layout.axes:
-        axis, table = form.axis, tables.get(form.axis.name)
+    for axis in (form.axis for form in vehicle.layout.axes if vehicle.layout.signs(form.axis)):
+        table = tables.get(axis.name)
         rows: Mapping[float, ResponseRow | None] = dict.fromkeys(_commands(vehicle))
         if table:
             rows = {float(row.command): row for row in table.rows}
-        for percent, row in rows.items() if vehicle.layout.signs(axis) else ():
+        for percent, row in rows.items():
             stem = f"{axis.name}_{percent:g}".replace("-", "minus_")
             inputs = vehicle.rov.held_inputs(axis, percent / 100.0)
-            units = {name: _unit(rov, axis, percent / 100.0, inputs) for name, rov in sets.items()}
-            longest = max(units.values()) * _MULTIPLES[-1]
+            time_units = {name: _time_unit(rov, axis, percent / 100.0, inputs) for name, rov in sets.items()}
+            longest = max(time_units.values()) * _MULTIPLES[-1]
             for name, rov in sets.items():
                 experiment = f"{stem}_{name}" if len(sets) > 1 else stem
                 references = f"{experiment}_expected.csv"
-                marks = [units[name] * n for n in _MULTIPLES]
-                trajectory = _trajectory(rov, [(inputs, marks)])
+                times = [time_units[name] * n for n in _MULTIPLES]
+                trajectory = _trajectory(rov, [(inputs, times)])
                 files[f"{stem}.csv"] = _csv([(t, _commanded(vehicle, inputs)) for t in (0.0, longest)])
                 files[references] = _csv(_moving(trajectory, rov.layout.velocities | rov.layout.pose))
-                yield Experiment(
+                yield ExperimentFiles(
                     experiment,
-                    _words(rov, axis, percent, name if len(sets) > 1 else "", table, row),
-                    _text(marks[-1]),
-                    _text(units[name] / _STEPS),
+                    _description(rov, axis, percent, name if len(sets) > 1 else "", table, row),
+                    _text(times[-1]),
+                    _text(time_units[name] / _STEPS),
                     name if len(sets) > 1 else None,
                     f"{stem}.csv",
                     references,
@@ -134,20 +134,20 @@ def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, 
 
 
 def _commands(vehicle: Vehicle) -> list[float]:
-    """In %: the greatest over which the vehicle was identified, both ways, and less."""
-    most = 100.0 * min(1.0, vehicle.command_range[1])
-    return [round(share * most, 6) for share in (0.4, 1.0, -1.0)]
+    """Return commands in %: the largest for which the vehicle was identified, in both directions, and a smaller one."""
+    largest = 100.0 * min(1.0, vehicle.command_range[1])
+    return [round(share * largest, 6) for share in (0.4, 1.0, -1.0)]
 
 
-def _unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
-    """Tau and the longest lag to three digits; shorter where nothing would be left to see of what is faster."""
+def _time_unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
+    """Return Tau plus the longest lag, to three digits, or less where faster motions would have settled."""
     lag = max((rov[curve.coefficient("T")] for curve in rov.layout.curves if curve.has_lag), default=0.0)
-    Tau = min(rov.response(axis, command)[1] + lag, _LONGEST, _horizon(rov, inputs))
+    Tau = min(rov.response(axis, command)[1] + lag, _LONGEST_TAU, _horizon(rov, inputs))
     return float(f"{Tau:.3g}")
 
 
 def _horizon(rov: Rov, inputs: Values) -> float:
-    """Some forty of the fastest time constants of the vehicle, and not many more radians of a turn (s)."""
+    """Return forty of the fastest time constants of the vehicle, but at most the time of a turn by 40 radians (s)."""
     rates = [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
     for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
         A, B = motion.drag(motion.C)
@@ -157,50 +157,50 @@ def _horizon(rov: Rov, inputs: Values) -> float:
         if form.axis is YAW and isfinite(V):
             rates.append(abs(V))
         if rov.layout.coupled and isfinite(V):
-            rates.append(_OF_COUPLING * sum(abs(rov.parameters[f"coupling_{v}"]) for v in "uvr") * abs(V))
-    return 40.0 / max(rates) if any(rates) else _LONGEST
+            rates.append(_COUPLING_FACTOR * sum(abs(rov.parameters[f"coupling_{v}"]) for v in "uvr") * abs(V))
+    return 40.0 / max(rates) if any(rates) else _LONGEST_TAU
 
 
-def _words(
+def _description(
     rov: Rov, axis: Axis, percent: float, name: str, table: ResponseTable | None, row: ResponseRow | None
 ) -> str:
-    """What the experiment is, and what it comes to in the words of the tables."""
+    """Describe an experiment, with its V_ss and Tau beside those of the tables."""
     V_ss, Tau = rov.response(axis, percent / 100.0)
     model = row and (row.scaled if name == "tuned" else row.non_linear)
 
-    def beside(cell: Cell | None) -> str:
-        told = {"printed": cell.printed, "measured": cell.measured} if cell else {}
-        found = ", ".join(f"{words} {value}" for words, value in told.items() if value is not None)
+    def published(cell: Cell | None) -> str:
+        values = {"printed": cell.printed, "measured": cell.measured} if cell else {}
+        found = ", ".join(f"{origin} {value}" for origin, value in values.items() if value is not None)
         return f" ({found})" if found else ""
 
-    late = ", without the lag" if rov.layout.lagging else ""
+    without_lag = ", without the lag" if rov.layout.lagging else ""
     return (
         f"{f'Table {table.number}: ' if table else ''}{axis.name}, {percent:g} % from rest{', ' * bool(name)}{name}: "
-        f"V_ss = {V_ss:.4g} {axis.unit}{beside(model.V_ss if model else None)}, "
-        f"Tau = {Tau:.4g} s{beside(model.Tau if model else None)}{late}"
+        f"V_ss = {V_ss:.4g} {axis.unit}{published(model.V_ss if model else None)}, "
+        f"Tau = {Tau:.4g} s{published(model.Tau if model else None)}{without_lag}"
     )
 
 
 # ---- A manoeuvre -----------------------------------------------------------------------------------------------------
 
-# Shares of the greatest command by axis, and of loads and current, phase by phase.
 _PHASES: tuple[tuple[Mapping[Axis, float], float], ...] = (
     ({SURGE: 0.8, HEAVE: 0.5}, 0.0),
     ({SURGE: 0.4, SWAY: 0.3, YAW: 0.3}, 1.0),
     ({SURGE: -0.5, HEAVE: -0.4, YAW: -0.2}, 1.0),
     ({}, 0.0),
 )
+"""The phases of the manoeuvre: shares of the largest command by axis, and of loads and current."""
 
 
-def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[Experiment]:
-    """All axes at once, with loads, a current and reversals, and what is left when all is off; all outputs."""
+def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFiles]:
+    """Write an experiment in which all axes move, with loads, a current and reversals, until all inputs are zero."""
     rov, layout = vehicle.rov, vehicle.layout
     phases = []
     for shares, load in _PHASES:
         inputs = dict.fromkeys(layout.inputs, 0.0)
-        for axis, share in shares.items():
-            for name, sign in layout.signs(axis).items() if layout.has(axis) else ():
-                inputs[name] = round(inputs[name] + share * sign * vehicle.command_range[1], 6)
+        for axis in filter(layout.has, shares):
+            for name, sign in layout.signs(axis).items():
+                inputs[name] = round(inputs[name] + shares[axis] * sign * vehicle.command_range[1], 6)
         for name, meta in layout.inputs.items():
             inputs[name] = max(-1.0, min(1.0, inputs[name])) if name in layout.commands else 0.05 * load * meta.nominal
         phases.append(inputs)
@@ -211,7 +211,7 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[Experiment]:
     trajectory = _trajectory(rov, held)
     files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
     files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.state))
-    yield Experiment(
+    yield ExperimentFiles(
         "manoeuvre",
         "All axes at once, with loads, a current and reversals, then all off",
         _text(ends[-1]),
@@ -236,7 +236,7 @@ def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> l
 
 
 def _moving(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> list[_Row]:
-    """The variables that do not stay at zero but for rounding."""
+    """Keep the variables that do not stay at zero except for rounding."""
     names = [
         name
         for name, meta in variables.items()
@@ -246,6 +246,7 @@ def _moving(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> list[
 
 
 def _commanded(vehicle: Vehicle, inputs: Values) -> Values:
+    """Return the inputs that are commands."""
     return {name: inputs[name] for name in vehicle.layout.commands}
 
 

@@ -1,7 +1,8 @@
-"""The FMU in pure Python: rov_fmu/model/rov.py behind PythonFMU's Fmi2Slave.
+"""The FMU in pure Python: connect rov_fmu/model/rov.py to PythonFMU's Fmi2Slave.
 
-In the FMU this file is the slave module, beside variables.json (the declaration) and its copy of the model. PythonFMU
-knows no fmi2Discard: a value that is refused is logged so, the old one is kept, and the call returns fmi2OK.
+In the FMU this file is the slave module; variables.json (the declaration) and a copy of the model lie in its folder.
+PythonFMU cannot return fmi2Discard: when a value is refused, a message with this status is logged, the old value is
+kept, and the call returns fmi2OK.
 """
 
 import json
@@ -16,7 +17,7 @@ from rov_fmu.model import layout, rov
 
 
 def layout_of(given: Any) -> layout.Layout:
-    """What a vehicle has, from what dataclasses.asdict makes of it, by way of JSON."""
+    """Return the layout of a vehicle from the JSON of its dataclasses.asdict."""
 
     def parts(kind: str) -> list[dict[str, Any]]:
         return [
@@ -34,12 +35,12 @@ def layout_of(given: Any) -> layout.Layout:
 
 
 def _time_tolerance(t: float, h: float) -> float:
-    """Rounding of communication points, as in instance.c."""
+    """Return the rounding error that communication points may have, as in instance.c."""
     return min(1e-9 * (abs(t) + h), 0.5 * h)
 
 
 class Rov(Fmi2Slave):  # type: ignore[misc]
-    """All values by value reference: inputs, state, derivative, thrust, coefficients."""
+    """The slave. Its values are ordered by value reference: inputs, state, derivatives, thrust, coefficients."""
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
@@ -71,11 +72,11 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             )
 
     def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:  # noqa: ARG002
-        """Keep the stop time: steps past it are errors."""
+        """Keep the start and stop time. A step past the stop time is an error."""
         self.time, self.stop_time = start_time, stop_time
 
     def set_real(self, references: list[int], values: list[float]) -> None:
-        """Set all values, or none where one is refused."""
+        """Set all values, or none if one is refused."""
         for reference, value in zip(references, values, strict=True):
             v = self.declared[reference]
             if self._is_calculated(reference):
@@ -94,7 +95,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
                 self._warn_once(reference, f"{v['name']} = {value!r} saturates at {limit:g}")
 
     def get_real(self, references: list[int]) -> list[float]:
-        """Values, the calculated ones from the others."""
+        """Return values, and calculate those that depend on others."""
         if any(map(self._is_calculated, references)):
             model, inputs, state = self._model()
             rates, thrust = model.derivatives(inputs, state), model.thrust(inputs, state)
@@ -102,7 +103,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         return [self.values[reference] for reference in references]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """One exact step; False past the stop time."""
+        """Take one exact step. Return False when it is refused."""
         end = current_time + step_size
         if not (step_size > 0.0 and isfinite(end)):
             self.log(f"step size {step_size!r} at t = {current_time!r} is not a step forward.", Fmi2Status.error)
@@ -129,7 +130,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         return self.calculated.start <= reference < self.calculated.stop
 
     def _model(self) -> tuple[rov.Rov, dict[str, float], dict[str, float]]:
-        """The vehicle, its inputs and its state."""
+        """Return the vehicle, its inputs and its state."""
         inputs, states, k = self.layout.inputs, self.layout.state, self.layout.coefficients
         return (
             rov.Rov(self.layout, dict(zip(k, self.values[self.calculated.stop :], strict=True))),

@@ -1,7 +1,7 @@
-"""terminalsAndIcons/terminalsAndIcons.xml: the variables in terminals, which tools connect as one (FMI 3.0, 2.4.9).
+"""Write terminalsAndIcons.xml, which groups variables into terminals to connect them together (FMI 3.0, 2.4.9).
 
-FMI 2.0.4 takes the file as FMI 3.0 defines it, fmiVersion="3.0" included, so it is the same in FMUs of both versions.
-There is no terminalKind: the standard defines none, and one of our own would only keep others from connecting.
+FMI 2.0.4 uses the file of FMI 3.0, including fmiVersion="3.0", so it is the same in FMUs of both versions. There is no
+terminalKind: the standard defines none, and our own kind would only prevent connections to others.
 """
 
 from collections.abc import Iterator
@@ -13,12 +13,12 @@ from rov_fmu.model.layout import Layout
 FOLDER = "terminalsAndIcons"
 ICON = f"{FOLDER}/icon.png"
 SIGNAL = "signal"
-"""Name of the picture of a terminal, without its ending."""
+"""The name of the picture of a terminal, without its suffix."""
 
 
 @dataclass(frozen=True)
 class Terminal:
-    """Variables of one causality; a plug is connected whole, of a bus whatever the other side has too."""
+    """Variables of one causality. A plug is connected as a whole, a bus by the variables that both sides have."""
 
     name: str
     causality: str
@@ -28,7 +28,7 @@ class Terminal:
 
 
 def terminals(layout: Layout) -> list[Terminal]:
-    """Those of which the vehicle has members: every input and output in one."""
+    """Return the terminals of a vehicle. Every input and output is in exactly one."""
     loads = tuple(form.axis.external for form in layout.axes)
     current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads})
     thrust = layout.lagging | layout.thrust
@@ -44,13 +44,13 @@ def terminals(layout: Layout) -> list[Terminal]:
 
 
 def terminals_and_icons(layout: Layout) -> bytes:
-    """The XML document: inputs on the left of the icon, outputs on its right. The same bytes for the same vehicle."""
+    """Return the XML document, with inputs on the left of the icon and outputs on its right."""
     placed = [place for causality, x in (("input", -120), ("output", 100)) for place in _placed(layout, causality, x)]
     return render("terminalsAndIcons.xml.j2", placed=placed, icon=SIGNAL).encode()
 
 
 def _placed(layout: Layout, causality: str, x: int) -> Iterator[tuple[Terminal, dict[str, int]]]:
-    """Terminals with the corners of their pictures, evenly from the top down."""
+    """Yield the terminals of one side with the corners of their pictures, spaced evenly from top to bottom."""
     side = [terminal for terminal in terminals(layout) if terminal.causality == causality]
     for n, terminal in enumerate(side, start=1):
         y = 100 - 200 * n // (len(side) + 1)

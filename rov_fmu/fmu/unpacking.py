@@ -41,8 +41,8 @@ def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> Any:
     try:
         return fmpy.read_model_description(str(folder), validate=False)
     except Exception as error:  # what FMPy raises
-        told = str(error).replace(f"{folder}{os.sep}", "")
-        raise FileError(f"{fmu}: is no FMU that FMPy reads: {brief(told)}") from error
+        reason = str(error).replace(f"{folder}{os.sep}", "")
+        raise FileError(f"{fmu}: is no FMU that FMPy reads: {brief(reason)}") from error
 
 
 def _refusal(zipped: zipfile.ZipFile) -> str:

@@ -1,4 +1,4 @@
-"""Every FMU variable, declared once.
+"""Declare every variable of the FMU once.
 
 modelDescription.xml, the C structs and value references, the documentation and the PythonFMU registration are all
 derived from `variables`. Their order is: inputs, state, derivatives, thrust, coefficients. The value reference of a
@@ -18,7 +18,7 @@ from rov_fmu.model.rov import Rov
 
 @dataclass(frozen=True)
 class Unit:
-    """An SI unit: its exponents of the FMI base units, and the unit a person reads, value times factor."""
+    """An SI unit: its exponents of the FMI base units, and a display unit; factor converts values to the latter."""
 
     exponents: Mapping[str, int]
     display: str | None = None
@@ -50,14 +50,14 @@ UNITS: dict[str, Unit] = {
 
 @dataclass(frozen=True)
 class Variable:
-    """One scalar variable as FMI describes it. Every one is a Real, a Float64 in FMI 3.0.
+    """A scalar variable with the attributes of FMI. Its type is Real in FMI 2.0 and Float64 in FMI 3.0.
 
     `dependencies` maps each known that the variable depends on to its dependenciesKind, for outputs and derivatives.
     """
 
     name: str
     value_reference: int
-    """In FMI 2.0. It is also the place of the variable in the arrays of the C code, from 0."""
+    """The value reference in FMI 2.0, which is also the index in the arrays of the C code, from 0."""
     description: str
     unit: str
     causality: str
@@ -73,16 +73,16 @@ class Variable:
 
     @property
     def index(self) -> int:
-        """Position in <ModelVariables>, from 1."""
+        """The position in <ModelVariables>, from 1."""
         return self.value_reference + 1
 
     def reference(self, fmi: int) -> int:
-        """Value reference in a version of FMI: in FMI 3.0 the index, because OMSimulator takes one for the other."""
+        """Return the value reference in a version of FMI. In 3.0 it is the index, as OMSimulator confuses the two."""
         return self.value_reference if fmi == 2 else self.index
 
     @property
     def kind(self) -> str:
-        """What it is in C: variable_kind of variable.h."""
+        """The variable_kind of variable.h."""
         if self.causality == "input":
             return "INPUT"
         if self.causality == "parameter":
@@ -90,11 +90,11 @@ class Variable:
         return "STATE" if self.initial == "exact" else "CALCULATED"
 
 
-# ---- What each derivative is ---------------------------------------------------------------------------------------
+# ---- Descriptions of the derivatives ---------------------------------------------------------------------------------
 
 
 def _derivatives(layout: Layout) -> dict[str, Declaration]:
-    """The derivative of every state."""
+    """Return the unit and the description of the derivative of every state."""
     found: dict[str, Declaration] = {}
     for axis in (form.axis for form in layout.axes):
         found[axis.velocity] = Declaration(
@@ -112,17 +112,19 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
     return found
 
 
-def _over_ground(layout: Layout, way: str, current: str, terms: Mapping[str, str]) -> Declaration:
-    """A horizontal velocity over ground: a term of each velocity; ψ is 0 without yaw."""
+def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[str, str]) -> Declaration:
+    """Describe a horizontal velocity over ground by its terms. ψ is 0 without yaw."""
     turns = layout.has(YAW)
     words = [
         term if turns else f"+ {v}" for v, term in terms.items() if v in layout.velocities and (turns or "cos" in term)
     ]
-    return Declaration("m/s", f"Velocity over ground {way}, {' '.join([*words, f'+ {current}']).removeprefix('+ ')}")
+    return Declaration(
+        "m/s", f"Velocity over ground {direction}, {' '.join([*words, f'+ {current}']).removeprefix('+ ')}"
+    )
 
 
 def variables(rov: Rov) -> tuple[Variable, ...]:
-    """All variables of the FMU of a vehicle, in the order of their value references."""
+    """Return all variables of the FMU of a vehicle, in the order of their value references."""
     layout = rov.layout
     result: list[Variable] = []
 
@@ -172,7 +174,6 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
     return tuple(result)
 
 
-# Names by the standard (2.2.4) and what is said in each.
 LOG_CATEGORIES = {
     "logEvents": "Changes of mode: initialization, event mode, reset, termination",
     "logStatusWarning": "A command beyond ±1 that saturates, a call or a time that the standard does not foresee; once",
@@ -180,10 +181,11 @@ LOG_CATEGORIES = {
     "logStatusError": "Illegal calls and arguments, steps past stopTime, results that overflow",
     "logAll": "All of these categories at once",
 }
+"""The log categories by the standard's names (2.2.4), each with its description."""
 
 
 def interface_header(rov: Rov, identifier: str, token: str, fmi: int = 2) -> str:
-    """interface.h: what the FMI layer knows of the variables, and the names of the functions in a static library."""
+    """Return interface.h: the variables as the FMI layer needs them, and the functions' names in a static library."""
     return render(
         "interface.h.j2",
         variables=variables(rov),

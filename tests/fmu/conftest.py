@@ -1,4 +1,4 @@
-"""The FMU of either version of FMI: what is said of one is said of both."""
+"""The VideoRay's FMU in either version of FMI, for tests that hold for both."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Each binary of the archive for all platforms: what it needs, what it exports, and that it runs as the others do.
+"""Each binary of the archive for all platforms: its dependencies, its exports and its results.
 
 The first build for all platforms compiles the C libraries of seven targets, which takes minutes: these tests are long.
 """
@@ -41,12 +41,12 @@ TUPLES = {
     "darwin64": "x86_64-darwin",
     "aarch64-darwin": "aarch64-darwin",
 }
-"""Folders in FMI 3.0 by those in FMI 2.0."""
-LARGEST = 600_000  # 31,000 of them for the page that flies
+"""The folders in FMI 3.0 by those in FMI 2.0."""
+LARGEST = 600_000  # bytes, including 31,000 for the page that flies the vehicle
 
 
 def functions(fmi: int) -> set[str]:
-    """All of a version, as its header names them."""
+    """Return the names of all functions of a version, from its header."""
     header = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
     return set(re.findall(rf"#define (fmi{fmi}\w+)\s+fmi{fmi}FullName\(\1\)", header))
 
@@ -104,7 +104,7 @@ def test_every_vehicle_that_ships_is_built_for_all_platforms(
     assert capsys.readouterr().out.startswith(f"{archive.name}  ")
 
 
-# As FMPy looks for it (in its own words by platform and machine), but Linux on ARM, which has no name in FMI 2.0.
+# The names that FMPy gives to platforms and machines, except Linux on ARM, which has no name in FMI 2.0.
 @pytest.mark.parametrize(
     ("system", "machine", "two", "three"),
     [
@@ -125,11 +125,11 @@ def test_the_hosts_binary_is_the_one_that_importers_load_there(
 
 
 @pytest.mark.parametrize(("fmi", "number"), [(2, 44), (3, 75)])
-def test_there_are_so_many_functions(fmi: int, number: int) -> None:
+def test_the_header_has_the_number_of_functions_of_the_standard(fmi: int, number: int) -> None:
     assert len(functions(fmi)) == number
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the others are looked at in the archive for all platforms")
+@pytest.mark.skipif(sys.platform != "linux", reason="other platforms are tested in the archive for all platforms")
 def test_the_library_of_this_machine_has_all_functions(either_dir: Path, fmi: int) -> None:
     (path,) = (either_dir / "binaries").glob("*/*.so")
     library = lief.ELF.parse(path)
@@ -138,7 +138,7 @@ def test_the_library_of_this_machine_has_all_functions(either_dir: Path, fmi: in
 
 
 @pytest.mark.parametrize("name", LINUX)
-def test_linux_needs_libc_and_libm_of_2012_alone(binaries: Binaries, name: str) -> None:
+def test_linux_needs_only_libc_and_libm_of_2012(binaries: Binaries, name: str) -> None:
     library = lief.ELF.parse(binaries.of(name))
     assert library is not None
     assert set(library.libraries) <= {"libc.so.6", "libm.so.6"}
@@ -149,7 +149,7 @@ def test_linux_needs_libc_and_libm_of_2012_alone(binaries: Binaries, name: str) 
 
 
 @pytest.mark.parametrize("name", WINDOWS)
-def test_windows_needs_the_system_and_its_c_run_time_alone(binaries: Binaries, name: str) -> None:
+def test_windows_needs_only_the_system_and_its_c_run_time(binaries: Binaries, name: str) -> None:
     library = lief.PE.parse(binaries.of(name))
     assert library is not None
     needed = {str(i.name) for i in library.imports}
@@ -161,7 +161,7 @@ def test_windows_needs_the_system_and_its_c_run_time_alone(binaries: Binaries, n
 
 
 @pytest.mark.parametrize("name", DARWIN)
-def test_darwin_has_the_processors_of_its_folder_and_needs_the_system_alone(binaries: Binaries, name: str) -> None:
+def test_darwin_has_the_processors_of_its_folder_and_needs_only_the_system(binaries: Binaries, name: str) -> None:
     universal = lief.MachO.parse(binaries.of(name))
     assert universal is not None
     slices = {str(part.header.cpu_type).rsplit(".", 1)[-1]: part for part in universal}
@@ -172,10 +172,12 @@ def test_darwin_has_the_processors_of_its_folder_and_needs_the_system_alone(bina
         assert {str(lib.name) for lib in part.libraries} == {"@rpath/videoray.dylib", "/usr/lib/libSystem.B.dylib"}
         assert part.dyld_info is not None
         exported = {str(e.symbol.name) for e in part.dyld_info.exports if e.symbol is not None}
-        # the linker adds two symbols of its own
+        # the linker adds two symbols
         assert exported - {"__mh_dylib_header", "___dso_handle"} == {f"_{f}" for f in functions(binaries.fmi)}
     if "ARM64" in slices:
-        assert slices["ARM64"].has_code_signature  # Apple Silicon loads nothing unsigned; ad hoc is enough
+        assert slices[
+            "ARM64"
+        ].has_code_signature  # Apple Silicon loads only signed libraries; an ad-hoc signature is enough
 
 
 # ---- Run for real --------------------------------------------------------------------------------------------------
@@ -183,7 +185,7 @@ def test_darwin_has_the_processors_of_its_folder_and_needs_the_system_alone(bina
 
 @dataclass(frozen=True)
 class Machine:
-    """How a program for a platform is run here, and why it cannot be."""
+    """The command that runs a program for a platform here, and the reason if it cannot run."""
 
     target: str
     suffix: str
@@ -220,7 +222,7 @@ MACHINES = {
 
 
 def _recorded_steps() -> str:
-    """A command sequence with every branch of the step: reversals, turns, rest, loads, current, 1e-5 s to 1e3 s."""
+    """Return commands that reach every branch of the step: reversals, turns, rest, loads, current, 1e-5 s to 1e3 s."""
     random_ = random.Random(20)
     lines = []
     for _ in range(400):
@@ -239,7 +241,7 @@ def _run(binaries: Binaries, name: str, folder: Path) -> np.ndarray:
     if reason := machine.missing():
         pytest.skip(f"{name}: {reason}")
     program = folder / f"host-{name}-{binaries.fmi}{machine.suffix}"
-    # With the flags of the binaries, so that the compiler finds the C library that it built for them.
+    # The flags are those of the binaries, so that the compiler finds the C library that it built for them.
     of_binaries = ("-g0", "-s", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables")
     flags = ("-target", machine.target, *of_binaries, *(() if machine.suffix else ("-ldl",)))
     compile_c(Path(__file__).with_name("host.c"), program, binaries.folder / "sources", *flags)
@@ -264,7 +266,7 @@ def trajectory(binaries: Binaries, folder: Path) -> np.ndarray:
 
 
 @pytest.mark.skipif(host_platform() != "linux64", reason="the programs are run on Linux on x86-64")
-def test_both_versions_of_fmi_fly_the_same_to_the_last_bit(
+def test_both_versions_of_fmi_give_the_same_trajectory_to_the_last_bit(
     videoray_fmu: Path, videoray_dir: Path, videoray3_fmu: Path, videoray3_dir: Path, folder: Path
 ) -> None:
     two = _run(Binaries(videoray_fmu, videoray_dir, 2), "linux64", folder)

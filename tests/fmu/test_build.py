@@ -18,7 +18,7 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE
 
 _LAYERS = {2: {"fmi2_host.h"}, 3: {"fmi3_host.h", "buildDescription.xml"}}
-"""What is a version's own beside its C files."""
+"""The files that only one version of FMI has, besides its C files."""
 
 
 def _build(output: Path, *arguments: str) -> int:
@@ -32,7 +32,7 @@ def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(either_fmu: Path) -> 
         assert round(float(result["u"][-1]), 4) == 0.4729
 
 
-def test_the_archive_is_one_that_every_importer_unpacks(either_fmu: Path) -> None:
+def test_every_importer_can_unpack_the_archive(either_fmu: Path) -> None:
     with zipfile.ZipFile(either_fmu) as archive:
         assert archive.testzip() is None
         members = archive.infolist()
@@ -59,7 +59,7 @@ def test_the_archive_is_one_that_every_importer_unpacks(either_fmu: Path) -> Non
         assert not m.flag_bits & 0x1
 
 
-def test_the_archive_has_what_is_of_its_version_alone(either_dir: Path, fmi: int) -> None:
+def test_the_archive_has_only_files_of_its_version(either_dir: Path, fmi: int) -> None:
     here = {path.name for path in (either_dir / "sources").iterdir()}
     layers = {path.name for path in fmu_compile.C_SOURCES.glob(f"fmi{fmi}_*")} | _LAYERS[fmi]
     shared = {path.name for path in fmu_compile.C_SOURCES.iterdir() if not path.name.startswith("fmi")}
@@ -101,7 +101,7 @@ def test_the_description_says_what_the_interface_declares(videoray_dir: Path, ve
 
 
 def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> None:
-    """FMI++ ends where these are absent."""
+    """FMI++ stops when these attributes are missing."""
     description = etree.parse(videoray_dir / "modelDescription.xml")
     once = "canBeInstantiatedOnlyOncePerProcess"
     for interface, flags in {
@@ -115,14 +115,14 @@ def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> Non
 
 @pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.long)], indirect=True)
 def test_the_same_inputs_give_the_same_bytes(either_fmu: Path, fmi: int, tmp_path: Path) -> None:
-    """FMI 2.0 by default in a notebook, too: tests/cli/test_start.py."""
+    """The same is tested in a notebook in tests/cli/test_start.py."""
     again = tmp_path / "elsewhere" / "other name.fmu"
     again.parent.mkdir()
     assert _build(again, "--fmi", str(fmi)) == 0
     assert again.read_bytes() == either_fmu.read_bytes()
 
 
-def test_another_coefficient_is_another_guid(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
+def test_another_coefficient_gives_another_guid(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
     guids = [fmpy.read_model_description(str(videoray_fmu)).guid]
     for mass in ("6.57", "6.58"):
         path = tmp_path / f"{mass}.toml"
@@ -132,15 +132,15 @@ def test_another_coefficient_is_another_guid(videoray_fmu: Path, vehicle: Vehicl
     assert vehicle.rov["m_rov"] == 6.57
 
 
-def test_the_command_line_says_what_it_built(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_prints_what_it_built(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert _build(tmp_path / "rov.fmu") == 0
-    told = capsys.readouterr().out
-    assert str(fmu_compile.host_platform()) in told
-    assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in told
-    assert "built in" in told
+    output = capsys.readouterr().out
+    assert str(fmu_compile.host_platform()) in output
+    assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in output
+    assert "built in" in output
 
 
-def test_a_program_is_told_of_a_platform_that_does_not_exist(vehicle: Vehicle, tmp_path: Path) -> None:
+def test_build_raises_an_error_about_an_unknown_platform(vehicle: Vehicle, tmp_path: Path) -> None:
     with pytest.raises(fmu_compile.BuildError, match="there is no platform linux, only host, linux64"):
         build(vehicle, tmp_path / "rov.fmu", platforms=["linux"])
     assert list(tmp_path.iterdir()) == []

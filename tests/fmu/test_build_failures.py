@@ -1,4 +1,4 @@
-"""What a build does when it cannot: one clear line, an exit code, the old FMU untouched, nothing left behind."""
+"""A build that fails prints one clear line, returns an exit code, keeps an old FMU and leaves no temporary files."""
 
 import errno
 import os
@@ -29,7 +29,7 @@ def _build(output: Path, *arguments: str) -> int:
 
 @pytest.fixture
 def old(tmp_path: Path) -> Path:
-    """An FMU that is there already, alone in its folder."""
+    """Return the path of an FMU that already exists, alone in its folder."""
     path = tmp_path / "target" / "rov.fmu"
     path.parent.mkdir()
     path.write_bytes(_OLD)
@@ -56,10 +56,10 @@ def test_an_impossible_output_is_refused_before_the_work(tmp_path: Path, capsys:
 def test_an_fmu_that_is_not_valid_does_not_replace_the_old_one(
     old: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def unhappy(_path: str) -> list[str]:
+    def invalid(_path: str) -> list[str]:
         return ["something is wrong with it"]
 
-    monkeypatch.setattr("fmpy.validation.validate_fmu", unhappy)
+    monkeypatch.setattr("fmpy.validation.validate_fmu", invalid)
     assert _build(old) == 1
     assert "not valid: something is wrong with it" in _one_line(capsys)
 
@@ -72,7 +72,7 @@ def test_an_fmu_that_is_not_valid_does_not_replace_the_old_one(
     assert _untouched(old)
 
 
-def test_a_compile_error_is_told_with_the_compilers_words(
+def test_a_compile_error_is_printed_with_the_compilers_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     broken = tmp_path / "c"
@@ -80,9 +80,9 @@ def test_a_compile_error_is_told_with_the_compilers_words(
     (broken / "step.c").write_text("int no semicolon", encoding="utf-8")
     monkeypatch.setattr("rov_fmu.fmu.archive.C_SOURCES", broken)
     assert _build(tmp_path / "rov.fmu") == 1
-    told = capsys.readouterr().err
-    assert told.startswith(f"rov-fmu: {fmu_compile.host_platform()}: the compiler failed")
-    assert "step.c:1" in told
+    error = capsys.readouterr().err
+    assert error.startswith(f"rov-fmu: {fmu_compile.host_platform()}: the compiler failed")
+    assert "step.c:1" in error
     assert not (tmp_path / "rov.fmu").exists()
 
 
@@ -96,13 +96,13 @@ def test_a_missing_compiler_says_how_to_get_it(
     assert _untouched(old)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder that takes no files, for the administrator too")
-def test_a_folder_that_takes_no_file_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is a folder in which not even root can create files")
+def test_a_folder_that_cannot_be_written_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert _build(Path("/proc/rov.fmu")) == 2
     assert "/proc/rov.fmu: cannot be written" in _one_line(capsys)
 
 
-def test_a_compiler_that_does_not_end_starts_again_without_its_vectorizer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_compiler_that_does_not_end_is_started_again_without_its_vectorizer(monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[bool] = []
     begin = subprocess.Popen
 
@@ -132,7 +132,7 @@ def test_a_full_disk_leaves_the_old_fmu(
 
 
 def _run(old: Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
-    """The script as a process of its own, its temporary files in a folder that can be looked at."""
+    """Start the script as another process, with its temporary files in a folder of the test."""
     (folder / "tmp").mkdir()
     return subprocess.Popen(
         [sys.executable, _SCRIPT, str(BARE), "--platform", "host", "-o", str(old)],
@@ -141,30 +141,30 @@ def _run(old: Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE,
         text=True,
         cwd=folder,
-        # a shell starts what it runs in the background with interrupts ignored, and that is inherited
+        # a shell starts background processes with interrupts ignored, and their children inherit this
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
     )
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a limit on the size of files is POSIX")
-def test_no_room_for_temporary_files(old: Path, tmp_path: Path) -> None:
+def test_a_full_temporary_folder_is_reported(old: Path, tmp_path: Path) -> None:
     limited = tmp_path / "limited.py"
     limited.write_text(
-        "import matplotlib.font_manager, resource, runpy, signal, sys\n"  # which writes a cache of its own
+        "import matplotlib.font_manager, resource, runpy, signal, sys\n"  # matplotlib writes a cache when imported
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
         f"sys.argv = ['build_fmu.py', {str(BARE)!r}, '--platform', 'host', '-o', {str(old)!r}]\n"
         f"runpy.run_path({_SCRIPT!r}, run_name='__main__')\n",
         encoding="utf-8",
     )
-    # -B: what Python compiles would be cut off too, and stay so for all who import it
+    # -B: otherwise Python would write truncated .pyc files, which later imports would read
     result = subprocess.run(
         [sys.executable, "-B", limited],
         capture_output=True,
         text=True,
         check=False,
         cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},  # this checkout, whichever is installed
+        env=os.environ | {"PYTHONPATH": str(ROOT)},  # this checkout, even if another is installed
     )
     assert result.returncode == 1
     assert result.stderr.splitlines()[0].startswith("rov-fmu: ")
@@ -174,7 +174,7 @@ def test_no_room_for_temporary_files(old: Path, tmp_path: Path) -> None:
 
 
 def _is_running(process: int) -> bool:
-    """Not gone, and not waiting for init to take note of its end."""
+    """Return True if a process exists and is not a zombie."""
     stat = Path(f"/proc/{process}/stat")
     try:
         return stat.read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
@@ -187,7 +187,7 @@ def _is_running(process: int) -> bool:
 def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
     old: Path, tmp_path: Path, signal_: signal.Signals
 ) -> None:
-    """No clock tells: nothing but the interrupt ends the compiler, and the limits are those of a test that hangs."""
+    """The test measures no time: only the interrupt can end the compiler. The timeouts end a test that hangs."""
     process = _run(old, tmp_path, **endless_compiler(tmp_path))
     deadline = time.monotonic() + 120.0
     while not (number := tmp_path / "number").exists():
@@ -199,7 +199,7 @@ def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
     deadline = time.monotonic() + 120.0
     assert process.returncode == 130
     assert error == "rov-fmu: interrupted, no file is half-written\n"
-    while _is_running(int(number.read_text(encoding="utf-8"))):  # killed, but perhaps not yet through with ending
+    while _is_running(int(number.read_text(encoding="utf-8"))):  # the process was killed, but may still be ending
         assert time.monotonic() < deadline
         time.sleep(0.02)
     assert list((tmp_path / "tmp").iterdir()) == []
@@ -220,7 +220,7 @@ _MOMENTS = list(product([signal.SIGINT, signal.SIGTERM], [0.0, 0.01, 0.03, 0.1, 
 def test_interrupted_at_any_moment_it_leaves_nothing(
     old: Path, tmp_path: Path, signal_: signal.Signals, share: float
 ) -> None:
-    """The real compiler, which an empty cache makes work for seconds."""
+    """The real compiler runs for seconds because its cache is empty."""
     cache = tmp_path / "cache"
     process = _run(old, tmp_path, ZIG_GLOBAL_CACHE_DIR=str(cache), ZIG_LOCAL_CACHE_DIR=str(cache))
     deadline = time.monotonic() + 120.0

@@ -1,4 +1,4 @@
-"""The numbers of modelDescription.xml, written down a second time: bounds, nominal values, units."""
+"""The bounds, nominal values and units in modelDescription.xml equal a second list of them."""
 
 from math import pi
 from pathlib import Path

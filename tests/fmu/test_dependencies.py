@@ -18,7 +18,7 @@ Slopes = dict[tuple[str, str], float]
 
 
 def slopes(rov: Rov, point: Point, knowns: Sequence[str]) -> Slopes:
-    """Central differences at a point of inputs, states and coefficients."""
+    """Return central differences at a point of inputs, states and coefficients."""
     found = {}
     for known in knowns:
         step = 1e-6 * max(1.0, abs(point[known]))
@@ -45,7 +45,7 @@ def vary(values: Sequence[float]) -> bool:
 
 
 def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
-    """One list of <ModelStructure>."""
+    """Return a list of <ModelStructure>."""
     of_rov = variables(rov)
     root = etree.fromstring(model_description(a_vehicle(rov), of_rov, guid="", interfaces=NATIVE[2]))
     name: Mapping[str, Variable] = {str(v.index): v for v in of_rov}
@@ -57,7 +57,7 @@ def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
 
 
 @pytest.mark.parametrize("kind", VEHICLES)
-def test_dependencies_are_declared_as_they_are(kind: str) -> None:
+def test_declared_dependencies_are_those_of_the_equations(kind: str) -> None:
     rov, rng = numbered(VEHICLES[kind].layout), random.Random(1)
     knowns = [*rov.layout.inputs, *rov.layout.state]
     motions = [motion(rov.layout, rng) for _ in range(12)]
@@ -80,8 +80,8 @@ def test_dependencies_are_declared_as_they_are(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", VEHICLES)
-def test_initial_dependencies_are_declared_as_they_are(kind: str) -> None:
-    """Knowns are inputs, states and coefficients; kinds are constant or dependent alone (2.2.8)."""
+def test_declared_initial_dependencies_are_those_of_the_equations(kind: str) -> None:
+    """The knowns are inputs, states and coefficients; the only kinds are constant and dependent (2.2.8)."""
     rov, rng = numbered(VEHICLES[kind].layout), random.Random(2)
     points = [motion(rov.layout, rng) | parameters(rov, rng, [False, True]) for _ in range(16)]
     samples = [slopes(rov, point, list(point)) for point in points]

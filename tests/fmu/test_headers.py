@@ -1,9 +1,10 @@
-"""The C sources under the FMI headers that importers ship, by other compilers: names, warnings, the same bits.
+"""The C sources compile under all FMI headers and compilers without warnings, and give the same bits.
 
-FMPy's package brings headers whose names never bear a prefix. The others are made of them, by what the standard's own
-differ in: FMI 2.0.0 (as in FMI Library, FMI4cpp, MasterSim or PythonFMU 0.6.3) has const members in
+The headers in FMPy's package never add a prefix to names. The other headers are made from them by the differences of
+the standard's releases: FMI 2.0.0 (as in FMI Library, FMI4cpp, MasterSim or PythonFMU 0.6.3) has const members in
 fmi2CallbackFunctions and pastes the prefix; 2.0.1 to 2.0.3 (and Reference-FMUs) paste it; 2.0.4 and 2.0.5 do, unless
-FMI2_OVERRIDE_FUNCTION_PREFIX is defined. FMPy's headers of FMI 3.0 are the standard's: as those of 2.0.4.
+FMI2_OVERRIDE_FUNCTION_PREFIX is defined. FMPy's headers of FMI 3.0 are those of the standard, and
+handle prefixes like 2.0.4.
 """
 
 import platform
@@ -72,7 +73,7 @@ def _version(release: str) -> int:
 
 @pytest.fixture(scope="module")
 def fmus(fmu: fmi2.Fmu, videoray3_dir: Path) -> dict[int, Fmu]:
-    """By version of FMI."""
+    """Return the FMUs by their version of FMI."""
     return {2: fmu, 3: fmi3.Fmu(videoray3_dir)}
 
 
@@ -84,23 +85,25 @@ def headers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 _STRICT = ("-pedantic", "-Wall", "-Wextra", "-Werror")
 _PLAIN = {"2.0.4": ("-DFMI2_OVERRIDE_FUNCTION_PREFIX",), "3.0": ("-DFMI3_OVERRIDE_FUNCTION_PREFIX",)}
-"""What these headers are told for a shared library; the others need nothing."""
+"""The flags that headers need for a shared library; other headers need none."""
 COMPILERS = {"zig": compiler()} | {name: [name] for name in ("gcc", "clang") if shutil.which(name)}
 _HAS_FMA = "fma" in Path("/proc/cpuinfo").read_text(encoding="utf-8") if Path("/proc/cpuinfo").exists() else False
 
 
 def _compile(fmu: Fmu, headers: Path, command: Sequence[str], library: Path, warnings: Sequence[str] = _STRICT) -> Path:
-    """The FMU's sources as a shared library."""
+    """Compile the FMU's sources to a shared library, without warnings."""
     sources = fmu.folder / "sources"
-    include = "-isystem" if headers.name == "3.0" else "-I"  # where the standard itself declares f() without arguments
+    include = (
+        "-isystem" if headers.name == "3.0" else "-I"
+    )  # because the headers of the standard declare f() without arguments
     shared = ("-shared", "-fPIC", include, str(headers), "fmu.c", "-lm", "-o", str(library))
     built = subprocess.run([*command, *warnings, *shared], cwd=sources, capture_output=True, text=True, check=False)
     assert (built.returncode, built.stderr) == (0, "")
     return library
 
 
-def _flight(fmu: Fmu, steps: int = 400) -> bytes:
-    """All values along a random flight: turns, reversals, saturation, loads, long and short steps, tuned."""
+def _values(fmu: Fmu, steps: int = 400) -> bytes:
+    """Return all values along a random motion: turns, reversals, saturation, loads, tuning, long and short steps."""
     drawn = random.Random(20)
     result = b""
     with fmu.instance() as rov:
@@ -119,12 +122,12 @@ def _flight(fmu: Fmu, steps: int = 400) -> bytes:
 
 @pytest.fixture(scope="module")
 def shipped(fmu: fmi2.Fmu) -> bytes:
-    """That of FMI 2.0 is that of all."""
-    return _flight(fmu)
+    """Return the values of the FMU that was built, which both versions of FMI share."""
+    return _values(fmu)
 
 
-def _flies_the_same(fmu: Fmu, library: Path, shipped: bytes) -> None:
-    assert _flight(type(fmu)(fmu.folder, library)) == shipped
+def _assert_same_values(fmu: Fmu, library: Path, shipped: bytes) -> None:
+    assert _values(type(fmu)(fmu.folder, library)) == shipped
 
 
 def _exports(library: Path) -> set[str]:
@@ -133,7 +136,7 @@ def _exports(library: Path) -> set[str]:
     return {name for function in binary.exported_functions if re.search("fmi[23]", name := str(function.name))}
 
 
-# Every header once, every compiler once, both standards; all of them in the weekly tests.
+# Every header, compiler and C standard occurs once; the weekly tests have all combinations.
 _STANDARDS, _NAMES = ("c99", "c11"), list(COMPILERS)
 _SOME = {(release, _NAMES[i % len(_NAMES)], _STANDARDS[i % 2]) for i, release in enumerate(RELEASES)}
 _MATRIX = [
@@ -145,7 +148,7 @@ _MATRIX = [
 
 
 @pytest.mark.parametrize(("release", "name", "standard"), _MATRIX)
-def test_a_shared_library_has_plain_names_and_flies_the_same(
+def test_a_shared_library_has_plain_names_and_gives_the_same_values(
     fmus: dict[int, Fmu],
     headers: dict[str, Path],
     shipped: bytes,
@@ -158,22 +161,22 @@ def test_a_shared_library_has_plain_names_and_flies_the_same(
     command = [*COMPILERS[name], f"-std={standard}", "-O2", *_PLAIN.get(release, ())]
     library = _compile(fmu, headers[release], command, tmp_path / "videoray.so")
     assert _exports(library) == _exports(fmu.library)
-    _flies_the_same(fmu, library, shipped)
+    _assert_same_values(fmu, library, shipped)
 
 
 @pytest.mark.parametrize("release", [pytest.param("2.0.0", marks=pytest.mark.weekly), "3.0"])
-def test_as_cpp_they_fly_the_same(
+def test_the_sources_compile_as_cpp_and_give_the_same_values(
     fmus: dict[int, Fmu], headers: dict[str, Path], shipped: bytes, tmp_path: Path, release: str
 ) -> None:
-    """Not pedantically so: compound literals are an extension there, of GCC and Clang."""
+    """The flag -pedantic is left out, because compound literals are an extension of GCC and Clang in C++."""
     fmu = fmus[_version(release)]
     command = [*compiler(), "-x", "c++", "-std=c++17", "-O2", *_PLAIN.get(release, ())]
     library = _compile(fmu, headers[release], command, tmp_path / "videoray.so", ("-Wall", "-Wextra", "-Werror"))
     assert _exports(library) == _exports(fmu.library)
-    _flies_the_same(fmu, library, shipped)
+    _assert_same_values(fmu, library, shipped)
 
 
-# Each way that a release has it once; all of them in the weekly tests.
+# Each behaviour of a release occurs once; the weekly tests have all combinations.
 _SOME_PREFIXES = {("2.0.0", False), ("2.0.4", False), ("2.0.4", True)}
 _PREFIXES = [
     pytest.param(r, o, marks=() if (r, o) in _SOME_PREFIXES else pytest.mark.weekly)
@@ -192,7 +195,7 @@ def test_the_prefix_reaches_the_exports_only_where_it_is_meant_to(
     command = [*compiler(), "-O0", *_PLAIN.get(release, _PLAIN["2.0.4"]) * override]
     library = _compile(fmu, headers[release], command, tmp_path / "a.so")
     assert _exports(library) == (prefixed if release in _PLAIN and not override else plain)
-    if not override:  # asked for, for a static library
+    if not override:  # a prefix is requested, for a static library
         command = [*compiler(), "-O0", f"-DFMI{_version(release)}_FUNCTION_PREFIX=videoray_"]
         assert _exports(_compile(fmu, headers[release], command, tmp_path / "b.so")) == prefixed
 
@@ -267,12 +270,12 @@ def test_fused_multiplication_does_not_change_a_bit(
     fmu: fmi2.Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path, name: str, flags: tuple[str, ...]
 ) -> None:
     library = _compile(fmu, headers["2.0.0"], [*COMPILERS[name], *flags], tmp_path / "videoray.so")
-    _flies_the_same(fmu, library, shipped)
+    _assert_same_values(fmu, library, shipped)
 
 
 _OF_ONE = ("fabs", "ceil", "sqrt", "sin", "cos", "exp", "log", "log1p", "expm1", "atan", "atanh")
 _OF_TWO = ("fmin", "fmax", "copysign", "hypot", "pow", "remainder")
-# What the sources use of the C library, as Microsoft's headers declare it; those cannot be had from a package.
+# The parts of the C library that the sources use, as Microsoft's headers declare them; no package has those headers.
 _MICROSOFT = {
     "math.h": "#define INFINITY ((float)(1e300 * 1e300))\n#define NAN (-(float)(INFINITY * 0.0f))\n"
     "short _dclass(double);\n#define isfinite(x) (_dclass(x) <= 0)\n#define isnan(x) (_dclass(x) == 2)\n"
@@ -295,10 +298,10 @@ _MICROSOFT = {
         for j, standard in enumerate(_STANDARDS)
     ],
 )
-def test_microsofts_compiler_would_take_them(
+def test_the_sources_compile_like_with_microsofts_compiler(
     fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, standard: str
 ) -> None:
-    """By clang, which takes its place: its target, its language, no __GNUC__."""
+    """Clang takes the place of Microsoft's compiler, with its target and language and without __GNUC__."""
     for name, text in _MICROSOFT.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     zig = Path(compiler()[0])
@@ -317,8 +320,8 @@ def test_microsofts_compiler_would_take_them(
     assert (result.returncode, result.stderr) == (0, "")
 
 
-def test_the_headers_are_what_their_releases_are(headers: dict[str, Path], tmp_path: Path) -> None:
-    """Const members are refused where they are assigned; a prefix is pasted where it is known."""
+def test_the_headers_differ_like_their_releases(headers: dict[str, Path], tmp_path: Path) -> None:
+    """An assignment of const members is refused, and a prefix is added where the release knows it."""
     program = tmp_path / "p.c"
     program.write_text(
         '#define FMI2_FUNCTION_PREFIX pre_\n#include "fmi2Functions.h"\n'

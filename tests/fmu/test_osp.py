@@ -1,4 +1,4 @@
-"""The OSP model description: what the interface declares, in groups as OSP-IS 1.0.1 has them."""
+"""The OSP model description contains every input and output in the groups of OSP-IS 1.0.1."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from tests.vehicles import VEHICLES
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
 
-# The sequence of the schema as far as it concerns motion, and the dimension of what each element groups.
+# The elements for motion in the sequence of the schema, with the dimension of their variables.
 SEQUENCE = {
     "Generic": {},
     "Force": {"kg": 1, "m": 1, "s": -2},
@@ -48,7 +48,7 @@ def references(group: etree._Element) -> list[str]:
 
 @pytest.mark.parametrize("kind", VEHICLES)
 def test_every_input_and_output_is_in_one_group(kind: str) -> None:
-    """Of vehicles of every kind; a group is of one causality, one unit and one variable an axis."""
+    """The variables of a group have the same causality and unit, and different axes."""
     groups = groups_of(VEHICLES[kind].layout)
     declared = {v.name: v for v in variables(VEHICLES[kind])}
     grouped = sorted(name for group in groups for name in references(group))
@@ -97,7 +97,7 @@ def test_what_systems_connect_by(
     assert {variable.get("ref"): variable.get("axis") for variable in group} == members
 
 
-def test_a_force_aslant_has_no_axis(heavy: Vehicle) -> None:
+def test_an_oblique_force_has_no_axis(heavy: Vehicle) -> None:
     axes = {v.get("ref"): v.get("axis") for group in groups_of(heavy.layout) for v in group}
     assert (axes["F_1"], axes["F_5"]) == (None, "z")
 
@@ -109,12 +109,12 @@ def _build(path: Path, *arguments: str) -> int:
     return main(["build", "--platform", "host", "-o", str(path), *arguments])
 
 
-def test_the_option_writes_it_beside_the_fmu(tmp_path: Path) -> None:
+def test_the_option_writes_it_to_the_folder_of_the_fmu(tmp_path: Path) -> None:
     vehicle = load_vehicle(BARE)
     assert _build(tmp_path / "rov.fmu", str(BARE)) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["rov.fmu"]
     assert _build(tmp_path / "rov.fmu", str(BARE), "--osp") == 0
-    # named after the model, not after the archive: that is where libcosim looks for it
+    # libcosim looks for the name of the model, not of the archive
     path = tmp_path / "bare_OspModelDescription.xml"
     assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]
     assert osp_path(tmp_path / "rov.fmu", vehicle.identifier) == path

@@ -1,4 +1,4 @@
-"""The FMU in pure Python: valid, and the same as the native one."""
+"""The FMU in pure Python is valid and gives the same results as the native one."""
 
 import os
 import random
@@ -30,7 +30,7 @@ def python_fmu(made_once: Made) -> Path:
         assert main(["build", "--backend", "pythonfmu", "-o", str(path)]) == 0
         fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
 
-    # PythonFMU's binary takes no other special character than the space in its path
+    # a space is the only special character that PythonFMU's binary accepts in its path
     return made_once("python flavour", fill) / "videoray-python.fmu"
 
 
@@ -57,7 +57,7 @@ def test_it_is_valid_and_says_what_it_can_do(python_fmu: Path, vehicle: Vehicle)
     assert can.maxOutputDerivativeOrder == 0
 
 
-def test_its_modules_bear_the_name_of_the_vehicle(python_fmu: Path) -> None:
+def test_its_modules_are_named_after_the_vehicle(python_fmu: Path) -> None:
     with zipfile.ZipFile(python_fmu) as archive:
         ours = {n for n in archive.namelist() if n.startswith("resources/") and "/pythonfmu/" not in n}
     assert ours == {
@@ -128,7 +128,7 @@ def test_both_flavours_move_the_same_way(python_dir: Path, videoray_dir: Path, v
         slave.freeInstance()
 
 
-# start time, stop time, and of one step t, h, and whether it is done
+# start time, stop time, t and h of a step, and True if the step is accepted
 STOPS = [
     (0.0, 1.0, 0.9, 0.1 + 1.0e-9, True),
     (0.0, 1.0, 0.9, 0.1 + 1.2e-9, False),
@@ -161,7 +161,9 @@ def test_both_flavours_end_at_the_same_stop_time(
         slave.freeInstance()
 
 
-def test_both_flavours_warn_once_of_what_saturates_and_of_a_jump_in_time(python_dir: Path, videoray_dir: Path) -> None:
+def test_both_flavours_warn_once_about_saturation_and_about_a_jump_in_time(
+    python_dir: Path, videoray_dir: Path
+) -> None:
     for folder in (python_dir, videoray_dir):
         log: list[Message] = []
         slave = fmpy_slave(folder, recording_callbacks(log))
@@ -171,7 +173,7 @@ def test_both_flavours_warn_once_of_what_saturates_and_of_a_jump_in_time(python_
         saved, warned = slave.getFMUState(), []
         for t in (1.0, 1.1, 1.0, 1.1 + 1e-11, 1.5, 9.0):
             if t == 1.0:
-                slave.setFMUState(saved)  # to step again from there is no jump
+                slave.setFMUState(saved)  # a step from a restored state is no jump
             slave.setReal([0], [1.5])
             slave.doStep(currentCommunicationPoint=t, communicationStepSize=0.1)
             warned.append([m.text for m in log if m.status == WARNING])
@@ -181,7 +183,7 @@ def test_both_flavours_warn_once_of_what_saturates_and_of_a_jump_in_time(python_
         slave.freeInstance()
 
 
-def test_what_the_native_one_refuses_is_refused(python_dir: Path, vehicle: Vehicle) -> None:
+def test_values_that_the_native_one_refuses_are_refused(python_dir: Path, vehicle: Vehicle) -> None:
     by_name = {v.name: v for v in variables(vehicle.rov)}
     slave = _instance(python_dir)
     slave.enterInitializationMode()
@@ -194,7 +196,7 @@ def test_what_the_native_one_refuses_is_refused(python_dir: Path, vehicle: Vehic
 
 @pytest.fixture
 def importer(tmp_path: Path) -> Path:
-    """An importer that is no Python process."""
+    """Return an importer that is not a Python process."""
     if fmpy.platform != "linux64":
         pytest.skip(
             "PythonFMU has a binary for Linux on x86-64; that of Windows is not preloaded but finds python3.dll"
@@ -209,10 +211,10 @@ def _imported(importer: Path, folder: Path, **environment: str) -> Ended:
     return run_program(importer, library, description.guid, resources, env=os.environ | environment)
 
 
-def test_an_importer_that_is_no_python_process_preloads_libpython(
+def test_an_importer_that_is_not_a_python_process_preloads_libpython(
     importer: Path, python_dir: Path, videoray_dir: Path
 ) -> None:
-    """As docs/platforms.md says, and as the FMU's own description and page do."""
+    """docs/platforms.md and the FMU's description and page tell users to do so."""
     alone = _imported(importer, python_dir)
     assert (alone.code, alone.lines) == (1, [])
     assert "undefined symbol: _Py_NoneStruct" in alone.errors
@@ -225,8 +227,8 @@ def test_an_importer_that_is_no_python_process_preloads_libpython(
     assert float(u) == pytest.approx(float(expected), rel=1e-12)
 
 
-def test_it_says_that_an_importer_in_another_language_preloads_libpython(python_dir: Path, videoray_dir: Path) -> None:
-    for folder, told in ((python_dir, True), (videoray_dir, False)):
+def test_the_description_and_the_page_mention_ld_preload(python_dir: Path, videoray_dir: Path) -> None:
+    for folder, mentioned in ((python_dir, True), (videoray_dir, False)):
         description = fmpy.read_model_description(str(folder)).description
         page = (folder / "documentation" / "index.html").read_text(encoding="utf-8")
-        assert ("LD_PRELOAD" in description) == ("LD_PRELOAD" in page) == told
+        assert ("LD_PRELOAD" in description) == ("LD_PRELOAD" in page) == mentioned

@@ -1,4 +1,4 @@
-"""The experiments inside the FMU: by the standard's form, and with expected results that the C has no part in."""
+"""The experiments in the FMU follow the standard, and their expected results do not come from the C code."""
 
 import csv
 import io
@@ -24,7 +24,7 @@ from tests.vehicles import VEHICLES, at_rest, still
 from verification.references import reference
 
 _SCHEMAS = Path(fmpy.__file__).parent
-# What the standard tells of its root element, around FMPy's copy of the attributes that all layered standards share.
+# The standard's root element, around FMPy's copy of the attributes that all layered standards share.
 _FORM = f"""
 <xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" xmlns:ls="http://fmi-standard.org/fmi-ls-manifest">
   <xs:import namespace="http://fmi-standard.org/fmi-ls-manifest"
@@ -89,7 +89,7 @@ def test_they_are_small_and_the_same_each_time(shipped: tuple[Vehicle, Mapping[s
 
 def test_the_tables_of_the_paper_are_experiments(vehicle: Vehicle) -> None:
     files = reference_results(vehicle)
-    experiments, told = _experiments(files), 0
+    experiments, printed = _experiments(files), 0
     for table in load_tables(vehicle):
         v = table.axis.velocity
         for row in table.rows:
@@ -98,7 +98,7 @@ def test_the_tables_of_the_paper_are_experiments(vehicle: Vehicle) -> None:
                 ("untuned", untuned(vehicle.rov), row.non_linear),
             ):
                 experiment = experiments.pop(f"{table.axis.name}_{row.command}_{name}")
-                told += 1
+                printed += 1
                 assert experiment.get("description").startswith(
                     f"Table {table.number}: {table.axis.name}, {row.command} %"
                 )
@@ -116,12 +116,12 @@ def test_the_tables_of_the_paper_are_experiments(vehicle: Vehicle) -> None:
                 ]
                 assert parameters == {key: model[key] for key in parameters}
                 assert len(parameters) == 6
-    assert told == 28
+    assert printed == 28
     assert list(experiments) == ["manoeuvre"]
 
 
 @pytest.mark.parametrize("name", sorted(set(SHIPPED) - {"videoray"}))
-def test_other_vehicles_have_experiments_of_their_own(name: str) -> None:
+def test_other_vehicles_have_different_experiments(name: str) -> None:
     vehicle = load_vehicle(SHIPPED[name])
     files = reference_results(vehicle)
     assert not [path for path, content in files.items() if b"Table" in content]
@@ -134,7 +134,7 @@ def test_other_vehicles_have_experiments_of_their_own(name: str) -> None:
 
 
 def _check(rov: Rov, files: Mapping[str, bytes], name: str) -> None:
-    """Every expected value against 50 digits."""
+    """Compare every expected value with a computation in 50 digits."""
     experiment = _experiments(files)[name]
     stimuli, expected = (_rows(files, experiment.find(part).get("source")) for part in ("Stimuli", "References"))
     state: Mapping[str, Any] = at_rest(rov)
@@ -158,7 +158,7 @@ def _check(rov: Rov, files: Mapping[str, bytes], name: str) -> None:
         ("bluerov2_heavy", "heave_40"),
     ],
 )
-def test_what_is_expected_is_right_to_the_digits_that_are_given(name: str, experiment: str) -> None:
+def test_expected_values_are_right_to_their_last_digit(name: str, experiment: str) -> None:
     vehicle = load_vehicle(SHIPPED[name])
     _check(vehicle.rov, reference_results(vehicle), experiment)
 
@@ -167,8 +167,8 @@ def test_what_is_expected_is_right_to_the_digits_that_are_given(name: str, exper
     "name",
     [pytest.param(name, marks=pytest.mark.long if "videoray" in name else pytest.mark.weekly) for name in SHIPPED],
 )
-def test_all_that_is_expected_is_right_to_the_digits_that_are_given(name: str) -> None:
-    """Every experiment that the FMU of a vehicle that ships carries; with coupling and lag, 50 digits take minutes."""
+def test_all_expected_values_are_right_to_their_last_digit(name: str) -> None:
+    """All experiments of the shipped vehicles; with coupling and lag, 50 digits take minutes."""
     vehicle = load_vehicle(SHIPPED[name])
     files = reference_results(vehicle)
     for experiment in _experiments(files):
@@ -180,14 +180,14 @@ def test_all_that_is_expected_is_right_to_the_digits_that_are_given(name: str) -
 
 @pytest.fixture
 def spinner() -> Vehicle:
-    """Its thrust turns it at thousands of radians per second: within the limits of a vehicle file."""
+    """Return a vehicle that turns at thousands of radians per second, which a vehicle file allows."""
     rov = VEHICLES["sway and yaw"]
     coefficients = {name: rov[name] for name in rov.layout.coefficients} | {"a_d_r": 0.0, "b_d_r": 0.01}
     vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
     return replace(vehicle, data=None, rov=Rov(rov.layout, coefficients))
 
 
-def test_what_is_expected_of_a_vehicle_that_spins_fast_is_right(spinner: Vehicle) -> None:
+def test_expected_values_of_a_vehicle_that_spins_fast_are_right(spinner: Vehicle) -> None:
     files = reference_results(spinner)
     assert spinner.rov.response(AXES["yaw"], 1.0)[0] > 1000.0
     for experiment in ("sway_100", "yaw_40", "yaw_100", "manoeuvre"):

@@ -1,4 +1,4 @@
-"""The same vehicle file gives the same FMU to the byte: from another folder, by another Python."""
+"""The same vehicle file gives the same FMU to the byte, also in another folder or with another Python."""
 
 import hashlib
 import subprocess
@@ -17,7 +17,7 @@ _OLDEST, _NEWEST = 10, 14  # Python 3, as pyproject.toml has it
 
 
 def _built(folder: Path, *command: str, flavours: Sequence[str] = tuple(_BUILDS)) -> dict[str, str]:
-    """Build flavours with a command; their hashes."""
+    """Build flavours with a command, and return their hashes."""
     hashes = {}
     for name in flavours:
         arguments = _BUILDS[name]
@@ -42,7 +42,7 @@ def test_built_in_another_folder(flavour: str, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def pinned(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Built by this Python from the checkout, with the versions of constraints.txt."""
+    """Return the hashes of builds by this Python from the checkout, with the versions of constraints.txt."""
     folder = tmp_path_factory.mktemp("pinned")
     return _built(folder, environment(folder / "venv", "-c", CONSTRAINTS, ROOT).python, _CHECKOUT)
 
@@ -52,7 +52,7 @@ def pinned(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     [pytest.param(1, marks=pytest.mark.long, id="oldest"), pytest.param(-1, marks=pytest.mark.weekly, id="newest")],
 )
 def test_built_by_another_python_from_the_wheel(pinned: dict[str, str], tmp_path: Path, order: int) -> None:
-    """By the oldest and by the newest Python that is here."""
+    """The Pythons are the oldest and the newest on this machine."""
     others = [f"3.{minor}" for minor in range(_OLDEST, _NEWEST + 1) if minor != sys.version_info.minor]
     if (python := next(filter(None, map(interpreter, others[::order])), None)) is None:
         pytest.skip("there is no other Python here")

@@ -1,4 +1,4 @@
-"""The C sources that travel in the FMU: compiled by an importer, free of warnings."""
+"""The C sources in the FMU compile in importers, without warnings."""
 
 import os
 import shlex
@@ -16,14 +16,14 @@ from rov_fmu.engine.compile import WARNINGS, compiler, fmi_headers
 
 @pytest.fixture
 def zig_as_cc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The compiler and the build tool from packages, for CMake on a machine that has none."""
+    """Give CMake the compiler and the build tool from packages, for machines that have none."""
     if os.name == "nt":
         pytest.skip("FMPy asks for Visual Studio on Windows")
     cc = tmp_path / "cc"
     cc.write_text(f'#!/bin/sh\nexec {shlex.join(compiler())} "$@"\n', encoding="utf-8")
     cc.chmod(0o755)
     monkeypatch.setenv("CC", str(cc))
-    monkeypatch.setenv("CXX", str(cc))  # CMake asks for one; nothing is compiled with it
+    monkeypatch.setenv("CXX", str(cc))  # CMake requires one, but nothing is compiled with it
     monkeypatch.setenv("CMAKE_GENERATOR", "Ninja")
 
 
@@ -39,11 +39,12 @@ def test_fmpy_compiles_and_runs_them(either_dir: Path, tmp_path: Path) -> None:
     _assert_same_simulation(folder, either_dir)
 
 
+@pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.long)], indirect=True)
 @pytest.mark.usefixtures("zig_as_cc")
 def test_the_cmake_project_that_fmpy_creates_builds_and_simulates(
     either_fmu: Path, either_dir: Path, tmp_path: Path
 ) -> None:
-    """FMPy defines the macros CO_SIMULATION and MODEL_EXCHANGE in it, so no identifier may have these names."""
+    """FMPy defines the macros CO_SIMULATION and MODEL_EXCHANGE, so no identifier may have these names."""
     project, build = tmp_path / "a project", tmp_path / "build"
     project.mkdir()
     for command in (
@@ -51,7 +52,7 @@ def test_the_cmake_project_that_fmpy_creates_builds_and_simulates(
         ["cmake", "-S", str(project), "-B", str(build)],
     ):
         subprocess.run(command, capture_output=True, check=True)
-    shutil.rmtree(project / "binaries")  # what is simulated is what is built
+    shutil.rmtree(project / "binaries")  # so that the binary that is built is simulated
     built = subprocess.run(["cmake", "--build", str(build)], capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stdout
     assert "warning" not in built.stdout

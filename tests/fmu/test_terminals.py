@@ -1,4 +1,4 @@
-"""terminalsAndIcons.xml: what the interface declares, in terminals as FMI 3.0 has them."""
+"""terminalsAndIcons.xml contains every input and output in the terminals of FMI 3.0."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +21,7 @@ PLUGS = {"body_velocity", "pose"}
 
 
 def read(document: bytes) -> dict[str, etree._Element]:
-    """By name, from a document that the schema allows."""
+    """Return the terminals of a document by name, after a check against the schema."""
     root = etree.fromstring(document)
     SCHEMA.assertValid(root)
     found = root.findall("Terminals/Terminal")
@@ -36,7 +36,7 @@ def members(terminal: etree._Element) -> list[str]:
 
 @pytest.mark.parametrize("kind", VEHICLES)
 def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
-    """Of vehicles of every kind: of one causality, with a name that is its own."""
+    """The members of a terminal have the same causality, and its name is unique."""
     declared = {v.name: v.causality for v in variables(VEHICLES[kind])}
     found = read(terminals_and_icons(VEHICLES[kind].layout))
     grouped = [name for terminal in found.values() for name in members(terminal)]
@@ -67,13 +67,13 @@ def test_what_systems_connect_by(name: str, of_the_videoray: str, of_the_heavy: 
         assert members(read(terminals_and_icons(rov.layout))[name]) == expected.split()
 
 
-def test_what_a_vehicle_has_not_is_no_terminal() -> None:
+def test_there_are_no_terminals_for_variables_that_a_vehicle_does_not_have() -> None:
     assert read(terminals_and_icons(VEHICLES["heave only"].layout)).keys() == (INPUTS | OUTPUTS) - {"current"}
 
 
 @pytest.mark.parametrize("kind", VEHICLES)
-def test_terminals_stand_beside_the_icon_and_apart(kind: str) -> None:
-    """Inputs on its left, outputs on its right, each a square."""
+def test_terminals_are_placed_around_the_icon_without_overlap(kind: str) -> None:
+    """Inputs are on its left and outputs on its right; each picture is a square."""
     document = terminals_and_icons(VEHICLES[kind].layout)
     (icon,) = etree.fromstring(document).iter("Icon")
     left, bottom, right, top = (float(icon.get(end)) for end in ("x1", "y1", "x2", "y2"))

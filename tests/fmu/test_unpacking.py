@@ -1,4 +1,4 @@
-"""An FMU that may come from anyone is unpacked into its folder, within limits, or refused in one line."""
+"""An FMU from an unknown source is unpacked into its folder, within limits, or refused in one line."""
 
 import stat
 import struct
@@ -62,36 +62,31 @@ BAD: dict[str, tuple[Callable[..., None], str]] = {
 
 @pytest.fixture
 def bad(request: pytest.FixtureRequest, videoray_fmu: Path, tmp_path: Path) -> tuple[Path, str]:
-    """An FMU with one member more, which it must not have, and what is told of it."""
-    add, told = BAD[request.param]
+    """Return an FMU with a further member that it must not have, and the error message about it."""
+    add, message = BAD[request.param]
     path = tmp_path / "bad.fmu"
     path.write_bytes(videoray_fmu.read_bytes())
     with zipfile.ZipFile(path, "a") as archive:
         add(archive)
-    return path, told
+    return path, message
 
 
-def _check(path: Path, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+def _check(path: Path, message: str, capsys: pytest.CaptureFixture[str]) -> None:
     out, err = capsys.readouterr()
     assert out == ""
-    assert err.startswith(f"rov-fmu: {path}: {told}")
+    assert err.startswith(f"rov-fmu: {path}: {message}")
     assert err.count("\n") == 1
     assert {file.name for file in path.parent.iterdir()} <= {"bad.fmu", "plan.toml"}
 
 
 @pytest.mark.parametrize("bad", BAD, indirect=True)
-def test_prove_refuses_it_in_one_line(bad: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
-    path, told = bad
+def test_prove_and_study_refuse_it_in_one_line(bad: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
+    path, message = bad
     assert main(["prove", str(path)]) == 2
-    _check(path, told, capsys)
-
-
-@pytest.mark.parametrize("bad", BAD, indirect=True)
-def test_study_refuses_it_in_one_line(bad: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:
-    path, told = bad
+    _check(path, message, capsys)
     (path.parent / "plan.toml").write_text(_STUDY)
     assert main(["study", str(path.parent / "plan.toml"), "-o", str(path.parent / "results")]) == 2
-    _check(path, told, capsys)
+    _check(path, message, capsys)
 
 
 def _archive(*members: Callable[..., None]) -> BytesIO:
@@ -103,7 +98,7 @@ def _archive(*members: Callable[..., None]) -> BytesIO:
 
 
 def test_an_archive_that_claims_to_be_huge_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
-    """3 GB, of which the archive says so; nothing is written."""
+    """The archive declares 3 GB, and nothing is written."""
     content = bytearray(_archive(_member("modelDescription.xml", b"a" * 100, method=zipfile.ZIP_STORED)).getvalue())
     size = content.rindex(b"PK\x01\x02") + 24
     struct.pack_into("<I", content, size, 3_000_000_000)
@@ -114,7 +109,7 @@ def test_an_archive_that_claims_to_be_huge_is_refused_before_it_is_unpacked(tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_archive_that_says_too_little_gives_no_more_than_it_says(tmp_path: Path) -> None:
+def test_an_archive_that_declares_too_small_a_size_is_not_unpacked_beyond_it(tmp_path: Path) -> None:
     content = bytearray(_archive(_zeros(20)).getvalue())
     for sign, place in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
         struct.pack_into("<I", content, content.rindex(sign) + place, 1000)
@@ -124,7 +119,7 @@ def test_an_archive_that_says_too_little_gives_no_more_than_it_says(tmp_path: Pa
 
 
 def test_a_large_fmu_that_is_compressed_as_files_are_is_unpacked(tmp_path: Path) -> None:
-    """Up to 100 MB however well, as a table of zeros is."""
+    """Up to 100 MB may be compressed to any degree, like a table of zeros."""
     description = (
         b'<fmiModelDescription fmiVersion="2.0" modelName="a" guid="a"><ModelVariables/></fmiModelDescription>'
     )
@@ -133,6 +128,6 @@ def test_a_large_fmu_that_is_compressed_as_files_are_is_unpacked(tmp_path: Path)
     assert (tmp_path / "resources" / "zeros.bin").stat().st_size == 99_000_000
 
 
-def test_an_archive_without_a_description_is_told(tmp_path: Path) -> None:
+def test_an_archive_without_a_description_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"^a\.fmu: is no FMU that FMPy reads: .*modelDescription.xml"):
         unpack_fmu(_archive(_member("resources/a")), Path("a.fmu"), tmp_path)

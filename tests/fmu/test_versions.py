@@ -1,6 +1,6 @@
-"""One declaration, two versions of FMI: both descriptions are valid, and say the same of the same vehicle.
+"""The descriptions of both versions of FMI are valid and declare the same variables.
 
-They differ in how they number variables, and in where the unit and the bounds of a variable stand.
+They differ in the value references, and in the elements that hold the unit and the bounds of a variable.
 """
 
 from pathlib import Path
@@ -44,7 +44,7 @@ def check_schema(document: etree._Element, name: str) -> None:
 
 
 def declared(root: etree._Element) -> dict[str, dict[str, Any]]:
-    """Every variable by name, with what FMI 2.0 says in a child and FMI 3.0 in a type; references by name."""
+    """Return every variable by name, with the attributes that FMI 2.0 has in a child and FMI 3.0 in a type."""
     types = {of.get("name"): of for of in root.iter("Float64Type")}
     found = {}
     numbers = list(root.find("ModelVariables"))
@@ -60,7 +60,7 @@ def declared(root: etree._Element) -> dict[str, dict[str, Any]]:
 
 
 def structure(root: etree._Element, fmi: int) -> dict[str, list[tuple[str, list[str], str]]]:
-    """The lists of <ModelStructure>, in order: the unknown, what it depends on and how, by name."""
+    """Return the lists of <ModelStructure> in order: each unknown with its knowns and their kinds, by name."""
     numbers = list(root.find("ModelVariables"))
     name = {str(n): v.get("name") for n, v in enumerate(numbers, 1)}
     if fmi == 3:
@@ -92,14 +92,14 @@ def test_both_versions_declare_the_same(kind: str) -> None:
     assert variables_3 == variables_2
     assert structure(three, 3) == structure(two, 2)
     units_3 = units(three)
-    assert b'<BaseUnit s="1">' in units_3["s"]  # that of the time
+    assert b'<BaseUnit s="1">' in units_3["s"]  # the unit of the time
     assert units_3 == units(two) | {"s": units_3["s"]}
     same = ("Category", "DefaultExperiment")
     assert [dict(e.attrib) for e in three.iter(*same)] == [dict(e.attrib) for e in two.iter(*same)]
 
 
 def value_references(root: etree._Element) -> list[int]:
-    """In the order of ModelVariables."""
+    """Return the value references in the order of ModelVariables."""
     return [int(v.get("valueReference")) for v in root.find("ModelVariables")]
 
 
@@ -107,7 +107,7 @@ def value_references(root: etree._Element) -> list[int]:
 def test_fmi_2_numbers_variables_from_0_and_fmi_3_from_1(kind: str) -> None:
     two, three = (value_references(described(VEHICLES[kind], fmi)) for fmi in (2, 3))
     assert two == [*range(len(two))]
-    assert three == [*range(1, len(two) + 2)]  # FMI 3.0 has the time besides
+    assert three == [*range(1, len(two) + 2)]  # FMI 3.0 also has the time
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -128,16 +128,18 @@ def test_omsimulator_resolves_every_dependency_to_the_variable_that_is_meant(nam
 
 
 @pytest.mark.parametrize("kind", VEHICLES)
-def test_fmi_3_says_all_of_a_number_in_its_type_and_nothing_in_the_variable(kind: str) -> None:
-    """FMI Library loses the unit of a variable with bounds of its own; fmi-sim refuses a unit on a variable."""
+def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> None:
+    """FMI Library loses the unit of a variable that has bounds; fmi-sim refuses a unit on a variable."""
     root = described(VEHICLES[kind], 3)
     types = {of.get("name"): of for of in root.iter("Float64Type")}
     variables_of = list(root.find("ModelVariables"))
     for v in variables_of:
         assert not {"unit", "displayUnit", "quantity", "min", "max", "nominal"} & {*v.attrib}, v.get("name")
         assert types[v.get("declaredType")].get("unit"), v.get("name")
-    said = [tuple(sorted((key, x) for key, x in of.attrib.items() if key != "name")) for of in types.values()]
-    assert len({*said}) == len(said) == len(root.findall("TypeDefinitions/*")), "one type per unit, range and nominal"
+    attributes = [tuple(sorted((key, x) for key, x in of.attrib.items() if key != "name")) for of in types.values()]
+    assert len({*attributes}) == len(attributes) == len(root.findall("TypeDefinitions/*")), (
+        "one type per unit, range and nominal"
+    )
     assert {*types} == {v.get("declaredType") for v in variables_of}
     assert not {*types} & {v.get("name") for v in variables_of}, "the names of types and variables differ"
 
@@ -156,8 +158,8 @@ def test_the_build_description_follows_its_schema_and_names_the_file_to_compile(
     assert [file.get("name") for file in document.iter("SourceFile")] == ["fmu.c"]
 
 
-def test_fmi_3_says_what_it_can_do() -> None:
-    """And nothing else: what is absent is false."""
+def test_fmi_3_declares_its_capabilities() -> None:
+    """A capability that is missing is false."""
     root = described(VEHICLES["VideoRay"], 3)
     assert root.get("fmiVersion") == "3.0"
     assert root.get("instantiationToken") == "{1}"
@@ -177,12 +179,12 @@ def test_fmi_3_says_what_it_can_do() -> None:
         "hasEventMode": "true",
     }
     for interface, can in {"ModelExchange": both, "CoSimulation": both | stepped}.items():
-        said = {key: x for key, x in root.find(interface).attrib.items() if x != "false"}
-        assert said == can
+        declared = {key: x for key, x in root.find(interface).attrib.items() if x != "false"}
+        assert declared == can
     assert root.find("ScheduledExecution") is None
 
 
-def test_inputs_and_outputs_alone_are_of_intermediate_update() -> None:
+def test_only_inputs_and_outputs_are_available_in_intermediate_update() -> None:
     root = described(VEHICLES["Heavy"], 3)
     updated = {v.get("name") for v in root.iter("Float64") if v.get("intermediateUpdate") == "true"}
     assert updated == {v.name for v in variables(VEHICLES["Heavy"]) if v.causality in ("input", "output")}

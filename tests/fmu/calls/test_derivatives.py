@@ -1,4 +1,4 @@
-"""Derivatives are those of the values, and the model structure declares exactly those that can be non-zero."""
+"""Derivatives are the slopes of the values, and the model structure declares exactly those that can be non-zero."""
 
 import random
 from collections.abc import Iterator, Sequence
@@ -42,7 +42,7 @@ ROVS = {
 
 @pytest.fixture(scope="module", params=ROVS)
 def fmu(request: pytest.FixtureRequest) -> Fmu:
-    """Of a vehicle of the paper, of one with sway, lag, coupling and dead band, and of one that has everything."""
+    """Return the FMU of the VideoRay, of a vehicle with sway, lag, coupling and dead band, or one with all effects."""
     return WRAPPERS[3 if "3" in request.param else 2](request.getfixturevalue(request.param))
 
 
@@ -53,7 +53,7 @@ def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
 
 @pytest.fixture
 def rov(fmu: Fmu) -> Rov:
-    """The same vehicle."""
+    """Return the vehicle of the FMU."""
     return rov_of(fmu)
 
 
@@ -62,7 +62,7 @@ def rov_of(fmu: Fmu) -> Rov:
 
 
 def random_motion(fmu: Fmu, rng: random.Random) -> dict[str, float]:
-    """Inputs and states of either sign, zeros, and commands beyond full, none on the corner."""
+    """Return random inputs and states: both signs, zeros, saturated commands, but no command near its limit."""
     values = {name: rng.uniform(-3.0, 3.0) for name in fmu.inputs + fmu.states}
     for name in fmu.commands:
         values[name] = rng.choice([rng.uniform(-0.99, 0.99), rng.choice([-1, 1]) * rng.uniform(1.01, 2.0)])
@@ -79,7 +79,7 @@ def random_parameters(
 
 
 def points(fmu: Fmu, n: int, seed: int) -> list[dict[str, float]]:
-    rng = random.Random(seed)  # no zeros: beside an input that saturates they put the mix on the corner
+    rng = random.Random(seed)  # no zeros, as with a saturated command they put the mix at its limit
     motions = ({name: x or rng.uniform(-0.9, 0.9) for name, x in random_motion(fmu, rng).items()} for _ in range(n))
     return [motion | random_parameters(fmu, rng) for motion in motions]
 
@@ -99,11 +99,11 @@ def at_point(fmu: Fmu, kind: int, mode: str, point: dict[str, float]) -> AnyInst
 
 
 _SLOPES: dict[tuple[Any, ...], dict[str, float]] = {}
-"""By vehicle, point, known and side: both versions and interfaces are held to the same ones."""
+"""Slopes by vehicle, point, known and side. All versions and interfaces are compared with the same slopes."""
 
 
 def slopes(rov: Rov, point: Values, known: str, side: int = 1) -> dict[str, float]:
-    """Of every output and derivative by one known, from one side: in 50 digits all that a double has."""
+    """Return the one-sided slope of every output and derivative by one known, computed in 50 digits."""
     key = (id(rov), *point.items(), known, side)
     if key not in _SLOPES:
         with mp.workdps(50):
@@ -116,7 +116,7 @@ def slopes(rov: Rov, point: Values, known: str, side: int = 1) -> dict[str, floa
 def check_slopes(rov: Rov, instance: AnyInstance, point: Values, known: str, side: int = 1) -> None:
     unknowns = instance.fmu.outputs + instance.fmu.derivatives
     found, expected = instance.derivatives(unknowns, known), slopes(rov, point, known, side)
-    size = max(1.0, *map(abs, expected.values()))  # what a sum of large terms leaves
+    size = max(1.0, *map(abs, expected.values()))  # for rounding in a sum of large terms
     for name, d in zip(unknowns, found, strict=True):
         assert d == pytest.approx(expected[name], rel=1e-12, abs=1e-14 * size), (name, known, side, point)
 
@@ -125,7 +125,7 @@ def check_slopes(rov: Rov, instance: AnyInstance, point: Values, known: str, sid
     "number", [2, pytest.param(15, marks=pytest.mark.long), pytest.param(60, marks=pytest.mark.weekly)]
 )
 def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
-    """By every input, state and coefficient, of all that is calculated, in both interfaces."""
+    """The knowns are all inputs, states and coefficients; the unknowns are all calculated variables."""
     for point, kind in product(points(fmu, number, seed=1), MODES):
         with at_point(fmu, kind, INITIALIZATION, point) as instance:
             for known in point:
@@ -133,7 +133,7 @@ def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: 
 
 
 def kinks(rov: Rov, point: Values) -> Iterator[tuple[State, str, int]]:
-    """Points on the edge of saturation, of a dead band and at rest; what crosses it there, and where its inside is."""
+    """Yield points at the limit of saturation or a dead band, or at rest, each with a known to vary and the side."""
     layout = rov.layout
     still = {**point, **dict.fromkeys(layout.commands, 0.0)}
     for command, sign in product(layout.commands, (1, -1)):
@@ -149,8 +149,8 @@ def kinks(rov: Rov, point: Values) -> Iterator[tuple[State, str, int]]:
         yield {**point, velocity: 0.0}, velocity, 1
 
 
-def test_at_a_kink_the_derivative_is_that_of_the_inside(fmu: Fmu, rov: Rov) -> None:
-    """Of commands within ±1, and of the dead band; a velocity at rest is about to go ahead."""
+def test_at_a_kink_the_derivative_is_one_sided(fmu: Fmu, rov: Rov) -> None:
+    """The side is a command within ±1, a wider dead band, and a positive velocity."""
     for kink, known, inside in kinks(rov, *points(fmu, 1, seed=9)):
         with at_point(fmu, CO_SIMULATION, INITIALIZATION, kink) as instance:
             check_slopes(rov, instance, kink, known, inside)
@@ -186,7 +186,7 @@ def test_a_directional_derivative_adds_up_its_seeds(fmu: Fmu) -> None:
 )
 @pytest.mark.parametrize("kind", MODES)
 def test_adjoint_derivatives_are_the_slopes_of_the_equations(fmu3: fmi3.Fmu, kind: int, number: int) -> None:
-    """Of every output and derivative, by every input, state and coefficient."""
+    """The unknowns are all outputs and derivatives; the knowns are all inputs, states and coefficients."""
     unknowns = fmu3.outputs + fmu3.derivatives
     for point in points(fmu3, number, seed=1):
         columns = [slopes(rov_of(fmu3), point, known) for known in point]
@@ -200,8 +200,8 @@ def test_adjoint_derivatives_are_the_slopes_of_the_equations(fmu3: fmi3.Fmu, kin
 
 
 @pytest.mark.parametrize(("kind", "mode"), [c for c in fmi3.EVERY_MODE if c[1] != INSTANTIATED], ids=str)
-def test_adjoint_derivatives_are_those_of_the_directional_ones(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
-    """(v J) u = v (J u), by the knowns of the mode."""
+def test_adjoint_derivatives_agree_with_the_directional_ones(fmu3: fmi3.Fmu, kind: int, mode: str) -> None:
+    """(v J) u = v (J u) for the knowns of the mode."""
     rng = random.Random(4)
     unknowns = fmu3.outputs + fmu3.derivatives
     for point in points(fmu3, 5, seed=2):
@@ -216,7 +216,7 @@ def test_adjoint_derivatives_are_those_of_the_directional_ones(fmu3: fmi3.Fmu, k
 
 
 @pytest.mark.parametrize("function", ["fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative"])
-def test_as_many_seeds_and_sensitivities_are_wanted_as_there_are_variables(fmu3: fmi3.Fmu, function: str) -> None:
+def test_the_numbers_of_seeds_and_sensitivities_must_match_the_variables(fmu3: fmi3.Fmu, function: str) -> None:
     of, n_seed = fmu3.references, 2 if "Directional" in function else 3
     arguments = (of(["u", "der(u)", "der(psi)"]), 3, of(["r", "u"]), 2)
     with fmu3.instance() as rov:
@@ -250,7 +250,7 @@ def declared(unknowns: Sequence[Any]) -> dict[tuple[str, str], str]:
 
 
 @pytest.mark.parametrize("structure", ["outputs", "derivatives"])
-def test_dependencies_are_declared_as_they_are(fmu: Fmu, structure: str) -> None:
+def test_declared_dependencies_are_those_of_the_derivatives(fmu: Fmu, structure: str) -> None:
     rng = random.Random(5)
     unknowns = [unknown.variable.name for unknown in getattr(fmu.description, structure)]
     knowns = fmu.inputs + fmu.states
@@ -276,7 +276,7 @@ def test_dependencies_are_declared_as_they_are(fmu: Fmu, structure: str) -> None
     assert {pair: kind for pair, kind in found.items() if kind} == declared(getattr(fmu.description, structure))
 
 
-def test_initial_dependencies_are_declared_as_they_are(fmu: Fmu) -> None:
+def test_declared_initial_dependencies_are_those_of_the_derivatives(fmu: Fmu) -> None:
     unknowns = [unknown.variable.name for unknown in fmu.description.initialUnknowns]
     samples: list[Jacobian] = []
     for point in points(fmu, 30, seed=6):
@@ -300,10 +300,10 @@ def test_the_structure_lists_every_output_state_and_calculated_variable(fmu: Fmu
 
 
 def exact_rates(rov: Rov, point: Values) -> dict[str, Any]:
-    """The first time derivative of every output: the slopes of the outputs along the motion, with the inputs held."""
+    """Return the first time derivative of every output, with the inputs held."""
     k = Rov(rov.layout, {name: point[name] for name in rov.coefficients})
     found: dict[str, Any] = equations(k, point).rates({n: mp.mpf(point[n]) for n in rov.layout.state}, point)
-    forces = {t.name: found.get(f"F_{t.name}", mp.zero) for t in rov.layout.thrusters}  # those without lag are constant
+    forces = {t.name: found.get(f"F_{t.name}", mp.zero) for t in rov.layout.thrusters}  # without lag they are constant
     found = found | {f"F_{name}": F for name, F in forces.items()}
     for curve in rov.layout.turning_curves:
         turning = (effect(k, t, "r") * forces[t.name] for t in rov.layout.thrusters if t.curve == curve.name)
@@ -315,7 +315,7 @@ def exact_rates(rov: Rov, point: Values) -> dict[str, Any]:
     "number", [8, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
 )
 def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Rov, number: int) -> None:
-    """From any motion, and from rest."""
+    """Every fourth point is at rest."""
     for n, point in enumerate(points(fmu, number, seed=7)):
         motion = point | (at_rest(rov) if n % 4 == 0 else {})
         with mp.workdps(50):
@@ -330,7 +330,7 @@ def test_output_derivatives_are_those_of_the_equations(fmu: Fmu, rov: Rov, numbe
 
 @pytest.mark.parametrize("order", [-1, 0, 2, 19])
 def test_output_derivatives_of_other_orders_are_refused(fmu: Fmu, order: int) -> None:
-    """Order 1 alone is declared; nothing is written when any order of a call is refused."""
+    """Only order 1 is declared; no value is written if any order of a call is refused."""
     assert fmu.description.coSimulation.maxOutputDerivativeOrder == 1
     values = room(2)
     with fmu.instance() as rov:

@@ -1,4 +1,4 @@
-"""Event Mode of FMI 3.0, in both interfaces: the model has no events of its own, the importer tunes and jumps there."""
+"""Event Mode of FMI 3.0 in both interfaces: the model has no events, the importer tunes parameters and sets states."""
 
 import pytest
 
@@ -7,11 +7,11 @@ from tests.fmi3 import Fmu, Instance, Stepped, flags
 
 MOVING = {"u_l": 0.6, "u_r": 0.2, "u_t": -0.4, "u": 0.3, "r": -0.5, "V_E": 0.1}
 CHANGES = {"beta_u": 0.7, "alpha_w": 1.3, "u_l": -0.5, "u": -0.2, "psi": 1.0, "N_ext": 0.05}
-"""Of tunable parameters, inputs and states."""
+"""New values of tunable parameters, inputs and states."""
 
 
 def run(rov: Instance, first: int) -> bytes:
-    """Ten steps."""
+    """Return the outputs after each of ten steps."""
     result = b""
     for i in range(first, first + 10):
         assert rov.step(0.1 * i, 0.1) == OK
@@ -25,9 +25,9 @@ def test_there_are_no_events(fmu3: Fmu, kind: int) -> None:
         rov.reach(EVENT)
         before = rov.save()
         for _ in range(2):
-            told, next_time = [flags(True) for _ in range(5)], room()
-            rov.expect("fmi3UpdateDiscreteStates", *told, next_time)
-            assert [bool(flag[0]) for flag in told] == [False] * 5
+            results, next_time = [flags(True) for _ in range(5)], room()
+            rov.expect("fmi3UpdateDiscreteStates", *results, next_time)
+            assert [bool(flag[0]) for flag in results] == [False] * 5
             assert next_time[0] == 0.0
             rov.expect("fmi3EvaluateDiscreteStates")
         assert rov.save() == before
@@ -39,7 +39,7 @@ def test_there_are_no_events(fmu3: Fmu, kind: int) -> None:
 
 
 @pytest.mark.parametrize("kind", [CO_SIMULATION, WITH_EVENTS])
-def test_a_step_tells_of_no_event_and_where_it_ends(fmu3: Fmu, kind: int) -> None:
+def test_a_step_reports_no_event_and_the_time_of_its_end(fmu3: Fmu, kind: int) -> None:
     with fmu3.instance(kind) as rov:
         assert rov.set(MOVING) == OK
         rov.reach(STEP)
@@ -50,8 +50,8 @@ def test_a_step_tells_of_no_event_and_where_it_ends(fmu3: Fmu, kind: int) -> Non
         assert rov.time() == 0.1 + 0.2
 
 
-def test_what_is_set_in_event_mode_holds_from_then_on(fmu3: Fmu) -> None:
-    """As if a run began with it; steps between events are those of an instance without Event Mode."""
+def test_values_set_in_event_mode_hold_afterwards(fmu3: Fmu) -> None:
+    """The steps after them equal those of a run that begins with these values, without Event Mode."""
     with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance() as plain, fmu3.instance() as changed:
         assert rov.set(MOVING) == OK
         rov.reach(STEP)
@@ -68,7 +68,7 @@ def test_what_is_set_in_event_mode_holds_from_then_on(fmu3: Fmu) -> None:
 
 
 @pytest.mark.parametrize("kind", [CO_SIMULATION, WITH_EVENTS])
-def test_between_steps_parameters_are_tuned_too_with_a_warning_where_there_is_event_mode(fmu3: Fmu, kind: int) -> None:
+def test_parameters_can_be_tuned_between_steps_with_a_warning_if_event_mode_is_used(fmu3: Fmu, kind: int) -> None:
     with fmu3.instance(kind) as rov, fmu3.instance() as changed:
         assert rov.set(MOVING) == OK
         rov.reach(STEP)

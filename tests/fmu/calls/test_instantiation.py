@@ -1,21 +1,27 @@
-"""Instances of either version of FMI are made, or refused with one log line that says why."""
+"""An instance of either version of FMI is created, or refused with one log line that gives the reason."""
 
 import ctypes
 from typing import Any
 
 import pytest
 from fmpy.fmi2 import fmi2CallbackFunctions
-from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
+from fmpy.fmi3 import (
+    fmi3ClockUpdateCallback,
+    fmi3IntermediateUpdateCallback,
+    fmi3LockPreemptionCallback,
+    fmi3LogMessageCallback,
+    fmi3UnlockPreemptionCallback,
+)
 
 from tests import fmi2, fmi3
 from tests.fmi import CO_SIMULATION, ERROR, MODEL_EXCHANGE, OK, Message, references, room
 
 CS, ME = CO_SIMULATION, MODEL_EXCHANGE
-GUID = object()  # the FMU's own
+GUID = object()  # stands for the GUID of the FMU
 
 
 @pytest.mark.parametrize(
-    ("name", "kind", "guid", "said"),
+    ("name", "kind", "guid", "reason"),
     [
         (None, CS, GUID, "name"),
         (b"", CS, GUID, "name"),
@@ -29,7 +35,7 @@ GUID = object()  # the FMU's own
     ],
 )
 def test_a_bad_instantiation_gives_no_instance_and_one_log_line(
-    fmu2: fmi2.Fmu, name: bytes | None, kind: int, guid: Any, said: str
+    fmu2: fmi2.Fmu, name: bytes | None, kind: int, guid: Any, reason: str
 ) -> None:
     log: list[Message] = []
     callbacks = fmi2.recording_callbacks(log)
@@ -39,7 +45,7 @@ def test_a_bad_instantiation_gives_no_instance_and_one_log_line(
     (message,) = log
     assert (message.status, message.category) == (ERROR, "logStatusError")
     assert message.text.startswith("fmi2Instantiate: ")
-    assert said in message.text
+    assert reason in message.text
     silent = fmi2CallbackFunctions()  # no logger
     assert fmu2.dll.fmi2Instantiate(name, kind, own if guid is GUID else guid, None, ctypes.byref(silent), 0, 0) is None
 
@@ -62,11 +68,11 @@ def test_no_callbacks_give_no_instance(fmu2: fmi2.Fmu) -> None:
         b"x" * 9999,
     ],
 )
-def test_any_resource_location_will_do(fmu2: fmi2.Fmu, uri: bytes | None) -> None:
-    callbacks = fmi2CallbackFunctions()  # NULL, all of them
+def test_any_resource_location_is_accepted(fmu2: fmi2.Fmu, uri: bytes | None) -> None:
+    callbacks = fmi2CallbackFunctions()  # all of them NULL
     component = fmu2.dll.fmi2Instantiate(b"rov", CS, fmu2.token, uri, ctypes.byref(callbacks), -1, -1)
     assert fmu2.call("fmi2SetupExperiment", component, 0, 0.0, 0.0, 0, 0.0) == OK
-    assert fmu2.call("fmi2DoStep", component, 0.0, 0.1, 1) == ERROR  # without a logger, too
+    assert fmu2.call("fmi2DoStep", component, 0.0, 0.1, 1) == ERROR  # also without a logger
     fmu2.dll.fmi2FreeInstance(component)
 
 
@@ -95,13 +101,13 @@ def instantiate(
     n: int = 0,
     logging: bool = True,
 ) -> Any:
-    """Of Co-Simulation, without intermediate update."""
+    """Return a new instance of Co-Simulation without intermediate update, or None."""
     arguments = (name, token, None, False, logging, False, False, references, n, None, logger, NO_UPDATE)
     return fmu3.dll.fmi3InstantiateCoSimulation(*arguments)
 
 
 @pytest.mark.parametrize(
-    ("name", "token", "said"),
+    ("name", "token", "reason"),
     [
         (None, GUID, "name"),
         (b" \t\r\n", GUID, "name"),
@@ -110,8 +116,8 @@ def instantiate(
         (b"rov", b"{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}", "{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}"),
     ],
 )
-def test_of_fmi_3_a_bad_instantiation_gives_no_instance(
-    fmu3: fmi3.Fmu, name: bytes | None, token: Any, said: str
+def test_a_bad_instantiation_of_fmi_3_gives_no_instance(
+    fmu3: fmi3.Fmu, name: bytes | None, token: Any, reason: str
 ) -> None:
     given = fmu3.token if token is GUID else token
     log: list[Message] = []
@@ -127,11 +133,11 @@ def test_of_fmi_3_a_bad_instantiation_gives_no_instance(
         (message,) = log
         assert (message.status, message.category) == (ERROR, "logStatusError")
         assert message.text.startswith(f"{function}: ")
-        assert said in message.text
+        assert reason in message.text
         log.clear()
 
 
-def test_variables_of_intermediate_update_are_those_of_the_fmu(fmu3: fmi3.Fmu) -> None:
+def test_variables_of_intermediate_update_must_be_variables_of_the_fmu(fmu3: fmi3.Fmu) -> None:
     n = len(fmu3.variables)  # references are 1 to n
     for vr, size in [(references(1, n + 1), 2), (references(0), 1), (None, 1)]:
         log: list[Message] = []
@@ -141,7 +147,7 @@ def test_variables_of_intermediate_update_are_those_of_the_fmu(fmu3: fmi3.Fmu) -
         assert "requiredIntermediateVariables" in message.text
 
 
-def test_intermediate_variables_without_a_callback_are_those_of_some_importers(fmu3: fmi3.Fmu) -> None:
+def test_intermediate_variables_without_a_callback_are_accepted_as_some_importers_pass_them(fmu3: fmi3.Fmu) -> None:
     component = instantiate(fmu3, b"rov", fmu3.token, NO_LOGGER, references(*fmu3.vr.values()), len(fmu3.vr))
     assert fmu3.call("EnterInitializationMode", component, False, 0.0, 0.0, False, 0.0) == OK
     assert fmu3.call("ExitInitializationMode", component) == OK
@@ -149,15 +155,16 @@ def test_intermediate_variables_without_a_callback_are_those_of_some_importers(f
     last = room()
     assert fmu3.call("DoStep", component, 0.0, 0.1, True, *flags, last) == OK
     assert last[0] == 0.1
-    assert fmu3.call("DoStep", component, 0.1, 0.0, True, *flags, last) == ERROR  # without a logger, too
+    assert fmu3.call("DoStep", component, 0.1, 0.0, True, *flags, last) == ERROR  # also without a logger
     fmu3.dll.fmi3FreeInstance(component)
 
 
 def test_there_is_no_scheduled_execution(fmu3: fmi3.Fmu) -> None:
     log: list[Message] = []
     logger = fmi3.recorder(log)
+    callbacks = fmi3ClockUpdateCallback(), fmi3LockPreemptionCallback(), fmi3UnlockPreemptionCallback()  # NULL
     for logging in (False, True):
-        arguments = (b"rov", fmu3.token, None, False, logging, None, logger, None, None, None)
+        arguments = (b"rov", fmu3.token, None, False, logging, None, logger, *callbacks)
         assert fmu3.dll.fmi3InstantiateScheduledExecution(*arguments) is None
     (message,) = log
     assert (message.status, message.text) == (

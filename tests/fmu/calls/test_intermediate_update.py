@@ -1,4 +1,4 @@
-"""Intermediate update and early return: the importer reads, sets inputs and ends a step while it is done."""
+"""Intermediate update and early return: the importer reads outputs, sets inputs and ends a step during the step."""
 
 from collections.abc import Callable, Mapping
 from itertools import pairwise
@@ -19,7 +19,7 @@ from verification.references.c_programs import compile_c, run_program
 PIECE = 1e-4
 MOVING = {"r": -0.5, "u": 0.3, "psi": 1.0, "V_E": 0.1}
 Control = Callable[[float], Mapping[str, float]]
-"""The inputs by time."""
+"""A function that returns inputs for a time."""
 
 
 @pytest.fixture(scope="module", params=["videoray3_dir", "heavy3_dir"])
@@ -28,14 +28,14 @@ def fmu3(request: pytest.FixtureRequest) -> fmi3.Fmu:
 
 
 def swing(fmu3: fmi3.Fmu) -> Control:
-    """Commands that swing, each in its own time."""
+    """Return sinusoidal commands of different frequencies."""
     return lambda t: {name: 0.8 * sin((3.0 + 2.0 * n) * t + n) for n, name in enumerate(fmu3.commands)}
 
 
 def moving(
     fmu3: fmi3.Fmu, control: Control, early: bool = False, kind: int = CO_SIMULATION, **start: float
 ) -> Instance:
-    """In Step Mode, commanded in intermediate update."""
+    """Return an instance in Step Mode whose inputs are set in intermediate update."""
     rov = fmu3.instance(kind, intermediate=[*fmu3.commands, *fmu3.outputs], early=early)
     assert rov.set(MOVING | start) == OK
     rov.reach(STEP)
@@ -47,8 +47,8 @@ def _command(rov: Instance, values: Mapping[str, float]) -> None:
     assert rov.set(values) == OK
 
 
-def apart(fmu3: fmi3.Fmu, times: list[float], control: Control) -> list[list[float]]:
-    """The outputs at each of these times, by a step from one to the next with the inputs set before it."""
+def separate_steps(fmu3: fmi3.Fmu, times: list[float], control: Control) -> list[list[float]]:
+    """Return the outputs at each time, computed by a step from each time to the next with the inputs set before it."""
     with fmu3.instance() as rov:
         rov.start(MOVING, at=times[0])
         found = []
@@ -65,32 +65,32 @@ def apart(fmu3: fmi3.Fmu, times: list[float], control: Control) -> list[list[flo
 def test_the_callback_is_called_at_the_ends_of_a_step_and_every_tenth_of_a_millisecond(
     fmu3: fmi3.Fmu, h: float, early: bool
 ) -> None:
-    told: list[Update] = []
+    updates: list[Update] = []
     with moving(fmu3, lambda _: {}, early) as rov:
-        rov.on_update = lambda _, update: told.append(update)
+        rov.on_update = lambda _, update: updates.append(update)
         assert rov.step(0.5, h) == OK
         assert rov.stepped == Stepped(False, False, False, 0.5 + h)
         assert rov.time() == 0.5 + h
-    times = [update.time for update in told]
-    pieces = len(told) - 1
+    times = [update.time for update in updates]
+    pieces = len(updates) - 1
     assert pieces == min(10_000, max(1, round(h / PIECE + 0.49)))
     assert times == pytest.approx([0.5 + h * n / pieces for n in range(pieces + 1)], rel=1e-15)
     assert (times[0], times[-1]) == (0.5, 0.5 + h)
-    assert [update.can_return_early for update in told] == [early and 0 < n < pieces for n in range(pieces + 1)]
-    assert all(update[1:4] == (True, True, True) for update in told)
+    assert [update.can_return_early for update in updates] == [early and 0 < n < pieces for n in range(pieces + 1)]
+    assert all(update[1:4] == (True, True, True) for update in updates)
 
 
-def test_who_has_nothing_to_say_inside_a_step_is_not_asked(fmu3: fmi3.Fmu) -> None:
-    told: list[Update] = []
-    with fmu3.instance(on_update=lambda _, update: told.append(update)) as rov:
+def test_an_importer_without_intermediate_variables_and_early_return_gets_no_callback(fmu3: fmi3.Fmu) -> None:
+    updates: list[Update] = []
+    with fmu3.instance(on_update=lambda _, update: updates.append(update)) as rov:
         rov.start(MOVING)
         assert rov.step(0.0, 0.1) == OK
-    assert told == []
+    assert updates == []
 
 
 @pytest.mark.parametrize("kind", [CO_SIMULATION, WITH_EVENTS])
 def test_inputs_set_inside_are_held_from_then_on_and_outputs_are_those_of_that_time(fmu3: fmi3.Fmu, kind: int) -> None:
-    """As steps from one callback to the next give them."""
+    """The results equal those of separate steps from one callback to the next."""
     control, seen = swing(fmu3), dict[float, list[float]]()
 
     def act(rov: Instance, update: Update) -> None:
@@ -109,14 +109,14 @@ def test_inputs_set_inside_are_held_from_then_on_and_outputs_are_those_of_that_t
         assert rov.mode() == STEP
         assert rov.log == []
         assert rov.get(fmu3.outputs) == seen[0.05 * 2 + 0.05]
-    expected = apart(fmu3, list(seen), control)
+    expected = separate_steps(fmu3, list(seen), control)
     assert (first, len(seen)) == (501, 1501)
-    assert list(seen.values())[:first] == expected[:first]  # to the bit; later the times are rounded
+    assert list(seen.values())[:first] == expected[:first]  # to the bit; later times have rounding errors
     for outputs, reference in zip(seen.values(), expected, strict=True):
         assert outputs == pytest.approx(reference, rel=1e-12, abs=1e-13)
 
 
-def test_what_is_not_set_again_stays(fmu3: fmi3.Fmu) -> None:
+def test_an_input_keeps_its_value_until_it_is_set_again(fmu3: fmi3.Fmu) -> None:
     command = fmu3.commands[0]
     with moving(fmu3, lambda t: {command: 0.5} if t > 0.00549 else {}) as rov:
         assert rov.step(0.0, 0.01) == OK
@@ -132,14 +132,14 @@ def test_what_is_not_set_again_stays(fmu3: fmi3.Fmu) -> None:
         assert end == pytest.approx(plain.get(fmu3.states), rel=1e-12, abs=1e-14)
 
 
-def test_nothing_but_inputs_can_be_set_inside(fmu3: fmi3.Fmu) -> None:
+def test_only_inputs_can_be_set_inside_a_step(fmu3: fmi3.Fmu) -> None:
     control = swing(fmu3)
 
     def act(rov: Instance, update: Update) -> None:
         for name in ("beta_u", "m_rov", "u", "F_0_w", "time"):
             if name in fmu3.vr:
                 assert rov.set({fmu3.commands[0]: 1.0, name: 0.5}) == ERROR
-        assert rov.step(update.time, 0.1) == ERROR  # nor is there a step in a step
+        assert rov.step(update.time, 0.1) == ERROR  # a step inside a step is refused
         assert all(m.status == ERROR for m in rov.log)
         _command(rov, control(update.time))
 
@@ -154,26 +154,26 @@ def test_nothing_but_inputs_can_be_set_inside(fmu3: fmi3.Fmu) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wanted", "end"),
+    ("requested", "end"),
     [
         (0.00137, 0.00137),
         (0.0007, 0.0007),
         (0.00050001, 0.00050001),
-        (0.0002, 0.0005),  # long ago: at once
+        (0.0002, 0.0005),  # in the past, so the step ends at once
         (-inf, 0.0005),
         (0.01, 0.01),
         (1.0, 0.01),
         (nan, 0.01),
     ],
 )
-def test_a_step_ends_where_it_is_wanted(fmu3: fmi3.Fmu, wanted: float, end: float) -> None:
+def test_a_step_ends_at_the_requested_time(fmu3: fmi3.Fmu, requested: float, end: float) -> None:
     control = swing(fmu3)
     times: list[float] = []
 
     def act(rov: Instance, update: Update) -> float | None:
         times.append(update.time)
         _command(rov, control(update.time))
-        return wanted if len(times) == 6 else None
+        return requested if len(times) == 6 else None
 
     with moving(fmu3, control, early=True) as rov:
         rov.on_update = act
@@ -181,23 +181,23 @@ def test_a_step_ends_where_it_is_wanted(fmu3: fmi3.Fmu, wanted: float, end: floa
         assert times[5] == 0.0005
         assert rov.stepped == Stepped(False, False, end < 0.01, end)
         assert times[-1] == rov.time() == end
-        assert rov.step(end, 0.01) == OK  # and goes on from there
+        assert rov.step(end, 0.01) == OK  # and the next step continues from there
         assert rov.log == []
         assert times.count(end) == 2
         outputs = rov.get(fmu3.outputs)
-    assert outputs == pytest.approx(apart(fmu3, sorted(set(times)), control)[-1], rel=1e-12, abs=1e-13)
+    assert outputs == pytest.approx(separate_steps(fmu3, sorted(set(times)), control)[-1], rel=1e-12, abs=1e-13)
 
 
 @pytest.mark.parametrize("early", [False, True])
-def test_an_early_end_that_cannot_be_is_not_heeded(fmu3: fmi3.Fmu, early: bool) -> None:
-    """Where it was not asked for at instantiation; at the beginning of a step and at its end."""
+def test_an_early_return_that_is_not_allowed_is_ignored(fmu3: fmi3.Fmu, early: bool) -> None:
+    """It is not allowed without earlyReturnAllowed, nor at the beginning and at the end of a step."""
     with moving(fmu3, swing(fmu3), early) as rov:
         rov.on_update = lambda _, update: None if update.can_return_early else 0.0
         assert rov.step(0.0, 0.01) == OK
         assert rov.stepped == Stepped(False, False, False, 0.01)
 
 
-def test_a_step_that_fails_inside_tells_how_far_it_came(fmu3: fmi3.Fmu) -> None:
+def test_a_step_that_fails_inside_returns_the_last_successful_time(fmu3: fmi3.Fmu) -> None:
     def act(rov: Instance, update: Update) -> None:
         if update.time > 0.00249:
             assert rov.set({"beta_u": 0.5}) == ERROR
@@ -213,12 +213,14 @@ def test_a_step_that_fails_inside_tells_how_far_it_came(fmu3: fmi3.Fmu) -> None:
 
 
 def test_pieces_within_a_step_are_counted_over_all_its_updates(fmu3: fmi3.Fmu) -> None:
-    """Or a step of ten thousand updates might take ten thousand times what any other may."""
+    """Otherwise a step with ten thousand updates could take ten thousand times the time of any other."""
     updates = []
 
     def act(rov: Instance, update: Update) -> None:
         updates.append(update.time)
-        _command(rov, {"N_ext": 1e9 * (-1.0) ** len(updates)})  # never settled, and turned many times at once
+        _command(
+            rov, {"N_ext": 1e9 * (-1.0) ** len(updates)}
+        )  # the motion never settles, and turns many times in a piece
 
     with moving(fmu3, swing(fmu3)) as rov:
         rov.on_update = act
@@ -234,13 +236,13 @@ def test_pieces_within_a_step_are_counted_over_all_its_updates(fmu3: fmi3.Fmu) -
 # ---- A host in C ----
 
 
-@pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy"])
-def test_a_sine_in_steps_of_a_tenth_of_a_second_is_that_of_a_tenth_of_a_millisecond(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["videoray", pytest.param("bluerov2_heavy", marks=pytest.mark.long)])
+def test_long_steps_with_updates_give_the_same_motion_as_short_steps(name: str, tmp_path: Path) -> None:
     sources = native_content(load_vehicle(SHIPPED[name]), fmi=3).sources
     program = compile_c(Path(__file__).with_name("intermediate.c"), tmp_path / "intermediate", sources)
     run = run_program(program)
     assert run.code == 0, run.errors
-    told = {name: float(value) for name, value in run.lines}
-    assert told["difference"] < 1e-9
-    assert told["held"] > 1e-3, "commands held over the steps make a difference"
-    assert told["updates"] == 100 * 1001
+    results = {name: float(value) for name, value in run.lines}
+    assert results["difference"] < 1e-9
+    assert results["held"] > 1e-3, "commands held over the steps make a difference"
+    assert results["updates"] == 100 * 1001

@@ -1,4 +1,4 @@
-"""Model Exchange: an integrator of the importer gives the trajectory of the exact steps, and events pass unnoticed."""
+"""Model Exchange: an integrator of the importer gives the trajectory of the exact steps, and there are no events."""
 
 import ctypes
 from itertools import pairwise
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tests.fmi import CONTINUOUS, DISCARD, EVENT, INITIALIZATION, MODEL_EXCHANGE, OK, Fmu, integers, reals, room
 
-# Straight and turning, ahead and astern, commands beyond full, loads and a current; held from one time to the next.
+# Inputs that are held from one time to the next: straight and turning, ahead and astern, saturated, loads, a current.
 START = {"u": -0.5, "w": 0.2, "r": 1.5, "psi": 2.0}
 SCHEDULE: dict[float, dict[str, float]] = {
     0.0: {"u_l": 0.3, "u_r": 0.3, "u_t": 0.4},
@@ -25,7 +25,7 @@ STOP, INTERVAL = 10.0, 0.1
 
 
 def signal(fmu: Fmu) -> NDArray[np.void]:
-    """The schedule as FMPy takes it: two rows where it jumps."""
+    """Return the schedule in the form that FMPy expects, with two rows at each jump."""
     rows = []
     for (t, held), end in zip(SCHEDULE.items(), [*list(SCHEDULE)[1:], STOP], strict=True):
         values = [held.get(name, 0.0) for name in fmu.inputs]
@@ -35,7 +35,7 @@ def signal(fmu: Fmu) -> NDArray[np.void]:
 
 @pytest.fixture(scope="module")
 def exact(fmu: Fmu) -> NDArray[np.float64]:
-    """The outputs of Co-Simulation, a row for each interval."""
+    """Return the outputs of Co-Simulation, with a row for each interval."""
     rows = []
     with fmu.instance() as rov:
         rov.start(START)
@@ -64,12 +64,12 @@ def test_cvode_gives_the_trajectory_of_co_simulation_within_its_tolerance(
         output=fmu.states,
         record_events=False,
     )
-    # The tolerance is that of one solver step; their errors add up to some hundred times as much.
+    # The tolerance holds for one solver step; the errors of all steps add up to some hundred times as much.
     error = np.abs(np.array([result[name] for name in fmu.states]).T - exact)
     assert error.max() < 1000.0 * tolerance
 
 
-def test_the_trajectory_is_one_that_turns_and_changes_its_signs(fmu: Fmu, exact: NDArray[np.float64]) -> None:
+def test_the_trajectory_turns_and_has_velocities_of_both_signs(fmu: Fmu, exact: NDArray[np.float64]) -> None:
     for name, column in zip(fmu.states, exact.T, strict=True):
         if name in ("u", "w", "r"):
             assert column.min() < -0.1, name
@@ -133,7 +133,7 @@ def test_nominals_are_those_of_the_description(fmu: Fmu) -> None:
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])
-def test_no_solver_state_is_not_finite(fmu: Fmu, value: float) -> None:
+def test_a_solver_state_that_is_not_finite_is_discarded(fmu: Fmu, value: float) -> None:
     n = len(fmu.states)
     good = reals(*(0.125 * i for i in range(n)))
     with fmu.instance(MODEL_EXCHANGE) as rov:

@@ -1,4 +1,4 @@
-"""A run goes on bit-equal wherever its state is taken and restored."""
+"""A run continues with the same bits wherever its state is saved and restored."""
 
 import ctypes
 import shutil
@@ -27,13 +27,13 @@ from tests.fmi import (
 )
 
 H = 0.05
-# Parameters, a load, a current and a motion that are not those of the start.
+# Parameters, a load, a current and a motion that differ from the start values.
 DISTURBED = {"m_rov": 7.5, "gamma": 0.4, "beta_u": 0.7, "alpha_w": 1.3, "a_d_r": 0.03, "Z_ext": -1.5, "V_E": 0.25}
 DISTURBED |= {"u": -0.4, "w": 0.2, "r": 0.9, "x": 10.0, "psi": 2.0}
 
 
 def commands(i: int) -> dict[str, float]:
-    """A run that turns and changes its signs, with commands beyond full and a parameter tuned on the way."""
+    """Return the inputs and the tuned parameter of a step in a run that turns, reverses and saturates."""
     return {
         "u_l": 0.3 * (i % 7) - 1.0,
         "u_r": 1.1 - 0.4 * (i % 5),
@@ -44,7 +44,7 @@ def commands(i: int) -> dict[str, float]:
 
 
 def run(rov: AnyInstance, first: int, last: int) -> bytes:
-    """All outputs after each step from the first to before the last."""
+    """Return all outputs after each step from `first` to before `last`."""
     result = b""
     for i in range(first, last):
         assert rov.set(commands(i)) == OK
@@ -55,7 +55,7 @@ def run(rov: AnyInstance, first: int, last: int) -> bytes:
 
 @pytest.fixture(scope="module")
 def whole(fmu: Fmu) -> bytes:
-    """The outputs of 20 steps in one go."""
+    """Return the outputs of 20 steps without interruption."""
     with fmu.instance() as rov:
         rov.start(DISTURBED, stop=1.0)
         result = run(rov, 0, 20)
@@ -69,7 +69,7 @@ def half(whole: bytes) -> bytes:
 
 @pytest.fixture(scope="module")
 def midway(fmu: Fmu) -> bytes:
-    """The serialized state after ten steps."""
+    """Return the serialized state after ten steps."""
     with fmu.instance() as rov:
         rov.start(DISTURBED, stop=1.0)
         run(rov, 0, 10)
@@ -92,14 +92,14 @@ def test_a_state_restored_in_its_own_run_repeats_it(fmu: Fmu, whole: bytes) -> N
         assert state.value is None
 
 
-def test_a_state_goes_on_in_an_instance_only_just_instantiated(fmu: Fmu, whole: bytes, midway: bytes) -> None:
+def test_a_run_continues_in_an_instance_that_was_only_instantiated(fmu: Fmu, whole: bytes, midway: bytes) -> None:
     with fmu.instance() as rov:
         assert rov.load(midway) == OK
         assert rov.mode() == STEP
         assert run(rov, 10, 20) == half(whole)
 
 
-def test_a_state_goes_on_in_another_process(fmu: Fmu, whole: bytes, midway: bytes, tmp_path: Path) -> None:
+def test_a_run_continues_in_another_process(fmu: Fmu, whole: bytes, midway: bytes, tmp_path: Path) -> None:
     saved = tmp_path / "state"
     saved.write_bytes(midway)
     script = (
@@ -147,7 +147,7 @@ def test_the_library_unloaded_and_loaded_again_gives_the_same_bits(fmu: Fmu, who
         loaded.unload()
 
 
-def test_two_instances_in_turns_give_the_bits_of_each_alone(fmu: Fmu, whole: bytes) -> None:
+def test_instances_that_step_in_turns_give_the_same_bits_as_alone(fmu: Fmu, whole: bytes) -> None:
     with fmu.instance(name="alone") as alone:
         alone.start()
         other = run(alone, 0, 20)
@@ -172,7 +172,7 @@ def test_with_event_mode_a_state_holds_the_mode(fmu3: fmi3.Fmu, mode: str) -> No
         assert another.save() == rov.save()
 
 
-def test_a_state_in_event_mode_is_refused_where_that_is_not_used(fmu3: fmi3.Fmu) -> None:
+def test_a_state_in_event_mode_is_refused_by_an_instance_without_event_mode(fmu3: fmi3.Fmu) -> None:
     state, restored = c_void_p(), c_void_p()
     with fmu3.instance(WITH_EVENTS) as rov, fmu3.instance() as other:
         rov.reach(EVENT)
@@ -186,7 +186,7 @@ def test_a_state_in_event_mode_is_refused_where_that_is_not_used(fmu3: fmi3.Fmu)
         rov.expect("FreeFMUState", ctypes.byref(state))
 
 
-def test_a_state_between_steps_goes_on_with_event_mode_and_without(fmu3: fmi3.Fmu) -> None:
+def test_a_state_between_steps_can_be_restored_with_event_mode_and_without(fmu3: fmi3.Fmu) -> None:
     with fmu3.instance() as plain, fmu3.instance(WITH_EVENTS) as events:
         plain.start(DISTURBED)
         events.reach(STEP)
@@ -201,7 +201,7 @@ def test_a_state_between_steps_goes_on_with_event_mode_and_without(fmu3: fmi3.Fm
 
 
 def test_a_state_of_the_other_version_is_refused(fmus: dict[int, Fmu]) -> None:
-    """The bytes begin with whose they are; in memory a state tells whose it is."""
+    """A state names its version of FMI, both in memory and as bytes."""
     for version, fmu in fmus.items():
         state, restored = c_void_p(), c_void_p()
         with fmu.instance() as rov, fmus[5 - version].instance() as other:
@@ -214,7 +214,7 @@ def test_a_state_of_the_other_version_is_refused(fmus: dict[int, Fmu]) -> None:
             rov.expect("FreeFMUState", ctypes.byref(state))
 
 
-# ---- What a state holds ----
+# ---- The content of a state ----
 
 
 @pytest.mark.parametrize(("kind", "mode"), EVERY_MODE)

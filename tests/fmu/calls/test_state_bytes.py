@@ -1,4 +1,4 @@
-"""Only bytes that are a state of this FMU, of a mode and of values that a run can reach, are restored."""
+"""Bytes are restored only if they are a state of this FMU with a mode and values that a run can reach."""
 
 import ctypes
 import struct
@@ -12,7 +12,7 @@ from tests.fmi import CO_SIMULATION, ERROR, INITIALIZATION, OK, AnyInstance, Fmu
 
 @pytest.fixture(scope="module")
 def serialized(fmu: Fmu) -> bytes:
-    """A state between steps."""
+    """Return a serialized state between steps."""
     with fmu.instance() as rov:
         rov.start({"u_l": 0.3, "u": -0.4, "r": 0.9, "beta_u": 0.7, "V_E": 0.25}, stop=1.0)
         assert rov.step(0.0, 0.5) == OK
@@ -20,7 +20,7 @@ def serialized(fmu: Fmu) -> bytes:
 
 
 def checksum(content: bytes) -> bytes:
-    """FNV-1a, the last eight bytes of a state."""
+    """Return the FNV-1a checksum, which is the last eight bytes of a state."""
     value = 14695981039346656037
     for byte in content:
         value = (value ^ byte) * 1099511628211 % 2**64
@@ -28,7 +28,7 @@ def checksum(content: bytes) -> bytes:
 
 
 def assert_refused(rov: AnyInstance, content: bytes) -> None:
-    """The bytes are an error, no instance changes, and neither does *FMUstate, NULL or a state."""
+    """Assert that the bytes are an error, and change neither the instance nor *FMUstate, be it NULL or a state."""
     nothing, state = c_void_p(), c_void_p()
     rov.expect("GetFMUState", ctypes.byref(state))
     before, address = rov.save(), state.value

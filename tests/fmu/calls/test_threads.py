@@ -1,4 +1,4 @@
-"""Instances know nothing of each other: eight threads drive their own, under ThreadSanitizer and AddressSanitizer."""
+"""Instances are independent: eight threads use one each, under ThreadSanitizer and AddressSanitizer."""
 
 import sys
 from collections.abc import Mapping
@@ -17,16 +17,16 @@ pytestmark = [
 
 PROGRAM = Path(__file__).parent / "threads.c"
 
-# Some clangs find no room for their bookkeeping among addresses as random as new kernels make them: 0x0040000 is
-# ADDR_NO_RANDOMIZE; where it is not allowed the program runs as it is.
-_PLAIN_ADDRESSES = (
+# The sanitizers of some clangs cannot place their memory among the random addresses of new kernels. 0x0040000 is
+# ADDR_NO_RANDOMIZE; if that is not allowed, the program runs with random addresses.
+_WITHOUT_RANDOM_ADDRESSES = (
     "import ctypes, os, sys; ctypes.CDLL(None).personality(0x0040000); os.execv(sys.argv[1], sys.argv[1:])"
 )
 
 
 def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls: int) -> Ended:
     program = compile_c(PROGRAM, folder / "threads", sources, "-pthread", sanitizers=sanitizers)
-    return run_program(sys.executable, "-c", _PLAIN_ADDRESSES, program, str(calls))
+    return run_program(sys.executable, "-c", _WITHOUT_RANDOM_ADDRESSES, program, str(calls))
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,9 @@ def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls
     [
         (2, "thread"),
         (3, "thread"),
-        *(pytest.param(fmi, "address,undefined", marks=pytest.mark.long) for fmi in (2, 3)),  # as the corpus has it
+        *(
+            pytest.param(fmi, "address,undefined", marks=pytest.mark.long) for fmi in (2, 3)
+        ),  # the corpus test has it, too
     ],
 )
 def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(

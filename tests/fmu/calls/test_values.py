@@ -1,4 +1,4 @@
-"""Values that cannot be are discarded, commands beyond ±1 saturate, and the log says so once, by name."""
+"""Invalid values are discarded, commands beyond ±1 saturate, and the log names the variable once."""
 
 from math import inf, nan, nextafter
 
@@ -30,7 +30,7 @@ COMMANDS = ("u_l", "u_r", "u_t")
 
 
 def assert_discarded(rov: AnyInstance, name: str, value: float) -> None:
-    """Setting a value together with a good one sets neither, and one log line names the variable."""
+    """Assert that an invalid value is discarded together with a valid one, and one log line names its variable."""
     companion = "u_l" if name != "u_l" else "u_r"
     before = rov.save()
     (kept,) = rov.get([name])
@@ -80,7 +80,7 @@ def test_a_tunable_parameter_is_checked_between_steps_too(fmu: Fmu) -> None:
         assert rov.set({"beta_u": 2.0}) == OK
 
 
-def test_values_that_overflow_are_told_and_not_given(fmu: Fmu) -> None:
+def test_values_that_overflow_are_logged_and_not_returned(fmu: Fmu) -> None:
     n = len(fmu.states)
     for kind, status in [(CO_SIMULATION, ERROR), (MODEL_EXCHANGE, DISCARD)]:
         with fmu.instance(kind) as rov:
@@ -127,7 +127,7 @@ def test_a_command_beyond_full_saturates_and_is_logged_once(fmu: Fmu, command: s
     )
 
 
-def test_every_command_that_saturates_has_its_line_and_has_it_again_after_reset(fmu: Fmu) -> None:
+def test_every_command_that_saturates_is_logged_once_and_again_after_reset(fmu: Fmu) -> None:
     with fmu.instance() as rov:
         for _ in range(2):
             assert rov.set(dict.fromkeys(COMMANDS, 1.25)) == OK
@@ -136,14 +136,14 @@ def test_every_command_that_saturates_has_its_line_and_has_it_again_after_reset(
         assert [m.text.split()[1] for m in rov.log if m.status == WARNING] == [*COMMANDS, *COMMANDS]
 
 
-def test_in_fmi_3_a_message_is_the_text_with_its_signs_of_references_doubled(fmu3: fmi3.Fmu) -> None:
+def test_in_fmi_3_a_message_is_the_text_with_every_hash_doubled(fmu3: fmi3.Fmu) -> None:
     with fmu3.instance() as rov:
         assert rov.call("SetDebugLogging", 1, 1, strings(b"#50 %d%%n%##")) == ERROR
         (message,) = rov.log
     assert message.text == "fmi3SetDebugLogging: there is no log category ##50 %d%%n%####."
 
 
-def test_with_event_mode_values_are_discarded_there_too(fmu3: fmi3.Fmu) -> None:
+def test_in_event_mode_of_co_simulation_invalid_values_are_discarded(fmu3: fmi3.Fmu) -> None:
     with fmu3.instance(WITH_EVENTS) as rov:
         rov.reach(EVENT)
         for name in fmu3.settable(EVENT):
@@ -151,7 +151,7 @@ def test_with_event_mode_values_are_discarded_there_too(fmu3: fmi3.Fmu) -> None:
         assert_discarded(rov, "beta_u", -0.001)
 
 
-def test_a_message_is_a_printf_format_that_gives_the_text_as_it_is(fmu2: Fmu) -> None:
+def test_in_fmi_2_a_message_is_a_printf_format_that_gives_the_text(fmu2: Fmu) -> None:
     with fmu2.instance(name="100 %s%n") as rov:
         assert rov.call("SetDebugLogging", 1, 1, strings(b"#50 %d%%n%##")) == ERROR
         (message,) = rov.log
@@ -160,7 +160,7 @@ def test_a_message_is_a_printf_format_that_gives_the_text_as_it_is(fmu2: Fmu) ->
 
 
 def refused(rov: AnyInstance) -> list[str]:
-    """The categories that speak on a restored state, an illegal call and a value that is not finite."""
+    """Return the categories logged for a restored state, an illegal call and a value that is not finite."""
     rov.log.clear()
     assert rov.load(rov.save()) == OK
     assert rov.call("ExitInitializationMode") == ERROR
@@ -188,13 +188,13 @@ def test_log_categories_are_switched_on_and_off(fmu: Fmu) -> None:
         rov.expect("SetDebugLogging", 1, 0, None)
         assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
         rov.expect("SetDebugLogging", 0, 1, strings(b"logStatusError"))
-        rov.expect("Reset")  # what instantiation was given holds again
+        rov.expect("Reset")  # restores the categories of the instantiation
         assert refused(rov) == ["logEvents", "logStatusError", "logStatusDiscard"]
         assert {c.name for c in fmu.description.logCategories} >= {"logStatusError", "logStatusDiscard", "logEvents"}
 
 
 def test_the_category_of_all_messages_switches_every_category(fmu: Fmu) -> None:
-    """FMUSDK switches logAll on right after instantiation, and gives up unless that is OK."""
+    """FMUSDK switches logAll on right after instantiation, and stops if that fails."""
     assert "logAll" in {c.name for c in fmu.description.logCategories}
     with fmu.instance(logging=False) as rov:
         rov.expect("SetDebugLogging", True, 1, strings(b"logAll"))

@@ -1,4 +1,4 @@
-"""The FMU of FMI 3.0 gives what that of FMI 2.0 gives, to the bit, whatever is asked of both."""
+"""The FMUs of FMI 2.0 and 3.0 give the same values to the bit."""
 
 import random
 from pathlib import Path
@@ -11,13 +11,13 @@ from tests.conftest import unzipped
 from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, AnyInstance, reals
 
 BUILT = {"videoray": ("videoray_dir", "videoray3_dir"), "bluerov2_heavy": ("heavy_dir", "heavy3_dir")}
-"""By other tests, too."""
+"""The fixtures of the vehicles whose FMUs other tests use, too."""
 _NAMES = [name if name in BUILT else pytest.param(name, marks=pytest.mark.long) for name in SHIPPED]
 
 
 @pytest.fixture(scope="module", params=_NAMES)
 def both(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[fmi2.Fmu, fmi3.Fmu]:
-    """Both FMUs of a vehicle that ships."""
+    """Return both FMUs of a shipped vehicle."""
     name: str = request.param
 
     def folder(version: int) -> Path:
@@ -34,7 +34,7 @@ def inputs(rov: AnyInstance, rng: random.Random) -> dict[str, float]:
 
 
 def run(rov: AnyInstance, steps: int) -> list[bytes]:
-    """All that can be read after each of random steps of random commands, with tuning on the way."""
+    """Return all values after each of many random steps with random commands and tuning."""
     rng, t, seen = random.Random(6), 0.0, []
     for _ in range(steps):
         h = 10.0 ** rng.uniform(-4.0, 0.8)
