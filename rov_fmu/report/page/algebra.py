@@ -1,7 +1,7 @@
-"""Formulas arranged as a person writes them: sums of products, with fractions, common factors and absolute values.
+"""Arrange formulas as a person writes them: sums of products, with fractions, common factors and absolute values.
 
-`Reader` turns a formula of rov_fmu/model/equation.py into a `Sum` of the same value. Only that a command saturates is
-left out, because the text beside the equations says it.
+`Reader` turns a formula of rov_fmu/model/equation.py into a `Sum` of the same value. It leaves out only the saturation
+of commands, which the text beside the equations mentions.
 """
 
 import ast
@@ -22,7 +22,7 @@ class Product:
 
 
 Sum: TypeAlias = tuple[Product, ...]
-"""The sum of its products; 0 without any."""
+"""A sum of products. It is 0 if it is empty."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Call:
-    """A function of a sum: sin, cos, abs, or sgn, the sign."""
+    """A function of a sum: sin, cos, abs, or sgn (the sign)."""
 
     function: str
     of: Sum
@@ -42,7 +42,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Choice:
-    """A parameter that depends on the sign of a name."""
+    """One of two parameters: the first where a variable is positive, the other where it is negative."""
 
     forward: str
     reverse: str
@@ -51,7 +51,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Cases:
-    """One value where a name is at most 0, and another one elsewhere."""
+    """A value where a variable is at most 0, and another value elsewhere."""
 
     name: str
     at_most_zero: Sum
@@ -62,23 +62,26 @@ Factor: TypeAlias = "str | float | Group | Call | Choice | Cases"
 
 
 class Reader:
-    """Read formulas; the names that `inlined` has are replaced by their formulas."""
+    """Reads formulas.
+
+    The names in `inlined` are replaced by their formulas.
+    """
 
     def __init__(self, inlined: Mapping[str, str]) -> None:
         self._inlined = inlined
 
     def read(self, formula: str) -> Sum:
-        """Return a formula as a sum. Raises ValueError where it has a form that is not known here."""
+        """Return a formula as a sum. Raises ValueError if there is no way to show it."""
         return self._read(parsed(formula))
 
-    def _read(self, node: ast.expr) -> Sum:  # noqa: PLR0911 - a case for each syntax
+    def _read(self, node: ast.expr) -> Sum:  # noqa: PLR0911 (one case for each kind of syntax)
         match node:
             case ast.Constant(value=float() | int() as value):
-                return (
-                    (Product(1 if value > 0 else -1, () if abs(value) == 1 else (abs(float(value)),)),) if value else ()
-                )
+                return _number(float(value))
+            case ast.Name(id=name) if name in self._inlined:
+                return self._read(parsed(self._inlined[name]))
             case ast.Name(id=name):
-                return self._read(parsed(self._inlined[name])) if name in self._inlined else (Product(1, (name,)),)
+                return (Product(1, (name,)),)
             case ast.UnaryOp(op=ast.USub()):
                 return negative(self._read(node.operand))
             case ast.BinOp(op=ast.Add()):
@@ -96,6 +99,7 @@ class Reader:
         raise ValueError(f"{ast.unparse(node)}: there is no way to show this")
 
     def _choice(self, node: ast.IfExp) -> Sum:
+        """Read a conditional: a saturated command, a value for each direction, or a dead band."""
         test, body, otherwise = ast.unparse(node.test), node.body, node.orelse
         name, _, condition = test.partition(" ")
         if condition == "> 1.0" and ast.unparse(otherwise) == f"-1.0 if {name} < -1.0 else {name}":
@@ -109,6 +113,14 @@ class Reader:
 
 
 # ---- Sums and products -----------------------------------------------------------------------------------------------
+
+
+def _number(value: float) -> Sum:
+    """Return a number as a sum, with its sign apart from its size."""
+    if value == 0.0:
+        return ()
+    size = abs(value)
+    return (Product(1 if value > 0.0 else -1, () if size == 1.0 else (size,)),)
 
 
 def negative(of: Sum) -> Sum:
@@ -126,32 +138,34 @@ def times(left: Sum, right: Sum) -> Sum:
     """Return the product of two sums. A sum before names is multiplied out: (a x + b) x is a x x + b x."""
     if not left or not right:
         return ()
-    by = _single(right)
-    if len(left) > 1 and not by.below and all(isinstance(factor, str | Call) for factor in by.above):
+    last = _single(right)
+    if len(left) > 1 and not last.below and all(isinstance(factor, str | Call) for factor in last.above):
         return tuple(product for term in left for product in times((term,), right))
-    of = _single(left)
-    above, below = [*of.above, *by.above], [*of.below, *by.below]
+    first = _single(left)
+    above, below = [*first.above, *last.above], [*first.below, *last.below]
     for factor in [*above]:
         if factor in below:
             above.remove(factor)
             below.remove(factor)
-    return (Product(of.sign * by.sign, _signs_absorbed(tuple(above)), tuple(below)),)
+    return (Product(first.sign * last.sign, _signs_absorbed(tuple(above)), tuple(below)),)
 
 
 def _single(of: Sum) -> Product:
+    """Return a sum as one product, in brackets unless it is one already."""
     return of[0] if len(of) == 1 else Product(1, (Group(of),))
 
 
 def _signs_absorbed(factors: tuple[Factor, ...]) -> tuple[Factor, ...]:
     """Write sgn(x) x as |x| and sgn(x) |x| as x, also where each term of a sum in brackets has this factor."""
-    for sign in (f for f in factors if isinstance(f, Call) and f.function == "sgn"):
+    for sign in [f for f in factors if isinstance(f, Call) and f.function == "sgn"]:
         rest = list(factors)
         rest.remove(sign)
         x, size = _single(sign.of).above[0], Call("abs", sign.of)
         for place, factor in enumerate(rest):
-            inner = [_replaced(product, size, x) for product in factor.of] if isinstance(factor, Group) else [None]
-            if None not in inner:
-                return (*rest[:place], Group(tuple(p for p in inner if p)), *rest[place + 1 :])
+            if isinstance(factor, Group):
+                inner = [found for product in factor.of if (found := _replaced(product, size, x))]
+                if len(inner) == len(factor.of):
+                    return (*rest[:place], Group(tuple(inner)), *rest[place + 1 :])
         for old, new in ((size, x), (x, size)):
             if old in rest:
                 rest[rest.index(old)] = new
@@ -160,7 +174,7 @@ def _signs_absorbed(factors: tuple[Factor, ...]) -> tuple[Factor, ...]:
 
 
 def _replaced(product: Product, old: Factor, new: Factor) -> Product | None:
-    """The product with the last of some equal factors replaced, if it has one."""
+    """Return the product with the last of its factors `old` replaced, or None if it has no such factor."""
     if old not in product.above:
         return None
     place = len(product.above) - 1 - product.above[::-1].index(old)
@@ -168,7 +182,10 @@ def _replaced(product: Product, old: Factor, new: Factor) -> Product | None:
 
 
 def _directed(subject: Product, forward: Sum, reverse: Sum) -> Sum:
-    """Two values by the sign of a name, in one: parameters that differ become a `Choice`, other signs a sgn."""
+    """Return two values, of which one holds forward and the other in reverse, as one sum.
+
+    Parameters that differ become a `Choice`; if the signs differ, the product gets the factor sgn.
+    """
     sign = Product(1, (Call("sgn", (subject,)),))
     if forward == negative(reverse):
         return times((sign,), (_single(forward),))
@@ -187,7 +204,7 @@ def _directed(subject: Product, forward: Sum, reverse: Sum) -> Sum:
 
 
 def arranged(of: Sum) -> Sum:
-    """Return the sum with numbers first, common first factors before brackets, and no brackets without need."""
+    """Return the sum with numbers first, common first factors before brackets, and no unnecessary brackets."""
     flat: list[Product] = []
     for product in of:
         above = sorted((_tidied(factor) for factor in product.above), key=lambda f: not isinstance(f, float))
@@ -208,6 +225,7 @@ def arranged(of: Sum) -> Sum:
 
 
 def _tidied(factor: Factor) -> Factor:
+    """Return the factor with the sums inside it arranged."""
     if isinstance(factor, Group):
         return Group(arranged(factor.of))
     if isinstance(factor, Cases):
@@ -216,11 +234,18 @@ def _tidied(factor: Factor) -> Factor:
 
 
 def _with_common_factors(of: Sum) -> Sum:
-    """Products that begin with the same factor, to four digits if it is a number, are put together: a (x - y)."""
+    """Return the sum with a common first factor of several products before a bracket: a x - a y becomes a (x - y).
+
+    Numbers count as equal if their first four digits are.
+    """
     together: dict[object, list[Product]] = {}
     for place, product in enumerate(of):
         head = product.above[0] if len(product.above) > 1 else None
-        key = (f"{head:.4g}" if isinstance(head, float) else head) if head is not None else place
+        key: object = head
+        if head is None:
+            key = place  # a product of one factor shares it with no other
+        elif isinstance(head, float):
+            key = f"{head:.4g}"
         together.setdefault(key, []).append(product)
     found: list[Product] = []
     for first, *others in together.values():
