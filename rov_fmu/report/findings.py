@@ -22,7 +22,7 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Unseen:
-    """How well the model predicts data of an axis that it was not fitted to.
+    """A prediction of data of an axis that the model was not fitted to.
 
     Recordings have a `fit`, and points an `error`. Both are None where no prediction was tried.
     """

@@ -1,4 +1,4 @@
-"""Commands that are killed, interrupted, run side by side, or have no one to talk to: whole files, at most one line."""
+"""Commands that are killed, interrupted, run at once, or cannot print: whole files, and at most one line."""
 
 import os
 import shutil
@@ -28,7 +28,7 @@ OLD = b"the old one"
 
 
 def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> None:
-    """Kill after so many seconds, or as soon as a draft stands in the folder."""
+    """Kill a process after some seconds, or as soon as a draft is in the folder."""
     deadline = time.monotonic() + (300.0 if after is None else after)
     while time.monotonic() < deadline and not (after is None and list(folder.glob(".*.part"))):
         assert after is not None or process.poll() is None
@@ -38,14 +38,14 @@ def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> 
 
 
 def _moments(seconds: float, number: int) -> list[float | None]:
-    """When to kill a command that takes so many seconds: as it writes, then more often near its end."""
+    """Return when to kill a command that takes so many seconds: as it writes, and at times that are denser near its end."""
     return [None, *(seconds * (n / number) ** 0.5 for n in range(1, number))]
 
 
 _few_or_many = pytest.mark.parametrize(
     "number", [pytest.param(5, marks=pytest.mark.long), pytest.param(20, marks=pytest.mark.weekly)]
 )
-"""At how many moments a command is killed."""
+"""The number of moments at which a command is killed."""
 
 
 def _succeeds(arguments: list[str]) -> None:
@@ -149,7 +149,7 @@ ACTIONS = {
     except BaseException:
         pass""",
 }
-"""Where Python or a library would make something else of a KeyboardInterrupt."""
+"""Code in which a KeyboardInterrupt would be lost or turned into something else."""
 
 
 @pytest.mark.parametrize("action", ACTIONS.values(), ids=ACTIONS)

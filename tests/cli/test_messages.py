@@ -20,7 +20,7 @@ Capsys = pytest.CaptureFixture[str]
 
 
 def said(arguments: list[str], capsys: Capsys) -> str:
-    """The one line on standard error of a command that refuses."""
+    """Run a command that refuses its arguments, and return its one line on standard error."""
     assert main(arguments) == 2
     out, err = capsys.readouterr()
     assert out == ""
@@ -388,7 +388,7 @@ TABLES: dict[str, tuple[str, str, str]] = {
 
 
 def _identified(folder: Path, files: Mapping[str, str], capsys: Capsys) -> str:
-    """What identification says of the VideoRay's tank tests with other files among them."""
+    """Return the line about the VideoRay's tank tests when other files are among them."""
     tests = Path(shutil.copytree(TESTS, folder / "tests"))
     for name, text in files.items():
         (tests / name).write_text(text, encoding="utf-8")

@@ -39,19 +39,19 @@ def page(vehicle: Vehicle) -> str:
 
 @pytest.fixture(scope="module")
 def bare_page(vehicle: Vehicle) -> str:
-    """Of a vehicle without a data folder."""
+    """The page of a vehicle without a data folder."""
     return documentation_page(replace(vehicle, data=None))
 
 
 def told(vehicle: Vehicle, **how: Any) -> str:
-    """The page without its plots: drawing takes most of the time, and words do not need it."""
+    """Return the page without its plots, which take most of the time."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")
         return documentation_page(vehicle, **how)
 
 
 def rows(page: str) -> list[list[str]]:
-    """Text of the cells of all rows of all tables."""
+    """Return the text of the cells of all rows of all tables."""
     return [[cell.text_content().strip() for cell in row.iter("th", "td")] for row in html.fromstring(page).iter("tr")]
 
 
@@ -121,7 +121,7 @@ def test_says_where_it_is_valid(page: str) -> None:
 
 
 def check_refers_to_itself_alone(page: str) -> None:
-    """No element loads anything, every reference leads to a place in the page, and images are in the page itself."""
+    """Check that no element loads anything, that links stay in the page, and that images are embedded."""
     root = html.fromstring(page)
     assert not list(root.iter("script", "link", "iframe", "object", "embed", "base"))
     for element in root.iter():
@@ -320,7 +320,7 @@ def heavy_page(heavy: Vehicle) -> str:
 
 
 def words(page: str) -> str:
-    """What a reader sees, without the plots."""
+    """Return the visible text without the plots."""
     root = html.fromstring(page)
     for plot in root.findall(".//svg"):
         plot.drop_tree()
