@@ -38,7 +38,7 @@ def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> 
 
 
 def _moments(seconds: float, number: int) -> list[float | None]:
-    """Return when to kill a command that takes so many seconds: as it writes, and at times that are denser near its end."""
+    """Return when to kill a command that takes so many seconds: as it writes, and most often near its end."""
     return [None, *(seconds * (n / number) ** 0.5 for n in range(1, number))]
 
 

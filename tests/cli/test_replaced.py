@@ -18,17 +18,17 @@ Capsys = pytest.CaptureFixture[str]
 
 
 @pytest.fixture(scope="module")
-def tests(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def tank_tests(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small folder of tank tests."""
     tables = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
     return folder_of(tmp_path_factory.mktemp("tests"), DOWN, tables)
 
 
 @pytest.fixture(scope="module")
-def made(tests: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tank_tests: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the command writes."""
     folder = tmp_path_factory.mktemp("made")
-    assert _identify(tests, folder) == 0
+    assert _identify(tank_tests, folder) == 0
     return folder
 
 
@@ -38,8 +38,10 @@ def folder(made: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(made, tmp_path / "copy"))
 
 
-def _identify(tests: Path, folder: Path, *options: str) -> int:
-    return main(["identify", str(tests), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html"), *options])
+def _identify(tank_tests: Path, folder: Path, *options: str) -> int:
+    return main(
+        ["identify", str(tank_tests), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html"), *options]
+    )
 
 
 def _edited(path: Path) -> bytes:
@@ -49,10 +51,10 @@ def _edited(path: Path) -> bytes:
     return changed
 
 
-def test_unchanged_files_are_replaced_and_reported(tests: Path, folder: Path, capsys: Capsys) -> None:
+def test_unchanged_files_are_replaced_and_reported(tank_tests: Path, folder: Path, capsys: Capsys) -> None:
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     capsys.readouterr()
-    assert _identify(tests, folder) == 0
+    assert _identify(tank_tests, folder) == 0
     out, err = capsys.readouterr()
     assert err == ""
     assert out.splitlines()[:2] == [
@@ -74,7 +76,7 @@ def test_the_work_of_others_is_refused_before_anything_is_computed(
     name: str,
     made_by_hand: bool,
     reason: str,
-    tests: Path,
+    tank_tests: Path,
     folder: Path,
     capsys: Capsys,
     monkeypatch: pytest.MonkeyPatch,
@@ -89,7 +91,7 @@ def test_the_work_of_others_is_refused_before_anything_is_computed(
         "rov_fmu.tank.tank_tests.read_rows", lambda *_: pytest.fail("tests are read before it is refused")
     )
     capsys.readouterr()
-    assert _identify(tests, folder) == 2
+    assert _identify(tank_tests, folder) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert err == f"rov-fmu: {folder / name}: cannot be written: the file there {reason}; --force replaces it\n"
@@ -98,12 +100,12 @@ def test_the_work_of_others_is_refused_before_anything_is_computed(
 
 
 def test_force_replaces_the_work_of_others_and_reports_it(
-    tests: Path, made: Path, folder: Path, capsys: Capsys
+    tank_tests: Path, made: Path, folder: Path, capsys: Capsys
 ) -> None:
     _edited(folder / "rov.toml")
     (folder / "r.html").write_text("my notes", encoding="utf-8")
     capsys.readouterr()
-    assert _identify(tests, folder, "--force") == 0
+    assert _identify(tank_tests, folder, "--force") == 0
     assert capsys.readouterr().out.splitlines()[:2] == [
         f"{folder / 'rov.toml'}: replaced a file that has changed since identify wrote it",
         f"{folder / 'r.html'}: replaced a file that does not begin with a digest by identify, so it may be made "
@@ -120,11 +122,11 @@ def test_force_is_no_leave_to_overwrite_an_input(tmp_path: Path, capsys: Capsys)
     assert (tests / "rov.toml").read_bytes() == before
 
 
-def test_a_vehicle_that_was_tuned_is_not_replaced(tests: Path, folder: Path, capsys: Capsys) -> None:
+def test_a_vehicle_that_was_tuned_is_not_replaced(tank_tests: Path, folder: Path, capsys: Capsys) -> None:
     rov = str(folder / "rov.toml")
     assert main(["tune", rov, "--axis", "heave", "--command", "0.3", "--v-ss", "0.2", "-o", rov]) == 0
     capsys.readouterr()
-    assert _identify(tests, folder) == 2
+    assert _identify(tank_tests, folder) == 2
     assert "rov.toml: cannot be written: the file there has changed since identify wrote it" in capsys.readouterr().err
 
 
