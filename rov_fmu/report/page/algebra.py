@@ -29,7 +29,7 @@ Sum: TypeAlias = tuple[Product, ...]
 class Group:
     """A sum in brackets."""
 
-    of: Sum
+    inner: Sum
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Call:
     """A function of a sum: sin, cos, abs, or sgn (the sign)."""
 
     function: str
-    of: Sum
+    inner: Sum
 
 
 @dataclass(frozen=True)
@@ -123,14 +123,14 @@ def _number(value: float) -> Sum:
     return (Product(1 if value > 0.0 else -1, () if size == 1.0 else (size,)),)
 
 
-def negative(of: Sum) -> Sum:
+def negative(terms: Sum) -> Sum:
     """Return the sum with the other sign."""
-    return tuple(replace(product, sign=-product.sign) for product in of)
+    return tuple(replace(product, sign=-product.sign) for product in terms)
 
 
-def inverse(of: Sum) -> Sum:
+def inverse(terms: Sum) -> Sum:
     """Return 1 over the sum."""
-    single = _single(of)
+    single = _single(terms)
     return (Product(single.sign, single.below, single.above),)
 
 
@@ -150,9 +150,9 @@ def times(left: Sum, right: Sum) -> Sum:
     return (Product(first.sign * last.sign, _signs_absorbed(tuple(above)), tuple(below)),)
 
 
-def _single(of: Sum) -> Product:
+def _single(terms: Sum) -> Product:
     """Return a sum as one product, in brackets unless it is one already."""
-    return of[0] if len(of) == 1 else Product(1, (Group(of),))
+    return terms[0] if len(terms) == 1 else Product(1, (Group(terms),))
 
 
 def _signs_absorbed(factors: tuple[Factor, ...]) -> tuple[Factor, ...]:
@@ -160,12 +160,12 @@ def _signs_absorbed(factors: tuple[Factor, ...]) -> tuple[Factor, ...]:
     for sign in [f for f in factors if isinstance(f, Call) and f.function == "sgn"]:
         rest = list(factors)
         rest.remove(sign)
-        x, size = _single(sign.of).above[0], Call("abs", sign.of)
+        x, size = _single(sign.inner).above[0], Call("abs", sign.inner)
         for place, factor in enumerate(rest):
             if isinstance(factor, Group):
-                inner = [found for product in factor.of if (found := _replaced(product, size, x))]
-                if len(inner) == len(factor.of):
-                    return (*rest[:place], Group(tuple(inner)), *rest[place + 1 :])
+                terms = [found for product in factor.inner if (found := _replaced(product, size, x))]
+                if len(terms) == len(factor.inner):
+                    return (*rest[:place], Group(tuple(terms)), *rest[place + 1 :])
         for old, new in ((size, x), (x, size)):
             if old in rest:
                 rest[rest.index(old)] = new
@@ -203,21 +203,21 @@ def _directed(subject: Product, forward: Sum, reverse: Sum) -> Sum:
     return (both,) if one.sign == other.sign else times((both,), (sign,))
 
 
-def arranged(of: Sum) -> Sum:
+def arranged(terms: Sum) -> Sum:
     """Return the sum with numbers first, common first factors before brackets, and no unnecessary brackets."""
     flat: list[Product] = []
-    for product in of:
+    for product in terms:
         above = sorted((_tidied(factor) for factor in product.above), key=lambda f: not isinstance(f, float))
         if above and isinstance(above[0], Group) and len(above) == 1 and not product.below:
-            flat += [replace(p, sign=p.sign * product.sign) for p in above[0].of]
+            flat += [replace(p, sign=p.sign * product.sign) for p in above[0].inner]
             continue
         sign, factors = product.sign, list[Factor]()
         for factor in above:
-            if isinstance(factor, Group) and all(p.sign < 0 for p in factor.of):
-                sign, factor = -sign, Group(negative(factor.of))  # noqa: PLW2901
-            if isinstance(factor, Group) and len(factor.of) == 1 and not factor.of[0].below:
-                sign *= factor.of[0].sign
-                factors += factor.of[0].above
+            if isinstance(factor, Group) and all(p.sign < 0 for p in factor.inner):
+                sign, factor = -sign, Group(negative(factor.inner))  # noqa: PLW2901
+            if isinstance(factor, Group) and len(factor.inner) == 1 and not factor.inner[0].below:
+                sign *= factor.inner[0].sign
+                factors += factor.inner[0].above
             else:
                 factors.append(factor)
         flat.append(Product(sign, tuple(sorted(factors, key=lambda f: not isinstance(f, float))), product.below))
@@ -227,19 +227,19 @@ def arranged(of: Sum) -> Sum:
 def _tidied(factor: Factor) -> Factor:
     """Return the factor with the sums inside it arranged."""
     if isinstance(factor, Group):
-        return Group(arranged(factor.of))
+        return Group(arranged(factor.inner))
     if isinstance(factor, Cases):
         return replace(factor, at_most_zero=arranged(factor.at_most_zero), otherwise=arranged(factor.otherwise))
     return factor
 
 
-def _with_common_factors(of: Sum) -> Sum:
+def _with_common_factors(terms: Sum) -> Sum:
     """Return the sum with a common first factor of several products before a bracket: a x - a y becomes a (x - y).
 
     Numbers count as equal if their first four digits are.
     """
     together: dict[object, list[Product]] = {}
-    for place, product in enumerate(of):
+    for place, product in enumerate(terms):
         head = product.above[0] if len(product.above) > 1 else None
         key: object = head
         if head is None:

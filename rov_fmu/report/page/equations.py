@@ -134,13 +134,13 @@ def choices(lines: Iterable[Line]) -> list[Choice]:
     return list(dict.fromkeys(choice for line in lines for choice in _choices(line.right)))
 
 
-def _choices(of: Sum) -> Iterator[Choice]:
+def _choices(terms: Sum) -> Iterator[Choice]:
     """Yield the parameters in a sum that depend on a direction."""
-    for factor in (factor for product in of for factor in (*product.above, *product.below)):
+    for factor in (factor for product in terms for factor in (*product.above, *product.below)):
         if isinstance(factor, Choice):
             yield factor
         elif isinstance(factor, Group | Call):
-            yield from _choices(factor.of)
+            yield from _choices(factor.inner)
         elif isinstance(factor, Cases):
             yield from _choices((*factor.at_most_zero, *factor.otherwise))
 
@@ -168,14 +168,14 @@ def symbols(layout: Layout) -> dict[str, Symbol]:
     return found
 
 
-def _coefficient(key: str, of: str) -> Symbol:
+def _coefficient(key: str, owner: str) -> Symbol:
     """Return the symbol of a coefficient of a curve or an axis.
 
     a_t of the curve rear is the letter a with the index t below and rear above; T has only the index below.
     """
     letter, _, index = key.removesuffix(REVERSE).partition("_")
     mark = "−" if key.endswith(REVERSE) else ""
-    return Symbol(letter, index, of, mark) if index else Symbol(letter, of, "", mark)
+    return Symbol(letter, index, owner, mark) if index else Symbol(letter, owner, "", mark)
 
 
 class Text:
@@ -205,10 +205,10 @@ class Text:
         rate = self.write("dotted", name) if line.is_rate else name
         return self.write("equal", self.side_by_side([*map(self.factor, line.factors), rate]), self.sum(line.right))
 
-    def sum(self, of: Sum) -> str:
+    def sum(self, terms: Sum) -> str:
         """Write a sum."""
         text = ""
-        for product in of:
+        for product in terms:
             if text or product.sign < 0:
                 text += self.write("sign" if text else "first", "−" if product.sign < 0 else "+")
             if product.below:
@@ -237,9 +237,9 @@ class Text:
             case Choice():
                 return self.symbol(replace(self._symbols[factor.forward], mark="±"))
             case Group():
-                return self.write("bracket", self.sum(factor.of))
+                return self.write("bracket", self.sum(factor.inner))
             case Call():
-                inner = self.sum(factor.of)
+                inner = self.sum(factor.inner)
                 is_own = factor.function in self.forms
                 return self.write(factor.function, inner) if is_own else self.write("function", factor.function, inner)
             case Cases():
@@ -250,10 +250,10 @@ class Text:
         """Fill the parts into one of the forms."""
         return self.forms[form].format(*parts)
 
-    def symbol(self, of: Symbol) -> str:
+    def symbol(self, symbol: Symbol) -> str:
         """Write a letter and its indices."""
-        name = "_".join(part for part in (of.letter, of.index, of.upper) if part)
-        return name + {"−": REVERSE}.get(of.mark, of.mark)
+        name = "_".join(part for part in (symbol.letter, symbol.index, symbol.upper) if part)
+        return name + {"−": REVERSE}.get(symbol.mark, symbol.mark)
 
     def side_by_side(self, factors: Iterable[str]) -> str:
         """Write factors one after the other."""
@@ -280,18 +280,20 @@ class MathML(Text):
         f"{_CELL}<mtext>for\xa0</mtext>{{0}}<mo>&gt;</mo><mn>0</mn></mtd></mtr><mtr>{_CELL}{{2}}</mtd>{_CELL}<mtext>otherwise</mtext></mtd></mtr></mtable></mrow>",
     }
 
-    def symbol(self, of: Symbol) -> str:
-        letter, index, upper = (f"<mi>{escape(part)}</mi>" if part else "" for part in (of.letter, of.index, of.upper))
-        if of.mark:
-            upper = f'<mrow>{upper}<mo lspace="0" rspace="0">{of.mark}</mo></mrow>'
+    def symbol(self, symbol: Symbol) -> str:
+        letter, index, upper = (
+            f"<mi>{escape(part)}</mi>" if part else "" for part in (symbol.letter, symbol.index, symbol.upper)
+        )
+        if symbol.mark:
+            upper = f'<mrow>{upper}<mo lspace="0" rspace="0">{symbol.mark}</mo></mrow>'
         if upper:
             return f"<msubsup>{letter}{index or '<mrow/>'}{upper}</msubsup>"
         return f"<msub>{letter}{index}</msub>" if index else letter
 
     def part(self, factors: tuple[Factor, ...]) -> str:
         match factors:
-            case (Group(of=of),):  # the bar replaces the brackets
-                return self.sum(of)
+            case (Group(inner=inner),):  # the bar replaces the brackets
+                return self.sum(inner)
         return self.factors(factors)
 
     def side_by_side(self, factors: Iterable[str]) -> str:
