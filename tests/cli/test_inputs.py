@@ -68,11 +68,11 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def _check(said: str, named: str) -> None:
-    assert said.startswith("rov-fmu: ")
-    assert said.count("\n") == 1
-    assert named in said
-    assert "written" not in said
+def _check(err: str, named: str) -> None:
+    assert err.startswith("rov-fmu: ")
+    assert err.count("\n") == 1
+    assert named in err
+    assert "written" not in err
     assert not list(Path.cwd().iterdir())
 
 
@@ -141,10 +141,10 @@ def test_what_may_not_be_read_is_one_line_that_names_it(cases: tuple[str, ...], 
         (folder / name).chmod(0)
         commands.append((Command(name, arguments), folder))
     ends = run_elsewhere(commands, tmp_path / "temporary", bound_by_permissions())
-    for (command, _), (code, said) in zip(commands, ends, strict=True):
+    for (command, _), (code, err) in zip(commands, ends, strict=True):
         assert code == 2, command.name
-        assert "cannot be read: Permission denied" in said
-        _check(said, Path(command.name).name)
+        assert "cannot be read: Permission denied" in err
+        _check(err, Path(command.name).name)
 
 
 _MORE = [pytest.param(*of, marks=pytest.mark.long) for of in (("tests", 0o000), ("tests", 0o300), ("tables", 0o600))]
@@ -158,8 +158,8 @@ def test_a_folder_that_may_not_be_read_is_named(copied: Path, tmp_path: Path, na
         "tables": Command("tables", lambda f: ["tables", str(f / "videoray.toml")]),
     }
     (copied / name).chmod(mode)
-    ((code, said),) = run_elsewhere([(commands[name], copied)], tmp_path / "temporary", bound_by_permissions())
+    ((code, err),) = run_elsewhere([(commands[name], copied)], tmp_path / "temporary", bound_by_permissions())
     (copied / name).chmod(0o755)
     assert code == 2
-    assert "Permission denied" in said
-    _check(said, str(copied / name))
+    assert "Permission denied" in err
+    _check(err, str(copied / name))

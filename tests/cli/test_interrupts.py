@@ -85,12 +85,12 @@ class Command:
     def _ended_by(self, action: Callable[[], object]) -> str:
         children = psutil.Process(self.process.pid).children(recursive=True)
         action()
-        _, said = self.process.communicate(timeout=PATIENCE)
+        _, err = self.process.communicate(timeout=PATIENCE)
         _, alive = psutil.wait_procs(children, PATIENCE)
         assert not alive
-        assert self.process.returncode == 130, said
+        assert self.process.returncode == 130, err
         assert not [*self.temporary.iterdir()]
-        return str(said)
+        return str(err)
 
 
 @contextmanager

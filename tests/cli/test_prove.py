@@ -164,7 +164,7 @@ def test_what_deviates_or_fails_is_told(
     fmu = _with(foreign, {f"{FOLDER}/{name}": text}, tmp_path / "other.fmu")
     assert main(["prove", str(fmu)]) == 1
     out, err = capsys.readouterr()
-    assert line in [" ".join(told.split())[: len(line)] for told in out.splitlines()]
+    assert line in [" ".join(row.split())[: len(line)] for row in out.splitlines()]
     assert err.startswith(f"rov-fmu: {fmu}: ")
     assert err.endswith(" results are not as expected\n")
 
@@ -258,10 +258,10 @@ def test_an_fmu_that_hangs_is_ended_by_an_interrupt(videoray_fmu: Path, vehicle:
             assert process.poll() is None
             time.sleep(0.02)
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=300)
+        _, err = process.communicate(timeout=300)
     finally:
         process.kill()
-    assert (process.returncode, said) == (130, "rov-fmu: interrupted, no file is half-written\n")
+    assert (process.returncode, err) == (130, "rov-fmu: interrupted, no file is half-written\n")
     assert list(folder.iterdir()) == []
 
 
@@ -344,14 +344,14 @@ def test_bad_input_is_one_line_that_names_the_file(case: str, foreign: Path, tmp
 
 
 @pytest.mark.parametrize(
-    ("step", "told"),
+    ("step", "expected"),
     {
         "1e-9": f"{_EXP}: experiment 'a': stepSize = 1e-09 s takes 1e+10 steps from 0 to 10 s; at most 1000000 are run",
         "soon": "modelDescription.xml: DefaultExperiment: stepSize = 'soon': must be a number",
     }.items(),
 )
 def test_a_default_experiment_is_checked_as_the_others(
-    step: str, told: str, foreign: Path, tmp_path: Path, capsys: Capsys
+    step: str, expected: str, foreign: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
     experiment = '<Experiments name="x"><Experiment name="a"/></Experiments>'
     fmu = _with(foreign, {_EXP: experiment}, tmp_path / "experiment.fmu")
@@ -360,7 +360,7 @@ def test_a_default_experiment_is_checked_as_the_others(
         fmu, "modelDescription.xml", lambda old: old.replace(b"<ModelVariables>", default), tmp_path / "other.fmu"
     )
     assert main(["prove", str(other)]) == 2
-    assert capsys.readouterr().err == f"rov-fmu: {other}: {told}\n"
+    assert capsys.readouterr().err == f"rov-fmu: {other}: {expected}\n"
 
 
 def _cut(fmu: Path, path: Path) -> None:

@@ -68,8 +68,8 @@ def test_an_unknown_name_is_one_line_with_those_that_ship(
 ) -> None:
     assert main([*command, "videorey"]) == 2
     ships = ", ".join(SHIPPED)
-    said = f"rov-fmu: videorey: there is no such file, and no vehicle of this name ships, only {ships}"
-    assert capsys.readouterr() == ("", f"{said}; did you mean videoray?\n")
+    line = f"rov-fmu: videorey: there is no such file, and no vehicle of this name ships, only {ships}"
+    assert capsys.readouterr() == ("", f"{line}; did you mean videoray?\n")
 
 
 # ---- Quickly ---------------------------------------------------------------------------------------------------------
@@ -112,8 +112,8 @@ def _completed(*words: str, shell: str = "bash") -> list[str]:
         "COMP_CWORD": str(len(words)) if shell == "bash" else words[-1],
     }
     process = start([], environment=asked, stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=300)
-    assert (process.returncode, said) == (0, "")
+    out, err = process.communicate(timeout=300)
+    assert (process.returncode, err) == (0, "")
     return out.splitlines()
 
 
@@ -134,8 +134,8 @@ def test_the_script_for_a_shell_is_there(shell: str) -> None:
     if shell == "bash" and not shutil.which("bash"):
         pytest.skip("click asks bash for its version")
     process = start([], environment={"_ROV_FMU_COMPLETE": f"{shell}_source"}, stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=300)
-    assert (process.returncode, said) == (0, "")
+    out, err = process.communicate(timeout=300)
+    assert (process.returncode, err) == (0, "")
     assert f"_ROV_FMU_COMPLETE={shell}_complete" in out
 
 
@@ -146,20 +146,20 @@ _BUILD = ["build", str(BARE), "--platform=host", "-o"]
 
 @_posix
 def test_a_build_tells_its_progress_on_a_terminal(tmp_path: Path) -> None:
-    said = _on_a_terminal([*_BUILD, str(tmp_path / "x.fmu")])
-    assert b"compiling " in said
-    assert said.index(b"compiling ") < said.index(b"built in")
-    assert b"\x1b[2K" in said, "the lines of the progress are taken back"
+    shown = _on_a_terminal([*_BUILD, str(tmp_path / "x.fmu")])
+    assert b"compiling " in shown
+    assert shown.index(b"compiling ") < shown.index(b"built in")
+    assert b"\x1b[2K" in shown, "the lines of the progress are taken back"
 
 
 @_posix
 @pytest.mark.long
 def test_an_identification_tells_its_progress_on_a_terminal() -> None:
-    said = _on_a_terminal(["identify", str(TESTS)])
-    before = said[: said.index(b"Coefficients")]
+    shown = _on_a_terminal(["identify", str(TESTS)])
+    before = shown[: shown.index(b"Coefficients")]
     assert b"%" in before
     assert b"heave" in before
-    assert b"\x1b[2K" in said, "the bar is taken back"
+    assert b"\x1b[2K" in shown, "the bar is taken back"
 
 
 def _on_a_terminal(arguments: Sequence[str]) -> bytes:
@@ -167,13 +167,13 @@ def _on_a_terminal(arguments: Sequence[str]) -> bytes:
     ours, theirs = os.openpty()
     process = start(arguments, environment={"TERM": "xterm", "NO_COLOR": "1"}, stdout=theirs)
     os.close(theirs)
-    said = b""
+    shown = b""
     while part := _read(ours):
-        said += part
+        shown += part
     os.close(ours)
     assert process.communicate(timeout=300)[1] == ""
     assert process.returncode == 0
-    return said
+    return shown
 
 
 def _read(terminal: int) -> bytes:
@@ -186,8 +186,8 @@ def _read(terminal: int) -> bytes:
 @pytest.mark.long
 def test_a_build_is_quiet_where_there_is_no_terminal(tmp_path: Path) -> None:
     process = start([*_BUILD, str(tmp_path / "x.fmu")], stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=300)
-    assert (process.returncode, said) == (0, "")
+    out, err = process.communicate(timeout=300)
+    assert (process.returncode, err) == (0, "")
     assert "compiling" not in out
     assert "\x1b" not in out
     assert "\r" not in out

@@ -74,11 +74,11 @@ def test_an_impossible_target_is_refused_before_the_work(
 def check_refusals(ends: list[tuple[int, str]], reason: str, target: Path, temporary: Path) -> None:
     """Check that every command printed one line about its own file, and that only the old files are there."""
     assert len(ends) == len(COMMANDS)
-    for code, said in ends:
-        assert code == (1 if ": cannot compile: " in said else 2)
-        assert said.endswith("\n")
-        assert said[:-1].isprintable()
-        assert reason in said
+    for code, err in ends:
+        assert code == (1 if ": cannot compile: " in err else 2)
+        assert err.endswith("\n")
+        assert err[:-1].isprintable()
+        assert reason in err
     assert {path.name: path.read_bytes() for path in target.iterdir()} == {c.name: OLD for c in COMMANDS.values()}
     assert list(temporary.iterdir()) == []
 

@@ -118,9 +118,9 @@ def test_the_installed_command_does_everything_outside_the_checkout(wheel: Path,
     made = environment(tmp_path / "venv", "-c", CONSTRAINTS, wheel)
     here = tmp_path / "here"
     here.mkdir()
-    told = made.run("rov-fmu", "build", where=here)
-    assert "aarch64-darwin" in told
-    assert "built in" in told
+    printed = made.run("rov-fmu", "build", where=here)
+    assert "aarch64-darwin" in printed
+    assert "built in" in printed
     made.run("fmpy", "simulate", "videoray.fmu", "--start-values", "u_l", "0.3", "u_r", "0.3", where=here)
     made.run("rov-fmu", "build", "videoray_refit", "--platform", "host", where=here)
     made.run("rov-fmu", "build", "--fmi", "3", where=here)

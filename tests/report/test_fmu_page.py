@@ -314,7 +314,7 @@ def words(page: str) -> str:
 
 def test_a_vehicle_with_lag_and_coupling_is_told_as_it_is(heavy_page: str) -> None:
     text, table = words(heavy_page), rows(heavy_page)
-    for said in (
+    for claim in (
         "eight thrusters",
         "surge, sway, heave and yaw",
         "lag of first order",
@@ -325,8 +325,8 @@ def test_a_vehicle_with_lag_and_coupling_is_told_as_it_is(heavy_page: str) -> No
         "tau_t200",
         "With all inputs zero, the constant load",
     ):
-        assert said in text, said
-    for said in (
+        assert claim in text, claim
+    for claim in (
         "rear thruster",
         "Table 9",
         "Tables 6",
@@ -335,7 +335,7 @@ def test_a_vehicle_with_lag_and_coupling_is_told_as_it_is(heavy_page: str) -> No
         "R sin",
         "paper calls",
     ):
-        assert said not in text, said
+        assert claim not in text, claim
     assert ["1 thruster 1 (front starboard)", "u_1", "t200", "−0.7071, 0.7071, 0", "0.156, 0.111, 0.085"] in table
     (row,) = [row for row in table if row[0] == "a_d_u" and len(row) == 6]
     assert row[2:4] == ["141", "130.5 … 151.5"]
@@ -409,11 +409,11 @@ def test_a_vehicle_of_one_axis_is_told_as_one(kind: str, absent: tuple[str, ...]
 
 
 def test_directions_that_differ_are_not_said_to_mirror() -> None:
-    late, yaw = (
+    by_direction, yaw = (
         words(page_without_plots(a_vehicle(VEHICLES[kind])))
         for kind in ("drag by direction, coupled, late", "yaw only")
     )
-    assert "change sign with the direction" not in late
+    assert "change sign with the direction" not in by_direction
     assert "Directions. Drag only changes sign" in yaw
 
 

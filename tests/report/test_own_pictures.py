@@ -70,7 +70,7 @@ def test_nothing_in_a_picture_runs_or_navigates(case: str, visit: Callable[..., 
     seen.page.wait_for_timeout(300)
     assert seen.page.title() == title != "owned"
     assert seen.page.url == path.as_uri()
-    assert [url for url in seen.asked if not url.startswith("data:image/svg+xml;base64,")] == [path.as_uri()]
+    assert [url for url in seen.requests if not url.startswith("data:image/svg+xml;base64,")] == [path.as_uri()]
     assert len(seen.page.context.pages) == 1
     assert seen.problems() == []
 
