@@ -410,8 +410,10 @@ def test_a_wrong_table_is_told_in_a_line(case: str, tmp_path: Path, capsys: Caps
 )
 def test_wrong_inputs_of_a_plan_are_told_in_a_line(text: str, expected: str, here: Path, capsys: Capsys) -> None:
     pytest.importorskip("dask")
-    plan = FILES["plan.toml"].replace("runs = 2", 'sampler = "grid"\ninput_file = { path = "in.csv" }')
+    plan = _PLAN.format("bare.toml").replace("max(u)", "max(w)")
+    plan = plan.replace("runs = 2", 'sampler = "grid"\ninput_file = { path = "in.csv" }')
     (here / "plan.toml").write_text(plan, encoding="utf-8")
+    shutil.copy(BARE, here / "bare.toml")
     (here / "in.csv").write_text(text, encoding="utf-8")
     assert f"in.csv: {expected}" in refusal(["study", "plan.toml", "-o", "r"], capsys)
 

@@ -116,7 +116,7 @@ class Reader:
 
 
 def _number(value: float) -> Sum:
-    """Return a number as a sum, with its sign apart from its size."""
+    """Return a number as a sum of one product with its sign and its size, or as an empty sum."""
     if value == 0.0:
         return ()
     size = abs(value)

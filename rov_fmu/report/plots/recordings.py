@@ -76,7 +76,7 @@ def measured(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]
 
 
 def modelled(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]:
-    """Return evenly spaced times and the velocity that the sensor would measure of the model, smoothed alike."""
+    """Return evenly spaced times and the velocity that the sensor would measure of the model, smoothed the same."""
     is_position = simulation.recording.is_position
     return velocity(simulation.time, simulation.modelled, is_position=is_position, window=window)
 
