@@ -1,4 +1,4 @@
-"""An identified underwater vehicle (ROV) as an FMU: tank tests to vehicle file, vehicle file to FMU.
+"""Make FMUs of identified underwater vehicles (ROVs): from tank tests to a vehicle file, and from that to an FMU.
 
 import rov_fmu
 
@@ -22,6 +22,6 @@ def load(vehicle: str | Path) -> "VehicleModel":
 
     Raises FileError, a ValueError, with one line for each mistake.
     """
-    from rov_fmu.interface.model import load as load_model  # late, so that `import rov_fmu` is quick
+    from rov_fmu.interface.model import load as load_model  # imported here, so that `import rov_fmu` is quick
 
     return load_model(vehicle)

@@ -1,4 +1,4 @@
-"""python -m rov_fmu: the same as the command rov-fmu."""
+"""Run the command rov-fmu by `python -m rov_fmu`."""
 
 import sys
 from collections.abc import Sequence
@@ -7,10 +7,10 @@ from rov_fmu.process import run_process
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line as a process of its own; return its exit code."""
+    """Run the command line as the whole process and return its exit code."""
 
     def main() -> int:
-        from rov_fmu import cli  # here, where Ctrl-C is handled already
+        from rov_fmu import cli  # imported here, where Ctrl-C is handled already
 
         return cli.main(arguments)
 

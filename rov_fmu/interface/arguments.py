@@ -1,4 +1,4 @@
-"""The arguments of a simulation, checked and as arrays: one clear line for each that cannot be used."""
+"""Check the arguments of a simulation and make arrays of them; each wrong argument gives one clear line."""
 
 import warnings
 from collections.abc import Collection, Mapping, Sequence
@@ -16,22 +16,26 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Inputs: TypeAlias = "Mapping[str, Any] | pd.DataFrame"
-"""Values of inputs by name: numbers, arrays, functions of time."""
+"""The values of the inputs by name: numbers, arrays or functions of time."""
 
 TIME = "time"
-"""The column of inputs that have times of their own."""
-_ONE_LINE = 60  # characters of a value in a message
+"""The name of the column that holds the times of the inputs themselves."""
+_ONE_LINE = 60
+"""The most characters of a value in a message."""
 
 
-def checked_times(key: str, given: ArrayLike, least: int = 2, *, may_stand: bool = False) -> Array:
-    """Return times (s) as an array, if there are enough of them and they rise, or at least do not fall."""
+def checked_times(key: str, given: ArrayLike, least: int = 2, *, may_repeat: bool = False) -> Array:
+    """Return times (s) as an array. Raises InputError if there are fewer than `least`, or if they do not rise.
+
+    `may_repeat` allows equal times.
+    """
     times = _numbers(key, given)
     if times.ndim != 1 or len(times) < least:
         raise InputError(f"{key}: must be a sequence of {least} or more times (s), and has the shape {times.shape}")
     steps = np.diff(times)
-    if len(wrong := np.flatnonzero(steps < 0.0 if may_stand else steps <= 0.0)):
+    if len(wrong := np.flatnonzero(steps < 0.0 if may_repeat else steps <= 0.0)):
         n = int(wrong[0]) + 1
-        allowed = "not be less" if may_stand else "be greater"
+        allowed = "not be less" if may_repeat else "be greater"
         raise InputError(f"{key}[{n}] = {times[n]:.15g}: must {allowed} than the time before it, {times[n - 1]:.15g}")
     return times
 
@@ -39,7 +43,7 @@ def checked_times(key: str, given: ArrayLike, least: int = 2, *, may_stand: bool
 def checked_values(
     what: str, given: Mapping[str, Any], metas: Mapping[str, Declaration], *, many: bool
 ) -> dict[str, Array]:
-    """Return values by name as arrays, if each name is known and each value is within its bounds.
+    """Return values by name as arrays. Raises InputError if a name is unknown or a value is out of bounds.
 
     For many vehicles each value is a number, or an array of one number for each vehicle, which becomes a column.
     """
@@ -68,14 +72,14 @@ class Commands:
 
     def __init__(self, layout: Layout, time: Array, inputs: Inputs, *, many: bool) -> None:
         names = _names("inputs", inputs)
-        own = checked_times("inputs['time']", inputs[TIME], 1, may_stand=True) if TIME in names else None
+        own = checked_times("inputs['time']", inputs[TIME], 1, may_repeat=True) if TIME in names else None
         self.time = time
-        """The times of the steps: those of the results, and those between them at which an input changes."""
+        """The times of the steps: the times of the results, and the times between them at which an input changes."""
         if own is not None:
             self.time = np.union1d(time, own[(own > time[0]) & (own < time[-1])])
         middles = np.append(0.5 * (self.time[:-1] + self.time[1:]), self.time[-1])
         self.values: dict[str, Array] = {}
-        """By name: numbers, or arrays whose last axis is that of the times; held from each time to the next."""
+        """The inputs by name: numbers, or arrays whose last axis is time. Each value is held up to the next time."""
         for name in names:
             if name == TIME:
                 continue
@@ -97,7 +101,7 @@ class Commands:
 
 
 def _names(what: str, given: Any) -> list[str]:
-    """Return the names of a mapping or of a data frame."""
+    """Return the names in a mapping or a data frame. Raises InputError if it is neither."""
     if not hasattr(given, "keys"):
         raise InputError(
             f"{what} = {brief(shown(given), _ONE_LINE)}: must be a mapping from names to values, or a data frame"
@@ -106,6 +110,7 @@ def _names(what: str, given: Any) -> list[str]:
 
 
 def _check_name(what: str, name: str, metas: Mapping[str, Declaration]) -> None:
+    """Raise InputError if no variable of this kind has the name."""
     if name not in metas:
         kind = {"inputs": "input", "start": "state", "coefficients": "coefficient"}[what]
         only = f", only {', '.join(metas)}" if len(metas) < 20 else ""
@@ -113,7 +118,7 @@ def _check_name(what: str, name: str, metas: Mapping[str, Declaration]) -> None:
 
 
 def _check_shape(key: str, values: Array, times: int, many: bool) -> None:
-    """See that values are a number, or an array by vehicle and time."""
+    """Raise InputError unless the values are a number, or an array by vehicle and time."""
     if values.ndim > 1 + many or (values.ndim and values.shape[-1] not in ((1, times) if many else (times,))):
         allowed = f"a number, or an array of the shape ({times},), one value for each time"
         allowed += f", or (vehicles, 1), or (vehicles, {times})" if many else ""
@@ -121,7 +126,7 @@ def _check_shape(key: str, values: Array, times: int, many: bool) -> None:
 
 
 def _numbers(key: str, given: ArrayLike) -> Array:
-    """Return finite numbers as an array."""
+    """Return finite numbers as an array. Raises InputError for anything else."""
     try:
         found = np.asarray(given)
         if found.dtype.kind not in "biufO":
@@ -138,7 +143,10 @@ def _numbers(key: str, given: ArrayLike) -> Array:
 
 
 def number_of_vehicles(values: Mapping[str, Array]) -> int:
-    """Return for how many vehicles there are values; those of one hold for all."""
+    """Return the number of vehicles that the values are for; a single value holds for all vehicles.
+
+    Raises InputError if the numbers of values differ.
+    """
     sizes = {name: len(array) for name, array in values.items() if array.ndim == 2 and len(array) != 1}
     for name, size in sizes.items():
         first, vehicles = next(iter(sizes.items()))
@@ -148,14 +156,17 @@ def number_of_vehicles(values: Mapping[str, Array]) -> int:
 
 
 def checked_workers(workers: object) -> int | None:
-    """Return a number of threads."""
+    """Return a number of threads, or None for the default. Raises InputError if it is not a whole number from 1 on."""
     if workers is not None and (not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers = {shown(workers)}: must be a whole number from 1 on")
     return workers
 
 
 def checked_record(record: Sequence[str] | None, layout: Layout, names: Collection[str]) -> list[str]:
-    """Return the names of the variables to record: by default the outputs of the FMU, which are states and thrust."""
+    """Return the names of the variables to record. The default is the outputs of the FMU: states and thrust.
+
+    Raises InputError if a name is unknown.
+    """
     if record is None:
         return [*layout.state, *layout.thrust]
     for name in [record] if isinstance(record, str) else record:

@@ -54,18 +54,20 @@ class VehicleModel(Vehicle):
         start: Mapping[str, Any] = _NONE,
         record: str | Sequence[str] | None = None,
     ) -> Result:
-        """Simulate the vehicle, with the C code of the FMU and its results to the last bit.
+        """Simulate the vehicle with the C code of the FMU; the results are equal to the last bit.
 
-        `time` are the output times (s), which rise. Each step from one to the next is exact, whatever its length.
+        `time` holds the output times (s), which rise. Each step from one to the next is exact, whatever its length.
 
-        `inputs` are the inputs by name, and 0 for all others: a number; an array of a value for each time, which is
-        held up to the next one; or a function of an array of times, which is evaluated in the middle of each step and
-        held over it. Beyond ±1 a command saturates, with a warning. A data frame is possible, too. If there is a column
-        `time` among the inputs, the other arrays have a value for each of these times instead; each is held from its
-        time up to the next, also between output times, and the inputs are 0 before the first.
+        `inputs` maps names of inputs to values; all other inputs are 0. A value is a number; an array with a value for
+        each time, which is held up to the next time; or a function of an array of times, which is evaluated in the
+        middle of each step and held over the step. Beyond ±1 a command saturates, with a warning. A data frame is
+        possible, too. If there is a column `time` among the inputs, the other arrays have a value for each of its times
+        instead. Each value is held from its time up to the next, also between output times; the inputs are 0 before the
+        first time.
 
-        `start` are states at the first time by name, 0 for all others. `record` names the variables to return: inputs,
-        states, derivatives such as `der(u)`, thrust. By default these are the outputs of the FMU: states and thrust.
+        `start` maps names of states to their values at the first time; all other states are 0. `record` names the
+        variables to return: inputs, states, derivatives such as `der(u)`, thrust. The default is the outputs of the
+        FMU: states and thrust.
 
         The first simulation of a kind of vehicle compiles the engine, which takes seconds, and keeps it in the user's
         cache folder.
@@ -90,13 +92,14 @@ class VehicleModel(Vehicle):
         record: str | Sequence[str] | None = None,
         workers: int | None = None,
     ) -> Result:
-        """Simulate many variations of the vehicle at once, on all cores. The arguments are those of `simulate`, but:
+        """Simulate many variations of the vehicle at once, on all cores.
 
-        An array among the `inputs` has the shape (times,), which holds for all vehicles, (vehicles, 1), or
-        (vehicles, times). Each value of `start` and of `coefficients` is a number, or an array of one number for each
-        vehicle. Coefficients that are not given are those of this vehicle.
+        The arguments are those of `simulate`, with these differences. An array among the `inputs` has the shape
+        (times,), which holds for all vehicles, (vehicles, 1), or (vehicles, times). Each value of `start` and of
+        `coefficients` is a number, or an array of one number for each vehicle. Coefficients that are not given keep the
+        values of this vehicle.
 
-        `workers` is the number of threads, by default that of the usable cores; the results do not depend on it.
+        `workers` is the number of threads; the default is the number of usable cores. The results do not depend on it.
 
         The arrays of the result have the shape (vehicles, times). Where the motion of a vehicle cannot be computed, its
         values are NaN from there on, and `result.failed` has its number.
@@ -132,7 +135,7 @@ class VehicleModel(Vehicle):
         many: bool,
     ) -> Result:
         layout = self.layout
-        check_coefficients(layout, self.rov.coefficients)  # those of `replace` were never checked
+        check_coefficients(layout, self.rov.coefficients)  # `dataclasses.replace` does not check them
         times = checked_times("time", time)
         commands = Commands(layout, times, inputs, many=many)
         values: dict[str, Array] = {

@@ -1,4 +1,4 @@
-"""What a simulation returns: arrays by the names of the variables, a data frame, a plot."""
+"""The result of a simulation: arrays by the names of the variables, which can become a data frame or a plot."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Result(Mapping[str, Array]):
     states: tuple[str, ...]
     """The recorded variables that are states."""
     failed: NDArray[np.intp]
-    """The vehicles whose motion could not be computed to the end, by their number; their arrays end with NaN."""
+    """The numbers of the vehicles whose motion could not be computed to the end; their arrays end with NaN."""
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of a variable. Raises UnknownNameError, a KeyError, if it was not recorded."""
@@ -49,10 +49,10 @@ class Result(Mapping[str, Array]):
 
     def __repr__(self) -> str:
         first = next(iter(self.arrays.values()))
-        of = f"{len(first)} vehicles, " if first.ndim == 2 else ""
+        vehicles = f"{len(first)} vehicles, " if first.ndim == 2 else ""
         failed = f", {len(self.failed)} failed" if len(self.failed) else ""
         span = f"{len(self.time)} times from {self.time[0]:g} to {self.time[-1]:g} s"
-        return f"<Result: {of}{span}{failed}; {', '.join(self.arrays)}>"
+        return f"<Result: {vehicles}{span}{failed}; {', '.join(self.arrays)}>"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -83,7 +83,7 @@ class Result(Mapping[str, Array]):
     def plot(self, names: str | Sequence[str] | None = None, figure: "Figure | None" = None) -> "Figure":
         """Plot variables over time, one panel for each unit, and return the figure of Matplotlib.
 
-        `names` are the variables, all by default. They are drawn on `figure`, by default a new one of pyplot.
+        `names` are the variables; the default is all. The default of `figure` is a new figure of pyplot.
         """
         if figure is None:
             import matplotlib.pyplot as plt

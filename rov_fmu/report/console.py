@@ -1,4 +1,4 @@
-"""Where the command line prints, and the tables of the paper beside a vehicle."""
+"""The console that the commands print on, its tables, and the printout of the paper's tables and of a proof."""
 
 from collections.abc import Iterable, Iterator
 from decimal import Decimal
@@ -16,18 +16,19 @@ if TYPE_CHECKING:
     from rov_fmu.fmu.proof import Finding
 
 DEVIATION = "+.1%"
-_MIN_WIDTH = 110  # rich takes 80 columns in a pipe, and cuts digits off to fit a table into them
+"""The format of a relative deviation."""
+_MIN_WIDTH = 110  # Rich assumes 80 columns in a pipe, and would cut digits off to fit a table into them
 
 
 def console() -> Console:
-    """Where to print: text as it is, wide enough for the tables."""
+    """Return a console that prints text without markup and is wide enough for the tables."""
     found = Console(markup=False, highlight=False, emoji=False)
     found.width = max(found.width, _MIN_WIDTH)
     return found
 
 
 def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
-    """Tables 6-8 of the paper beside what the vehicle gives."""
+    """Print Tables 6-8 of the paper beside the values computed for the vehicle."""
     out = console()
     out.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
     for t in tables:
@@ -41,7 +42,7 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
 
 
 def print_proof(findings: "Iterable[Finding]") -> None:
-    """How far each variable of an experiment is from its expected values."""
+    """Print how far each variable of each experiment deviates from its expected values."""
     found = table("", "experiment", (), ("variable",))
     for header in ("deviation", "tolerance"):
         found.add_column(header, justify="right", no_wrap=True)
@@ -59,6 +60,7 @@ def print_proof(findings: "Iterable[Finding]") -> None:
 
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
+    """Return a published table with the printed, computed and measured values side by side."""
     values = ", ".join(f"{name} = {vehicle.rov[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
     compared = [f"{model}\nprinted|\ncomputed|\ndev." for model in ("non-linear", "scaled")]
     headers = "|".join([*compared, "test\nmeasured|\ndev."]).split("|")
@@ -79,14 +81,14 @@ def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
 
 
 def _model(cell: Cell) -> Iterator[str]:
-    """Printed, computed, deviation."""
+    """Yield the printed value, the computed value and their deviation."""
     yield text(cell.printed)
     yield f"{cell.computed:.4f}"
     yield text(cell.from_printed, DEVIATION) + (" " if cell.rounds_to_printed else "*")
 
 
 def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] = ()) -> Table:
-    """An empty table: a first column, then numbers, then texts."""
+    """Return an empty table with a first column, then columns of numbers, then columns of texts."""
     result = Table(
         title=title,
         title_justify="left",
@@ -103,5 +105,5 @@ def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] =
 
 
 def text(value: float | Decimal | None, form: str = "") -> str:
-    """A number as the format has it; a dash where there is none."""
+    """Return a number in a format, or a dash for None and NaN."""
     return "-" if value is None or isnan(value) else format(value, form)

@@ -1,42 +1,40 @@
-"""What the command line prints of an identification and of a tuning."""
+"""The printout of an identification and of a tuning."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from rich.table import Table
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
+from rov_fmu.identify.next_test import NextTest
 from rov_fmu.identify.recordings.recordings_fit import Effect
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.report.console import DEVIATION, console, table, text
 from rov_fmu.report.findings import Unseen, acting, effects, unseen
 from rov_fmu.vehicle.vehicle import Vehicle
 
-_OUT = "leave-\none-out"
+_LEAVE_ONE_OUT = "leave-\none-out"
 _MOST_STEPS = 20
+"""The most held commands of an axis in the printout."""
 
 
 def print_identification(identification: Identification) -> None:
-    """How well it predicts, coefficients, what else acts, what to measure next; then steps, points and warnings."""
+    """Print the results of an identification, the most important first.
+
+    These are the prediction errors, the coefficients, the other effects and the next tests; then the held commands, the
+    points and the warnings.
+    """
     out, vehicle = console(), identification.vehicle
     out.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
-    comparisons, other = compare(identification), [identification.against.name] if identification.against else []
-    if predicted := [*unseen(identification, comparisons)]:
-        out.print()
-        out.print(_predicted(predicted))
-    acts = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
-    for found in [_coefficients(vehicle), *([_effects(acts)] if acts else [])]:
+    comparisons = compare(identification)
+    other = [identification.against.name] if identification.against else []
+    for found in _first_tables(identification, comparisons):
         out.print()
         out.print(found)
     if identification.next_tests:
         out.print("\nTo measure next:")
     for test in identification.next_tests:
-        now = f"now {test.interval[0]:.3g} ... {test.interval[1]:.3g}" if test.interval else "not identifiable yet"
-        narrowed = f"; then {1.0 - test.narrowed:.0%} narrower" if test.interval else ""
-        words = f"- {test.axis.name}: {test.words} ({test.coefficient}, {now}{narrowed})"
-        out.print(words, soft_wrap=True)
-    tables = [_steps(result) for result in identification.axes if result.steps]
-    tables += [_points(comparison, other) for comparison in comparisons]
-    for found in [*tables, *([_summary(comparisons, other)] if comparisons else [])]:
+        out.print(_next_test(test), soft_wrap=True)
+    for found in _detailed_tables(identification, comparisons, other):
         out.print()
         out.print(found)
     out.print(
@@ -49,7 +47,39 @@ def print_identification(identification: Identification) -> None:
         out.print(f"- {warning}", soft_wrap=True)
 
 
+def _first_tables(identification: Identification, comparisons: Sequence[Comparison]) -> Iterator[Table]:
+    """Yield the tables of the predictions, of the coefficients and of the other effects."""
+    if predicted := list(unseen(identification, comparisons)):
+        yield _predicted(predicted)
+    yield _coefficients(identification.vehicle)
+    kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
+    if kept:
+        yield _effects(kept)
+
+
+def _next_test(test: NextTest) -> str:
+    """Return the line about a test to make next."""
+    if not test.interval:
+        return f"- {test.axis.name}: {test.words} ({test.coefficient}, not identifiable yet)"
+    now = f"now {test.interval[0]:.3g} ... {test.interval[1]:.3g}"
+    return f"- {test.axis.name}: {test.words} ({test.coefficient}, {now}; then {1.0 - test.narrowed:.0%} narrower)"
+
+
+def _detailed_tables(
+    identification: Identification, comparisons: Sequence[Comparison], other: Sequence[str]
+) -> Iterator[Table]:
+    """Yield the tables of the held commands, of the points, and of the RMS errors."""
+    for result in identification.axes:
+        if result.steps:
+            yield _steps(result)
+    for comparison in comparisons:
+        yield _points(comparison, other)
+    if comparisons:
+        yield _summary(comparisons, other)
+
+
 def _predicted(found: Iterable[Unseen]) -> Table:
+    """Return the table of how well the model predicts data that it was not fitted to."""
     result = table("Prediction of what a fit has not seen", "axis", ("fit", "RMS error"), ("of",))
     for row in found:
         fit = "" if row.fit is None else text(row.fit / 100.0, ".1%")
@@ -59,6 +89,7 @@ def _predicted(found: Iterable[Unseen]) -> Table:
 
 
 def _effects(kept: Iterable[Effect]) -> Table:
+    """Return the table of the other effects that were kept."""
     found = table("What else acts", "of", ("value", "95 % from", "to", "unit"), ("",))
     for effect in kept:
         low, high = (f"{end:.4g}" for end in effect.interval) if effect.interval else ("", "")
@@ -68,6 +99,7 @@ def _effects(kept: Iterable[Effect]) -> Table:
 
 
 def _coefficients(vehicle: Vehicle) -> Table:
+    """Return the table of all coefficients with their intervals and sources."""
     result = table("Coefficients", "name", ("value", "95 % from", "to", "unit"), ("source",))
     for name, meta in vehicle.layout.coefficients.items():
         low, high = (f"{end:.5g}" for end in vehicle.intervals[name]) if name in vehicle.intervals else ("", "")
@@ -76,27 +108,22 @@ def _coefficients(vehicle: Vehicle) -> Table:
 
 
 def _steps(result: AxisResult) -> Table:
+    """Return the table of the held commands in the recordings of an axis."""
     headers = ("from s", "to s", "command", f"V_ss [{result.axis.unit}]", "+-", "Tau [s]", "+-")
     found = table(f"{result.axis.name.capitalize()}: held commands of the recordings", "file", headers, ("",))
     for s in result.steps[:_MOST_STEPS]:
-        responses = [
-            text(n, form)
-            for n, form in (
-                (s.V_ss, ".4f"),
-                (s.V_ss_error, ".1g"),
-                (s.Tau, ".4f"),
-                (s.Tau_error, ".1g"),
-            )
-        ]
-        found.add_row(s.file, f"{s.start:.1f}", f"{s.end:.1f}", f"{s.command:.0%}", *responses, s.note)
+        held = s.file, f"{s.start:.1f}", f"{s.end:.1f}", f"{s.command:.0%}"
+        V_ss, Tau = (text(s.V_ss, ".4f"), text(s.V_ss_error, ".1g")), (text(s.Tau, ".4f"), text(s.Tau_error, ".1g"))
+        found.add_row(*held, *V_ss, *Tau, s.note)
     if (more := len(result.steps) - _MOST_STEPS) > 0:
         found.add_row(f"and {more} more: --report lists them all")
     return found
 
 
 def _points(comparison: Comparison, other: Sequence[str]) -> Table:
+    """Return the table of the measured points of one quantity beside the models."""
     axis, quantity = comparison.result.axis, comparison.quantity
-    names = [name for model in ("model", _OUT, *other) for name in (model, "dev.")]
+    names = [name for model in ("model", _LEAVE_ONE_OUT, *other) for name in (model, "dev.")]
     title = f"{axis.name.capitalize()}: {quantity} [{'s' if quantity == 'Tau' else axis.unit}]"
     found = table(title, "command", ("measured", *names), ("source",))
     for n, p in enumerate(comparison.points):
@@ -107,18 +134,20 @@ def _points(comparison: Comparison, other: Sequence[str]) -> Table:
 
 
 def _summary(comparisons: Iterable[Comparison], other: Sequence[str]) -> Table:
-    found = table("RMS relative error", "", ("model", _OUT, *other))
+    """Return the table of the RMS errors of all quantities."""
+    found = table("RMS relative error", "", ("model", _LEAVE_ONE_OUT, *other))
     for c in comparisons:
         found.add_row(f"{c.result.axis.name} {c.quantity}", *(text(c.rms(column), ".4f") for column in c.columns))
     return found
 
 
 def _against(value: float, measured: float) -> tuple[str, str]:
-    return text(value, ".4f"), text(round(value / measured - 1.0, 3) + 0.0, DEVIATION)  # and no -0.0
+    """Return the cells for a value of a model and its deviation from the measured value."""
+    return text(value, ".4f"), text(round(value / measured - 1.0, 3) + 0.0, DEVIATION)  # + 0.0 makes 0.0 of -0.0
 
 
 def print_tuning(tuning: Tuning) -> None:
-    """α and β, and what they give at the wanted points."""
+    """Print α and β, the response at the wanted points, and the inputs of these commands."""
     out = console()
     for kind in ("alpha", "beta"):
         name = tuning.axis.coefficient(kind)

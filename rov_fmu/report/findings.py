@@ -1,4 +1,4 @@
-"""What an identification is asked first: how well it predicts what it has not seen, what is known, what else acts."""
+"""The main findings of an identification: prediction errors, known coefficients, and other effects on the motion."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from rov_fmu.identify.identification import AxisResult, Comparison, Identificati
 from rov_fmu.identify.recordings.recordings_fit import Effect, count
 from rov_fmu.model.layout import Axis
 
-_ACTS = {
+_WORDS = {
     "load": "constant load",
     "delay": "delay from the commands to the motion",
     "current": "current along the axis",
@@ -22,35 +22,41 @@ _ACTS = {
 
 @dataclass(frozen=True)
 class Unseen:
-    """How well what a fit has not seen is predicted; either a fit or an error, NaN or None where none was tried."""
+    """A prediction of data of an axis that the model was not fitted to.
+
+    Recordings have a `fit`, and points an `error`. Both are None where no prediction was tried.
+    """
 
     axis: Axis
     what: str
+    """The predicted data, in words."""
     by: str
+    """The fit that predicts them, in words."""
     fit: float | None = None
-    """Time-domain fit, percent: 100 is perfect, 0 is no better than the mean."""
+    """The fit of the velocity over time in percent: 100 is perfect, 0 is no better than the mean velocity."""
     seen: float | None = None
-    """The same of the fit to all recordings."""
+    """The fit in percent of the model that was fitted to all recordings, these included."""
     error: float | None = None
-    """RMS relative error."""
+    """The RMS relative error."""
     parts: tuple[tuple[str, float], ...] = ()
-    """The fit of each recording, by its file."""
+    """Each recording (or half of one) and its fit in percent."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """A coefficient that the tests were to tell."""
+    """A coefficient that was to be identified from the tests."""
 
     name: str
     value: float
     interval: tuple[float, float] | None
-    """95 %; None where the tests do not tell it."""
+    """The 95 % interval, or None if the tests do not determine the coefficient."""
     unit: str
     assumed: bool
+    """True if the value was assumed because no test determines it."""
 
     @property
     def relative(self) -> tuple[float, float] | None:
-        """The ends by the value; None where that is 0."""
+        """The ends of the interval divided by the value, or None if there is no interval or the value is 0."""
         if self.interval is None or self.value == 0.0:
             return None
         low, high = sorted(end / self.value for end in self.interval)
@@ -58,7 +64,10 @@ class Known:
 
 
 def unseen(results: Identification, comparisons: Sequence[Comparison]) -> Iterator[Unseen]:
-    """Of every axis that was tested: recordings by fits to the others, or points by fits to other thrusts."""
+    """Yield the predictions for each tested axis.
+
+    Recordings are predicted by fits to the other recordings, and points by fits without the points of their thrust.
+    """
     for result in results.axes:
         if held_out := result.held_out:
             parts = [(p.recording.file, p.fit) for p in held_out.predictions]
@@ -77,11 +86,13 @@ def unseen(results: Identification, comparisons: Sequence[Comparison]) -> Iterat
 
 
 def known(results: Identification) -> tuple[Known, ...]:
-    """What was fitted or had to be assumed, in the order of the vehicle."""
+    """Return the coefficients that were fitted or had to be assumed, in the order of the vehicle."""
     vehicle = results.vehicle
     estimates = [fit.estimate for fit in results.thrust.values()] + [r.estimate for r in results.axes if r.estimate]
     fitted = {name for estimate in estimates for name in estimate.names}
-    alphas = {result.axis.coefficient("alpha") for result in results.axes}  # 1 by convention, not for want of a test
+    alphas = {
+        result.axis.coefficient("alpha") for result in results.axes
+    }  # they are 1 by convention, not because a test is missing
     assumed = {name for result in results.axes for name in result.assumed} - fitted - alphas
     return tuple(
         Known(name, vehicle.rov[name], vehicle.intervals.get(name), meta.unit, name in assumed)
@@ -91,16 +102,16 @@ def known(results: Identification) -> tuple[Known, ...]:
 
 
 def effects(result: AxisResult) -> tuple[Effect, ...]:
-    """What else acts along an axis, or was looked for in vain; those kept first."""
+    """Return the effects that were looked for along an axis, the kept ones first."""
     found = result.recordings.effects if result.recordings else ()
     return tuple(sorted(found, key=lambda effect: not effect.kept))
 
 
 def acting(effect: Effect) -> str:
-    """An effect in words."""
-    return _ACTS[effect.kind]
+    """Return an effect in words."""
+    return _WORDS[effect.kind]
 
 
 def verdict(effect: Effect) -> str:
-    """What became of it."""
+    """Return whether an effect was kept, in words."""
     return "kept" if effect.kept else f"left at {int(effect.kind.startswith('reverse'))}"

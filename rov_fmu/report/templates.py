@@ -1,4 +1,4 @@
-"""What pages are made with: their templates, and numbers as one writes them."""
+"""Render pages from templates, with filters that format numbers and units for readers."""
 
 from math import isfinite, isnan
 from pathlib import Path
@@ -7,10 +7,11 @@ from rov_fmu.io.templates import render
 from rov_fmu.report.plots.svg import PALETTE
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""The translation of digits to superscripts."""
 
 
 def page(template: str, **content: object) -> str:
-    """A page from a template, with these formats as filters."""
+    """Return a page made from a template; the functions of this module are its filters."""
     return render(
         template,
         Path(__file__).parent / "templates",
@@ -23,7 +24,10 @@ def page(template: str, **content: object) -> str:
 
 
 def number(value: float | None, digits: int | None = None) -> str:
-    """So many significant digits, or exactly where that is short; a dash where there is no number."""
+    """Return a number for readers, or a dash for None, NaN and infinity.
+
+    It has the given number of significant digits. Without it, it is exact if that is short, and else has 6 digits.
+    """
     if value is None or not isfinite(value):
         return "–"
     is_short = digits is None and len(repr(value)) <= 9 and abs(value) < 1e5
@@ -36,12 +40,12 @@ def number(value: float | None, digits: int | None = None) -> str:
 
 
 def text(value: float | None, form: str) -> str:
-    """A number as the format has it; a dash where there is none."""
+    """Return a number in a format, or a dash for None and NaN."""
     if value is None or isnan(value):
         return "–"
     return format(value, form).replace("%", " %").replace("-", "−").replace("inf", "∞")
 
 
 def pretty_unit(unit: str) -> str:
-    """A unit as one writes it: N.m.s2/rad2 is N·m·s²/rad²."""
+    """Return a unit for readers: N.m.s2/rad2 becomes N·m·s²/rad²."""
     return unit if unit == "1" else unit.translate(RAISED).replace(".", "·")

@@ -1,4 +1,4 @@
-"""Commands that are killed, interrupted, run side by side, or have no one to talk to: whole files, at most one line."""
+"""Commands that are killed, interrupted, run at once, or cannot print: whole files, and at most one line."""
 
 import os
 import shutil
@@ -28,7 +28,7 @@ OLD = b"the old one"
 
 
 def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> None:
-    """Kill after so many seconds, or as soon as a draft stands in the folder."""
+    """Kill a process after some seconds, or as soon as a draft is in the folder."""
     deadline = time.monotonic() + (300.0 if after is None else after)
     while time.monotonic() < deadline and not (after is None and list(folder.glob(".*.part"))):
         assert after is not None or process.poll() is None
@@ -38,14 +38,14 @@ def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> 
 
 
 def _moments(seconds: float, number: int) -> list[float | None]:
-    """When to kill a command that takes so many seconds: as it writes, then more often near its end."""
+    """Return when to kill a command that takes so many seconds: as it writes, and most often near its end."""
     return [None, *(seconds * (n / number) ** 0.5 for n in range(1, number))]
 
 
 _few_or_many = pytest.mark.parametrize(
     "number", [pytest.param(5, marks=pytest.mark.long), pytest.param(20, marks=pytest.mark.weekly)]
 )
-"""At how many moments a command is killed."""
+"""The number of moments at which a command is killed."""
 
 
 def _succeeds(arguments: list[str]) -> None:
@@ -133,9 +133,9 @@ def test_an_interrupted_command_says_so_and_leaves_nothing(
     )
     with pipe.open("wb"):  # opens when the command reads it
         process.send_signal(signal_)
-        _, said = process.communicate(timeout=300)
+        _, err = process.communicate(timeout=300)
     assert process.returncode == 130
-    assert said == "rov-fmu: interrupted, no file is half-written\n"
+    assert err == "rov-fmu: interrupted, no file is half-written\n"
     assert not any(output.parent.iterdir())
 
 
@@ -149,7 +149,7 @@ ACTIONS = {
     except BaseException:
         pass""",
 }
-"""Where Python or a library would make something else of a KeyboardInterrupt."""
+"""Code in which a KeyboardInterrupt would be lost or turned into something else."""
 
 
 @pytest.mark.parametrize("action", ACTIONS.values(), ids=ACTIONS)
@@ -208,17 +208,17 @@ def test_an_identification_that_is_cancelled_as_it_works_loses_nothing(moment: b
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     os.close(theirs)
-    told = b""
-    while moment not in told:
-        told += os.read(ours, 4096)  # of a terminal that is closed this fails
+    shown = b""
+    while moment not in shown:
+        shown += os.read(ours, 4096)  # of a terminal that is closed this fails
     process.send_signal(signal.SIGINT)
     with suppress(OSError):  # so Linux ends a terminal
         while part := os.read(ours, 4096):
-            told += part
+            shown += part
     os.close(ours)
     assert process.communicate(timeout=300)[1] == "rov-fmu: interrupted, no file is half-written\n"
     assert process.returncode == 130
-    assert b"Coefficients" not in told
+    assert b"Coefficients" not in shown
     assert [path.name for path in target.parent.iterdir()] == [target.name]
     assert target.read_bytes() == OLD
 
@@ -299,8 +299,8 @@ def test_who_does_not_read_on_gets_no_message(case: str) -> None:
     os.close(end)
     process = start(PRINTING[case], stdout=start_)
     os.close(start_)
-    _, said = process.communicate(timeout=300)
-    assert (process.returncode, said) == (1, "")
+    _, err = process.communicate(timeout=300)
+    assert (process.returncode, err) == (1, "")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
@@ -308,8 +308,8 @@ def test_who_does_not_read_on_gets_no_message(case: str) -> None:
 def test_output_that_has_no_room_is_one_line(case: str) -> None:
     with Path("/dev/full").open("w", encoding="utf-8") as full:
         process = start(PRINTING[case], stdout=full)
-        _, said = process.communicate(timeout=300)
-    assert said == "rov-fmu: the output, or a temporary file: cannot be written: No space left on device\n"
+        _, err = process.communicate(timeout=300)
+    assert err == "rov-fmu: the output, or a temporary file: cannot be written: No space left on device\n"
     assert process.returncode == 2
 
 
@@ -331,17 +331,17 @@ def test_a_terminal_that_knows_ascii_alone_gets_every_line(name: str, tmp_path: 
     shutil.copytree(VIDEORAY.parent, tmp_path, dirs_exist_ok=True)
     ascii_ = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii", "COLUMNS": "3"}
     process = start(["tables", str(path)], environment=ascii_, stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=300)
-    assert (process.returncode, said) == (0, "")
+    out, err = process.communicate(timeout=300)
+    assert (process.returncode, err) == (0, "")
     assert out.startswith("R\\xf6v \\u03b1. ")
     assert "Table 8. Surge, alpha_u = 1.1, beta_u = 1" in out
     process = start(["tables", str(path) + "x"], environment=ascii_, stdout=subprocess.PIPE)
-    out, said = process.communicate(timeout=300)
+    out, err = process.communicate(timeout=300)
     assert (process.returncode, out) == (2, "")
-    assert said.isascii()
-    assert said.startswith("rov-fmu: ")
-    assert ": there is no such file" in said
-    assert said.count("\n") == 1
+    assert err.isascii()
+    assert err.startswith("rov-fmu: ")
+    assert ": there is no such file" in err
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -360,10 +360,10 @@ def test_options_that_do_not_exist_end_with_what_is_allowed(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments) == 2
-    out, said = capsys.readouterr()
+    out, err = capsys.readouterr()
     assert out == ""
-    assert said.startswith("rov-fmu: ")
-    assert said.count("\n") == 1
+    assert err.startswith("rov-fmu: ")
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -374,10 +374,10 @@ def test_empty_and_clashing_options_of_the_build_are_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["build", *arguments]) in (1, 2)
-    out, said = capsys.readouterr()
+    out, err = capsys.readouterr()
     assert out == ""
-    assert said.startswith("rov-fmu: ")
-    assert said.count("\n") == 1
+    assert err.startswith("rov-fmu: ")
+    assert err.count("\n") == 1
     assert not any(tmp_path.iterdir())
 
 

@@ -1,4 +1,4 @@
-"""Files that cannot be read: one line that names the file and the reason, and nothing of writing."""
+"""Files that cannot be read: one line that names the file and the reason, and does not mention writing."""
 
 import os
 import shutil
@@ -16,7 +16,7 @@ from tests.commands import TESTS, Command, run_elsewhere
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="permissions are POSIX")
 
-# What reads a file of the folder that `copied` makes, and that file.
+# A file of the folder that `copied` makes, and a command that reads it.
 READING: dict[str, tuple[str, Callable[[Path], list[str]]]] = {
     "the vehicle of a build": ("videoray.toml", lambda f: _build(f / "videoray.toml")),
     "the vehicle of the tables": ("videoray.toml", lambda f: ["tables", str(f / "videoray.toml")]),
@@ -36,7 +36,7 @@ READING: dict[str, tuple[str, Callable[[Path], list[str]]]] = {
     "the vehicle to compare with": ("tests/beside.toml", lambda f: ["identify", str(f / "tests")]),
 }
 PICTURES = {"a drawing", "a drawing of the FMU in Python", "the icon"}
-"""Where there is none, the neutral one stands in."""
+"""The cases whose file may be missing, because a neutral picture replaces it."""
 
 
 def _tune(folder: Path, *options: str) -> list[str]:
@@ -49,7 +49,7 @@ def _build(vehicle: Path, *options: str) -> list[str]:
 
 @pytest.fixture
 def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The shipped vehicles with all that they read, in a folder that is the current one's neighbour."""
+    """A folder, beside the current one, with the shipped vehicles and all files that they read."""
     folder = tmp_path / "inputs"
     shutil.copytree(VIDEORAY.parent, folder)
     shutil.copytree(TESTS, folder / "tests")
@@ -68,11 +68,11 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def _check(said: str, named: str) -> None:
-    assert said.startswith("rov-fmu: ")
-    assert said.count("\n") == 1
-    assert named in said
-    assert "written" not in said
+def _check(err: str, named: str) -> None:
+    assert err.startswith("rov-fmu: ")
+    assert err.count("\n") == 1
+    assert named in err
+    assert "written" not in err
     assert not list(Path.cwd().iterdir())
 
 
@@ -104,7 +104,7 @@ WRONG = [
 
 
 _WORKS = {"the icon", "the report", "a drawing", "a drawing of the FMU in Python"}
-"""Of what is read in the middle of a build; one of them by default."""
+"""The cases that read their file in the middle of a build. Only one of them runs by default."""
 _CASES = [
     pytest.param(
         case, what, marks=[pytest.mark.long] * (what is _gone_as_it_is_read and case in _WORKS - {"a drawing"})
@@ -128,7 +128,7 @@ def test_what_is_no_file_is_one_line_that_names_it(
 
 
 SOME = ("the vehicle of the tables", "the points", "a published table", "rov.toml", "a tank test")
-"""That are soon told; the long tests try all."""
+"""The quick cases; the long tests try all."""
 
 
 @pytest.mark.parametrize("cases", [SOME, pytest.param(tuple(READING), marks=pytest.mark.long)], ids=len)
@@ -141,10 +141,10 @@ def test_what_may_not_be_read_is_one_line_that_names_it(cases: tuple[str, ...], 
         (folder / name).chmod(0)
         commands.append((Command(name, arguments), folder))
     ends = run_elsewhere(commands, tmp_path / "temporary", bound_by_permissions())
-    for (command, _), (code, said) in zip(commands, ends, strict=True):
+    for (command, _), (code, err) in zip(commands, ends, strict=True):
         assert code == 2, command.name
-        assert "cannot be read: Permission denied" in said
-        _check(said, Path(command.name).name)
+        assert "cannot be read: Permission denied" in err
+        _check(err, Path(command.name).name)
 
 
 _MORE = [pytest.param(*of, marks=pytest.mark.long) for of in (("tests", 0o000), ("tests", 0o300), ("tables", 0o600))]
@@ -158,8 +158,8 @@ def test_a_folder_that_may_not_be_read_is_named(copied: Path, tmp_path: Path, na
         "tables": Command("tables", lambda f: ["tables", str(f / "videoray.toml")]),
     }
     (copied / name).chmod(mode)
-    ((code, said),) = run_elsewhere([(commands[name], copied)], tmp_path / "temporary", bound_by_permissions())
+    ((code, err),) = run_elsewhere([(commands[name], copied)], tmp_path / "temporary", bound_by_permissions())
     (copied / name).chmod(0o755)
     assert code == 2
-    assert "Permission denied" in said
-    _check(said, str(copied / name))
+    assert "Permission denied" in err
+    _check(err, str(copied / name))

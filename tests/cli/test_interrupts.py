@@ -23,21 +23,21 @@ termios = pytest.importorskip("termios", reason="terminals and signals are POSIX
 LINE = "rov-fmu: interrupted, no file is half-written\n"
 LINE_OF_A_STUDY = "rov-fmu: interrupted, no file is half-written; the same command continues the study\n"
 PATIENCE = 300.0
-"""Seconds until a test gives up; no test passes or fails by the speed of the machine."""
+"""The seconds until a test gives up; no test depends on the speed of the machine."""
 
 
 class Command:
-    """A command in a terminal of its own; what it prints to stderr is kept apart."""
+    """A command in its own terminal; its stderr is read separately."""
 
     def __init__(self, arguments: list[str], folder: Path, is_controlled: bool = True, **environment: str) -> None:
-        """Without a terminal that controls it, none of its processes ends just because the first one does."""
+        """`is_controlled` makes the terminal control the command, so that all its processes end with the first one."""
         self.temporary = folder / "temporary files"
         self.temporary.mkdir()
         self.shown = b""
         self._terminal, inside = os.openpty()
 
         def own_terminal() -> None:
-            # a shell starts what it runs in the background with interrupts ignored, and that is inherited
+            # a shell that starts a process in the background makes it ignore interrupts, and children inherit that
             signal.signal(signal.SIGINT, signal.SIG_DFL)
             if is_controlled:
                 fcntl.ioctl(inside, termios.TIOCSCTTY, 0)
@@ -57,7 +57,7 @@ class Command:
         Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
-        with suppress(OSError):  # so Linux ends a terminal
+        with suppress(OSError):  # on Linux the end of a terminal is an error
             while part := os.read(self._terminal, 4096):
                 self.shown += part
         os.close(self._terminal)
@@ -77,7 +77,7 @@ class Command:
         return []
 
     def press_ctrl_c(self) -> str:
-        """What it says then; all of it, that is until every process that may say something has ended."""
+        """Press Ctrl-C and return what the command prints until all its processes have ended."""
         return self._ended_by(lambda: os.write(self._terminal, b"\x03"))
 
     def terminate(self) -> str:
@@ -86,12 +86,12 @@ class Command:
     def _ended_by(self, action: Callable[[], object]) -> str:
         children = psutil.Process(self.process.pid).children(recursive=True)
         action()
-        _, said = self.process.communicate(timeout=PATIENCE)
+        _, err = self.process.communicate(timeout=PATIENCE)
         _, alive = psutil.wait_procs(children, PATIENCE)
         assert not alive
-        assert self.process.returncode == 130, said
+        assert self.process.returncode == 130, err
         assert not [*self.temporary.iterdir()]
-        return str(said)
+        return str(err)
 
 
 @contextmanager
@@ -249,7 +249,7 @@ sys.exit(main(["study", "plan.toml", "-o", sys.argv[1]]))
 
 
 def test_a_warning_is_printed_above_the_bar(tmp_path: Path) -> None:
-    """And not onto its line: the line is empty when the warning comes, and the warning ends it."""
+    """The warning is not appended to the line of the bar: that line is cleared before."""
     with command(["-c", _WARNING, str(tmp_path / "results")], tmp_path) as study:
         study.process.communicate(timeout=PATIENCE)
         assert study.process.returncode == 2

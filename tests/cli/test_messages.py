@@ -19,8 +19,8 @@ from tests.commands import ALONE, BARE, TESTS
 Capsys = pytest.CaptureFixture[str]
 
 
-def said(arguments: list[str], capsys: Capsys) -> str:
-    """The one line on standard error of a command that refuses."""
+def refusal(arguments: list[str], capsys: Capsys) -> str:
+    """Run a command that refuses its arguments, and return its one line on standard error."""
     assert main(arguments) == 2
     out, err = capsys.readouterr()
     assert out == ""
@@ -51,7 +51,7 @@ _SHIPS = "there is no such file, and no vehicle of this name ships, only " + ", 
 _PLATFORMS = "host, linux64, linux32, aarch64-linux, win64, win32, darwin64, aarch64-darwin"
 _COMMAND = "must be a number within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3"
 _HEAVE = ["tune", "videoray", "--axis", "heave"]
-# What is typed in a folder with the files of `FILES`, and what is said.
+# What is typed in a folder with the files of `FILES`, and the expected part of the line.
 TYPED: dict[str, tuple[list[str], str]] = {
     "a vehicle misspelt": (["build", "videorey"], f"videorey: {_SHIPS}; did you mean videoray?"),
     "a vehicle in capital letters": (["fly", "BlueROV2"], f"BlueROV2: {_SHIPS}; did you mean bluerov2?"),
@@ -194,8 +194,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("case", TYPED)
 def test_what_is_typed_wrong_is_told_in_a_line(case: str, here: Path, capsys: Capsys) -> None:
-    arguments, told = TYPED[case]
-    assert told in said(arguments, capsys)
+    arguments, expected = TYPED[case]
+    assert expected in refusal(arguments, capsys)
     assert {path.name: path.read_text(encoding="utf-8") for path in here.iterdir()} == FILES
 
 
@@ -207,8 +207,8 @@ def test_platforms_of_a_program_are_guessed_too() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc is of Linux")
 @pytest.mark.parametrize("arguments", [["build", str(BARE), "-o"], ["fly", str(BARE), "-o"]])
 def test_a_folder_that_takes_no_files_is_told_before_the_work(arguments: list[str], capsys: Capsys) -> None:
-    told = said([*arguments, "/proc/x"], capsys)
-    assert told == "rov-fmu: /proc/x: cannot be written: the folder /proc takes no new files"
+    line = refusal([*arguments, "/proc/x"], capsys)
+    assert line == "rov-fmu: /proc/x: cannot be written: the folder /proc takes no new files"
 
 
 def test_without_a_browser_the_page_is_told_and_what_to_do(monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
@@ -264,15 +264,15 @@ KEYS: dict[str, tuple[str, str, str]] = {
 
 @pytest.mark.parametrize("case", KEYS)
 def test_keys_of_a_vehicle_file_are_guessed(case: str, here: Path, capsys: Capsys) -> None:
-    old, new, told = KEYS[case]
+    old, new, expected = KEYS[case]
     text = ALONE.replace(old, new, 1)
     assert text != ALONE
     (here / "mine.toml").write_text(text, encoding="utf-8")
-    assert told in said(["build", "mine.toml", "-o", "new.fmu"], capsys)
+    assert expected in refusal(["build", "mine.toml", "-o", "new.fmu"], capsys)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "expected"),
     [
         ('against = "videoray"', 'against = "VideoRay"', "against = 'VideoRay': must be a vehicle file in this "),
         ('against = "videoray"', 'against = "videorey"', "; did you mean videoray?"),
@@ -289,14 +289,14 @@ def test_keys_of_a_vehicle_file_are_guessed(case: str, here: Path, capsys: Capsy
         ),
     ],
 )
-def test_keys_of_rov_toml_are_guessed(old: str, new: str, told: str, tmp_path: Path, capsys: Capsys) -> None:
+def test_keys_of_rov_toml_are_guessed(old: str, new: str, expected: str, tmp_path: Path, capsys: Capsys) -> None:
     line = _identified(tmp_path, {"rov.toml": FILES["rov.toml"].replace(old, new, 1)}, capsys)
-    assert told in line
+    assert expected in line
     assert "did you mean" in line
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "expected"),
     [
         ('"videoray"', '"BlueROV2"', "vehicle = 'BlueROV2': there is no such file beside the plan, "),
         ("runs = 2", 'runs = 2\nsampler = "Sobol"', "sampler = 'Sobol': must be 'grid', 'sobol', "),
@@ -307,11 +307,11 @@ def test_keys_of_rov_toml_are_guessed(old: str, new: str, told: str, tmp_path: P
         ),
     ],
 )
-def test_keys_and_words_of_a_plan_are_guessed(old: str, new: str, told: str, here: Path, capsys: Capsys) -> None:
+def test_keys_and_words_of_a_plan_are_guessed(old: str, new: str, expected: str, here: Path, capsys: Capsys) -> None:
     pytest.importorskip("dask")
     (here / "plan.toml").write_text(FILES["plan.toml"].replace(old, new, 1), encoding="utf-8")
-    line = said(["study", "plan.toml", "-o", "r"], capsys)
-    assert told in line
+    line = refusal(["study", "plan.toml", "-o", "r"], capsys)
+    assert expected in line
     assert re.search(r"; did you mean (bluerov2|sobol|uniform)\?$", line)
 
 
@@ -388,39 +388,41 @@ TABLES: dict[str, tuple[str, str, str]] = {
 
 
 def _identified(folder: Path, files: Mapping[str, str], capsys: Capsys) -> str:
-    """What identification says of the VideoRay's tank tests with other files among them."""
+    """Return the line about the VideoRay's tank tests when other files are among them."""
     tests = Path(shutil.copytree(TESTS, folder / "tests"))
     for name, text in files.items():
         (tests / name).write_text(text, encoding="utf-8")
-    return said(["identify", str(tests)], capsys)
+    return refusal(["identify", str(tests)], capsys)
 
 
 @pytest.mark.parametrize("case", TABLES)
 def test_a_wrong_table_is_told_in_a_line(case: str, tmp_path: Path, capsys: Capsys) -> None:
-    name, text, told = TABLES[case]
-    assert told in _identified(tmp_path, {name: text}, capsys)
+    name, text, expected = TABLES[case]
+    assert expected in _identified(tmp_path, {name: text}, capsys)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected"),
     [
         ("", "is empty"),
         ("0,1\n1,2\n", "the first line must be a header that names the columns: the time, and then var"),
     ],
 )
-def test_wrong_inputs_of_a_plan_are_told_in_a_line(text: str, told: str, here: Path, capsys: Capsys) -> None:
+def test_wrong_inputs_of_a_plan_are_told_in_a_line(text: str, expected: str, here: Path, capsys: Capsys) -> None:
     pytest.importorskip("dask")
-    plan = FILES["plan.toml"].replace("runs = 2", 'sampler = "grid"\ninput_file = { path = "in.csv" }')
+    plan = _PLAN.format("bare.toml").replace("max(u)", "max(w)")
+    plan = plan.replace("runs = 2", 'sampler = "grid"\ninput_file = { path = "in.csv" }')
     (here / "plan.toml").write_text(plan, encoding="utf-8")
+    shutil.copy(BARE, here / "bare.toml")
     (here / "in.csv").write_text(text, encoding="utf-8")
-    assert f"in.csv: {told}" in said(["study", "plan.toml", "-o", "r"], capsys)
+    assert f"in.csv: {expected}" in refusal(["study", "plan.toml", "-o", "r"], capsys)
 
 
 # ---- Tuning ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "expected"),
     [
         (
             ["bluerov2", "--axis", "sway", "--command", "0.15", "--v-ss", "5"],
@@ -436,10 +438,10 @@ def test_wrong_inputs_of_a_plan_are_told_in_a_line(text: str, told: str, here: P
         (["videoray", "--axis", "yaw", "--command", "0.3", "--v-ss", "1.5", "--tau", "2"], []),
     ],
 )
-def test_an_implausible_tuning_is_told_and_why(arguments: list[str], told: list[str], capsys: Capsys) -> None:
+def test_an_implausible_tuning_is_told_and_why(arguments: list[str], expected: list[str], capsys: Capsys) -> None:
     assert main(["tune", *arguments]) == 0
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == len(told)
-    for line, words in zip(lines, told, strict=True):
+    assert len(lines) == len(expected)
+    for line, words in zip(lines, expected, strict=True):
         assert line.startswith(f"rov-fmu: warning: {words}")
         assert "Check the wanted" in line

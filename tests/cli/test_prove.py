@@ -1,4 +1,4 @@
-"""rov-fmu prove: an FMU comes to the results that it carries, or not; ours, and any other."""
+"""`rov-fmu prove`: whether an FMU, ours or any other, gives the results that it carries."""
 
 import re
 import shutil
@@ -28,11 +28,11 @@ from tests.conftest import unzipped
 
 Capsys = pytest.CaptureFixture[str]
 Files = Mapping[str, str | None]
-"""By their name in the FMU, or beside the manifest; None where one is to be left out."""
+"""Texts of files by their name in the FMU, or beside the manifest; None leaves a file out."""
 
 
 def _with(fmu: Path, files: Files, path: Path) -> Path:
-    """Another FMU with these files."""
+    """Write a copy of an FMU with these files, and return its path."""
     changed = {name if "/" in name else f"{FOLDER}/{name}": text for name, text in files.items()}
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
         for member in set(old.namelist()) - changed.keys():
@@ -164,13 +164,13 @@ def test_what_deviates_or_fails_is_told(
     fmu = _with(foreign, {f"{FOLDER}/{name}": text}, tmp_path / "other.fmu")
     assert main(["prove", str(fmu)]) == 1
     out, err = capsys.readouterr()
-    assert line in [" ".join(told.split())[: len(line)] for told in out.splitlines()]
+    assert line in [" ".join(row.split())[: len(line)] for row in out.splitlines()]
     assert err.startswith(f"rov-fmu: {fmu}: ")
     assert err.endswith(" results are not as expected\n")
 
 
 def _changed(fmu: Path, begin: str, change: Callable[[bytes], bytes], path: Path) -> Path:
-    """Another FMU, with other bytes where a member's name begins so."""
+    """Write a copy of an FMU in which the members whose name begins with `begin` are changed; return its path."""
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(path, "w") as new:
         for member in old.namelist():
             content = old.read(member)
@@ -234,7 +234,7 @@ static void hang(void)
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals are POSIX, and the binary is of linux64")
 def test_an_fmu_that_hangs_is_ended_by_an_interrupt(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
-    """In compiled code, which Python does not get out of."""
+    """It hangs in compiled code, which Python cannot interrupt."""
     content = native_content(vehicle)
     name = "fmi2_co_simulation.c"
     step = content.sources[name].replace("    OPEN(fmi2DoStep,", "    hang();\n    OPEN(fmi2DoStep,")
@@ -258,10 +258,10 @@ def test_an_fmu_that_hangs_is_ended_by_an_interrupt(videoray_fmu: Path, vehicle:
             assert process.poll() is None
             time.sleep(0.02)
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=300)
+        _, err = process.communicate(timeout=300)
     finally:
         process.kill()
-    assert (process.returncode, said) == (130, "rov-fmu: interrupted, no file is half-written\n")
+    assert (process.returncode, err) == (130, "rov-fmu: interrupted, no file is half-written\n")
     assert list(folder.iterdir()) == []
 
 
@@ -344,14 +344,14 @@ def test_bad_input_is_one_line_that_names_the_file(case: str, foreign: Path, tmp
 
 
 @pytest.mark.parametrize(
-    ("step", "told"),
+    ("step", "expected"),
     {
         "1e-9": f"{_EXP}: experiment 'a': stepSize = 1e-09 s takes 1e+10 steps from 0 to 10 s; at most 1000000 are run",
         "soon": "modelDescription.xml: DefaultExperiment: stepSize = 'soon': must be a number",
     }.items(),
 )
 def test_a_default_experiment_is_checked_as_the_others(
-    step: str, told: str, foreign: Path, tmp_path: Path, capsys: Capsys
+    step: str, expected: str, foreign: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
     experiment = '<Experiments name="x"><Experiment name="a"/></Experiments>'
     fmu = _with(foreign, {_EXP: experiment}, tmp_path / "experiment.fmu")
@@ -360,7 +360,7 @@ def test_a_default_experiment_is_checked_as_the_others(
         fmu, "modelDescription.xml", lambda old: old.replace(b"<ModelVariables>", default), tmp_path / "other.fmu"
     )
     assert main(["prove", str(other)]) == 2
-    assert capsys.readouterr().err == f"rov-fmu: {other}: {told}\n"
+    assert capsys.readouterr().err == f"rov-fmu: {other}: {expected}\n"
 
 
 def _cut(fmu: Path, path: Path) -> None:
@@ -368,7 +368,7 @@ def _cut(fmu: Path, path: Path) -> None:
 
 
 def _flipped(fmu: Path, path: Path) -> None:
-    """Damage in the manifest's bytes, which its checksum tells."""
+    """Damage the bytes of the manifest, so that its checksum is wrong."""
     content = fmu.read_bytes()
     path.write_bytes(content.replace(b"my%20tests", b"mx%20tests"))
 

@@ -1,4 +1,4 @@
-"""Files that `identify` replaces: those that it wrote itself and nobody changed, and all others only with --force."""
+"""Files that `identify` replaces: unchanged files that it wrote itself, and all others only with --force."""
 
 import shutil
 from collections.abc import Sequence
@@ -12,34 +12,49 @@ from rov_fmu.io.output import WriteError
 from rov_fmu.io.seal import check_replaced, sealed
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import REFIT, TESTS
+from tests.folders import DOWN, SPEED, folder_of, pulled
 
 Capsys = pytest.CaptureFixture[str]
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what the command writes."""
+def tank_tests(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small folder of tank tests."""
+    tables = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
+    return folder_of(tmp_path_factory.mktemp("tests"), DOWN, tables)
+
+
+@pytest.fixture(scope="module")
+def made(tank_tests: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that the command writes."""
     folder = tmp_path_factory.mktemp("made")
-    assert _identify(folder) == 0
+    assert _identify(tank_tests, folder) == 0
     return folder
 
 
-def _identify(folder: Path, *options: str) -> int:
-    return main(["identify", str(TESTS), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html"), *options])
+@pytest.fixture
+def folder(made: Path, tmp_path: Path) -> Path:
+    """A copy of the folder that a test may change."""
+    return Path(shutil.copytree(made, tmp_path / "copy"))
+
+
+def _identify(tank_tests: Path, folder: Path, *options: str) -> int:
+    return main(
+        ["identify", str(tank_tests), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html"), *options]
+    )
 
 
 def _edited(path: Path) -> bytes:
-    """As somebody leaves a file who changes it by hand."""
-    changed = path.read_bytes().replace(b"VideoRay", b"My own VideoRay", 1)
+    """Change a file as somebody would by hand, and return its new content."""
+    changed = path.read_bytes().replace(b"Mine", b"My own", 1)
     path.write_bytes(changed)
     return changed
 
 
-def test_what_nobody_changed_is_replaced_and_told(made: Path, tmp_path: Path, capsys: Capsys) -> None:
-    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+def test_unchanged_files_are_replaced_and_reported(tank_tests: Path, folder: Path, capsys: Capsys) -> None:
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     capsys.readouterr()
-    assert _identify(folder) == 0
+    assert _identify(tank_tests, folder) == 0
     out, err = capsys.readouterr()
     assert err == ""
     assert out.splitlines()[:2] == [
@@ -49,34 +64,34 @@ def test_what_nobody_changed_is_replaced_and_told(made: Path, tmp_path: Path, ca
     assert load_vehicle(folder / "rov.toml").provenance
 
 
+@pytest.mark.parametrize("name", ["rov.toml", "r.html"])
 @pytest.mark.parametrize(
-    ("name", "made_by_hand", "reason"),
+    ("made_by_hand", "reason"),
     [
-        ("rov.toml", False, "has changed since identify wrote it"),
-        ("r.html", False, "has changed since identify wrote it"),
-        ("rov.toml", True, "does not begin with a digest by identify, so it may be made by hand"),
-        ("r.html", True, "does not begin with a digest by identify, so it may be made by hand"),
+        (False, "has changed since identify wrote it"),
+        (True, "does not begin with a digest by identify, so it may be made by hand"),
     ],
 )
 def test_the_work_of_others_is_refused_before_anything_is_computed(
     name: str,
     made_by_hand: bool,
     reason: str,
-    made: Path,
-    tmp_path: Path,
+    tank_tests: Path,
+    folder: Path,
     capsys: Capsys,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    folder = Path(shutil.copytree(made, tmp_path / "copy"))
     if made_by_hand:
-        (folder / name).write_bytes(b"\xff my notes")
-    own = _edited(folder / name) if not made_by_hand else b"\xff my notes"
+        own = b"\xff my notes"
+        (folder / name).write_bytes(own)
+    else:
+        own = _edited(folder / name)
     monkeypatch.setattr(identification, "identify", lambda *_: pytest.fail("it is computed before it is refused"))
     monkeypatch.setattr(
         "rov_fmu.tank.tank_tests.read_rows", lambda *_: pytest.fail("tests are read before it is refused")
     )
     capsys.readouterr()
-    assert _identify(folder) == 2
+    assert _identify(tank_tests, folder) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert err == f"rov-fmu: {folder / name}: cannot be written: the file there {reason}; --force replaces it\n"
@@ -84,12 +99,13 @@ def test_the_work_of_others_is_refused_before_anything_is_computed(
     assert len([*folder.iterdir()]) == 2
 
 
-def test_force_replaces_the_work_of_others_and_tells(made: Path, tmp_path: Path, capsys: Capsys) -> None:
-    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+def test_force_replaces_the_work_of_others_and_reports_it(
+    tank_tests: Path, made: Path, folder: Path, capsys: Capsys
+) -> None:
     _edited(folder / "rov.toml")
     (folder / "r.html").write_text("my notes", encoding="utf-8")
     capsys.readouterr()
-    assert _identify(folder, "--force") == 0
+    assert _identify(tank_tests, folder, "--force") == 0
     assert capsys.readouterr().out.splitlines()[:2] == [
         f"{folder / 'rov.toml'}: replaced a file that has changed since identify wrote it",
         f"{folder / 'r.html'}: replaced a file that does not begin with a digest by identify, so it may be made "
@@ -106,12 +122,11 @@ def test_force_is_no_leave_to_overwrite_an_input(tmp_path: Path, capsys: Capsys)
     assert (tests / "rov.toml").read_bytes() == before
 
 
-def test_a_vehicle_that_was_tuned_is_not_replaced(made: Path, tmp_path: Path, capsys: Capsys) -> None:
-    folder = Path(shutil.copytree(made, tmp_path / "copy"))
+def test_a_vehicle_that_was_tuned_is_not_replaced(tank_tests: Path, folder: Path, capsys: Capsys) -> None:
     rov = str(folder / "rov.toml")
     assert main(["tune", rov, "--axis", "heave", "--command", "0.3", "--v-ss", "0.2", "-o", rov]) == 0
     capsys.readouterr()
-    assert _identify(folder) == 2
+    assert _identify(tank_tests, folder) == 2
     assert "rov.toml: cannot be written: the file there has changed since identify wrote it" in capsys.readouterr().err
 
 

@@ -108,11 +108,11 @@ def test_a_mistake_is_one_line_and_writes_nothing(case: str, here: Path, capsys:
     (here / "cell.csv").write_text("time,u_l\n0,1\n1,x\n", encoding="utf-8")
     (here / "short.csv").write_text("time,u_l\n0,1\n", encoding="utf-8")
     before = {path.name: path.read_bytes() for path in here.iterdir()}
-    arguments, told = WRONG[case]
+    arguments, expected = WRONG[case]
     assert main(["simulate", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert told in err
+    assert expected in err
     assert err.startswith("rov-fmu: ")
     assert err.count("\n") == 1
     assert {path.name: path.read_bytes() for path in here.iterdir()} == before
@@ -121,6 +121,6 @@ def test_a_mistake_is_one_line_and_writes_nothing(case: str, here: Path, capsys:
 def test_parquet_that_is_not_installed_is_named(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert main(["simulate", str(BARE), "-o", "result.parquet"]) == 2
-    told = "rov-fmu: --output result.parquet: Parquet needs pandas and pyarrow: pip install pandas pyarrow\n"
-    assert capsys.readouterr() == ("", told)
+    expected = "rov-fmu: --output result.parquet: Parquet needs pandas and pyarrow: pip install pandas pyarrow\n"
+    assert capsys.readouterr() == ("", expected)
     assert not (here / "result.parquet").exists()

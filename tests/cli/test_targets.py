@@ -1,4 +1,4 @@
-"""Where a file cannot be written: one clear line, what was there stays, nothing is left behind, all files or none."""
+"""Files that cannot be written: one clear line, old files stay, no drafts remain, and all files are written or none."""
 
 import errno
 import os
@@ -34,7 +34,7 @@ def _file_for_folder(path: Path) -> None:
     path.parent.touch()
 
 
-# What stands at the target before, and what the line must say of it.
+# What is at the target before, and what the line must say about it.
 IMPOSSIBLE: dict[str, tuple[Callable[[Path], object], str]] = {
     "a folder": (lambda path: path.mkdir(), "is a folder"),
     "no folder": (lambda path: path.parent.rmdir(), "there is no folder"),
@@ -44,7 +44,7 @@ IMPOSSIBLE: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
-# The figures, which are drawn before, take a second each.
+# The figures are drawn before the check, which takes a second each time.
 _CASES = [
     pytest.param(command, case, marks=[pytest.mark.long] * (name == "the figures" and case != "a folder"))
     for name, command in COMMANDS.items()
@@ -72,19 +72,19 @@ def test_an_impossible_target_is_refused_before_the_work(
 
 
 def check_refusals(ends: list[tuple[int, str]], reason: str, target: Path, temporary: Path) -> None:
-    """Every command has said one line about its own file, all old files stand alone."""
+    """Check that every command printed one line about its own file, and that only the old files are there."""
     assert len(ends) == len(COMMANDS)
-    for code, said in ends:
-        assert code == (1 if ": cannot compile: " in said else 2)
-        assert said.endswith("\n")
-        assert said[:-1].isprintable()
-        assert reason in said
+    for code, err in ends:
+        assert code == (1 if ": cannot compile: " in err else 2)
+        assert err.endswith("\n")
+        assert err[:-1].isprintable()
+        assert reason in err
     assert {path.name: path.read_bytes() for path in target.iterdir()} == {c.name: OLD for c in COMMANDS.values()}
     assert list(temporary.iterdir()) == []
 
 
 def full_folder(folder: Path) -> tuple[Path, Path]:
-    """A folder with an old file of every command, and one for temporary files."""
+    """Return a folder with an old file of every command, and a folder for temporary files."""
     target, temporary = folder / "target", folder / "temporary"
     temporary.mkdir()
     target.mkdir(exist_ok=True)
@@ -94,7 +94,7 @@ def full_folder(folder: Path) -> tuple[Path, Path]:
 
 
 def bound_by_permissions() -> list[str]:
-    """What to put before a command that permissions shall bind, as they do not the administrator."""
+    """Return the words before a command that make permissions bind it, even if the administrator runs it."""
     if os.geteuid() != 0:
         return []
     if not shutil.which("setpriv"):

@@ -21,7 +21,7 @@ _PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
 
 
 def built(kind: str, folder: Path) -> Path:
-    """The wheel or the sdist of this checkout."""
+    """Build the wheel or the sdist of this checkout, and return its path."""
     subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", folder], check=True, cwd=ROOT)
     (path,) = folder.glob("*.whl" if kind == "wheel" else "*.tar.gz")
     return path
@@ -42,7 +42,7 @@ class Environment:
         return str(self.bin / "python")
 
     def run(self, *command: str | Path, where: Path) -> str:
-        """Run a program of this environment in a folder, where there is no other program; what it prints."""
+        """Run a program of this environment, with no other on the path, in a folder; return what it prints."""
         path = {"PATH": str(self.bin), "PYTHONSAFEPATH": "1"}
         program = [str(self.bin / command[0]), *map(str, command[1:])]
         return subprocess.run(
@@ -51,7 +51,7 @@ class Environment:
 
 
 def environment(folder: Path, *requirements: str | Path, python: str = sys.executable) -> Environment:
-    """A virtual environment of a Python with what is required installed."""
+    """Make a virtual environment of a Python with the requirements installed."""
     subprocess.run([python, "-m", "venv", folder], check=True)
     made = Environment(folder)
     subprocess.run([made.python, *_PIP, "install", *map(str, requirements)], check=True, cwd=folder)
@@ -59,7 +59,7 @@ def environment(folder: Path, *requirements: str | Path, python: str = sys.execu
 
 
 def interpreter(version: str) -> str | None:
-    """An interpreter of a version, if there is one that starts."""
+    """Return an interpreter of a version, if there is one that starts."""
     installed = [str(path) for path in Path.home().glob(f".pyenv/versions/{version}.*/bin/python")]
     for candidate in [shutil.which(f"python{version}"), *installed]:
         if candidate and subprocess.run([candidate, "--version"], capture_output=True, check=False).returncode == 0:
@@ -68,7 +68,7 @@ def interpreter(version: str) -> str | None:
 
 
 def _files(folder: str) -> set[str]:
-    """Of the checkout, but what Python leaves there and what is for readers of the repository."""
+    """Return the files in a folder of the checkout, without caches of Python and without README files."""
     files = (path for path in (ROOT / folder).rglob("*") if path.is_file())
     kept = (path for path in files if path.parent.name != "__pycache__" and path.name != "README.md")
     return {path.relative_to(ROOT).as_posix() for path in kept}
@@ -118,9 +118,9 @@ def test_the_installed_command_does_everything_outside_the_checkout(wheel: Path,
     made = environment(tmp_path / "venv", "-c", CONSTRAINTS, wheel)
     here = tmp_path / "here"
     here.mkdir()
-    told = made.run("rov-fmu", "build", where=here)
-    assert "aarch64-darwin" in told
-    assert "built in" in told
+    printed = made.run("rov-fmu", "build", where=here)
+    assert "aarch64-darwin" in printed
+    assert "built in" in printed
     made.run("fmpy", "simulate", "videoray.fmu", "--start-values", "u_l", "0.3", "u_r", "0.3", where=here)
     made.run("rov-fmu", "build", "videoray_refit", "--platform", "host", where=here)
     made.run("rov-fmu", "build", "--fmi", "3", where=here)

@@ -50,12 +50,12 @@ def test_a_coefficient_that_is_set_by_hand_says_so_everywhere(videoray: VehicleM
     changed = videoray.with_(a_d_u=10, beta_w=np.float64(0.5))
     assert (changed.rov["a_d_u"], changed.rov["beta_w"]) == (10.0, 0.5)
     assert {name for name, source in changed.sources.items() if source == BY_HAND} == {"a_d_u", "beta_w"}
-    told = "set by hand: a_d_u = 10 N.s2/m2, beta_w = 0.5"
-    assert repr(changed).endswith(f"; {told}>")
+    expected = "set by hand: a_d_u = 10 N.s2/m2, beta_w = 0.5"
+    assert repr(changed).endswith(f"; {expected}>")
     described = native_content(changed).files["modelDescription.xml"].decode()
-    assert f'description="{videoray.description} ({told})"' in described
+    assert f'description="{videoray.description} ({expected})"' in described
     page = documentation_page(changed)
-    assert page.count(told) == 2
+    assert page.count(expected) == 2
     assert page.count("<td>set by hand</td>") == 2
     assert videoray.rov["a_d_u"] != 10.0
     assert "set by hand" not in videoray.summary
@@ -254,8 +254,8 @@ WRONG: dict[str, tuple[Call, str]] = {
 
 @pytest.mark.parametrize("case", WRONG)
 def test_a_mistake_is_one_line(case: str, videoray: VehicleModel) -> None:
-    call, told = WRONG[case]
-    with pytest.raises((InputError, FileError), match=f"^{told}") as error:
+    call, expected = WRONG[case]
+    with pytest.raises((InputError, FileError), match=f"^{expected}") as error:
         call(videoray)
     assert isinstance(error.value, ValueError)
     assert "\n" not in str(error.value)

@@ -1,4 +1,4 @@
-"""Pages in headless browsers."""
+"""Fixtures that open pages in headless browsers."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ _FLAGS = (
     "--disable-sync",
 )
 _LONG = 120_000.0
-"""Milliseconds that a browser on a busy machine may take for anything."""
+"""The milliseconds that a browser on a busy machine may take for any action."""
 
 
 @pytest.fixture(scope="module")
@@ -40,26 +40,26 @@ def browser(engine: "Playwright") -> "Iterator[Browser]":
 @pytest.fixture(scope="module")
 def firefox(engine: "Playwright") -> "Iterator[Browser]":
     firefox = shutil.which("firefox") or shutil.which("firefox-esr") or pytest.skip("there is no firefox")
-    # By this channel Playwright speaks WebDriver BiDi, so that it drives a Firefox that is not of its own build.
+    # With this channel Playwright uses WebDriver BiDi, which also drives a Firefox that is not Playwright's build.
     browser = engine.firefox.launch(channel="moz-firefox", executable_path=firefox, headless=True, timeout=_LONG)
     yield browser
     browser.close()
 
 
 class Visit:
-    """A page with what it said and what it asked for."""
+    """A page in a browser, with its console messages and the addresses that it requested."""
 
     def __init__(self, browser: "Browser", *, width: int = 1280, height: int = 900, scheme: Any = "light") -> None:
         self.page: Page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
         self.page.set_default_timeout(_LONG)
-        self.said: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda message: self.said.append(f"{message.type}: {message.text}"))
-        self.page.on("pageerror", lambda error: self.said.append(f"exception: {error}"))
-        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.messages: list[str] = []
+        self.requests: list[str] = []
+        self.page.on("console", lambda message: self.messages.append(f"{message.type}: {message.text}"))
+        self.page.on("pageerror", lambda error: self.messages.append(f"exception: {error}"))
+        self.page.on("request", lambda request: self.requests.append(request.url))
 
     def problems(self) -> list[str]:
-        return [text for text in self.said if text.startswith(("error", "warning", "exception", "assert"))]
+        return [text for text in self.messages if text.startswith(("error", "warning", "exception", "assert"))]
 
 
 @pytest.fixture

@@ -45,8 +45,8 @@ def test_the_documentation_asks_for_nothing_and_fits(
     url = (videoray_dir / "documentation" / "index.html").as_uri()
     seen.page.goto(url)
     seen.page.screenshot(path=tmp_path / f"documentation-{width}-{scheme}.png", full_page=True)
-    assert seen.said == []
-    assert seen.asked == [url]
+    assert seen.messages == []
+    assert seen.requests == [url]
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width  # nothing to scroll sideways for
     plots = seen.page.locator("svg:not(.live svg), img")
     assert plots.count() == 12
@@ -98,8 +98,8 @@ def test_the_report_asks_for_nothing_and_fits(
     seen = visit(width=width)
     seen.page.goto(report.as_uri())
     seen.page.screenshot(path=tmp_path / f"report-{width}.png", full_page=True)
-    assert seen.said == []
-    assert seen.asked == [report.as_uri()]
+    assert seen.messages == []
+    assert seen.requests == [report.as_uri()]
     assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
     tables = seen.page.evaluate("Array.from(document.querySelectorAll('#predicts ~ .wide'), t => t.scrollWidth)")
     assert tables[0] <= width, "the first answer is not cut off"
@@ -216,4 +216,4 @@ def test_the_web_app_offers_the_declared_values_simulates_and_tells_what_the_mod
     page.locator("#documentation-container").wait_for(state="visible")
     assert vehicle.name in page.frame_locator("#documentation-container iframe").locator("h1").inner_text()
     assert seen.problems() == []
-    assert [url for url in seen.asked if not url.startswith((webapp, BOOTSTRAP))] == []
+    assert [url for url in seen.requests if not url.startswith((webapp, BOOTSTRAP))] == []

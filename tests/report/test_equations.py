@@ -49,9 +49,9 @@ def of_factor(factor: Factor, at: Values) -> float:
         case Choice():
             return at[factor.reverse if at[factor.subject] < 0.0 else factor.forward]
         case Group():
-            return of_sum(factor.of, at)
+            return of_sum(factor.inner, at)
         case Call():
-            return FUNCTIONS[factor.function](of_sum(factor.of, at))
+            return FUNCTIONS[factor.function](of_sum(factor.inner, at))
         case Cases():
             return of_sum(factor.at_most_zero if at[factor.name] <= 0.0 else factor.otherwise, at)
 

@@ -1,4 +1,4 @@
-"""The page that flies its model, in headless Chromium: what it computes, says, asks for, and does with files."""
+"""The page that flies its model, in headless Chromium: its results, its messages, its requests, and its files."""
 
 import random
 import re
@@ -30,7 +30,7 @@ FILES = {"videoray": SHIPPED["videoray"], "heavy": SHIPPED["bluerov2_heavy"], "e
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
-    """The address of the page of a vehicle."""
+    """A function that returns the address of the page of a vehicle."""
     folder = tmp_path_factory.mktemp("pages")
 
     def page(kind: str) -> str:
@@ -51,7 +51,7 @@ def flying(visit: Visitor, address: str, **options: Any) -> Visit:
 
 
 def until(page: Any, condition: str) -> None:
-    """Playwright's own waiting evaluates strings in the page, which the page forbids."""
+    """Wait for a condition. Playwright's own waiting evaluates strings in the page, which the page forbids."""
     for _ in range(2400):
         if page.evaluate(condition):
             return
@@ -61,7 +61,7 @@ def until(page: Any, condition: str) -> None:
 
 @pytest.fixture
 def quiet(visit: Visitor) -> Iterator[Visitor]:
-    """Pages that in the end have said nothing and asked for nothing but themselves."""
+    """Pages that must print nothing to the console and request nothing but themselves."""
     seen: list[Visit] = []
 
     def new(**options: Any) -> Visit:
@@ -70,14 +70,14 @@ def quiet(visit: Visitor) -> Iterator[Visitor]:
 
     yield new
     for one in seen:
-        assert one.said == []
-        assert len(one.asked) == 1
+        assert one.messages == []
+        assert len(one.requests) == 1
 
 
 # ---- What it computes ------------------------------------------------------------------------------------------------
 
 Leg = dict[str, Any]
-"""Its length in s, inputs, and α and β that change before it."""
+"""A part of a manoeuvre: its length (s), its inputs, and the α and β that change before it."""
 
 _FLY = """legs => {
     live.pause(true);
@@ -92,7 +92,7 @@ _FLY = """legs => {
 
 
 def a_manoeuvre(vehicle: Vehicle) -> list[Leg]:
-    """Commands beyond what saturates, loads, current and tuning at random, for 5 ms to 5 s each."""
+    """Return random commands (some of which saturate), loads, currents and tunings, for 5 ms to 5 s each."""
     rng, layout = random.Random(vehicle.identifier), vehicle.layout
     tunable = [name for name, meta in layout.coefficients.items() if meta.tunable]
     return [
@@ -106,7 +106,7 @@ def a_manoeuvre(vehicle: Vehicle) -> list[Leg]:
 
 
 def natively(folder: Path, vehicle: Vehicle, legs: list[Leg]) -> Iterator[list[float]]:
-    """All variables after each leg, by the FMU's binary."""
+    """Yield all variables after each leg, computed by the FMU's binary."""
     declared = variables(vehicle.rov)
     reference = {v.name: v.value_reference for v in declared}
     slave = fmpy_slave(folder)
@@ -141,12 +141,12 @@ def test_a_manoeuvre_is_that_of_the_native_fmu_in_firefox(
     seen.page.goto(address)
     seen.page.wait_for_selector("#live-section:not([hidden])")
     check_manoeuvre(seen.page, heavy, heavy_dir)
-    assert seen.said == []
-    assert set(seen.asked) <= {address}  # Firefox need not tell of the page itself, which is a file
+    assert seen.messages == []
+    assert set(seen.requests) <= {address}  # Firefox need not tell of the page itself, which is a file
 
 
 def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path) -> None:
-    """All variables are those of the FMU in this folder after each leg."""
+    """Check that all variables equal those of the FMU in this folder after each leg."""
     legs = a_manoeuvre(vehicle)
     flown = page.evaluate(_FLY, legs)
     names = [v.name for v in variables(vehicle.rov)]
@@ -258,8 +258,8 @@ def test_a_step_test_stands_beside_what_was_measured(
         until(page, "live.flight.time > 0.1")
         title = page.text_content("#live-chart-heave .title") or ""
         assert title.endswith(f"V_ss {V:.3f} · Tau {Tau:.2f} s")
-        said = page.inner_text("#live-said")
-        assert f"measured: V_ss {row.scaled.V_ss.measured} m/s, Tau {row.scaled.Tau.measured} s" in said
+        line = page.inner_text("#live-said")
+        assert f"measured: V_ss {row.scaled.V_ss.measured} m/s, Tau {row.scaled.Tau.measured} s" in line
         assert page.get_attribute("#live-chart-heave .point", "visibility") == "visible"
     page.locator("input[name=u_l]").fill("0.25")
     until(page, "document.querySelector('#live-chart-heave .point').getAttribute('visibility') === 'hidden'")
@@ -392,10 +392,10 @@ def test_a_recording_flies_again_beside_its_prediction(
     until(page, "live.flight.playback !== null")
     page.evaluate("live.speed = 20")
     until(page, "live.paused")
-    said = page.inner_text("#live-said")
-    deviations = [float(number) for number in re.findall(r"(?:surge|heave|yaw) (\S+) ", said)]
+    line = page.inner_text("#live-said")
+    deviations = [float(number) for number in re.findall(r"(?:surge|heave|yaw) (\S+) ", line)]
     assert len(deviations) == 3
-    assert max(deviations) < 1e-8, said  # the recording is that of the model
+    assert max(deviations) < 1e-8, line  # the recording is that of the model
     assert page.is_checked("#live-ghost")
     page.click("#live-reset")
     assert not page.is_checked("#live-ghost"), "what was measured is gone"
@@ -467,13 +467,13 @@ def test_a_file_that_is_no_recording_is_told_and_the_model_flies_on(
 ) -> None:
     page = flying(quiet, pages("videoray")).page
     page.locator("input[name=u_l]").fill("0.5")
-    for name, (content, told) in BAD.items():
+    for name, (content, expected) in BAD.items():
         page.evaluate("live.say('')")
         drop(page, f"{name}.csv", content)
         until(page, "document.getElementById('live-said').textContent !== ''")
-        said = page.inner_text("#live-said")
-        assert said.startswith(f"{name}.csv cannot be flown: "), said
-        assert told in said, said
+        line = page.inner_text("#live-said")
+        assert line.startswith(f"{name}.csv cannot be flown: "), line
+        assert expected in line, line
         time = page.evaluate("live.flight.time")
         until(page, f"live.flight.time > {time}")
         assert page.evaluate("live.flight.pilot.model.get('u_l')") == 0.5

@@ -1,4 +1,4 @@
-"""A vehicle's own pictures may come from a stranger: they are images of the page, where nothing in them runs."""
+"""A vehicle's own pictures may come from a stranger: the page shows them as images, in which nothing runs."""
 
 import base64
 import re
@@ -13,6 +13,7 @@ from lxml import html
 from PIL import Image
 
 from rov_fmu.cli import main
+from rov_fmu.fmu.archive import native_content
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import VIDEORAY
@@ -45,7 +46,7 @@ HOSTILE = {
 
 
 def _page(folder: Path, picture: str) -> Path:
-    """The page of the VideoRay with a picture of its own."""
+    """Write the page of the VideoRay with this picture of it, and return its path."""
     vehicle = folder / "videoray.toml"
     (folder / "pictures").mkdir()
     (folder / "pictures" / "from_above.svg").write_text(picture, encoding="utf-8")
@@ -69,7 +70,7 @@ def test_nothing_in_a_picture_runs_or_navigates(case: str, visit: Callable[..., 
     seen.page.wait_for_timeout(300)
     assert seen.page.title() == title != "owned"
     assert seen.page.url == path.as_uri()
-    assert [url for url in seen.asked if not url.startswith("data:image/svg+xml;base64,")] == [path.as_uri()]
+    assert [url for url in seen.requests if not url.startswith("data:image/svg+xml;base64,")] == [path.as_uri()]
     assert len(seen.page.context.pages) == 1
     assert seen.problems() == []
 
@@ -115,7 +116,7 @@ def test_the_shipped_pictures_are_seen_on_light_ground(
 
 
 def _picture(name: str, folder: Path, content: bytes) -> Path:
-    """A vehicle with its pictures, one of which is another."""
+    """Write a vehicle with its pictures, one of which is replaced; return the path of its file."""
     shutil.copytree(VIDEORAY.parent, folder, dirs_exist_ok=True)
     (folder / "pictures" / name).write_bytes(content)
     return folder / "videoray.toml"
@@ -136,8 +137,17 @@ NO_PNG = {
 
 
 @pytest.mark.parametrize("case", NO_PNG)
-def test_a_model_png_that_is_none_is_refused(case: str, tmp_path: Path, capsys: Capsys) -> None:
-    vehicle = _picture("model.png", tmp_path / "own", NO_PNG[case])
+def test_a_model_png_that_is_none_is_refused(case: str, tmp_path: Path) -> None:
+    vehicle = load_vehicle(_picture("model.png", tmp_path, NO_PNG[case]))
+    with pytest.raises(FileError, match=r"model\.png: not a PNG picture"):
+        native_content(vehicle)
+
+
+def test_a_build_with_a_wrong_picture_ends_with_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
+) -> None:
+    monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
+    vehicle = _picture("model.png", tmp_path / "own", NO_PNG["text"])
     assert main(["build", str(vehicle), "--platform", "host", "-o", str(tmp_path / "out.fmu")]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"rov-fmu: {vehicle.parent / 'pictures' / 'model.png'}: not a PNG picture")

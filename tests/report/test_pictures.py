@@ -21,24 +21,24 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import VEHICLES, VIDEORAY
 
 Pictures = Mapping[str, bytes]
-"""By their path in the FMU."""
+"""The pictures of a vehicle by their path in the FMU."""
 SIZES = {"diagram": 8_500, "icon": 3_000, "signal": 500}
 
 
 @pytest.fixture(scope="module")
 def shipped() -> dict[str, Pictures]:
-    """Of every vehicle that ships."""
+    """The pictures of every vehicle that ships."""
     return {name: pictures(load_vehicle(path).rov) for name, path in SHIPPED.items()}
 
 
 @pytest.fixture(params=SHIPPED)
 def files(request: pytest.FixtureRequest, shipped: dict[str, Pictures]) -> Pictures:
-    """Of one of them."""
+    """The pictures of one of these vehicles."""
     return shipped[request.param]
 
 
 def decoded(png: bytes) -> Any:
-    """Red, green, blue, alpha from 0 to 1, by row and column."""
+    """Return red, green, blue and alpha, from 0 to 1, by row and column."""
     return imread(BytesIO(png), format="png")
 
 
@@ -97,7 +97,7 @@ def test_every_thruster_is_within_the_icon(kind: str) -> None:
 
 
 def test_vehicles_have_pictures_of_their_own(shipped: dict[str, Pictures]) -> None:
-    """And the refit of the VideoRay, which has the same thrusters, the same."""
+    """The refit of the VideoRay has the same thrusters, so its pictures are the same."""
     assert shipped["videoray"] == shipped["videoray_refit"]
     names = ("videoray", "bluerov2", "bluerov2_heavy")
     for path in ("terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg", "documentation/diagram.png"):

@@ -27,23 +27,25 @@ from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT, TESTS
-from tests.folders import DOWN, SPEED, pulled, read
+from tests.folders import DOWN, SPEED, folder_of, pulled, read
 from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
 from tests.recordings import PLANS, clean, write_log
 from tests.report.test_fmu_page import check_refers_to_itself_alone
 
 PAGES = ["of_tables", "of_recordings"]
+ONE_AXIS = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
+"""The tank tests of a vehicle with one axis."""
 
 
 @pytest.fixture(scope="module")
 def of_tables() -> Identification:
-    """The VideoRay's tests, as they ship."""
+    """The results of the VideoRay's tank tests that ship."""
     return identify(load_tank_tests(TESTS))
 
 
 @pytest.fixture(scope="module")
 def of_recordings(tmp_path_factory: pytest.TempPathFactory) -> Identification:
-    """Thrust tests, and a recording of each axis."""
+    """The results of thrust tests and a recording of each axis."""
     folder, random = tmp_path_factory.mktemp("logs"), np.random.default_rng(1)
     write_rov(folder, thrust_rear=(0.0, 0.7))
     k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
@@ -256,8 +258,7 @@ def test_long_tables_are_folded_without_a_script(of_recordings: Identification) 
 
 @pytest.mark.usefixtures("without_plots")
 def test_the_report_of_another_vehicle_speaks_of_it_alone(tmp_path: Path) -> None:
-    tables = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
-    results = identify(read(tmp_path / "mine", DOWN, tables))
+    results = identify(read(tmp_path / "mine", DOWN, ONE_AXIS))
     page = report_page(results)
     assert sections(page)[-3:] == ["thrust", "heave", "inputs"]
     assert not re.search(r"videoray|rear|top thruster|surge|yaw", text_of(page), re.IGNORECASE)
@@ -353,17 +354,18 @@ def test_a_place_that_cannot_be_is_named(
 
 @pytest.fixture(scope="module")
 def with_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a vehicle file that names its report, in another folder."""
+    """A folder with a vehicle file that names its report, which is in a folder of its own."""
     folder = tmp_path_factory.mktemp("identified")
     (folder / "pages").mkdir()
     options = ["-o", str(folder / "vehicle.toml"), "--report", str(folder / "pages" / "report.html")]
-    assert main(["identify", str(TESTS), *options]) == 0
+    tests = folder_of(tmp_path_factory.mktemp("tests"), DOWN, ONE_AXIS)
+    assert main(["identify", str(tests), *options]) == 0
     return folder
 
 
 @pytest.fixture
 def identified(with_report: Path, tmp_path: Path) -> Path:
-    """A copy of it."""
+    """The vehicle file in a copy of that folder."""
     shutil.copytree(with_report, tmp_path, dirs_exist_ok=True)
     return tmp_path / "vehicle.toml"
 

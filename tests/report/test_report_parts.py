@@ -21,9 +21,9 @@ from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-LATE = 0.4  # s, between commands and motion
+DELAY_TIME = 0.4  # s, between commands and motion
 LOAD = Effect("load", "heave", "N", 0.0, (-0.1, 0.1), kept=False)
-DELAY = Effect("delay", "heave", "s", LATE, (0.39, 0.41), kept=True)
+DELAY = Effect("delay", "heave", "s", DELAY_TIME, (0.39, 0.41), kept=True)
 OF_FILE = Effect("delay", "b.csv", "s", 0.1, None, kept=True)
 
 
@@ -33,15 +33,15 @@ def k() -> Rov:
 
 
 def recorded(
-    file: str, changes: dict[float, float], *, late: float = 0.0, by_thrusters: bool = False, white: float = 1.0
+    file: str, changes: dict[float, float], *, delay: float = 0.0, by_thrusters: bool = False, white: float = 1.0
 ) -> Simulation:
     """20 s of depth at 20 Hz: the command at each change, and a velocity that follows with 1 s, half of it."""
     time = np.arange(400) / 20.0
     command, velocity = np.zeros(400), np.zeros(400)
     for at, value in changes.items():
         command[time >= at - 1e-9] = value
-        after = time >= at + late
-        velocity[after] += (0.5 * value - velocity[after]) * (1.0 - np.exp(-(time[after] - at - late)))
+        after = time >= at + delay
+        velocity[after] += (0.5 * value - velocity[after]) * (1.0 - np.exp(-(time[after] - at - delay)))
     depth = np.cumsum(velocity) / 20.0
     of_axis, of_thrusters = (None, {"t": command}) if by_thrusters else (command, {})
     recording = Recording(file, HEAVE, "depth", time, of_axis, depth, of_thrusters)
@@ -115,7 +115,7 @@ def test_a_recording_that_only_begins_with_a_command_has_no_step(k: Rov) -> None
 
 
 def test_the_delay_is_marked_and_seen(k: Rov) -> None:
-    result = result_of(k, recorded("b.csv", {4.0: 0.7}, late=LATE), acts=(LOAD, DELAY))
+    result = result_of(k, recorded("b.csv", {4.0: 0.7}, delay=DELAY_TIME), acts=(LOAD, DELAY))
     assert result.recordings
     step = clearest_step(result.recordings)
     assert step
@@ -124,14 +124,14 @@ def test_the_delay_is_marked_and_seen(k: Rov) -> None:
     (ax,) = figure.axes
     (span,) = ax.patches
     box = span.get_path().get_extents(span.get_patch_transform())
-    assert (box.x0, box.x1) == pytest.approx((0.0, LATE))
+    assert (box.x0, box.x1) == pytest.approx((0.0, DELAY_TIME))
     low, high = ax.get_xlim()
     assert low == -1.0
-    assert high == pytest.approx(max(3.0 * step.Tau, 1.0) + LATE)
+    assert high == pytest.approx(max(3.0 * step.Tau, 1.0) + DELAY_TIME)
     (model,) = [line for line in ax.lines if line.get_label() == "model"]
     time, v = (np.asarray(data) for data in model.get_data())
-    assert np.interp(LATE - 0.25, time, v) < 0.02, "it rests until the delay is over"
-    assert np.interp(LATE + 0.6, time, v) > 0.1
+    assert np.interp(DELAY_TIME - 0.25, time, v) < 0.02, "it rests until the delay is over"
+    assert np.interp(DELAY_TIME + 0.6, time, v) > 0.1
 
 
 def test_the_model_is_drawn_as_the_sensor_would_tell_it(k: Rov) -> None:
@@ -157,8 +157,8 @@ def test_effects_kept_come_first_and_the_others_are_left_at_nothing(k: Rov) -> N
 def test_the_delay_of_a_recording_is_that_of_the_axis_and_its_own(k: Rov) -> None:
     result = result_of(k, acts=(DELAY, OF_FILE, LOAD))
     assert result.recordings
-    assert result.recordings.delay_of("a.csv") == LATE
-    assert result.recordings.delay_of("b.csv") == pytest.approx(LATE + 0.1)
+    assert result.recordings.delay_of("a.csv") == DELAY_TIME
+    assert result.recordings.delay_of("b.csv") == pytest.approx(DELAY_TIME + 0.1)
 
 
 def test_residuals_are_noise_only_where_they_are_white() -> None:

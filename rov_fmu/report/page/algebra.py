@@ -1,7 +1,7 @@
-"""Formulas arranged as a person writes them: sums of products, with fractions, common factors and absolute values.
+"""Arrange formulas as a person writes them: sums of products, with fractions, common factors and absolute values.
 
-`Reader` turns a formula of rov_fmu/model/equation.py into a `Sum` of the same value. Only that a command saturates is
-left out, because the text beside the equations says it.
+`Reader` turns a formula of rov_fmu/model/equation.py into a `Sum` of the same value. It leaves out only the saturation
+of commands, which the text beside the equations mentions.
 """
 
 import ast
@@ -22,27 +22,27 @@ class Product:
 
 
 Sum: TypeAlias = tuple[Product, ...]
-"""The sum of its products; 0 without any."""
+"""A sum of products. It is 0 if it is empty."""
 
 
 @dataclass(frozen=True)
 class Group:
     """A sum in brackets."""
 
-    of: Sum
+    inner: Sum
 
 
 @dataclass(frozen=True)
 class Call:
-    """A function of a sum: sin, cos, abs, or sgn, the sign."""
+    """A function of a sum: sin, cos, abs, or sgn (the sign)."""
 
     function: str
-    of: Sum
+    inner: Sum
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A parameter that depends on the sign of a name."""
+    """One of two parameters: the first where a variable is positive, the other where it is negative."""
 
     forward: str
     reverse: str
@@ -51,7 +51,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Cases:
-    """One value where a name is at most 0, and another one elsewhere."""
+    """A value where a variable is at most 0, and another value elsewhere."""
 
     name: str
     at_most_zero: Sum
@@ -62,23 +62,26 @@ Factor: TypeAlias = "str | float | Group | Call | Choice | Cases"
 
 
 class Reader:
-    """Read formulas; the names that `inlined` has are replaced by their formulas."""
+    """Reads formulas.
+
+    The names in `inlined` are replaced by their formulas.
+    """
 
     def __init__(self, inlined: Mapping[str, str]) -> None:
         self._inlined = inlined
 
     def read(self, formula: str) -> Sum:
-        """Return a formula as a sum. Raises ValueError where it has a form that is not known here."""
+        """Return a formula as a sum. Raises ValueError if there is no way to show it."""
         return self._read(parsed(formula))
 
-    def _read(self, node: ast.expr) -> Sum:  # noqa: PLR0911 - a case for each syntax
+    def _read(self, node: ast.expr) -> Sum:  # noqa: PLR0911 (one case for each kind of syntax)
         match node:
             case ast.Constant(value=float() | int() as value):
-                return (
-                    (Product(1 if value > 0 else -1, () if abs(value) == 1 else (abs(float(value)),)),) if value else ()
-                )
+                return _number(float(value))
+            case ast.Name(id=name) if name in self._inlined:
+                return self._read(parsed(self._inlined[name]))
             case ast.Name(id=name):
-                return self._read(parsed(self._inlined[name])) if name in self._inlined else (Product(1, (name,)),)
+                return (Product(1, (name,)),)
             case ast.UnaryOp(op=ast.USub()):
                 return negative(self._read(node.operand))
             case ast.BinOp(op=ast.Add()):
@@ -96,6 +99,7 @@ class Reader:
         raise ValueError(f"{ast.unparse(node)}: there is no way to show this")
 
     def _choice(self, node: ast.IfExp) -> Sum:
+        """Read a conditional: a saturated command, a value for each direction, or a dead band."""
         test, body, otherwise = ast.unparse(node.test), node.body, node.orelse
         name, _, condition = test.partition(" ")
         if condition == "> 1.0" and ast.unparse(otherwise) == f"-1.0 if {name} < -1.0 else {name}":
@@ -111,14 +115,22 @@ class Reader:
 # ---- Sums and products -----------------------------------------------------------------------------------------------
 
 
-def negative(of: Sum) -> Sum:
+def _number(value: float) -> Sum:
+    """Return a number as a sum of one product with its sign and its size, or as an empty sum."""
+    if value == 0.0:
+        return ()
+    size = abs(value)
+    return (Product(1 if value > 0.0 else -1, () if size == 1.0 else (size,)),)
+
+
+def negative(terms: Sum) -> Sum:
     """Return the sum with the other sign."""
-    return tuple(replace(product, sign=-product.sign) for product in of)
+    return tuple(replace(product, sign=-product.sign) for product in terms)
 
 
-def inverse(of: Sum) -> Sum:
+def inverse(terms: Sum) -> Sum:
     """Return 1 over the sum."""
-    single = _single(of)
+    single = _single(terms)
     return (Product(single.sign, single.below, single.above),)
 
 
@@ -126,32 +138,34 @@ def times(left: Sum, right: Sum) -> Sum:
     """Return the product of two sums. A sum before names is multiplied out: (a x + b) x is a x x + b x."""
     if not left or not right:
         return ()
-    by = _single(right)
-    if len(left) > 1 and not by.below and all(isinstance(factor, str | Call) for factor in by.above):
+    last = _single(right)
+    if len(left) > 1 and not last.below and all(isinstance(factor, str | Call) for factor in last.above):
         return tuple(product for term in left for product in times((term,), right))
-    of = _single(left)
-    above, below = [*of.above, *by.above], [*of.below, *by.below]
+    first = _single(left)
+    above, below = [*first.above, *last.above], [*first.below, *last.below]
     for factor in [*above]:
         if factor in below:
             above.remove(factor)
             below.remove(factor)
-    return (Product(of.sign * by.sign, _signs_absorbed(tuple(above)), tuple(below)),)
+    return (Product(first.sign * last.sign, _signs_absorbed(tuple(above)), tuple(below)),)
 
 
-def _single(of: Sum) -> Product:
-    return of[0] if len(of) == 1 else Product(1, (Group(of),))
+def _single(terms: Sum) -> Product:
+    """Return a sum as one product, in brackets unless it is one already."""
+    return terms[0] if len(terms) == 1 else Product(1, (Group(terms),))
 
 
 def _signs_absorbed(factors: tuple[Factor, ...]) -> tuple[Factor, ...]:
     """Write sgn(x) x as |x| and sgn(x) |x| as x, also where each term of a sum in brackets has this factor."""
-    for sign in (f for f in factors if isinstance(f, Call) and f.function == "sgn"):
+    for sign in [f for f in factors if isinstance(f, Call) and f.function == "sgn"]:
         rest = list(factors)
         rest.remove(sign)
-        x, size = _single(sign.of).above[0], Call("abs", sign.of)
+        x, size = _single(sign.inner).above[0], Call("abs", sign.inner)
         for place, factor in enumerate(rest):
-            inner = [_replaced(product, size, x) for product in factor.of] if isinstance(factor, Group) else [None]
-            if None not in inner:
-                return (*rest[:place], Group(tuple(p for p in inner if p)), *rest[place + 1 :])
+            if isinstance(factor, Group):
+                terms = [found for product in factor.inner if (found := _replaced(product, size, x))]
+                if len(terms) == len(factor.inner):
+                    return (*rest[:place], Group(tuple(terms)), *rest[place + 1 :])
         for old, new in ((size, x), (x, size)):
             if old in rest:
                 rest[rest.index(old)] = new
@@ -160,7 +174,7 @@ def _signs_absorbed(factors: tuple[Factor, ...]) -> tuple[Factor, ...]:
 
 
 def _replaced(product: Product, old: Factor, new: Factor) -> Product | None:
-    """The product with the last of some equal factors replaced, if it has one."""
+    """Return the product with the last of its factors `old` replaced, or None if it has no such factor."""
     if old not in product.above:
         return None
     place = len(product.above) - 1 - product.above[::-1].index(old)
@@ -168,7 +182,10 @@ def _replaced(product: Product, old: Factor, new: Factor) -> Product | None:
 
 
 def _directed(subject: Product, forward: Sum, reverse: Sum) -> Sum:
-    """Two values by the sign of a name, in one: parameters that differ become a `Choice`, other signs a sgn."""
+    """Return two values, of which one holds forward and the other in reverse, as one sum.
+
+    Parameters that differ become a `Choice`; if the signs differ, the product gets the factor sgn.
+    """
     sign = Product(1, (Call("sgn", (subject,)),))
     if forward == negative(reverse):
         return times((sign,), (_single(forward),))
@@ -186,21 +203,21 @@ def _directed(subject: Product, forward: Sum, reverse: Sum) -> Sum:
     return (both,) if one.sign == other.sign else times((both,), (sign,))
 
 
-def arranged(of: Sum) -> Sum:
-    """Return the sum with numbers first, common first factors before brackets, and no brackets without need."""
+def arranged(terms: Sum) -> Sum:
+    """Return the sum with numbers first, common first factors before brackets, and no unnecessary brackets."""
     flat: list[Product] = []
-    for product in of:
+    for product in terms:
         above = sorted((_tidied(factor) for factor in product.above), key=lambda f: not isinstance(f, float))
         if above and isinstance(above[0], Group) and len(above) == 1 and not product.below:
-            flat += [replace(p, sign=p.sign * product.sign) for p in above[0].of]
+            flat += [replace(p, sign=p.sign * product.sign) for p in above[0].inner]
             continue
         sign, factors = product.sign, list[Factor]()
         for factor in above:
-            if isinstance(factor, Group) and all(p.sign < 0 for p in factor.of):
-                sign, factor = -sign, Group(negative(factor.of))  # noqa: PLW2901
-            if isinstance(factor, Group) and len(factor.of) == 1 and not factor.of[0].below:
-                sign *= factor.of[0].sign
-                factors += factor.of[0].above
+            if isinstance(factor, Group) and all(p.sign < 0 for p in factor.inner):
+                sign, factor = -sign, Group(negative(factor.inner))  # noqa: PLW2901
+            if isinstance(factor, Group) and len(factor.inner) == 1 and not factor.inner[0].below:
+                sign *= factor.inner[0].sign
+                factors += factor.inner[0].above
             else:
                 factors.append(factor)
         flat.append(Product(sign, tuple(sorted(factors, key=lambda f: not isinstance(f, float))), product.below))
@@ -208,19 +225,27 @@ def arranged(of: Sum) -> Sum:
 
 
 def _tidied(factor: Factor) -> Factor:
+    """Return the factor with the sums inside it arranged."""
     if isinstance(factor, Group):
-        return Group(arranged(factor.of))
+        return Group(arranged(factor.inner))
     if isinstance(factor, Cases):
         return replace(factor, at_most_zero=arranged(factor.at_most_zero), otherwise=arranged(factor.otherwise))
     return factor
 
 
-def _with_common_factors(of: Sum) -> Sum:
-    """Products that begin with the same factor, to four digits if it is a number, are put together: a (x - y)."""
+def _with_common_factors(terms: Sum) -> Sum:
+    """Return the sum with a common first factor of several products before a bracket: a x - a y becomes a (x - y).
+
+    Numbers count as equal if their first four digits are.
+    """
     together: dict[object, list[Product]] = {}
-    for place, product in enumerate(of):
+    for place, product in enumerate(terms):
         head = product.above[0] if len(product.above) > 1 else None
-        key = (f"{head:.4g}" if isinstance(head, float) else head) if head is not None else place
+        key: object = head
+        if head is None:
+            key = place  # a product of one factor shares it with no other
+        elif isinstance(head, float):
+            key = f"{head:.4g}"
         together.setdefault(key, []).append(product)
     found: list[Product] = []
     for first, *others in together.values():

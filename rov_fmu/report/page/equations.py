@@ -1,4 +1,4 @@
-"""The equations of a vehicle as a person reads them, from the formulas of its equation of motion (rov_fmu/model/)."""
+"""The equations of a vehicle for readers, made from the formulas of its equation of motion (rov_fmu/model/)."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +14,10 @@ from rov_fmu.report.templates import RAISED, number
 
 @dataclass(frozen=True)
 class Symbol:
-    """A letter with its indices; `mark` is − for what holds in reverse, ± for either way, * for a steady force."""
+    """A letter with its indices.
+
+    `mark` is − for a parameter that holds in reverse, ± for one of two parameters by direction, * for a steady force.
+    """
 
     letter: str
     index: str = ""
@@ -24,14 +27,14 @@ class Symbol:
 
 @dataclass(frozen=True)
 class Line:
-    """An equation: some factors times a name, or its time derivative, equal a sum."""
+    """An equation: on the left some factors times a name or its time derivative, on the right a sum."""
 
     factors: tuple[Factor, ...]
     name: str
     is_rate: bool
     right: Sum
     reference: str = ""
-    """The number of the equation in the paper, or where else it is published."""
+    """The number of the equation in the paper, or another publication of it."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +54,14 @@ class Equations:
 
     motion: list[Line]
     inertia: list[Line]
-    """The effective inertias M, where axes are coupled or have an added mass."""
+    """The effective inertias M, if axes are coupled or have an added mass."""
     commands: list[Line]
-    """The command of each thruster, where inputs are mixed."""
+    """The command of each thruster, if inputs are mixed."""
     curves: list[CurveLines]
     pose: list[Line]
 
     def __iter__(self) -> Iterator[Line]:
-        """All of them, in the order of the page."""
+        """Iterate over all equations in the order of the page."""
         of_curves = (line for curve in self.curves for line in (*curve.thrust, *curve.lag, *curve.torque))
         yield from (*self.motion, *self.inertia, *self.commands, *of_curves, *self.pose)
 
@@ -73,7 +76,7 @@ def of(layout: Layout) -> Equations:
         return Line((), name, False, arranged(reader.read(formula)), reference)
 
     def rate(name: str, formula: str, reference: str = "") -> Line:
-        """Multiplied by what all terms are divided by."""
+        """Return the equation of a time derivative, multiplied by the divisors that all its terms share."""
         right = reader.read(formula)
         below = [factor for factor in right[0].below if all(factor in p.below for p in right)]
         for factor in below:
@@ -107,7 +110,7 @@ def of(layout: Layout) -> Equations:
 
 
 def _inlined(layout: Layout, equation: Equation) -> dict[str, str]:
-    """The formulas that are written where their names stand: all but those that have an equation of their own."""
+    """Return the formulas that replace their names: all except those that have an equation of their own."""
     found = {
         name: formula for name, formula in equation.program.items() if not name.startswith(("F_", "tau_", "steady_"))
     }
@@ -122,20 +125,22 @@ def _inlined(layout: Layout, equation: Equation) -> dict[str, str]:
 
 
 def _has_effective_inertia(layout: Layout) -> bool:
+    """Return True if the effective inertias have equations of their own."""
     return layout.coupled or any("m_a" in form.keys for form in layout.axes)
 
 
 def choices(lines: Iterable[Line]) -> list[Choice]:
-    """Return the parameters in some equations that depend on a direction."""
+    """Return the parameters in these equations that depend on a direction."""
     return list(dict.fromkeys(choice for line in lines for choice in _choices(line.right)))
 
 
-def _choices(of: Sum) -> Iterator[Choice]:
-    for factor in (factor for product in of for factor in (*product.above, *product.below)):
+def _choices(terms: Sum) -> Iterator[Choice]:
+    """Yield the parameters in a sum that depend on a direction."""
+    for factor in (factor for product in terms for factor in (*product.above, *product.below)):
         if isinstance(factor, Choice):
             yield factor
         elif isinstance(factor, Group | Call):
-            yield from _choices(factor.of)
+            yield from _choices(factor.inner)
         elif isinstance(factor, Cases):
             yield from _choices((*factor.at_most_zero, *factor.otherwise))
 
@@ -163,11 +168,14 @@ def symbols(layout: Layout) -> dict[str, Symbol]:
     return found
 
 
-def _coefficient(key: str, of: str) -> Symbol:
-    """a_t of the curve rear is a with the index t and rear above; T has but one index."""
+def _coefficient(key: str, owner: str) -> Symbol:
+    """Return the symbol of a coefficient of a curve or an axis.
+
+    a_t of the curve rear is the letter a with the index t below and rear above; T has only the index below.
+    """
     letter, _, index = key.removesuffix(REVERSE).partition("_")
     mark = "−" if key.endswith(REVERSE) else ""
-    return Symbol(letter, index, of, mark) if index else Symbol(letter, of, "", mark)
+    return Symbol(letter, index, owner, mark) if index else Symbol(letter, owner, "", mark)
 
 
 class Text:
@@ -197,10 +205,10 @@ class Text:
         rate = self.write("dotted", name) if line.is_rate else name
         return self.write("equal", self.side_by_side([*map(self.factor, line.factors), rate]), self.sum(line.right))
 
-    def sum(self, of: Sum) -> str:
+    def sum(self, terms: Sum) -> str:
         """Write a sum."""
         text = ""
-        for product in of:
+        for product in terms:
             if text or product.sign < 0:
                 text += self.write("sign" if text else "first", "−" if product.sign < 0 else "+")
             if product.below:
@@ -216,7 +224,7 @@ class Text:
         return self.side_by_side(texts) or self.write("number", "1")
 
     def part(self, factors: tuple[Factor, ...]) -> str:
-        """Write what is above or below the bar of a fraction."""
+        """Write the numerator or the denominator of a fraction."""
         return self.factors(factors) if len(factors) < 2 else self.write("bracket", self.factors(factors))
 
     def factor(self, factor: Factor) -> str:
@@ -229,9 +237,9 @@ class Text:
             case Choice():
                 return self.symbol(replace(self._symbols[factor.forward], mark="±"))
             case Group():
-                return self.write("bracket", self.sum(factor.of))
+                return self.write("bracket", self.sum(factor.inner))
             case Call():
-                inner = self.sum(factor.of)
+                inner = self.sum(factor.inner)
                 is_own = factor.function in self.forms
                 return self.write(factor.function, inner) if is_own else self.write("function", factor.function, inner)
             case Cases():
@@ -239,13 +247,13 @@ class Text:
                 return self.write("cases", self.factor(factor.name), *values)
 
     def write(self, form: str, *parts: object) -> str:
-        """Write one of the forms with these parts."""
+        """Fill the parts into one of the forms."""
         return self.forms[form].format(*parts)
 
-    def symbol(self, of: Symbol) -> str:
+    def symbol(self, symbol: Symbol) -> str:
         """Write a letter and its indices."""
-        name = "_".join(part for part in (of.letter, of.index, of.upper) if part)
-        return name + {"−": REVERSE}.get(of.mark, of.mark)
+        name = "_".join(part for part in (symbol.letter, symbol.index, symbol.upper) if part)
+        return name + {"−": REVERSE}.get(symbol.mark, symbol.mark)
 
     def side_by_side(self, factors: Iterable[str]) -> str:
         """Write factors one after the other."""
@@ -272,23 +280,25 @@ class MathML(Text):
         f"{_CELL}<mtext>for\xa0</mtext>{{0}}<mo>&gt;</mo><mn>0</mn></mtd></mtr><mtr>{_CELL}{{2}}</mtd>{_CELL}<mtext>otherwise</mtext></mtd></mtr></mtable></mrow>",
     }
 
-    def symbol(self, of: Symbol) -> str:
-        letter, index, upper = (f"<mi>{escape(part)}</mi>" if part else "" for part in (of.letter, of.index, of.upper))
-        if of.mark:
-            upper = f'<mrow>{upper}<mo lspace="0" rspace="0">{of.mark}</mo></mrow>'
+    def symbol(self, symbol: Symbol) -> str:
+        letter, index, upper = (
+            f"<mi>{escape(part)}</mi>" if part else "" for part in (symbol.letter, symbol.index, symbol.upper)
+        )
+        if symbol.mark:
+            upper = f'<mrow>{upper}<mo lspace="0" rspace="0">{symbol.mark}</mo></mrow>'
         if upper:
             return f"<msubsup>{letter}{index or '<mrow/>'}{upper}</msubsup>"
         return f"<msub>{letter}{index}</msub>" if index else letter
 
     def part(self, factors: tuple[Factor, ...]) -> str:
         match factors:
-            case (Group(of=of),):  # the bar stands for the brackets
-                return self.sum(of)
+            case (Group(inner=inner),):  # the bar replaces the brackets
+                return self.sum(inner)
         return self.factors(factors)
 
     def side_by_side(self, factors: Iterable[str]) -> str:
         text = ""
-        for factor in factors:  # an index would touch the letter after it
+        for factor in factors:  # without a space, an index touches the letter after it
             space = text.endswith(("</mn>", "</msub>")) and not factor.startswith("<mrow>")
             text += f'<mspace width=".1em"/>{factor}' if space else factor
         return text

@@ -1,4 +1,4 @@
-"""documentation/index.html: one page that stands alone, with the numbers and plots of the vehicle it is about."""
+"""The page documentation/index.html of an FMU: one file with the numbers and plots of its vehicle."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _PANEL = (3.7, 2.9)  # inches
-_FRAMES = {
+_PICTURES = {
     "from_above.svg": "The vehicle from above: x forward, y to starboard",
     "from_starboard.svg": "The vehicle from starboard: x forward, z down",
 }
@@ -48,17 +48,16 @@ _FRAMES = {
 
 
 def documentation(vehicle: Vehicle, *, native: bool, fmi: int = 2, module: bytes | None = None) -> dict[str, bytes]:
-    """The page and the pictures by their path in the FMU. Raises FileError."""
+    """Return the page and the pictures by their path in the FMU. Raises FileError."""
     text = documentation_page(vehicle, native=native, fmi=fmi, module=module)
     return {"documentation/index.html": text.encode(), **pictures(vehicle.rov)}
 
 
 def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, module: bytes | None = None) -> str:
-    """The page of a vehicle as HTML, of the native FMU in a version of FMI or the one in pure Python.
+    """Return the page as HTML, for the native FMU of a version of FMI or for the FMU in pure Python.
 
-    `module`: the model as WebAssembly; without it nothing flies.
-
-    Without a data folder it goes without tables and measurements.
+    `module` is the model as WebAssembly; without it the page has no live section. The page of a vehicle without a data
+    folder has no tables and no measurements. Raises FileError.
     """
     rov, layout = vehicle.rov, vehicle.layout
     tables = tables_by_axis(vehicle)
@@ -67,7 +66,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
     first = axes[0]
     start = {name: 0.3 * sign for name, sign in layout.signs(first).items()}
     rest = dict.fromkeys([*layout.inputs, *layout.state], 0.0)
-    own = [(label, path) for name, label in _FRAMES.items() if (path := vehicle.picture(name))]
+    own = [(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))]
     return page(
         "index.html.j2",
         vehicle=vehicle,
@@ -96,7 +95,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
         motions=[motion for axis in axes for motion in _motions(rov, axis, held)],
         frames=[image(label, path) for label, path in own],
         thrusters=[
-            inline_svg(f"Thrusters {view}", partial(_draw, partial(draw_thrusters, rov=rov, scene=scene)), scene.inches)
+            _plot(f"Thrusters {view}", partial(draw_thrusters, rov=rov, scene=scene), scene.inches)
             for view, scene in scenes(rov).items()
         ],
         curves=[_plot(f"Thrust curve: {c.name}", partial(draw_curve, rov=rov, curve=c)) for c in layout.curves],
@@ -119,29 +118,33 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
 
 @dataclass(frozen=True)
 class Motion:
-    """What held commands come to, along one axis and in one direction."""
+    """The motion that held commands lead to, along one axis and in one direction."""
 
     axis: Axis
-    way: str
-    """In words where the two directions differ."""
+    direction: str
+    """The direction in words, after a space; nothing if both directions give the same motion."""
     signs: Mapping[str, float]
+    """The sign of each command."""
     responses: Sequence[tuple[float, float]]
     """V_ss and Tau for each command."""
-    beside: Sequence[tuple[Axis, float]]
-    """Other axes that the last command pushes too, and the force or torque."""
+    side_effects: Sequence[tuple[Axis, float]]
+    """The other axes that the last command pushes too, and the force or torque along them."""
 
 
 def _motions(rov: Rov, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
-    two = differs_by_direction(rov, axis)
-    for sign, way in ((1.0, axis.positive), (-1.0, axis.negative))[: 1 + two]:
-        signs = {name: sign * of for name, of in rov.layout.signs(axis).items()}
-        responses = [rov.response(axis, sign * float(c) / 100.0) for c in commands]
-        last = sign * float(commands[-1]) / 100.0
-        yield Motion(axis, f" {way}" if two else "", signs, responses, list(_beside(rov, axis, last)))
+    """Yield the motion along an axis, for each direction if they differ. The commands are in percent."""
+    directions = [(1.0, "")]
+    if differs_by_direction(rov, axis):
+        directions = [(1.0, f" {axis.positive}"), (-1.0, f" {axis.negative}")]
+    for sign, words in directions:
+        signs = {name: sign * one for name, one in rov.layout.signs(axis).items()}
+        fractions = [sign * float(c) / 100.0 for c in commands]
+        responses = [rov.response(axis, fraction) for fraction in fractions]
+        yield Motion(axis, words, signs, responses, list(_side_effects(rov, axis, fractions[-1])))
 
 
-def _beside(rov: Rov, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
-    """The other axes that the commands of one push, as where thrust in reverse is weaker."""
+def _side_effects(rov: Rov, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
+    """Yield the other axes that a command of an axis pushes, for example because thrust in reverse is weaker."""
     F = rov.commanded(rov.held_inputs(axis, command))
     for other in (form.axis for form in rov.layout.axes if form.axis is not axis):
         pushes = [rov.effect(t, other) * F[t.name] for t in rov.layout.drivers(other)]
@@ -150,7 +153,7 @@ def _beside(rov: Rov, axis: Axis, command: float) -> Iterator[tuple[Axis, float]
 
 
 def differs_by_direction(rov: Rov, axis: Axis) -> bool:
-    """Whether a negative command gives another motion than the mirror image of the positive one."""
+    """Return True if the motion under a negative command is not the mirror image of that under a positive one."""
     for c in (0.1, 0.3, 0.6, 1.0):
         (V, Tau), (back, Tau_back) = rov.response(axis, c), rov.response(axis, -c)
         if not (isclose(V, -back, rel_tol=1e-9) and isclose(Tau, Tau_back, rel_tol=1e-9)):
@@ -159,7 +162,11 @@ def differs_by_direction(rov: Rov, axis: Axis) -> bool:
 
 
 def _agreement(table: ResponseTable) -> dict[str, Any]:
-    """How many cells are printed, as computed and rounded, or as computed and cut off; the farthest and its place."""
+    """Compare the printed cells of a table with the computed ones.
+
+    Returns how many are printed, how many of these are the computed value rounded or cut off, and the cell that
+    deviates most, with its quantity and command.
+    """
     cells = [
         (cell, f"{model} {quantity}", row.command)
         for row in table.rows
@@ -176,13 +183,14 @@ def _agreement(table: ResponseTable) -> dict[str, Any]:
 
 
 def _is_cut_off(cell: Cell) -> bool:
+    """Return True if the printed value is the computed one without its last digits, not rounded."""
     if cell.printed is None or cell.rounds_to_printed or not isfinite(cell.computed):
         return False
     return Decimal(cell.computed).quantize(cell.printed, ROUND_DOWN) == cell.printed
 
 
 def _reversing(layout: Layout, values: Mapping[str, float]) -> list[tuple[str, float]]:
-    """Thrust curves that point backward at small commands, and the command at which they turn."""
+    """Return the thrust curves that push backward at small commands, and the command at which they change sign."""
     found = []
     for curve in layout.curves:
         for end, words in (("", ""), ("_reverse", " in reverse")):
@@ -194,18 +202,19 @@ def _reversing(layout: Layout, values: Mapping[str, float]) -> list[tuple[str, f
 
 
 def _mirrored(layout: Layout) -> str:
-    """Which thrust and drag are in reverse the mirror image of forward."""
+    """Return, in words, which thrust curves and axes behave in reverse as forward."""
+    curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys]
+    axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
     found = []
-    for what, of, same, n in (
-        ("thrust", "of curve", [c.name for c in layout.curves if "a_t_reverse" not in c.keys], len(layout.curves)),
-        ("drag", "in", [f.axis.name for f in layout.axes if "a_d_reverse" not in f.keys], len(layout.axes)),
-    ):
-        if same:
-            found.append(what if len(same) == n else f"{what} {of} {', '.join(same)}")
+    if curves:
+        found.append("thrust" if len(curves) == len(layout.curves) else f"thrust of curve {', '.join(curves)}")
+    if axes:
+        found.append("drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}")
     return " and ".join(found)
 
 
 def _is_tuned(rov: Rov) -> bool:
+    """Return True unless each alpha and beta is 1."""
     return any(rov[name] != 1.0 for name, meta in rov.layout.coefficients.items() if meta.tunable)
 
 
@@ -213,7 +222,7 @@ def _is_tuned(rov: Rov) -> bool:
 
 
 def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
-    """V_ss over the command: with and without tuning, the measured points, the range they hold for."""
+    """Plot V_ss over the command with and without tuning, the measured points, and the range of valid commands."""
     rov, (low, high) = vehicle.rov, (100.0 * end for end in vehicle.command_range)
     least = -100 if differs_by_direction(rov, axis) else 0
     ax.axvspan(low, high, label="range of the model", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
@@ -235,7 +244,7 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
 
 
 def plot_steps(ax: Axes, rov: Rov, axis: Axis, commands: Sequence[Decimal], table: ResponseTable | None) -> None:
-    """Velocity after steps of the command from rest, with the measured V_ss and Tau."""
+    """Plot the velocity after steps of the command from rest, with the measured V_ss and Tau."""
     steps = [measured_step(table, c) for c in commands]
     if differs_by_direction(rov, axis):
         steps += [Step(-step.command) for step in steps]
@@ -244,7 +253,7 @@ def plot_steps(ax: Axes, rov: Rov, axis: Axis, commands: Sequence[Decimal], tabl
 
 
 def steady_picture(vehicle: Vehicle) -> str:
-    """V_ss of all axes side by side as an SVG file."""
+    """Return plots of V_ss of all axes, side by side, as an SVG file."""
     tables, axes = tables_by_axis(vehicle), [form.axis for form in vehicle.layout.axes]
 
     def draw(figure: Figure) -> None:
@@ -254,9 +263,6 @@ def steady_picture(vehicle: Vehicle) -> str:
     return svg_file(draw, (len(axes) * _PANEL[0], _PANEL[1]), salt="steady") + "\n"
 
 
-def _draw(draw: Callable[[Axes], None], figure: Figure) -> None:
-    draw(figure.subplots())
-
-
-def _plot(label: str, draw: Callable[[Axes], None]) -> Markup:
-    return inline_svg(label, partial(_draw, draw), _PANEL)
+def _plot(label: str, draw: Callable[[Axes], None], size: tuple[float, float] = _PANEL) -> Markup:
+    """Return one plot as inline SVG."""
+    return inline_svg(label, lambda figure: draw(figure.subplots()), size)

@@ -1,4 +1,4 @@
-"""The live section of a page: the model as WebAssembly, what is told of the vehicle, and the scripts that fly it."""
+"""The live section of a page: the model as WebAssembly, the data of the vehicle, and the scripts that fly it."""
 
 import base64
 import hashlib
@@ -22,13 +22,13 @@ from rov_fmu.report.templates import number, page, pretty_unit
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "controls.js")
-# Types and words for who reads the source; a quarter of it.
+# The comments and types are for readers of the source. They are a quarter of it, and are left out of the page.
 _COMMENT = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ ")
 
 
 @dataclass(frozen=True)
 class Flown:
-    """A vehicle and its module."""
+    """A vehicle and its WebAssembly module."""
 
     vehicle: Vehicle
     module: bytes
@@ -36,32 +36,34 @@ class Flown:
 
 @dataclass(frozen=True)
 class Live:
-    """What the templates of a page need to fly the first vehicle, with another one as a ghost."""
+    """The content that the templates of a page need to fly a vehicle, with another one as a ghost."""
 
     data: Markup
-    """JSON, as fmu_src/live/model.js declares it."""
+    """The vehicles as JSON, as fmu_src/live/model.js declares it."""
     script: Markup
+    """The scripts of fmu_src/live/, one after the other."""
     policy: str
-    """What the content security policy allows beside the page's own."""
+    """The directive that allows this script in the page's content security policy."""
     tests: Sequence[dict[str, Any]]
+    """The step tests that a button starts."""
     loads: Sequence[tuple[str, float, str]]
-    """Inputs beside the commands: name, how far the slider goes, unit."""
+    """The inputs that are not commands: name, end of the slider, unit."""
     tunable: Sequence[tuple[str, str, float, float, float]]
-    """Name, words, ends of the slider, value of the file."""
+    """The tunable coefficients: name, label, both ends of the slider, value in the vehicle file."""
     other: str | None
-    """The name of the ghost."""
+    """The name of the ghost, if there is one."""
 
 
 def live(flown: Sequence[Flown]) -> Live:
-    """The section that flies the first of these vehicles. Raises DataFileError."""
+    """Return the content that flies the first of these vehicles. Raises DataFileError."""
     pilot = flown[0].vehicle
-    told = [_told(one) for one in flown]
-    data = json.dumps(told, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    data = [_data(one) for one in flown]
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     script = _COMMENT.sub("", "".join((MODULE_SOURCES / name).read_text(encoding="utf-8") for name in _SCRIPTS))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    tests = told[0]["tests"]
+    tests = data[0]["tests"]
     return Live(
-        data=Markup(data),
+        data=Markup(text),
         script=Markup(script),
         policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
         tests=[{**test, "words": _words(pilot, test)} for test in tests],
@@ -72,12 +74,16 @@ def live(flown: Sequence[Flown]) -> Live:
 
 
 def fly_page(flown: Sequence[Flown]) -> str:
-    """A page of the live section alone: the first vehicle, with another one as a ghost. Raises DataFileError."""
+    """Return a page that has only the live section: the first vehicle and the second one as a ghost.
+
+    Raises DataFileError.
+    """
     vehicle = flown[0].vehicle
     return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=live(flown))
 
 
-def _told(flown: Flown) -> dict[str, Any]:
+def _data(flown: Flown) -> dict[str, Any]:
+    """Return the data of a vehicle for the scripts."""
     vehicle, rov, layout = flown.vehicle, flown.vehicle.rov, flown.vehicle.layout
     return {
         "name": vehicle.name,
@@ -121,7 +127,7 @@ def _thruster(rov: Rov, thruster: Thruster) -> dict[str, Any]:
 
 
 def _tests(vehicle: Vehicle) -> Iterator[dict[str, Any]]:
-    """The published step tests of every axis; of a vehicle without any, the commands of the page's plots."""
+    """Yield the published step tests of each axis; without any, steps of the commands that the page plots."""
     tables = tables_by_axis(vehicle)
     for n, form in enumerate(vehicle.layout.axes):
         table = tables.get(form.axis.name)
@@ -132,11 +138,12 @@ def _tests(vehicle: Vehicle) -> Iterator[dict[str, Any]]:
 
 
 def _words(vehicle: Vehicle, test: dict[str, Any]) -> str:
+    """Return the label of a step test."""
     return f"{vehicle.layout.axes[test['axis']].axis.name} {number(100.0 * test['command'], 3)} %"
 
 
 def _loads(rov: Rov) -> Iterator[tuple[str, float, str]]:
-    """Loads reach as far as the thrusters do, a current 1 m/s."""
+    """Yield the sliders of the loads, which end at the strongest thrust, and of the current, which end at 1 m/s."""
     most = {form.axis.external: _round(rov.strongest(form.axis)) for form in rov.layout.axes}
     for name, meta in rov.layout.inputs.items():
         if name not in rov.layout.commands:
@@ -144,6 +151,7 @@ def _loads(rov: Rov) -> Iterator[tuple[str, float, str]]:
 
 
 def _tunable(rov: Rov) -> Iterator[tuple[str, str, float, float, float]]:
+    """Yield the sliders of the tunable coefficients."""
     for key, letter in (("alpha", "α"), ("beta", "β")):
         for axis in (form.axis for form in rov.layout.axes):
             value = rov[name := axis.coefficient(key)]
@@ -151,5 +159,5 @@ def _tunable(rov: Rov) -> Iterator[tuple[str, str, float, float, float]]:
 
 
 def _round(x: float) -> float:
-    """To one digit."""
+    """Round to one significant digit; 0 becomes 1."""
     return round(x, -floor(log10(x))) if x > 0.0 else 1.0

@@ -1,4 +1,4 @@
-"""Pictures of a vehicle in its FMU, drawn from its thrusters: the icon, the diagram, the icon of a terminal."""
+"""The pictures in an FMU, drawn from the vehicle's thrusters: the icon, the diagram, the icon of a terminal."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -15,7 +15,7 @@ _ICON, _SIGNAL = (2.0, 2.0), (0.2, 0.2)  # inches
 
 
 def pictures(rov: Rov) -> dict[str, bytes]:
-    """All by their path in the FMU."""
+    """Return all pictures by their path in the FMU."""
     icon, views = partial(_icon, rov=rov), list(scenes(rov).values())
     widths, heights = zip(*(scene.inches for scene in views), strict=True)
     diagram = partial(_diagram, rov=rov, views=views)
@@ -28,7 +28,7 @@ def pictures(rov: Rov) -> dict[str, bytes]:
 
 
 def _diagram(figure: Figure, rov: Rov, views: Sequence[Scene]) -> None:
-    """The thrusters and axes, view beside view."""
+    """Draw the thrusters and axes, one view beside the other."""
     for ax, scene in zip(figure.subplots(1, len(views)), views, strict=True):
         draw_thrusters(ax, rov, scene)
         ax.set_anchor("NW")
@@ -39,7 +39,7 @@ def _icon(figure: Figure, rov: Rov) -> None:
 
 
 def _signal(figure: Figure) -> None:
-    """A triangle, the way that signals go: in on the left of an icon, out on the right."""
+    """Draw a triangle that points as signals go: they enter an icon on the left and leave it on the right."""
     ax = figure.subplots()
     ax.fill([0.0, 1.0, 0.0], [0.0, 0.5, 1.0], color=LIGHT["blue"], linewidth=0.0)
     ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))

@@ -1,4 +1,4 @@
-"""The vehicle's thrusters drawn from its geometry: from above and from starboard."""
+"""Drawings of the vehicle's thrusters from its geometry: from above and from starboard."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,15 +17,21 @@ from rov_fmu.report.plots.svg import LIGHT
 Point = tuple[float, float, float]
 
 VIEWS = {"from above": (SWAY, HEAVE, -1), "from starboard": (HEAVE, SWAY, 1)}
-"""The axis that points down in the view, the one along the line of sight, and whether that points at who looks (1)."""
+"""For each view: the axis that points down, the axis along the line of sight, and 1 if that points at the viewer."""
 _LETTERS = {SURGE: "x", SWAY: "y", HEAVE: "z"}
 _INDEX = {axis: n for n, axis in enumerate(AXES.values())}
-_SMALLEST = 0.05  # m
-_WIDTH = 3.7  # inches
+_SMALLEST = 0.05
+"""The least size of a vehicle, m."""
+_WIDTH = 3.7
+"""The width of a drawing, inches."""
 
 
 def place(rov: Rov, thruster: Thruster) -> Point:
-    """Where a thruster is, from the centre of mass: that of an arm R, γ behind it; the centre where nothing is said."""
+    """Return the position of a thruster from the centre of mass, m.
+
+    A thruster on an arm is at the distance R and the angle γ behind the centre of mass; one without a known position is
+    drawn at the centre of mass.
+    """
     if thruster.position is not None:
         return thruster.position
     if not thruster.arm or not rov.layout.has_arm:
@@ -36,22 +42,24 @@ def place(rov: Rov, thruster: Thruster) -> Point:
 
 @dataclass(frozen=True)
 class _Mark:
-    """Thrusters that look the same in a view: where, and the direction of a positive force."""
+    """One or more thrusters that look the same in a view."""
 
     at: Place
     along: Place
+    """The direction of a positive force in the plane of the view."""
     toward: float
-    """Of the direction, the part toward who looks."""
+    """The component of the direction toward the viewer; 0 if the force is mostly in the plane of the view."""
     label: str
     width: float
-    """Of the label, in inches."""
+    """The width of the label, inches."""
 
     def tip(self, size: float) -> Place:
-        """The end of its arrow."""
+        """Return the end of the arrow of its force."""
         return self.at[0] + 0.5 * size * self.along[0], self.at[1] + 0.5 * size * self.along[1]
 
 
 def _marks(rov: Rov, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
+    """Yield the marks of a view, which is one of VIEWS."""
     seen: dict[tuple[float, ...], list[str]] = {}
     for thruster in rov.layout.thrusters:
         at, d = place(rov, thruster), thruster.direction
@@ -66,27 +74,28 @@ def _marks(rov: Rov, down: Axis, sight: Axis, toward: int) -> Iterator[_Mark]:
 
 @dataclass(frozen=True)
 class Scene:
-    """What a view shows, in metres; the second coordinate runs downward."""
+    """The content of a view, in metres; the second coordinate runs downward."""
 
     view: str
     marks: list[_Mark]
     labels: list[tuple[str, Place, str]]
-    """Text, centre and colour."""
+    """The text, centre and colour of each label."""
     size: float
-    """How far thrusters are from the centre of mass."""
+    """The largest coordinate of a thruster from the centre of mass."""
     limits: tuple[Place, Place]
+    """The coordinates at the left and right edge, and at the lower and upper edge."""
 
     @property
     def inches(self) -> Place:
-        """Width and height of a drawing that it fits."""
+        """The width and height of a drawing that the view fits into."""
         (left, right), (low, high) = self.limits
         return _WIDTH, _WIDTH * (low - high) / (right - left) + 0.3
 
 
 def scenes(rov: Rov) -> dict[str, Scene]:
-    """By view, at the scale that both share."""
+    """Return the scene of each view, at a common scale."""
     inch = 0.9 * size_of(rov)
-    for _ in range(3):  # the larger the part of the drawing that text takes, the smaller the rest
+    for _ in range(3):  # text takes part of the drawing, which changes the scale and so the size of text in metres
         found = {view: _arranged(rov, view, inch) for view in VIEWS}
         left, right = zip(*(scene.limits[0] for scene in found.values()), strict=True)
         inch = (max(right) - min(left)) / _WIDTH
@@ -95,74 +104,86 @@ def scenes(rov: Rov) -> dict[str, Scene]:
 
 
 def size_of(rov: Rov) -> float:
-    """How far thrusters are from the centre of mass, in m."""
+    """Return the largest coordinate of a thruster from the centre of mass, m."""
     return max([_SMALLEST, *(abs(part) for thruster in rov.layout.thrusters for part in place(rov, thruster))])
 
 
 def _arranged(rov: Rov, view: str, inch: float) -> Scene:
-    """A view with its names, where an inch is so many metres."""
+    """Return a view with its labels placed, in a drawing where an inch is so many metres."""
     down, sight, toward = VIEWS[view]
     size = size_of(rov)
-    space = Space(inch, [(-1.2 * size, 0.0)])  # the width of a drawing with little in it
+    space = Space(inch, [(-1.2 * size, 0.0)])  # the width of a drawing with few things in it
     marks = list(_marks(rov, down, sight, toward))
+    from_above = down is SWAY
     ends = {SURGE: (1.4 * size, 0.0), down: (0.0, 0.9 * size)}
     for end in ends.values():
         space.line((0.0, 0.0), end)
-    tail, tip = _turn(size)
-    if turns := down is SWAY and rov.layout.has(YAW):
+    turn = _turn(size) if from_above and rov.layout.has(YAW) else None
+    if turn:
+        tail, tip = turn
         space.line(tail, (1.27 * size, 0.0))
         space.line((1.27 * size, 0.0), tip)
     for mark in marks:
         space.ring(mark.at, 0.1 * size)
         if not mark.toward:
             space.line(mark.at, mark.tip(size))
-    labels = []
-    if down is SWAY and rov.layout.has_arm:
-        x, y, _ = _armed(rov)
-        space.line((0.0, 0.0), (x, y))
-        space.line((0.0, 0.0), (1.15 * x, 0.0))
-        gamma, far, side = atan2(abs(y), -x), 0.38 * size, -1.0 if y < 0.0 else 1.0
-        labels = [
-            ("$R$", (0.68 * x, 0.68 * y - 0.12 * side * size), "muted"),
-            (r"$\gamma$", (-far * cos(gamma / 2.0), side * far * sin(gamma / 2.0)), "muted"),
-        ]
-        for _, at, _ in labels:
-            space.box(at, 0.1)
+    labels = _arm_labels(rov, space, size) if from_above and rov.layout.has_arm else []
     for axis, end in ends.items():
         words = rf"${_LETTERS[axis]}, {axis.velocity}$" if rov.layout.has(axis) else f"${_LETTERS[axis]}$"
         ahead = end[0] / hypot(*end), end[1] / hypot(*end)
         labels.append((words, space.name(0.3 if "," in words else 0.1, [(end, 0.0, [ahead, *AROUND])]), "ink"))
-    if turns:
+    if turn:
         at = space.name(0.3, [(tip, 0.0, [AROUND[5], AROUND[2], AROUND[0]]), (tail, 0.0, [AROUND[4], AROUND[1]])])
         labels.append((r"$\psi, r$", at, "ink"))
-    for mark in marks:
-        dx, dy = (part / (hypot(*mark.along) or 1.0) for part in mark.along)
-        behind, beside = (-dx, -dy), [(dy, -dx), (-dy, dx)]
-        around = [
-            (mark.at, 0.1 * size, [behind, *sorted(beside, key=lambda way: way[1]), *AROUND]),
-            (mark.tip(size), 0.0, [(dx, dy), *AROUND]),
-        ]
-        at = space.name(mark.width, [(mark.at, 0.1 * size, AROUND)] if mark.toward else around)
-        labels.append((mark.label, at, "blue"))
+    labels += [(mark.label, _place_label(mark, space, size), "blue") for mark in marks]
     (left, right), (high, low) = space.limits()
     edge = 0.06 * inch
-    has_scale = any(any(place(rov, thruster)) for thruster in rov.layout.thrusters)
-    low += (0.3 if has_scale else 0.06) * inch
+    low += (0.3 if _has_scale(rov) else 0.06) * inch
     return Scene(view, marks, labels, size, ((left - edge, right + edge), (low, high - edge)))
 
 
+def _arm_labels(rov: Rov, space: Space, size: float) -> list[tuple[str, Place, str]]:
+    """Return the labels of R and γ, and reserve the space of the arm and of these labels."""
+    x, y, _ = _armed(rov)
+    space.line((0.0, 0.0), (x, y))
+    space.line((0.0, 0.0), (1.15 * x, 0.0))
+    gamma, far, side = atan2(abs(y), -x), 0.38 * size, -1.0 if y < 0.0 else 1.0
+    of_R = 0.68 * x, 0.68 * y - 0.12 * side * size
+    of_gamma = -far * cos(gamma / 2.0), side * far * sin(gamma / 2.0)
+    for at in (of_R, of_gamma):
+        space.box(at, 0.1)
+    return [("$R$", of_R, "muted"), (r"$\gamma$", of_gamma, "muted")]
+
+
+def _place_label(mark: _Mark, space: Space, size: float) -> Place:
+    """Return the centre of the label of a mark: near the thruster, or at the tip of its arrow."""
+    if mark.toward:
+        return space.name(mark.width, [(mark.at, 0.1 * size, AROUND)])
+    dx, dy = (part / (hypot(*mark.along) or 1.0) for part in mark.along)
+    sides = sorted([(dy, -dx), (-dy, dx)], key=lambda direction: direction[1])
+    near_thruster = mark.at, 0.1 * size, [(-dx, -dy), *sides, *AROUND]
+    near_tip = mark.tip(size), 0.0, [(dx, dy), *AROUND]
+    return space.name(mark.width, [near_thruster, near_tip])
+
+
+def _has_scale(rov: Rov) -> bool:
+    """Return True if the position of a thruster is known, so that the drawing has a scale."""
+    return any(any(place(rov, thruster)) for thruster in rov.layout.thrusters)
+
+
 def _armed(rov: Rov) -> Point:
+    """Return the position of the first thruster on an arm."""
     return next(place(rov, t) for t in rov.layout.thrusters if t.position is None and t.arm)
 
 
 def _turn(size: float) -> tuple[Place, Place]:
-    """Where the arrow of a positive turn begins and ends."""
+    """Return the start and the end of the arrow of a positive turn."""
     tail, tip = ((1.27 * size * cos(angle), 1.27 * size * sin(angle)) for angle in (-0.25, 0.25))
     return tail, tip
 
 
 def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
-    """Centre of mass, body frame, thrusters with the direction of a positive force, R and γ where they are given."""
+    """Draw the centre of mass, the body frame, the thrusters with their positive forces, and R and γ if they exist."""
     down, size = VIEWS[scene.view][0], scene.size
     _draw_frame(ax, size, turns=down is SWAY and rov.layout.has(YAW))
     if not any(mark.toward and hypot(*mark.at) < 0.05 * size for mark in scene.marks):
@@ -176,14 +197,14 @@ def draw_thrusters(ax: Axes, rov: Rov, scene: Scene) -> None:
     ax.set(aspect="equal", xlim=scene.limits[0], ylim=scene.limits[1])
     ax.grid(visible=False)
     ax.spines[:].set_visible(False)
-    if any(any(place(rov, thruster)) for thruster in rov.layout.thrusters):
+    if _has_scale(rov):
         _draw_scale(ax, size)
     ax.set(xticks=[], yticks=[])
     ax.set_title(scene.view.capitalize(), loc="left")
 
 
 def draw_icon(ax: Axes, rov: Rov) -> None:
-    """The vehicle from above without words: its thrusters, on a body as wide as they are apart, round at the bow."""
+    """Draw the vehicle from above without text: its thrusters on a body with a round bow."""
     size, marks = size_of(rov), list(_marks(rov, *VIEWS["from above"]))
     x, y = 1.2 * size, max([0.5 * size, *(abs(mark.at[1]) for mark in marks)])
     ax.add_patch(PathPatch(_body(x, y), facecolor=LIGHT["band"], edgecolor=LIGHT["metal"], linewidth=2.0))
@@ -195,12 +216,12 @@ def draw_icon(ax: Axes, rov: Rov) -> None:
 
 
 def _body(x: float, y: float) -> Path:
-    """An outline from -x to x and from -y to y."""
+    """Return the outline of a body from -x to x and from -y to y."""
     starboard = [(-x, 0.0), (-x, 0.8 * y), (-x, y), (-x + 0.2 * y, y), (0.4 * x, y), (x, y), (x, 0.0)]
     port = [(along, -across) for along, across in reversed(starboard)]
-    ways = [Path.LINETO, Path.CURVE3, Path.CURVE3, Path.LINETO, Path.CURVE3, Path.CURVE3]
-    back = [Path.CURVE3, Path.CURVE3, Path.LINETO, Path.CURVE3, Path.CURVE3, Path.LINETO]
-    return Path(starboard + port[1:], [Path.MOVETO, *ways, *back])
+    ahead = [Path.LINETO, Path.CURVE3, Path.CURVE3, Path.LINETO, Path.CURVE3, Path.CURVE3]
+    back = ahead[::-1]
+    return Path(starboard + port[1:], [Path.MOVETO, *ahead, *back])
 
 
 def _arrow(ax: Axes, start: tuple[float, float], end: tuple[float, float], color: str, **how: Any) -> None:
@@ -209,20 +230,21 @@ def _arrow(ax: Axes, start: tuple[float, float], end: tuple[float, float], color
 
 
 def _draw_mark(ax: Axes, mark: _Mark, size: float) -> None:
+    """Draw a circle with an arrow; an arrow toward the viewer is a point, one away from the viewer a cross."""
     (x, y), (dx, dy), r = mark.at, mark.along, 0.1 * size
     ax.add_patch(Circle(mark.at, r, facecolor=LIGHT["panel"], edgecolor=LIGHT["metal"], linewidth=1.4, zorder=3))
     if not mark.toward:
         _arrow(ax, (x + dx * r, y + dy * r), mark.tip(size), "blue")
-    elif mark.toward > 0.0:  # the point of an arrow
+    elif mark.toward > 0.0:  # the point of the arrow
         ax.add_patch(Circle(mark.at, 0.3 * r, color=LIGHT["blue"], zorder=4))
-    else:  # its feathers
+    else:  # the feathers of the arrow
         a = 0.7 * r
-        for way in (-1, 1):
-            ax.plot([x - a, x + a], [y - way * a, y + way * a], color=LIGHT["blue"], linewidth=1.4, zorder=4)
+        for sign in (-1, 1):
+            ax.plot([x - a, x + a], [y - sign * a, y + sign * a], color=LIGHT["blue"], linewidth=1.4, zorder=4)
 
 
 def _draw_frame(ax: Axes, size: float, *, turns: bool) -> None:
-    """Axes of the body."""
+    """Draw the axes of the body, and the arrow of a positive turn."""
     for end in ((1.4 * size, 0.0), (0.0, 0.9 * size)):
         _arrow(ax, (0.0, 0.0), end, "ink", linewidth=1.0)
     if turns:
@@ -230,7 +252,7 @@ def _draw_frame(ax: Axes, size: float, *, turns: bool) -> None:
 
 
 def _draw_centre(ax: Axes, size: float) -> None:
-    """The centre of mass."""
+    """Draw the centre of mass."""
     r = 0.055 * size
     ax.add_patch(Circle((0.0, 0.0), r, facecolor=LIGHT["page"], edgecolor=LIGHT["ink"], linewidth=1.0, zorder=6))
     for angle in (0.0, 180.0):
@@ -238,7 +260,7 @@ def _draw_centre(ax: Axes, size: float) -> None:
 
 
 def _draw_arm(ax: Axes, at: Point, size: float) -> None:
-    """Lines of R from the centre of mass to a rear thruster, and of γ from the centre line."""
+    """Draw R from the centre of mass to a rear thruster, and γ from the centre line."""
     x, y, _ = at
     dashed: Any = {"color": LIGHT["muted"], "linewidth": 1.0, "dashes": (4, 3), "zorder": 1}
     ax.plot([0.0, x], [0.0, y], **dashed)
@@ -250,7 +272,7 @@ def _draw_arm(ax: Axes, at: Point, size: float) -> None:
 
 
 def _draw_scale(ax: Axes, size: float) -> None:
-    """A bar of a length that one reads at once."""
+    """Draw a scale bar with a length of 1, 2 or 5 times a power of 10."""
     decade = 10.0 ** next(n for n in range(3, -4, -1) if 10.0**n <= 0.6 * size)
     length = next(step * decade for step in (5.0, 2.0, 1.0) if step * decade <= 0.6 * size)
     y, x = ax.get_ylim()[0] - 0.08 * size, ax.get_xlim()[0]

@@ -1,4 +1,4 @@
-"""The plots of the identification report: every fit with its 95 % band, and its residuals below."""
+"""The plots of the identification report: each fit with its 95 % band, and its residuals below."""
 
 from collections.abc import Iterator, Sequence
 from math import log
@@ -17,34 +17,16 @@ from rov_fmu.report.plots.svg import LIGHT
 from rov_fmu.report.templates import pretty_unit, text
 from rov_fmu.tank.arrays import Array, Flags
 
-_WIDEST = 5.0  # end of an interval by the value, or its inverse: beyond it there is an arrow
-_TICKS = (
-    0.001,
-    0.002,
-    0.003,
-    0.005,
-    0.01,
-    0.02,
-    0.03,
-    0.04,
-    0.05,
-    0.1,
-    0.15,
-    0.2,
-    0.3,
-    0.4,
-    0.5,
-    0.75,
-    1.0,
-    2.0,
-    3.0,
-    4.0,
-)
-_REACH = 1.96  # standard errors of a 95 % interval
+_WIDEST = 5.0
+"""The greatest ratio of the end of an interval to the value, or of the value to it; beyond it there is an arrow."""
+_TICKS = [n / 1000 for n in (1, 2, 3, 5, 10, 20, 30, 40, 50, 100, 150, 200, 300, 400, 500, 750, 1000, 2000, 3000, 4000)]
+"""The relative deviations that may be labelled."""
+_STANDARD_ERRORS = 1.96
+"""Half the width of a 95 % interval in standard errors."""
 
 
 def plot_thrust(figure: Figure, results: Identification, fit: ThrustFit) -> None:
-    """Force over command, and the curve of the vehicle where recordings have moved it away from the fit."""
+    """Plot force over command, and the curve of the vehicle if recordings have moved it away from the fit."""
     rov = results.vehicle.rov
     curve = next(curve for curve in rov.layout.curves if curve.name == fit.curve.name)
     moved = curve != fit.curve or not all(np.isclose(rov[name], value, rtol=1e-9) for name, value in fit.values.items())
@@ -55,7 +37,7 @@ def plot_thrust(figure: Figure, results: Identification, fit: ThrustFit) -> None
 
 
 def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> None:
-    """Thrust at measured V_ss: the drag that the vehicle takes, and the fit to these forces alone as in (11)-(16)."""
+    """Plot the thrust at each measured V_ss, the drag of the vehicle, and the fit to these forces alone, (11)-(16)."""
     assert result.drag
     axis, load, rov = result.axis, pretty_unit(result.axis.load), results.vehicle.rov
     above, below, v = _fitted(figure, result.drag, 1.0, "grey", "fit to these forces")
@@ -70,7 +52,7 @@ def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> No
 
 
 def _fitted(figure: Figure, fit: CurveFit, scale: float, color: str, label: str) -> tuple[Axes, Axes, Array]:
-    """Both parts of the plot of a fit, and over which numbers it is drawn."""
+    """Draw a fit and its residuals. Returns both parts of the plot, and the numbers over which the fit is drawn."""
     above, below = _two(figure)
     x = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
     _band(above, scale * x, *fit.band(x), color)
@@ -84,7 +66,7 @@ def _fitted(figure: Figure, fit: CurveFit, scale: float, color: str, label: str)
 def plot_response(
     figure: Figure, results: Identification, result: AxisResult, quantity: str, comparison: Comparison | None
 ) -> None:
-    """V_ss or Tau over command, signs dropped, and below the relative errors."""
+    """Plot the size of V_ss or Tau over that of the command, and the relative errors below."""
     axis, points, which = result.axis, comparison.points if comparison else (), int(quantity == "Tau")
     above, below = _two(figure) if points else (figure.subplots(), None)
     at = [abs(p.command) for p in points] or list(results.vehicle.command_range)
@@ -106,7 +88,7 @@ def plot_response(
     if comparison and below:
         x, y = 100.0 * np.array(at), np.array([abs(p.value) for p in points])
         counts = np.array([p.weight > 0.0 for p in points])
-        errors = _REACH * np.array([p.error or 0.0 for p in points])
+        errors = _STANDARD_ERRORS * np.array([p.error or 0.0 for p in points])
         _bars(above, x, y, errors)
         _dots(above, x, y, counts, label="measured")
         off = np.abs(comparison.model) / y
@@ -118,7 +100,7 @@ def plot_response(
 
 
 def plot_steps(figure: Figure, results: Identification, result: AxisResult) -> None:
-    """Steps of the command from rest, up to four, with what was measured of them; signs dropped."""
+    """Plot the size of the velocity after up to four steps of the command from rest, with the measured points."""
     tested = sorted({round(abs(p.command), 6) for p in result.points})
     steps = []
     for command in evenly(tested):
@@ -131,7 +113,7 @@ def plot_steps(figure: Figure, results: Identification, result: AxisResult) -> N
 
 
 def plot_known(figure: Figure, found: Sequence[Known]) -> None:
-    """The intervals of coefficients by their values, side by side; an arrow where one goes beyond the plot."""
+    """Plot the intervals of coefficients relative to their values. An arrow marks an interval beyond the plot."""
     ax: Axes = figure.subplots()
     ends = [abs(log(max(end, 1.0 / _WIDEST))) for k in found for end in k.relative or ()]
     reach = min(max([1.15 * end for end in ends], default=0.0), log(_WIDEST)) or log(_WIDEST)
@@ -163,27 +145,32 @@ def plot_known(figure: Figure, found: Sequence[Known]) -> None:
 
 
 def _ticks(sizes: Sequence[float], reach: float) -> Iterator[float]:
-    """The outermost within reach, and one nearer to the middle."""
-    places = {size: abs(log(1.0 + size)) for size in sizes}
-    inside = [size for size in sizes if places[size] <= reach]
-    yield from inside[-1:]
-    yield from [size for size in inside if places[size] <= 0.55 * places[inside[-1]] and places[size] > 0.25 * reach][
-        -1:
-    ]
+    """Yield the outermost tick within reach, and one nearer to the middle."""
+    places = {size: place for size in sizes if (place := abs(log(1.0 + size))) <= reach}
+    if not places:
+        return
+    outermost = list(places)[-1]
+    yield outermost
+    nearer = [size for size, place in places.items() if 0.25 * reach < place <= 0.55 * places[outermost]]
+    if nearer:
+        yield nearer[-1]
 
 
 def _band(ax: Axes, x: Array, low: Array, high: Array, color: str) -> None:
+    """Draw a 95 % band if it is finite."""
     if np.isfinite(low).all() and np.isfinite(high).all():
         ax.fill_between(x, low, high, color=LIGHT[color], alpha=0.18, linewidth=0.0, label="95 %")
 
 
-def _two(figure: Figure, heights: tuple[float, float] = (2.6, 1.0)) -> tuple[Axes, Axes]:
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=heights)
+def _two(figure: Figure) -> tuple[Axes, Axes]:
+    """Return a plot, and a lower one below it for residuals."""
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.6, 1.0))
     below.axhline(0.0, color=LIGHT["muted"], linewidth=0.8)
     return above, below
 
 
 def _finish(above: Axes, below: Axes | None, title: str, x: str, y: str) -> None:
+    """Add title, labels and legend; the residuals have symmetric limits."""
     above.set_title(title, loc="left")
     (below or above).set_xlabel(x)
     above.locator_params(nbins=6)
@@ -196,7 +183,7 @@ def _finish(above: Axes, below: Axes | None, title: str, x: str, y: str) -> None
 
 
 def _dots(ax: Axes, x: Array, y: Array, counts: Flags, label: str = "") -> None:
-    """Points that count are filled."""
+    """Draw points: those that count are filled, those of weight 0 are hollow."""
     for which, face, name in ((counts, LIGHT["orange"], label), (~counts, "none", label and f"{label}, weight 0")):
         if which.any():
             ax.plot(
@@ -212,11 +199,11 @@ def _dots(ax: Axes, x: Array, y: Array, counts: Flags, label: str = "") -> None:
 
 
 def _bars(ax: Axes, x: Array, y: Array, errors: Array) -> None:
-    """Intervals of points, where they are known."""
+    """Draw the intervals of points whose error is known."""
     if (there := errors > 0.0).any():
         ax.errorbar(x[there], y[there], errors[there], fmt="none", ecolor=LIGHT["orange"], elinewidth=1.1, capsize=2.0)
 
 
 def _diamonds(ax: Axes, x: Array, y: Array) -> None:
-    """Leave-one-thrust-out."""
+    """Draw the leave-one-thrust-out predictions or residuals."""
     ax.plot(x, y, "D", color=LIGHT["violet"], markerfacecolor="none", markersize=4.0, zorder=4)

@@ -1,8 +1,8 @@
-"""Figures 5-9 and 11 of the paper, redrawn as far as it prints their data: `rov-fmu figures docs`.
+"""Redraw Figures 5-9 and 11 of the paper as far as it prints their data: `rov-fmu figures docs`.
 
-Its curves are those of the printed equations. Of the points only V_ss and Tau are printed (Tables 3-7); the force at a
-measured velocity is that of the thrust curve, (11)-(13). The forces behind the thrust curves (Figures 4-6) and every
-recording (Figures 3, 10, 11) are not printed, and not drawn.
+The curves are those of the printed equations. The only printed points are V_ss and Tau (Tables 3-7); the force at a
+measured velocity is that of the thrust curve, (11)-(13). The forces behind the thrust curves (Figures 4-6) and all
+recordings (Figures 3, 10, 11) are not printed, so they are not drawn.
 """
 
 from decimal import Decimal
@@ -42,7 +42,7 @@ _NOT_PRINTED = (
 
 
 def write_figures(folder: Path) -> list[Path]:
-    """Write the figures as one SVG file, and V_ss of the three axes as another. Raises WriteError."""
+    """Write an SVG file with the figures and one with V_ss of the three axes; return their paths. Raises WriteError."""
     vehicle = load_vehicle(VIDEORAY)
     pictures = {
         NAME: svg_file(partial(_draw, vehicle=vehicle), _SIZE, salt=NAME) + "\n",
@@ -87,7 +87,7 @@ def _drag(ax: Axes, k: Rov, table: ResponseTable, title: str) -> None:
 def _steps(ax: Axes, k: Rov, table: ResponseTable, title: str) -> None:
     axis = table.axis
     draw_steps(ax, axis, [measured_step(table, Decimal(command)) for command in _STEPS], [(untuned(k), "--"), (k, "-")])
-    if axis is not SURGE:  # there it would stand in the way
+    if axis is not SURGE:  # in the plot of surge the legend would hide the curves
         for look, label in (("--", "non-linear"), ("-", "scaled"), (":", "measured $V_{ss}$"), ("o", "measured $Tau$")):
             ax.plot([], [], look, color=LIGHT["muted"], markersize=5.0, label=label)
     finish(ax, title, "time (s)", f"${axis.velocity}$ ({axis.unit})", where="lower right")

@@ -1,4 +1,4 @@
-"""The plots of recordings: measured, modelled and predicted velocity, the residuals, and one step close up."""
+"""The plots of recordings: measured, modelled and predicted velocity, the residuals, and one step in detail."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -17,16 +17,22 @@ from rov_fmu.report.templates import text
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.smoothing import velocity, without_spikes
 
-_BINS = 300  # of a recording: as many as one can see
-_BEFORE = 1.0  # s, of a step
-_WINDOWS = (0.2, 0.3, 0.5, 0.8, 1.2)  # s
-_STILL = 0.02  # of a change of velocity: noise that does not hide it
-_SETTLED = 0.3  # s, within which a command that is ramped has changed
-_FROM_REST = 1.25  # how much better a step from rest shows a delay
+_BINS = 300
+"""The parts of a recording in which residuals are summarised; more of them cannot be seen in the plot."""
+_BEFORE = 1.0
+"""The time shown before a step, s."""
+_WINDOWS = (0.2, 0.3, 0.5, 0.8, 1.2)
+"""The windows for smoothing a step, s."""
+_VISIBLE = 0.02
+"""The noise that does not hide a change of velocity, as a part of that change."""
+_SETTLED = 0.3
+"""The time within which a ramped command has changed, s."""
+_FROM_REST = 1.25
+"""The factor by which a step from rest is preferred, because it shows a delay better."""
 
 
 def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -> None:
-    """Velocity of a recording, of the model, and as predicted unseen; below the residuals of the measured samples."""
+    """Plot the measured, modelled and predicted velocity of a recording, and the residuals of its samples below."""
     recording, axis = simulation.recording, result.axis
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
     below.axhline(0.0, color=LIGHT["muted"], linewidth=0.8)
@@ -64,23 +70,24 @@ def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -
 
 
 def measured(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]:
-    """Velocity as the sensor tells it, smoothed over a window (s), on even times."""
+    """Return evenly spaced times and the measured velocity at them, smoothed over a window (s)."""
     values, is_position = without_spikes(simulation.measured), simulation.recording.is_position
     return velocity(simulation.time, values, is_position=is_position, window=window)
 
 
 def modelled(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]:
-    """What the sensor would tell of the model, smoothed alike."""
+    """Return evenly spaced times and the velocity that the sensor would measure of the model, smoothed the same."""
     is_position = simulation.recording.is_position
     return velocity(simulation.time, simulation.modelled, is_position=is_position, window=window)
 
 
 def _legend(ax: Axes) -> None:
-    """Above the plot, clear of what it holds."""
+    """Put the legend above the plot, where it hides nothing."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, columnspacing=1.2)
 
 
 def _thin(time: Array, values: Array) -> tuple[Array, Array]:
+    """Return as many samples as can be seen in the plot."""
     some = slice(None, None, max(1, len(time) // (2 * _BINS)))
     return time[some], values[some]
 
@@ -94,22 +101,23 @@ class CommandStep:
 
     simulation: Simulation
     at: float
-    """s, the time of the recording."""
+    """The time of the change in the recording, s."""
     strength: float
-    """N or N m by which the push changes along the axis, more for a step from rest."""
+    """The change of the force or torque along the axis, N or N m; a step from rest counts more."""
     words: str
-    """From what to what."""
+    """The command (or force) before and after the change."""
     Tau: float
-    """s, about, of what follows."""
+    """The approximate time constant of the response, s."""
 
 
 def clearest_step(fit: RecordingsFit) -> CommandStep | None:
-    """The strongest step of the recordings of an axis, one from rest rather; None where there is none."""
+    """Return the strongest step in the recordings of an axis, preferably one from rest; None if there is no step."""
     found = [step for s in fit.simulations if (step := _strongest(s, fit.rov))]
     return max(found, key=lambda step: step.strength, default=None)
 
 
 def _strongest(simulation: Simulation, rov: Rov) -> CommandStep | None:
+    """Return the strongest step in a recording, or None if there is no step far enough from its ends."""
     recording, axis = simulation.recording, simulation.recording.axis
     data = prepare(recording, rov)
     curves = [curve for curve in rov.layout.curves if any(t.curve == curve.name for t in rov.layout.drivers(axis))]
@@ -133,10 +141,10 @@ def _strongest(simulation: Simulation, rov: Rov) -> CommandStep | None:
 
 
 def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
-    """Velocity from a second before a change of the command to three time constants after it, and the fitted delay."""
+    """Plot the velocity around a change of the command, up to three time constants after it, and the fitted delay."""
     axis = result.axis
-    late = result.recordings.delay_of(step.simulation.recording.file) if result.recordings else 0.0
-    low, high = -_BEFORE, max(3.0 * step.Tau, _BEFORE) + max(late, 0.0)
+    delay = result.recordings.delay_of(step.simulation.recording.file) if result.recordings else 0.0
+    low, high = -_BEFORE, max(3.0 * step.Tau, _BEFORE) + max(delay, 0.0)
     ax: Axes = figure.subplots()
     ax.axvline(0.0, color=LIGHT["muted"], linewidth=1.2)
     ax.text(
@@ -149,9 +157,9 @@ def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
         va="top",
         color=LIGHT["muted"],
     )
-    if late:
-        label = f"delay {text(late, '.2f')} s"
-        ax.axvspan(0.0, late, facecolor=LIGHT["violet"], edgecolor="none", alpha=0.25, zorder=0, label=label)
+    if delay:
+        label = f"delay {text(delay, '.2f')} s"
+        ax.axvspan(0.0, delay, facecolor=LIGHT["violet"], edgecolor="none", alpha=0.25, zorder=0, label=label)
     window = _window(step.simulation)
     for (time, v), color, width, label in (
         (measured(step.simulation, window), "orange", 2.6, "measured"),
@@ -168,11 +176,11 @@ def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
 
 
 def _window(simulation: Simulation) -> float:
-    """The shortest window (s) in which noise does not hide a step of the velocity."""
+    """Return the shortest smoothing window (s) with which noise does not hide the changes of the velocity."""
     from scipy.signal import savgol_coeffs
 
     rate = (len(simulation.time) - 1) / float(simulation.time[-1] - simulation.time[0])
-    visible = _STILL * float(np.ptp(simulation.velocity))
+    visible = _VISIBLE * float(np.ptp(simulation.velocity))
     for window in _WINDOWS[:-1]:
         n = max(2 * int(0.5 * window * rate) + 1, 5)
         kernel = savgol_coeffs(n, 3, deriv=int(simulation.recording.is_position), delta=1.0 / rate)

@@ -1,4 +1,4 @@
-"""The plot that all pages share: steps of the command from rest, modelled and measured."""
+"""Plots that the pages share: thrust curves, and steps of the command from rest, modelled and measured."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -20,41 +20,41 @@ from rov_fmu.vehicle.vehicle import Vehicle
 Number = TypeVar("Number", float, Decimal)
 
 LINES = ("teal", "blue", "violet", "orange")
-"""Colours of lines beside each other."""
+"""The colours of the lines in a plot, by role."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """A held command (fraction of full thrust) from rest, and what was measured of its response."""
+    """A command (fraction of full thrust) that is held from rest, and the measurements of the response."""
 
     command: float
     V_ss: Sequence[float] = ()
+    """The measured steady velocities, m/s or rad/s."""
     Tau: Sequence[float] = ()
+    """The measured time constants, s."""
 
 
 def measured_step(table: ResponseTable | None, command: Decimal) -> Step:
-    """A command (%) and what the published table has of it."""
+    """Return the step to a command (%) with the measurements in the published table."""
     rows = [row.scaled for row in table.rows if row.command == command] if table else []
-    V_ss, Tau = (
-        [float(cell.measured) for cell in cells if cell.measured is not None]
-        for cells in ([row.V_ss for row in rows], [row.Tau for row in rows])
-    )
+    V_ss = [float(row.V_ss.measured) for row in rows if row.V_ss.measured is not None]
+    Tau = [float(row.Tau.measured) for row in rows if row.Tau.measured is not None]
     return Step(float(command) / 100.0, V_ss, Tau)
 
 
 def evenly(commands: Sequence[Number]) -> list[Number]:
-    """Up to four of the commands, evenly from the first to the last."""
+    """Return up to four of the commands, evenly spaced from the first to the last."""
     last = len(LINES) - 1
     return sorted({commands[round((len(commands) - 1) * n / last)] for n in range(last + 1)})
 
 
 def tables_by_axis(vehicle: Vehicle) -> dict[str, ResponseTable]:
-    """The published tables of a vehicle by axis, none without a data folder. Raises DataFileError."""
+    """Return the published tables of a vehicle by axis; there are none without a data folder. Raises DataFileError."""
     return {table.axis.name: table for table in load_tables(vehicle)} if vehicle.data else {}
 
 
 def held_commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Decimal]:
-    """Up to four commands (%) for the step responses: those that all tables hold, else tens across the range."""
+    """Return up to four commands (%) for the step responses: commands of all tables, or else multiples of 10."""
     rows = [{row.command for row in table.rows} for table in tables]
     common = sorted(set.intersection(*rows)) if rows else []
     if len(common) < 2:
@@ -67,7 +67,7 @@ def held_commands(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> list[Dec
 def finish(
     ax: Axes, title: str, x: str, y: str = "", where: Literal["upper left", "lower right"] = "upper left"
 ) -> None:
-    """Labels, title, legend; the axes begin at 0, as far as the data let them."""
+    """Add labels, title and legend. The axes begin at 0 if no value is below."""
     ax.set(xlabel=x, ylabel=y)
     ax.set_xlim(left=0.0)
     if ax.dataLim.y0 >= 0.0:
@@ -79,7 +79,7 @@ def finish(
 
 
 def draw_curve(ax: Axes, rov: Rov, curve: Curve) -> None:
-    """Steady thrust of a thruster over its command, reverse and dead band as they are."""
+    """Plot the steady thrust of a thruster over its command, with reverse and the dead band."""
     commands = {n / 50.0 for n in range(-50, 51)}
     if "c_0" in curve.keys:
         ends = -rov[curve.coefficient("c_0_reverse")], rov[curve.coefficient("c_0")]
@@ -110,8 +110,10 @@ def after_step(rov: Rov, axis: Axis, command: float, times: Sequence[float]) -> 
 
 
 def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tuple[Rov, str]]) -> None:
-    """Velocity after steps of the command, of every model (the last is the one to label): measured V_ss are dotted
-    lines, measured Tau points at 1 - 1/e of it."""
+    """Plot the velocity after steps of the command for every model, and label the last one.
+
+    A measured V_ss is a dotted line, and a measured Tau is a point at 1 - 1/e of it.
+    """
     Taus = [models[-1][0].response(axis, step.command)[1] for step in steps]
     Taus += [Tau for step in steps for Tau in step.Tau]
     end = ceil(3.3 * max((Tau for Tau in Taus if isfinite(Tau)), default=3.0))

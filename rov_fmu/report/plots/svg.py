@@ -1,4 +1,4 @@
-"""Plots as SVG: the same bytes at every call, in the colours and the type of the page that they stand in."""
+"""Plots as SVG, in the colours and fonts of the page that holds them. The bytes are the same at every call."""
 
 import base64
 import re
@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 
 from rov_fmu.io.picture import read_svg
 
-# Role: colour on a light and on a dark page. In a page a plot refers to the role, so it follows the page.
 PALETTE = {
     "page": ("#fcfdfe", "#11171d"),
     "panel": ("#f1f5f9", "#1a222b"),
@@ -32,6 +31,7 @@ PALETTE = {
     "steel": ("#22303d", "#4d6172"),
     "metal": ("#5d6f7e", "#8497a6"),
 }
+"""The colours on a light and on a dark page, by role. A plot in a page refers to the role, so it follows the page."""
 LIGHT = {role: light for role, (light, _) in PALETTE.items()}
 _FONTS = "system-ui, sans-serif"
 _STYLE: Any = {
@@ -67,21 +67,21 @@ Draw = Callable[[Figure], None]
 
 
 def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
-    """A plot as part of a page, named for readers of screens. No other plot of the page has this label."""
+    """Return a plot as part of a page, with a label for screen readers. The labels of a page must differ."""
     return inline(label, svg_file(draw, size, salt=label, background="none", margin=0.02))
 
 
 def image(label: str, path: Path) -> Markup:
-    """An SVG file from elsewhere as an image of a page: there no script runs, and nothing in it leads elsewhere.
+    """Return an SVG file from elsewhere as an image, in which no script runs and no link works. Raises FileError.
 
-    Its place in the page is light, for a file knows nothing of the page's colours. Raises FileError.
+    The page shows it on a light ground, because the file does not follow the colours of the page.
     """
     data = base64.b64encode(read_svg(path)).decode()
     return Markup('<img src="data:image/svg+xml;base64,{}" alt="{}">').format(data, label)
 
 
 def inline(label: str, svg: str) -> Markup:
-    """An SVG document as part of a page: named, in the colours of the page where they are those of the palette."""
+    """Return an SVG document as part of a page, with a label; colours of the palette become those of the page."""
     head = f'role="img" aria-label="{escape(label)}">'
     svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', lambda found: f"<svg {found[1]} {head}", svg, count=1)
     svg = svg.replace(f"font-family:{_FONTS};", "")
@@ -93,7 +93,7 @@ def inline(label: str, svg: str) -> Markup:
 def svg_file(
     draw: Draw, size: tuple[float, float], *, salt: str, background: str = "white", margin: float = 0.1
 ) -> str:
-    """A figure (size in inches) as SVG, whatever the user's Matplotlib is set to."""
+    """Return a figure (size in inches) as SVG, independent of the user's settings of Matplotlib."""
     svg = saved(draw, size, background=background, margin=margin, salt=salt, format="svg", metadata={"Date": None})
     return _without_ballast(svg).replace("'DejaVu Sans'", _FONTS)
 
@@ -101,7 +101,7 @@ def svg_file(
 def saved(
     draw: Draw, size: tuple[float, float], *, background: str, margin: float, salt: str = "", **how: Any
 ) -> bytes:
-    """A figure (size in inches) as Matplotlib saves it, in the one style; `how` tells it the format."""
+    """Return a figure (size in inches) as Matplotlib saves it, in the common style; `how` says in which format."""
     file = BytesIO()
     margins = {f"figure.constrained_layout.{side}_pad": margin for side in "wh"}
     with style.context(["default", _STYLE, {"svg.hashsalt": salt, **margins}]):
@@ -113,7 +113,7 @@ def saved(
 
 
 def _arrange(figure: Figure, form: str) -> None:
-    """Lay it out as it is saved; where that is left to Matplotlib, it draws all of it once more."""
+    """Lay the figure out for a format. Otherwise Matplotlib would do it while saving, and draw everything twice."""
     if form == "svg":
         FigureCanvasSVG(figure)
         figure.dpi = 72.0  # as SVG is drawn
@@ -124,7 +124,7 @@ def _arrange(figure: Figure, form: str) -> None:
 
 
 def _without_ballast(svg: bytes) -> str:
-    """The same picture without metadata, groups and ids that nothing refers to, and digits that no one sees."""
+    """Return the picture without metadata, unused groups and ids, and digits that nobody can see."""
     parser = etree.XMLParser(remove_comments=True, remove_blank_text=True)
     root = etree.fromstring(svg, parser)
     root.set("stroke-linejoin", "round")
@@ -153,6 +153,6 @@ def _without_ballast(svg: bytes) -> str:
 
 
 def _rounded(text: str) -> str:
-    """Coordinates to a fiftieth of a point."""
+    """Round the coordinates in a text to two decimals."""
     text = re.sub(r"-?\d+\.\d+", lambda x: f"{float(x[0]):.2f}".rstrip("0").rstrip("."), text)
     return " ".join(text.split())

@@ -1,4 +1,4 @@
-"""The command `rov-fmu simulate`: what its options mean, and what it writes and prints."""
+"""The command `rov-fmu simulate`: the meaning of its options, the files that it writes, and what it prints."""
 
 from collections.abc import Sequence
 from io import BytesIO, StringIO
@@ -8,25 +8,29 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.interface.arguments import TIME
+from rov_fmu.interface.arguments import TIME, Array
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import FileError, InputError, did_you_mean, shown
-from rov_fmu.io.output import Output, check_targets
+from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.time_series import Series, series
 from rov_fmu.report.console import console, table
 
-STOP, STEP = 10.0, 0.01
-"""The default end of a simulation and the time between two results, s: those of the FMU's default experiment."""
-_SHORTEST = 1e-6  # s
-_MOST_TIMES = 1_000_000
-_TABLES, _PICTURES = (".csv", ".parquet"), (".png", ".svg", ".pdf")
+_STOP, _STEP = 10.0, 0.01
+"""The default end of a simulation and the default time between two results, s, as in the FMU's default experiment."""
+_SHORTEST = 1e-6
+"""The shortest simulation, s."""
+_MOST_RESULTS = 1_000_000
+_TABLE_SUFFIXES, _PLOT_SUFFIXES = (".csv", ".parquet"), (".png", ".svg", ".pdf")
 
 
-def check_targets_of(output: Path | None, plot: Path | None, inputs: Sequence[Path]) -> None:
-    """Raise InputError about a file to write whose suffix does not say how, or WriteError if it cannot be written."""
-    for option, path, suffixes in (("--output", output, _TABLES), ("--plot", plot, _PICTURES)):
+def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]) -> None:
+    """Check the paths of the table and of the plot before the simulation.
+
+    Raises InputError if the suffix of a path is not that of a known format, and WriteError if it cannot be written.
+    """
+    for option, path, suffixes in (("--output", output, _TABLE_SUFFIXES), ("--plot", plot, _PLOT_SUFFIXES)):
         if path and path.suffix.lower() not in suffixes:
             raise InputError(f"{option} {path}: the name must end with {', '.join(suffixes[:-1])} or {suffixes[-1]}")
     check_targets(filter(None, (output, plot)), inputs)
@@ -38,9 +42,10 @@ def run(
     """Simulate a vehicle as the options say. Raises InputError, FileError, BuildError."""
     inputs: dict[str, Any] = {}
     if commands:
-        times, *columns = _read_commands(commands, vehicle).items()
-        inputs = {TIME: times[1], **dict(columns)}
-        stop = times[1][-1] if stop is None else stop
+        (_, times), *columns = _read_commands(commands, vehicle).items()
+        inputs = {TIME: times, **dict(columns)}
+        if stop is None:
+            stop = times[-1]
         if stop < _SHORTEST:
             raise FileError(
                 f"{commands}: the last time is {stop:g} s, and must be at least {_SHORTEST:g}, without --stop"
@@ -51,16 +56,26 @@ def run(
     for name, value in _read_settings(settings, [*layout.inputs, *layout.state, *layout.coefficients]).items():
         if name in inputs:
             raise InputError(f"--set {name}: {commands} has this input, too")
-        (inputs if name in layout.inputs else start if name in layout.state else coefficients)[name] = value
-    end, step = STOP if stop is None else stop, STEP if step is None else step
-    if end / step > _MOST_TIMES:
-        raise InputError(f"--step {step:g}: gives more than {_MOST_TIMES} results up to {end:g} s")
-    time = np.round(step * np.arange(int(end / step) + 2), 12)  # 0.3, and not 3 * 0.1 = 0.30000000000000004
-    time = np.append(time[time < end - 1e-9], end)
+        if name in layout.inputs:
+            inputs[name] = value
+        elif name in layout.state:
+            start[name] = value
+        else:
+            coefficients[name] = value
+    time = _result_times(_STOP if stop is None else stop, _STEP if step is None else step)
     return vehicle.with_(**coefficients).simulate(time, inputs, start=start)
 
 
+def _result_times(stop: float, step: float) -> Array:
+    """Return the times of the results: round multiples of the step, and the end. Raises InputError."""
+    if stop / step > _MOST_RESULTS:
+        raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
+    time = np.round(step * np.arange(int(stop / step) + 2), 12)  # 0.3, and not 3 * 0.1 = 0.30000000000000004
+    return np.append(time[time < stop - 1e-9], stop)
+
+
 def _read_settings(settings: Sequence[str], names: Sequence[str]) -> dict[str, float]:
+    """Return the values of the options --set by name. Raises InputError."""
     found: dict[str, float] = {}
     for text in settings:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -96,8 +111,18 @@ def _read_commands(path: Path, vehicle: VehicleModel) -> Series:
     return series(read_text(path), error, check_column)
 
 
-def table_output(result: Result, path: Path) -> Output:
-    """Return the file of a result: a column for the time and one for each variable. Raises InputError."""
+def write_results(result: Result, table: Path | None, plot: Path | None) -> None:
+    """Write a result as a table and as a plot, if there are paths for them. Raises InputError, WriteError."""
+    outputs = []
+    if table:
+        outputs.append(_table_output(result, table))
+    if plot:
+        outputs.append(_plot_output(result, plot))
+    write_whole(*outputs)
+
+
+def _table_output(result: Result, path: Path) -> Output:
+    """Return the table of a result: a column for the time and one for each variable. Raises InputError."""
     if path.suffix.lower() == ".parquet":
         try:
             import pyarrow  # noqa: F401
@@ -115,8 +140,8 @@ def table_output(result: Result, path: Path) -> Output:
     return Output(path, text.getvalue().encode())
 
 
-def plot_output(result: Result, path: Path) -> Output:
-    """Return the plot of a result as a file."""
+def _plot_output(result: Result, path: Path) -> Output:
+    """Return the plot of a result, in the format of the path's suffix."""
     from matplotlib.figure import Figure
 
     picture = BytesIO()
@@ -125,7 +150,7 @@ def plot_output(result: Result, path: Path) -> Output:
 
 
 def print_final(vehicle: VehicleModel, result: Result) -> None:
-    """Print the values at the end."""
+    """Print the values at the end as a table."""
     found = table(f"{vehicle.name} after {result.time[-1] - result.time[0]:g} s", "variable", ["value"], ["unit"])
     for name, values in result.items():
         found.add_row(name, f"{values[-1]:.6g}", "" if result.units[name] == "1" else result.units[name])

@@ -1,0 +1,66 @@
+"""The command `rov-fmu identify`: from a folder of tank tests to the vehicle file and the report."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rov_fmu.identify import identify
+from rov_fmu.identify.identification import Identification
+from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
+from rov_fmu.io.output import Output, check_targets, write_whole
+from rov_fmu.io.seal import check_replaced
+from rov_fmu.tank.tank_tests import load_tank_tests
+from rov_fmu.vehicle.writer import check_report, vehicle_output
+
+
+def identify_folder(
+    folder: Path, vehicle: Path | None, report: Path | None, *, force: bool, on_progress: Callable[[str, float], None]
+) -> tuple[Identification, list[str]]:
+    """Identify a vehicle from a folder of tank tests, and write its vehicle file and its report if they are asked for.
+
+    `force` allows to replace files that were not written by `identify`, or were changed since. `on_progress` is called
+    with the name of the next step and the share of work done. Returns the identification, and a line for each file
+    that was replaced. Raises FileError, and WriteError before the work begins if a file cannot be written.
+    """
+    replaced: list[str] = []
+    if vehicle and report:
+        check_report(vehicle, report)
+
+    def check_outputs(inputs: Sequence[Path]) -> None:
+        """Check the files to write as soon as the input files are known."""
+        targets = [path for path in (vehicle, report) if path]
+        check_targets(targets, inputs)
+        if vehicle:
+            check_written(vehicle, VEHICLE_FILE)
+        if report:
+            check_written(report, PAGE)
+        replaced.extend(check_replaced(targets, force=force))
+
+    tests = load_tank_tests(folder, check_outputs)
+    identification = identify.identify(tests, on_progress)
+    on_progress("each recording predicted by the others", 0.97)
+    for result in identification.axes:
+        result.held_out  # noqa: B018 (it is computed once, and here rather than when it is printed)
+    outputs = []
+    if report:
+        on_progress("drawing the report", 1.0)
+        outputs.append(_report_output(identification, report))
+    if vehicle:
+        outputs.append(_vehicle_output(identification, vehicle, report))
+    write_whole(*outputs)
+    return identification, replaced
+
+
+def _report_output(identification: Identification, path: Path) -> Output:
+    from rov_fmu.report.report import report_output  # imports Matplotlib, which takes a second
+
+    return report_output(identification, path)
+
+
+def _vehicle_output(identification: Identification, path: Path, report: Path | None) -> Output:
+    """Return the vehicle file, which names the report."""
+    vehicle = identification.vehicle
+    if report:
+        assert vehicle.provenance
+        vehicle = replace(vehicle, provenance=replace(vehicle.provenance, report=report))
+    return vehicle_output(vehicle, path)
