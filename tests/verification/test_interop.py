@@ -1,4 +1,4 @@
-"""Independent importers fly as `rov_fmu.model.rov` does, and the harness notices where one does not."""
+"""Independent importers agree with `rov_fmu.model.rov`, and the comparison notices when one does not."""
 
 import csv
 import re

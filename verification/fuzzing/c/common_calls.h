@@ -157,7 +157,7 @@ static void PLAY(GetReal)(slot *s)
     check_results("GetReal", CALL_AS(s, wanted, false, GetReal, s->f, vr, n, values AND(m)), values, m);
 }
 
-/* Return true when the standard allows to set a variable: FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and 4.2. */
+/* Return true when a variable may be set (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and 4.2). */
 static bool settable(const slot *s, unsigned place)
 {
     const variable_kind kind = VARIABLES[place].kind;
