@@ -111,7 +111,8 @@ def _show(outcomes: Sequence[Outcome], console: Console) -> None:
     console.print(table)
     for outcome in outcomes:
         if outcome.reason:
-            console.print(f"{outcome.importer.name} {outcome.verdict.value}, {outcome.vehicle}: {outcome.reason}")
+            reason = f"{outcome.importer.name} {outcome.verdict.value}, {outcome.vehicle}: {outcome.reason}"
+            console.print(reason, soft_wrap=True)  # so that a command in it can be copied
         for line in outcome.log.strip().splitlines()[-15:]:
             console.print(f"    {line}", markup=False)
 
