@@ -1,1 +1,1 @@
-"""What a user would build with the FMU."""
+"""Examples of what users build with the FMU."""

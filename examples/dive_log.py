@@ -22,11 +22,11 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from verification.references.pool import Array, swim
 
 LAG = 0.15
-"""s, of the thrusters."""
+"""The time constant of the thrusters (s)."""
 CURRENT = (0.06, -0.03)
-"""m/s, north and east."""
+"""The current north and east (m/s)."""
 DEPTH = 8.0
-"""m, where the dive begins."""
+"""The depth at the start of the dive (m)."""
 _RATE = 20  # Hz, of the attitude; commands, depth and velocity have half of it
 _BEGUN = 1_700_000_000.0  # s since 1970, of the first message
 _NEUTRAL, _SPAN = 1500, 400  # us, of a thruster's signal
@@ -46,24 +46,24 @@ _STICKS = ((0.4, 0.4, 4.0), (0.3, 0.3, 4.0), (0.55, 0.4, 5.0), (0.18, 0.18, 3.0)
 
 @dataclass(frozen=True, eq=False)
 class Dive:
-    """n samples, SI units: without noise, but as quantized as the outputs are."""
+    """n samples in SI units, without noise. The commands are quantized like the outputs of the autopilot."""
 
     time: Array
     outputs: Mapping[str, Array]
-    """us, by thruster."""
+    """The pulse width (us) by thruster."""
     motion: Mapping[str, Array]
-    """u, v, w, r through the water, x, y, z, psi."""
+    """u, v, w, r through the water, and x, y, z, psi."""
 
     @property
     def over_ground(self) -> Array:
-        """Velocity north, east and down, n x 3."""
+        """Return the velocity north, east and down, n x 3."""
         u, v, w, psi = (self.motion[name] for name in ("u", "v", "w", "psi"))
         c, s = np.cos(psi), np.sin(psi)
         return np.column_stack([c * u - s * v + CURRENT[0], s * u + c * v + CURRENT[1], w])
 
 
 def bluerov2() -> Rov:
-    """The vehicle in the water."""
+    """Return the simulated vehicle."""
     k = load_vehicle(SHIPPED["bluerov2"]).rov
     return k.replaced({"T_t200": LAG})
 
@@ -95,7 +95,7 @@ def _stick(random: np.random.Generator, n: int, ahead: float, back: float, hold:
 
 
 def write_log(path: Path, dived: Dive, seed: int = 0) -> None:
-    """Write the messages, each behind the time at which it arrived."""
+    """Write the messages, each after the time at which it arrived."""
     packer, random = mavlink.MAVLink(None, srcSystem=1, srcComponent=1), np.random.default_rng(seed)
     with path.open("wb") as file:
         for time, message in _messages(dived, random):
@@ -103,7 +103,7 @@ def write_log(path: Path, dived: Dive, seed: int = 0) -> None:
 
 
 def _messages(dived: Dive, random: np.random.Generator) -> Iterator[tuple[float, Any]]:
-    """All messages in their order, with sensors' noise."""
+    """Yield all messages in their order, with the noise of the sensors."""
     n = len(dived.time)
     noise = {name: spread * random.standard_normal(n) for name, spread in _NOISE.items()}
     heading = (dived.motion["psi"] + noise["psi"] + np.pi) % (2.0 * np.pi) - np.pi

@@ -1,4 +1,4 @@
-"""A system of FMUs as files for co-simulation tools: an SSP 1.0 archive, an OSP configuration beside the FMUs."""
+"""Write a system of FMUs for co-simulation tools, as an SSP 1.0 archive or as an OSP configuration."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,12 +8,12 @@ from zipfile import ZipFile
 from rov_fmu.io.templates import render
 
 PARAMETER_SET = "initial_values"
-"""The name of every component's parameter set: Ecos takes those of one name."""
+"""The name of every component's parameter set. Ecos uses the sets of one name."""
 
 
 @dataclass(frozen=True)
 class Component:
-    """An FMU, the values that it starts with, and its connectors."""
+    """An FMU, its start values and its connectors."""
 
     fmu: Path
     values: Mapping[str, float | bool]
@@ -23,20 +23,20 @@ class Component:
 
 @dataclass(frozen=True)
 class System:
-    """Components, stepped at once every `step` seconds until `stop`."""
+    """Components that are stepped together every `step` seconds until `stop`."""
 
     name: str
     components: Mapping[str, Component]
     step: float
     stop: float
     connections: Mapping[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
-    """From output to input: component and variable."""
+    """The connections from outputs to inputs, each given by component and variable."""
     groups: Sequence[str] = ()
-    """The same for OSP: variable groups that all components have."""
+    """The connections for OSP, between variable groups of the components."""
 
 
 def write_ssp(path: Path, system: System) -> None:
-    """Write the SSP archive: the structure, with one parameter binding a component, and the FMUs."""
+    """Write the SSP archive: the structure, with a parameter binding for each component, and the FMUs."""
     with ZipFile(path, "w") as archive:
         archive.writestr("SystemStructure.ssd", _render("SystemStructure.ssd.j2", system))
         for component in system.components.values():
@@ -44,7 +44,7 @@ def write_ssp(path: Path, system: System) -> None:
 
 
 def write_osp(path: Path, system: System) -> None:
-    """Write the OSP configuration; the FMUs and their OSP model descriptions stand beside it."""
+    """Write the OSP configuration. The FMUs and their OSP model descriptions are in the same folder."""
     path.write_text(_render("OspSystemStructure.xml.j2", system), encoding="utf-8")
 
 

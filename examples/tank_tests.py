@@ -58,9 +58,9 @@ OTTER = Rov(
         "beta_r": 0.45,
     },
 )
-"""What the tests are made of, and what an identification is to find."""
+"""The true coefficients, which an identification should find."""
 DELAY = 0.12
-"""s, from a command to the thrust."""
+"""The delay from a command to the thrust (s)."""
 
 # Of each axis: the thrusters that drive it, what is measured, its header, its noise, and from SI units to the header's.
 _SENSORS: Mapping[str, tuple[Axis, Mapping[str, float], str, str, float, float]] = {
@@ -119,14 +119,14 @@ def write_tests(folder: Path, seed: int = 0) -> None:
 
 
 def bollard_pull(curve: str, command: float) -> float:
-    """Force (N) of the thrusters of a curve together, at a command, of the vehicle held fast."""
+    """Return the force (N) of all thrusters of a curve at a command, while the vehicle is held."""
     end = "_reverse" if command < 0.0 else ""
     beyond = max(abs(command) - OTTER[f"c_0_{curve}"], 0.0)
     return float(np.sign(command) * (OTTER[f"a_t_{curve}{end}"] * beyond**2 + OTTER[f"b_t_{curve}{end}"] * beyond))
 
 
 def _log(name: str, plan: Sequence[tuple[int, float]], random: np.random.Generator) -> Array:
-    """Time (s), command (%) and what the sensor of an axis says, n x 3."""
+    """Return the time (s), the command (%) and the sensor's value of an axis, n x 3."""
     axis, pattern, symbol, _, noise, unit = _SENSORS[name]
     percent = np.concatenate([np.full(round(_RATE * hold), command) for command, hold in plan])
     time = np.arange(len(percent)) / _RATE

@@ -1,4 +1,4 @@
-"""The closed loop in three engines, and without one.
+"""The closed loop in three engines, and in a plain loop.
 
 All are Jacobi masters: at each communication point they pass on the outputs, then both FMUs step with what they got.
 So a command acts one step after the depth that it answers to.
@@ -97,7 +97,7 @@ def libcosim(folder: Path, parameters: str, *, osp: bool = False) -> Trajectory:
 
 
 def ecos(folder: Path, parameters: str) -> Trajectory:
-    """Ecos from the SSP archive; it takes the parameter sets of the name that it is given."""
+    """Run Ecos from the SSP archive. It uses the parameter sets of the given name."""
     from ecospy import EcosSimulation
 
     with EcosSimulation(ssp_path=str(system_files(folder, parameters)[0]), step_size=STEP) as simulation:
@@ -115,13 +115,13 @@ def _trajectory(rows: Sequence[Sequence[float]]) -> Trajectory:
 
 
 class Engine(NamedTuple):
-    """How to run the system, and the module to have for it."""
+    """A way to run the system, and the module that it needs."""
 
     run: Callable[[Path, str], Trajectory]
     module: str
 
     def missing(self) -> str:
-        """Why it cannot run here; empty where it can."""
+        """Return the reason why it cannot run here, or an empty text."""
         try:
             import_module(self.module)
         except (ImportError, OSError) as error:  # the module, or a library that it loads

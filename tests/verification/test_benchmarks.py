@@ -1,4 +1,4 @@
-"""The benchmark measures what it says: every method solves the same equations, as exactly as it should."""
+"""Every method of the benchmarks solves the same equations, with the accuracy that it should have."""
 
 import subprocess
 import sys
@@ -32,7 +32,7 @@ def plain_c(vehicle: Vehicle, tmp_path_factory: pytest.TempPathFactory) -> Plain
 
 
 class Small:
-    """All methods on a few commands: those that turn the motion back, and those that do not."""
+    """All methods on a few commands, with and without reversals."""
 
     def __init__(self, vehicle: Vehicle, plain_c: PlainC) -> None:
         self.work = Work(vehicle.rov, False, 1.0, COMMANDS, COMMANDS)

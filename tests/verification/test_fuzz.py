@@ -24,7 +24,7 @@ def corpus(tmp_path: Path) -> Path:
 
 
 NEVER = {2: {"fmi2GetStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus"}, 3: set[str]()}
-"""Legal and refused all the same: no step is ever pending."""
+"""The legal calls that are refused, because no step is ever pending."""
 MISSING = {
     2: {"fmi2CancelStep"},
     3: {
@@ -44,13 +44,13 @@ MISSING = {
 def test_the_corpus_reaches_every_function_and_finds_nothing(corpus: Path, tmp_path: Path, name: str, fmi: int) -> None:
     build_target(native_content(load_vehicle(command.VEHICLES[name]), fmi=fmi).sources, tmp_path / "target", fmi)
     counts = replay(tmp_path / "target", [corpus], tmp_path)
-    # FMI 3.0 has one kind of instances more
+    # FMI 3.0 has one more kind of instances.
     legal = {name for kind in range(fmi) for name in legal_modes(kind, fmi)}
     assert {name for name, accepted in +counts if accepted} == legal - NEVER[fmi]
     assert {name for name, accepted in +counts if not accepted} == legal | MISSING[fmi]
 
 
-# A line of C, what it is made into, and how the fuzzer tells.
+# A line of C, its defective replacement, and the report of the fuzzer.
 PLANTED = {
     "a bound is not looked at": (
         "instance.c",
@@ -260,7 +260,7 @@ def test_every_defect_has_a_place_to_be_planted() -> None:
     assert [name for name, (of, fmi, file, line, *_) in every if sources[of, fmi][file].count(line) != 1] == []
 
 
-# Two of each vehicle and version of FMI; all of them in the weekly tests.
+# Two defects of each vehicle and version of FMI; the weekly tests have all of them.
 _SOME = {name for planted in (PLANTED, PLANTED_IN_HEAVY, PLANTED_IN_FMI3) for name in (min(planted), max(planted))}
 
 

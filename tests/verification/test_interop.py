@@ -1,4 +1,4 @@
-"""Independent importers fly as `rov_fmu.model.rov` does, and the harness notices where one does not."""
+"""Independent importers agree with `rov_fmu.model.rov`, and the comparison notices when one does not."""
 
 import csv
 import re
@@ -190,7 +190,7 @@ def test_thrust_that_lags_has_a_tolerance_of_its_own(tmp_path: Path, tools: Path
     rows = [*manoeuvre.reference]
     rows[200] = rows[200] | {"w": rows[200]["w"] + 1e-7}
     program = COPY.format(source=str(write_result(tmp_path / "given.csv", rows)))
-    importer = replace(PRETEND, command=("{python}", "-c", program), late=1e-6)
+    importer = replace(PRETEND, command=("{python}", "-c", program), lagging_tolerance=1e-6)
     (tmp_path / "any.fmu").touch()
     expected = Verdict.AGREES if manoeuvre.vehicle == "bluerov2_heavy" else Verdict.DIFFERS
     assert run(importer, tmp_path / "any.fmu", tools, manoeuvre).verdict is expected

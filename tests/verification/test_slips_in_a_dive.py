@@ -1,4 +1,4 @@
-"""Slips are told from none where all axes move at once."""
+"""Slips are recognised in a dive in which all axes move at once."""
 
 from dataclasses import replace
 

@@ -1,1 +1,1 @@
-"""What is measured, with one command: python -m verification.benchmarks."""
+"""The benchmarks: python -m verification.benchmarks."""

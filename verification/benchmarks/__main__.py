@@ -1,4 +1,4 @@
-"""Measure what the FMU costs and how exact it is, beside other ways to the same motion, and print one table."""
+"""Measure the speed and the accuracy of the FMU and of other solvers, and print one table."""
 
 import sys
 import tempfile
@@ -28,16 +28,16 @@ from .work import Work
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is measured."""
+    """The numbers of repetitions and runs."""
 
     repetitions: int = 25
     commands: int = 16384
-    known: int = 64  # commands whose ends are compared with 50 digits
+    known: int = 64  # commands whose results are compared with 50 digits
     manoeuvres: int = 5  # repetitions of what Python steps
     runs: int = 100_000
     runs_in_fmpy: int = 2000
     loads: int = 20
-    study_runs: tuple[int, ...] = (10_000, 1000, 100_000)  # beside the runs alone, and few and many
+    study_runs: tuple[int, ...] = (10_000, 1000, 100_000)  # one that is compared with the runs alone, then few and many
     all_platforms: bool = True
 
 

@@ -1,4 +1,4 @@
-"""The archive: its size, and how long it takes to load and to build, with the compiler's cache empty and warm."""
+"""The archive: its size, its load time, and its build time with an empty and with a warm cache of the compiler."""
 
 import ctypes
 import os
@@ -17,7 +17,7 @@ _CACHES = ("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR")
 
 
 def build(output: Path, platforms: list[str]) -> tuple[int, float, float]:
-    """Build the FMU twice with the exporter's command line: bytes; seconds with an empty cache and after that."""
+    """Build the FMU twice. Return its size (bytes), and the seconds with an empty and with a warm cache."""
     command = [sys.executable, "-m", "rov_fmu", "build", "-o", str(output)]
     command += [word for name in platforms for word in ("--platform", name)]
     with tempfile.TemporaryDirectory(prefix="cache-", ignore_cleanup_errors=True) as cache:
@@ -29,8 +29,11 @@ def build(output: Path, platforms: list[str]) -> tuple[int, float, float]:
 
 
 def load(archive: Path, folder: Path, repetitions: int) -> list[float]:
-    """Load the archive again and again through FMPy. Seconds, medians: to unzip, to read the description, to load the
-    library and instantiate; of that, the library alone."""
+    """Load the archive repeatedly with FMPy. Return median times (s).
+
+    They are the times to unzip it, to read its description, to load the library and instantiate, and to load the
+    library alone.
+    """
     fmpy.extract(str(archive), str(folder))
     name = fmpy.read_model_description(str(folder)).coSimulation.modelIdentifier
     library = folder / "binaries" / fmpy.platform / f"{name}{fmpy.sharedLibraryExtension}"

@@ -20,7 +20,7 @@ _STEPS, _CHECKED = 200_000, 10
 
 @dataclass(frozen=True)
 class Runs:
-    """How many; how many a second, the median; the first ones' largest difference from the step in Python (SI)."""
+    """The number of runs, the median of runs per second, and the largest error of the first runs (SI units)."""
 
     count: int
     rate: float
@@ -28,7 +28,7 @@ class Runs:
 
 
 class Variations:
-    """Runs of 100 s, ten commands of 10 s, each with another α and β: within 30 % of the vehicle's."""
+    """Runs of 100 s with ten commands of 10 s. Each has its own α and β, within 30 % of the vehicle's."""
 
     def __init__(self, rov: Rov, count: int) -> None:
         self.rov, layout = rov, rov.layout
@@ -42,7 +42,10 @@ class Variations:
         )
 
     def error(self, ends: Reals) -> float:
-        """Compare the first runs with the step in Python, because the engine computes with the C that is measured."""
+        """Return the largest difference of the first runs from the step in Python.
+
+        The engine is no reference here, because it uses the C that is measured.
+        """
         exact = []
         for values in self.values[:_CHECKED].tolist():
             rov = self.rov.replaced(dict(zip(self.parameters, values, strict=True)))
@@ -54,12 +57,12 @@ class Variations:
 
 
 def instances(plain_c: PlainC, repetitions: int) -> Reals:
-    """For each of INSTANCES, stepped in turn, medians: seconds a step of 10 ms, bytes of memory each."""
+    """Return, for each number in INSTANCES, the median seconds per step of 10 ms and the bytes per instance."""
     return np.median([[plain_c.step_in_turn(n, _STEPS) for n in INSTANCES] for _ in range(repetitions)], axis=0)
 
 
 def in_c(plain_c: PlainC, variations: Variations, repetitions: int) -> Runs:
-    """The runs, a share of them in each repetition."""
+    """Measure the runs in C, a part of them in each repetition."""
     shares = np.array_split(variations.values, repetitions)
     found = [plain_c.run_each(variations.references, share, variations.work.array) for share in shares]
     rates = [len(share) / seconds for share, (seconds, _) in zip(shares, found, strict=True)]
@@ -68,7 +71,7 @@ def in_c(plain_c: PlainC, variations: Variations, repetitions: int) -> Runs:
 
 
 def through_fmpy(slave: FMU2Slave, variations: Variations, runs: int, repetitions: int) -> Runs:
-    """The first runs of the same, function by function."""
+    """Measure the first runs through FMPy's functions."""
     seconds: list[float] = []
     for _ in range(repetitions):
         ends = []

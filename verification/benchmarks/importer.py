@@ -25,7 +25,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 
 
 def restart(slave: FMU2Slave, references: Sequence[int] = (), values: Sequence[float] = ()) -> None:
-    """From the beginning, with parameters set."""
+    """Reset an instance, set parameters, and initialize it."""
     slave.reset()
     slave.setupExperiment(startTime=0.0)
     slave.setReal(references, values)
@@ -36,11 +36,11 @@ def restart(slave: FMU2Slave, references: Sequence[int] = (), values: Sequence[f
 def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, tuple[Reals, float]]:
     """Simulate the extracted FMUs in turn: commands that change every second, the state recorded every 10 ms.
 
-    Seconds of processor time in each repetition; the largest error of a state at the end (SI units).
+    Return the seconds of processor time in each repetition, and the largest error of a state at the end (SI units).
     """
     keep_loaded(folders[PYTHONFMU])
     end = flight(manoeuvre.rov, manoeuvre.sequence, manoeuvre.hold)[-1]
-    # two rows at each change, as FMPy wants them
+    # FMPy needs two rows at each change.
     rows = [((n + k) * manoeuvre.hold, *c.values()) for n, c in enumerate(manoeuvre.sequence) for k in (0, 1)]
     signals = np.array(rows, dtype=[("time", float), *((name, float) for name in manoeuvre.rov.layout.inputs)])
     seconds, errors = defaultdict(list), {}
@@ -65,10 +65,10 @@ def simulate(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> 
 
 
 def step_through(folders: Mapping[str, Path], manoeuvre: Work, repetitions: int) -> dict[str, Reals]:
-    """Seconds of processor time in each repetition for the same, with nothing but the functions of a step."""
+    """Return the seconds of processor time in each repetition when only the functions of a step are called."""
     slaves = {name: fmpy_slave(folder) for name, folder in folders.items()}
     seconds, rows = defaultdict(list), manoeuvre.array.tolist()
-    # both flavours have the same references
+    # Both FMUs have the same value references.
     description = fmpy.read_model_description(str(folders[NATIVE]))
     references = {variable.name: variable.valueReference for variable in description.modelVariables}
     commands, velocities = ([references[name] for name in names] for names in (manoeuvre.names, ("u", "w", "r")))

@@ -1,4 +1,4 @@
-"""The one table: sections that share five columns, and how numbers look in it."""
+"""The table of results: sections that share five columns, and the format of their numbers."""
 
 import os
 import platform
@@ -16,11 +16,11 @@ from rov_fmu.engine.compile import compiler
 _WIDTH = 118
 
 Section = Sequence[Sequence[str]]
-"""A title and headings of up to four columns; then rows, each of a name and its cells."""
+"""A title with the headings of up to four columns, then rows with a name and cells."""
 
 
 def print_sections(sections: Iterable[Section]) -> None:
-    """Print the table, as wide as it is where no terminal limits it."""
+    """Print the table. Without a terminal it is 118 characters wide."""
     table = Table(show_header=False, show_edge=False, box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column(min_width=46)
     for _ in range(4):
@@ -36,7 +36,7 @@ def print_sections(sections: Iterable[Section]) -> None:
 
 
 def digits(value: float, count: int = 3) -> str:
-    """So many significant digits, thousands apart."""
+    """Return a number with `count` significant digits and commas between thousands."""
     if value == 0.0:
         return "0"
     exponent = int(f"{value:.{count - 1}e}".partition("e")[2])
@@ -44,7 +44,7 @@ def digits(value: float, count: int = 3) -> str:
 
 
 def duration(seconds: float) -> str:
-    """In ns, µs, ms or s."""
+    """Return a duration in ns, µs, ms or s."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if seconds >= 0.9995 * size:
             return f"{digits(seconds / size)} {unit}"
@@ -52,12 +52,12 @@ def duration(seconds: float) -> str:
 
 
 def error(value: float) -> str:
-    """A power of ten and a digit."""
+    """Return an error as one digit and a power of ten."""
     return f"{value:.0e}".replace("e-0", "e-") if value else "0"
 
 
 def machine() -> str:
-    """The machine and what runs on it, in two lines."""
+    """Return two lines about the machine and its software."""
     model = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():

@@ -1,4 +1,4 @@
-"""The picture of docs/accuracy.md: cost against error of a held command, on logarithmic axes."""
+"""The picture of docs/accuracy.md: cost over error of a held command, on logarithmic axes."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""What is measured in plain C: built with the compiler of the FMU, and called in this process (Linux on x86-64)."""
+"""Measurements in plain C, built with the compiler of the FMU and called in this process (Linux on x86-64)."""
 
 import ctypes
 from ctypes import POINTER, byref, c_double, c_long, c_size_t, c_void_p
@@ -19,14 +19,14 @@ from verification.references.c_programs import compile_c
 from .taylor import Heyoka
 
 PLATFORM = "linux64"
-# as steps.py names them: the FMU, the same with its commands set before every step, both of FMI 3.0 too, its step
-# without FMI, the explicit methods, CVODE's
+# The methods: the FMU, and the FMU with its commands set before every step, in FMI 2.0 and 3.0; its step without FMI;
+# the explicit methods; the methods of CVODE.
 FMU, FMU_SET, FMU_3, FMU_3_SET = FMUS = ("fmu", "fmu-set", "fmu-3", "fmu-3-set")
 CORE, EULER, RK4 = "core", "euler", "rk4"
 HEYOKA = "heyoka"
 BDF, ADAMS = CVODE = ("bdf", "adams")
 _SOURCES = Path(__file__).with_name("c")
-# a library needs but a part of the FMU's sources; what replaces mallinfo came after the GLIBC that is linked here
+# A library uses only some functions of the FMU's sources. mallinfo's successor is newer than the GLIBC of this target.
 _FLAGS = (
     "-target",
     PLATFORMS[PLATFORM].target,
@@ -46,13 +46,12 @@ Reals = NDArray[np.float64]
 
 
 def measurable() -> bool:
-    """Whether that runs on this machine."""
+    """Return True when this machine can run the measurements."""
     return host_platform() == PLATFORM
 
 
 class PlainC:
-    """The FMU's shared library in both versions of FMI, and beside it the methods and what times them all, in a folder
-    of their own."""
+    """The FMU's shared library in both versions of FMI, and libraries with the other methods and the timing."""
 
     def __init__(self, vehicle: Vehicle, folder: Path) -> None:
         content = {fmi: native_content(vehicle, fmi=fmi) for fmi in (2, 3)}
@@ -79,7 +78,7 @@ class PlainC:
         self._heyoka = cache(lambda: Heyoka(vehicle.rov))
 
     def _new_solver(self, method: str, tolerance: float) -> tuple[Any, Any]:
-        """CVODE with the same relative and absolute tolerance, and its vector.
+        """Return a solver of CVODE with equal relative and absolute tolerances, and its vector.
 
         BDF: Newton's method with a dense matrix, as FMPy sets it up. Adams: fixed-point iteration.
         """
@@ -104,9 +103,9 @@ class PlainC:
     def hold(
         self, method: str, setting: float, h: float, steps: int, commands: Reals, start: Reals
     ) -> tuple[float, Reals]:
-        """Hold commands in turn, each for so many steps of h: seconds a step, and the end (all states).
+        """Hold each command for `steps` steps of h. Return seconds per step, and the final state.
 
-        `setting`: sub-steps, or the tolerance of CVODE.
+        `setting` is the number of sub-steps, or the tolerance of CVODE.
         """
         if method == HEYOKA:
             return self._heyoka().hold(h, steps, commands, start)
@@ -122,12 +121,12 @@ class PlainC:
         return 1e-9 * each, end
 
     def step_in_turn(self, instances: int, steps: int) -> tuple[float, float]:
-        """So many instances, so many steps of 10 ms in all: seconds a step, bytes of memory an instance."""
+        """Step instances in turn by 10 ms. Return seconds per step and bytes per instance."""
         memory = c_double()
         return 1e-9 * self._measure.step_in_turn(instances, steps // instances, byref(memory)), memory.value
 
     def run_each(self, references: list[int], values: Reals, commands: Reals) -> tuple[float, Reals]:
-        """A run of ten commands of 10 s for each row of start values: seconds, and where each ends."""
+        """Run ten commands of 10 s for each row of start values. Return the seconds and the final states."""
         ends = np.empty((len(values), self._states))
         vr = np.array(references, dtype=np.uint32)
         seconds = 1e-9 * self._measure.run_each(len(values), vr, len(vr), values, commands, ends)

@@ -1,4 +1,4 @@
-"""The sections of the table, of what was measured."""
+"""The sections of the table of results."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -24,10 +24,9 @@ _NAMES = {**_MORE, **_OURS, RK4: f"RK4, {_SUBSTEPS}", EULER: f"forward Euler, {_
 
 
 def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
-    """What a communication step costs (turning, straight, and straight ahead), and a held command of 1 s where all have
-    the same error."""
+    """Return the cost of a communication step (turning, straight, straight ahead), and of a command at equal error."""
     for straight in (False, True):
-        section = [[f"Velocities and pose, {_way(straight)}", *_STEPS]]
+        section = [[f"Velocities and pose, {_direction(straight)}", *_STEPS]]
         for method, tolerance in METHODS:
             name = _NAMES.get(method) or f"{NAMES[method]}, tolerance {error(tolerance)}"
             jobs = [plan.job(method, h, straight, tolerance) for h in H]
@@ -43,12 +42,12 @@ def plain_c(plan: Plan, measured: Measured) -> Iterator[Section]:
     yield [[f"A command of 1 s to {error(TARGET)}", "turning", "times ours"], *section]
 
 
-def _way(straight: bool) -> str:
+def _direction(straight: bool) -> str:
     return "straight" if straight else "turning"
 
 
 def heavy(plan: HeavyPlan, measured: Measured) -> Section:
-    """All states of a vehicle with coupling and lag."""
+    """Return the cost of a step of a vehicle with coupling and lag."""
     rows = {"ours, without FMI": plan.ours, _NAMES[RK4]: plan.rk4}
     return [
         ["BlueROV2 Heavy, coupling and lag", *_STEPS],
@@ -60,7 +59,7 @@ def heavy(plan: HeavyPlan, measured: Measured) -> Section:
 
 
 def taylor(plan: TaylorPlan, measured: Measured) -> Section:
-    """heyoka on the same system, and how many times the cost of ours its steps have."""
+    """Return the cost of heyoka on the same system, and its ratio to ours."""
     names = {CORE: _OURS[CORE], RK4: _NAMES[RK4], HEYOKA: "heyoka, loop in C++, thrust ahead and not timed"}
     section: list[list[str]] = [["Velocities and pose, turning one way", *_STEPS]]
     for method, jobs in plan.rows.items():
@@ -73,7 +72,7 @@ def taylor(plan: TaylorPlan, measured: Measured) -> Section:
 
 
 def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[str, Reals]) -> Section:
-    """The manoeuvre in an importer: as a user simulates it, and the functions of a step alone."""
+    """Return the cost of a manoeuvre in FMPy, simulated as a user does and by the functions of a step."""
 
     def row(name: str, seconds: Reals, native: Reals, end: str) -> list[str]:
         total = float(np.median(seconds))
@@ -90,7 +89,7 @@ def through_fmpy(simulated: Mapping[str, tuple[Reals, float]], stepped: Mapping[
 
 
 def instances(found: Reals) -> Section:
-    """Many instances, stepped in turn."""
+    """Return the cost of many instances that are stepped in turn."""
     return [
         ["Instances in turn, straight and down", *(f"{n:,}" for n in INSTANCES)],
         ["a step of 10 ms", *map(duration, found[:, 0])],
@@ -99,7 +98,7 @@ def instances(found: Reals) -> Section:
 
 
 def variations(runs: Mapping[str, Runs]) -> Section:
-    """Runs with other parameters."""
+    """Return the cost of runs with varied parameters."""
     return [
         ["Variations of α and β, 100 s, turning", "runs", "a run", "runs a second", "error at the end"],
         *(
@@ -110,7 +109,7 @@ def variations(runs: Mapping[str, Runs]) -> Section:
 
 
 def studies(pairs: Sequence[tuple[Cost, Cost]], costs: Sequence[Cost]) -> Section:
-    """Runs by the engine of studies, beside those alone: processor time of who does them, and time on the clock."""
+    """Return the processor time and the elapsed time of studies and of the same runs alone."""
     runs = pairs[0][0].runs
     sides = zip(("the runs alone, in a loop", "by one worker"), zip(*pairs, strict=True), strict=True)
     started = float(np.median([cost.started for cost in costs]))
@@ -141,7 +140,7 @@ def studies(pairs: Sequence[tuple[Cost, Cost]], costs: Sequence[Cost]) -> Sectio
 
 
 def archive(builds: Mapping[str, tuple[int, float, float]], loaded: Sequence[float]) -> Iterator[Section]:
-    """Size, build time and load time."""
+    """Return the size, the build time and the load time of the archive."""
     rows = [
         [name, f"{size / 1000:,.0f} kB", duration(cold), duration(warm)] for name, (size, cold, warm) in builds.items()
     ]
@@ -156,12 +155,13 @@ FINE = 1e-10
 """The error at which the Heavy is compared with RK4."""
 _SHORT = (0.001, SUBSTEP)
 _TO_RK4 = {(0.001, False): 1.5, (SUBSTEP, False): 1.7, (0.001, True): 2.2, (SUBSTEP, True): 2.2}
-"""Promised of a step, by its length and whether it is straight: its cost in steps of RK4."""
+"""The promised ratio of a step's cost to RK4's, by the length of the step and whether it is straight."""
 _TO_OURS = {RK4: 5.0, ADAMS: 8.0, BDF: 18.0}
-"""Promised of a command of 1 s that each method simulates to TARGET: its cost in commands of ours, at least."""
+"""The promised minimal ratio of each method's cost to ours, for a command of 1 s at the error TARGET."""
 
 
 def _ratio(measured: Measured, ours: Job, other: Job) -> float:
+    """Return the median ratio of the costs of two jobs."""
     return float(np.median(measured.seconds[ours] / measured.seconds[other]))
 
 
@@ -173,7 +173,7 @@ def promises(
     series: TaylorPlan,
     measured_series: Measured,
 ) -> Section:
-    """What was promised of the cost of a step. Ratios and differences are the medians of those in each repetition."""
+    """Compare the measurements with the promises. Ratios and differences are medians over the repetitions."""
     made: list[tuple[str, str, str, bool]] = []
 
     def at_most(what: str, ratio: float, limit: float) -> None:
@@ -184,7 +184,7 @@ def promises(
 
     for (h, straight), limit in _TO_RK4.items():
         ratio = _ratio(measured, plan.job(CORE, h, straight), plan.job(RK4, h, straight))
-        at_most(f"{_way(straight)} step to one of RK4, {1000 * h:g} ms", ratio, limit)
+        at_most(f"{_direction(straight)} step to one of RK4, {1000 * h:g} ms", ratio, limit)
     set_too = _ratio(measured, plan.job(FMU_SET, SUBSTEP), plan.job(RK4, SUBSTEP))
     at_most("turning, with fmi2SetReal and fmi2DoStep, 10 ms", set_too, 2.0)
     for h in _SHORT:

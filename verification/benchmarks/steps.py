@@ -1,4 +1,4 @@
-"""What a step costs in plain C: ours, forward Euler, RK4 and CVODE on the same commands, with the errors."""
+"""The cost and the error of a step in plain C: ours, forward Euler, RK4 and CVODE on the same commands."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .work import Work
 TARGET = 1e-9
 """The error of a held command of 1 s at which costs are compared (SI units)."""
 SUBSTEP = 0.01
-"""Of the explicit methods, at most, s."""
+"""The longest sub-step of the explicit methods (s)."""
 H = (0.001, 0.01, 1.0, 100.0)
 TOLERANCES = (1e-6, 1e-9)
 NAMES = {RK4: "RK4", BDF: "CVODE BDF", ADAMS: "CVODE Adams"}
@@ -32,7 +32,7 @@ _SWEEP = {
 }
 _FEW = 8
 _PASS = 4e-3
-"""Seconds to measure at a time: short, so that all are measured in the same minute, again and again."""
+"""Seconds of one measurement. It is short, so that each minute has measurements of all methods."""
 
 
 @dataclass(frozen=True)
@@ -45,19 +45,19 @@ class Job:
     h: float
 
     def hold(self, plain_c: PlainC, start: int, commands: int) -> tuple[float, Reals]:
-        """Hold so many commands, from the known start of the first on: seconds a step, and the end."""
+        """Hold commands from the known start of the first one. Return seconds per step, and the final state."""
         held, state = self.work.array[start : start + commands], self.work.states[start]
         steps = round(self.work.hold / self.h)
         return plain_c.hold(self.method, self.setting, self.h, steps, held, state)
 
     def commands(self, plain_c: PlainC) -> int:
-        """How many to time: where they are cheap so many that no branch is known by heart."""
+        """Return the number of commands to time: many of cheap ones, so that branches stay unpredictable."""
         seconds = self.hold(plain_c, 0, _FEW)[0] * self.work.hold / self.h
         return min(self.work.commands, max(_FEW, round(_PASS / seconds)))
 
 
 class Measured:
-    """Seconds a communication step in each repetition, and the error, by job."""
+    """The seconds per communication step in each repetition, and the error, by job."""
 
     def __init__(self, plain_c: PlainC, jobs: Sequence[Job], repetitions: int) -> None:
         self.ends = {job: [job.hold(plain_c, n, 1)[1].tolist() for n in range(job.work.starts)] for job in jobs}
@@ -69,16 +69,16 @@ class Measured:
         self.seconds = dict(zip(jobs, np.array(turns).T, strict=True))
 
     def error(self, job: Job) -> float:
-        """The largest error at the end of a held command."""
+        """Return the largest error at the end of a held command."""
         return job.work.error(self.ends[job])
 
     def cost(self, job: Job) -> float:
-        """Seconds a communication step, the median."""
+        """Return the median seconds per communication step."""
         return float(np.median(self.seconds[job]))
 
 
 class Plan:
-    """What is measured: the table's jobs and, for the picture, cost against error of a held command of 1 s."""
+    """The jobs of the table and, for the picture, of cost over error of a held command of 1 s."""
 
     def __init__(self, rov: Rov, commands: int, starts: int) -> None:
         @cache
@@ -101,13 +101,13 @@ class Plan:
         self.jobs = list(dict.fromkeys([*rows, *ahead, *chain.from_iterable(self.sweeps.values())]))
 
     def job(self, method: str, h: float, straight: bool = False, setting: float = 0.0, ahead: bool = False) -> Job:
-        """A cell of the table. `ahead`: straight ahead and down, nothing turns back."""
+        """Return the job of one cell. `ahead`: all commands are positive, so no velocity reverses."""
         setting = setting or (max(1.0, round(h / SUBSTEP)) if method in (EULER, RK4) else 1.0)
         return Job(method, setting, self._work(straight or ahead, h > 1.0, ahead), h)
 
 
 class HeavyPlan:
-    """What is measured of a vehicle with coupling and lag, of all states: its steps, and RK4 ever finer."""
+    """The jobs of a vehicle with coupling and lag: our steps, and RK4 with ever shorter steps."""
 
     def __init__(self, rov: Rov, commands: int, starts: int) -> None:
         short, long = (Work(rov, False, hold, commands, known) for hold, known in ((1.0, starts), (100.0, starts // 4)))
@@ -119,7 +119,7 @@ class HeavyPlan:
 
 
 class TaylorPlan:
-    """What is measured beside heyoka, where it is installed: steps of all states while the vehicle turns one way."""
+    """The jobs of the comparison with heyoka, while no velocity reverses."""
 
     def __init__(self, rov: Rov, commands: int, starts: int) -> None:
         def job(method: str, h: float) -> Job:
@@ -134,9 +134,10 @@ class TaylorPlan:
 
 
 def cost_at(measured: Measured, jobs: Sequence[Job], target: float = TARGET) -> Reals:
-    """Seconds at which a method reaches an error, in each repetition: between its settings, on logarithmic axes.
+    """Return the seconds at which a method reaches an error, in each repetition.
 
-    A setting that costs more than another one which is as exact is left out.
+    The cost is interpolated between settings, on logarithmic axes. A setting is left out if another one is as exact and
+    cheaper.
     """
     errors = np.array([measured.error(job) for job in jobs])
     costs = np.array([measured.seconds[job] for job in jobs])
@@ -149,6 +150,6 @@ def cost_at(measured: Measured, jobs: Sequence[Job], target: float = TARGET) -> 
 
 
 def compared(measured: Measured, jobs: Sequence[Job], ours: Job, target: float = TARGET) -> tuple[float, float]:
-    """Medians at an error: the seconds of a method, and how many times ours they are."""
+    """Return the median seconds of a method at an error, and their ratio to ours."""
     costs = cost_at(measured, jobs, target)
     return float(np.median(costs)), float(np.median(costs / measured.seconds[ours]))

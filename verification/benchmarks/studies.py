@@ -1,4 +1,4 @@
-"""A study: what the engine adds to the simulation alone, and whether many runs cost as much each as few."""
+"""Studies: their cost beyond the simulation alone, and the cost per run of few and many runs."""
 
 import shutil
 import tempfile
@@ -40,43 +40,43 @@ T = "Tau(u, 0, 10)"
 
 @dataclass(frozen=True)
 class Cost:
-    """What runs took, from when the workers were there."""
+    """The cost of runs, from the time at which the workers have started."""
 
     runs: int
     processor: float
-    """Seconds of processor time of the process that does the runs, or of all that do."""
+    """Seconds of processor time of all processes that simulate."""
     clock: float
-    """Seconds."""
+    """Seconds of elapsed time."""
     started: float = 0.0
-    """Seconds until the workers were there."""
+    """Seconds until the workers had started."""
     growth: float = 0.0
-    """Bytes of all processes together, from a tenth of the runs to the end."""
+    """The growth of the memory of all processes (bytes), from a tenth of the runs to the end."""
 
 
 @dataclass(frozen=True)
 class _Look:
-    """At the processes of a study."""
+    """The resources of the processes of a study at one time."""
 
     time: float
     workers: float
-    """Processor time, s."""
+    """Processor time (s)."""
     memory: int
-    """Of all, bytes."""
+    """The memory of all processes (bytes)."""
 
 
 class Study:
-    """Runs of 30 s of the VideoRay, of which two outputs are kept each 0.1 s and three figures computed."""
+    """A study of the VideoRay with runs of 30 s, two outputs every 0.1 s and three figures."""
 
     def __init__(self, fmu: Path, folder: Path) -> None:
         self._fmu, self._folder = fmu, folder
 
     def pairs(self, runs: int, repetitions: int) -> Iterator[tuple[Cost, Cost]]:
-        """In turn: the runs alone, in a loop in this process; the study with one worker."""
+        """Yield the cost of the runs alone, in a loop in this process, and of the study with one worker."""
         for _ in range(repetitions):
             yield self._alone(runs), self.cost(runs, workers=1)
 
     def cost(self, runs: int, workers: int) -> Cost:
-        """Of a study from its beginning."""
+        """Return the cost of a study."""
         looks: list[_Look] = []
         later: list[int] = []
 
@@ -92,7 +92,7 @@ class Study:
         return Cost(runs, last.workers - first.workers, clock, spent.started, later[-1] - later[0])
 
     def _alone(self, runs: int) -> Cost:
-        """By the same simulator."""
+        """Return the cost of the same runs in a loop in this process."""
         path = self._plan(runs)
         plan, model = load_plan(path), read_model(self._fmu)
         prepared = prepare(plan, path, model)
@@ -116,7 +116,7 @@ class Study:
 
 
 def overhead(pairs: Iterable[tuple[Cost, Cost]], of: str) -> float:
-    """What the engine adds to the runs alone, 0.1 is 10 %: the median over the pairs, of a field of their costs."""
+    """Return the median relative cost that a study adds to the runs alone, for one field of their costs."""
     return float(np.median([getattr(by_one, of) / getattr(alone, of) - 1.0 for alone, by_one in pairs]))
 
 

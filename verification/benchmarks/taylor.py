@@ -1,4 +1,4 @@
-"""heyoka on the vehicle's equation, beside our steps and RK4: an integrator by Taylor series, compiled by LLVM.
+"""heyoka, an integrator by Taylor series that LLVM compiles, on the equation of a vehicle.
 
 It gets the table of terms of rov_fmu/model/equation.py, so it has the same states as ours, with the cosine and sine of
 the heading. It is compiled once. The forces of a held command and the direction of each drag are runtime parameters, so
@@ -21,12 +21,12 @@ Reals = NDArray[np.float64]
 
 
 def installed() -> bool:
-    """Whether heyoka can be imported."""
+    """Return True when heyoka can be imported."""
     return find_spec("heyoka") is not None
 
 
 class Heyoka:
-    """The integrator of a vehicle, with a tolerance of rounding, which is heyoka's default."""
+    """The integrator of a vehicle. Its tolerance is the rounding error, heyoka's default."""
 
     def __init__(self, rov: Rov) -> None:
         import heyoka
@@ -48,7 +48,7 @@ class Heyoka:
         self._places = [self._equation.states.index(name) for name in rov.layout.state]
 
     def hold(self, h: float, steps: int, commands: Reals, start: Reals) -> tuple[float, Reals]:
-        """Hold commands in turn, each for so many steps of h: seconds a step, and the end (all states of the vehicle).
+        """Hold commands one after the other, each for `steps` steps of h. Return seconds per step, and the final state.
 
         The steps run in a loop in C++: propagate_for takes none that is longer than h. Each command begins with a call
         from Python, which is timed too.
@@ -66,7 +66,7 @@ class Heyoka:
         return 1e-9 * seconds / (len(commands) * steps), end
 
     def _values(self, command: Reals, state: Reals) -> tuple[list[float], list[float]]:
-        """The runtime parameters, and the states of the table, at the beginning of a held command."""
+        """Return the runtime parameters and the states of the equation at the start of a held command."""
         layout, equation = self._rov.layout, self._equation
         at = dict.fromkeys(layout.inputs, 0.0) | dict(zip(layout.commands, command.tolist(), strict=True))
         at |= {**self._rov.coefficients, **dict(zip(layout.state, state.tolist(), strict=True))}

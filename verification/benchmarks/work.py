@@ -1,4 +1,4 @@
-"""The same work for all: seeded commands, held, and where each ends to 50 digits."""
+"""The commands that every method simulates, and their exact final states."""
 
 import random
 from collections.abc import Iterable, Mapping, Sequence
@@ -35,18 +35,18 @@ class Work:
     commands: int
     starts: int
     ahead: bool = False
-    """All commands positive, so that nothing turns back."""
+    """All commands are positive, so that no velocity reverses."""
     one_way: bool = False
-    """All commands positive and the first at least the second: the VideoRay turns, and no velocity turns back."""
+    """All commands are positive and the first is at least the second: the VideoRay turns and no velocity reverses."""
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the commands."""
+        """The names of the commands."""
         return tuple(self.rov.layout.commands)
 
     @cached_property
     def array(self) -> NDArray[np.float64]:
-        """The commands, a row each: with another length of the sequence the same ones."""
+        """The commands, one in each row. A longer sequence begins with the same commands."""
         rng = random.Random(SEED)
         drawn = np.array([[rng.uniform(-1.0, 1.0) for _ in self.names] for _ in range(self.commands)])
         if self.straight:
@@ -58,18 +58,18 @@ class Work:
 
     @cached_property
     def sequence(self) -> list[Values]:
-        """All inputs at each command."""
+        """All inputs for each command."""
         still = dict.fromkeys(self.rov.layout.inputs, 0.0)
         return [still | dict(zip(self.names, row, strict=True)) for row in self.array.tolist()]
 
     @cached_property
     def states(self) -> NDArray[np.float64]:
-        """Where the first commands start: each where the one before ends after a second, the first at rest."""
+        """The states at which the first commands start: rest, then the state after 1 s of the command before."""
         return np.array([list(s.values()) for s in flight(self.rov, self.sequence[: self.starts - 1], 1.0)])
 
     @cached_property
     def ends(self) -> list[list[reference.Number]]:
-        """The states at the ends of the first commands, to 50 digits."""
+        """The states at the end of the first commands, to 50 digits."""
         names = list(self.rov.layout.state)
         return [
             list(reference.step(self.rov, command, dict(zip(names, start, strict=True)), self.hold).state.values())
@@ -77,7 +77,7 @@ class Work:
         ]
 
     def error(self, found: Iterable[Sequence[float]]) -> float:
-        """The largest difference of any state (SI units) of the first ones that were found."""
+        """Return the largest error of any of these states (SI units)."""
         return max(
             abs(float(exact - value))
             for end, values in zip(self.ends, found, strict=True)

@@ -1,1 +1,1 @@
-"""The C of the FMU under clang's sanitizers and its fuzzer: python -m verification.fuzzing."""
+"""Fuzzing of the FMU's C with libFuzzer and clang's sanitizers: python -m verification.fuzzing."""

@@ -30,8 +30,10 @@ VEHICLES = {
     "videoray": VIDEORAY,
     "bare": Path(__file__).with_name("bare.toml"),
 }
-"""Lag, coupling, curves with reverse and dead band; closed form; as little as there can be. The slowest is first: each
-one begins with all that was found before it."""
+"""The vehicles: one with lag, coupling, reverse thrust and dead band; the default; and the smallest possible one.
+
+The slowest is first, because each one starts with the inputs that the vehicles before it have found.
+"""
 
 
 def _positive(text: str) -> int:
@@ -71,7 +73,7 @@ def _command(
         corpus = Path(name) / "corpus"
         pairs = product([chosen] if chosen else VEHICLES, [int(fmi)] if fmi else (2, 3))
         targets = {(vehicle, version): Path(name) / f"{vehicle}{version}" for vehicle, version in pairs}
-        with ThreadPoolExecutor(jobs) as pool:  # each waits for a compiler
+        with ThreadPoolExecutor(jobs) as pool:  # each thread waits for a compiler
             list(pool.map(_build, targets, targets.values()))
         unpack_corpus(corpus)
         limit, share = seconds or (None if calls else _ROUND), len(targets)
@@ -96,7 +98,7 @@ def _build(pair: tuple[str, int], target: Path) -> None:
 
 
 def _keep(options: str, found: Path) -> str:
-    """Copy an input here, and say what is in it: on a machine that is thrown away, what is printed is what is left."""
+    """Copy an input to this folder, and return its content as text, because the log may outlive the machine."""
     copy = shutil.copy(found, ".")
     content = b64encode(found.read_bytes()).decode()
     return f"again with: python -m verification.fuzzing {options} {copy}, in base64:\n{content}"

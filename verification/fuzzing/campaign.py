@@ -1,4 +1,4 @@
-"""The fuzzer: built, run on several processors at once, its findings and its corpus kept."""
+"""Build the fuzzer, run it on several processors, and keep its findings and its corpus."""
 
 import os
 import subprocess
@@ -18,15 +18,15 @@ _LONGEST_TIME = 60  # s for one of them
 
 
 class FindingError(Exception):
-    """A sanitizer's report or a broken property: what was said, and the inputs that lead there."""
+    """A sanitizer's report or a broken property, with the inputs that cause it."""
 
-    def __init__(self, words: str, inputs: Sequence[Path] = ()) -> None:
-        super().__init__(words)
+    def __init__(self, message: str, inputs: Sequence[Path] = ()) -> None:
+        super().__init__(message)
         self.inputs = inputs
 
 
 Counts = Counter[tuple[str, bool]]
-"""Calls by function and whether they were accepted."""
+"""The number of calls by function and by whether they were accepted."""
 
 
 def build_target(sources: Mapping[str, str], output: Path, fmi: int = 2) -> None:
@@ -35,13 +35,13 @@ def build_target(sources: Mapping[str, str], output: Path, fmi: int = 2) -> None
 
 
 def unpack_corpus(folder: Path) -> None:
-    """Write the inputs that are kept, one file each, into a folder."""
+    """Write the inputs of the corpus into a folder, one file each."""
     with zipfile.ZipFile(CORPUS) as kept:
         kept.extractall(folder)
 
 
 def pack_corpus(targets: Sequence[Path], folder: Path) -> int:
-    """Keep of a folder of inputs those that together reach all that it reaches in any of the targets; how many."""
+    """Pack the inputs of a folder that together reach the same places in all targets. Return their number."""
     kept: dict[str, bytes] = {}
     for target in targets:
         smaller = folder.with_name(f"{target.name}.smaller")
@@ -54,18 +54,18 @@ def pack_corpus(targets: Sequence[Path], folder: Path) -> int:
 
 
 def replay(target: Path, inputs: Sequence[Path], folder: Path) -> Counts:
-    """Run files of input, or folders of them, once each. Raises FindingError."""
+    """Run each input, given as a file or in a folder, once. Raises FindingError."""
     return _finish(_start(target, folder, ["-runs=0", *map(str, inputs)]), folder)
 
 
 def fuzz(target: Path, corpus: Path, folder: Path, seconds: int, jobs: int) -> Counts:
-    """Fuzz for so long in so many processes that share a corpus. Raises FindingError."""
+    """Fuzz for some seconds in several processes that share a corpus. Raises FindingError."""
     arguments = [
         str(corpus),
         f"-max_total_time={seconds}",
         f"-max_len={_LONGEST_INPUT}",
         f"-timeout={_LONGEST_TIME}",
-        f"-report_slow_units={_LONGEST_TIME}",  # no file for what is slow but ends
+        f"-report_slow_units={_LONGEST_TIME}",  # a slow input that ends is no finding
         "-len_control=0",
         "-reload=1",
     ]
@@ -101,15 +101,15 @@ def _finish(job: _Job, folder: Path) -> Counts:
     process, file, log = job
     if process.wait() != 0:
         lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
-        # libFuzzer's progress begins with #, and has names of the log categories in it
-        told = _essence([line for line in lines if not line.startswith("#")])
-        raise FindingError("\n".join(told), sorted(folder.glob("finding-*")))
+        # Lines of libFuzzer's progress begin with #. They may contain names of log categories.
+        message = _report([line for line in lines if not line.startswith("#")])
+        raise FindingError("\n".join(message), sorted(folder.glob("finding-*")))
     words = map(str.split, file.read_text(encoding="utf-8").splitlines() if file.exists() else ())
     return Counts({(name, bool(n)): int(count) for name, *both in words for n, count in enumerate(both)})
 
 
-def _essence(lines: Sequence[str]) -> Iterator[str]:
-    """Of a log of libFuzzer what was found and where in our C, without how it went there."""
+def _report(lines: Sequence[str]) -> Iterator[str]:
+    """Yield the lines of libFuzzer's log that name a finding, and its places in our C."""
     for line in lines:
         if line.startswith("    #"):
             _, _, place = line.partition(" in ")

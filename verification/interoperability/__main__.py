@@ -1,4 +1,4 @@
-"""Fly vehicles in independent importers, a manoeuvre each, and compare them with rov_fmu.model.rov."""
+"""Fly a manoeuvre of each vehicle in independent importers, and compare the results with rov_fmu.model.rov."""
 
 import argparse
 import sys
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{row}, {importer.interface}")
         return 0
     if options.install:
-        # All kits, whether or not one fails.
+        # The other kits are installed even if one fails.
         return max([_install(kit, tools, console) for kit in dict.fromkeys(importer.kit for importer in importers)])
     outcomes = []
     with tempfile.TemporaryDirectory() as folder:
@@ -71,12 +71,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             with console.status(f"{importer.title}, FMI {importer.fmi}.0, {importer.interface}: {vehicle}"):
                 outcomes.append(run(importer, fmu, tools, MANOEUVRES[vehicle]))
     _show(outcomes, console)
-    # What was asked for by name must run.
+    # An importer that was named must run.
     bad = {Verdict.DIFFERS, Verdict.FAILED, *([Verdict.NOT_RUN] if options.names else [])}
     return int(any(outcome.verdict in bad for outcome in outcomes))
 
 
 def _install(kit: str, tools: Path, console: Console) -> int:
+    """Install a kit and return the exit code."""
     try:
         with console.status(f"installing {kit}"):
             install(kit, tools, console.print)
@@ -87,7 +88,7 @@ def _install(kit: str, tools: Path, console: Console) -> int:
 
 
 def _show(outcomes: Sequence[Outcome], console: Console) -> None:
-    """A row for each importer, a column for each vehicle; then what is to be said of one."""
+    """Print a table with a row for each importer and a column for each vehicle, then the reasons and logs."""
     vehicles = dict.fromkeys(outcome.vehicle for outcome in outcomes)
     table = Table(
         "importer",
@@ -110,7 +111,8 @@ def _show(outcomes: Sequence[Outcome], console: Console) -> None:
     console.print(table)
     for outcome in outcomes:
         if outcome.reason:
-            console.print(f"{outcome.importer.name} {outcome.verdict.value}, {outcome.vehicle}: {outcome.reason}")
+            reason = f"{outcome.importer.name} {outcome.verdict.value}, {outcome.vehicle}: {outcome.reason}"
+            console.print(reason, soft_wrap=True)  # so that a command in it can be copied
         for line in outcome.log.strip().splitlines()[-15:]:
             console.print(f"    {line}", markup=False)
 

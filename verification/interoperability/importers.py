@@ -1,4 +1,4 @@
-"""The importers: how each is called, what it is to agree to, and how to tell that it is installed."""
+"""The importers: the command, the tolerance and the installed files of each."""
 
 import re
 import sys
@@ -7,21 +7,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 VERSIONS = (2, 3)
-"""Of FMI."""
+"""The versions of FMI."""
 HERE = Path(__file__).parent
 RUNNERS = HERE / "runners"
 
 EXACT = 1e-9
-"""Tolerance where the FMU itself takes the steps."""
+"""The tolerance when the FMU itself takes the steps."""
 SOLVER = 1e-5
-"""Tolerance of a solver with error control, in Model Exchange."""
+"""The tolerance of a solver with error control, in Model Exchange."""
 SINGLE = 2e-6
-"""Tolerance of outputs in single precision: half a unit in the last place of numbers up to 64."""
+"""The tolerance of outputs in single precision: half a unit in the last place of numbers up to 64."""
 EULER = 1e-3
-"""Tolerance of forward Euler with steps of 0.1 ms."""
-EULER_LATE = 1e-2
-"""The same where thrust lags: when a command jumps, such a step errs in the force by h ΔF / (2 e T) at most, which is
-7e-3 N for 58 N and a lag of 0.15 s."""
+"""The tolerance of forward Euler with steps of 0.1 ms."""
+EULER_LAGGING = 1e-2
+"""The tolerance of forward Euler when thrust lags.
+
+After a jump of the command its error of the force is at most h ΔF / (2 e T), which is 7e-3 N for 58 N and a lag of
+0.15 s.
+"""
 
 
 @dataclass(frozen=True)
@@ -29,43 +32,43 @@ class Importer:
     """One row of the matrix."""
 
     name: str
-    """On the command line."""
+    """The name on the command line."""
     title: str
     interface: str
     kit: str
-    """What installs it: python, java or rust."""
+    """The kit that installs it: python, java or rust."""
     pin: tuple[str, str]
     """The file that pins the version, and the package."""
     proof: str
-    """A file among the tools that exists where this version is installed."""
+    """A file among the tools that exists when this version is installed."""
     command: tuple[str, ...]
-    """Run in a folder with rov.fmu and the manoeuvre."""
+    """The command, to run in a folder with rov.fmu and the manoeuvre."""
     tolerance: float | None = EXACT
-    """Of any output at any communication point, in SI units; None: it checks the FMU and runs nothing."""
-    late: float | None = None
-    """The same of a vehicle whose thrust lags behind the commands, where it is more."""
+    """The tolerance of outputs at communication points (SI units); None when the importer only checks the FMU."""
+    lagging_tolerance: float | None = None
+    """The tolerance for a vehicle whose thrust lags behind the commands, when it is larger."""
     programs: tuple[str, ...] = ()
-    """From the system, beside what its kit takes."""
+    """The programs of the system that it needs besides those of its kit."""
     fmi: int = 2
     """The version of the FMU that it loads."""
 
     @property
     def version(self) -> str:
-        """The version that is pinned."""
+        """The pinned version."""
         return pinned(*self.pin)
 
     def is_installed(self, tools: Path) -> bool:
-        """Whether this version is among the tools."""
+        """Return True when this version is installed among the tools."""
         return any(tools.glob(self.proof.format(version=self.version)))
 
     def command_line(self, tools: Path) -> list[str]:
-        """The command with all paths filled in."""
+        """Return the command with all paths filled in."""
         paths = {"tools": tools, "runners": RUNNERS, "python": sys.executable}
         return [part.format(version=self.version, **paths) for part in self.command]
 
 
 def pinned(file: str, package: str) -> str:
-    """The version of a package in a requirements.txt, pom.xml or Cargo.toml."""
+    """Return the version of a package in a requirements.txt, pom.xml or Cargo.toml."""
     pattern = rf"^\W*(?:artifactId>)?{re.escape(package)}(?:==|</artifactId>\s*<version>|\s*=\s*\"=)([\w.]+)"
     match = re.search(pattern, (HERE / file).read_text(), re.MULTILINE)
     if match is None:
@@ -74,7 +77,7 @@ def pinned(file: str, package: str) -> str:
 
 
 def environment(requirements: str) -> str:
-    """The folder among the tools that holds what a requirements file lists."""
+    """Return the folder among the tools for the packages of a requirements file."""
     return requirements.replace("requirements", "python").removesuffix(".txt")
 
 
@@ -110,7 +113,7 @@ def _java(
 
 
 def _both(*importers: Importer) -> Iterator[Importer]:
-    """Each with an FMU of FMI 2.0 and of FMI 3.0."""
+    """Yield each importer with an FMU of FMI 2.0 and with one of FMI 3.0."""
     for importer in importers:
         yield from (importer, replace(importer, name=f"{importer.name}-fmi3", fmi=3))
 
@@ -120,21 +123,26 @@ def _source(name: str, *options: str) -> tuple[str, ...]:
 
 
 def _rust(
-    name: str, package: str, interface: str, tolerance: float = EXACT, late: float | None = None, fmi: int = 2
+    name: str,
+    package: str,
+    interface: str,
+    tolerance: float = EXACT,
+    lagging_tolerance: float | None = None,
+    fmi: int = 2,
 ) -> Importer:
     pin = f"runners/{package.replace('-', '_')}/Cargo.toml", package
     proof = f"rust/{package}-{{version}}/debug/fly"
     command = f"{{tools}}/{proof}", *name.removeprefix(package).split("-")[1:]
-    return Importer(name, package, interface, "rust", pin, proof, command, tolerance, late, fmi=fmi)
+    return Importer(name, package, interface, "rust", pin, proof, command, tolerance, lagging_tolerance, fmi=fmi)
 
 
 _CARGO = "runners/fmu_runner/Cargo.toml"
 _FMI_SIM = "rust/fmi-sim-{version}/bin/fmi-sim"
 
-# Not among them: FMI++ (fmipp 2.1.0) and mosaik-fmi 1.1.0, which is built on it, come without binaries for Linux and
-# compile with SUNDIALS 3 only; OMSimulator's package (3.0.0.post198) fetches its binaries from another host as it is
-# installed, so tests/fmu/test_versions.py checks its rule for value references.
-# Jaxonomy's Model Exchange agrees to 4e-6, but takes minutes.
+# Some importers are not in the table. FMI++ (fmipp 2.1.0) and mosaik-fmi 1.1.0, which uses it, have no binaries for
+# Linux and compile with SUNDIALS 3 only. OMSimulator's package (3.0.0.post198) fetches its binaries from another host
+# during its installation; tests/fmu/test_versions.py checks its rule for value references instead. Jaxonomy's Model
+# Exchange agrees to 4e-6, but takes minutes.
 IMPORTERS = (
     *_both(
         _python("fmpy-cs", "FMPy", "CS, state restored", "fmpy"),
@@ -208,11 +216,11 @@ IMPORTERS = (
             _FMI_SIM,
             ("sh", "{runners}/fmi_sim.sh", "me"),
             EULER,
-            EULER_LATE,
+            EULER_LAGGING,
         ),
     ),
     _rust("fmi-rs-cs", "fmi-rs", "CS, Event Mode", fmi=3),
-    _rust("fmi-rs-me", "fmi-rs", "ME, forward Euler", EULER, EULER_LATE, fmi=3),
+    _rust("fmi-rs-me", "fmi-rs", "ME, forward Euler", EULER, EULER_LAGGING, fmi=3),
     _rust("fmu-runner", "fmu-runner", "CS, state restored"),
 )
 
@@ -220,7 +228,7 @@ KITS = tuple(dict.fromkeys(importer.kit for importer in IMPORTERS))
 
 
 def chosen(names: list[str], versions: Collection[int] = VERSIONS) -> list[Importer]:
-    """The importers of these names or kits, all without names, with these versions of FMI. Raises LookupError."""
+    """Return the importers of these names or kits (default: all) with these versions of FMI. Raises LookupError."""
     known = {*KITS, *(importer.name for importer in IMPORTERS)}
     if unknown := [name for name in names if name not in known]:
         raise LookupError(f"{unknown[0]}: no such importer; there are {', '.join(sorted(known))}")

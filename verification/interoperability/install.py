@@ -1,4 +1,4 @@
-"""Install the importers: Python ones into an environment of their own, Java and Rust ones beside it."""
+"""Install the importers: those in Python into virtual environments, those in Java and Rust into folders."""
 
 import shutil
 import subprocess
@@ -11,7 +11,7 @@ from pathlib import Path
 from .importers import HERE, IMPORTERS, RUNNERS, Importer, environment
 from .run import without_places
 
-# What each kit takes from the system, and the Debian packages that have it.
+# The programs that each kit needs from the system, and the Debian packages that contain them.
 PROGRAMS: dict[str, tuple[tuple[str, ...], str]] = {
     "python": ((), "python3-venv"),
     "java": (("java", "javac", "mvn"), "openjdk-17-jdk-headless maven"),
@@ -22,11 +22,11 @@ ATTEMPTS = 3
 
 
 class InstallError(Exception):
-    """A kit that cannot be installed, with what the tool said."""
+    """A kit that cannot be installed, with the output of the failed tool."""
 
 
 def install(kit: str, tools: Path, say: Callable[[str], None]) -> None:
-    """Install what is missing of a kit. Raises InstallError."""
+    """Install the missing importers of a kit. Raises InstallError."""
     programs, packages = PROGRAMS[kit]
     try:
         _install(kit, programs, tools, say)
@@ -70,13 +70,13 @@ def _install_java(importer: Importer, tools: Path) -> None:
 def _install_rust(importer: Importer, tools: Path) -> None:
     package = importer.pin[1]
     folder = tools / "rust" / f"{package}-{importer.version}"
-    # Not optimized: that takes longer than it saves.
+    # Without optimization, because it would take longer than it saves.
     options = ["--quiet", "--config", "profile.dev.debug=false"]
-    if package == "fmi-sim":  # the lock file of the crate pins all that it is built of
+    if package == "fmi-sim":  # the crate's lock file pins all its dependencies
         program = f"{package}@{importer.version}"
         _call(["cargo", "install", *options, "--debug", "--locked", program, "--root", str(folder)], tools)
         return
-    with tempfile.TemporaryDirectory() as name:  # Cargo.lock names the registry: it stays out of the sources
+    with tempfile.TemporaryDirectory() as name:  # Cargo.lock names the registry, so it must not be in the sources
         project = shutil.copytree((HERE / importer.pin[0]).parent, Path(name) / "fly") / "Cargo.toml"
         _call(["cargo", "build", *options, "--manifest-path", str(project), "--target-dir", str(folder)], tools)
 
@@ -88,5 +88,5 @@ def _call(command: list[str], tools: Path) -> None:
             return
         if attempt < ATTEMPTS:  # registries fail now and then
             time.sleep(5.0 * attempt)
-    said = without_places(done.stdout.decode(errors="replace"), Path(tempfile.gettempdir()), tools)
-    raise InstallError("\n".join([f"{Path(command[0]).name} failed", *said.strip().splitlines()[-15:]]))
+    output = without_places(done.stdout.decode(errors="replace"), Path(tempfile.gettempdir()), tools)
+    raise InstallError("\n".join([f"{Path(command[0]).name} failed", *output.strip().splitlines()[-15:]]))

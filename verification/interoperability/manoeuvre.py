@@ -1,15 +1,15 @@
-"""The manoeuvres that every importer flies, one of each vehicle, and what `rov_fmu.model.rov` makes of them.
+"""The manoeuvres that every importer flies, one for each vehicle, and their reference by `rov_fmu.model.rov`.
 
 Inputs are held over each communication step. A runner finds the FMU as `rov.fmu`, and beside it:
 
 - `parameters.csv`: name, value; to be set before the initialization.
-- `manoeuvre.csv`: a row for each communication point with the inputs of the step that starts there. Where `detour` is
-  1, an importer that can saves the state, takes a step with the commands of `detour.csv` (name, value), and restores:
-  it must leave no trace.
-- `jumps.csv`: the same inputs for tools that interpolate: the corners only, two rows where the inputs jump.
-- `outputs.txt`: the names of the outputs, a line each.
+- `manoeuvre.csv`: a row for each communication point with the inputs of the step that starts there. When `detour` is 1,
+  an importer that supports states saves the state, takes a step with the commands of `detour.csv` (name, value), and
+  restores the state. The detour must not change the result.
+- `jumps.csv`: the same inputs for tools that interpolate, with rows only where the inputs change, two for each jump.
+- `outputs.txt`: the names of the outputs, one in each line.
 
-It leaves `result.csv`: time and all outputs at each communication point, at the end of the step that leads there. Of
+It writes `result.csv`: time and all outputs at each communication point, at the end of the step that leads there. Of
 several rows for one time the first counts; rows between communication points are allowed.
 """
 
@@ -39,15 +39,17 @@ class ResultError(Exception):
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """What a vehicle is made to do."""
+    """The manoeuvre of a vehicle."""
 
     vehicle: str
-    """Of those that ship."""
+    """The name of a vehicle that ships."""
     parameters: Mapping[str, float]
-    """Those that are changed."""
+    """The parameters that differ from the vehicle file."""
     phases: Mapping[float, Mapping[str, float]]
-    """From each time (s) on: inputs by name, and parts of the command to every thruster that drives an axis, by the
-    axis's name. The first has none, so that it does not matter when an importer sets the first inputs."""
+    """The inputs from each time (s) on. The name of an axis stands for a command to all thrusters that drive it.
+
+    The first phase has no inputs, so that it does not matter when an importer sets the first inputs.
+    """
 
     @cached_property
     def rov(self) -> Rov:
@@ -60,7 +62,7 @@ class Manoeuvre:
         return (*self.rov.layout.state, *self.rov.layout.thrust)
 
     def inputs_at(self, time: float) -> dict[str, float]:
-        """All inputs of the step that starts at a time."""
+        """Return all inputs of the step that starts at a time."""
         layout = self.rov.layout
         inputs = dict.fromkeys(layout.inputs, 0.0)
         for name, value in self.phases[max(start for start in self.phases if start <= time)].items():
@@ -69,7 +71,7 @@ class Manoeuvre:
         return inputs
 
     def write_files(self, folder: Path) -> None:
-        """Write what the runners read."""
+        """Write the files that the runners read."""
         layout = self.rov.layout
         _write(folder / "parameters.csv", ("name", "value"), self.parameters.items())
         _write(folder / "detour.csv", ("name", "value"), zip(layout.commands, cycle((1.0, -1.0)), strict=False))
@@ -89,7 +91,7 @@ class Manoeuvre:
 
     @cached_property
     def reference(self) -> list[dict[str, float]]:
-        """Time and outputs at each communication point by `rov_fmu.model.rov`."""
+        """The time and the outputs at each communication point by `rov_fmu.model.rov`."""
         rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
         state, rows = dict.fromkeys(rov.layout.state, 0.0), []
         for time in TIMES:
@@ -100,7 +102,7 @@ class Manoeuvre:
         return rows
 
     def difference(self, result: Path) -> float:
-        """The largest difference of any output at any communication point, in SI units. Raises ResultError."""
+        """Return the largest difference of any output at any communication point (SI units). Raises ResultError."""
         try:
             with result.open(newline="") as file:
                 rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
@@ -184,4 +186,4 @@ _HEAVY = Manoeuvre(
 )
 
 MANOEUVRES = {manoeuvre.vehicle: manoeuvre for manoeuvre in (_VIDEORAY, _HEAVY)}
-"""By the name of the vehicle."""
+"""The manoeuvres by the name of the vehicle."""

@@ -1,4 +1,4 @@
-"""Run importers: each in a folder of its own, its result compared with the reference."""
+"""Run each importer in its own folder, and compare its result with the reference."""
 
 import os
 import re
@@ -24,7 +24,7 @@ TIMEOUT = 300.0
 
 
 class Verdict(Enum):
-    """What came of an importer."""
+    """The verdict on an importer."""
 
     AGREES = "agrees"
     NO_FINDING = "no finding"
@@ -34,7 +34,7 @@ class Verdict(Enum):
 
     @property
     def is_good(self) -> bool:
-        """Whether the importer ran and is content."""
+        """True when the importer ran and agrees or found nothing."""
         return self in {Verdict.AGREES, Verdict.NO_FINDING}
 
 
@@ -75,13 +75,15 @@ def run(importer: Importer, fmu: Path, tools: Path, manoeuvre: Manoeuvre) -> Out
             largest = max(map(manoeuvre.difference, results))
         except ResultError as error:
             return outcome(Verdict.FAILED, reason=str(error), log=log)
-    tolerance = importer.late if importer.late and manoeuvre.rov.layout.lagging else importer.tolerance
+    tolerance = importer.tolerance
+    if importer.lagging_tolerance and manoeuvre.rov.layout.lagging:
+        tolerance = importer.lagging_tolerance
     verdict = Verdict.AGREES if largest <= tolerance else Verdict.DIFFERS
     return outcome(verdict, largest)
 
 
 def obstacle(importer: Importer, tools: Path) -> str:
-    """Why an importer cannot run; empty where it can."""
+    """Return the reason why an importer cannot run, or an empty text."""
     if not importer.is_installed(tools):
         return f"python -m verification.interoperability --install {importer.kit}"
     missing = [name for name in (importer.command[0], *importer.programs) if "{" not in name and not shutil.which(name)]
@@ -89,12 +91,12 @@ def obstacle(importer: Importer, tools: Path) -> str:
 
 
 def code_name(code: int) -> str:
-    """An exit code in words."""
+    """Return an exit code in words."""
     return f"exit code {code}" if code >= 0 else signal.Signals(-code).name
 
 
 def without_places(text: str, folder: Path, tools: Path) -> str:
-    """A log without the folders of this machine and without the hosts that packages come from."""
+    """Return a log without the folders of this machine and the hosts of packages."""
     for path, name in ((folder, "."), (tools, "tools"), (ROOT, "."), (Path.home(), "~")):
         if path.name:  # not the root
             text = text.replace(str(path), name)
@@ -102,6 +104,7 @@ def without_places(text: str, folder: Path, tools: Path) -> str:
 
 
 def _call(importer: Importer, folder: Path, tools: Path) -> tuple[int, str]:
+    """Run an importer; return its exit code and its log."""
     temporary = folder / "tmp"  # several importers leave the unzipped FMU behind
     temporary.mkdir()
     bins = [tools / "python" / "bin", *sorted(tools.glob("rust/*/bin"))]
@@ -113,7 +116,7 @@ def _call(importer: Importer, folder: Path, tools: Path) -> tuple[int, str]:
         "LD_LIBRARY_PATH": str(tools / "python" / "lib"),  # TBB for Ecos
     }
     with (folder / "log.txt").open("w+", errors="replace") as log:
-        # A session of its own, so that a time-out ends the programs that the runner has started, too.
+        # In a new session, so that a time-out also ends the programs that the runner has started.
         process = subprocess.Popen(
             importer.command_line(tools),
             cwd=folder,

@@ -1,4 +1,4 @@
-"""C programs and libraries built with the FMU's sources, for any machine or under clang's sanitizers, and run."""
+"""Build C programs and libraries with the FMU's sources, for this machine or with clang's sanitizers, and run them."""
 
 import shutil
 import subprocess
@@ -13,7 +13,7 @@ _HEADERS = Path(__file__).with_name("c")
 
 
 def clang() -> str | None:
-    """The compiler with its sanitizers, Debian's packages clang and libclang-rt-dev; None where one is missing."""
+    """Return the path of clang; None when clang or its sanitizers (Debian: clang, libclang-rt-dev) are missing."""
     command = shutil.which("clang")
     if command is None:
         return None
@@ -24,17 +24,18 @@ def clang() -> str | None:
 def compile_c(
     program: Path, output: Path, sources: Mapping[str, str] | Path, *flags: str, sanitizers: str = ""
 ) -> Path:
-    """Compile a C file that finds there what it includes: of the FMU's sources (a folder, or file name to text, which
-    goes beside output), of FMI's headers and of verification/references/c. The output.
+    """Compile a C file and return the path of the output.
 
-    With the FMU's compiler and its flags; with `sanitizers`, what -fsanitize takes ("address,undefined", "thread",
-    "fuzzer,address,undefined"), with clang. Raises BuildError without a compiler, and at every warning.
+    The file can include the FMU's sources (a folder, or file name to text), the FMI headers and the headers of
+    verification/references/c. The compiler and its flags are the FMU's. `sanitizers` is an argument of -fsanitize
+    ("address,undefined", "thread", "fuzzer,address,undefined"), which needs clang. Raises BuildError when there is no
+    compiler, and for every warning.
     """
     command = compiler()
     if sanitizers:
         if (found := clang()) is None:
             raise BuildError("clang with its sanitizers is missing: apt-get install clang libclang-rt-dev")
-        # every report ends the program
+        # Every report ends the program.
         command = [found, "-g", "-fno-omit-frame-pointer", f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all"]
     folder = sources if isinstance(sources, Path) else output.with_name(f"{output.name}.sources")
     if not isinstance(sources, Path):
@@ -56,7 +57,7 @@ def compile_c(
 
 @dataclass(frozen=True)
 class Ended:
-    """A program that has ended: the words of each line that it printed, its exit code, and its errors."""
+    """The result of a program: the words of each line of its output, its exit code, and its error output."""
 
     lines: list[list[str]]
     code: int
@@ -64,6 +65,6 @@ class Ended:
 
 
 def run_program(*command: str | Path, **how: Any) -> Ended:
-    """Run a program, with more of what subprocess.run takes."""
+    """Run a program. Further arguments go to subprocess.run."""
     result = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False, **how)
     return Ended([line.split() for line in result.stdout.splitlines()], result.returncode, result.stderr)

@@ -16,8 +16,8 @@ from math import atan, atanh, copysign, cos, exp, expm1, hypot, inf, log, log1p,
 from rov_fmu.model.riccati import Riccati
 from rov_fmu.model.rov import Rov
 
-# Below this |q|, and by half the argument below four times as much, a fraction in q stands for the hyperbolic and the
-# circular functions; it needs no branch on the sign.
+# Below this |q| a fraction in q replaces the hyperbolic and the circular functions, and it needs no branch on the sign.
+# With half the argument it holds up to four times this |q|.
 _MODERATE = 0.8
 
 
@@ -29,8 +29,8 @@ class Axis(Riccati):
         return advance(self.A, self.B, self.C, v, h, self.reverse)
 
     def reversal_time(self, v: float) -> float:
-        """Return when the force brings the motion to rest and reverses it; infinite where it does not."""
-        if (v <= 0.0 or self.C >= 0.0) and (v >= 0.0 or self.C <= 0.0):  # a product would underflow
+        """Return the time (s) at which the force reverses the motion; infinite when it does not."""
+        if (v <= 0.0 or self.C >= 0.0) and (v >= 0.0 or self.C <= 0.0):  # a product of them could underflow
             return inf
         return time_to_rest(*self.drag(v), -abs(self.C), abs(v))
 
@@ -83,20 +83,19 @@ def time_to_rest(A: float, B: float, C: float, v0: float) -> float:
 
 
 def _signed_root(A: float, B: float, C: float) -> float:
-    """The root of |D^2|, D^2 = B^2 + 4 A C with C < 0, with the sign of D^2."""
+    """Return the root of |D^2| with the sign of D^2, where D^2 = B^2 + 4 A C and C < 0."""
     D2 = B * B + 4.0 * A * C
     if 1e-290 < abs(D2) < 1e300:
         return copysign(sqrt(abs(D2)), D2)
-    root = 2.0 * sqrt(A) * sqrt(-C)  # B^2 or A C may have underflowed, or overflown
+    root = 2.0 * sqrt(A) * sqrt(-C)  # B^2 or A C may have underflowed or overflowed
     return copysign(sqrt(abs(B - root)) * sqrt(B + root), B - root)
 
 
 def _leg(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
-    """v(h) and its integral for v0 >= 0 where v keeps its sign.
+    """Return v(h) and its integral for v0 >= 0 while v keeps its sign.
 
-    v is that of `_end_velocity` with f = tanh(r)/r, r^2 = q, and the distance is ln(1 + A X)/A with X linear in v0
-    and C, X = h (v0 Y + C h W); Y and W are the divided differences of exp and of (exp(l) - 1)/l over l1 and l2. Both
-    are free of cancellation.
+    `_end_velocity` gives v with f = tanh(r)/r and r^2 = q. The distance is ln(1 + A X)/A, where X = h (v0 Y + C h W).
+    Y and W are the divided differences of exp(l) and of (exp(l) - 1)/l between l1 and l2. Neither formula cancels.
     """
     a, b, c = A * h, 0.5 * B * h, C * h
     q = b * b + a * c
@@ -115,7 +114,7 @@ def _leg(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, floa
     else:
         root = sqrt(q) if q < 1e300 else hypot(b, sqrt(a) * sqrt(c))
         l1, l2 = a * (c / (root + b)), -(root + b)  # root - b without cancellation, and -root - b
-        is_settled = root > 20.0 and root - b > 2.0  # nothing is left of the start
+        is_settled = root > 20.0 and root - b > 2.0  # the initial velocity has no effect any more
         decay = 0.0 if is_settled else exp(-2.0 * root)
         gain, M = 1.0 - decay, root * (1.0 + decay)
         v = _end_velocity(a, b, c, v0, gain, M, l1 - decay * l2)
@@ -129,10 +128,10 @@ def _leg(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, floa
 
 
 def _end_velocity(a: float, b: float, c: float, v0: float, N: float, M: float, keep: float) -> float:
-    """v = (v0 (1 - b f) + c f) / (1 + (b + a v0) f), f = N/M, keep = M - b N.
+    """Return v = (v0 (1 - b f) + c f) / (1 + (b + a v0) f), where f = N/M and keep = M - b N.
 
-    Taken as the change from v0, unless that is most of v0: rounding then never makes drag push, and what is steady
-    stays.
+    The change is added to v0, unless it is most of v0. Rounding then never makes drag accelerate the vehicle, and a
+    steady velocity stays the same.
     """
     drag = b + a * v0
     growth = M + drag * N
@@ -141,15 +140,15 @@ def _end_velocity(a: float, b: float, c: float, v0: float, N: float, M: float, k
 
 
 def _mean_velocity(b: float, c: float, x: float, v0: float, n: float, m: float) -> float:
-    """X/h = v0 Y + c W where |q| is moderate, x = q/4.
+    """Return X/h = v0 Y + c W for a moderate |q|, where x = q/4.
 
-    With g = tanh(r/2)/(r/2) = n/m, the same for r = b, and t = r g/2, t_b = b g_b/2,
+    With g = tanh(r/2)/(r/2) = n/m and t = r g/2, and with g_b and t_b for r = b,
 
         exp(-b) = (1 - t_b)/(1 + t_b),    cosh(r) = (1 + t^2)/(1 - t^2),    sinh(r)/r = g/(1 - t^2)
         Y = (1 - t_b) g / ((1 + t_b) (1 - t^2))
         W = (g^2 + b (2 + b g) dg) / (2 (1 + t_b) (1 - t^2)),   dg = (g - g_b)/(q - b^2)
 
-    and dg is that of n and m, where no difference is left.
+    and dg follows from the divided differences of n and m, which need no subtraction of nearly equal numbers.
     """
     y, half = 0.25 * b * b, 0.5 * b
     n_b, m_b = _tanh_fraction(y)
@@ -160,7 +159,7 @@ def _mean_velocity(b: float, c: float, x: float, v0: float, n: float, m: float) 
 
 
 def _tanh_fraction(x: float) -> tuple[float, float]:
-    """n, m with tanh(sqrt(x))/sqrt(x) = n/m, the continued fraction of tanh: exact to the last digit for |x| < 0.9."""
+    """Return n and m of tanh(sqrt(x))/sqrt(x) = n/m, a continued fraction that is exact to rounding for |x| < 0.9."""
     x2 = x * x
     n = (_N[0] + _N[1] * x) + x2 * ((_N[2] + _N[3] * x) + x2 * _N[4])
     m = (_M[0] + _M[1] * x) + x2 * ((_M[2] + _M[3] * x) + x2 * _M[4])
@@ -168,7 +167,7 @@ def _tanh_fraction(x: float) -> tuple[float, float]:
 
 
 def _tanh_difference(x: float, y: float) -> tuple[float, float]:
-    """The divided differences of n and m over x and y."""
+    """Return the divided differences of n and m between x and y."""
     first, product = x + y, x * y
     second = first * first - product
     third = first * (second - product)

@@ -1,7 +1,6 @@
-"""The equations of motion as DESIGN.md has them, written out once more and without rounding (mpmath).
+"""The equations of motion as a reference: written out independently of the package, and calculated with mpmath.
 
-Of a vehicle they take what is declared (its axes, curves, thrusters, inputs) and its numbers, no formula of
-rov_fmu/model/.
+They use a vehicle's declarations (its axes, curves, thrusters, inputs) and numbers, but no formula of rov_fmu/model/.
 """
 
 from collections.abc import Mapping
@@ -13,28 +12,28 @@ from mpmath import mp
 from rov_fmu.model.layout import Curve, Thruster
 from rov_fmu.model.rov import Rov
 
-Number = Any  # of mpmath
+Number = Any  # an mpmath number
 PLACES = {"u": 0, "v": 1, "w": 2}
-"""Of a velocity in a thruster's direction."""
+"""The component of a thruster's direction along each velocity."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """v' = C + sum of the late forces' accelerations - B v - A |v| v, without coupling."""
+    """An axis without coupling: v' = C - B v - A |v| v + the accelerations by the lagging forces."""
 
     ahead: tuple[Number, Number]
     """A and B for v > 0."""
     astern: tuple[Number, Number]
     """A and B for v < 0."""
     C: Number
-    """Of loads and of the thrusters without lag."""
-    late: Mapping[str, Number]
-    """Acceleration by 1 N of each thruster with a lag."""
+    """The acceleration by loads and by the thrusters without lag."""
+    lagging: Mapping[str, Number]
+    """The acceleration by 1 N of each thruster with a lag."""
 
 
 @dataclass(frozen=True)
 class Lag:
-    """F' = (target - F)/T."""
+    """The lag of a force: F' = (target - F)/T."""
 
     target: Number
     T: Number
@@ -42,24 +41,24 @@ class Lag:
 
 @dataclass(frozen=True)
 class Equations:
-    """Of a vehicle under held inputs; exact numbers by the names of velocities, of thrusters."""
+    """The numbers of a vehicle under held inputs: axes and inertias by velocity, lags by thruster."""
 
     axes: Mapping[str, Axis]
     lags: Mapping[str, Lag]
     inertias: Mapping[str, Number]
-    """m/β, of the coupling."""
+    """m/β of each axis, for the coupling."""
     coupled: bool
 
     def rates(self, state: Mapping[str, Number], inputs: Mapping[str, float]) -> dict[str, Number]:
-        """Time derivatives of a state."""
+        """Return the time derivatives of a state."""
         found: dict[str, Number] = {}
         u, v, w, r, psi = (state.get(name, 0) for name in ("u", "v", "w", "r", "psi"))
         for name, axis in self.axes.items():
             V = state[name]
             A, B = axis.astern if mp.re(V) < 0 else axis.ahead
-            way = -1 if mp.re(V) < 0 else 1
-            late = sum(gain * state[f"F_{thruster}"] for thruster, gain in axis.late.items())
-            found[name] = axis.C + late - B * V - way * A * V * V
+            sign = -1 if mp.re(V) < 0 else 1
+            lagging = sum(gain * state[f"F_{thruster}"] for thruster, gain in axis.lagging.items())
+            found[name] = axis.C + lagging - B * V - sign * A * V * V
         if self.coupled:
             M_u, M_v, M_r = (self.inertias[name] for name in ("u", "v", "r"))
             found["u"] += M_v * v * r / M_u
@@ -82,7 +81,7 @@ def _limited(command: Number) -> Number:
 
 
 def thrust(rov: Rov, curve: Curve, command: Number) -> Number:
-    """F(c) = a (c - c0)^2 + b (c - c0) beyond the dead band; for c < 0 the same mirrored, of the set for reverse."""
+    """Return F(c) = a (c - c0)^2 + b (c - c0) beyond the dead band; for c < 0, -F(-c) with the reverse coefficients."""
     keys, reverse = curve.keys, "_reverse" if command < 0 else ""
 
     def number(key: str) -> Number:
@@ -97,7 +96,7 @@ def thrust(rov: Rov, curve: Curve, command: Number) -> Number:
 
 
 def steady_forces(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
-    """Of every thruster for the commands, once it does not lag any more."""
+    """Return the force of every thruster under the commands after its lag has died out."""
     curves = {curve.name: curve for curve in rov.layout.curves}
     found = {}
     for thruster in rov.layout.thrusters:
@@ -114,7 +113,10 @@ def steady_forces(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
 
 
 def effect(rov: Rov, thruster: Thruster, velocity: str) -> Number:
-    """Force along an axis of 1 N; torque x Y - y X of a position, R sin γ of an arm, (4)."""
+    """Return the force along an axis, or the yaw torque, by 1 N of a thruster.
+
+    The torque is x Y - y X for a thruster with a position, and R sin γ for one with an arm (4).
+    """
     if velocity != "r":
         return mp.mpf(thruster.direction[PLACES[velocity]])
     if thruster.position is not None:
@@ -126,7 +128,7 @@ def effect(rov: Rov, thruster: Thruster, velocity: str) -> Number:
 
 
 def equations(rov: Rov, inputs: Mapping[str, Number]) -> Equations:
-    """Of a vehicle with these inputs, in the precision of mpmath at the time."""
+    """Return the equations of a vehicle with these inputs, in the current precision of mpmath."""
     k = {name: mp.mpf(value) for name, value in rov.coefficients.items()}
     F = steady_forces(rov, inputs)
     lag_of = {curve.name: k[f"T_{curve.name}"] for curve in rov.layout.curves if "T" in curve.keys}

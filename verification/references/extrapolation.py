@@ -1,8 +1,8 @@
 """The motion with lag and coupling to some 30 digits, by extrapolation of the midpoint rule (Gragg, Bulirsch, Stoer).
 
-Nothing of rov_fmu/model/ is in it, not even its method: no series, no closed form. The equations of
-verification/references/equations.py are stepped with the signs of the velocities held, and cut where one of them
-reverses, which is found by Newton's method.
+It shares neither code nor method with rov_fmu/model/: it uses no series and no closed form. The equations of
+verification/references/equations.py are integrated while the signs of the velocities are held. A step ends where a
+velocity reverses, and Newton's method finds that time.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +15,7 @@ from mpmath import mp
 
 from .equations import Equations
 
-Number = Any  # of gmpy2
+Number = Any  # a gmpy2 number
 Rates = Callable[[Sequence[Number]], list[Number]]
 BITS = 260
 _DIVISIONS = tuple(range(2, 34, 2))
@@ -25,27 +25,29 @@ _SETTLED = 1e-42
 
 @dataclass
 class Ended:
-    """States by name, the pose counted from the start; the largest velocities, the ways there and back."""
+    """The end of a motion: the states, with the pose relative to the start, and what scales their errors."""
 
     state: dict[str, Number]
     fastest: dict[str, Number]
-    ways: dict[str, Number]
+    """The largest velocity of each axis."""
+    paths: dict[str, Number]
+    """The length of the path of each coordinate, back and forth."""
 
 
 class _System:
-    """The equations on lists of numbers: velocities, then x, y, z, psi, then forces."""
+    """The equations for a state that is a list: the velocities, then x, y, z, psi, then the lagging forces."""
 
     def __init__(self, equations: Equations, psi: float) -> None:
         self.names = list(equations.axes)
-        self.late = list(equations.lags)
+        self.lagging = list(equations.lags)
         self.first_force = len(self.names) + 4
         self.axes = [
             (
                 _real(axis.C),
                 [
-                    (n, _real(axis.late[name]))
-                    for n, name in enumerate(self.late, self.first_force)
-                    if axis.late[name] != 0
+                    (n, _real(axis.lagging[name]))
+                    for n, name in enumerate(self.lagging, self.first_force)
+                    if axis.lagging[name] != 0
                 ],
                 [(_real(a), _real(b)) for a, b in (axis.ahead, axis.astern)],
             )
@@ -60,17 +62,17 @@ class _System:
             self.factors = [_real(M_v / M_u), _real(M_u / M_v), _real((M_v - M_u) / M_r)]
 
     def rates(self, signs: Sequence[int]) -> Rates:
-        """Time derivatives, drag as it is for velocities of these signs."""
+        """Return the function that gives the time derivatives, with the drag for velocities of these signs."""
         drags = [drag[sign < 0] for (_, _, drag), sign in zip(self.axes, signs, strict=True)]
         drags = [(sign * A, B) for (A, B), sign in zip(drags, signs, strict=True)]
         U, V, W, R = self.places
         zero, first = mpfr(0), self.first_force
 
-        def of(y: Sequence[Number]) -> list[Number]:
+        def derivatives(y: Sequence[Number]) -> list[Number]:
             found = []
-            for a, (C, late, _) in enumerate(self.axes):
+            for a, (C, lagging, _) in enumerate(self.axes):
                 A, B = drags[a]
-                found.append(C + sum(gain * y[n] for n, gain in late) - (B + A * y[a]) * y[a])
+                found.append(C + sum(gain * y[n] for n, gain in lagging) - (B + A * y[a]) * y[a])
             u, v, w, r = (zero if n < 0 else y[n] for n in (U, V, W, R))
             if self.factors:
                 for n, factor, term in zip((U, V, R), self.factors, (v * r, -u * r, -u * v), strict=True):
@@ -80,37 +82,35 @@ class _System:
             found += [(target - F) / T for (target, T), F in zip(self.lags, y[first:], strict=True)]
             return found
 
-        return of
+        return derivatives
 
     def first_step(self, y: Sequence[Number]) -> Number:
-        """A time (s) within which little changes: from longer ones the way back is long."""
+        """Return a time (s) in which little changes, because shortening a long first step is expensive."""
         rates = [1 / T for _, T in self.lags] + [abs(y[n]) for n in self.places if n >= 0]
-        for a, (C, late, drags) in enumerate(self.axes):
-            lags = ((gain, y[n], self.lags[n - self.first_force][0]) for n, gain in late)
+        for a, (C, lagging, drags) in enumerate(self.axes):
+            lags = ((gain, y[n], self.lags[n - self.first_force][0]) for n, gain in lagging)
             force = abs(C) + sum(abs(gain) * (abs(now) + abs(target)) for gain, now, target in lags)
             rates += [B + 2 * A * abs(y[a]) + gmpy2.sqrt(A * force) for A, B in drags] + [gmpy2.sqrt(force)]
         rates += [factor * sum(abs(x) for x in y[: len(self.names)]) for factor in map(abs, self.factors)]
         return mpfr(0.1) / (sum(rates) or mpfr("1e-9"))
 
     def is_settled(self, rates: Sequence[Number], y: Sequence[Number]) -> bool:
-        """Whether all that would still change is far behind the digits asked for."""
-        n, sizes = (
-            len(self.names),
-            [abs(C) + abs(y[a]) * drag[0][1] + y[a] ** 2 * drag[0][0] for a, (C, _, drag) in enumerate(self.axes)],
-        )
-        late = zip(self.lags, y[self.first_force :], strict=True)
-        return all(abs(rate) <= _SETTLED * size for rate, size in zip(rates[:n], sizes, strict=True)) and all(
-            abs(target - F) <= _SETTLED * abs(target) for (target, _), F in late
+        """Return True when every remaining change is far below the required precision."""
+        sizes = [abs(C) + abs(y[a]) * drag[0][1] + y[a] ** 2 * drag[0][0] for a, (C, _, drag) in enumerate(self.axes)]
+        axes = zip(rates, sizes, strict=False)
+        forces = zip(self.lags, y[self.first_force :], strict=True)
+        return all(abs(rate) <= _SETTLED * size for rate, size in axes) and all(
+            abs(target - F) <= _SETTLED * abs(target) for (target, _), F in forces
         )
 
 
 def _real(number: Any) -> Number:
-    """Of mpmath, to gmpy2."""
+    """Convert a number of mpmath to gmpy2."""
     return mpfr(mp.nstr(number, 90))
 
 
 def _leap(rates: Rates, y: Sequence[Number], start: Sequence[Number], h: Number) -> tuple[list[Number], Number]:
-    """The state after h, and the error against its size; `start` are the rates at y."""
+    """Return the state after h and its relative error; `start` are the rates at y."""
     rows: list[list[list[Number]]] = []
     for divisions in _DIVISIONS:
         step = h / divisions
@@ -130,7 +130,7 @@ def _leap(rates: Rates, y: Sequence[Number], start: Sequence[Number], h: Number)
 
 
 def _signs(system: _System, y: Sequence[Number], h: Number) -> tuple[list[int], Number]:
-    """Of the velocities, of those at rest the sign that they get; and a time after which they have it."""
+    """Return the signs of the velocities in the step, and a time after which a velocity that is zero has its sign."""
     n = len(system.names)
     signs = [-1 if y[a] < 0 else 1 for a in range(n)]
     soon = h / 2**24
@@ -142,7 +142,7 @@ def _signs(system: _System, y: Sequence[Number], h: Number) -> tuple[list[int], 
 
 
 def _reversal(rates: Rates, y: Sequence[Number], a: int, low: Number, high: Number) -> tuple[Number, list[Number]]:
-    """When the velocity of an axis is zero between two times at which its signs differ, and the state then."""
+    """Return the time between `low` and `high` at which the velocity of axis `a` is zero, and the state then."""
     start = rates(y)
     t, sign = (low + high) / 2, _leap(rates, y, start, high)[0][a] > 0
     for _ in range(400):
@@ -158,7 +158,7 @@ def _reversal(rates: Rates, y: Sequence[Number], a: int, low: Number, high: Numb
 
 
 def _dip(rates: Rates, y: Sequence[Number], end: Sequence[Number], a: int, sign: int, h: Number) -> Number | None:
-    """A time at which a velocity of the same sign at both ends is of the other, where there is one."""
+    """Return a time at which a velocity with the same sign at both ends has the other sign; None if there is none."""
     start, last = rates(y), rates(end)
     if not (sign * start[a] < 0 < sign * last[a]) or min(abs(y[a]), abs(end[a])) > h * max(abs(start[a]), abs(last[a])):
         return None
@@ -173,23 +173,23 @@ def _dip(rates: Rates, y: Sequence[Number], end: Sequence[Number], a: int, sign:
 
 
 def integrate(equations: Equations, state: Mapping[str, float], h: float) -> Ended:
-    """The motion over h seconds, the current left out."""
+    """Return the end of the motion after h seconds, without the current."""
     with gmpy2.context(gmpy2.get_context(), precision=BITS):
         system = _System(equations, state.get("psi", 0.0))
         n = len(system.names)
         y = [mpfr(state[name]) for name in system.names] + [mpfr(0)] * 4
-        y += [mpfr(state[f"F_{name}"]) for name in system.late]
-        fastest, ways = [abs(x) for x in y[:n]], [mpfr(0)] * 3
-        rest = mpfr(h)
+        y += [mpfr(state[f"F_{name}"]) for name in system.lagging]
+        fastest, paths = [abs(x) for x in y[:n]], [mpfr(0)] * 3
+        remaining = mpfr(h)
         size = system.first_step(y)
-        while rest > 0:
-            size = min(size, rest)
+        while remaining > 0:
+            size = min(size, remaining)
             signs, soon = _signs(system, y, size)
             rates = system.rates(signs)
             start = rates(y)
             if system.is_settled(start, y):
-                y = _carried_on(system, y, start, rest)
-                ways = [way + abs(rest * rate) for way, rate in zip(ways, _pace(start, n), strict=True)]
+                y = _steady_end(system, y, start, remaining)
+                paths = [path + abs(remaining * rate) for path, rate in zip(paths, _pace(start, n), strict=True)]
                 break
             end, error = _leap(rates, y, start, size)
             scale = mpfr(0.9) * (mpfr(_TOLERANCE) / error) ** (mpfr(1) / 31) if error else mpfr(4)
@@ -204,12 +204,12 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
                     taken, end = _reversal(rates, y, a, low, high)
             moved = [b - a for a, b in zip(y[n : n + 4], end[n : n + 4], strict=True)]
             steps = (gmpy2.hypot(moved[0], moved[1]), abs(moved[2]), abs(moved[3]))
-            ways = [way + step for way, step in zip(ways, steps, strict=True)]
-            y, rest = end, rest - taken
+            paths = [path + step for path, step in zip(paths, steps, strict=True)]
+            y, remaining = end, remaining - taken
             fastest = [max(a, abs(b)) for a, b in zip(fastest, y, strict=False)]
             size *= min(mpfr(4), scale)
-        names = [*system.names, "x", "y", "z", "psi", *(f"F_{name}" for name in system.late)]
-        planar, depth, turn = map(_plain, ways)
+        names = [*system.names, "x", "y", "z", "psi", *(f"F_{name}" for name in system.lagging)]
+        planar, depth, turn = map(_plain, paths)
         return Ended(
             {name: _plain(x) for name, x in zip(names, y, strict=True)},
             {name: _plain(x) for name, x in zip(system.names, fastest, strict=True)},
@@ -218,20 +218,21 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
 
 
 def _pace(rates: Sequence[Number], n: int) -> tuple[Number, Number, Number]:
+    """Return the horizontal speed, the rate of the depth and the rate of the heading."""
     return gmpy2.hypot(rates[n], rates[n + 1]), rates[n + 2], rates[n + 3]
 
 
-def _carried_on(system: _System, y: Sequence[Number], rates: Sequence[Number], h: Number) -> list[Number]:
-    """A steady motion: straight, or on a circle."""
+def _steady_end(system: _System, y: Sequence[Number], rates: Sequence[Number], h: Number) -> list[Number]:
+    """Return the state after h seconds of steady motion, straight or on a circle."""
     n = len(system.names)
     r, end = rates[n + 3], list(y)
-    ahead, aside = rates[n], rates[n + 1]
+    north, east = rates[n], rates[n + 1]
     if r == 0:
-        end[n], end[n + 1] = y[n] + ahead * h, y[n + 1] + aside * h
-    else:  # x' and y' turn by r h
+        end[n], end[n + 1] = y[n] + north * h, y[n + 1] + east * h
+    else:  # the velocity (x', y') turns by r h
         s, c = gmpy2.sin_cos(r * h)
-        end[n] += (ahead * s - aside * (1 - c)) / r
-        end[n + 1] += (aside * s + ahead * (1 - c)) / r
+        end[n] += (north * s - east * (1 - c)) / r
+        end[n + 1] += (east * s + north * (1 - c)) / r
     end[n + 2] += rates[n + 2] * h
     end[n + 3] += r * h
     for place, (target, _) in enumerate(system.lags, system.first_force):
@@ -240,5 +241,5 @@ def _carried_on(system: _System, y: Sequence[Number], rates: Sequence[Number], h
 
 
 def _plain(number: Number) -> Any:
-    """Of gmpy2, to mpmath."""
+    """Convert a number of gmpy2 to mpmath."""
     return mp.mpf(f"{number:.70e}")

@@ -1,4 +1,4 @@
-"""The FMU as FMPy drives it."""
+"""Instances of an FMU in FMPy."""
 
 import ctypes
 from pathlib import Path
@@ -9,7 +9,7 @@ from fmpy.fmi2 import FMU2Slave
 
 
 def fmpy_slave(folder: Path, callbacks: Any = None) -> FMU2Slave:
-    """An instance of an unzipped FMU for Co-Simulation; all is logged where callbacks are given."""
+    """Return an instance of an unzipped FMU for Co-Simulation. With callbacks, logging is on."""
     description = fmpy.read_model_description(str(folder))
     slave = FMU2Slave(
         guid=description.guid,
@@ -22,6 +22,6 @@ def fmpy_slave(folder: Path, callbacks: Any = None) -> FMU2Slave:
 
 
 def keep_loaded(folder: Path) -> None:
-    """Hold the library of a PythonFMU FMU: to unload it and load it again may crash the interpreter it shares."""
+    """Keep the library of a PythonFMU FMU loaded: loading it a second time may crash the Python interpreter."""
     for library in (folder / "binaries" / fmpy.platform).iterdir():
         ctypes.CDLL(str(library))

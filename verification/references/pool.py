@@ -1,7 +1,7 @@
-"""A vehicle in a pool by an integrator of its own: the equations of motion, written out and handed to SciPy's DOP853.
+"""A simulated pool for tests of identification: the equations of motion, integrated by SciPy's DOP853.
 
-It shares the names of a vehicle's coefficients with the package and none of its mathematics, so that what is identified
-from a recording of it is held against a truth from elsewhere. Commands may reach the thrusters late, water may flow.
+It uses the names of a vehicle's coefficients but none of the package's mathematics, so its recordings are an
+independent truth. Commands may reach the thrusters with a delay, and the water may have a current.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,22 +19,23 @@ from rov_fmu.model.rov import Rov
 Array = NDArray[np.float64]
 
 _PRECISION = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
-_ALONG = {"u": 0, "v": 1, "w": 2}  # of a direction: forward, to starboard, down
+_ALONG = {"u": 0, "v": 1, "w": 2}  # the components of a direction: forward, starboard, down
 
 
 def swim(
     k: Rov, time: Array, thrusters: Mapping[str, Array], delay: float = 0.0, current: tuple[float, float] = (0.0, 0.0)
 ) -> dict[str, Array]:
-    """u, v, w, r (those that the vehicle has) and x, y, z, psi at the times (s), from rest; SI units.
+    """Return the velocities of the vehicle's axes and x, y, z, psi at the times (s), from rest, in SI units.
 
-    `thrusters` are the commands that reach the thrusters, n each, by name, from their times on and `delay` (s) later;
-    those left out stand still. `current` is the water's velocity north and east (m/s). The vehicle heads north first.
+    `thrusters` maps each thruster to its commands, one for each time; without commands a thruster gives no thrust. Each
+    command takes effect `delay` (s) after its time. `current` is the velocity of the water north and east (m/s). The
+    vehicle starts with a heading of north.
     """
     still = np.zeros(len(time))
     commands = np.column_stack([thrusters.get(thruster.name, still) for thruster in k.layout.thrusters])
     changes = np.concatenate([[0], np.flatnonzero(np.any(np.diff(commands, axis=0) != 0.0, axis=1)) + 1])
-    late = (time[changes] + delay).tolist()
-    bounds = [float(time[0]), *(t for t in late if t < time[-1]), float(time[-1])]
+    delayed = (time[changes] + delay).tolist()
+    bounds = [float(time[0]), *(t for t in delayed if t < time[-1]), float(time[-1])]
     held = [np.zeros(commands.shape[1]), *commands[changes]]
     vehicle = _Vehicle.of(k)
     state = np.zeros(vehicle.size)
@@ -57,25 +58,26 @@ class _Vehicle:
 
     k: Rov
     axes: tuple[str, ...]
-    """Symbols of their velocities."""
+    """The symbols of the axes' velocities."""
     inertia: Sequence[float]
-    """m/β."""
+    """m/β of each axis."""
     drag: Sequence[tuple[float, float, float, float]]
-    """a_d, b_d for v >= 0, and those for v < 0."""
+    """a_d and b_d for v >= 0, then a_d and b_d for v < 0."""
     load: Sequence[float]
+    """The constant load F_0 of each axis (N or N.m)."""
     arms: Array
-    """axes x thrusters: α times force, or torque (m), of 1 N of each."""
+    """α times the force or torque on each axis (row) by 1 N of each thruster (column)."""
     lags: Sequence[float]
-    """s, a thruster each; 0 where the force follows at once."""
+    """The time constant (s) of each thruster; 0 without lag."""
 
     @property
     def size(self) -> int:
-        """Of the state: velocities, pose, forces of the thrusters."""
+        """The size of the state: velocities, pose, forces of the thrusters."""
         return len(self.axes) + 4 + len(self.lags)
 
     @classmethod
     def of(cls, k: Rov) -> "_Vehicle":
-        """Read the numbers by their names."""
+        """Return the numbers of a vehicle."""
         get, names = k.coefficients.get, [axis.velocity for axis in AXES.values() if k.layout.has(axis)]
         bodies = [k["I_r" if v == "r" else "m_rov"] + get(f"m_a_{v}", 0.0) for v in names]
         drag = [(k[f"a_d_{v}"], k[f"b_d_{v}"]) for v in names]
@@ -93,13 +95,13 @@ class _Vehicle:
         )
 
     def rates(self, command: Array, current: tuple[float, float]) -> Callable[[float, Array], list[float]]:
-        """The derivatives of the state under held commands."""
+        """Return the function that gives the derivatives of the state under held commands."""
         k, n = self.k, len(self.axes)
         steady = [_force(k, t, c) for t, c in zip(k.layout.thrusters, command.tolist(), strict=True)]
-        late = [number for number, lag in enumerate(self.lags) if lag]
-        swift = self.arms @ np.array([0.0 if lag else F for F, lag in zip(steady, self.lags, strict=True)])
-        constant = (swift + np.array(self.load)).tolist()
-        slow = [[(n + 4 + number, arms[number]) for number in late] for arms in self.arms.tolist()]
+        lagging = [number for number, lag in enumerate(self.lags) if lag]
+        immediate = self.arms @ np.array([0.0 if lag else F for F, lag in zip(steady, self.lags, strict=True)])
+        constant = (immediate + np.array(self.load)).tolist()
+        lagging_arms = [[(n + 4 + number, arms[number]) for number in lagging] for arms in self.arms.tolist()]
         u_at, v_at, w_at, r_at = (self.axes.index(name) if name in self.axes else -1 for name in "uvwr")
         M_u, M_v, M_r = (self.inertia[at] if k.layout.coupled else 0.0 for at in (u_at, v_at, r_at))
 
@@ -108,9 +110,9 @@ class _Vehicle:
             found = [0.0] * len(y)
             for axis, (a, b, a_reverse, b_reverse) in enumerate(self.drag):
                 speed = y[axis]
-                against = (a * speed + b) * speed if speed >= 0.0 else (-a_reverse * speed + b_reverse) * speed
-                force = constant[axis] + sum(arm * y[at] for at, arm in slow[axis])
-                found[axis] = (force - against) / self.inertia[axis]
+                resistance = (a * speed + b) * speed if speed >= 0.0 else (-a_reverse * speed + b_reverse) * speed
+                force = constant[axis] + sum(arm * y[at] for at, arm in lagging_arms[axis])
+                found[axis] = (force - resistance) / self.inertia[axis]
             u, v, w, r = (y[at] if at >= 0 else 0.0 for at in (u_at, v_at, w_at, r_at))
             if k.layout.coupled:
                 found[u_at] += M_v * v * r / M_u
@@ -120,7 +122,7 @@ class _Vehicle:
             found[n] = u * cos(heading) - v * sin(heading) + current[0]
             found[n + 1] = u * sin(heading) + v * cos(heading) + current[1]
             found[n + 2], found[n + 3] = w, r
-            for number in late:
+            for number in lagging:
                 found[n + 4 + number] = (steady[number] - y[n + 4 + number]) / self.lags[number]
             return found
 
@@ -128,7 +130,7 @@ class _Vehicle:
 
 
 def _arm(k: Rov, thruster: Thruster, velocity: str) -> float:
-    """Force along an axis, or torque (m), of 1 N of a thruster."""
+    """Return the force along an axis, or the yaw torque, by 1 N of a thruster."""
     if velocity in _ALONG:
         return thruster.direction[_ALONG[velocity]]
     if thruster.position is None:
@@ -138,7 +140,10 @@ def _arm(k: Rov, thruster: Thruster, velocity: str) -> float:
 
 
 def _force(k: Rov, thruster: Thruster, command: float) -> float:
-    """Steady thrust (N) of one thruster: a_t (c - c_0)^2 + b_t (c - c_0) of its curve, by the number it is of."""
+    """Return the steady thrust (N) of one thruster.
+
+    The curve a_t (c - c_0)^2 + b_t (c - c_0) is that of all its thrusters together.
+    """
     get, name, end = k.coefficients.get, thruster.curve, "_reverse" if command < 0.0 else ""
     (together,) = (curve.together for curve in k.layout.curves if curve.name == name)
     a_t, b_t = (get(f"{key}_{name}{end}", k[f"{key}_{name}"]) for key in ("a_t", "b_t"))

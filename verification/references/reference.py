@@ -1,8 +1,9 @@
-"""The exact motion to 50 digits, from the textbook solutions of (18), not the formulas of rov_fmu/model/ (mpmath).
+"""The exact motion to 50 digits (mpmath), from the textbook solutions of (18), not the formulas of rov_fmu/model/.
 
-While v keeps its sign, v' = C - B v - A v^2 is elementary: through its two equilibria where they are real, a tangent
-where they are not, a hyperbola where they coincide, an exponential or a line without quadratic drag. Every formula
-holds for complex times too, which is what the pose is integrated with.
+While v keeps its sign, v' = C - B v - A v^2 has an elementary solution. With quadratic drag it depends on the
+equilibria: exponentials when they are real, a tangent when they are not, a hyperbola when they coincide. Without
+quadratic drag it is an exponential or a line. Every formula also holds for complex times, which the integral of the
+pose uses.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,7 +21,7 @@ from .equations import Axis, Equations, equations
 from .extrapolation import integrate
 
 DIGITS = 50
-Number = Any  # of mpmath, real or complex
+Number = Any  # a number of mpmath, real or complex
 Function = Callable[[Number], Number]
 Rest = Callable[[], Number]
 
@@ -33,19 +34,20 @@ class Leg:
         self._velocity, self._distance, self._room, self.rest = _elementary(A, B, C, v0)
 
     def velocity(self, time: Number) -> Number:
+        """Return the velocity."""
         return self.sign * self._velocity(time - self.start)
 
     def distance(self, time: Number) -> Number:
-        """From the beginning of the motion."""
+        """Return the distance from the start of the motion."""
         return self.offset + self.sign * self._distance(time - self.start)
 
     def room(self, time: Number) -> Number:
-        """How far from a complex time the nearest singularity is."""
+        """Return the distance from a complex time to the nearest singularity."""
         return self._room(time - self.start)
 
 
 def _elementary(A: Number, B: Number, C: Number, v0: Number) -> tuple[Function, Function, Function, Rest]:
-    """Velocity, distance and room at a time after v0, and when a force C < 0 brings the motion to rest."""
+    """Return functions for velocity, distance and room at a time after v0, and for the time to rest under C < 0."""
     D2 = B * B + 4 * A * C
     D = mp.sqrt(abs(D2))
     if A == 0 and B == 0:
@@ -84,7 +86,7 @@ def _elementary(A: Number, B: Number, C: Number, v0: Number) -> tuple[Function, 
 
 
 def _to_pole(t: Number, pole: Number, period: Number) -> Number:
-    """To the nearest of poles a period apart."""
+    """Return the distance to the nearest of the poles, which are one period apart."""
     return abs(t - pole - mp.nint(mp.re((t - pole) / period)) * period)
 
 
@@ -100,11 +102,10 @@ class Motion:
         (A, B), back = (ahead, astern)[::sign]
         self.legs = [Leg(A, B, sign * C, sign * v0, mp.mpf(0), sign, mp.mpf(0))]
         if sign * C < 0 and v0 != 0 and (rest := self.legs[0].rest()) < h:
-            way = self.legs[0].distance(rest)
-            self.legs.append(Leg(*back, -sign * C, mp.mpf(0), rest, -sign, way))
+            self.legs.append(Leg(*back, -sign * C, mp.mpf(0), rest, -sign, self.legs[0].distance(rest)))
 
     def end(self) -> tuple[Number, Number, Number]:
-        """Velocity, distance and length of the path, there and back."""
+        """Return the velocity, the distance and the length of the path, back and forth."""
         last = self.legs[-1]
         distance = last.distance(self.h)
         return last.velocity(self.h), distance, abs(last.offset) + abs(distance - last.offset)
@@ -112,20 +113,22 @@ class Motion:
 
 @dataclass(frozen=True)
 class AxisEnd:
+    """The end of the motion of one axis."""
+
     velocity: Number
     distance: Number
     path: Number
     scale: Number
-    """The largest velocity on the way."""
+    """The largest velocity of the motion."""
     digits: int
-    """Digits to calculate with for a result of 50."""
+    """The digits of precision that a result of 50 digits needs."""
 
 
 def axis(
     A: Number, B: Number, C: Number, v0: Number, h: Number, astern: tuple[Number, Number] | None = None
 ) -> AxisEnd:
-    """One axis after h seconds: calculated with more and more digits until 50 of them stay."""
-    # Terms cancel by as many digits as the numbers, or their squares, are apart.
+    """Return the motion of one axis after h seconds, with as much precision as 50 stable digits need."""
+    # Terms cancel by as many digits as the magnitudes of the numbers, or of their squares, differ.
     digits = DIGITS + sum(abs(mp.mag(number)) * 6 // 10 for number in (A, B, C, v0, h, *(astern or ())) if number != 0)
     before = None
     while True:
@@ -140,29 +143,33 @@ def axis(
 
 @cache
 def _nodes() -> list[tuple[Number, Number]]:
-    """The Gauss-Legendre rule of 24 nodes on [-1, 1]."""
+    """Return the Gauss-Legendre rule of 24 nodes on [-1, 1]."""
     with mp.workdps(2 * DIGITS):
         nodes: list[tuple[Number, Number]] = GaussLegendre(mp).calc_nodes(4, mp.prec)
     return nodes
 
 
 class _Plane:
-    """The integral of u e^(i angle) over a time in which surge and yaw keep their signs."""
+    """The integral of u e^(i angle) over a time in which surge and yaw keep their signs.
+
+    The angle is the heading relative to the start.
+    """
 
     def __init__(self, surge: Leg, yaw: Leg) -> None:
         self.surge, self.yaw = surge, yaw
 
     def integral(self, a: Number, b: Number) -> Number:
-        """Along the real axis where little is turned; over a long turn through complex times.
+        """Return the integral from a to b.
 
-        There it dies out on the side where e^(i angle) does, and no singularity is between the ways there from a and b.
+        For a small turn the path of integration is the real axis. For a large turn it goes through complex times, to
+        the side where e^(i angle) decays, if there is no singularity between the paths from a and from b.
         """
         angles = self.yaw.distance(a), self.yaw.distance(b)
         if abs(angles[1] - angles[0]) < 60:
             return self.along(a, b)
         slowest = min(abs(self.yaw.velocity(t)) for t in (a, b))
         room = min(leg.room(t) for leg in (self.surge, self.yaw) for t in (a, b))
-        if slowest * room > 80:  # up is shorter than room: no singularity on the way
+        if slowest * room > 80:  # `up` is shorter than `room`, so the path meets no singularity
             up = mp.mpc(0, 64 * self.yaw.sign) / slowest
             limit = 1e-25 * max(abs(self.surge.velocity(t)) for t in (a, b))
             near = all(abs(self.yaw.distance(t + up) - self.yaw.distance(t)) < 600 for t in (a, b))
@@ -172,20 +179,24 @@ class _Plane:
         return self.integral(a, middle) + self.integral(middle, b)
 
     def integrand(self, t: Number) -> Number:
+        """Return u e^(i angle) at a complex time."""
         return self.surge.velocity(t) * mp.expj(self.yaw.distance(t))
 
     def along(self, a: Number, b: Number) -> Number:
-        """A straight line in panels that are short against the turn and the way to the next singularity."""
+        """Return the integral along a straight line.
+
+        Its panels are short relative to the turn and to the distance of the next singularity.
+        """
         total = mp.mpf(0)
         if a == b:
             return total
-        way = (b - a) / abs(b - a)
+        direction = (b - a) / abs(b - a)
         while a != b:
             length = min(self.surge.room(a), self.yaw.room(a)) * 2 / 3
             angle = self.yaw.distance(a)
-            while abs(self.yaw.distance(a + min(length, abs(b - a)) * way) - angle) > 12:
+            while abs(self.yaw.distance(a + min(length, abs(b - a)) * direction) - angle) > 12:
                 length = min(length, abs(b - a)) / 2
-            end = a + length * way if length < abs(b - a) else b
+            end = a + length * direction if length < abs(b - a) else b
             half, middle = (end - a) / 2, (end + a) / 2
             total += half * mp.fsum(weight * self.integrand(middle + half * node) for node, weight in _nodes())
             a = end
@@ -193,7 +204,7 @@ class _Plane:
 
 
 def planar(surge: Motion, yaw: Motion) -> Number:
-    """Distance ahead + i distance to starboard of the first heading; its quadrature leaves some 25 digits."""
+    """Return the distance ahead + i distance to starboard, relative to the first heading, to some 25 digits."""
     cuts = sorted([mp.mpf(0), *(motion.legs[-1].start for motion in (surge, yaw) if len(motion.legs) > 1), surge.h])
     total = mp.mpc(0)
     for a, b in pairwise(cuts):
@@ -204,50 +215,50 @@ def planar(surge: Motion, yaw: Motion) -> Number:
 
 @dataclass(frozen=True)
 class Step:
-    """State after a step by name, and what its errors are measured by."""
+    """The state after a step by name, and the scale of its errors."""
 
     state: dict[str, Number]
     scale: dict[str, Number]
-    """The largest velocity on the way, the length of the path, the angle turned there and back."""
+    """The largest velocity, the length of the path, or the angle turned back and forth."""
 
 
 def step(rov: Rov, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> Step:
-    """The vehicle after h seconds with the inputs held."""
+    """Return the state of the vehicle after h seconds with the inputs held."""
     with mp.workdps(4 * DIGITS):
-        said = equations(rov, inputs)
-        if said.lags or said.coupled:
-            ended = integrate(said, state, h)
-            found, fastest, ways = ended.state, ended.fastest, ended.ways
+        equation = equations(rov, inputs)
+        if equation.lags or equation.coupled:
+            ended = integrate(equation, state, h)
+            found, fastest, paths = ended.state, ended.fastest, ended.paths
         else:
-            found, fastest, ways = _free(said, state, h)
-        scale = fastest | {name: ways[name] for name in ("x", "y", "z", "psi")}
+            found, fastest, paths = _uncoupled(equation, state, h)
+        scale = fastest | {name: paths[name] for name in ("x", "y", "z", "psi")}
         for name in ("x", "y", "z", "psi"):
             found[name] += mp.mpf(state.get(name, 0))
         for name, current in (("x", "V_N"), ("y", "V_E")):
             drift = mp.mpf(inputs.get(current, 0)) * h
             found[name] += drift
             scale[name] += abs(drift)
-        scale |= {f"F_{name}": max(abs(lag.target), abs(state[f"F_{name}"])) for name, lag in said.lags.items()}
+        scale |= {f"F_{name}": max(abs(lag.target), abs(state[f"F_{name}"])) for name, lag in equation.lags.items()}
         return Step({name: found[name] for name in state}, {name: scale[name] for name in state})
 
 
 _Numbers = dict[str, Number]
 
 
-def _free(said: Equations, state: Mapping[str, float], h: float) -> tuple[_Numbers, _Numbers, _Numbers]:
-    """Velocities, distances and track of a vehicle whose axes have nothing to do with each other; what scales them."""
+def _uncoupled(equation: Equations, state: Mapping[str, float], h: float) -> tuple[_Numbers, _Numbers, _Numbers]:
+    """Return the state of a vehicle without coupling and lag, its largest velocities and the lengths of its paths."""
     still = Axis((0, 0), (0, 0), mp.zero, {})
-    axes = {name: said.axes.get(name, still) for name in ("u", "v", "w", "r")}
+    axes = {name: equation.axes.get(name, still) for name in ("u", "v", "w", "r")}
     forms = {name: (*form.ahead, form.C, state.get(name, 0.0), h, form.astern) for name, form in axes.items()}
     ends = {name: axis(*form) for name, form in forms.items()}
     with mp.workdps(max(end.digits for end in ends.values())):
         u, v, r = (Motion(*forms[name]) for name in ("u", "v", "r"))
         track = planar(u, r) + 1j * planar(v, r)
         track *= mp.expj(mp.mpf(state.get("psi", 0)))
-    way = ends["u"].path + ends["v"].path
+    planar_path = ends["u"].path + ends["v"].path
     return (
-        {name: ends[name].velocity for name in said.axes}
+        {name: ends[name].velocity for name in equation.axes}
         | {"x": track.real, "y": track.imag, "z": ends["w"].distance, "psi": ends["r"].distance},
-        {name: ends[name].scale for name in said.axes},
-        {"x": way, "y": way, "z": ends["w"].path, "psi": ends["r"].path},
+        {name: ends[name].scale for name in equation.axes},
+        {"x": planar_path, "y": planar_path, "z": ends["w"].path, "psi": ends["r"].path},
     )

@@ -1,7 +1,7 @@
-/* Forward Euler and the classical Runge-Kutta method, with the flags that are best for them: see plain_c.py. */
+/* Forward Euler and the classical Runge-Kutta method, compiled with the flags that suit them best (plain_c.py). */
 #include "motion.h"
 
-/* `stages` is constant where this is called, so that all is unrolled; the state stays in registers. */
+/* Every caller passes a constant `stages`, so the compiler unrolls the loops and keeps the state in registers. */
 static inline __attribute__((always_inline)) void runge_kutta(int stages, const vehicle *from, double s[N_STATES], double h,
                                                               long steps)
 {

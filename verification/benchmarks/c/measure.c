@@ -1,5 +1,5 @@
-/* Times held commands, by one method or another, and the FMU in numbers: a library that plain_c.py
- * calls, linked with SUNDIALS. Times are processor time of this thread: what else runs does not count. */
+/* Measure held commands by several methods, and many instances of the FMU. plain_c.py calls this library, which is linked
+ * with SUNDIALS. Times are processor time of this thread. */
 #define _POSIX_C_SOURCE 200809L
 #include "fmu.h"
 #include "motion.h"
@@ -23,14 +23,14 @@ static double nanoseconds(void)
     return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
 }
 
-/* From the beginning, with n values set. */
+/* Reset an instance, set n values and initialize it. */
 static void start_instance(fmu_instance c, const unsigned vr[], size_t n, const double values[])
 {
     CHECK(API.Reset(c) == 0 && set_values(c, vr, n, values));
     initialize(c);
 }
 
-/* Once, before all else. */
+/* Load the FMU. This is the first call. */
 void begin(const char *path)
 {
     for (int i = 0; i < N_VARIABLES; i++) {
@@ -44,7 +44,7 @@ void begin(const char *path)
 
 /* ---- Methods ---- */
 
-/* Ours: one step, however long. */
+/* Our method takes one step of any length. */
 void core(vehicle *at, double state[N_STATES], double h, long steps)
 {
     (void)steps;
@@ -54,7 +54,7 @@ void core(vehicle *at, double state[N_STATES], double h, long steps)
     memcpy(state, next, sizeof next);
 }
 
-/* SUNDIALS CVODE, of which FMPy ships the libraries and no headers. plain_c.py makes the solvers. */
+/* SUNDIALS CVODE: FMPy ships its libraries without headers. plain_c.py makes the solvers. */
 typedef void *handle;
 enum { NORMAL = 1 }; /* task */
 double *N_VGetArrayPointer(handle vector);
@@ -69,7 +69,7 @@ int cvode_rates(double t, handle y, handle rate, void *user)
     return 0;
 }
 
-/* A held command begins anew, for the right side has a jump there, and ends at a stop time. */
+/* The solver starts again with each held command, because the right side jumps there, and ends at a stop time. */
 static __attribute__((noinline)) void solve(handle solver, handle y, double s[N_STATES], double h, long steps)
 {
     const size_t size = N_STATES * sizeof s[0];
@@ -118,9 +118,9 @@ double hold(advance *method, handle solver, handle y, double h, long substeps, l
     return each;
 }
 
-/* ---- Numbers ---- */
+/* ---- Many instances and runs ---- */
 
-/* n instances that go straight ahead and down, so many rounds of steps in turn: nanoseconds a step; *bytes of each. */
+/* Step n instances in turn, straight ahead and down. Return nanoseconds per step; *bytes becomes the memory of each. */
 double step_in_turn(size_t n, size_t rounds, double *bytes)
 {
     static const double h = 0.01;
@@ -153,7 +153,7 @@ double step_in_turn(size_t n, size_t rounds, double *bytes)
     return each;
 }
 
-/* Runs of ten commands of 10 s, each with n values set at its start: nanoseconds, and where each ends. */
+/* Run ten commands of 10 s, with n values set at the start of each run. Return nanoseconds; `end` gets the final states. */
 double run_each(size_t runs, const unsigned vr[], size_t n, const double *values,
                 const double command[HELD][N_COMMANDS], double end[][N_STATES])
 {

@@ -1,4 +1,4 @@
-/* What all methods work on: all states of a vehicle. One call advances the state by `steps` steps of h seconds, as an
+/* The vehicle that all methods simulate. One call advances the state by `steps` steps of h seconds, as an
  * importer's communication step does, and is not inlined into the loop that measures it. */
 #pragma once
 
@@ -10,12 +10,12 @@
 typedef struct {
     double at[N_VARIABLES];
     model_numbers numbers;
-    model_held held; /* what holds while the commands do */
+    model_held held; /* numbers that are constant while the commands are held */
 } vehicle;
 
 typedef void advance(vehicle *v, double state[N_STATES], double h, long steps);
 
-/* Compute what does not change while the commands are held. With lag, the forces of the thrusters are states. */
+/* Compute the numbers that are constant while the commands are held. With lag, the forces of the thrusters are states. */
 static inline void hold_commands(vehicle *v)
 {
     model_thrust(v->at, &v->held);

@@ -5,7 +5,7 @@
 
 /* ---- Life ---- */
 
-/* Its index, or as many as there are. */
+/* Return the index of a category; N_LOG_CATEGORIES when it is unknown. */
 static int category_of(const char *name)
 {
     int i = 0;
@@ -15,7 +15,7 @@ static int category_of(const char *name)
     return i;
 }
 
-/* What both versions promise of a message. */
+/* Check what both versions of FMI demand of a message. */
 static void check_message(const slot *s, int status, const char *category, const char *text)
 {
     PROPERTY(text[0] != '\0' && strlen(text) < 640, "a message of %zu characters", strlen(text));
@@ -45,7 +45,7 @@ static void free_instance(slot *s)
     s->f = NULL;
 }
 
-/* What replaces the instance of a slot; `good`: the arguments that it was made with. */
+/* Put a new instance into a slot. `good`: the arguments that it was made with are valid. */
 static void put_instance(slot *s, fmu *made, bool good, int type, manner of)
 {
     s->f = made;
@@ -76,7 +76,7 @@ static void PLAY(SetDebugLogging)(slot *s)
     CALL(s, good, true, SetDebugLogging, s->f, take_bool(), n, categories);
 }
 
-/* Functions without arguments that lead to a mode. */
+/* Functions without arguments that change the mode. */
 #define CALL_THAT_LEADS(name, good, to)                \
     static void PLAY(name)(slot *s)                    \
     {                                                  \
@@ -99,13 +99,13 @@ static void PLAY(Reset)(slot *s)
 
 /* ---- Values ---- */
 
-/* Room for n of them, or NULL. */
+/* Return room for n elements, or NULL. */
 static void *take_room(size_t n, size_t size)
 {
     return take_byte() < 253 ? exactly(n, size) : NULL;
 }
 
-/* A list of n of them, or NULL. */
+/* Return a list of n elements, or NULL. */
 #define TAKE_LIST(name, type, take)                              \
     static type *name(size_t n)                                  \
     {                                                            \
@@ -119,7 +119,7 @@ static void *take_room(size_t n, size_t size)
 TAKE_LIST(take_references, unsigned, take_reference)
 TAKE_LIST(take_reals, double, take_real)
 
-/* Where a function gives back n doubles: they are all finite, or it was refused and left them alone. */
+/* Check n returned doubles: they are finite or, after a refused call, unchanged. */
 static void check_results(const char *function, bool accepted, const double *values, size_t n)
 {
     static const unsigned char untouched[sizeof(double)] = {0xa5, 0xa5, 0xa5, 0xa5, 0xa5, 0xa5, 0xa5, 0xa5};
@@ -132,7 +132,7 @@ static void check_results(const char *function, bool accepted, const double *val
     }
 }
 
-/* How many values there are for n references: FMI 3.0 asks for their number, which may be wrong. */
+/* Return the number of values for n references. FMI 3.0 passes this number, and it may be wrong. */
 static size_t take_size(size_t n)
 {
     const unsigned any = FMI_VERSION == 3 ? take_byte() : 0;
@@ -152,12 +152,12 @@ static void PLAY(GetReal)(slot *s)
     }
     verdict wanted = legal(s, WHICH(GetReal), good);
     if (wanted == ALLOWED && derived && !is_moderate(s->f)) {
-        wanted = EITHER; /* a derivative may overflow, and what follows from forces that are states */
+        wanted = EITHER; /* a derivative may overflow, and so may outputs that follow from lagging forces */
     }
     check_results("GetReal", CALL_AS(s, wanted, false, GetReal, s->f, vr, n, values AND(m)), values, m);
 }
 
-/* FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and 4.2. */
+/* Return true when a variable may be set (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and 4.2). */
 static bool settable(const slot *s, unsigned place)
 {
     const variable_kind kind = VARIABLES[place].kind;
@@ -194,7 +194,7 @@ static void PLAY(SetReal)(slot *s)
     }
 }
 
-/* Nothing to get or set: variables of another type, clocks. */
+/* Functions for types of which the FMU has no variables, and for clocks. */
 #define CALL_OF_NONE(name, ...)                                           \
     static void PLAY(name)(slot *s)                                       \
     {                                                                     \
@@ -206,14 +206,14 @@ static void PLAY(SetReal)(slot *s)
 
 /* ---- Partial derivatives ---- */
 
-/* J seed, or seed J of the adjoint ones. */
+/* The arguments of a directional (J seed) or an adjoint (seed J) derivative. */
 typedef struct {
     size_t n_unknown, n_known, n_seed, n_result;
     unsigned *unknown, *known;
     double *seed, *result;
 } partial;
 
-/* Mostly a reference to one of the places from `first` on, before `end`. */
+/* Take a reference, mostly to one of the places from `first` to before `end`. */
 static unsigned take_reference_among(unsigned first, unsigned end)
 {
     const unsigned n = take_byte();

@@ -1,4 +1,4 @@
-/* What only FMI 2.0 has, and has otherwise than FMI 3.0. */
+/* The functions that only FMI 2.0 has, or that differ from FMI 3.0. */
 #pragma once
 
 #include "common_calls.h"
@@ -19,7 +19,7 @@ static void check_line(fmi2ComponentEnvironment environment, fmi2String name, fm
     check_message(s, (int)status, category, text);
 }
 
-/* A new instance in place of what is there; NULL where an argument is wrong. */
+/* Replace the instance of a slot; by NULL when an argument is wrong. */
 static void place(slot *s, const char *name, int type, const char *token, manner of, bool functions)
 {
     free_instance(s);
@@ -68,7 +68,7 @@ static void call_fmi2SetupExperiment(slot *s)
 
 CALL_THAT_LEADS(EnterInitializationMode, s->at.experiment_defined, INITIALIZATION)
 
-/* From Instantiated to Initialization Mode. */
+/* Enter Initialization Mode. */
 static void begin(slot *s)
 {
     fmi2SetupExperiment(s->f, fmi2False, 0.0, 0.0, fmi2False, 0.0);

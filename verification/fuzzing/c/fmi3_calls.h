@@ -1,4 +1,4 @@
-/* What only FMI 3.0 has, and has otherwise than FMI 2.0. */
+/* The functions that only FMI 3.0 has, or that differ from FMI 2.0. */
 #pragma once
 
 #include "common_calls.h"
@@ -6,7 +6,7 @@
 
 /* ---- Intermediate update ---- */
 
-/* A step that may go in pieces: from where, how far it is, how long it gets; what happens in it. */
+/* A step with intermediate updates: its start, its length, how far it has come, and where it ends. */
 typedef struct updates {
     double t, h, gone, length;
     unsigned n, quiet; /* updates so far, and to come until something is called */
@@ -14,7 +14,7 @@ typedef struct updates {
     verdict *wanted;
 } updates;
 
-/* Calls inside a step: the inputs may become such that the rest of it may fail. */
+/* Make calls inside a step. New inputs may make the rest of the step fail. */
 static void play_inside(slot *s, updates *u, fmi3Boolean *early, double *end)
 {
     const unsigned what = take_byte();
@@ -38,7 +38,7 @@ static void play_inside(slot *s, updates *u, fmi3Boolean *early, double *end)
     }
 }
 
-/* The callback: a piece has passed as the inputs before it have it. */
+/* The callback: check the piece of the step that has just passed. */
 static void update_step(fmi3InstanceEnvironment environment, double time, bool may_set, bool may_get, bool finished,
                         bool may_return, fmi3Boolean *early, double *end)
 {
@@ -65,7 +65,7 @@ static void update_step(fmi3InstanceEnvironment environment, double time, bool m
         u->length = fmax(*end - u->t, u->gone);
     }
     s->at.mode = STEP;
-    before_call(); /* what follows is the step's */
+    before_call(); /* what follows belongs to the step */
     before(s)->now.mode = STEP;
 }
 
@@ -109,7 +109,7 @@ static void check_line(fmi3InstanceEnvironment environment, fmi3Status status, f
     check_message(environment, (int)status, category, message);
 }
 
-/* A new instance in place of what is there; NULL where an argument is wrong. `n`: of the variables that updates shall have. */
+/* Replace the instance of a slot; by NULL when an argument is wrong. `vr`: the n variables for intermediate updates. */
 static void replace_instance(slot *s, const char *name, int type, const char *token, manner of, const unsigned vr[], size_t n)
 {
     const fmi3LogMessageCallback log = of.logs ? check_line : NULL;
@@ -181,7 +181,7 @@ static void call_fmi3EnterInitializationMode(slot *s)
     enter_initialization(s, start, stops, stops ? take_real() : 0.0);
 }
 
-/* From Instantiated to Initialization Mode. */
+/* Enter Initialization Mode. */
 static void begin(slot *s)
 {
     enter_initialization(s, 0.0, false, 0.0);
@@ -251,7 +251,7 @@ CALL_OF_NONE(SetIntervalFraction, room, room)
 CALL_OF_NONE(SetShiftDecimal, room)
 CALL_OF_NONE(SetShiftFraction, room, room)
 
-/* What this FMU does not have. */
+/* Functions of features that this FMU does not have. */
 #define CALL_OF_MISSING(name, ...)                                                              \
     static void PLAY(name)(slot *s)                                                             \
     {                                                                                           \
@@ -266,7 +266,7 @@ CALL_OF_MISSING(GetVariableDependencies, s->f, take_reference(), NULL, NULL, NUL
 
 /* ---- Partial derivatives ---- */
 
-/* Each column of the Jacobian, by its directional derivative, times the seed. */
+/* Check adjoint derivatives against the columns of the Jacobian times the seed. */
 static void check_adjoint(slot *s, const partial *p)
 {
     const double one = 1.0;

@@ -47,7 +47,7 @@ static void PLAY(SetContinuousStates)(slot *s)
     }
 }
 
-/* `overflows`: a result may. */
+/* `overflows`: a result may overflow. */
 #define CALL_OF_STATES(name, overflows)                                                                 \
     static void PLAY(name)(slot *s)                                                                     \
     {                                                                                                   \

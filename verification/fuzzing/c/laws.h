@@ -1,4 +1,4 @@
-/* What holds whatever was called: finite outputs, motion that obeys its equation, derivatives that are the motion's. The
+/* The laws that hold after any calls: outputs are finite, the motion obeys its equation, and derivatives match it. The
  * velocities are the first states, and the load along velocity a is input N_COMMANDS + a. */
 #pragma once
 
@@ -6,7 +6,7 @@
 
 enum { N_VELOCITIES = N_MONITORED };
 
-/* The place of a state by its name among the states, or of an input among the inputs; NONE where the vehicle lacks it. */
+/* Return the place of a state or an input between two places by its name; NONE when the vehicle lacks it. */
 static int named(const char *name, int first, int end)
 {
     for (int i = first; i < end; i++) {
@@ -45,13 +45,13 @@ static bool is_coupled(int a)
     return false;
 }
 
-/* Whether a velocity has a closed form: nothing but its own drag and a constant force acts on it. */
+/* Return true when only its own drag and a constant force act on a velocity, so that it has a closed form. */
 static bool is_free(int a)
 {
     return !HAS_LAG && !is_coupled(a);
 }
 
-/* The sums of the sizes of the terms of each row at y, with the drag of one direction of all velocities or the other. */
+/* Sum the absolute terms of each row at y, with the drag for forward (back = 0) or reverse (back = 1) motion. */
 static void sizes_at(const fmu *f, const double y[N_SERIES], int back, double size[N_SERIES])
 {
     model_held held;
@@ -65,18 +65,18 @@ static void sizes_at(const fmu *f, const double y[N_SERIES], int back, double si
     model_sizes(&f->numbers, &held, y, size);
 }
 
-/* What the forces of the moment, and those that the lags leave, can accelerate each axis by. */
+/* Bound the acceleration of each axis by the present forces and the remaining lags. */
 static void strongest(const fmu *f, double C[N_VELOCITIES])
 {
     double y[N_SERIES] = {0.0}, size[N_SERIES];
-    for (int i = N_VELOCITIES; i < N_USED; i++) { /* what is left of a lag acts as the progress 1 */
+    for (int i = N_VELOCITIES; i < N_USED; i++) { /* the remaining part of a lag has at most the progress 1 */
         y[i] = COMPONENT_OF[i] < N_DYNAMIC ? 1.0 : 0.0;
     }
     sizes_at(f, y, 0, size);
     memcpy(C, size, sizeof(double[N_VELOCITIES]));
 }
 
-/* Acceleration per load of an axis: beta/m. */
+/* Return the acceleration of an axis per load: beta/m. */
 static double gain_of(const fmu *f, int a)
 {
     double d[N_VARIABLES] = {0.0};
@@ -85,8 +85,8 @@ static double gain_of(const fmu *f, int a)
     return d[FIRST_CALCULATED + a];
 }
 
-/* The fastest that a motion can get along each axis within h. Drag only brakes, and the coupling does no work: the root n of
- * the sum of M v^2, twice the kinetic energy, grows by no more than that of the sum of F^2/M in a second. */
+/* Bound the velocity of each axis within h. Drag only brakes and the coupling does no work, so sqrt(sum M v^2), the root of
+ * twice the kinetic energy, grows by at most sqrt(sum F^2/M) per second. */
 static void fastest(const fmu *f, double h, double v[N_VELOCITIES])
 {
     double C[N_VELOCITIES], energy = 0.0, power = 0.0;
@@ -101,7 +101,7 @@ static void fastest(const fmu *f, double h, double v[N_VELOCITIES])
     }
 }
 
-/* The rates, together, at which drag and coupling change velocities up to v. */
+/* Return the sum of the relative rates at which drag and coupling change velocities up to v. */
 static double rates_up_to(const fmu *f, const double v[N_VELOCITIES])
 {
     double y[N_SERIES] = {0.0}, size[N_SERIES], still[N_SERIES], rates = 0.0;
@@ -117,7 +117,7 @@ static double rates_up_to(const fmu *f, const double v[N_VELOCITIES])
     return rates;
 }
 
-/* How far anything changes within h, together. */
+/* Return the sum of all relative changes within h. */
 static double changes_of(const fmu *f, double h)
 {
     double v[N_VELOCITIES], y[N_SERIES] = {0.0}, size[N_SERIES], rates;
@@ -125,12 +125,12 @@ static double changes_of(const fmu *f, double h)
     rates = of_velocity(v, "r") + rates_up_to(f, v);
     sizes_at(f, y, 0, size);
     for (int i = N_VELOCITIES; i < N_USED; i++) {
-        rates += COMPONENT_OF[i] < N_DYNAMIC ? size[i] : 0.0; /* of the lags */
+        rates += COMPONENT_OF[i] < N_DYNAMIC ? size[i] : 0.0; /* rates of the lags */
     }
     return rates * h;
 }
 
-/* Whether a step takes few enough pieces in any case: its rates come to no more than 1,000 over it. */
+/* Return true when a step surely needs few pieces: its relative changes sum to at most 1,000. */
 static bool is_calm(const fmu *f, double h)
 {
     return h <= 1e30 && changes_of(f, h) <= 1e3;
@@ -138,15 +138,15 @@ static bool is_calm(const fmu *f, double h)
 
 /* ---- Axes alone ---- */
 
-/* Where drag balances the force. */
+/* Return the velocity at which drag balances the force. */
 static double equilibrium(double A, double B, double C)
 {
     const double root = hypot(B, 2.0 * sqrt(A) * sqrt(fabs(C)));
     return C == 0.0 ? 0.0 : 2.0 * C / (B + root);
 }
 
-/* The velocity of an axis alone has gone from where it was towards its equilibrium and not beyond; without force and drag, it
- * stays to the last bit. */
+/* Check that the velocity of an uncoupled axis moves towards its equilibrium and not beyond. Without force and drag it is
+ * constant to the last bit. */
 static void check_velocity(const fmu *start, int a, double v)
 {
     const char *const name = VARIABLES[FIRST_STATE + a].name;
@@ -169,14 +169,13 @@ static void check_velocity(const fmu *start, int a, double v)
     }
 }
 
-/* What rounding may add to a distance that v covers from one place to another. */
+/* Bound the rounding error of a distance that is covered with the velocity v. */
 static double rounding_of_way(double v, double h, double from, double to)
 {
     return 64.0 * DBL_EPSILON * (fabs(v) * h + fabs(from) + fabs(to)) + DBL_MIN * (1.0 + h);
 }
 
-/* Between two velocities that are the bounds all the way, no less is covered than at the lower and no more than at the
- * higher. */
+/* Check that a distance lies between those of the lowest and the highest velocity. */
 static void check_way(const char *name, double low, double high, double h, double from, double to)
 {
     const double rounding = rounding_of_way(fmax(fabs(low), fabs(high)), h, from, to);
@@ -184,7 +183,7 @@ static void check_way(const char *name, double low, double high, double h, doubl
              "%s goes from %a to %a in %a, at %a to %a", name, from, to, h, low, high);
 }
 
-/* A turn does not make the way longer. */
+/* Check that the distance through the water is at most that of the highest velocity. */
 static void check_track(const double before[], const double after[], double fastest_way, double h)
 {
     const double current[] = {input_of(before, "V_N"), input_of(before, "V_E")};
@@ -196,7 +195,7 @@ static void check_track(const double before[], const double after[], double fast
     PROPERTY(!isfinite(rounding) || way <= fastest_way * h + rounding, "%a at no more than %a for %a", way, fastest_way, h);
 }
 
-/* A force that lags goes towards what the commands lead to, and not beyond: its rate keeps its sign. */
+/* Check that a lagging force approaches its steady value and does not pass it. */
 static void check_lag(const fmu *start, const fmu *end)
 {
     double before[N_VARIABLES], after[N_VARIABLES];
@@ -227,7 +226,7 @@ static void check_step(const fmu *start, const fmu *end, double h)
     fastest(start, h, most);
     for (int a = 0; a < N_VELOCITIES; a++) {
         const double v0 = from[FIRST_STATE + a], v = to[FIRST_STATE + a];
-        const double room = most[a] + 1e-9 * most[a]; /* of thousands of pieces, rounded */
+        const double room = most[a] + 1e-9 * most[a]; /* for the rounding of thousands of pieces */
         if (is_free(a)) {
             check_velocity(start, a, v);
         } else {
@@ -253,9 +252,9 @@ static void check_step(const fmu *start, const fmu *end, double h)
     }
 }
 
-/* ---- One motion, asked for in several ways ---- */
+/* ---- One motion, calculated in several ways ---- */
 
-/* How large the terms are that make up each state within h. */
+/* Bound the terms that each state consists of within h. */
 static void sizes_of(const fmu *f, double h, double size[N_STATES])
 {
     const double *const state = f->now.values + FIRST_STATE;
@@ -291,12 +290,12 @@ static void check_same(const char *what, const fmu *start, double h, const doubl
     }
 }
 
-/* A step leads where so many parts of it lead. */
+/* Check that a step ends where its parts end. */
 static void check_parts(const fmu *start, const fmu *end, double h, int parts)
 {
     double values[N_VARIABLES];
     memcpy(values, start->now.values, sizeof values);
-    if (!(changes_of(start, h) <= 1.0) || h / parts < DBL_MIN) { /* rounding may grow; a subnormal has no third */
+    if (!(changes_of(start, h) <= 1.0) || h / parts < DBL_MIN) { /* rounding may grow; a subnormal length cannot be divided */
         return;
     }
     for (int i = 0; i < parts; i++) {
@@ -307,7 +306,7 @@ static void check_parts(const fmu *start, const fmu *end, double h, int parts)
     check_same("a step and its parts", start, h, end->now.values + FIRST_STATE, values + FIRST_STATE, 1e-9);
 }
 
-/* A step with the inputs held, from t. */
+/* Check a step from t with the inputs held. */
 static void check_whole_step(const fmu *start, const fmu *end, double t, double h)
 {
     check_step(start, end, h);
@@ -315,7 +314,7 @@ static void check_whole_step(const fmu *start, const fmu *end, double t, double 
     PROPERTY(end->now.time == t + h, "a step to t = %a ends at %a", t + h, end->now.time);
 }
 
-/* The first time derivative of a state is what the model says that it is. */
+/* Check that the first time derivative of a state is that of the model. */
 static void check_first_derivative(fmu *f, unsigned state, double derivative)
 {
     const unsigned vr = FIRST_REFERENCE + FIRST_CALCULATED + state;
@@ -326,7 +325,7 @@ static void check_first_derivative(fmu *f, unsigned state, double derivative)
              VARIABLES[FIRST_STATE + state].name, derivative, rate);
 }
 
-/* The numbers and the mode are the expected ones; states and thrust can be read and are finite. */
+/* Check the numbers and the mode of an instance, and that its states and thrusts can be read and are finite. */
 static void check_instance(const slot *s)
 {
     unsigned vr[N_STATES + N_THRUST];

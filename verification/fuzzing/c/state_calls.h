@@ -1,4 +1,4 @@
-/* The functions of states, with states and bytes of any origin. */
+/* The functions that save and restore states, with states and bytes of any origin. */
 #pragma once
 
 #include "world.h"
@@ -25,7 +25,7 @@ static void PLAY(GetFMUstate)(slot *s)
     PROPERTY(other == foreign, "memory that is no state is taken");
 }
 
-/* In which an instance of an interface can be saved, were it made as this one was. */
+/* Return the modes in which an instance of an interface, made like this one, can be saved. */
 static int modes_of(const slot *s, interface_type type)
 {
     return BETWEEN & ~(type == TYPE_MODEL_EXCHANGE ? STEP | FAILED : s->of.events ? CONTINUOUS : EVENT | CONTINUOUS);
@@ -84,7 +84,7 @@ static void PLAY(SerializeFMUstate)(slot *s)
     free(bytes);
 }
 
-/* Bytes are damaged; or given values that a run may or may not reach, with the checksum that belongs to them. */
+/* Damage bytes, or write values into them that a run may or may not reach, with a correct checksum. */
 static void damage(void)
 {
     buffer *const b = &buffers[take_byte() % N_BUFFERS];

@@ -1,5 +1,5 @@
-/* libFuzzer target: bytes become calls of any FMI function on several instances, and after each call it is looked
- * whether it kept its promises. How often each was called goes to the file that FUZZ_COUNTS names. */
+/* The target of libFuzzer: it turns bytes into calls of any FMI function on several instances, and checks the promises of
+ * the FMU after each call. It writes the number of calls of each function to the file that FUZZ_COUNTS names. */
 #include "interface_calls.h"
 #include "state_calls.h"
 
@@ -11,7 +11,7 @@ static void any_call(slot *s, unsigned which)
     OPERATIONS[which % N_CALLS](s);
 }
 
-/* From Event Mode to where time passes. */
+/* Leave Event Mode for Step Mode or Continuous-Time Mode. */
 static void leave_event_mode(slot *s)
 {
     if (s->at.type == TYPE_MODEL_EXCHANGE) {
@@ -24,7 +24,7 @@ static void leave_event_mode(slot *s)
 #endif
 }
 
-/* An instance of each interface in two slots each, running: few bytes lead far. */
+/* Start two instances of each interface, so that few bytes of input reach much of the code. */
 static void set_out(void)
 {
     manner of = take_manner();
@@ -38,7 +38,7 @@ static void set_out(void)
     }
 }
 
-/* Any calls in Event Mode. */
+/* Make any calls in Event Mode. */
 static void meet_events(slot *s)
 {
     PLAY(EnterEventMode)(s);
@@ -48,7 +48,7 @@ static void meet_events(slot *s)
     leave_event_mode(s);
 }
 
-/* A run from its start, with any start values and end. */
+/* Start a new run, with any start values and any end. */
 static void start_again(slot *s)
 {
     PLAY(Reset)(s);
@@ -62,7 +62,7 @@ static void start_again(slot *s)
     leave_event_mode(s);
 }
 
-/* Sets and steps, as a run has them. */
+/* Set inputs and take steps, as in a normal run. */
 static void fly(slot *s, unsigned length)
 {
     for (unsigned i = 0; i < length; i++) {
@@ -74,7 +74,7 @@ static void fly(slot *s, unsigned length)
     }
 }
 
-/* No thrust, no load, no current: what moves is braked. */
+/* Step without thrust, load and current, so that drag brakes the vehicle. */
 static void coast(slot *s)
 {
     static const double nothing[FIRST_STATE];
@@ -91,8 +91,8 @@ static bool is_alike(const manner *a, const manner *b)
     return a->events == b->events && a->updates == b->updates && a->returns_early == b->returns_early;
 }
 
-/* The same bytes from the same state give the same calls and the same results: in the instance that was saved, and in
- * another one by way of bytes. */
+/* Check that the same calls after a restored state give the same results, in the instance that was saved and, after
+ * serialization, in another one. */
 static void replay(slot *s)
 {
     slot *const other = &slots[take_byte() % N_SLOTS];
@@ -124,12 +124,12 @@ static void replay(slot *s)
     PROPERTY(FMI(FreeFMUstate)(s->f, &state) == DONE && FMI(FreeFMUstate)(s->f, &copy) == DONE, "not freed");
 }
 
-/* A state by way of bytes that may be damaged on the way, into any instance. */
+/* Serialize a state, perhaps damage the bytes, and restore the state in any instance. */
 static void carry(slot *s)
 {
     const size_t start = position;
     PLAY(GetFMUstate)(s);
-    position = start; /* the same place again */
+    position = start; /* take the same saved slot again */
     PLAY(SerializeFMUstate)(s);
     if (take_bool()) {
         damage();
@@ -140,7 +140,7 @@ static void carry(slot *s)
 
 static void clear_world(void)
 {
-    if (slots[0].f == NULL) { /* states are freed by an instance */
+    if (slots[0].f == NULL) { /* freeing a state needs an instance */
         make(&slots[0], TYPE_CO_SIMULATION, (manner){.logs = false});
     }
     for (int i = 0; i < N_SAVED; i++) {
@@ -156,7 +156,7 @@ static void clear_world(void)
     memset(buffers, 0, sizeof buffers);
 }
 
-/* At the end. Lines of: function, calls refused, calls accepted. */
+/* Write a line for each function at the end: its name, the refused calls, the accepted calls. */
 __attribute__((destructor)) static void write_counts(void)
 {
     const char *const path = getenv("FUZZ_COUNTS");

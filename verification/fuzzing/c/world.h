@@ -1,4 +1,4 @@
-/* What the fuzzer plays with: bytes to take values from, instances, states, and what the standard expects of each. */
+/* The state of the fuzzer: the bytes that give values, the instances, the saved states, and what the standard expects. */
 #pragma once
 
 #include <float.h>
@@ -25,10 +25,10 @@ static void *calloc_or_not(size_t count, size_t size)
 
 enum { N_SLOTS = 4, N_SAVED = 3, N_BUFFERS = 3 };
 
-/* What an instance is in after the calls so far, by the standard; its values are not followed. */
+/* The state of an instance that the standard demands after its calls so far. Its values are not used. */
 typedef fmu_state expected;
 
-/* How an instance was made: with a logger; of FMI 3.0 in Co-Simulation, what its host uses. */
+/* How an instance was made: whether it has a logger and, for Co-Simulation of FMI 3.0, what its host uses. */
 typedef struct {
     bool logs, is_told, events, updates, returns_early; /* is_told: loggingOn */
 } manner;
@@ -37,7 +37,7 @@ typedef struct {
     fmu *f;
     manner of;
     expected at;
-    struct updates *inside; /* a step */
+    struct updates *inside; /* the step that is in progress */
 } slot;
 
 typedef struct {
@@ -45,12 +45,12 @@ typedef struct {
     expected at;
 } saved_slot;
 
-/* Serialized bytes, and the sum of them that tells whether they are as they were. */
+/* Serialized bytes, with a checksum that shows changes. */
 typedef struct {
     unsigned char *bytes;
     size_t size;
     uint64_t sum;
-    bool forged; /* what is in it is not known */
+    bool forged; /* its content is not known */
     expected at;
 } buffer;
 
@@ -61,7 +61,7 @@ static unsigned spent; /* pieces that the steps of an input may have taken */
 
 static void any_call(slot *s, unsigned which);
 
-/* ---- Values from the fuzzer's bytes; zeros where they end ---- */
+/* ---- Values from the fuzzer's bytes; zeros after their end ---- */
 
 static const unsigned char *input;
 static size_t input_size, position;
@@ -108,7 +108,7 @@ static double take_real(void)
     }
 }
 
-/* A pointer whose memory is freed where its block ends. */
+/* Free the memory of a pointer at the end of its block (LENT). */
 static void release(const void *pointer)
 {
     free(*(void *const *)pointer);
@@ -116,7 +116,7 @@ static void release(const void *pointer)
 
 #define LENT __attribute__((cleanup(release)))
 
-/* Memory of exactly this size, so that a byte beyond it is seen. */
+/* Return memory of exactly this size, so that the sanitizer sees an access beyond it. */
 static void *exactly(size_t count, size_t size)
 {
     void *const memory = malloc(count * size);
@@ -146,16 +146,16 @@ static unsigned take_reference(void)
     return n < 253 ? FIRST_REFERENCE + N_VARIABLES + n % 4 : (unsigned)take_word(4);
 }
 
-/* ---- One call: was it right to accept or refuse it, and did it leave alone what it must ---- */
+/* ---- One call: whether it was right to accept or refuse it, and whether it changed only what it may change ---- */
 
 typedef enum { FORBIDDEN, ALLOWED, EITHER } verdict;
 
 static unsigned long long counts[N_CALLS][2]; /* refused, accepted */
-static uint64_t trace;                        /* of all that was returned; two runs of the same bytes give the same */
+static uint64_t trace;                        /* a checksum of all results; two runs of the same bytes give the same one */
 static unsigned messages;                     /* logged during the call */
 
-/* What libFuzzer takes for new beside new places in the code: any function in any mode, and a state that was saved in any
- * mode, by kind of instance. Most calls that are illegal are refused in one place. */
+/* Besides new places in the code, libFuzzer counts each function in each mode, and each state that was saved in each mode,
+ * by kind of instance, as new. Without these counters, most illegal calls would look alike. */
 enum { WITH_EVENTS = 2, N_KINDS, N_MODES = 8 }; /* beyond the interface types */
 #define LEADS __attribute__((section("__libfuzzer_extra_counters")))
 static unsigned char called[N_CALLS][N_KINDS][N_MODES][2] LEADS;
@@ -171,7 +171,7 @@ static void note(const void *bytes, size_t size)
     }
 }
 
-/* The bytes of an instance but for the calculated variables, which follow from the rest, and who called last. */
+/* Copy an instance without its calculated variables, which follow from the rest, and without the last function. */
 static void copy_instance(unsigned char *to, const fmu *from)
 {
     memcpy(to, from, sizeof *from);
@@ -185,7 +185,7 @@ static fmu *before(const slot *s)
     return (fmu *)(void *)instances_before[s - slots];
 }
 
-/* `speaks`: it may have warned of what is warned of once. */
+/* Return true when an instance has not changed. `speaks`: it may have given a warning that is given only once. */
 static bool is_same(const slot *s, bool speaks)
 {
     if (s->f == NULL) {
@@ -214,7 +214,7 @@ static void before_call(void)
     }
 }
 
-/* The row of LEGAL. */
+/* Return the row of LEGAL. */
 static int kind_of(const slot *s)
 {
     return s->of.events ? WITH_EVENTS : (int)s->at.type;
@@ -230,7 +230,7 @@ static verdict legal(const slot *s, call which, bool arguments)
     return s->f != NULL && arguments && (LEGAL[kind_of(s)][which] & (int)s->at.mode) != 0 ? ALLOWED : FORBIDDEN;
 }
 
-/* Whether the call was accepted. `changes`: it may change its instance, if accepted. */
+/* Check a call and return whether it was accepted. `changes`: an accepted call may change its instance. */
 static bool after_call(const slot *s, call which, verdict wanted, int status, bool changes)
 {
     const char *const name = CALL_NAMES[which];
@@ -259,12 +259,12 @@ static bool after_call(const slot *s, call which, verdict wanted, int status, bo
     return accepted;
 }
 
-/* Calls a function of the FMU, and after_call with what it returned. `good`: its arguments are. */
+/* Call a function of the FMU, and after_call with its status. `good`: its arguments are valid. */
 #define CALL_AS(s, wanted, changes, name, ...) \
     (before_call(), after_call(s, WHICH(name), wanted, (int)FMI(name)(__VA_ARGS__), changes))
 #define CALL(s, good, changes, name, ...) CALL_AS(s, legal(s, WHICH(name), good), changes, name, __VA_ARGS__)
 
-/* Far from where a result can overflow. */
+/* Return true when no result can overflow. */
 static bool is_moderate(const fmu *f)
 {
     double numbers[sizeof f->numbers / sizeof(double)];
@@ -274,7 +274,7 @@ static bool is_moderate(const fmu *f)
         moderate = moderate && fabs(f->now.values[i]) <= 1e30;
     }
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
-        moderate = moderate && fabs(numbers[i]) <= 1e30; /* nor is a NaN */
+        moderate = moderate && fabs(numbers[i]) <= 1e30; /* false for a NaN */
     }
     return moderate;
 }

@@ -1,4 +1,4 @@
-"""CasADi, Model Exchange: DaeBuilder makes functions of the FMU, CVODES integrates them from jump to jump."""
+"""CasADi, Model Exchange: DaeBuilder makes functions of the FMU, and CVODES integrates each step."""
 
 from zipfile import ZipFile
 

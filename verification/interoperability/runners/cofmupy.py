@@ -7,7 +7,7 @@ from cofmupy import Coordinator
 
 from verification.interoperability.runners.flight import FMU, OUTPUTS, fly, parameters, steps
 
-streams = {  # half a step early, for its clock adds up the steps and drifts
+streams = {  # half a step early, because its clock adds up the steps and drifts
     name: {str(step.start - 0.05): step.inputs[name] for step in steps()} for name in steps()[0].inputs
 }
 Path("system.json").write_text(

@@ -1,4 +1,4 @@
-"""Ecos. cs: a structure of one ROV, its parameters as a named set; ssp: the same from an SSP archive."""
+"""Ecos. cs: a structure of one ROV with its parameters as a named set; ssp: the same system from an SSP archive."""
 
 import sys
 from contextlib import ExitStack

@@ -21,22 +21,22 @@ class Step:
 
     @property
     def length(self) -> float:
-        """What is left between the two communication points (s)."""
+        """The length of the step (s)."""
         return self.end - self.start
 
 
 def parameters() -> dict[str, float]:
-    """The parameters to set before the initialization."""
+    """Return the parameters to set before the initialization."""
     return _values("parameters.csv")
 
 
 def detour() -> dict[str, float]:
-    """The commands of the detour."""
+    """Return the commands of the detour."""
     return _values("detour.csv")
 
 
 def steps() -> list[Step]:
-    """The communication steps."""
+    """Return the communication steps."""
     rows = [{name: float(value) for name, value in row.items()} for row in _read("manoeuvre.csv")]
     return [Step(row.pop("time"), after["time"], row, bool(row.pop("detour"))) for row, after in pairwise(rows)]
 
@@ -44,7 +44,7 @@ def steps() -> list[Step]:
 def fly(
     advance: Callable[[Step], object], outputs: Callable[[], Sequence[float]], files: Sequence[str] = ("result.csv",)
 ) -> None:
-    """Take every step and write all outputs, those of one ROV after the other, to a file for each ROV."""
+    """Take every step and write a file for each ROV. `outputs` returns the outputs of all ROVs, one after the other."""
     rows = [(0.0, outputs())]
     for step in steps():
         advance(step)

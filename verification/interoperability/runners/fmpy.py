@@ -1,6 +1,9 @@
-"""FMPy, FMI 2.0 and 3.0. cs: a slave stepped by hand, its state saved and restored on the way; events: inputs set in
-Event Mode, each step ended early by an intermediate update; me: Model Exchange, CVode, in one call; compile: the FMU
-compiled from its sources (`fmpy compile`), Co-Simulation in one call."""
+"""FMPy, FMI 2.0 and 3.0.
+
+cs: a slave is stepped, and its state is saved and restored once. events: inputs are set in Event Mode, and an
+intermediate update ends each step early. me: Model Exchange with CVode, in one call. compile: Co-Simulation in one
+call, with the FMU compiled from its sources (`fmpy compile`).
+"""
 
 import subprocess
 import sys
@@ -19,7 +22,7 @@ from verification.interoperability.runners.flight import FMU, OUTPUTS, Step, det
 
 
 class Slave:
-    """A slave, variables by name."""
+    """A slave whose variables are accessed by name."""
 
     def __init__(self, fmu: str, values: Mapping[str, float], **options: object) -> None:
         """Start with these parameters."""
@@ -57,7 +60,7 @@ class Slave:
 
 
 def by_hand() -> None:
-    """Step the FMU; the detour leaves no trace."""
+    """Step the FMU, with the detour."""
     rov = Slave(FMU, parameters())
 
     def advance(step: Step) -> None:
@@ -78,7 +81,7 @@ def by_hand() -> None:
 
 
 def with_events() -> None:
-    """Set the inputs in Event Mode; an intermediate update ends each step half way, and another step does the rest."""
+    """Set the inputs in Event Mode. An intermediate update ends each step half-way, and another step completes it."""
     half = 0.0
 
     def update(_: object, time: float, *rest: Any) -> None:
@@ -109,7 +112,7 @@ def with_events() -> None:
 
 
 def in_one_call(fmu: str, **options: object) -> None:
-    """Let FMPy simulate, the inputs from an array with two rows where they jump."""
+    """Let FMPy simulate with inputs from an array, which has two rows for each jump."""
     result = simulate_fmu(
         fmu,
         stop_time=30.0,
@@ -123,7 +126,7 @@ def in_one_call(fmu: str, **options: object) -> None:
 
 
 def compiled() -> str:
-    """The FMU without its binaries, compiled."""
+    """Return the FMU with binaries that were compiled from its sources."""
     with ZipFile(FMU) as whole, ZipFile("compiled.fmu", "w") as sources:
         for name in whole.namelist():
             if not name.startswith("binaries/"):

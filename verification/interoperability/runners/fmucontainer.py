@@ -1,4 +1,4 @@
-"""fmu-manipulation-toolbox: a container FMU of two ROVs, which FMPy runs; both fly the manoeuvre."""
+"""fmu-manipulation-toolbox: FMPy runs a container FMU of two ROVs, and both fly the manoeuvre."""
 
 import json
 import subprocess
@@ -15,7 +15,7 @@ ROVS = ("port", "starboard")
 
 
 def build() -> str:
-    """Build the container."""
+    """Build the container and return its name."""
     container = {
         "name": "pair.fmu",
         "step_size": 0.1,

@@ -1,4 +1,4 @@
-"""FMUGym, Co-Simulation: the FMU as a Gymnasium environment, which shows its outputs in single precision."""
+"""FMUGym, Co-Simulation: the FMU as a Gymnasium environment with outputs in single precision."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ class Rov(FMUGym):  # type: ignore[misc]
 
 
 def space(*names: str) -> VarSpace:
-    """Variables without bounds."""
+    """Return a space of variables without bounds."""
     variables = VarSpace("variables")
     for name in names:
         variables.add_var_box(name, -np.inf, np.inf)

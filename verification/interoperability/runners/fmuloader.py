@@ -1,4 +1,4 @@
-"""fmuloader, Co-Simulation, FMI 2.0 and 3.0: the state is saved as bytes and restored on the way.
+"""fmuloader, Co-Simulation, FMI 2.0 and 3.0: the state is saved as bytes and restored once.
 
 fmuloader calls the functions of the library but does not read modelDescription.xml, so this program does.
 """
@@ -20,7 +20,7 @@ reference = {v.attrib["name"]: int(v.attrib["valueReference"]) for v in descript
 
 
 def instantiated() -> tuple[Any, Any, Any]:
-    """An instance, and its functions that get and set values."""
+    """Return an instance, and its functions that get and set values."""
     if description.attrib["fmiVersion"] == "2.0":
         two = Fmi2Slave(FMU, model_identifier=identifier)
         two.instantiate("rov", Fmi2Type.CO_SIMULATION, guid=description.attrib["guid"])

@@ -6,7 +6,7 @@ from jaxonomy.library import DataSource, ModelicaFMU
 from verification.interoperability.runners.flight import FMU, OUTPUTS, parameters, steps, write
 
 builder = DiagramBuilder()
-# Without first_step_at_zero a step takes the inputs of its end.
+# Without first_step_at_zero a step uses the inputs at its end.
 rov = builder.add(ModelicaFMU(FMU, 0.1, parameters=parameters(), first_step_at_zero=True))
 for name, port in zip(steps()[0].inputs, rov.input_ports, strict=True):
     source = DataSource(

@@ -1,5 +1,7 @@
-"""libcosim, its inputs overridden by a manipulator. cs: one slave; ssp: an SSP archive; osp: an OSP configuration; both
-with the parameters in the file."""
+"""libcosim, with inputs from a manipulator.
+
+cs: one slave; ssp: an SSP archive; osp: an OSP configuration. The files of ssp and osp contain the parameters.
+"""
 
 import sys
 from functools import partial
@@ -21,7 +23,7 @@ log_output_level(CosimLogLevel.WARNING)
 match sys.argv[1]:
     case "cs":
         execution = CosimExecution.from_step_size(STEP)
-        slave = CosimLocalSlave(fmu_path=FMU, instance_name="rov")  # to be kept as long as the execution
+        slave = CosimLocalSlave(fmu_path=FMU, instance_name="rov")  # must live as long as the execution
         execution.add_local_slave(slave)
     case "ssp":
         write_ssp(Path("dive.ssp"), dive())

@@ -1,5 +1,7 @@
-"""PathSim, the FMU as a block between step sources and a scope. cs: Co-Simulation; me: Model Exchange, integrated by
-one of PathSim's solvers."""
+"""PathSim: the FMU is a block between step sources and a scope.
+
+cs: Co-Simulation; me: Model Exchange with one of PathSim's solvers.
+"""
 
 import sys
 from typing import Any
@@ -27,7 +29,7 @@ sources = {
     for name in flight[0].inputs
 }
 simulation = Simulation(
-    [scope, *sources.values(), rov],  # the scope first: it is to look before the sources jump
+    [scope, *sources.values(), rov],  # the scope comes first, so that it samples before the sources jump
     [
         *(Connection(source, rov[name]) for name, source in sources.items()),
         *(Connection(rov[name], scope[n]) for n, name in enumerate(OUTPUTS)),
@@ -37,6 +39,6 @@ simulation = Simulation(
 )
 simulation.run(end)
 times, shown = (values.T.tolist() for values in scope.read())
-if sys.argv[1] == "cs":  # the block takes its step when a period starts: from then on it shows the end of the period
+if sys.argv[1] == "cs":  # the block steps at the start of a period, and from then on shows the outputs at its end
     times, shown = [0.0, *(step.end for step in flight)], [at_rest, *shown]
 write([time, *values] for time, values in zip(times, shown, strict=True))

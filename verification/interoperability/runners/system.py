@@ -7,6 +7,6 @@ from verification.interoperability.runners.flight import FMU, OUTPUTS, parameter
 
 
 def dive() -> System:
-    """The system; its FMU stands in this folder."""
+    """Return the system, whose FMU is in this folder."""
     rov = Component(Path(FMU), parameters(), list(steps()[0].inputs), OUTPUTS)
     return System("dive", {"rov": rov}, step=0.1, stop=30.0)

@@ -1,4 +1,4 @@
-/* What must hold in a C program: where it does not, the program says what and where, and aborts. */
+/* PROPERTY and CHECK test a condition. When it is false, the program prints the condition and its place, and aborts. */
 #pragma once
 
 #include <stdio.h>

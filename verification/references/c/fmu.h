@@ -1,5 +1,5 @@
-/* The FMU as an importer loads it, on every platform: its functions by name, and an instance for Co-Simulation, driven
- * alike in both versions of FMI. */
+/* Load an FMU as an importer does, on every platform, and call an instance for Co-Simulation in the same way in FMI 2.0
+ * and FMI 3.0. */
 #pragma once
 
 #include "check.h"
@@ -16,8 +16,8 @@
 
 #ifdef _WIN32
 #define WIN32_LEAN_AND_MEAN
-#define NOGDI /* has a FIXED of its own */
-#define NOUSER /* and an INPUT */
+#define NOGDI /* its headers define FIXED */
+#define NOUSER /* its headers define INPUT */
 #include <windows.h>
 typedef HMODULE library;
 static inline library open_library(const char *path) { return LoadLibraryA(path); }
@@ -125,7 +125,7 @@ static inline bool do_step(fmu_instance c, double t, double h)
 }
 #endif
 
-/* From Instantiated to Step Mode. */
+/* Bring a new instance into Step Mode. */
 static inline void initialize(fmu_instance c)
 {
     CHECK(set_up(c) && API.ExitInitializationMode(c) == 0);

@@ -1,5 +1,5 @@
-/* The functions of the version of FMI at hand, included behind fmu.c: FMI(Reset) is fmi2Reset or fmi3Reset. Where names
- * differ it is that of FMI 2.0. */
+/* Names for the functions of both versions of FMI, to include after fmu.c: FMI(Reset) is fmi2Reset or fmi3Reset. When the
+ * names differ, FMI() takes the name of FMI 2.0. */
 #pragma once
 
 #define PASTE_(a, b) a##b

@@ -1,0 +1,61 @@
+"""The mutation test: which lines it changes, and which tests it runs for them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from verification import mutation
+
+
+def test_every_file_has_tests() -> None:
+    files = mutation.files()
+    assert {"rov_fmu/model/step.py", "rov_fmu/identify/slips/search.py", "fmu_src/c/step.c"} <= {*files}
+    assert not [test for file in files for test in mutation.tests_of(file) if not (mutation.ROOT / test).exists()]
+
+
+@pytest.fixture
+def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A module that is the only file to mutate."""
+    pytest.importorskip("cosmic_ray")
+    monkeypatch.setattr(mutation, "ROOT", tmp_path)
+    monkeypatch.setattr(mutation, "files", lambda: ["source.py"])
+    mutation._mutants.cache_clear()
+    return tmp_path / "source.py"
+
+
+def test_only_code_is_mutated(source: Path) -> None:
+    source.write_text(
+        '"""1 + 2."""\n'
+        "from dataclasses import dataclass\n"
+        "@dataclass(frozen=True)\n"
+        "class A:\n"
+        "    x: list[1] = 3\n"
+        "def f(\n"
+        "    a: list[1],\n"
+        ") -> list[2]:\n"
+        "    return zip(a, a, strict=True)\n"
+        "if TYPE_CHECKING:\n"
+        "    x = 1\n"
+        "b = 1 < 2\n"
+    )
+    mutants = [mutant for seed in range(20) for mutant in mutation.draw(seed)]
+    assert {mutant.line for mutant in mutants} == {5, 12}
+    assert {mutant.after.replace(" ", "") for mutant in mutants if mutant.line == 5} == {"x:list[1]=4", "x:list[1]=2"}
+    assert [mutant.after for mutant in mutation.draw(1)] == [mutant.after for mutant in mutation.draw(1)]
+
+
+def test_a_line_of_c_is_changed_in_one_place() -> None:
+    pytest.importorskip("universalmutator")
+    mutants = mutation._c_mutants("/* a + b */\nx = a + b;\n")
+    assert set(mutants) == {2}
+    assert "/* a + b */\nx = a - b;\n" in [make() for make in mutants[2]]
+
+
+@pytest.mark.long
+def test_survivors_are_those_that_no_test_notices(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = "rov_fmu/model/riccati.py"
+    monkeypatch.setattr(mutation, "TESTS", {file: "model/test_riccati.py"})
+    text = (mutation.ROOT / file).read_text(encoding="utf-8")
+    same = mutation.Mutant(file, 1, "", "", f"{text}\n")
+    assert mutation.survivors([same, replace(same, text=f"{text}1 / 0\n")], jobs=1) == [same]
