@@ -48,7 +48,7 @@ static void update_step(fmi3InstanceEnvironment environment, double time, bool m
     const double pieces = fmin(fmax(1.0, ceil(u->h / 1e-4 * (1.0 - 1e-9))), MOST_PIECES), from = u->gone;
     if (u->n > 0) {
         u->gone = u->n < pieces ? fmin(u->length, u->h * (u->n / pieces)) : u->length;
-        check_step(before(s), s->f, u->gone - from);
+        check_step_law(before(s), s->f, u->gone - from);
     }
     const bool is_inside = u->n++ > 0 && u->gone < u->length;
     spent++;

@@ -219,7 +219,7 @@ static void check_lag(const fmu *start, const fmu *end)
     }
 }
 
-static void check_step(const fmu *start, const fmu *end, double h)
+static void check_step_law(const fmu *start, const fmu *end, double h)
 {
     const double *const from = start->now.values, *const to = end->now.values;
     double most[N_VELOCITIES], low[N_VELOCITIES], high[N_VELOCITIES];
@@ -309,7 +309,7 @@ static void check_parts(const fmu *start, const fmu *end, double h, int parts)
 /* Check a step from t with the inputs held. */
 static void check_whole_step(const fmu *start, const fmu *end, double t, double h)
 {
-    check_step(start, end, h);
+    check_step_law(start, end, h);
     check_parts(start, end, h, 3);
     PROPERTY(end->now.time == t + h, "a step to t = %a ends at %a", t + h, end->now.time);
 }
