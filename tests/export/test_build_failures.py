@@ -7,16 +7,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.engine import compile as fmu_compile
-from rov_fmu.engine.compile import compile_engine
 from tests.commands import BARE, ROOT, endless_compiler
 
 _SCRIPT = str(ROOT / "build_fmu.py")
@@ -100,22 +97,6 @@ def test_a_missing_compiler_says_how_to_get_it(
 def test_a_folder_that_takes_no_file_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert _build(Path("/proc/rov.fmu")) == 2
     assert "/proc/rov.fmu: cannot be written" in _one_line(capsys)
-
-
-def test_a_compiler_that_does_not_end_starts_again_without_its_vectorizer(monkeypatch: pytest.MonkeyPatch) -> None:
-    started: list[bool] = []
-    begin = subprocess.Popen
-
-    def popen(command: Sequence[str], **how: Any) -> Any:
-        again = "-fno-slp-vectorize" in command
-        started.append(again)
-        return begin(command if again else [sys.executable, "-c", "while True: pass"], **how)
-
-    monkeypatch.setattr(fmu_compile, "LONGEST", 0.5)
-    monkeypatch.setattr(subprocess, "Popen", popen)
-    sources = {"engine.c": "int one(void); int one(void) { return 1; }"}
-    assert compile_engine(sources)
-    assert started == [False, True]
 
 
 @pytest.mark.parametrize("function", ["fsync", pytest.param("replace", marks=pytest.mark.long)])
