@@ -24,6 +24,7 @@ def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "source.py"
 
 
+@pytest.mark.long
 def test_only_code_is_mutated(source: Path) -> None:
     source.write_text(
         '"""1 + 2."""\n'
@@ -45,6 +46,7 @@ def test_only_code_is_mutated(source: Path) -> None:
     assert [mutant.after for mutant in mutation.draw(1)] == [mutant.after for mutant in mutation.draw(1)]
 
 
+@pytest.mark.long
 def test_a_line_of_c_is_changed_in_one_place() -> None:
     pytest.importorskip("universalmutator")
     mutants = mutation._c_mutants("/* a + b */\nx = a + b;\n")
