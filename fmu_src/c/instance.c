@@ -9,7 +9,7 @@ static outcome enter(fmu *f, lifecycle mode)
     return DONE;
 }
 
-/* Refuse a call whose arguments `names` are NULL. */
+/* Refuse the call unless `exist` is true. `names` are the arguments in the message. */
 static outcome check_not_null(fmu *f, bool exist, const char *names)
 {
     REQUIRE(exist, "%s is NULL.", names);
@@ -184,8 +184,8 @@ static bool may_set(const fmu *f, variable_kind kind)
     return false;
 }
 
-/* True when the standard wants Event Mode for a change of a parameter. For Step Mode, FMI 3.0 demands it in 2.4.7.4, but not in
- * 4.2.1. */
+/* True when the standard asks for Event Mode before a parameter is changed. For Step Mode, FMI 3.0 contradicts itself: section
+ * 2.4.7.4 asks for it, and section 4.2.1 does not. */
 static bool is_for_event_mode(const fmu *f)
 {
     return f->now.mode == CONTINUOUS || (f->now.mode == STEP && has_event_mode(&f->host));
@@ -311,8 +311,8 @@ static const char *name_of(unsigned reference)
     return place < N_VARIABLES ? VARIABLES[place].name : "an unknown value reference";
 }
 
-/* True for a variable that a partial derivative may be taken with respect to. Parameters are such knowns during initialization
- * only (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.12). */
+/* True when derivatives may be taken with respect to this variable: inputs and states always, parameters only during
+ * initialization (FMI 2.0, section 2.1.9; FMI 3.0, section 2.2.12). */
 static bool is_known(const fmu *f, unsigned reference)
 {
     const unsigned place = place_of(reference);
@@ -417,11 +417,10 @@ static void warn_of_jump(fmu *f, double time, double t, double h)
     }
 }
 
-/* Advance the states by h seconds from t with the inputs held. *cuts counts the pieces that the step needed in addition to one
- * piece for each call. */
+/* Advance the states by h seconds from t with the inputs held. Add to *cuts the number of pieces beyond the first one. */
 static outcome advance(fmu *f, double t, double h, int *cuts)
 {
-    double next[N_STATES], sum = 0.0; /* zero times a number that is not finite is NaN, and so is the sum */
+    double next[N_STATES], sum = 0.0; /* it stays 0 while every state is finite: 0 times infinity or NaN is NaN */
     const int pieces = model_step(f->now.values, &f->numbers, h, next);
     *cuts += pieces - 1;
     if (pieces == 0 || *cuts >= MOST_PIECES) {

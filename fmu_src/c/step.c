@@ -8,7 +8,7 @@ typedef struct {
     double y[N_SERIES];       /* the states at the start of a piece */
     double lost[N_SERIES];    /* the rounding error of each state, to be added to its next change */
     double gone[N_SERIES];    /* the changes so far of the integrals, which are the states from N_USED on */
-    double scale[N_SERIES];   /* the size of each group of states; an earlier larger size decays by 4 from piece to piece */
+    double scale[N_SERIES];   /* the size of each group of states, or an earlier size divided by 4 for each piece since, if larger */
     double largest[N_SERIES]; /* the largest size of each group so far */
     double covered[N_USED];   /* the integral of each state's size over time, to within a factor of two */
     unsigned settled;         /* one bit for each component; it is set once the component has settled */
@@ -247,7 +247,7 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
     return !all;
 }
 
-/* Compute the states after h > 0 seconds with the inputs held. They are not finite only when a result overflows. Return the
+/* Compute the states after h > 0 seconds with the inputs held. They are finite unless a result overflows. Return the
  * number of pieces, or 0 when more than MOST_PIECES would be needed. */
 static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES])
 {

@@ -19,7 +19,7 @@ from typing import IO, Any
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
 
 _POLL = 0.1
-"""Seconds between two looks for an answer: on Windows, an interrupt arrives only between two waits."""
+"""The wait for an answer is cut into pieces of so many seconds, because Windows delivers Ctrl-C only between waits."""
 _PROGRAM = "import sys; sys.path[:] = {}; from rov_fmu.engine.child_process import _serve; _serve()"
 
 
@@ -60,7 +60,7 @@ class ChildProcess:
             raise
 
     def call(self, method: str, *arguments: Any) -> Any:
-        """Return what a method of the object returns. Raises what it raises, and ChildError; then the process ends."""
+        """Return what a method of the object returns. Raises its exceptions; after a ChildError the process is gone."""
         self._send((method, arguments))
         return self._answer(self._time_limit)
 
@@ -132,7 +132,7 @@ def _serve() -> None:
     requests: SimpleQueue[Any] = SimpleQueue()
 
     def receive() -> None:
-        """End this process when the parent process has ended, even while the FMU does not return."""
+        """Queue the requests of the parent. When the parent has ended, end this process, even if the FMU hangs."""
         for request in _messages(sys.stdin.buffer):
             requests.put(request)
         os._exit(0)

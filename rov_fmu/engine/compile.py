@@ -24,7 +24,7 @@ MODULE_SOURCES = FMU_SRC / "live"
 MODULE_FILE = "module.c"
 ENGINE_FILE = FMU_SRC / "engine" / "engine.c"
 # The numbers and their cost depend on these flags: the same rounding on every processor, no errno in the mathematics.
-# LLVM's vectorizer of straight-line code is off, because it does not come to an end for a few equations.
+# LLVM's vectorizer of straight-line code is off, because it does not terminate for the equations of a few vehicles.
 C_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-slp-vectorize")
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 _LIBRARY_FLAGS = ("-g0", "-s", "-shared", "-fvisibility=hidden", "-fno-asynchronous-unwind-tables")
@@ -56,7 +56,7 @@ class Platform:
     """The compiler's name for the platform."""
     flags: Sequence[str] = ()
     also: str | None = None
-    """A second target, whose library is joined with the first one in FMI 2.0 to one universal file."""
+    """A second target. In FMI 2.0, the libraries of both are joined into one universal file."""
 
     def targets(self, fmi: int) -> list[str]:
         """Return the targets of the library for a version of FMI."""

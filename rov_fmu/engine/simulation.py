@@ -23,7 +23,8 @@ _SHARES = 8
 """The number of parts that each worker computes on average. Small parts keep workers from waiting for each other."""
 
 _TABLE = np.dtype([("at", np.uintp), ("per_vehicle", np.intp), ("per_time", np.intp)])
-"""The struct `table` of engine.c: the address of an array by vehicle and time, and its strides in numbers."""
+"""The struct `table` of engine.c: the address of an array indexed by vehicle and time, and its two
+strides, counted in doubles."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,7 +85,7 @@ class EquationSource:
         return [(curve, [t.name for t in layout.thrusters if t.curve == curve]) for curve in lagging]
 
     def coasting(self) -> list[str]:
-        """Return the integrals whose rates are constant while all velocities are steady: all but x and y of a turn."""
+        """Return the integrals with constant rates while all velocities are steady: all, but x and y not in a turn."""
         return [name for name in self.equation.states if not self.used(name) and not self._turns(name)]
 
     def _turns(self, name: str) -> bool:
@@ -149,7 +149,8 @@ class EquationSource:
     def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, ...], str]]:
         """Return the products of a block as runs over neighbouring states, and the C expression of each product.
 
-        A run is (first factor, first of the second factors, length). The first factor of squares is "".
+        A run multiplies one state by several neighbouring ones: (that state, the first neighbour, how many). For
+        squares, that state is "".
         """
         states = self.equation.states
         pairs = {term.factors for name in block for term in self.equation.rows[name] if len(term.factors) == 2}
@@ -205,7 +206,7 @@ class EquationSource:
         return any(name in inputs for inputs in self.equation.inputs_of.values())
 
     def needed_with(self, group: Sequence[str]) -> int:
-        """Return one bit for each state that makes a component matter to others, or all bits if it always matters."""
+        """Return bits for the states that let a component act on others unless they are 0, or all bits for always."""
         always, partners = 2**32 - 1, 0
         if not any(map(self.used, group)) or set(group) & set(self.equation.monitored):
             return always
@@ -237,7 +238,7 @@ class EquationSource:
         return lines
 
     def tangent_lines(self) -> list[str]:
-        """Return statements that write the changes of the calculated variables to d, which has those of the others."""
+        """Return statements that add the changes of the calculated variables to d, which holds all other changes."""
         equation = self.equation
         given = self.variables - {*self.layout.thrust}
         text = {name: f"at[REF_{name}]" for name in given}

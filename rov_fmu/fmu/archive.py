@@ -44,7 +44,7 @@ class Content:
 
 
 def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2) -> Content:
-    """Return the FMU in C, for Co-Simulation and Model Exchange. `pages` are further files by their path."""
+    """Return the FMU in C, for Co-Simulation and Model Exchange. `pages` are further files, by their paths."""
     declared = variables(vehicle.rov)
     other_version = f"fmi{5 - fmi}_"
     paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(other_version)]

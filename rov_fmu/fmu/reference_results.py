@@ -31,7 +31,7 @@ _STEPS = 10
 _LONGEST_TAU = 10.0
 """The longest Tau that an experiment uses (s)."""
 _COUPLING_FACTOR = 4.0
-"""The factor by which a coupled motion is observed for a shorter time, because small differences grow in it."""
+"""The weight of the coupling in `_horizon`: small differences grow in coupled motion, so experiments are shorter."""
 _NEGLIGIBLE = 1e-8
 """A variable that stays below this share of its nominal value does not move."""
 _PHASE = 2.0
@@ -140,14 +140,14 @@ def _commands(vehicle: Vehicle) -> list[float]:
 
 
 def _time_unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
-    """Return Tau plus the longest lag, to three digits, or less where faster motions would have settled."""
+    """Return Tau plus the longest lag, but at most _LONGEST_TAU and `_horizon`, to three digits (s)."""
     lag = max((rov[curve.coefficient("T")] for curve in rov.layout.curves if curve.has_lag), default=0.0)
     Tau = min(rov.response(axis, command)[1] + lag, _LONGEST_TAU, _horizon(rov, inputs))
     return float(f"{Tau:.3g}")
 
 
 def _horizon(rov: Rov, inputs: Values) -> float:
-    """Return forty of the fastest time constants of the vehicle, but at most the time of a turn by 40 radians (s)."""
+    """Return 40 times the shortest time constant of the vehicle, but at most the time of a turn by 40 rad (s)."""
     rates = [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
     for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
         A, B = motion.drag(motion.C)

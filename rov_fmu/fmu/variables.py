@@ -82,7 +82,7 @@ class Variable:
 
     @property
     def kind(self) -> str:
-        """The variable_kind of variable.h."""
+        """The variable_kind of interface.h."""
         if self.causality == "input":
             return "INPUT"
         if self.causality == "parameter":

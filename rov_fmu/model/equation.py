@@ -243,9 +243,10 @@ def _saturated(name: str) -> str:
 
 
 def _steady_thrust(name: str, curve: Curve) -> dict[str, str]:
-    """Return formulas from the command of a thruster to its steady thrust, a_t m^2 + b_t m with m beyond the dead band.
+    """Return formulas from the command of a thruster to its steady thrust, a_t m^2 + b_t m.
 
-    The coefficients are those of the direction. Adding 0 turns a negative zero into a positive one.
+    m is the part of the command beyond the dead band. The coefficients are those for the direction of the
+    command. Adding 0 turns a negative zero into a positive one.
     """
     is_reverse = f"command_{name} < 0"
 
@@ -316,7 +317,7 @@ def _lagging(layout: Layout, form: VehicleAxis) -> list[Curve]:
 def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
     """Return the rows of the pose, which follows from the velocities and a steady current.
 
-    Heading north is cos_psi = 1, sin_psi = 0.
+    A vehicle that heads north has cos_psi = 1, sin_psi = 0.
     """
     rows: dict[str, tuple[Term, ...]] = {}
     if layout.has(SURGE, SWAY):
@@ -356,7 +357,7 @@ def _joined(parts: Iterable[str]) -> str:
 
 
 def _weighted(parts: Sequence[tuple[float, str]]) -> str:
-    """Write a weighted sum as one formula. Each part must have at least the precedence of a product."""
+    """Write a weighted sum as one formula. Each part must be a product, or need no brackets in one."""
     return _joined(
         part if weight == 1.0 else f"-{part}" if weight == -1.0 else f"{weight!r} * {part}" for weight, part in parts
     )

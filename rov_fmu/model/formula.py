@@ -53,7 +53,7 @@ _IN_PYTHON = {"__builtins__": {}, "sin": math.sin, "cos": math.cos, "abs": abs}
 
 
 def compiled(formulas: Mapping[str, str]) -> Callable[[Mapping[str, float]], dict[str, float]]:
-    """Compile formulas into one function from values by name to these values and those of the formulas.
+    """Compile formulas into one function. It takes values by name, and adds the values of the formulas to them.
 
     The formulas are evaluated in their order, and each may use those before it. Raises ValueError when one of the texts
     is not a formula.
@@ -118,7 +118,7 @@ def tangent(formula: str, change_of: Callable[[str], str | None]) -> str | None:
     """Return the change of a formula as a formula: the sum of its partial derivatives times the changes of its names.
 
     `change_of` gives the formula of the change of a name, or None for a name that does not change. The result is None
-    when the formula does not change. The derivative of a choice is that of the alternative it takes.
+    when the formula does not change. The derivative of `a if test else b` is that of the branch that is taken.
     """
     node = _tangent(parsed(formula), change_of)
     return ast.unparse(node) if node is not None else None

@@ -155,7 +155,7 @@ LEAST_BETA = 1e-3
 
 @dataclass(frozen=True)
 class Curve:
-    """A thrust curve: F(c) = a_t (c - c_0)^2 + b_t (c - c_0) for `together` thrusters in sum, mirrored for c < 0."""
+    """A thrust curve: F(c) = a_t (c - c_0)^2 + b_t (c - c_0) the sum for `together` thrusters, mirrored for c < 0."""
 
     name: str
     keys: tuple[str, ...] = ("a_t", "b_t")

@@ -90,7 +90,7 @@ class Rov:
         return {name: found[name] for name in self.layout.thrust}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
-        """Return the force along an axis, or the torque (m), of 1 N of a thruster."""
+        """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""
         found = thruster.effect(axis)
         by_arm = axis is YAW and thruster.position is None and thruster.arm
         return found * arm(*(self[name] for name in ARM)) if by_arm else found

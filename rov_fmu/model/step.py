@@ -300,7 +300,7 @@ def _sign_kept(c: Sequence[float], length: float) -> tuple[float, bool]:
             break
         if first == 0 and sizes[1] > 4.0 * sum(n * size for n, size in enumerate(sizes[2:], 2)):  # monotonic
             end = c[0] + _change(c, length)
-            is_reversal = end == 0.0 or (end > 0.0) != (c[0] > 0.0)  # a product could underflow
+            is_reversal = end == 0.0 or (end > 0.0) != (c[0] > 0.0)  # the product of both values could underflow
             return (min(length, _root(c)), True) if is_reversal else (length, False)
         length *= 0.5
     return length, False

@@ -77,7 +77,7 @@ def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
 
 
 def check_names_and_keys(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
-    """Yield a line for each wrong name, and for each key without another one that it needs.
+    """Yield a line for each wrong name, and for each key that needs another key which is missing.
 
     These checks do not need all the coefficients of the vehicle.
     """
@@ -267,7 +267,7 @@ def _wrong_correlation(name: str, other: str, rows: Mapping[str, Estimated]) -> 
 
 
 def check_quantities(table: str, found: Mapping[str, Quantity], metas: Mapping[str, Declaration]) -> Iterator[str]:
-    """Yield a line for each coefficient that the vehicle does not have, with another unit, or out of its bounds."""
+    """Yield a line for each coefficient that is unknown, has a wrong unit, or is out of its bounds."""
     for name, quantity in found.items():
         key = f"{table}.{name}"
         if (meta := metas.get(name)) is None:

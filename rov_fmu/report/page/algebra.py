@@ -135,7 +135,7 @@ def inverse(terms: Sum) -> Sum:
 
 
 def times(left: Sum, right: Sum) -> Sum:
-    """Return the product of two sums. A sum before names is multiplied out: (a x + b) x is a x x + b x."""
+    """Return the product of two sums. A sum times names is multiplied out: (a x + b) x is a x x + b x."""
     if not left or not right:
         return ()
     last = _single(right)

@@ -110,7 +110,7 @@ def of(layout: Layout) -> Equations:
 
 
 def _inlined(layout: Layout, equation: Equation) -> dict[str, str]:
-    """Return the formulas that replace their names: all except those that have an equation of their own."""
+    """Return the formulas to write in place of their names. A name with an equation of its own stays."""
     found = {
         name: formula for name, formula in equation.program.items() if not name.startswith(("F_", "tau_", "steady_"))
     }

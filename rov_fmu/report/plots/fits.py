@@ -18,7 +18,7 @@ from rov_fmu.report.templates import pretty_unit, text
 from rov_fmu.tank.arrays import Array, Flags
 
 _WIDEST = 5.0
-"""The greatest ratio of the end of an interval to the value, or of the value to it; beyond it there is an arrow."""
+"""Intervals are drawn from a fifth to five times the value. An arrow marks one that goes further."""
 _TICKS = [n / 1000 for n in (1, 2, 3, 5, 10, 20, 30, 40, 50, 100, 150, 200, 300, 400, 500, 750, 1000, 2000, 3000, 4000)]
 """The relative deviations that may be labelled."""
 _STANDARD_ERRORS = 1.96

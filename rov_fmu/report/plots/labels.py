@@ -1,4 +1,4 @@
-"""Place names in a drawing: near what they name, and clear of everything else. In drawings y is down."""
+"""Find room for labels in a drawing: near what they name, and clear of everything else. In drawings y is down."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ _GAP = 0.045
 
 @dataclass
 class Space:
-    """The space that is taken in a drawing, as points that are close together."""
+    """The occupied space of a drawing, as closely spaced points."""
 
     inch: float
     """The length of an inch of paper in the drawing, m."""

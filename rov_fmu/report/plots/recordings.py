@@ -24,7 +24,7 @@ _BEFORE = 1.0
 _WINDOWS = (0.2, 0.3, 0.5, 0.8, 1.2)
 """The windows for smoothing a step, s."""
 _VISIBLE = 0.02
-"""The noise that does not hide a change of velocity, as a part of that change."""
+"""Noise up to this share of a change of velocity does not hide the change."""
 _SETTLED = 0.3
 """The time within which a ramped command has changed, s."""
 _FROM_REST = 1.25

@@ -33,7 +33,7 @@ _LEAST = 0.2
 _AHEAD = 3
 """The number of tasks submitted for each thread, so that no thread waits for the next one."""
 _CHANCES = 3
-"""After so many deaths of workers, all runs are done in child processes; one that then fails so often is given up."""
+"""After this many deaths of workers, all new tasks run in child processes, where a task may fail this often."""
 _GONE = (CancelledError, CommClosedError)
 """What Dask raises when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
@@ -199,7 +199,7 @@ class _Runs:
         self._seconds = max(part.seconds / (end - first), 1e-6)
 
     def _repeat(self, first: int, end: int, separate: bool, error: KilledWorker) -> None:
-        """Repeat the runs of a worker that died in a child process, which shows the run that is the cause."""
+        """Repeat the runs of a worker that has died. In a child process only the run that is the cause fails."""
         self._deaths += 1
         self._chances[first] += separate
         if self._chances[first] < _CHANCES:

@@ -35,7 +35,7 @@ def study(
     workers are lost, WriteError, and KeyboardInterrupt. Finished runs are kept, and the same call continues from there.
     """
     if getattr(current_process(), "_inheriting", False):
-        sys.exit(1)  # this is a worker that imports a script without that line; the process that started it says why
+        sys.exit(1)  # a worker imports a script without that line; its parent prints the message
     _, results = run_study(Path(plan), Path(folder), workers, scheduler, on_progress)
     return results
 

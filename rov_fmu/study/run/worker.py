@@ -116,7 +116,7 @@ class InstancePool:
                 self._one_only.release()
 
     def begin(self, separate: bool) -> None:
-        """Start the time limit of a run. A worker ends its own process when a run exceeds it; nothing else would."""
+        """Start the time limit of a run. A worker whose run exceeds it ends its own process."""
         if self._is_watched and not separate:
             self._ends[get_ident()] = monotonic() + self.job.time_limit
 
