@@ -37,10 +37,9 @@ MISSING = {
 }
 
 
-@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.long), 3])
-@pytest.mark.parametrize(
-    "name", [n if n == "videoray" else pytest.param(n, marks=pytest.mark.long) for n in command.VEHICLES]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", command.VEHICLES)
 def test_the_corpus_reaches_every_function_and_finds_nothing(corpus: Path, tmp_path: Path, name: str, fmi: int) -> None:
     build_target(native_content(load_vehicle(command.VEHICLES[name]), fmi=fmi).sources, tmp_path / "target", fmi)
     counts = replay(tmp_path / "target", [corpus], tmp_path)
