@@ -4,19 +4,11 @@ from collections.abc import Iterator
 
 from rov_fmu.model.layout import Axis, Curve, Layout
 
-_KEYS = ("a_t", "b_t", "a_t_reverse", "b_t_reverse")
-"""The keys of coefficients that thrust is linear in."""
-
 
 def curves_of(layout: Layout, axis: Axis) -> list[Curve]:
     """Return the curves of the thrusters that act on an axis."""
     names = {thruster.curve for thruster in layout.drivers(axis)}
     return [curve for curve in layout.curves if curve.name in names]
-
-
-def thrust_names(layout: Layout, axis: Axis) -> tuple[str, ...]:
-    """Return the names of the coefficients that the thrust along an axis is linear in."""
-    return tuple(curve.coefficient(key) for curve in curves_of(layout, axis) for key in _KEYS if key in curve.keys)
 
 
 def connected(layout: Layout) -> Iterator[tuple[list[Curve], list[Axis]]]:
