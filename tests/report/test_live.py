@@ -159,26 +159,41 @@ def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["videoray", "heavy"])
-def test_ten_thousand_steps_take_less_than_a_frame(kind: str, pages: Callable[[str], str], visit: Visitor) -> None:
+def test_a_step_costs_little_beside_arithmetic_in_javascript(
+    kind: str, pages: Callable[[str], str], visit: Visitor
+) -> None:
+    """A step takes at most as long as 500 multiplications and additions in JavaScript, timed in the same rounds.
+
+    A core that does one in 3 ns then does 10,000 steps in 15 ms, less than a frame at 60 Hz.
+    """
     page = flying(visit, pages(kind)).page
-    best = page.evaluate(
+    step, arithmetic = page.evaluate(
         """() => {
             live.pause(true);
             const { pilot } = live.flight;
-            let best = Infinity;
+            const { commands } = live.vehicle;
+            let sum = 0;
+            const works = [
+                () => {
+                    for (let i = 0; i < 1000; i++) {
+                        if (i % 50 === 0) commands.forEach((name, n) => pilot.model.set(name, Math.sin(i + n)));
+                        pilot.model.step(1 / 60);
+                    }
+                },
+                () => { for (let i = 0; i < 1000000; i++) sum = sum * 0.999 + i; },
+            ];
+            const best = works.map(() => Infinity);
             for (let round = 0; round < 100; round++) {
-                const start = performance.now();
-                for (let i = 0; i < 2000; i++) {
-                    const { commands } = live.vehicle;
-                    if (i % 50 === 0) commands.forEach((name, n) => pilot.model.set(name, Math.sin(i + n)));
-                    pilot.model.step(1 / 60);
-                }
-                best = Math.min(best, performance.now() - start);
+                works.forEach((work, n) => {
+                    const start = performance.now();
+                    work();
+                    best[n] = Math.min(best[n], performance.now() - start);
+                });
             }
-            return 5 * best;
+            return [...best, sum];
         }"""
-    )  # by a fifth of them, which fits into the time that a busy machine gives at once
-    assert best < 1000.0 / 60.0
+    )[:2]
+    assert step < 0.5 * arithmetic, "a thousand steps beside a million multiplications and additions"
 
 
 def test_a_frame_is_drawn_in_time(pages: Callable[[str], str], visit: Visitor) -> None:
