@@ -11,7 +11,7 @@ from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.algebra import Call, Cases, Choice, Factor, Group, Product, Reader, Sum
-from rov_fmu.report.page.equations import Line, MathML, Text
+from rov_fmu.report.page.equations import Equations, Line, MathML, Text
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import EVERYTHING, VEHICLES, random_inputs, random_state, random_vehicle
@@ -56,11 +56,10 @@ def of_factor(factor: Factor, at: Values) -> float:
             return of_sum(factor.at_most_zero if at[factor.name] <= 0.0 else factor.otherwise, at)
 
 
-def evaluated(rov: Rov, inputs: Values, state: Values) -> dict[str, float]:
-    """Every name to the left of an equation, with what is to its right; rates as der(<name>)."""
+def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict[str, float]:
+    """Return the value of every name to the left of an equation by what is to its right; rates as der(<name>)."""
     at = {**rov.coefficients, **inputs, **state}
     at |= {name: max(-1.0, min(1.0, at[name])) for name in rov.layout.commands}
-    shown = equations.of(rov.layout)
     found: dict[str, float] = {}
 
     def calculate(line: Line) -> None:
@@ -86,33 +85,35 @@ def evaluated(rov: Rov, inputs: Values, state: Values) -> dict[str, float]:
     return found
 
 
-def check(rov: Rov, rng: random.Random) -> set[str]:
-    inputs, state = random_inputs(rng, rov), random_state(rng, rov)
-    exact = {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}).items()}
-    found = evaluated(rov, inputs, state)
-    largest = max(map(abs, exact.values()))
-    for name, value in found.items():
-        if name in exact:
-            assert value == pytest.approx(exact[name], rel=1e-9, abs=1e-12 * largest), name
+def check(rov: Rov, rng: random.Random, times: int) -> set[str]:
+    """Check the equations at random inputs and states, and return the names that they give."""
+    shown = equations.of(rov.layout)
+    for _ in range(times):
+        inputs, state = random_inputs(rng, rov), random_state(rng, rov)
+        exact = {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}).items()}
+        found = evaluated(rov, shown, inputs, state)
+        largest = max(map(abs, exact.values()))
+        for name in found.keys() & exact.keys():
+            assert found[name] == pytest.approx(exact[name], rel=1e-9, abs=1e-12 * largest), name
     return {*found}
 
 
 @pytest.mark.parametrize("kind", ROVS)
 def test_the_equations_shown_are_those_of_the_vehicle(kind: str) -> None:
-    rov, rng = ROVS[kind], random.Random(1)
-    for _ in range(30):
-        found = check(rov, rng)
-        states = {name for name in rov.layout.state if not name.startswith("F_")}
-        assert {f"der({name})" for name in states} <= found, "every rate has its equation"
-        assert {name for name in rov.layout.thrust if name.startswith("tau_")} <= found
+    rov = ROVS[kind]
+    found = check(rov, random.Random(1), 10)
+    states = {name for name in rov.layout.state if not name.startswith("F_")}
+    assert {f"der({name})" for name in states} <= found, "every rate has its equation"
+    assert {name for name in rov.layout.thrust if name.startswith("tau_")} <= found
 
 
-def test_the_equations_shown_are_those_of_any_vehicle() -> None:
+@pytest.mark.parametrize("vehicles", [50, pytest.param(1000, marks=pytest.mark.long)])
+def test_the_equations_shown_are_those_of_any_vehicle(vehicles: int) -> None:
     rng = random.Random(2)
-    for _ in range(200):
+    for _ in range(vehicles):
         rov = random_vehicle(rng)
         if {t.curve for t in rov.layout.thrusters} == {curve.name for curve in rov.layout.curves}:
-            check(rov, rng)
+            check(rov, rng, 2)
 
 
 def _text(layout: Layout) -> list[str]:

@@ -75,8 +75,8 @@ def test_nothing_in_a_picture_runs_or_navigates(case: str, visit: Callable[..., 
     assert seen.problems() == []
 
 
-@pytest.mark.long
-def test_a_picture_stands_in_the_page_as_an_image_alone(tmp_path: Path) -> None:
+def test_a_picture_stands_in_the_page_as_an_image_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
     for n, picture in enumerate(HOSTILE.values()):
         folder = tmp_path / str(n)
         folder.mkdir()
@@ -146,7 +146,8 @@ def test_a_model_png_that_is_none_is_refused(case: str, tmp_path: Path) -> None:
 def test_a_build_with_a_wrong_picture_ends_with_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
-    monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
+    monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots and the module for the page
+    monkeypatch.setattr("rov_fmu.build.module", lambda _: None)  # take most of the time
     vehicle = _picture("model.png", tmp_path / "own", NO_PNG["text"])
     assert main(["build", str(vehicle), "--platform", "host", "-o", str(tmp_path / "out.fmu")]) == 2
     error = capsys.readouterr().err

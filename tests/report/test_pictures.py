@@ -1,8 +1,11 @@
 """The pictures in the FMU: small, whole, of the vehicle's own thrusters, the same bytes every time."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
 from io import BytesIO
+from math import atan2, hypot, sin
 from typing import Any
 
 import matplotlib as mpl
@@ -13,28 +16,23 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.text import Annotation
 
+from rov_fmu.fmu.archive import Content, native_content, python_content
+from rov_fmu.fmu.terminals import ICON
 from rov_fmu.report.page.pictures import pictures
-from rov_fmu.report.plots.drawing import draw_icon
+from rov_fmu.report.plots.drawing import VIEWS, draw_icon, draw_thrusters, place, scenes
 from rov_fmu.report.plots.png import png_file
+from rov_fmu.report.plots.svg import inline_svg
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import VEHICLES, VIDEORAY
 
-Pictures = Mapping[str, bytes]
-"""The pictures of a vehicle by their path in the FMU."""
 SIZES = {"diagram": 8_500, "icon": 3_000, "signal": 500}
 
 
-@pytest.fixture(scope="module")
-def shipped() -> dict[str, Pictures]:
-    """The pictures of every vehicle that ships."""
-    return {name: pictures(load_vehicle(path).rov) for name, path in SHIPPED.items()}
-
-
-@pytest.fixture(params=SHIPPED)
-def files(request: pytest.FixtureRequest, shipped: dict[str, Pictures]) -> Pictures:
-    """The pictures of one of these vehicles."""
-    return shipped[request.param]
+@cache
+def shipped(name: str) -> Mapping[str, bytes]:
+    """Return the pictures of a vehicle that ships, by their path in the FMU."""
+    return pictures(load_vehicle(SHIPPED[name]).rov)
 
 
 def decoded(png: bytes) -> Any:
@@ -42,41 +40,86 @@ def decoded(png: bytes) -> Any:
     return imread(BytesIO(png), format="png")
 
 
-def test_each_png_opens_and_is_small(files: Pictures) -> None:
+@pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy", pytest.param("bluerov2", marks=pytest.mark.long)])
+def test_the_pictures_are_small_and_need_nothing(name: str) -> None:
     shapes = {}
-    for path, content in files.items():
+    for path, content in shipped(name).items():
         if path.endswith(".png"):
-            name = path.split("/")[-1].removesuffix(".png")
-            assert len(content) <= SIZES[name]
+            kind = path.split("/")[-1].removesuffix(".png")
+            assert len(content) <= SIZES[kind]
             assert not re.search(rb"tEXt|tIME|iTXt", content)
-            shapes[name] = decoded(content).shape
-    assert shapes["icon"] == (200, 200, 4)
-    assert shapes["signal"] == (20, 20, 4)
-    assert shapes["diagram"][1] == 740
-
-
-def test_the_icon_is_transparent_and_the_diagram_is_not(shipped: dict[str, Pictures]) -> None:
-    files = shipped["videoray"]
-    icon = decoded(files["terminalsAndIcons/icon.png"])
-    assert [float(icon[place][3]) for place in ((0, 0), (-1, -1), (100, 100))] == [0.0, 0.0, 1.0]
-    assert (decoded(files["documentation/diagram.png"])[..., 3] == 1.0).all()
-
-
-def test_the_svg_needs_nothing_and_runs_nothing(files: Pictures) -> None:
-    svg = files["terminalsAndIcons/icon.svg"]
+            shapes[kind] = decoded(content).shape
+    assert (shapes["icon"], shapes["signal"], shapes["diagram"][1]) == ((200, 200, 4), (20, 20, 4), 740)
+    svg = shipped(name)["terminalsAndIcons/icon.svg"]
     root = etree.fromstring(svg)
-    assert {etree.QName(element).localname for element in root.iter()} <= {
-        "svg",
-        "g",
-        "path",
-        "defs",
-        "clipPath",
-        "rect",
-    }
-    ids = set(root.xpath("//@id"))
-    assert set(re.findall(r"url\(#(\w+)\)", svg.decode())) <= ids
+    tags = {etree.QName(element).localname for element in root.iter()}
+    assert tags <= {"svg", "g", "path", "defs", "clipPath", "rect"}
+    assert set(re.findall(r"url\(#(\w+)\)", svg.decode())) <= set(root.xpath("//@id"))
     assert not re.search(rb"href|@import|url\((?!#)|<!|<\?|\bon\w+=", svg)
     assert len(svg) < 7_000
+
+
+def test_the_icon_is_transparent_and_the_diagram_is_not() -> None:
+    icon = decoded(shipped("videoray")[ICON])
+    assert [float(icon[place][3]) for place in ((0, 0), (-1, -1), (100, 100))] == [0.0, 0.0, 1.0]
+    assert (decoded(shipped("videoray")["documentation/diagram.png"])[..., 3] == 1.0).all()
+
+
+def test_vehicles_have_pictures_of_their_own() -> None:
+    for path in (ICON, "terminalsAndIcons/icon.svg", "documentation/diagram.png"):
+        assert shipped("videoray")[path] != shipped("bluerov2_heavy")[path]
+
+
+def test_the_same_bytes_whatever_matplotlib_is_set_to() -> None:
+    def draw(figure: Figure) -> None:
+        figure.subplots().plot([0.0, 1.0], [0.0, 2.0], label="$x$")
+        figure.axes[0].legend()
+
+    plot = inline_svg("A plot", draw, (3.0, 2.0))
+    with mpl.rc_context({"lines.linewidth": 5.0, "figure.dpi": 77, "savefig.dpi": 55, "font.size": 20.0}):
+        assert pictures(VIDEORAY) == shipped("videoray")
+        assert inline_svg("A plot", draw, (3.0, 2.0)) == plot
+
+
+@pytest.mark.parametrize("content_of", [native_content, python_content])
+def test_model_png_is_the_own_picture_or_else_the_icon(vehicle: Vehicle, content_of: Callable[..., Content]) -> None:
+    assert vehicle.pictures
+    own = (vehicle.pictures / "model.png").read_bytes()
+    assert len(own) < 20_000
+    assert b"tEXt" not in own
+    assert content_of(vehicle, shipped("videoray")).files["model.png"] == own
+    bare = replace(vehicle, pictures=None)
+    assert content_of(bare, shipped("videoray")).files["model.png"] == shipped("videoray")[ICON]
+
+
+@pytest.mark.parametrize("size", [(0.29, 0.57), (1.14, 0.58)])
+def test_a_png_has_the_pixels_asked_for_in_flat_colours(size: tuple[float, float]) -> None:
+    """Odd widths too, whose last row ends within a byte."""
+
+    def draw(figure: Figure) -> None:
+        ax = figure.subplots()
+        ax.set_axis_off()
+        ax.axvspan(0.0, 0.5, color="#0a5cad", linewidth=0.0)
+        ax.set_xlim(0.0, 1.0)
+
+    pixels = np.round(255 * decoded(png_file(draw, size, background="white"))).astype(int)
+    assert pixels.shape[:2] == (round(100 * size[1]), round(100 * size[0]))
+    assert (pixels[:, 1, :3] == [0x0A, 0x5C, 0xAD]).all()
+    assert (pixels[:, -1, :3] == 255).all()
+
+
+def test_many_colours_become_few_near_ones() -> None:
+    def draw(figure: Figure) -> None:
+        ax = figure.subplots()
+        ax.set_axis_off()
+        ax.imshow([[n / 255 for n in range(256)]], cmap="gray", aspect="auto")
+
+    grey = np.round(255 * decoded(png_file(draw, (2.56, 0.1), background="white"))[5, :, 0])
+    assert len(np.unique(grey)) <= 64
+    assert np.abs(grey - range(256)).max() <= 16
+
+
+# ---- The thrusters in a drawing --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", VEHICLES)
@@ -96,41 +139,56 @@ def test_every_thruster_is_within_the_icon(kind: str) -> None:
     assert len(arrows) == len(horizontal)
 
 
-def test_vehicles_have_pictures_of_their_own(shipped: dict[str, Pictures]) -> None:
-    """The refit of the VideoRay has the same thrusters, so its pictures are the same."""
-    assert shipped["videoray"] == shipped["videoray_refit"]
-    names = ("videoray", "bluerov2", "bluerov2_heavy")
-    for path in ("terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg", "documentation/diagram.png"):
-        assert len({shipped[name][path] for name in names}) == len(names)
+def test_thrusters_are_drawn_where_they_are_and_push_where_they_push(heavy: Vehicle) -> None:
+    """An arrow begins at the thruster and points along its direction; in pixels y is down."""
+    figure = Figure(figsize=(6.0, 6.0))
+    ax = figure.subplots()
+    draw_thrusters(ax, heavy.rov, scenes(heavy.rov)["from above"])
+    arrows = {(round(a.xyann[0], 2), round(a.xyann[1], 2)): a.xy for a in ax.texts if isinstance(a, Annotation)}
+    names = {text.get_text() for text in ax.texts}
+    for thruster in heavy.layout.thrusters:
+        assert f"$F_{{{thruster.name}}}$" in names
+        x, y, _ = thruster.position or (0.0, 0.0, 0.0)
+        if thruster.direction[2] == 0.0:
+            ((start, tip),) = [(a, b) for a, b in arrows.items() if hypot(a[0] - x, a[1] - y) < 0.03]
+            along = tip[0] - start[0], tip[1] - start[1]
+            expected = atan2(thruster.direction[1], thruster.direction[0])
+            assert atan2(along[1], along[0]) == pytest.approx(expected, abs=0.2)
+    assert ax.yaxis_inverted()
 
 
-def test_the_same_bytes_whatever_matplotlib_is_set_to(shipped: dict[str, Pictures]) -> None:
-    with mpl.rc_context({"lines.linewidth": 5.0, "figure.dpi": 77, "savefig.dpi": 55, "font.size": 20.0}):
-        assert pictures(VIDEORAY) == shipped["videoray"]
+def test_the_arm_of_the_paper_stands_where_its_torque_says(vehicle: Vehicle) -> None:
+    """(4): x F_y - y F_x of a force ahead is ±R sin γ, behind the centre of mass."""
+    k = vehicle.rov
+    for thruster, side in zip(vehicle.layout.thrusters[:2], (1.0, -1.0), strict=True):
+        x, y, _ = place(k, thruster)
+        assert x < 0.0
+        assert hypot(x, y) == pytest.approx(k["R"])
+        assert -y == pytest.approx(side * k["R"] * sin(k["gamma"]))
 
 
-@pytest.mark.parametrize("size", [(0.29, 0.57), (1.14, 0.58)])
-def test_a_png_has_the_pixels_asked_for_in_flat_colours(size: tuple[float, float]) -> None:
-    """Odd widths too, whose last row ends within a byte."""
-
-    def draw(figure: Figure) -> None:
-        ax = figure.subplots()
-        ax.set_axis_off()
-        ax.axvspan(0.0, 0.5, color="#0a5cad", linewidth=0.0)
-        ax.set_xlim(0.0, 1.0)
-
-    pixels = np.round(255 * decoded(png_file(draw, size, background="white"))).astype(int)
-    assert pixels.shape[:2] == (round(100 * size[1]), round(100 * size[0]))
-    assert (pixels[:, 1, :3] == [0x0A, 0x5C, 0xAD]).all()
-    assert (pixels[:, -1, :3] == 255).all()
-
-
-def test_many_colours_come_down_to_those_that_are_near() -> None:
-    def draw(figure: Figure) -> None:
-        ax = figure.subplots()
-        ax.set_axis_off()
-        ax.imshow([[n / 255 for n in range(256)]], cmap="gray", aspect="auto")
-
-    grey = np.round(255 * decoded(png_file(draw, (2.56, 0.1), background="white"))[5, :, 0])
-    assert len(np.unique(grey)) <= 64
-    assert np.abs(grey - range(256)).max() <= 16
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "VideoRay",
+        "neither lag nor coupling",
+        *(pytest.param(kind, marks=pytest.mark.long) for kind in ("heave only", "yaw only", "sway and yaw")),
+    ],
+)
+def test_a_drawing_holds_its_arrows_and_names_which_do_not_cover_each_other(kind: str, view: str) -> None:
+    scene = scenes(VEHICLES[kind])[view]
+    figure = Figure(figsize=scene.inches, layout="constrained")
+    ax = figure.subplots()
+    draw_thrusters(ax, VEHICLES[kind], scene)
+    figure.draw_without_rendering()
+    boxes = {text: text.get_window_extent() for text in ax.texts if text.get_text()}
+    for text, box in boxes.items():
+        assert min(box.x0, box.y0) >= 0.0, text
+        assert box.x1 <= figure.bbox.x1, text
+        assert box.y1 <= ax.bbox.y1, text
+        assert sum(box.overlaps(other) for other in boxes.values()) == 1, text
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    tips = [text.xy for text in ax.texts if isinstance(text, Annotation)]
+    assert tips
+    assert all(left < x < right and high < y < low for x, y in tips)

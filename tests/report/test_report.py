@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import zipfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import pytest
 from lxml import html
 
 from rov_fmu.cli import main
+from rov_fmu.fmu.archive import native_content, python_content
 from rov_fmu.identify.identification import Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.next_test import NextTest
@@ -20,6 +20,7 @@ from rov_fmu.io.output import write_whole
 from rov_fmu.model.layout import HEAVE, SURGE, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.console_results import print_identification
+from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.report import report_output, report_page
 from rov_fmu.report.templates import number
 from rov_fmu.tank.tank_tests import load_tank_tests
@@ -30,7 +31,7 @@ from tests.commands import ROOT, TESTS
 from tests.folders import DOWN, SPEED, folder_of, pulled, read
 from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
 from tests.recordings import PLANS, clean, write_log
-from tests.report.test_fmu_page import check_refers_to_itself_alone
+from tests.report.pages import check_is_whole, check_refers_to_itself_alone, rows, text_of
 
 PAGES = ["of_tables", "of_recordings"]
 ONE_AXIS = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
@@ -45,14 +46,13 @@ def of_tables() -> Identification:
 
 @pytest.fixture(scope="module")
 def of_recordings(tmp_path_factory: pytest.TempPathFactory) -> Identification:
-    """The results of thrust tests and a recording of each axis."""
+    """The results of thrust tests and of recordings of surge and heave."""
     folder, random = tmp_path_factory.mktemp("logs"), np.random.default_rng(1)
     write_rov(folder, thrust_rear=(0.0, 0.7))
     k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
     for thruster, m in (("rear", SURGE), ("top", HEAVE)):
         rows = [(c, k.force(m, c) + 0.05 * random.standard_normal()) for c in COMMANDS.tolist()]
         write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
-    for m in (SURGE, HEAVE, YAW):
         write_log(folder, "a&b $1", clean(k, m, PLANS[m.name][0], rate=20.0).noisy(random))
     return identify(load_tank_tests(folder))
 
@@ -73,77 +73,77 @@ def page(results: Identification, pages: Mapping[int, str]) -> str:
     return pages[id(results)]
 
 
+def leave_plots_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the plots out, because drawing takes most of the time, and words do not need it."""
+    for module in ("rov_fmu.report.report", "rov_fmu.report.page.fmu_page"):
+        monkeypatch.setattr(f"{module}.inline_svg", lambda *_: "")
+
+
 @pytest.fixture
 def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drawing takes most of the time, and words do not need it."""
-    monkeypatch.setattr("rov_fmu.report.report.inline_svg", lambda *_: "")
+    leave_plots_out(monkeypatch)
 
 
-def text_of(page: str) -> str:
-    return " ".join(html.fromstring(page).text_content().split())
+def sections(page: str) -> list[str]:
+    return [h2.get("id") for h2 in html.fromstring(page).iter("h2")]
 
 
-def rows(page: str) -> list[list[str]]:
-    return [[cell.text_content().strip() for cell in row.iter("th", "td")] for row in html.fromstring(page).iter("tr")]
-
-
-def test_page_is_whole_html(page: str) -> None:
-    assert page.startswith("<!DOCTYPE html>")
-    root = html.document_fromstring(page, ensure_head_body=True)
-    ids = [e.get("id") for e in root.iter() if isinstance(e.tag, str) and e.get("id")]
-    assert len(ids) == len(set(ids))
-    assert {a.get("href").removeprefix("#") for a in root.iter("a")} <= set(ids)
-    assert set(re.findall(r"url\(#(\w+)\)", page)) | set(re.findall(r'<use [^>]*href="#(\w+)"', page)) <= set(ids)
-    for tag in ("table", "tbody", "tr", "td", "th", "div", "p", "ul", "li", "svg", "text", "figure"):
-        assert len(re.findall(rf"<{tag}[\s>]", page)) == page.count(f"</{tag}>"), tag
+def test_the_page_is_whole_loads_nothing_and_answers_three_questions_first(page: str) -> None:
+    check_is_whole(page)
+    check_refers_to_itself_alone(page)
+    assert not list(html.fromstring(page).iter("script"))
+    assert sections(page)[:4] == ["predicts", "known", "next", "warnings"]
     assert "nan" not in re.findall(r"[a-z]+", text_of(page)), "a dash stands where there is no number"
 
 
-def test_loads_nothing(page: str) -> None:
-    check_refers_to_itself_alone(page)
-    assert not re.search(r"https?://|@import", page)
-    assert set(re.findall(r"url\((.)", page)) == {"#"}
-
-
-@pytest.mark.parametrize("results", ["of_tables", pytest.param("of_recordings", marks=pytest.mark.long)], indirect=True)
+@pytest.mark.long
 def test_the_same_twice(results: Identification, page: str) -> None:
     assert report_page(results) == page
 
 
-def test_every_input_has_its_hash(results: Identification, page: str) -> None:
-    table = [row for row in rows(page) if len(row) == 3]
+def test_inputs_coefficients_and_intervals_have_their_rows(results: Identification, page: str) -> None:
+    table = rows(page)
     for name, digest in results.tests.inputs.items():
-        (row,) = [row for row in table if row[0] == name]
-        assert row[1]
-        assert row[2] == digest
-
-
-def test_every_warning_is_there_in_words(of_tables: Identification, pages: Mapping[int, str]) -> None:
-    items = [item.text_content().strip() for item in html.fromstring(pages[id(of_tables)]).iter("li")]
-    assert of_tables.warnings
-    assert {f"{warning}." for warning in of_tables.warnings} <= set(items)
-
-
-def test_every_coefficient_has_its_interval(results: Identification, page: str) -> None:
-    table = {row[0]: row for row in reversed(rows(page)) if len(row) == 7}  # the first of each name
-    for name in PAPER.coefficients:
-        row, interval = table[name], results.vehicle.intervals.get(name)
+        ((holds, found),) = [row[1:] for row in table if len(row) == 3 and row[0] == name]
+        assert holds
+        assert found == digest
+    coefficients = {row[0]: row for row in reversed(table) if len(row) == 7}  # the first of each name
+    for name in results.vehicle.layout.coefficients:
+        row, interval = coefficients[name], results.vehicle.intervals.get(name)
         assert row[2] == f"{results.vehicle.rov[name]:.5g}"
         assert row[3:5] == ([f"{end:.4g}" for end in interval] if interval else ["", ""])
         assert row[6] == results.vehicle.sources[name]
 
 
-def test_every_measured_point_stands_beside_the_models(of_tables: Identification, pages: Mapping[int, str]) -> None:
-    table = rows(pages[id(of_tables)])
+def test_fitted_coefficients_are_in_a_plot_and_a_table(results: Identification, page: str) -> None:
+    table = {row[0]: row for row in reversed(rows(page)) if len(row) in (4, 5)}
+    fitted = {name for result in results.axes if result.estimate for name in result.estimate.names}
+    for name in fitted:
+        low, high = results.vehicle.intervals[name]
+        assert table[name][1:4] == [number(results.vehicle.rov[name], 4), number(low, 3), number(high, 3)]
+    (plot,) = [svg for svg in html.fromstring(page).iter("svg") if svg.get("aria-label") == "What is known"]
+    labels = {text.text_content() for text in plot.iter("text")}
+    assert {"a_d_u", "b_d_w"} <= fitted <= labels
+    assert not [label for label in labels if label.startswith(("alpha", "m_rov"))], "what is given, or by convention"
+
+
+def test_warnings_points_and_predictions_of_tables(of_tables: Identification, pages: Mapping[int, str]) -> None:
+    page = pages[id(of_tables)]
+    items = [item.text_content().strip() for item in html.fromstring(page).iter("li")]
+    assert of_tables.warnings
+    assert {f"{warning}." for warning in of_tables.warnings} <= set(items)
+    table = rows(page)
     for comparison in compare(of_tables):
         for n, p in enumerate(comparison.points):
             numbers = [f"{column[n]:.4g}".replace("-", "−") for column in comparison.columns]
             assert [row for row in table if len(row) == 9 and row[2::2][:3] == numbers and p.source in row[8]]
     assert ["Surge, Vss", "6", "5.3 %", "9.7 %", "16.6 %"] in table
+    for words, error in (("Vss of 6 points", "9.7 %"), ("Tau of 4 points", "17.0 %")):
+        assert [row for row in table if row[1:2] == [f"{words}, each by a fit without its thrust"] and row[-1] == error]
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_a_vehicle_of_another_kind_stands_beside(of_tables: Identification) -> None:
+def test_a_vehicle_of_another_kind_is_compared(of_tables: Identification) -> None:
     heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
     axes = tuple(form for form in heavy.layout.axes if form.axis is not YAW)
     rov = Rov(replace(heavy.layout, axes=axes, coupled=False), heavy.rov.coefficients)
@@ -158,61 +158,32 @@ def test_a_vehicle_of_another_kind_stands_beside(of_tables: Identification) -> N
     assert all(row[-3:-1] == ["–", "–"] for row in of_yaw)
 
 
-def test_recordings_are_drawn_and_their_holds_listed(of_recordings: Identification, pages: Mapping[int, str]) -> None:
+def test_recordings_are_drawn_listed_and_predicted(of_recordings: Identification, pages: Mapping[int, str]) -> None:
+    """The prediction is in percent of the velocity over time."""
     page = pages[id(of_recordings)]
     labels = {svg.get("aria-label") for svg in html.fromstring(page).iter("svg")}
-    for axis in of_recordings.axes:
-        assert axis.recordings
-        assert f"Recording: log_{axis.axis.name}_a&b $1.csv" in labels
-        assert sum(row[0].startswith(f"log_{axis.axis.name}") for row in rows(page)) >= len(axis.steps)
     assert {"Thrust: rear", "Thrust: top"} <= labels
-    assert ["80 %", "weight 0"] in [[row[0], row[-1]] for row in rows(page) if len(row) == 6]
-
-
-# ---- Three questions first ------------------------------------------------------------------------------------------
-
-
-def sections(page: str) -> list[str]:
-    return [h2.get("id") for h2 in html.fromstring(page).iter("h2")]
-
-
-def test_three_questions_come_first(page: str) -> None:
-    assert sections(page)[:4] == ["predicts", "known", "next", "warnings"]
-
-
-def test_recordings_are_predicted_in_percent_of_the_velocity_over_time(
-    of_recordings: Identification, pages: Mapping[int, str]
-) -> None:
-    table = rows(pages[id(of_recordings)])
-    for result in of_recordings.axes:
+    table = rows(page)
+    assert ["80 %", "weight 0"] in [[row[0], row[-1]] for row in table if len(row) == 6]
+    for result in of_recordings.axes[:2]:
+        file = f"log_{result.axis.name}_a&b $1.csv"
+        assert f"Recording: {file}" in labels
+        assert sum(row[0] == file for row in table) >= len(result.steps) > 0
         assert result.held_out
         p = np.concatenate([[p.measured, p.predicted] for p in result.held_out.predictions], axis=1)
         fit = 1.0 - np.sqrt(np.mean((p[0] - p[1]) ** 2)) / np.std(p[0])
         assert 0.5 < fit < 1.0
-        name, halves = result.axis.name.capitalize(), f"halves of log_{result.axis.name}_a&b $1.csv, each by a fit to"
-        assert [row[2] for row in table if row[0] == name and row[1].startswith(halves)] == [f"{100.0 * fit:.1f} %"]
+        words = f"halves of {file}, each by a fit to the other"
+        assert [row[2] for row in table if row[:2] == [result.axis.name.capitalize(), words]] == [
+            f"{100.0 * fit:.1f} %"
+        ]
 
 
-def test_points_are_predicted_by_fits_without_their_thrust(of_tables: Identification, pages: Mapping[int, str]) -> None:
-    table = rows(pages[id(of_tables)])
-    for words, error in (("Vss of 6 points", "9.7 %"), ("Tau of 4 points", "17.0 %")):
-        assert [row for row in table if row[1:2] == [f"{words}, each by a fit without its thrust"] and row[-1] == error]
-
-
-def test_what_was_sought_is_known_in_a_plot_and_a_table(results: Identification, page: str) -> None:
-    table = {row[0]: row for row in reversed(rows(page)) if len(row) in (4, 5)}
-    for name in (name for result in results.axes if result.estimate for name in result.estimate.names):
-        low, high = results.vehicle.intervals[name]
-        numbers = number(results.vehicle.rov[name], 4), number(low, 3), number(high, 3)
-        assert tuple(table[name][1:4]) == numbers
-    (plot,) = [svg for svg in html.fromstring(page).iter("svg") if svg.get("aria-label") == "What is known"]
-    labels = {text.text_content() for text in plot.iter("text")}
-    assert {"a_d_u", "b_d_w", "beta_r"} <= labels
-    assert not [label for label in labels if label.startswith(("alpha", "m_rov"))], "what is given, or by convention"
+# ---- Without plots ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_the_next_test_is_told_the_worst_axis_first(of_tables: Identification) -> None:
+def test_the_next_tests_begin_with_the_worst_axis(of_tables: Identification) -> None:
     def test_of(n: int, interval: tuple[float, float] | None, width: float) -> NextTest:
         return NextTest(
             of_tables.axes[n].axis, PAPER.axes[n].axis.coefficient("a_d"), interval, width, 0.4, f"do {n} < 3"
@@ -228,7 +199,7 @@ def test_the_next_test_is_told_the_worst_axis_first(of_tables: Identification) -
 
 
 @pytest.mark.usefixtures("without_plots")
-def test_what_else_acts_is_told_kept_or_not(of_recordings: Identification) -> None:
+def test_other_effects_are_listed_kept_or_not(of_recordings: Identification) -> None:
     heave = of_recordings.axes[1]
     assert heave.recordings
     file = heave.recordings.simulations[0].recording.file
@@ -270,7 +241,7 @@ def test_the_report_of_another_vehicle_speaks_of_it_alone(tmp_path: Path) -> Non
 def test_the_printout_is_short_and_says_the_same(
     of_recordings: Identification, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    surge, heave, yaw = of_recordings.axes
+    surge, heave, *others = of_recordings.axes
     assert heave.recordings
     acts = (Effect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),)
     heave = replace(
@@ -279,7 +250,7 @@ def test_the_printout_is_short_and_says_the_same(
         next_test=NextTest(HEAVE, "a_d_w", (10.0, 20.0), 0.5, 0.25, "a dive"),
         steps=heave.steps[:1] * 30,
     )
-    print_identification(replace(of_recordings, axes=(surge, heave, yaw)))
+    print_identification(replace(of_recordings, axes=(surge, heave, *others)))
     out = capsys.readouterr().out
     words = [" ".join(line.split()) for line in out.splitlines()]
     assert heave.held_out
@@ -302,10 +273,8 @@ CASES: Mapping[str, Tables] = {
 }
 
 
-_SOME = ("backward too",)
-
-
-@pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in CASES])
+@pytest.mark.long
+@pytest.mark.parametrize("case", CASES)
 def test_any_data(case: str, tmp_path: Path) -> None:
     text = text_of(report_page(folder_with(tmp_path, CASES[case])))
     assert "nan" not in re.findall(r"[a-z]+", text)
@@ -352,35 +321,24 @@ def test_a_place_that_cannot_be_is_named(
     assert not list(tmp_path.iterdir()), "no vehicle file without the report that it names"
 
 
-@pytest.fixture(scope="module")
-def with_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a vehicle file that names its report, which is in a folder of its own."""
-    folder = tmp_path_factory.mktemp("identified")
-    (folder / "pages").mkdir()
-    options = ["-o", str(folder / "vehicle.toml"), "--report", str(folder / "pages" / "report.html")]
-    tests = folder_of(tmp_path_factory.mktemp("tests"), DOWN, ONE_AXIS)
-    assert main(["identify", str(tests), *options]) == 0
-    return folder
-
-
 @pytest.fixture
-def identified(with_report: Path, tmp_path: Path) -> Path:
-    """The vehicle file in a copy of that folder."""
-    shutil.copytree(with_report, tmp_path, dirs_exist_ok=True)
+def identified(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A vehicle file that names its report, which is in a folder of its own."""
+    leave_plots_out(monkeypatch)
+    (tmp_path / "pages").mkdir()
+    options = ["-o", str(tmp_path / "vehicle.toml"), "--report", str(tmp_path / "pages" / "report.html")]
+    assert main(["identify", str(folder_of(tmp_path / "tests", DOWN, ONE_AXIS)), *options]) == 0
     return tmp_path / "vehicle.toml"
 
 
-@pytest.mark.parametrize(
-    "backend", [["--platform", "host"], pytest.param(["--backend", "pythonfmu"], marks=pytest.mark.long)]
-)
-def test_the_fmu_has_the_report(identified: Path, tmp_path: Path, backend: list[str]) -> None:
-    output = tmp_path / "out.fmu"
+def test_the_fmu_has_the_report(identified: Path) -> None:
     assert 'report = "pages/report.html"' in identified.read_text(encoding="utf-8")
-    assert main(["build", str(identified), *backend, "-o", str(output)]) == 0
-    with zipfile.ZipFile(output) as archive:
-        assert archive.read("documentation/identification.html") == (tmp_path / "pages/report.html").read_bytes()
-        index = html.fromstring(archive.read("documentation/index.html").decode())
-    assert "identification.html" in [a.get("href") for a in index.iter("a")]
+    vehicle = load_vehicle(identified)
+    for content in (native_content(vehicle), python_content(vehicle)):
+        report = content.files["documentation/identification.html"]
+        assert report == (identified.parent / "pages" / "report.html").read_bytes()
+    links = html.fromstring(documentation_page(vehicle)).iter("a")
+    assert "identification.html" in [a.get("href") for a in links]
 
 
 def test_a_report_that_is_gone(identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -392,22 +350,22 @@ def test_a_report_that_is_gone(identified: Path, tmp_path: Path, capsys: pytest.
 
 
 def test_a_tuned_vehicle_keeps_its_report_where_that_is_inside_its_folder(
-    with_report: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    identified: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    identified = Path(shutil.copytree(with_report, tmp_path / "found")) / "vehicle.toml"
+    folder = identified.parent
     tune = ["tune", str(identified), "--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "-o"]
-    assert main([*tune, str(tmp_path / "tuned.toml")]) == 0
-    provenance = load_vehicle(tmp_path / "tuned.toml").provenance
+    assert main([*tune, str(folder / "tuned.toml")]) == 0
+    provenance = load_vehicle(folder / "tuned.toml").provenance
     assert provenance
     assert provenance.report
-    assert provenance.report.samefile(tmp_path / "found" / "pages" / "report.html")
-    (tmp_path / "other").mkdir()
+    assert provenance.report.samefile(folder / "pages" / "report.html")
+    (folder / "other").mkdir()
     capsys.readouterr()
-    assert main([*tune, str(tmp_path / "other" / "tuned.toml")]) == 2
+    assert main([*tune, str(folder / "other" / "tuned.toml")]) == 2
     error = capsys.readouterr().err
     assert "provenance.report = 'pages/report.html': must be inside the folder of the new file" in error
     assert error.count("\n") == 1
-    assert not list((tmp_path / "other").iterdir())
+    assert not list((folder / "other").iterdir())
 
 
 def test_a_report_outside_the_folder_of_the_vehicle_file_is_refused_before_the_fit(
@@ -419,21 +377,19 @@ def test_a_report_outside_the_folder_of_the_vehicle_file_is_refused_before_the_f
     assert capsys.readouterr().err.startswith(f"rov-fmu: {report}: must be inside the folder of ")
 
 
-def test_vehicle_without_a_report(of_tables: Identification) -> None:
-    assert of_tables.vehicle.provenance
-    assert of_tables.vehicle.provenance.report is None
-
-
 # ---- The paper's figures ---------------------------------------------------------------------------------------------
 
 
 def test_figures_of_the_paper_are_those_that_ship(tmp_path: Path) -> None:
     assert main(["figures", str(tmp_path)]) == 0
-    made = tmp_path / "paper_figures.svg"
-    assert sorted(path.name for path in tmp_path.iterdir()) == [made.name, "videoray.svg"]
-    text = made.read_text(encoding="utf-8")
-    shown = re.findall(r"<text[^>]*>([^<]*)</text>", text)
+    written = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
+    assert sorted(written) == ["paper_figures.svg", "videoray.svg"]
+    assert written["videoray.svg"].startswith("<svg ")
+    assert written["videoray.svg"].count("measured</text>") == 3
+    shipped = (ROOT / "docs" / "paper_figures.svg").read_text(encoding="utf-8")
+    shown, expected = (
+        re.findall(r"<text[^>]*>([^<]*)</text>", text) for text in (written["paper_figures.svg"], shipped)
+    )
+    assert shown == expected
     for figure in ("5", "6", "7", "8", "9", "11a", "11b"):
         assert any(words.startswith(f"Figure {figure}: ") for words in shown), figure
-    shipped = (ROOT / "docs" / made.name).read_text(encoding="utf-8")
-    assert re.findall(r"<text[^>]*>([^<]*)</text>", shipped) == shown

@@ -1,0 +1,42 @@
+"""Checks that every page must pass, and readers of its text and tables."""
+
+import re
+
+from lxml import html
+
+
+def text_of(page: str) -> str:
+    """Return the text of a page, in which every space is one blank."""
+    return " ".join(html.fromstring(page).text_content().split())
+
+
+def rows(page: str) -> list[list[str]]:
+    """Return the text of the cells of all rows of all tables."""
+    return [[cell.text_content().strip() for cell in row.iter("th", "td")] for row in html.fromstring(page).iter("tr")]
+
+
+def check_is_whole(page: str) -> None:
+    """Check that every element is closed, and that every reference within the page leads to one element."""
+    assert page.startswith("<!DOCTYPE html>")
+    root = html.document_fromstring(page, ensure_head_body=True)
+    assert root.get("lang") == "en"
+    ids = [element.get("id") for element in root.iter() if isinstance(element.tag, str) and element.get("id")]
+    assert len(ids) == len(set(ids))
+    assert {a.get("href").removeprefix("#") for a in root.iter("a")} <= set(ids)
+    assert set(re.findall(r"url\(#(\w+)\)", page)) | set(re.findall(r'<use [^>]*href="#(\w+)"', page)) <= set(ids)
+    for tag in re.findall(r"\w+", "table tbody tr td th div p ul li figure math mrow msub msubsup mfrac svg text"):
+        assert len(re.findall(rf"<{tag}[\s>]", page)) == page.count(f"</{tag}>"), tag
+
+
+def check_refers_to_itself_alone(page: str) -> None:
+    """Check that no element loads anything, that links stay in the page, and that images are embedded."""
+    root = html.fromstring(page)
+    assert not list(root.iter("link", "iframe", "object", "embed", "base"))
+    for element in root.iter():
+        for name, value in element.items():
+            assert name != "src" or (element.tag == "img" and value.startswith("data:image/svg+xml;base64,"))
+            assert not name.startswith("on")
+            assert name not in {"href", "xlink:href"} or value.startswith("#")
+    namespace = 'createElementNS("http://www.w3.org/2000/svg"'  # the page's script names it, and nothing loads it
+    assert not re.search(r"https?://|@import", page.replace(namespace, ""))
+    assert set(re.findall(r"url\((.)", page)) <= {"#"}
