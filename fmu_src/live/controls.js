@@ -5,12 +5,13 @@ const SPAN = 20; // s, of the charts
 const LONGEST_FRAME = 0.1; // s; a page that was hidden does not fly what it missed
 const DEAD_ZONE = 0.12;
 
-/** The axis that each key drives, and the direction. Keys are known by their place. @type {Record<string, [string, number]>} */
-const KEYS = {
-  KeyW: ["surge", 1], ArrowUp: ["surge", 1], KeyS: ["surge", -1], ArrowDown: ["surge", -1],
-  KeyD: ["yaw", 1], ArrowRight: ["yaw", 1], KeyA: ["yaw", -1], ArrowLeft: ["yaw", -1],
-  KeyE: ["sway", 1], KeyQ: ["sway", -1], KeyF: ["heave", 1], KeyR: ["heave", -1],
-}; // biome-ignore format: pairs
+/** The axis that each arrow key drives, and the direction. @type {Record<string, [string, number]>} */
+const ARROWS = {
+  ArrowUp: ["surge", 1],
+  ArrowDown: ["surge", -1],
+  ArrowRight: ["yaw", 1],
+  ArrowLeft: ["yaw", -1],
+};
 
 /** The sticks of a standard gamepad, assigned as on ROVs: axis, stick, direction. @type {[string, number, number][]} */
 const STICKS = [
@@ -40,6 +41,12 @@ class Live {
     this.speed = 1;
     /** The time span of the charts, in s. */
     this.span = SPAN;
+    /** The axis and the direction of each key, which is known by its place on the keyboard. @type {Record<string, [string, number]>} */
+    this.driving = { ...ARROWS };
+    for (const { name, keys } of this.vehicle.axes) {
+      this.driving[`Key${keys[0]}`] = [name, 1];
+      this.driving[`Key${keys[1]}`] = [name, -1];
+    }
     /** The keys that are down, with their axes and directions. @type {Map<string, [string, number]>} */
     this.keys = new Map();
     /** @type {Map<string, number>} */
@@ -164,7 +171,7 @@ class Live {
 
   /** @param {string} words */
   say(words) {
-    part("said").textContent = words;
+    part("message").textContent = words;
   }
 
   /** @param {boolean} paused */
@@ -195,7 +202,7 @@ class Live {
     this.show();
   }
 
-  /** Sets all commands to zero. */
+  /** Returns all commands to their start values. */
   still() {
     this.takeOver();
     this.slideCommands({});
@@ -204,7 +211,7 @@ class Live {
   /** @param {Record<string, number>} commands */
   slideCommands(commands) {
     for (const slider of this.sliders) {
-      if (slider.dataset.kind === "command") slider.value = String(commands[slider.name] ?? 0);
+      if (slider.dataset.kind === "command") slider.value = String(commands[slider.name] ?? slider.dataset.start);
     }
     this.show();
   }
@@ -223,7 +230,7 @@ class Live {
     const test = this.vehicle.tests[Number(/** @type {HTMLSelectElement} */ (part("test")).value)];
     const { signs, name, unit } = this.vehicle.axes[test.axis];
     this.takeOver();
-    for (const slider of this.sliders) if (slider.dataset.kind === "load") slider.value = "0";
+    for (const slider of this.sliders) if (slider.dataset.kind === "load") slider.value = String(slider.dataset.start);
     this.flight.run(test);
     this.slideCommands(Object.fromEntries(Object.entries(signs).map(([input, sign]) => [input, sign * test.command])));
     const Tau = this.flight.pilot.model.marks[2 * test.axis + 1];
@@ -257,7 +264,7 @@ class Live {
   /** @param {KeyboardEvent} event */
   pressed(event) {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
-    if (event.code in KEYS) this.keys.set(event.code, KEYS[event.code]);
+    if (event.code in this.driving) this.keys.set(event.code, this.driving[event.code]);
     else if (event.code === "Space") this.pause(!this.paused);
     else if (event.key === "+") this.faster(1);
     else if (event.key === "-") this.faster(-1);
@@ -274,12 +281,12 @@ class Live {
     const strength = Number(/** @type {HTMLInputElement} */ (part("strength")).value);
     /** @type {Map<string, number>} */
     const demands = new Map();
-    for (const [axis, way] of this.keys.values())
-      demands.set(axis, Math.max(-1, Math.min(1, (demands.get(axis) ?? 0) + way)) * strength);
+    for (const [axis, direction] of this.keys.values())
+      demands.set(axis, Math.max(-1, Math.min(1, (demands.get(axis) ?? 0) + direction)) * strength);
     const pad = navigator.getGamepads?.().find((one) => one !== null && one.mapping === "standard");
-    for (const [axis, stick, way] of pad ? STICKS : []) {
+    for (const [axis, stick, direction] of pad ? STICKS : []) {
       const value = pad?.axes[stick] ?? 0;
-      if (Math.abs(value) > DEAD_ZONE) demands.set(axis, value * way);
+      if (Math.abs(value) > DEAD_ZONE) demands.set(axis, value * direction);
     }
     return demands;
   }
@@ -335,11 +342,11 @@ class Live {
     this.depth?.draw(flight, ghost);
     for (const chart of this.charts) chart.draw(flight, this.span, ghost);
     const heading = ((Math.round((model.get("psi") * 180) / Math.PI) % 360) + 360) % 360;
-    const told = [`${shown(flight.time, 1)} s`];
-    if (model.has("x")) told.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);
-    if (model.has("z")) told.push(`depth ${shown(model.get("z"), 2)} m`);
-    if (model.has("psi")) told.push(`heading ${shown(heading, 0)}°`);
-    part("told").textContent = told.join(" · ");
+    const readings = [`${shown(flight.time, 1)} s`];
+    if (model.has("x")) readings.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);
+    if (model.has("z")) readings.push(`depth ${shown(model.get("z"), 2)} m`);
+    if (model.has("psi")) readings.push(`heading ${shown(heading, 0)}°`);
+    part("readings").textContent = readings.join(" · ");
   }
 }
 

@@ -15,7 +15,7 @@ class Craft {
     /** Depth, heading, or the distance along the axis. @type {number[][]} */
     this.positions = model.vehicle.axes.map(() => []);
     /** The distance covered along each axis. */
-    this.ways = model.vehicle.axes.map(() => 0);
+    this.distances = model.vehicle.axes.map(() => 0);
   }
 
   reset() {
@@ -23,18 +23,18 @@ class Craft {
     this.track = [];
     this.velocities = this.velocities.map(() => []);
     this.positions = this.positions.map(() => []);
-    this.ways = this.ways.map(() => 0);
+    this.distances = this.distances.map(() => 0);
     this.keep();
   }
 
   /** Steps h seconds. Returns false when the step fails. @param {number} h */
   step(h) {
-    const { model, ways } = this;
+    const { model, distances } = this;
     const { axes } = model.vehicle;
     const before = axes.map(({ velocity }) => model.get(velocity));
     if (!model.step(h)) return false;
     axes.forEach(({ velocity }, a) => {
-      ways[a] += (h / 2) * (before[a] + model.get(velocity));
+      distances[a] += (h / 2) * (before[a] + model.get(velocity));
     });
     return true;
   }
@@ -61,7 +61,7 @@ class Craft {
   /** Returns depth, heading, or the distance along an axis. @param {number} a */
   position(a) {
     const { position } = this.model.vehicle.axes[a];
-    return position ? this.model.get(position) : this.ways[a];
+    return position ? this.model.get(position) : this.distances[a];
   }
 
   /** Removes the oldest n entries of the history. @param {number} n */
@@ -180,12 +180,12 @@ class Flight {
     this.begun = true;
   }
 
-  /** Flies a published step test: from rest, with all other inputs at zero. @param {StepTest} test */
+  /** Flies a published step test: from rest, with all other inputs at their start values. @param {StepTest} test */
   run(test) {
     const { vehicle } = this.pilot.model;
     const { signs } = vehicle.axes[test.axis];
-    const inputs = vehicle.variables.slice(0, vehicle.inputs).map(([name]) => name);
-    this.set(Object.fromEntries(inputs.map((name) => [name, test.command * (signs[name] ?? 0)])));
+    const inputs = vehicle.variables.slice(0, vehicle.inputs);
+    this.set(Object.fromEntries(inputs.map(([name, start]) => [name, name in signs ? signs[name] * test.command : start])));
     this.reset();
     this.test = test;
     this.begun = true;

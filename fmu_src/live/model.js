@@ -2,9 +2,10 @@
 // The vehicle of a page: the module that a build has compiled from the FMU's C, with the names of the FMU's variables.
 
 /**
- * An axis: the names of its velocity, load and position, their units, and the commands that drive it with their signs.
+ * An axis: the names of its velocity, load and position, their units, the commands that drive it with their signs, and the letters
+ * of the keys that drive it in its positive and in its negative direction.
  * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string,
- *   signs: Record<string, number>}} Axis
+ *   signs: Record<string, number>, keys: string}} Axis
  */
 /**
  * A thruster: the variable of its force, its place (x, y) and direction (x, y, z) in the body frame, its strongest force in N.

@@ -211,7 +211,7 @@ class Playback {
         const { velocity, position } = craft.model.vehicle.axes[axis];
         const name = isPosition ? position : velocity;
         if (name) craft.model.set(name, this.measured[n].now);
-        else craft.ways[axis] = this.measured[n].now;
+        else craft.distances[axis] = this.measured[n].now;
       });
       craft.track = [];
       craft.forget(1);
@@ -252,7 +252,7 @@ class Playback {
 
   /** Moves the ghost h seconds along the measured motion. @param {Craft} ghost @param {number} h */
   move(ghost, h) {
-    const { model, ways } = ghost;
+    const { model, distances } = ghost;
     this.recording.signals.forEach(({ isPosition }, n) => {
       const axis = ghost.axis(this.names[n]);
       if (axis < 0) return;
@@ -261,7 +261,7 @@ class Playback {
       model.set(velocity, isPosition ? rate : now);
       if (isPosition && position) model.set(position, now);
       else if (position) model.set(position, model.get(position) + now * h);
-      else ways[axis] = isPosition ? now : ways[axis] + now * h;
+      else distances[axis] = isPosition ? now : distances[axis] + now * h;
     });
     const [u, v, psi] = ["u", "v", "psi"].map((name) => model.get(name));
     model.set("x", model.get("x") + h * (u * Math.cos(psi) - v * Math.sin(psi) + model.get("V_N")));

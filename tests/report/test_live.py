@@ -273,7 +273,7 @@ def test_a_step_test_stands_beside_what_was_measured(
         until(page, "live.flight.time > 0.1")
         title = page.text_content("#live-chart-heave .title") or ""
         assert title.endswith(f"V_ss {V:.3f} · Tau {Tau:.2f} s")
-        line = page.inner_text("#live-said")
+        line = page.inner_text("#live-message")
         assert f"measured: V_ss {row.scaled.V_ss.measured} m/s, Tau {row.scaled.Tau.measured} s" in line
         assert page.get_attribute("#live-chart-heave .point", "visibility") == "visible"
     page.locator("input[name=u_l]").fill("0.25")
@@ -331,13 +331,13 @@ def test_a_track_far_away_is_drawn(pages: Callable[[str], str], quiet: Visitor) 
         return live.track.grid.getAttribute("d").split("M").length;
     }""")
     assert lines < 40
-    assert "north 1.00e17 m" in page.inner_text("#live-told")
+    assert "north 1.00e17 m" in page.inner_text("#live-readings")
 
 
 def test_a_heading_is_below_360(pages: Callable[[str], str], quiet: Visitor) -> None:
     page = flying(quiet, pages("videoray")).page
     page.evaluate("() => { live.flight.pilot.model.set('psi', -0.005); live.draw(); }")
-    assert page.inner_text("#live-told").endswith("heading 0°")
+    assert page.inner_text("#live-readings").endswith("heading 0°")
 
 
 def test_loads_and_current_act(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
@@ -407,7 +407,7 @@ def test_a_recording_flies_again_beside_its_prediction(
     until(page, "live.flight.playback !== null")
     page.evaluate("live.speed = 20")
     until(page, "live.paused")
-    line = page.inner_text("#live-said")
+    line = page.inner_text("#live-message")
     deviations = [float(number) for number in re.findall(r"(?:surge|heave|yaw) (\S+) ", line)]
     assert len(deviations) == 3
     assert max(deviations) < 1e-8, line  # the recording is that of the model
@@ -485,8 +485,8 @@ def test_a_file_that_is_no_recording_is_told_and_the_model_flies_on(
     for name, (content, expected) in BAD.items():
         page.evaluate("live.say('')")
         drop(page, f"{name}.csv", content)
-        until(page, "document.getElementById('live-said').textContent !== ''")
-        line = page.inner_text("#live-said")
+        until(page, "document.getElementById('live-message').textContent !== ''")
+        line = page.inner_text("#live-message")
         assert line.startswith(f"{name}.csv cannot be flown: "), line
         assert expected in line, line
         time = page.evaluate("live.flight.time")

@@ -5,7 +5,7 @@ import hashlib
 import json
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 from typing import Any
@@ -14,13 +14,16 @@ from markupsafe import Markup
 
 from rov_fmu.engine.compile import MODULE_SOURCES
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.layout import Thruster, VehicleAxis
+from rov_fmu.model.layout import Axis, Layout, Thruster
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.drawing import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import number, page, pretty_unit
 from rov_fmu.vehicle.vehicle import Vehicle
 
+_KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
+"""The letters of the keys for the positive and the negative direction of an axis."""
+_SPARE_KEYS = ("LJ", "IK")
 _SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "controls.js")
 # The comments and types are for readers of the source. They are a quarter of it, and are left out of the page.
 _COMMENT = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ ")
@@ -46,6 +49,10 @@ class Live:
     """The directive that allows this script in the page's content security policy."""
     tests: Sequence[dict[str, Any]]
     """The step tests that a button starts."""
+    keys: Sequence[tuple[Axis, str]]
+    """The axes, each with the letters of its keys: that of its positive direction, and that of its negative one."""
+    start: Mapping[str, float]
+    """The start value of each variable."""
     loads: Sequence[tuple[str, float, str]]
     """The inputs that are not commands: name, end of the slider, unit."""
     tunable: Sequence[tuple[str, str, float, float, float]]
@@ -61,13 +68,15 @@ def live(flown: Sequence[Flown]) -> Live:
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     script = _COMMENT.sub("", "".join((MODULE_SOURCES / name).read_text(encoding="utf-8") for name in _SCRIPTS))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    tests = data[0]["tests"]
+    tests, start = data[0]["tests"], dict(data[0]["variables"])
     return Live(
         data=Markup(text),
         script=Markup(script),
         policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
         tests=[{**test, "words": _words(pilot, test)} for test in tests],
-        loads=list(_loads(pilot.rov)),
+        keys=[(form.axis, keys) for form, keys in zip(pilot.layout.axes, _keys(pilot.layout), strict=True)],
+        start=start,
+        loads=list(_loads(pilot.rov, start)),
         tunable=list(_tunable(pilot.rov)),
         other=flown[1].vehicle.name if len(flown) > 1 else None,
     )
@@ -93,7 +102,7 @@ def _data(flown: Flown) -> dict[str, Any]:
         "states": len(layout.state),
         "commands": list(layout.commands),
         "mixed": bool(layout.mix),
-        "axes": [_axis(rov, form) for form in layout.axes],
+        "axes": [_axis(layout, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
         "thrusters": [_thruster(rov, thruster) for thruster in layout.thrusters],
         "tunable": [name for name, meta in layout.coefficients.items() if meta.tunable],
         "tests": list(_tests(vehicle)),
@@ -101,8 +110,13 @@ def _data(flown: Flown) -> dict[str, Any]:
     }
 
 
-def _axis(rov: Rov, form: VehicleAxis) -> dict[str, Any]:
-    axis = form.axis
+def _keys(layout: Layout) -> list[str]:
+    """Return the letters of the keys of each axis. Axes without letters of their own share out the spare ones."""
+    spare = iter(_SPARE_KEYS)
+    return [_KEYS[form.axis.name] if form.axis.name in _KEYS else next(spare) for form in layout.axes]
+
+
+def _axis(layout: Layout, axis: Axis, keys: str) -> dict[str, Any]:
     position = {"heave": "z", "yaw": "psi"}.get(axis.name)
     return {
         "name": axis.name,
@@ -111,7 +125,8 @@ def _axis(rov: Rov, form: VehicleAxis) -> dict[str, Any]:
         "external": axis.external,
         "position": position,
         "positionUnit": axis.position_unit,
-        "signs": rov.layout.signs(axis),
+        "signs": layout.signs(axis),
+        "keys": keys,
     }
 
 
@@ -142,12 +157,15 @@ def _words(vehicle: Vehicle, test: dict[str, Any]) -> str:
     return f"{vehicle.layout.axes[test['axis']].axis.name} {number(100.0 * test['command'], 3)} %"
 
 
-def _loads(rov: Rov) -> Iterator[tuple[str, float, str]]:
-    """Yield the sliders of the loads, which end at the strongest thrust, and of the current, which end at 1 m/s."""
+def _loads(rov: Rov, start: Mapping[str, float]) -> Iterator[tuple[str, float, str]]:
+    """Yield the sliders of the inputs that are not commands.
+
+    Loads end at the strongest thrust, and others at 1, or at twice their start value if that is more.
+    """
     most = {form.axis.external: _round(rov.strongest(form.axis)) for form in rov.layout.axes}
     for name, meta in rov.layout.inputs.items():
         if name not in rov.layout.commands:
-            yield name, most.get(name, 1.0), pretty_unit(meta.unit)
+            yield name, max(most.get(name, 1.0), 2.0 * abs(start[name])), pretty_unit(meta.unit)
 
 
 def _tunable(rov: Rov) -> Iterator[tuple[str, str, float, float, float]]:
