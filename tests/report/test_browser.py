@@ -19,10 +19,10 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.fmu.variables import UNITS, Variable, variables
-from rov_fmu.report.templates import number, pretty_unit
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import TESTS
 from tests.report.conftest import Visit
+from tests.report.pages import row_of
 
 pytestmark = pytest.mark.interop
 
@@ -71,14 +71,8 @@ def test_the_documentation_shows_the_variables_in_groups(
         " row => Array.from(row.cells, cell => cell.innerText.trim())))"
     )
     expected = groupby(declared, lambda v: (v.causality, v.variability, v.initial))
-    assert groups == [[_row(v) for v in members] for _, members in expected]
+    assert groups == [[row_of(v) for v in members] for _, members in expected]
     assert len(groups) == 6  # inputs, states, derivatives, thrust, fixed and tunable coefficients
-
-
-def _row(v: Variable) -> list[str]:
-    unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
-    limits = ["" if value is None else number(value) for value in (v.start, v.minimum, v.maximum)]
-    return [v.name, v.description, v.causality, v.variability, unit, *limits]
 
 
 # ---- The report of an identification ---------------------------------------------------------------------------------
@@ -164,7 +158,7 @@ def _bootstrap() -> str:
     return Path(package.origin).with_name("static").joinpath("bootstrap5/css/bootstrap.min.css").read_text("utf-8")
 
 
-def test_the_web_app_offers_the_declared_values_simulates_and_tells_what_the_model_is(
+def test_the_web_app_offers_the_declared_values_simulates_and_describes_the_model(
     webapp: str, visit: Callable[..., Visit], vehicle: Vehicle, declared: tuple[Variable, ...], tmp_path: Path
 ) -> None:
     from dash_bootstrap_components.themes import BOOTSTRAP

@@ -74,7 +74,7 @@ def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict
     for curve in shown.curves:
         for line in [*curve.thrust[::-1], *curve.lag]:
             calculate(line)
-    for name in rov.layout.thrust:  # those that the page tells of in words: "likewise"
+    for name in rov.layout.thrust:  # the page mentions these in words: "likewise"
         if name not in at and name.startswith("F_"):
             at[name] = float(calculated(rov, {**rov.coefficients, **inputs, **state})[name])
     for curve in shown.curves:
@@ -163,6 +163,6 @@ def test_mathml_says_what_the_text_says(kind: str) -> None:
         assert sorted(c for c in written if c not in left_out) == sorted(c for c in plain if c not in left_out)
 
 
-def test_a_form_that_cannot_be_shown_is_told() -> None:
+def test_a_form_that_cannot_be_shown_is_an_error() -> None:
     with pytest.raises(ValueError, match=r"2\.0 if x > 3\.0 else y: there is no way to show this"):
         Reader({}).read("2 if x > 3 else y")

@@ -17,10 +17,10 @@ from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.module import module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page
-from rov_fmu.report.templates import number, pretty_unit
+from rov_fmu.report.templates import number
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.report.pages import check_is_whole, check_refers_to_itself_alone, rows, text_of
+from tests.report.pages import check_is_whole, check_refers_to_itself_alone, row_of, rows, text_of
 from tests.vehicles import VEHICLES, a_vehicle
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
@@ -116,9 +116,7 @@ def test_what_flies_for_another_vehicle_is_the_same_twice(heavy: Vehicle) -> Non
 def test_every_variable_and_coefficient_has_its_row(page: str, vehicle: Vehicle) -> None:
     table = rows(page)
     for v in variables(vehicle.rov):
-        unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
-        limits = ["" if value is None else number(value) for value in (v.start, v.minimum, v.maximum)]
-        assert [v.name, v.description, v.causality, v.variability, unit, *limits] in table
+        assert row_of(v) in table
     coefficients = {row[0]: row for row in table if len(row) == 5}  # the last table with five columns
     for name, source in vehicle.sources.items():
         assert coefficients[name][2::2] == [number(vehicle.rov[name]), source]

@@ -142,7 +142,7 @@ def test_a_manoeuvre_is_that_of_the_native_fmu_in_firefox(
     seen.page.wait_for_selector("#live-section:not([hidden])")
     check_manoeuvre(seen.page, heavy, heavy_dir)
     assert seen.messages == []
-    assert set(seen.requests) <= {address}  # Firefox need not tell of the page itself, which is a file
+    assert set(seen.requests) <= {address}  # Firefox need not report the page itself, which is a file
 
 
 def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path) -> None:
@@ -322,8 +322,10 @@ def test_words_fit_their_places(tmp_path: Path, quiet: Visitor) -> None:
     assert page.evaluate("live.charts[0].title.getComputedTextLength()") < 298
 
 
-def test_a_track_far_away_is_drawn(pages: Callable[[str], str], quiet: Visitor) -> None:
+def test_a_heading_is_below_360_and_a_track_far_away_is_drawn(pages: Callable[[str], str], quiet: Visitor) -> None:
     page = flying(quiet, pages("videoray")).page
+    page.evaluate("() => { live.flight.pilot.model.set('psi', -0.005); live.draw(); }")
+    assert page.inner_text("#live-readings").endswith("heading 0°")
     lines = page.evaluate("""() => {
         live.flight.pilot.model.set("x", 1e17);
         live.zoom(1000);
@@ -332,12 +334,6 @@ def test_a_track_far_away_is_drawn(pages: Callable[[str], str], quiet: Visitor) 
     }""")
     assert lines < 40
     assert "north 1.00e17 m" in page.inner_text("#live-readings")
-
-
-def test_a_heading_is_below_360(pages: Callable[[str], str], quiet: Visitor) -> None:
-    page = flying(quiet, pages("videoray")).page
-    page.evaluate("() => { live.flight.pilot.model.set('psi', -0.005); live.draw(); }")
-    assert page.inner_text("#live-readings").endswith("heading 0°")
 
 
 def test_loads_and_current_act(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
@@ -477,7 +473,7 @@ BAD = {
 }
 
 
-def test_a_file_that_is_no_recording_is_told_and_the_model_flies_on(
+def test_the_page_says_why_a_file_is_no_recording_and_the_model_flies_on(
     pages: Callable[[str], str], quiet: Visitor
 ) -> None:
     page = flying(quiet, pages("videoray")).page
@@ -530,7 +526,7 @@ def test_axe_finds_nothing_and_it_fits(
     assert axe.Axe().run(page).response["violations"] == []
 
 
-def test_a_browser_that_cannot_is_told(pages: Callable[[str], str], quiet: Visitor) -> None:
+def test_the_page_says_that_a_browser_cannot_fly_it(pages: Callable[[str], str], quiet: Visitor) -> None:
     seen = quiet()
     seen.page.add_init_script("delete globalThis.WebAssembly")
     seen.page.goto(pages("videoray"))

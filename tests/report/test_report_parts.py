@@ -81,7 +81,7 @@ def test_intervals_stand_side_by_side_by_their_ratio_to_the_value() -> None:
 @pytest.mark.parametrize(
     ("value", "interval"), [(1.0, (0.0, 40.0)), (1.0, None), (0.0, (0.0, 0.3)), (0.2, (-0.3, 0.7))]
 )
-def test_what_is_hardly_known_goes_beyond_the_plot(value: float, interval: tuple[float, float] | None) -> None:
+def test_a_wide_interval_goes_beyond_the_plot(value: float, interval: tuple[float, float] | None) -> None:
     figure = Figure()
     plot_known(figure, [Known("b_d_w", value, interval, "N.s/m", False)])
     low, high = figure.axes[0].get_xlim()
@@ -94,7 +94,7 @@ def test_what_is_hardly_known_goes_beyond_the_plot(value: float, interval: tuple
 
 
 @pytest.mark.parametrize("by_thrusters", [False, True])
-def test_the_strongest_step_is_shown_one_from_rest_rather(k: Rov, by_thrusters: bool) -> None:
+def test_the_clearest_step_is_the_strongest_preferably_from_rest(k: Rov, by_thrusters: bool) -> None:
     weak = recorded("a.csv", {3.0: 0.3}, by_thrusters=by_thrusters)
     strong = recorded("b.csv", {4.0: 0.7, 12.0: 0.0}, by_thrusters=by_thrusters)
     fit = result_of(k, weak, strong).recordings
@@ -134,7 +134,7 @@ def test_the_delay_is_marked_and_seen(k: Rov) -> None:
     assert np.interp(DELAY_TIME + 0.6, time, v) > 0.1
 
 
-def test_the_model_is_drawn_as_the_sensor_would_tell_it(k: Rov) -> None:
+def test_the_model_is_drawn_as_the_sensor_would_measure_it(k: Rov) -> None:
     simulation = recorded("b.csv", {4.0: 0.7})
     time, v = modelled(simulation)
     assert v == pytest.approx(np.interp(time, simulation.time, simulation.velocity), abs=0.03)

@@ -12,6 +12,7 @@ from rov_fmu.identify.points.curve_fit import CurveFit
 from rov_fmu.identify.points.response_fit import holding_force, responses
 from rov_fmu.identify.points.thrust_fit import ThrustFit, forces
 from rov_fmu.report.findings import Known
+from rov_fmu.report.plots.residuals import finish_residuals, with_residuals
 from rov_fmu.report.plots.steps import Step, draw_steps, evenly
 from rov_fmu.report.plots.svg import LIGHT
 from rov_fmu.report.templates import pretty_unit, text
@@ -53,7 +54,7 @@ def plot_drag(figure: Figure, results: Identification, result: AxisResult) -> No
 
 def _fitted(figure: Figure, fit: CurveFit, scale: float, color: str, label: str) -> tuple[Axes, Axes, Array]:
     """Draw a fit and its residuals. Returns both parts of the plot, and the numbers over which the fit is drawn."""
-    above, below = _two(figure)
+    above, below = with_residuals(figure, 2.6)
     x = np.linspace(min(0.0, 1.05 * fit.x.min()), max(0.0, 1.05 * fit.x.max()), 61)
     _band(above, scale * x, *fit.band(x), color)
     above.plot(scale * x, fit.value(x), "--" if color == "grey" else "-", color=LIGHT[color], label=label)
@@ -68,7 +69,7 @@ def plot_response(
 ) -> None:
     """Plot the size of V_ss or Tau over that of the command, and the relative errors below."""
     axis, points, which = result.axis, comparison.points if comparison else (), int(quantity == "Tau")
-    above, below = _two(figure) if points else (figure.subplots(), None)
+    above, below = with_residuals(figure, 2.6) if points else (figure.subplots(), None)
     at = [abs(p.command) for p in points] or list(results.vehicle.command_range)
     c = np.linspace(max(0.5 * min(at), 0.01), min(max(at) + 0.05, 1.0), 46)
     tested = (c >= min(at)) & (c <= max(at))
@@ -162,23 +163,13 @@ def _band(ax: Axes, x: Array, low: Array, high: Array, color: str) -> None:
         ax.fill_between(x, low, high, color=LIGHT[color], alpha=0.18, linewidth=0.0, label="95 %")
 
 
-def _two(figure: Figure) -> tuple[Axes, Axes]:
-    """Return a plot, and a lower one below it for residuals."""
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.6, 1.0))
-    below.axhline(0.0, color=LIGHT["muted"], linewidth=0.8)
-    return above, below
-
-
 def _finish(above: Axes, below: Axes | None, title: str, x: str, y: str) -> None:
-    """Add title, labels and legend; the residuals have symmetric limits."""
+    """Add title, labels and legend."""
     above.set_title(title, loc="left")
     (below or above).set_xlabel(x)
     above.locator_params(nbins=6)
     if below:
-        below.set_ylabel(y)
-        below.locator_params(axis="y", nbins=3)
-        reach = 1.15 * max(map(abs, below.get_ylim()))
-        below.set_ylim(-reach, reach)
+        finish_residuals(below, y)
     above.legend(loc="best")
 
 

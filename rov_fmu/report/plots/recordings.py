@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import isfinite
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +13,7 @@ from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.identify.recordings.runs import prepare, push
 from rov_fmu.model.rov import Rov
+from rov_fmu.report.plots.residuals import finish_residuals, with_residuals
 from rov_fmu.report.plots.svg import LIGHT
 from rov_fmu.report.templates import text
 from rov_fmu.tank.arrays import Array
@@ -34,20 +36,10 @@ _FROM_REST = 1.25
 def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -> None:
     """Plot the measured, modelled and predicted velocity of a recording, and the residuals of its samples below."""
     recording, axis = simulation.recording, result.axis
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
-    below.axhline(0.0, color=LIGHT["muted"], linewidth=0.8)
+    above, below = with_residuals(figure, 2.2)
     for hold in (step for step in result.steps if step.file == recording.file):
         above.axvspan(hold.start, hold.end, facecolor=LIGHT["band"], edgecolor=LIGHT["page"], zorder=0)
-        above.text(
-            0.5 * (hold.start + hold.end),
-            1.0,
-            text(hold.command, ".0%"),
-            fontsize=8.5,
-            transform=above.get_xaxis_transform(),
-            ha="center",
-            va="top",
-            color=LIGHT["muted"],
-        )
+        _write_at_top(above, 0.5 * (hold.start + hold.end), text(hold.command, ".0%"), "center")
     above.plot(*_thin(*measured(simulation)), color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label="measured")
     above.plot(*_thin(*modelled(simulation)), color=LIGHT["blue"], linewidth=1.2, label="model")
     label: str | None = "predicted unseen"
@@ -62,10 +54,8 @@ def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -
     above.set_title(f"${axis.velocity}$ ({axis.unit})", loc="left")
     above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
     above.locator_params(nbins=6)
-    below.set(xlabel="time (s)", ylabel=f"residual ({recording.unit})")
-    below.locator_params(axis="y", nbins=3)
-    reach = 1.15 * max(map(abs, below.get_ylim()))
-    below.set_ylim(-reach, reach)
+    below.set_xlabel("time (s)")
+    finish_residuals(below, f"residual ({recording.unit})")
     _legend(above)
 
 
@@ -79,6 +69,12 @@ def modelled(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]
     """Return evenly spaced times and the velocity that the sensor would measure of the model, smoothed the same."""
     is_position = simulation.recording.is_position
     return velocity(simulation.time, simulation.modelled, is_position=is_position, window=window)
+
+
+def _write_at_top(ax: Axes, x: float, words: str, align: Literal["center", "right"]) -> None:
+    """Write a few words at the upper edge of a plot."""
+    place = ax.get_xaxis_transform()
+    ax.text(x, 1.0, words, fontsize=8.5, transform=place, ha=align, va="top", color=LIGHT["muted"])
 
 
 def _legend(ax: Axes) -> None:
@@ -147,16 +143,7 @@ def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
     low, high = -_BEFORE, max(3.0 * step.Tau, _BEFORE) + max(delay, 0.0)
     ax: Axes = figure.subplots()
     ax.axvline(0.0, color=LIGHT["muted"], linewidth=1.2)
-    ax.text(
-        0.0,
-        1.0,
-        f"{step.words}  ",
-        fontsize=8.5,
-        transform=ax.get_xaxis_transform(),
-        ha="right",
-        va="top",
-        color=LIGHT["muted"],
-    )
+    _write_at_top(ax, 0.0, f"{step.words}  ", "right")
     if delay:
         label = f"delay {text(delay, '.2f')} s"
         ax.axvspan(0.0, delay, facecolor=LIGHT["violet"], edgecolor="none", alpha=0.25, zorder=0, label=label)
