@@ -185,7 +185,8 @@ class Flight {
     const { vehicle } = this.pilot.model;
     const { signs } = vehicle.axes[test.axis];
     const inputs = vehicle.variables.slice(0, vehicle.inputs);
-    this.set(Object.fromEntries(inputs.map(([name, start]) => [name, name in signs ? signs[name] * test.command : start])));
+    const given = inputs.map(([name, start]) => [name, name in signs ? signs[name] * test.command : start]);
+    this.set(Object.fromEntries(given));
     this.reset();
     this.test = test;
     this.begun = true;

@@ -1,14 +1,12 @@
 """The identification report: one HTML file with the data, the fits, their residuals, and the warnings."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from markupsafe import Markup
-
-from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
+from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.recordings.recordings_fit import count
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.io.output import Output
@@ -46,7 +44,9 @@ def report_page(results: Identification) -> str:
         unseen_fit=dict(part for row in predicted for part in row.parts),
         known=found,
         closeups=closeups,
-        plots=dict(_plots(results, comparisons, found, closeups)),
+        plots={
+            label: inline_svg(label, draw, size) for label, draw, size in _plots(results, comparisons, found, closeups)
+        },
         holds=_holds(results.tests),
         effects=effects,
         acting=acting,
@@ -60,47 +60,27 @@ def _plots(
     comparisons: tuple[Comparison, ...],
     found: tuple[Known, ...],
     closeups: Mapping[str, CommandStep],
-) -> Iterator[tuple[str, Markup]]:
-    """Yield the label and the SVG of each plot."""
+) -> Iterator[tuple[str, Draw, tuple[float, float]]]:
+    """Yield the label of each plot, the function that draws it, and its size in inches."""
     if found:
-        label, size = "What is known", (4.6, 0.7 + 0.23 * len(found))
-        yield label, inline_svg(label, partial(plot_known, found=found), size)
+        yield "What is known", partial(plot_known, found=found), (4.6, 0.7 + 0.23 * len(found))
     for name, fit in results.thrust.items():
-        label = f"Thrust: {name}"
-        yield label, inline_svg(label, partial(plot_thrust, results=results, fit=fit), _PLOT)
+        yield f"Thrust: {name}", partial(plot_thrust, results=results, fit=fit), _PLOT
     for result in results.axes:
+        name = result.axis.name
         if result.points or result.recordings:
-            own = [c for c in comparisons if c.result is result]
-            for label, draw in _plots_of_points(results, result, own).items():
-                yield label, inline_svg(label, draw, _PLOT)
-            for label, draw in _plots_of_recordings(result, closeups.get(result.axis.name)).items():
-                yield label, inline_svg(label, draw, _WIDE)
-
-
-def _plots_of_points(results: Identification, result: AxisResult, comparisons: Iterable[Comparison]) -> dict[str, Draw]:
-    """Return the functions that draw V_ss, Tau, drag and step responses of an axis, by label."""
-    name, by_quantity = result.axis.name, {c.quantity: c for c in comparisons}
-    draw: dict[str, Draw] = {}
-    for quantity in ("V_ss", "Tau"):
-        draw[f"{quantity} over the command: {name}"] = partial(
-            plot_response, results=results, result=result, quantity=quantity, comparison=by_quantity.get(quantity)
-        )
-    if result.drag:
-        draw[f"Drag: {name}"] = partial(plot_drag, results=results, result=result)
-    if result.points:
-        draw[f"Step responses: {name}"] = partial(plot_steps, results=results, result=result)
-    return draw
-
-
-def _plots_of_recordings(result: AxisResult, step: CommandStep | None) -> dict[str, Draw]:
-    """Return the functions that draw the recordings of an axis and its clearest step, by label."""
-    draw: dict[str, Draw] = {}
-    if result.recordings:
-        for s in result.recordings.simulations:
-            draw[f"Recording: {s.recording.file}"] = partial(plot_recording, result=result, simulation=s)
-    if step:
-        draw[f"Step in {step.simulation.recording.file}"] = partial(plot_step, result=result, step=step)
-    return draw
+            compared = {c.quantity: c for c in comparisons if c.result is result}
+            for quantity in ("V_ss", "Tau"):
+                response = partial(plot_response, quantity=quantity, comparison=compared.get(quantity))
+                yield f"{quantity} over the command: {name}", partial(response, results=results, result=result), _PLOT
+            if result.drag:
+                yield f"Drag: {name}", partial(plot_drag, results=results, result=result), _PLOT
+        if result.points:
+            yield f"Step responses: {name}", partial(plot_steps, results=results, result=result), _PLOT
+        for s in result.recordings.simulations if result.recordings else ():
+            yield f"Recording: {s.recording.file}", partial(plot_recording, result=result, simulation=s), _WIDE
+        if step := closeups.get(name):
+            yield f"Step in {step.simulation.recording.file}", partial(plot_step, result=result, step=step), _WIDE
 
 
 def _holds(tests: TankTests) -> dict[str, str]:

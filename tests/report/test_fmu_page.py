@@ -17,6 +17,7 @@ from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.module import module
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.templates import number
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -111,6 +112,20 @@ def test_what_flies_for_another_vehicle_is_the_same_twice(heavy: Vehicle) -> Non
     compiled = module(heavy.rov)
     assert module(heavy.rov) == compiled
     check_live_section(page_without_plots(heavy, module=compiled), heavy)
+
+
+def test_every_axis_has_keys_of_its_own_and_every_input_its_start_value(
+    heavy: Vehicle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    declared = [replace(v, start=500.0) if v.name == "Z_ext" else v for v in variables(heavy.rov)]
+    monkeypatch.setattr("rov_fmu.report.page.live.variables", lambda _: declared)
+    root = html.fromstring(fly_page([Flown(heavy, b"")]))
+    letters = re.findall(r"<kbd>([A-Z])</kbd>", html.tostring(root, encoding="unicode"))
+    assert len(set(letters)) == len(letters) == 2 * len(heavy.layout.axes)
+    start = {slider.get("name"): float(slider.get("value")) for slider in root.iter("input") if slider.get("name")}
+    assert start == {v.name: v.start for v in declared if v.name in start}
+    assert start["Z_ext"] == 500.0
+    assert {*heavy.layout.inputs} <= {*start}
 
 
 def test_every_variable_and_coefficient_has_its_row(page: str, vehicle: Vehicle) -> None:

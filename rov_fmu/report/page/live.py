@@ -47,8 +47,8 @@ class Live:
     """The scripts of fmu_src/live/, one after the other."""
     policy: str
     """The directive that allows this script in the page's content security policy."""
-    tests: Sequence[dict[str, Any]]
-    """The step tests that a button starts."""
+    tests: Sequence[str]
+    """The labels of the step tests that a button starts."""
     keys: Sequence[tuple[Axis, str]]
     """The axes, each with the letters of its keys: that of its positive direction, and that of its negative one."""
     start: Mapping[str, float]
@@ -73,7 +73,7 @@ def live(flown: Sequence[Flown]) -> Live:
         data=Markup(text),
         script=Markup(script),
         policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
-        tests=[{**test, "words": _words(pilot, test)} for test in tests],
+        tests=[f"{pilot.layout.axes[t['axis']].axis.name} {number(100.0 * t['command'], 3)} %" for t in tests],
         keys=[(form.axis, keys) for form, keys in zip(pilot.layout.axes, _keys(pilot.layout), strict=True)],
         start=start,
         loads=list(_loads(pilot.rov, start)),
@@ -150,11 +150,6 @@ def _tests(vehicle: Vehicle) -> Iterator[dict[str, Any]]:
             step = measured_step(table, command)
             V, Tau = (values[0] if values else None for values in (step.V_ss, step.Tau))
             yield {"axis": n, "command": step.command, "V": V, "Tau": Tau}
-
-
-def _words(vehicle: Vehicle, test: dict[str, Any]) -> str:
-    """Return the label of a step test."""
-    return f"{vehicle.layout.axes[test['axis']].axis.name} {number(100.0 * test['command'], 3)} %"
 
 
 def _loads(rov: Rov, start: Mapping[str, float]) -> Iterator[tuple[str, float, str]]:

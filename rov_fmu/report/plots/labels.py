@@ -24,7 +24,8 @@ class Space:
 
     def line(self, start: Place, end: Place) -> None:
         """Reserve the space of a line."""
-        self.busy += [_between(start, end, n / 24.0) for n in range(25)]
+        (x, y), dx, dy = start, end[0] - start[0], end[1] - start[1]
+        self.busy += [(x + n / 24.0 * dx, y + n / 24.0 * dy) for n in range(25)]
 
     def ring(self, at: Place, r: float) -> None:
         """Reserve the space of a circle."""
@@ -60,11 +61,6 @@ class Space:
         """Return how many reserved points a name with this centre and half its size would hide."""
         (x, y), (w, h) = center, half
         return sum(abs(at - x) <= w and abs(down - y) <= h for at, down in self.busy)
-
-
-def _between(start: Place, end: Place, part: float) -> Place:
-    """Return the point after a part of the way from the start to the end."""
-    return start[0] + part * (end[0] - start[0]), start[1] + part * (end[1] - start[1])
 
 
 def _side(part: float) -> float:

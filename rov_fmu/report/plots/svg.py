@@ -67,8 +67,17 @@ Draw = Callable[[Figure], None]
 
 
 def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
-    """Return a plot as part of a page, with a label for screen readers. The labels of a page must differ."""
-    return inline(label, svg_file(draw, size, salt=label, background="none", margin=0.02))
+    """Return a plot as part of a page, with a label for screen readers. The labels of a page must differ.
+
+    The colours of the palette become those of the page.
+    """
+    svg = svg_file(draw, size, salt=label, background="none", margin=0.02)
+    head = f'role="img" aria-label="{escape(label)}">'
+    svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', lambda found: f"<svg {found[1]} {head}", svg, count=1)
+    svg = svg.replace(f"font-family:{_FONTS};", "")
+    for role, color in LIGHT.items():
+        svg = svg.replace(color, f"var(--{role})")
+    return Markup(svg)
 
 
 def image(label: str, path: Path) -> Markup:
@@ -78,16 +87,6 @@ def image(label: str, path: Path) -> Markup:
     """
     data = base64.b64encode(read_svg(path)).decode()
     return Markup('<img src="data:image/svg+xml;base64,{}" alt="{}">').format(data, label)
-
-
-def inline(label: str, svg: str) -> Markup:
-    """Return an SVG document as part of a page, with a label; colours of the palette become those of the page."""
-    head = f'role="img" aria-label="{escape(label)}">'
-    svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', lambda found: f"<svg {found[1]} {head}", svg, count=1)
-    svg = svg.replace(f"font-family:{_FONTS};", "")
-    for role, color in LIGHT.items():
-        svg = svg.replace(color, f"var(--{role})")
-    return Markup(svg)
 
 
 def svg_file(
