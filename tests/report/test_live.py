@@ -74,6 +74,12 @@ def quiet(visit: Visitor) -> Iterator[Visitor]:
         assert len(one.requests) == 1
 
 
+@pytest.fixture
+def page(pages: Callable[[str], str], quiet: Visitor) -> Any:
+    """The page of the VideoRay, in which its model flies."""
+    return flying(quiet, pages("videoray")).page
+
+
 # ---- What it computes ------------------------------------------------------------------------------------------------
 
 Leg = dict[str, Any]
@@ -261,10 +267,7 @@ def test_a_gamepad_steers_and_lets_go(pages: Callable[[str], str], quiet: Visito
     until(page, "live.vehicle.commands.every(name => live.flight.pilot.model.get(name) === 0)")
 
 
-def test_a_step_test_stands_beside_what_was_measured(
-    pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle
-) -> None:
-    page = flying(quiet, pages("videoray")).page
+def test_a_step_test_stands_beside_what_was_measured(page: Any, vehicle: Vehicle) -> None:
     (heave,) = (table for table in load_tables(vehicle) if table.axis is HEAVE)
     for row in heave.rows:
         page.select_option("#live-test", label=f"heave {row.command} %")
@@ -280,10 +283,7 @@ def test_a_step_test_stands_beside_what_was_measured(
     until(page, "document.querySelector('#live-chart-heave .point').getAttribute('visibility') === 'hidden'")
 
 
-def test_alpha_and_beta_are_felt_and_the_ghost_keeps_those_of_the_file(
-    pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle
-) -> None:
-    page = flying(quiet, pages("videoray")).page
+def test_alpha_and_beta_are_felt_and_the_ghost_keeps_those_of_the_file(page: Any, vehicle: Vehicle) -> None:
     page.locator("summary", has_text="Tuning").click()
     page.locator("input[name=alpha_w]").fill("2")
     page.locator("input[name=u_t]").fill("0.5")
@@ -322,8 +322,7 @@ def test_words_fit_their_places(tmp_path: Path, quiet: Visitor) -> None:
     assert page.evaluate("live.charts[0].title.getComputedTextLength()") < 298
 
 
-def test_a_heading_is_below_360_and_a_track_far_away_is_drawn(pages: Callable[[str], str], quiet: Visitor) -> None:
-    page = flying(quiet, pages("videoray")).page
+def test_a_heading_is_below_360_and_a_track_far_away_is_drawn(page: Any) -> None:
     page.evaluate("() => { live.flight.pilot.model.set('psi', -0.005); live.draw(); }")
     assert page.inner_text("#live-readings").endswith("heading 0°")
     lines = page.evaluate("""() => {
@@ -336,8 +335,7 @@ def test_a_heading_is_below_360_and_a_track_far_away_is_drawn(pages: Callable[[s
     assert "north 1.00e17 m" in page.inner_text("#live-readings")
 
 
-def test_loads_and_current_act(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
-    page = flying(quiet, pages("videoray")).page
+def test_loads_and_current_act(page: Any, vehicle: Vehicle) -> None:
     page.locator("summary", has_text="Loads").click()
     page.evaluate("live.pause(true)")  # so that both act from the start
     page.locator("input[name=Z_ext]").fill("1")
@@ -395,10 +393,7 @@ def a_recording(vehicle: Vehicle, form: Callable[[float], str] = repr) -> str:
     return "\n".join(lines)
 
 
-def test_a_recording_flies_again_beside_its_prediction(
-    pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle
-) -> None:
-    page = flying(quiet, pages("videoray")).page
+def test_a_recording_flies_again_beside_its_prediction(page: Any, vehicle: Vehicle) -> None:
     drop(page, "log_of_a_pool.csv", a_recording(vehicle).encode())
     until(page, "live.flight.playback !== null")
     page.evaluate("live.speed = 20")
@@ -440,8 +435,7 @@ def test_a_log_may_be_written_otherwise_and_have_other_columns(pages: Callable[[
     assert recording["left"] == 0
 
 
-def test_a_log_of_one_axis_is_known_by_its_name(pages: Callable[[str], str], quiet: Visitor) -> None:
-    page = flying(quiet, pages("videoray")).page
+def test_a_log_of_one_axis_is_known_by_its_name(page: Any) -> None:
     rows = [f"{n / 5:g};{0 if n < 5 else 40};{0.01 * n:g}".replace(".", ",") for n in range(100)]
     drop(page, "log_heave_2.csv", "\n".join(["time [s];command [%];depth [cm]", *rows]).encode())
     until(page, "live.flight.playback !== null")
@@ -473,10 +467,7 @@ BAD = {
 }
 
 
-def test_the_page_says_why_a_file_is_no_recording_and_the_model_flies_on(
-    pages: Callable[[str], str], quiet: Visitor
-) -> None:
-    page = flying(quiet, pages("videoray")).page
+def test_the_page_says_why_a_file_is_no_recording_and_the_model_flies_on(page: Any) -> None:
     page.locator("input[name=u_l]").fill("0.5")
     for name, (content, expected) in BAD.items():
         page.evaluate("live.say('')")
@@ -493,8 +484,7 @@ def test_the_page_says_why_a_file_is_no_recording_and_the_model_flies_on(
 # ---- The page --------------------------------------------------------------------------------------------------------
 
 
-def test_a_file_is_taken_where_it_is_dropped(pages: Callable[[str], str], quiet: Visitor, vehicle: Vehicle) -> None:
-    page = flying(quiet, pages("videoray")).page
+def test_a_file_is_taken_where_it_is_dropped(page: Any, vehicle: Vehicle) -> None:
     page.evaluate(
         """text => {
             const dataTransfer = new DataTransfer();
