@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -93,19 +94,18 @@ def test_the_rows_are_those_of_the_closed_form(whole: Results) -> None:
     for t, part in long.groupby("t"):
         assert part.y.to_numpy() == pytest.approx(_expected(runs, t).to_numpy(), rel=1e-12)
     assert whole.trajectories([3, 7]).run.unique().tolist() == [3, 7]
-
-
-def test_bands_are_quantiles_over_the_runs(whole: Results) -> None:
     bands = whole.bands("y", (0.0, 0.5, 1.0))
     assert bands.index.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
     for t in bands.index:
-        y = _expected(whole.runs, t)
+        y = _expected(runs, t)
         assert bands.loc[t].tolist() == pytest.approx([y.min(), y.median(), y.max()], rel=1e-12, abs=1e-15)
 
 
 def test_a_ramp_is_exact_to_second_order_of_the_step(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
-    """y of an input that is the time, in closed form: t - Tau (1 - exp(-t / Tau)); by the start of each step half a
-    step late."""
+    """For an input that equals the time, y is t - Tau (1 - exp(-t / Tau)).
+
+    With the value at the start of each step, y would be half a step late.
+    """
     errors = []
     for step in (0.1, 0.05):
         plan = _plan(tmp_path, foreign(), runs=1, step=step)
@@ -144,8 +144,8 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     assert {*results.trajectories().run} == {*others.index}
 
 
-LIMIT = 4.0
-"""Seconds for runs that take thousandths, for a busy machine may hold a process for long."""
+LIMIT = 2.0
+"""The seconds that a run may take, which takes thousandths: a busy machine may stop a process for long."""
 HARMFUL = {2: "the FMU ended its process: SIGABRT", 3: "the FMU ended its process: SIGSEGV"} | {
     4: f"the FMU did not return within time_limit = {LIMIT:g} s"
 }
@@ -187,13 +187,13 @@ def test_workers_that_nobody_starts_again_outlive_an_fmu(foreign: Foreign, tmp_p
 def test_a_separate_simulator_gives_the_reason_when_its_process_ends_and_continues(
     foreign: Foreign, tmp_path: Path
 ) -> None:
-    path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 3, 4]", limit=LIMIT)
+    path = _plan(tmp_path, foreign(), vary="mode.values = [0, 1, 2, 4]", limit=LIMIT)
     model = read_model(foreign())
     job = prepare(load_plan(path), path, model).job
     model.unpack(tmp_path / "fmu")
     simulator = SeparateSimulator(str(tmp_path / "fmu"), model, job.manoeuvre, job.time_limit)
     y = []
-    for mode in (0, 2, 3, 4, 1, 0):
+    for mode in (0, 2, 4, 1, 0):
         try:
             y.append(simulator.run([1.0, 0.0, 0.0, mode])["y"][10])
             simulator.reset()
@@ -201,7 +201,7 @@ def test_a_separate_simulator_gives_the_reason_when_its_process_ends_and_continu
             y.append(str(error))
     simulator.free()
     end = pytest.approx(1.0 - np.exp(-2.0), rel=1e-12)
-    assert y == [end, *HARMFUL.values(), "the step at 1 s: error; the FMU: the pump is blocked", end]
+    assert y == [end, HARMFUL[2], HARMFUL[4], "the step at 1 s: error; the FMU: the pump is blocked", end]
 
 
 def test_what_loads_an_fmu_or_cannot_leaves_the_process_where_it_was(foreign: Foreign, tmp_path: Path) -> None:
@@ -218,7 +218,7 @@ def test_what_loads_an_fmu_or_cannot_leaves_the_process_where_it_was(foreign: Fo
 
     try:
         with ThreadPoolExecutor(8) as threads:
-            [*threads.map(load, [whole] * 200)]
+            [*threads.map(load, [whole] * 50)]
         assert Path.cwd() == here
         with pytest.raises(LoadError, match="Failed to load"):
             load(broken)
@@ -270,24 +270,6 @@ def test_results_that_are_not_there_are_told(foreign: Foreign, tmp_path: Path, s
         results.sensitivity("y")
 
 
-def test_sobol_indices_of_a_linear_fmu_are_those_of_the_closed_form(
-    foreign: Foreign, tmp_path: Path, scheduler: str
-) -> None:
-    """Of a sum of uniform terms with factors 1, 2, 3: shares of the variance 1/14, 4/14, 9/14, and no interaction."""
-    plan = _plan(tmp_path, foreign(), runs=5 * 1024, more='same = "0*y[0]"')
-    plan.write_text(plan.read_text().replace("seed = 5", 'sampler = "saltelli"'))
-    results = study(plan, tmp_path / "results", scheduler=scheduler)
-    with pytest.raises(FileError, match="same is the same in all runs"):
-        results.sensitivity("same")
-    found = results.sensitivity("end")
-    shares = [1 / 14, 4 / 14, 9 / 14]
-    assert found.index.tolist() == ["a", "b", "c"]
-    assert found.S1.tolist() == pytest.approx(shares, abs=0.01)
-    assert found.ST.tolist() == pytest.approx(shares, abs=0.01)
-    assert (abs(found.S1 - shares) <= found.S1_95).all()
-    assert (found.S1_95 < 0.1).all()
-
-
 def test_the_time_of_a_study_begins_when_the_workers_are_there(
     foreign: Foreign, tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -317,15 +299,15 @@ def test_a_study_that_is_interrupted_half_way_goes_on_to_the_same_rows(
     _same(study(plan, results, scheduler=scheduler), whole)
 
 
-SLOW: dict[str, Any] = {"runs": 1500, "more": "[set]\nmode = 5"}
-"""Fifteen seconds of two workers, nearly all of them waiting: most are left when the first two parts are there."""
+SLOW: dict[str, Any] = {"runs": 600, "more": "[set]\nmode = 5"}
+"""Two workers wait seven seconds for the FMU: most runs are left when the first two parts are there."""
 
 
 @pytest.fixture(scope="module")
-def slow(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
-    """The results of an undisturbed study."""
+def slow(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign, scheduler: str) -> Results:
+    """The results of an undisturbed study, whose FMU need not wait."""
     folder = tmp_path_factory.mktemp("slow")
-    return study(_plan(folder, foreign(), **SLOW), folder / "results", workers=4)
+    return study(_plan(folder, foreign(), runs=SLOW["runs"]), folder / "results", scheduler=scheduler)
 
 
 def _parts(results: Path) -> list[Path]:
@@ -353,15 +335,24 @@ def _workers(pid: int) -> list[psutil.Process]:
     return [child for child in psutil.Process(pid).children() if any("spawn_main" in word for word in child.cmdline())]
 
 
-@pytest.mark.parametrize(
-    ("script", "told"),
-    [
-        pytest.param("script.py", "the workers do not start; ", marks=pytest.mark.long),
-        ("-", "workers cannot be started of <stdin>, which is no file; "),
-    ],
-)
+GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
+NO_FILE = "workers cannot be started of <stdin>, which is no file; "
+
+
+def test_workers_of_a_script_that_is_no_file_are_not_started(
+    foreign: Foreign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "__main__", SimpleNamespace(__file__="<stdin>"))
+    with pytest.raises(StudyError) as refused:
+        study(_plan(tmp_path, foreign()), tmp_path / "results", workers=2)
+    assert str(refused.value) == NO_FILE + GUARD
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("script", "reason"), [("script.py", "the workers do not start; "), ("-", NO_FILE)])
 def test_a_script_that_workers_cannot_import_is_told_of_its_guard(
-    script: str, told: str, foreign: Foreign, tmp_path: Path
+    script: str, reason: str, foreign: Foreign, tmp_path: Path
 ) -> None:
     """Only the process that started the workers prints something."""
     _plan(tmp_path, foreign())
@@ -369,8 +360,7 @@ def test_a_script_that_workers_cannot_import_is_told_of_its_guard(
     (tmp_path / "script.py").write_text(text)
     begin = [sys.executable, script]
     ran = subprocess.run(begin, check=False, input=text, capture_output=True, text=True, cwd=tmp_path)
-    *_, last = ran.stderr.splitlines()
-    assert last.startswith(f'rov_fmu.io.messages.StudyError: {told}a script calls study under `if __name__ == "__m')
+    assert ran.stderr.splitlines()[-1] == f"rov_fmu.io.messages.StudyError: {reason}{GUARD}"
     assert ran.stderr.count("Traceback") == 1
     assert not (tmp_path / "results").exists()
 
@@ -425,9 +415,8 @@ def test_a_scheduler_that_is_not_there_is_a_line(
     address: str, foreign: Foreign, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 1.0)
-    assert (
-        main(["study", str(_plan(tmp_path, foreign())), "-o", str(tmp_path / "results"), "--scheduler", address]) == 2
-    )
+    plan, results = str(_plan(tmp_path, foreign())), str(tmp_path / "results")
+    assert main(["study", plan, "-o", results, "--scheduler", address]) == 2
     assert capsys.readouterr().err == f"rov-fmu: --scheduler {address}: no scheduler of Dask answers there\n"
     assert not (tmp_path / "results").exists()
 

@@ -56,7 +56,7 @@ class Progress:
 
 @dataclass
 class Spent:
-    """The time that a study took, and for what."""
+    """The runs that one call did, and the time that it took."""
 
     runs: int = 0
     failed: int = 0
@@ -64,10 +64,6 @@ class Spent:
     """The seconds until the workers had started."""
     elapsed: float = 0.0
     """The seconds from then until the last run was done."""
-    working: float = 0.0
-    """The seconds that all workers together spent on tasks."""
-    simulating: float = 0.0
-    """The part of these seconds that the FMU took."""
 
 
 def execute(
@@ -194,8 +190,6 @@ class _Runs:
         except Exception as error:  # the cluster raises various exceptions
             raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
         self._write(first, end, part)
-        self._spent.working += part.seconds
-        self._spent.simulating += part.simulating
         self._seconds = max(part.seconds / (end - first), 1e-6)
 
     def _repeat(self, first: int, end: int, separate: bool, error: KilledWorker) -> None:
