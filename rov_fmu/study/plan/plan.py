@@ -192,11 +192,6 @@ class InputFile(Strict):
     between: Literal["steps", "ramps"] = "ramps"
     """Whether a row is held until the next one, or is reached on a straight line."""
 
-    @property
-    def is_held(self) -> bool:
-        """True when each row is held until the next one."""
-        return self.between == "steps"
-
 
 def _once(names: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(names)) < len(names):
@@ -286,6 +281,11 @@ class Plan(Strict):
         """The number of steps of a run."""
         return round((self.stop_time - self.start_time) / self.step)
 
+    @property
+    def points(self) -> int:
+        """The number of points of a grid."""
+        return prod(len(varied.choices or ()) for varied in self.vary.values())
+
     def step_at(self, time: float) -> int | None:
         """Return the number of steps until a time of the run, or None if it is not a multiple of the step."""
         steps = (time - self.start_time) / self.step
@@ -333,11 +333,8 @@ def check_plan(plan: Plan) -> Iterator[str]:
         yield from _unreachable(plan, plan.keep)
     if plan.sampler == "grid" and plan.runs is not None:
         yield key_line("runs", "a grid has as many as it has points; leave this out", plan.runs)
-    if (
-        plan.sampler == "grid"
-        and (points := prod(len(varied.choices or ()) for varied in plan.vary.values())) > _MOST_RUNS
-    ):
-        yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {points:.3g}")
+    if plan.sampler == "grid" and plan.points > _MOST_RUNS:
+        yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {plan.points:.3g}")
     if plan.sampler != "grid" and plan.runs is None:
         yield "runs: this key is missing"
     if not plan.keep and not plan.figures:

@@ -26,7 +26,10 @@ _PLOT = (3.7, 2.6)  # inches
 _BINS = 40
 _POINTS = 400
 """The number of points of a band that are drawn; more would not be visible."""
+_NUMBERS = 6
+"""The number of values of a distribution that are shown."""
 _REASONS = 50
+"""The number of reasons of failures that are shown."""
 _ROWS = 60
 """The number of rows of a grid that are shown."""
 _MARKED = 40
@@ -97,6 +100,7 @@ def _grid(results: Results) -> Sequence[str]:
 
 
 def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
+    """Return the row about a figure with its plot."""
     values = results.runs[name].to_numpy(float)
     there, unit = values[np.isfinite(values)], results.figure_units[name]
     found = {"name": name, "expression": results.plan["figures"][name], "unit": unit, "runs": there.size}
@@ -204,18 +208,21 @@ def _tells(index: "pd.Series[float]", half_width: "pd.Series[float]") -> "pd.Ser
 
 
 def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], results: Results) -> dict[str, Any]:
+    """Return the row about a varied variable: how it varies, and the values that it had."""
     distributions = dict(plan["vary"])
-    ((kind, told),) = (
-        distributions[name] if name in distributions else {"estimate": plan["vary_from"]["estimates"][name]}
-    ).items()
-    numbers = told.items() if isinstance(told, dict) else [("", value) for value in told]
-    some = [f"{key} {number(value, 4)}".strip() for key, value in numbers]
-    words = ", ".join([*some[:6], *(["…"] if len(some) > 6 else [])])
+    if name in distributions:
+        ((kind, given),) = distributions[name].items()
+    else:
+        kind, given = "estimate", plan["vary_from"]["estimates"][name]
+    pairs = given.items() if isinstance(given, dict) else [("", value) for value in given]
+    some = [f"{key} {number(value, 4)}".strip() for key, value in pairs]
+    if len(some) > _NUMBERS:
+        some[_NUMBERS:] = ["…"]
     others = [other for group in results.groups if name in group for other in group if other != name]
     values = column.to_numpy(float)
     return {
         "name": name,
-        "planned": f"{kind}: {words}",
+        "planned": f"{kind}: {', '.join(some)}",
         "others": others,
         "least": float(values.min()),
         "median": float(np.median(values)),

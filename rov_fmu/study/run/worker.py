@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Lock, Thread, current_thread, get_ident, main_thread
 from time import monotonic, perf_counter
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
