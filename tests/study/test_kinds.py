@@ -72,6 +72,10 @@ def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
         assert run.final_x == pytest.approx(state["x"], rel=1e-9), number
         last = native.trajectories([int(str(number))]).iloc[-1]
         assert (last.t, last.u, last.psi) == pytest.approx((4.0, state["u"], state["psi"]), rel=1e-9)
+    runs = pd.read_parquet(native.folder / "runs")  # other tools can read a folder of Parquet files as one table
+    assert sorted(runs.columns) == ["V_N", "alpha_u", "drift", "final_x", "m_rov", "reason", "run", "status"]
+    assert len(runs) == RUNS
+    assert pd.read_parquet(native.folder / "trajectories").columns.tolist() == ["run", "t", "u", "psi"]
 
 
 def test_an_fmu_of_fmi_3_gives_the_same_rows_and_leaves_the_workers_as_they_were(
@@ -106,14 +110,6 @@ def test_a_vehicle_is_built_for_its_study(tmp_path: Path, native: Results, sched
     results = study(_plan(tmp_path, None), tmp_path / "results", scheduler=scheduler)
     _close(results, native)
     assert (tmp_path / "results" / "videoray.fmu").is_file()
-
-
-def test_the_tables_open_in_other_tools(native: Results) -> None:
-    """A folder of Parquet files is a data set for pandas."""
-    runs = pd.read_parquet(native.folder / "runs")
-    assert sorted(runs.columns) == ["V_N", "alpha_u", "drift", "final_x", "m_rov", "reason", "run", "status"]
-    assert len(runs) == RUNS
-    assert pd.read_parquet(native.folder / "trajectories").columns.tolist() == ["run", "t", "u", "psi"]
 
 
 def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
@@ -178,6 +174,6 @@ def test_an_fmu_that_cannot_be_loaded_is_a_line(
         part.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
     plan = _plan(tmp_path, fmu)
     assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith("rov-fmu: videoray.fmu: cannot be run: Cannot find shared library binaries")
-    assert told.count("\n") == 1
+    line = capsys.readouterr().err
+    assert line.startswith("rov-fmu: videoray.fmu: cannot be run: Cannot find shared library binaries")
+    assert line.count("\n") == 1

@@ -139,9 +139,9 @@ def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_do
 ) -> None:
     failed = len(Results(done).failed)
     assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
-    told = capsys.readouterr()
-    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in told.out.replace("\n", " ")
-    assert told.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
+    printed = capsys.readouterr()
+    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in printed.out.replace("\n", " ")
+    assert printed.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
 
 
 def test_another_page_of_this_name_is_not_overwritten(
@@ -150,8 +150,8 @@ def test_another_page_of_this_name_is_not_overwritten(
     own = tmp_path / "study.html"
     own.write_text("<p>My studies</p>")
     assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
-    told = "is no page of this tool and would be overwritten: choose another folder"
-    assert capsys.readouterr().err == f"rov-fmu: {own}: {told}\n"
+    reason = "is no page of this tool and would be overwritten: choose another folder"
+    assert capsys.readouterr().err == f"rov-fmu: {own}: {reason}\n"
     assert [*tmp_path.iterdir()] == [own]
     assert own.read_text() == "<p>My studies</p>"
 
@@ -171,8 +171,8 @@ figures.end = "t[-1]"
 """)
     results = tmp_path / "results"
     assert main(["study", str(tmp_path / "plan.toml"), "-o", str(results), "--scheduler", scheduler]) == 1
-    said = [line.strip() for line in capsys.readouterr().out.splitlines() if " runs: " in line]
-    assert len(said) == 6
-    assert said[-1] == "4 runs: other reasons (2), which are on the page"
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines() if " runs: " in line]
+    assert len(lines) == 6
+    assert lines[-1] == "4 runs: other reasons (2), which are on the page"
     page = (results / "study.html").read_text(encoding="utf-8")
     assert all(f"index {n} is out of bounds" in page for n in range(3, 10))

@@ -164,7 +164,7 @@ def test_a_path_that_does_not_stay_in_the_folder_of_the_plan_is_refused(
         assert message in line
 
 
-def test_mistakes_of_all_kinds_are_told_at_once_and_nothing_is_written(
+def test_mistakes_of_all_kinds_are_reported_at_once_and_nothing_is_written(
     tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copy(videoray_fmu, tmp_path / "videoray.fmu")
@@ -172,12 +172,12 @@ def test_mistakes_of_all_kinds_are_told_at_once_and_nothing_is_written(
     head = HEAD.replace("1.0", "0.95").replace("runs = 4\n", 'input_file = { path = "u.csv" }\n')
     (tmp_path / "plan.toml").write_text(head + VARY + "[inputs]\nu_l = 1.5\n" + '[figures]\nend = "q[-1]"\n')
     assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results")]) == 2
-    told = [line.split(":")[2].split()[0] for line in capsys.readouterr().err.splitlines()]
-    assert told == ["stop_time", "runs", "inputs.u_l", "figures.end", "row"]
+    keys = [line.split(":")[2].split()[0] for line in capsys.readouterr().err.splitlines()]
+    assert keys == ["stop_time", "runs", "inputs.u_l", "figures.end", "row"]
     assert not (tmp_path / "results").exists()
 
 
-def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path) -> None:
+def test_what_is_no_fmu_for_co_simulation_is_refused(tmp_path: Path) -> None:
     (tmp_path / "videoray.fmu").write_bytes(b"no archive")
     with pytest.raises(FileError, match=r"videoray\.fmu: is no FMU, or a damaged one: "):
         read_model(tmp_path / "videoray.fmu")
@@ -193,7 +193,7 @@ def test_what_is_no_fmu_for_co_simulation_is_told(tmp_path: Path) -> None:
         "time,u_r\n0,0\n": "column 'u_r': is given in [inputs] too",
     }.items(),
 )
-def test_a_mistake_in_a_file_of_inputs_is_told_by_its_row(
+def test_a_mistake_in_a_file_of_inputs_is_reported_with_its_row(
     rows: str, message: str, tmp_path: Path, model: Model
 ) -> None:
     (tmp_path / "u.csv").write_text(rows)

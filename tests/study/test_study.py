@@ -122,7 +122,7 @@ def test_a_ramp_is_exact_to_second_order_of_the_step(foreign: Foreign, tmp_path:
 def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
     reset: int, foreign: Foreign, tmp_path: Path, whole: Results, scheduler: str
 ) -> None:
-    """y itself is left as it was by a reset that does nothing."""
+    """A reset that does nothing leaves y as it was."""
     _same(study(_plan(tmp_path, foreign(reset)), tmp_path / "results", scheduler=scheduler), whole)
 
 
@@ -170,8 +170,7 @@ def _harmful_plan(folder: Path, fmu: Path) -> Path:
 
 
 @posix
-@pytest.mark.long
-@pytest.mark.parametrize("reset", [0, 2])
+@pytest.mark.parametrize("reset", [pytest.param(0, marks=pytest.mark.long), pytest.param(2, marks=pytest.mark.weekly)])
 def test_a_run_that_ends_its_process_or_does_not_return_is_a_row(reset: int, foreign: Foreign, tmp_path: Path) -> None:
     _harmful(_harmful_plan(tmp_path, foreign(reset)), tmp_path / "results", workers=2)
 
@@ -241,15 +240,15 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
         "holds runs of another FMU": {"fmu": foreign(1)},
         "holds runs up to number 39, and the plan has 12 alone": {"fmu": foreign(), "runs": 12},
     }
-    for told, changed in others.items():
+    for reason, changed in others.items():
         assert main(["study", str(_plan(tmp_path, **changed)), "-o", str(results)]) == 2  # type: ignore[arg-type]
         line = capsys.readouterr().err
-        assert line.startswith(f"rov-fmu: {results}: {told}")
+        assert line.startswith(f"rov-fmu: {results}: {reason}")
         assert line.count("\n") == 1
     _same(Results(results), whole)
 
 
-def test_the_fmu_of_a_changed_vehicle_is_told_as_that(tmp_path: Path) -> None:
+def test_the_fmu_of_a_changed_vehicle_is_refused_with_this_reason(tmp_path: Path) -> None:
     store = Store(tmp_path / "results")
     with store.held():
         store.belongs_to({}, "one", "rov.toml", 1, {})
@@ -258,12 +257,14 @@ def test_the_fmu_of_a_changed_vehicle_is_told_as_that(tmp_path: Path) -> None:
             store.belongs_to({}, "another", "rov.toml", 1, {})
 
 
-def test_results_that_are_not_there_are_told(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
+def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
     with pytest.raises(FileError, match="nowhere: there is no such folder"):
         Results(tmp_path / "nowhere")
-    plan = _plan(tmp_path, foreign(), runs=2)
+    plan = _plan(tmp_path, foreign(), runs=2, more="[set]\nfast = true\ngain = 2")
     plan.write_text(plan.read_text().replace('[keep]\noutputs = ["y"]\nevery = 0.5\n', ""))
     results = study(plan, tmp_path / "results", scheduler=scheduler)
+    runs = results.runs
+    assert runs.end.to_numpy() == pytest.approx((runs.a + 2.0 * runs.b + 3.0 * runs.c + 1.0).to_numpy(), rel=1e-12)
     with pytest.raises(FileError, match=r"no trajectory of 'y' is kept, nor any other: the plan has no \[keep\]"):
         results.bands("y")
     with pytest.raises(FileError, match="there is no figure 'y', only end, sooner"):
@@ -351,7 +352,7 @@ def test_workers_of_a_script_that_is_no_file_are_not_started(
 
 @pytest.mark.long
 @pytest.mark.parametrize(("script", "reason"), [("script.py", "the workers do not start; "), ("-", NO_FILE)])
-def test_a_script_that_workers_cannot_import_is_told_of_its_guard(
+def test_a_script_that_workers_cannot_import_ends_with_one_error(
     script: str, reason: str, foreign: Foreign, tmp_path: Path
 ) -> None:
     """Only the process that started the workers prints something."""
@@ -367,7 +368,9 @@ def test_a_script_that_workers_cannot_import_is_told_of_its_guard(
 
 @posix
 @pytest.mark.long
-def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+def test_an_interrupted_study_goes_on_where_it_was(
+    foreign: Foreign, tmp_path: Path, slow: Results, scheduler: str
+) -> None:
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
     process = _begun(plan, results)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does it
@@ -378,7 +381,7 @@ def test_an_interrupted_study_goes_on_where_it_was(foreign: Foreign, tmp_path: P
     assert 0 < done < SLOW["runs"]
     kept = {path: path.read_bytes() for path in _parts(results)}
     assert sum(pq.read_metadata(path).num_rows for path in kept) == done
-    _same(study(plan, results, workers=1), slow)
+    _same(study(plan, results, scheduler=scheduler), slow)
     assert all(path.read_bytes() == content for path, content in kept.items())
 
 
@@ -398,7 +401,7 @@ def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, s
 
 @posix
 @pytest.mark.long
-def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results) -> None:
+def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, slow: Results, scheduler: str) -> None:
     plan, results = _plan(tmp_path, foreign(), **SLOW), tmp_path / "results"
     process = _begun(plan, results)
     process.kill()
@@ -406,7 +409,7 @@ def test_a_killed_study_goes_on_where_it_was(foreign: Foreign, tmp_path: Path, s
     assert 0 < len(Results(results).runs) < SLOW["runs"]
     (results / "trajectories" / "part-000000000-000009999.parquet").write_bytes(b"half of it, without its runs")
     (results / "runs" / ".part-000000000-000009999.parquet.abc.part").write_bytes(b"a draft")
-    _same(study(plan, results, workers=2), slow)
+    _same(study(plan, results, scheduler=scheduler), slow)
     assert not [*results.glob("*/.*")]
 
 
@@ -421,10 +424,11 @@ def test_a_scheduler_that_is_not_there_is_a_line(
     assert not (tmp_path / "results").exists()
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("wait", [0.0, 5.0])
+@pytest.mark.parametrize(
+    "wait", [pytest.param(0.0, marks=pytest.mark.weekly), pytest.param(5.0, marks=pytest.mark.long)]
+)
 def test_a_scheduler_that_goes_takes_nothing_with_it(
-    wait: float, foreign: Foreign, tmp_path: Path, slow: Results, monkeypatch: pytest.MonkeyPatch
+    wait: float, foreign: Foreign, tmp_path: Path, slow: Results, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The study notices it at once, or when the client has given up the scheduler."""
     monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 4.0)
@@ -439,4 +443,4 @@ def test_a_scheduler_that_goes_takes_nothing_with_it(
         with pytest.raises(StudyError, match="the scheduler is gone; what is done is kept"):
             study(plan, results, scheduler=cluster.scheduler_address, on_progress=close)
     assert 0 < len(Results(results).runs) < SLOW["runs"]
-    _same(study(plan, results, workers=2), slow)
+    _same(study(plan, results, scheduler=scheduler), slow)
