@@ -251,10 +251,10 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
 def test_the_fmu_of_a_changed_vehicle_is_refused_with_this_reason(tmp_path: Path) -> None:
     store = Store(tmp_path / "results")
     with store.held():
-        store.belongs_to({}, "one", "rov.toml", 1, {})
+        store.belongs_to({}, "one", "rov.toml", 1)
         store.write(0, 1, b"", None)
         with pytest.raises(FileError, match=r"another FMU, for the vehicle rov\.toml has changed, or rov-fmu, which"):
-            store.belongs_to({}, "another", "rov.toml", 1, {})
+            store.belongs_to({}, "another", "rov.toml", 1)
 
 
 def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:

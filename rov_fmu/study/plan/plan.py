@@ -1,6 +1,5 @@
 """The plan of a study: the TOML file that says what is run, what is varied, what is kept and what is computed."""
 
-import hashlib
 import json
 import os
 from collections.abc import Iterator
@@ -350,8 +349,3 @@ def _unreachable(plan: Plan, keep: Keep) -> Iterator[str]:
             rule = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
             yield key_line("keep.at", rule, list(keep.at or ()))
             return
-
-
-def digest(content: bytes) -> str:
-    """Return the SHA-256 digest in hexadecimal digits."""
-    return hashlib.sha256(content).hexdigest()

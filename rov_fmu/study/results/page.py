@@ -115,7 +115,7 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
         draw: Draw = partial(_draw_lines, name=name, results=results, grid=grid)
         title = f"{name} over {' and '.join(grid)}"
     else:
-        draw = partial(_draw_distribution, values=there, quantiles=quantiles, label=_axis("", unit))
+        draw = partial(_draw_distribution, values=there, quantiles=quantiles, label=axis_label("", unit))
         title = f"Distribution of {name}"
     return {**found, "plot": inline_svg(title, draw, _PLOT), "is_still": False}
 
@@ -125,9 +125,11 @@ def _is_constant(values: Any) -> bool:
     return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
 
 
-def _axis(name: str, unit: str) -> str:
-    """Return the label of an axis."""
-    return name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
+def axis_label(name: str, unit: str) -> str:
+    """Return a name with its unit; either of them may be missing."""
+    if unit in ("", "1"):
+        return name
+    return f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
 
 
 def _draw_distribution(figure: Figure, values: Any, quantiles: list[float], label: str) -> None:
@@ -154,9 +156,9 @@ def _draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str]
         marker = "o" if len(line) <= _MARKED else ""
         ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
     for other in others:
-        title = _axis(other, results.units[other])
+        title = axis_label(other, results.units[other])
         figure.legend(title=title, title_fontsize=8.5, handlelength=1.0, loc="outside right upper")
-    ax.set(xlabel=_axis(along, results.units[along]), ylabel=_axis("", results.figure_units[name]))
+    ax.set(xlabel=axis_label(along, results.units[along]), ylabel=axis_label("", results.figure_units[name]))
     _set_ticks(ax)
 
 
@@ -180,7 +182,7 @@ def _draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
     ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
     ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
     ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6)
-    ax.set(xlabel="time (s)", ylabel=_axis("", unit))
+    ax.set(xlabel="time (s)", ylabel=axis_label("", unit))
     _set_ticks(ax)
 
 
