@@ -1,4 +1,4 @@
-"""How often a predicted band contains the motion of the true vehicle.
+"""Predicted bands contain the motion of the true vehicle as often as they should.
 
 The integrator in verification/references/pool.py simulates true vehicles and their tests in a pool, with the errors of
 measurements: noise, some of it slow, errors of time stamps, the marks of scales and rulers, and numbers read off a

@@ -141,7 +141,7 @@ class Done:
     plan: Path
     results: Results
     lines: list[str]
-    """What the command printed to stderr."""
+    """The lines that the command printed to stderr."""
 
 
 @pytest.fixture(scope="module")

@@ -42,7 +42,7 @@ _Term = Callable[[Mapping[str, _Value]], _Value]
 
 
 class ExpressionError(ValueError):
-    """Why a text is not an expression that a figure may have."""
+    """A text is not an expression that a figure may have; the message is the reason."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Function:
 
     @classmethod
     def by_name(cls, compute: Callable[..., _Value]) -> "Function":
-        """A function whose values may be given by the names of its parameters."""
+        """Return a function whose values may be given by the names of its parameters."""
         parameters = signature(compute).parameters
         needed = sum(p.default is Parameter.empty for p in parameters.values())
         return cls(compute, needed, len(parameters), tuple(parameters))
@@ -156,7 +156,7 @@ class Expression:
         """For each call of a function whose parameters have names: the numbers given in the text, by parameter."""
 
     def value(self, values: Mapping[str, _Value]) -> _Value:
-        """Its value, a number or an array, for the values of all its names. May raise any exception."""
+        """Return the value, a number or an array, for the values of all names. May raise any exception."""
         return self._term(values)
 
 
@@ -182,7 +182,7 @@ class _Reader:
         }
 
     def term(self, node: ast.expr) -> _Term:
-        """The term of a node. Raises ExpressionError."""
+        """Return the term of a node. Raises ExpressionError."""
         if self._depth == _DEEPEST:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels")
         self._depth += 1
@@ -305,7 +305,7 @@ class _Reader:
 
 
 def _called(compute: Callable[..., _Value], terms: list[_Term], names: list[str]) -> _Term:
-    """The call of a function with the values of these terms, the last ones by name."""
+    """Return the call of a function with the values of these terms, the last ones by name."""
     places = len(terms) - len(names)
 
     def call(values: Mapping[str, _Value]) -> _Value:

@@ -39,20 +39,20 @@ class Responses:
         """The functions by their names in an expression."""
 
     def at(self, y: Array, time: float) -> float:
-        """y at a time, interpolated linearly."""
+        """Return y at a time, interpolated linearly."""
         self._check_times(time)
         return float(np.interp(time, self._times, y))
 
     def final(self, y: Array) -> float:
-        """The last y."""
+        """Return the last y."""
         return float(y[-1])
 
     def steady(self, y: Array, start: float | None = None, end: float | None = None) -> float:
-        """Steady y: its mean over the last tenth of the time from `start` to `end`."""
+        """Return the steady y: its mean over the last tenth of the time from `start` to `end`."""
         return float(y[self._window(start, end)[1]].mean())
 
     def time_constant(self, y: Array, start: float | None = None, end: float | None = None) -> float:
-        """Time from `start` until y has made 1 - 1/e of its change to the steady value; NaN without a change."""
+        """Return the time from `start` until 1 - 1/e of the change to the steady value; NaN without a change."""
         change, t = self._change(y, start, end)
         n = int((change >= RISE).argmax())
         if not change[n] >= RISE:
@@ -61,14 +61,14 @@ class Responses:
         return float(t[n - 1] + share * (t[n] - t[n - 1]) - t[0])
 
     def overshoot(self, y: Array, start: float | None = None, end: float | None = None) -> float:
-        """How far y goes beyond its steady value, divided by its change: 0.1 is 10 %. NaN without a change."""
+        """Return the largest excess of y over its steady value, divided by its change; NaN without a change."""
         change, _ = self._change(y, start, end)
         return float(np.maximum(change.max() - 1.0, 0.0))
 
     def settling_time(
         self, y: Array, start: float | None = None, end: float | None = None, band: float = _BAND
     ) -> float:
-        """Time from `start` until y stays within a band around its steady value; NaN if it never does.
+        """Return the time from `start` until y stays within a band around its steady value; NaN if it never does.
 
         A band of 0.05 is 5 % of the change to the steady value.
         """
@@ -100,7 +100,7 @@ class Responses:
                 raise ValueError(f"there is no time {time:g} s in a run from {first:g} to {last:g} s")
 
     def wrong_times(self, given: Mapping[str, Any]) -> str:
-        """What is wrong with the times among the constant values of a call, by parameter; an empty text if nothing."""
+        """Return the mistake in the times among the constant values of a call, by parameter, or an empty text."""
         try:
             self._window(given.get("time"), None)
             self._window(given.get("start"), given.get("end"))

@@ -51,18 +51,18 @@ class Normal(Strict):
     """A normal distribution, cut off where the FMU's variable has its bounds."""
 
     mean: Finite
-    """In the variable's unit."""
+    """The mean, in the variable's unit."""
     sd: Positive
-    """Standard deviation, in the variable's unit."""
+    """The standard deviation, in the variable's unit."""
 
 
 class LogNormal(Strict):
     """The distribution of a positive number whose logarithm is normal, cut off at the variable's bounds."""
 
     median: Positive
-    """In the variable's unit."""
+    """The median, in the variable's unit."""
     sd: Positive
-    """Standard deviation of the natural logarithm."""
+    """The standard deviation of the natural logarithm."""
 
 
 class Range(Strict):
@@ -253,7 +253,7 @@ class Plan(Strict):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """The parameters of a run depend only on this and on the run's number."""
     sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
-    """How the numbers are drawn; saltelli is what Sobol indices are computed from."""
+    """The method by which the values are drawn. Sobol indices need saltelli."""
     vary_from: _Beside | None = None
     """A vehicle file beside the plan, or the name of a vehicle that ships. Its coefficients vary with the errors and
     correlations that identification wrote there, except for those in [vary] and [set]."""

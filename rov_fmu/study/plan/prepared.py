@@ -49,7 +49,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
         from_file = _file_inputs(plan, path, model)
     except FileError as error:
         unread = [str(error)]
-    times = np.zeros(0) if own else _times(plan)
+    times = np.zeros(0) if own else plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
     words = [*own, *estimates.check(), *_check(plan, model, estimates.names, from_file, times)]
     wrong = lines_on(path, words) + unread
     if plan.input_file:
@@ -201,7 +201,7 @@ def _out_of_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, st
 
 
 def _misplaced_jumps(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, str]]:
-    """Yield the number of the first jump that would come late, because no step begins there, and the rule."""
+    """Yield the number of the first jump that would be delayed, because no step begins there, and the rule."""
     for n in signal.jumps(before):
         time = signal.points[n][0]
         if plan.start_time < time < plan.stop_time and plan.step_at(time) is None:
@@ -228,11 +228,6 @@ def _check_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], ti
 
 
 # ---- Over time -------------------------------------------------------------------------------------------------------
-
-
-def _times(plan: Plan) -> Array:
-    """Return the times of the communication points, s."""
-    return plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
 
 
 def _kept_points(plan: Plan) -> Sequence[int]:

@@ -19,7 +19,7 @@ _Draw = Callable[[int, int], Array]
 
 
 class Design:
-    """The varied variables and their values: first the estimates, drawn together, then those in [vary], drawn alone."""
+    """The varied variables and their values: first the estimates, drawn together, then those in [vary], independent."""
 
     def __init__(self, plan: Plan, variables: Mapping[str, Variable], known: Uncertainty = NOTHING) -> None:
         self._known, self._varied = known, plan.vary

@@ -35,7 +35,7 @@ _AHEAD = 3
 _CHANCES = 3
 """After this many deaths of workers, all new tasks run in child processes, where a task may fail this often."""
 _GONE = (CancelledError, CommClosedError)
-"""What Dask raises when the scheduler is gone."""
+"""Exceptions of Dask when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
 _WAIT = 10.0
 """The seconds within which a scheduler or a worker must answer."""
@@ -70,9 +70,9 @@ def execute(
     job: Job,
     design: Design,
     store: Store,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    on_progress: Callable[[Progress], None] = lambda _: None,
+    workers: int | None,
+    scheduler: str | None,
+    on_progress: Callable[[Progress], None],
 ) -> Spent:
     """Do the runs that are missing in the store. Raises FileError, StudyError, WriteError, and KeyboardInterrupt."""
     spent, begin = Spent(), perf_counter()
@@ -80,7 +80,11 @@ def execute(
     if not missing:
         return spent
     with _client(workers, scheduler) as client:
-        _deliver(client, Delivery(job, own_cluster=scheduler is None))
+        try:
+            client.register_plugin(Delivery(job, own_cluster=scheduler is None))
+        except Exception as error:  # whatever a worker may raise
+            needs = "a worker cannot take the study; it needs the same rov-fmu[study] as here"
+            raise StudyError(f"{needs}: {brief(str(error))}") from error
         spent.started = perf_counter() - begin
         begin += spent.started
         try:
@@ -116,7 +120,7 @@ class _Runs:
         self._missing, self._spent, self._on_progress = missing, spent, on_progress
         self._done_before = design.runs - sum(end - first for first, end in missing)
         self._futures: dict[Any, tuple[int, int, bool]] = {}
-        """By future: the first run, the one after the last, and True when they are done in a child process."""
+        """The first run of a future, the run after its last one, and True when they are done in a child process."""
         self._lost: deque[tuple[int, int]] = deque()
         """The runs whose worker died; they are repeated in a child process."""
         self._deaths = 0
@@ -213,16 +217,6 @@ class _Runs:
         self._on_progress(
             Progress(self._done_before + self._spent.runs, self._design.runs, self._spent.failed, link or "")
         )
-
-
-def _deliver(client: Client, delivery: Delivery) -> None:
-    try:
-        client.register_plugin(delivery)
-    except Exception as error:  # whatever a worker may raise
-        reason = brief(str(error))
-        raise StudyError(
-            f"a worker cannot take the study; it needs the same rov-fmu[study] as here: {reason}"
-        ) from error
 
 
 @contextmanager

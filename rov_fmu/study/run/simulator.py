@@ -45,7 +45,7 @@ class Manoeuvre:
     varied: Sequence[str]
     """The variables that get other values in each run."""
     inputs: Mapping[str, Array]
-    """By variable: the value that is set at the beginning of each step."""
+    """The values that are set at the beginning of each step, by variable."""
     recorded: Sequence[str]
     """The variables that are read before the first step and after every step."""
 
