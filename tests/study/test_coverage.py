@@ -120,8 +120,8 @@ class Fmus:
 @pytest.mark.parametrize(
     ("kind", "vehicles", "width"),
     [
-        pytest.param("points", 10, 0.25, marks=pytest.mark.long),
-        pytest.param("recordings", 3, 0.02, marks=pytest.mark.long),
+        pytest.param("points", 15, 0.25, marks=pytest.mark.long),
+        pytest.param("recordings", 4, 0.02, marks=pytest.mark.long),
         pytest.param("points", 60, 0.25, marks=pytest.mark.weekly),
         pytest.param("recordings", 15, 0.02, marks=pytest.mark.weekly),
     ],
