@@ -1,18 +1,18 @@
-"""How often a predicted band holds what the true vehicle does: tests in a pool, identify, a vehicle file, a study.
+"""Predicted bands contain the motion of the true vehicle as often as they should.
 
-The truth and its tests come from the integrator in verification/references/pool.py, with what measuring adds: noise,
-some of it slow, time stamps with errors, scales and rulers with marks, and numbers read off a plot. The predicted
-manoeuvre is not one of the tests. The band from 2.5 to 97.5 % must contain the truth of 95 % of the vehicles at each
-time, and the page's band, from 5 to 95 %, that of 90 %. Neither may be wider than necessary.
+The integrator in verification/references/pool.py simulates true vehicles and their tests in a pool, with the errors of
+measurements: noise, some of it slow, errors of time stamps, the marks of scales and rulers, and numbers read off a
+plot. `identify` makes a vehicle file of the tests, and a study predicts a manoeuvre that is not one of them. The band
+from 2.5 to 97.5 % must contain the truth of 95 % of the vehicles at each time, and the page's band, from 5 to 95 %,
+that of 90 %. Neither may be wider than necessary.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from distributed import LocalCluster
 
 from rov_fmu.build import build
 from rov_fmu.identify.identify import identify
@@ -50,19 +50,19 @@ at = {[*TIMES]}
 [figures]
 stopping_distance = "x[-1] - at(x, {OFF})"
 """
-"""Ahead at half thrust, then none: a distance to stop."""
+"""The vehicle goes ahead at half thrust, and then stops without thrust."""
 LEVELS = {95: (0.025, 0.975), 90: (0.05, 0.95)}
-"""Quantiles by what lies between them, %."""
+"""The quantiles of each band, by the share of the runs within it (%)."""
 
 
 def a_vehicle(random: Random) -> Rov:
-    """Of the VideoRay's form, its coefficients a quarter off, and any β that a body in water has."""
+    """Return a VideoRay with coefficients that differ by a quarter, and any β that a body in water may have."""
     off = {name: value * np.exp(0.25 * random.standard_normal()) for name, value in NOMINAL.items()}
     return VIDEORAY.replaced({**off, "alpha_u": 1.0, "beta_u": random.uniform(0.5, 1.0)})
 
 
 def pulls(folder: Path, k: Rov, random: Random) -> None:
-    """16 forces at a scale with marks of 0.1 N, 0.3 N off."""
+    """Write 16 forces with errors of 0.3 N, read from a scale with marks of 0.1 N."""
     c = np.tile(np.linspace(0.1, 0.8, 8), 2)
     force = np.round(k["a_t_rear"] * c**2 + k["b_t_rear"] * c + 0.3 * random.standard_normal(16), 1)
     rows = [f"{command:.2f},{newton}" for command, newton in zip(c.tolist(), force.tolist(), strict=True)]
@@ -70,14 +70,14 @@ def pulls(folder: Path, k: Rov, random: Random) -> None:
 
 
 def recordings(folder: Path, k: Rov, random: Random) -> None:
-    """Two logs of the distance, in cm, 10 a second: 2 cm off, which goes on for some samples; stamps 5 ms off."""
+    """Write two logs of the distance at 10 Hz: correlated errors of 2 cm, rounded to cm; time stamps with 5 ms."""
     for number, plan in enumerate(PLANS):
         found = run(k, SURGE, plan, 10.0).recorded(random, "distance", colour=0.5, jitter=0.005)
         write_log(folder, str(number), replace(found, values=np.round(found.values, 2)))
 
 
 def points(folder: Path, k: Rov, random: Random) -> None:
-    """Six V_ss and Tau of steps from rest, read to the hundredth; no two starts are alike, by 3 % and 5 %."""
+    """Write V_ss and Tau of six steps from rest, with errors of 3 % and 5 %, read to the hundredth."""
     tables: dict[str, list[str]] = {SPEED: [], TAU: []}
     for command in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7):
         step = run(k, SURGE, ((command, 20.0),), 20.0)
@@ -95,7 +95,7 @@ KINDS: dict[str, Callable[[Path, Rov, Random], None]] = {"recordings": recording
 
 
 def true_motion(k: Rov) -> dict[str, Array]:
-    """u and x at the times, and the stopping distance."""
+    """Return u and x at the times, and the stopping distance."""
     motion = run(k, SURGE, ((0.5, OFF), (0.0, OFF + 0.2)), 10.0)
     places = [round(10.0 * time) for time in TIMES]
     u, x = motion.velocity[places], motion.position[places]
@@ -103,27 +103,18 @@ def true_motion(k: Rov) -> dict[str, Array]:
 
 
 class Fmus:
-    """Those of the vehicles that were found; one for all that differ in nothing but what is drawn."""
+    """The FMUs of identified vehicles. Vehicles that differ only in coefficients that are drawn share one FMU."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._made = folder, dict[object, Path]()
 
     def of(self, vehicle: Vehicle) -> Path:
-        """The FMU to draw in."""
+        """Return the FMU for studies of a vehicle."""
         key = tuple((name, name in vehicle.intervals or value) for name, value in vehicle.rov.coefficients.items())
         if key not in self._made:
             path = self._folder / f"{len(self._made)}.fmu"
             self._made[key] = build(vehicle, path, platforms=["host"]).path
         return self._made[key]
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    folder = tmp_path_factory.mktemp("workers")
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", local_directory=folder
-    ) as cluster:
-        yield cluster.scheduler_address
 
 
 @pytest.mark.parametrize(
@@ -135,8 +126,11 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         pytest.param("recordings", 15, 0.02, marks=pytest.mark.weekly),
     ],
 )
-def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, address: str, tmp_path: Path) -> None:
-    """Of fewer than the 200 of which docs/studies.md tells, for their time; `width` is of the stopping distance."""
+def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, scheduler: str, tmp_path: Path) -> None:
+    """`width` is the largest relative width of the band of the stopping distance.
+
+    docs/studies.md gives the shares for 200 vehicles, which would take too long here.
+    """
     fmus, widths = Fmus(tmp_path), list[float]()
     inside = {(level, of): list[float]() for level in LEVELS for of in ("u", "x", "stopping_distance")}
     for seed in range(vehicles):
@@ -149,7 +143,7 @@ def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, address
         found = identify(load_tank_tests(folder / "tests")).vehicle
         write_vehicle(found, folder / "found.toml")
         (folder / "plan.toml").write_text(PLAN.format(fmu=beside(fmus.of(found), folder), seed=seed), encoding="utf-8")
-        results = study(folder / "plan.toml", folder / "results", scheduler=address)
+        results = study(folder / "plan.toml", folder / "results", scheduler=scheduler)
         assert results.warnings == ()
         for of, true in true_motion(k).items():
             for level, quantiles in LEVELS.items():
@@ -158,16 +152,16 @@ def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, address
         ends = results.runs.stopping_distance.quantile([*LEVELS[95], 0.5])
         widths.append(float((ends[0.975] - ends[0.025]) / ends[0.5]))
     shares = {key: 100.0 * float(np.mean(found)) for key, found in inside.items()}
-    told = ", ".join(f"{of} {level} %: {share:.1f} %" for (level, of), share in shares.items())
-    print(f"{kind}: {told}; width {np.median(widths):.3f}")
+    found_shares = ", ".join(f"{of} {level} %: {share:.1f} %" for (level, of), share in shares.items())
+    print(f"{kind}: {found_shares}; width {np.median(widths):.3f}")
     for (level, _), share in shares.items():
         by_chance = 300.0 * np.sqrt(level / 100.0 * (1.0 - level / 100.0) / vehicles)  # three standard deviations
-        assert share >= level - 5.0 - by_chance, told
-    assert np.median(widths) < width, told
+        assert share >= level - 5.0 - by_chance, found_shares
+    assert np.median(widths) < width, found_shares
 
 
 def band(results: Results, of: str, quantiles: tuple[float, float]) -> Array:
-    """From which to which number, of an output at each time or of a figure."""
+    """Return the lower and the upper limits of the band of an output at each time, or of a figure."""
     if of in results.figures:
         return np.asarray(results.runs[of].quantile([*quantiles]), np.float64)[:, None]
     return np.asarray(results.bands(of, quantiles), np.float64).T

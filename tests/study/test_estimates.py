@@ -1,4 +1,4 @@
-"""The estimates of a vehicle file in a study: they are drawn together, and are on the page with their Sobol indices."""
+"""The estimates of a vehicle file vary together in a study, and its page shows them with their Sobol indices."""
 
 from collections.abc import Mapping
 from contextlib import redirect_stderr
@@ -12,6 +12,7 @@ import pytest
 from lxml import html
 
 from rov_fmu.cli import main
+from rov_fmu.io.messages import FileError
 from rov_fmu.study import Results
 from rov_fmu.study.plan.estimates import Estimates
 from rov_fmu.study.plan.model import Variable
@@ -23,7 +24,6 @@ from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT
 from tests.folders import beside
 
-SAMPLERS = ["sobol", "latin-hypercube", "random", "saltelli"]
 REFITTED = load_vehicle(REFIT)
 ROWS = {"a_d_u": (9.0, 0.5, {}), "b_d_u": (5.0, 0.3, {"a_d_u": -0.8}), "a_d_w": (18.0, 0.6, {})}
 MADE = replace(
@@ -32,11 +32,7 @@ MADE = replace(
     intervals={name: (value - 1.96 * error, value + 1.96 * error) for name, (value, error, _) in ROWS.items()},
     estimates={name: Estimated(error=error, correlation=others) for name, (_, error, others) in ROWS.items()},
 )
-"""Far from its bounds, so that all of it is normal."""
-WARNED = [
-    "the FMU has other values than made.toml of b_d_w (0.6324, not 0.372294), a_d_r (0.1246, not 0.147144), ",
-    "what is correlated has one Sobol index together: a_d_u and b_d_u",
-]
+"""A vehicle whose coefficients are far from their bounds, so that all distributions are normal."""
 
 
 def _has(vehicle: Vehicle, **other: float) -> dict[str, Variable]:
@@ -48,18 +44,17 @@ def _has(vehicle: Vehicle, **other: float) -> dict[str, Variable]:
     }
 
 
-def _estimates(vehicle: Vehicle, has: Mapping[str, Variable] | None = None, **told: Any) -> tuple[Plan, Estimates]:
-    plan = Plan.model_validate({"stop_time": 1.0, "step": 1.0, "runs": 9, "vary_from": "its.toml", **told})
+def _estimates(vehicle: Vehicle, has: Mapping[str, Variable] | None = None, **keys: Any) -> tuple[Plan, Estimates]:
+    plan = Plan.model_validate({"stop_time": 1.0, "step": 1.0, "runs": 9, "vary_from": "its.toml", **keys})
     return plan, Estimates(plan, vehicle, has or _has(vehicle))
 
 
 # ---- Drawn -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("sampler", SAMPLERS)
-def test_a_run_has_its_vehicle_in_whatever_part_it_comes(sampler: str) -> None:
-    """To the bit, a run that is done again alone among them; with bounds in the way, as in the refit."""
-    plan, found = _estimates(REFITTED, sampler=sampler, runs=400, vary={"m_rov": {"uniform": (6.0, 7.0)}})
+def test_a_run_has_its_vehicle_in_whatever_part_it_comes() -> None:
+    """The values are equal to the bit, also for a run that is repeated alone, and where a bound cuts them off."""
+    plan, found = _estimates(REFITTED, sampler="saltelli", runs=400, vary={"m_rov": {"uniform": (6.0, 7.0)}})
     design = Design(plan, _has(REFITTED), found.known)
     assert design.names == (*REFITTED.uncertainty.names, "m_rov")
     whole = design.rows(0, design.runs)
@@ -68,9 +63,8 @@ def test_a_run_has_its_vehicle_in_whatever_part_it_comes(sampler: str) -> None:
         assert design.rows(first, end).tolist() == whole[first:end].tolist()
 
 
-@pytest.mark.parametrize("sampler", SAMPLERS)
-def test_what_is_drawn_has_the_errors_and_correlations_of_the_file(sampler: str) -> None:
-    plan, found = _estimates(MADE, sampler=sampler, runs=6000)
+def test_what_is_drawn_has_the_errors_and_correlations_of_the_file() -> None:
+    plan, found = _estimates(MADE, sampler="random", runs=6000)
     drawn = Design(plan, _has(MADE), found.known).rows(0, 6000)
     assert found.names == (*ROWS,)
     assert drawn.mean(axis=0) == pytest.approx([9.0, 5.0, 18.0], abs=0.04)
@@ -89,82 +83,52 @@ def test_what_the_fmu_does_not_take_is_not_drawn() -> None:
     assert b_d[at_most].mean() == pytest.approx(5.0 - 0.8 * 0.3 / 0.5 * 0.25, abs=0.02), "what a fit with it held finds"
 
 
-# ---- Told ------------------------------------------------------------------------------------------------------------
+# ---- Messages --------------------------------------------------------------------------------------------------------
 
 
-def test_a_study_of_the_vehicle_of_its_fmu_has_nothing_to_warn_of() -> None:
-    assert [*_estimates(REFITTED)[1].warnings()] == []
+def test_a_reader_is_warned_of_what_he_may_not_expect() -> None:
+    no_rows = replace(MADE, estimates={})
+    varied = {"b_d_u": {"uniform": (4.0, 6.0)}}
+    no_row = "no row in [estimates] of its.toml: a_d_u, b_d_u and a_d_w vary as if correlated with nothing"
+    left_out = "the plan gives {}: its correlation with {} in its.toml is left out"
+    differs = "the FMU has other values than its.toml of beta_w (0.5, not 0.620654): the estimates were found beside"
+    for words, (_, estimates) in (
+        (no_row, _estimates(no_rows)),
+        (left_out.format("b_d_u", "a_d_u"), _estimates(MADE, vary=varied)),
+        (left_out.format("a_d_u", "b_d_u"), _estimates(MADE, set={"a_d_u": 9.0})),
+        (differs, _estimates(MADE, _has(MADE, beta_w=0.5, a_d_u=7.0))),
+        ("what is correlated has one Sobol index together: a_d_u and b_d_u", _estimates(MADE, sampler="saltelli")),
+    ):
+        (warning,) = estimates.warnings()
+        assert warning.startswith(words)
+    weighed = replace(no_rows, intervals={"m_rov": (6.5, 6.64)})
+    for vehicle in (REFITTED, weighed):  # the vehicle of the FMU, and one with a single interval
+        assert not [*_estimates(vehicle)[1].warnings()]
 
 
-NO_ROWS = replace(MADE, estimates={})
-WARNINGS: dict[str, tuple[Vehicle, Mapping[str, Variable] | None, dict[str, Any]]] = {
-    "no row in [estimates] of its.toml: a_d_u, b_d_u and a_d_w vary as if correlated with nothing": (NO_ROWS, None, {}),
-    "the plan gives b_d_u: its correlation with a_d_u in its.toml is left out": (
+def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
+    names = ("a_d_u", "b_d_u")
+    made = replace(
         MADE,
-        None,
-        {"vary": {"b_d_u": {"uniform": (4.0, 6.0)}}},
-    ),
-    "the plan gives a_d_u: its correlation with b_d_u in its.toml is left out": (MADE, None, {"set": {"a_d_u": 9.0}}),
-    "the FMU has other values than its.toml of beta_w (0.5, not 0.620654): the estimates were found beside those": (
-        MADE,
-        _has(MADE, beta_w=0.5, a_d_u=7.0),
-        {},
-    ),
-    "what is correlated has one Sobol index together: a_d_u and b_d_u": (MADE, None, {"sampler": "saltelli"}),
-}
-
-
-@pytest.mark.parametrize("words", WARNINGS)
-def test_what_a_reader_may_not_expect_is_told(words: str) -> None:
-    vehicle, has, told = WARNINGS[words]
-    (said,) = _estimates(vehicle, has, **told)[1].warnings()
-    assert said.startswith(words)
-
-
-def test_an_interval_alone_needs_no_row() -> None:
-    weighed = replace(MADE, intervals={"m_rov": (6.5, 6.64)}, estimates={})
-    assert [*_estimates(weighed)[1].warnings()] == []
-
-
-SAME_WAY = replace(
-    MADE,
-    intervals={name: MADE.intervals[name] for name in ("a_d_u", "b_d_u")},
-    estimates={name: MADE.estimates[name] for name in ("a_d_u", "b_d_u")},
-)
-WRONG: dict[str, tuple[Vehicle, dict[str, Variable], dict[str, Any]]] = {
-    "vary_from = 'its.toml': a grid needs values or a range, and what is estimated has none": (
-        SAME_WAY,
-        _has(MADE),
-        {"sampler": "grid", "runs": None},
-    ),
-    "vary_from = 'its.toml': the FMU has no variable 'a_d_u' that is a number": (
-        SAME_WAY,
-        {name: v for name, v in _has(MADE).items() if name != "a_d_u"},
-        {},
-    ),
-    "vary_from = 'its.toml': the b_d_u of this vehicle must be within 6 ... 7 N.s/m in the FMU": (
-        SAME_WAY,
-        _has(MADE) | {"b_d_u": replace(_has(MADE)["b_d_u"], minimum=6.0, maximum=7.0)},
-        {},
-    ),
-    "vary_from = 'its.toml': nothing varies, for [set] gives all that has an interval there": (
-        SAME_WAY,
-        _has(MADE),
-        {"set": {"a_d_u": 9.0, "b_d_u": 5.0}},
-    ),
-    "sampler = 'saltelli': Sobol indices tell apart what is independent, and all that varies is correlated": (
-        SAME_WAY,
-        _has(MADE),
-        {"sampler": "saltelli"},
-    ),
-}
-
-
-@pytest.mark.parametrize("words", WRONG)
-def test_what_does_not_fit_is_a_line(words: str) -> None:
-    vehicle, has, told = WRONG[words]
-    (said,) = _estimates(vehicle, has, **told)[1].check()
-    assert said.startswith(words)
+        intervals={name: MADE.intervals[name] for name in names},
+        estimates={name: MADE.estimates[name] for name in names},
+    )
+    has = _has(MADE)
+    without = {name: variable for name, variable in has.items() if name != "a_d_u"}
+    narrow = has | {"b_d_u": replace(has["b_d_u"], minimum=6.0, maximum=7.0)}
+    all_set = {"a_d_u": 9.0, "b_d_u": 5.0}
+    for words, (_, estimates) in (
+        ("a grid needs values or a range, and what is estimated has none", _estimates(made, sampler="grid", runs=None)),
+        ("the FMU has no variable 'a_d_u' that is a number", _estimates(made, without)),
+        ("the b_d_u of this vehicle must be within 6 ... 7 N.s/m in the FMU", _estimates(made, narrow)),
+        ("nothing varies, for [set] gives all that has an interval there", _estimates(made, set=all_set)),
+    ):
+        (line,) = estimates.check()
+        assert line.startswith(f"vary_from = 'its.toml': {words}")
+    (line,) = _estimates(made, sampler="saltelli")[1].check()
+    assert line == (
+        "sampler = 'saltelli': Sobol indices tell apart what is independent, and all that varies is correlated"
+    )
 
 
 # ---- Done ------------------------------------------------------------------------------------------------------------
@@ -172,15 +136,16 @@ def test_what_does_not_fit_is_a_line(words: str) -> None:
 
 @dataclass(frozen=True)
 class Done:
-    """A study of an FMU by its command, with the vehicle file that tells what is uncertain."""
+    """A study of an FMU, made by the command, with the vehicle file that holds the estimates."""
 
     plan: Path
     results: Results
-    said: str
+    lines: list[str]
+    """The lines that the command printed to stderr."""
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path) -> Done:
+def done(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, scheduler: str) -> Done:
     folder = tmp_path_factory.mktemp("estimates")
     write_vehicle(MADE, folder / "made.toml")
     plan = folder / "plan.toml"
@@ -188,51 +153,53 @@ def done(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path) -> Done:
 vary_from = "made.toml"
 stop_time = 0.1
 step = 0.1
-runs = 5120
+runs = 2560
 sampler = "saltelli"
 [vary]
 m_rov.normal = {{ mean = 6.57, sd = 0.05 }}
 [figures]
 mixed = "a_d_u + 2*b_d_u + a_d_w + 4*m_rov"
+same = "0*a_d_u"
 """)
-    with redirect_stderr(StringIO()) as said:
-        assert main(["study", str(plan), "-o", str(folder / "results"), "--workers", "1"]) == 0
-    return Done(plan, Results(folder / "results"), said.getvalue())
+    with redirect_stderr(StringIO()) as printed:
+        assert main(["study", str(plan), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
+    return Done(plan, Results(folder / "results"), printed.getvalue().splitlines())
 
 
 def test_sobol_indices_are_those_of_groups_in_closed_form(done: Done) -> None:
-    """Of a sum of normal numbers: the variance of what a group adds to it. As if alone a_d_u and b_d_u had 0.60."""
+    """The variance of a sum of normal numbers is the sum of the variances of its independent groups.
+
+    If a_d_u and b_d_u were independent, they would have 0.60 of it.
+    """
     assert done.results.groups == (("a_d_u", "b_d_u"), ("a_d_w",), ("m_rov",))
     both = 0.5**2 + (2.0 * 0.3) ** 2 - 2.0 * 0.8 * 0.5 * (2.0 * 0.3)
     shares = np.array([both, 0.6**2, (4.0 * 0.05) ** 2])
+    shares /= shares.sum()
     found = done.results.sensitivity("mixed")
     assert found.index.tolist() == ["a_d_u, b_d_u", "a_d_w", "m_rov"]
     for index in ("S1", "ST"):
-        assert found[index].to_numpy() == pytest.approx(shares / shares.sum(), abs=0.02)
-
-
-def test_the_rows_are_drawn_together(done: Done) -> None:
+        assert found[index].to_numpy() == pytest.approx(shares, abs=0.02)
+    assert (abs(found.S1 - shares) <= found.S1_95).all()
+    assert (found.S1_95 < 0.2).all()
     runs = done.results.runs
     assert np.corrcoef(runs.a_d_u, runs.b_d_u)[0, 1] == pytest.approx(-0.8, abs=0.04)
     assert abs(np.corrcoef(runs.a_d_u, runs.a_d_w)[0, 1]) < 0.04
     assert runs.mixed.std() == pytest.approx(np.sqrt(0.53), rel=0.03)
+    with pytest.raises(FileError, match="same is the same in all runs"):
+        done.results.sensitivity("same")
 
 
-def test_warnings_are_told_on_the_console_and_on_the_page(done: Done) -> None:
+def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(done: Done) -> None:
     page = html.fromstring((done.results.folder / "study.html").read_text(encoding="utf-8"))
     items = [item.text_content() for item in page.xpath("//ul[@class='warnings']/li")]
-    lines = done.said.splitlines()
-    assert len(items) == len(lines) == len(done.results.warnings) == len(WARNED)
-    for item, said, warning, words in zip(items, lines, done.results.warnings, WARNED, strict=True):
-        assert warning.startswith(words)
-        assert (item, said) == (f"{warning}.", f"rov-fmu: warning: {warning}")
-
-
-def test_the_page_says_how_each_varies(done: Done) -> None:
-    page = html.fromstring((done.results.folder / "study.html").read_text(encoding="utf-8"))
-    told = {row[0].text_content(): row[1].text_content() for row in page.xpath("//h2[@id='varied']/following::tr")}
-    assert told["b_d_u"] == "estimate: value 5, error 0.3; correlated with a_d_u"
-    assert told["m_rov"] == "normal: mean 6.57, sd 0.05"
+    warnings = done.results.warnings
+    assert warnings[0].startswith("the FMU has other values than made.toml of b_d_w (0.6324, not 0.372294), a_d_r (0.")
+    assert warnings[1:] == ("what is correlated has one Sobol index together: a_d_u and b_d_u",)
+    assert items == [f"{warning}." for warning in warnings]
+    assert done.lines == [f"rov-fmu: warning: {warning}" for warning in warnings]
+    varied = {row[0].text_content(): row[1].text_content() for row in page.xpath("//h2[@id='varied']/following::tr")}
+    assert varied["b_d_u"] == "estimate: value 5, error 0.3; correlated with a_d_u"
+    assert varied["m_rov"] == "normal: mean 6.57, sd 0.05"
     index = done.results.sensitivity("mixed").loc["a_d_u, b_d_u"]
     cells = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='a_d_u, b_d_u']/td")
     assert float(cells[1].text_content()) == pytest.approx(index.S1, abs=1e-3)
@@ -244,5 +211,5 @@ def test_another_correlation_is_another_study(done: Done, capsys: pytest.Capture
     plan = done.plan.with_name("other_plan.toml")
     plan.write_text(done.plan.read_text(encoding="utf-8").replace("made.toml", "other.toml"), encoding="utf-8")
     assert main(["study", str(plan), "-o", str(done.results.folder), "--workers", "1"]) == 2
-    *_, said = capsys.readouterr().err.splitlines()
-    assert said.endswith("holds runs of another plan (vary_from changed): choose another folder")
+    *_, line = capsys.readouterr().err.splitlines()
+    assert line.endswith("holds runs of another plan (vary_from changed): choose another folder")

@@ -1,4 +1,4 @@
-"""The figures of responses whose figures are known in closed form."""
+"""Figures of responses for which they are known in closed form, and the reasons for missing ones."""
 
 import warnings
 from math import exp, log, nan, pi, sqrt
@@ -12,7 +12,7 @@ from rov_fmu.study.plan.figures import Figures, read_expression, unusable
 
 T = np.linspace(0.0, 40.0, 4001)
 FIRST = np.where(T > 2.0, 3.0 * (1.0 - np.exp(-np.maximum(T - 2.0, 0.0) / 1.5)), 0.0)
-"""From rest at 2 s to 3, by a time constant of 1.5 s."""
+"""A response from 0 to 3 that begins at 2 s, with a time constant of 1.5 s."""
 ZETA, OMEGA = 0.4, 2.0
 _D = OMEGA * sqrt(1.0 - ZETA**2)
 SECOND = 1.0 - np.exp(-ZETA * OMEGA * T) * (np.cos(_D * T) + ZETA * OMEGA / _D * np.sin(_D * T))
@@ -92,49 +92,43 @@ def test_max_and_min_of_several_are_the_greatest_and_the_least() -> None:
     assert "e: must be one number, and not array(" in reason
 
 
-@pytest.mark.parametrize("expression", ["Tau(0*y)", "overshoot(0*y)", "settling_time(0*y)", "log(-m)", "V_ss(0*y/0)"])
-def test_a_figure_that_is_nan_has_that_for_a_reason(expression: str) -> None:
-    found, reason = Figures({"f": expression}, T).of({"y": FIRST, "m": 6.5})
-    assert (repr(found), reason) == ("[nan]", "f: is NaN")
-
-
-def test_a_figure_that_is_infinite_is_missing_with_that_for_a_reason() -> None:
+def test_a_figure_that_is_nan_or_infinite_is_missing_with_this_reason() -> None:
+    for expression in ("Tau(0*y)", "overshoot(0*y)", "settling_time(0*y)", "log(-m)", "V_ss(0*y/0)"):
+        found, reason = Figures({"f": expression}, T).of({"y": FIRST, "m": 6.5})
+        assert (repr(found), reason) == ("[nan]", "f: is NaN")
     found, reason = Figures({"f": "max(y/0)", "g": "m"}, T).of({"y": FIRST[300:], "m": 6.5})
     assert (repr(found), reason) == ("[nan, 6.5]", "f: is infinite")
 
 
 @pytest.mark.parametrize("function", ["V_ss", "Tau", "overshoot", "settling_time"])
-def test_a_time_that_no_run_has_is_told_before_the_first_one_by_one_rule(function: str) -> None:
-    told = "there is no time {} s in a run from 0 to 40 s"
+def test_a_time_that_no_run_has_is_refused_before_the_first_run_by_one_rule(function: str) -> None:
+    reason = "there is no time {} s in a run from 0 to 40 s"
     late = {"(y, 0, 100)": "100", "(y, end=4*10.5)": "42", "(y, -1)": "-1", "(y, m, 41)": "41"}
     for arguments, time in late.items():
-        assert unusable(f"1 + {function}{arguments}", ["y"], ["m"], T) == told.format(time)
+        assert unusable(f"1 + {function}{arguments}", ["y"], ["m"], T) == reason.format(time)
     assert unusable(f"{function}(y, 9, 8)", ["y"], ["m"], T) == "there is no communication point from 9 to 8"
     for arguments in ("(y)", "(y, 0, 40)", "(y, m, m + 50)", "(y, end=39.995)"):
         assert unusable(f"{function}{arguments}", ["y"], ["m"], T) == ""
-    assert Figures({"f": f"{function}(y, 0, m)"}, T).of({"y": FIRST, "m": 41.0})[1].endswith(told.format("41"))
-    assert unusable("at(y, 50)", ["y"], ["m"], T) == told.format("50")
+    assert Figures({"f": f"{function}(y, 0, m)"}, T).of({"y": FIRST, "m": 41.0})[1].endswith(reason.format("41"))
+    assert unusable("at(y, 50)", ["y"], ["m"], T) == reason.format("50")
     assert unusable("at(y, m + 50)", ["y"], ["m"], T) == ""
 
 
 def test_a_plan_is_seen_without_warnings_of_numpy() -> None:
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         assert unusable("mean(y[t > 30])", ["y"], [], T) == ""
-    assert not told
+    assert not warned
 
 
-@pytest.mark.parametrize("long", ["m" + "+1" * 900, "-" * 1900 + "m", "sqrt(" * 99 + "m" + ")" * 99 + "+1"])
-def test_an_expression_that_is_nested_too_deeply_is_refused(long: str) -> None:
-    with pytest.raises(ExpressionError, match="is nested too deeply: at most 100 levels"):
-        read_expression(long)
-
-
-def test_an_expression_of_the_greatest_depth_is_computed() -> None:
+def test_an_expression_has_at_most_100_levels() -> None:
+    for text in ("m" + "+1" * 900, "-" * 1900 + "m", "sqrt(" * 99 + "m" + ")" * 99 + "+1"):
+        with pytest.raises(ExpressionError, match="is nested too deeply: at most 100 levels"):
+            read_expression(text)
     assert Figures({"f": "m" + "+1" * 99}, T).of({"m": 6.5}) == ([105.5], "")
 
 
-def test_functions_and_variables_of_the_same_name_are_told_apart() -> None:
+def test_functions_and_variables_of_the_same_name_are_distinguished() -> None:
     assert Figures({"f": "max(max) + t + pi + out['at']"}, T).of({"max": T, "t": 1.0, "pi": 2.0, "at": 3.0})[0] == [
         46.0
     ]

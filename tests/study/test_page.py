@@ -1,4 +1,4 @@
-"""The page on a study says what the data frames say."""
+"""The page about a study shows what is in its data frames."""
 
 import re
 from collections.abc import Callable
@@ -9,12 +9,13 @@ from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.study import Results
+from rov_fmu.study.results.page import study_page
 from tests.folders import beside
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path], scheduler: str) -> Path:
-    """A study of which some runs fail, and none is done, for `odd` is not there; its page, by the command."""
+    """The results of a study with its page, made by the command. Some runs fail; the others lack the figure `odd`."""
     folder = tmp_path_factory.mktemp("page")
     (folder / "plan.toml").write_text(f"""fmu = "{beside(foreign(), folder)}"
 stop_time = 2.0
@@ -57,12 +58,7 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
     assert "<script" not in text
     assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
-
-
-def test_the_page_is_the_same_for_the_same_results(done: Path) -> None:
-    from rov_fmu.study.results.page import study_page
-
-    assert study_page(Results(done)) == (done / "study.html").read_text(encoding="utf-8")
+    assert study_page(results) == text, "the page is the same for the same results"
 
 
 def test_a_grid_shows_figures_over_what_varies_with_their_units(
@@ -99,13 +95,17 @@ T = "Tau(u)"
     assert "Surge velocity" in page.xpath("string(//h2[@id='trajectories']/following::figure[1])")
 
 
-def test_indices_of_few_blocks_are_said_to_tell_nothing(
+def test_the_page_shows_which_sobol_indices_are_uncertain(
     foreign: Callable[..., Path], tmp_path: Path, scheduler: str
 ) -> None:
-    """Two terms of the same variance: S1 is 1/2 each, which 3 blocks do not show and 500 do."""
+    """S1 is 1/2 for both terms of `sum`, which 3 blocks do not show and 200 do.
+
+    A term with a millionth of the variance has an index of 0.000, without the sign that chance gives it.
+    """
     pages = {}
-    for runs in (12, 2000):
-        (tmp_path / f"{runs}.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
+    for runs in (12, 800):
+        plan, results = tmp_path / f"{runs}.toml", tmp_path / f"{runs}"
+        plan.write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
 stop_time = 1.0
 step = 0.5
 runs = {runs}
@@ -115,19 +115,23 @@ a.uniform = [0.0, 1.0]
 u.uniform = [0.0, 1.0]
 [figures]
 sum = "a + u"
+up = "a + u / 1000"
+down = "a - u / 1000"
 """)
-        arguments = [str(tmp_path / f"{runs}.toml"), "-o", str(tmp_path / f"{runs}"), "--scheduler", scheduler]
-        assert main(["study", *arguments]) == 0
-        pages[runs] = html.parse(tmp_path / f"{runs}" / "study.html")
-    said = "An index whose interval is as wide as itself (grey) tells nothing"
+        assert main(["study", str(plan), "-o", str(results), "--scheduler", scheduler]) == 0
+        pages[runs] = html.parse(results / "study.html")
+    few, many = (pages[runs].xpath("string(//body)") for runs in (12, 800))
     cells = "//h2[@id='sensitivity']/following::table[1]//td[@class='number same' or @class='number first same']"
-    assert said in pages[12].xpath("string(//body)")
+    for text in ("An index whose interval is as wide as itself (grey) tells nothing", "So few blocks tell nothing"):
+        assert text in few
+        assert text not in many
     assert pages[12].xpath(cells)
-    assert "So few blocks tell nothing" in pages[12].xpath("string(//body)")
-    assert "So few blocks tell nothing" not in pages[2000].xpath("string(//body)")
-    assert said not in pages[2000].xpath("string(//body)")
-    assert not pages[2000].xpath(cells)
-    assert "from 500 blocks" in pages[2000].xpath("string(//body)")
+    assert not pages[800].xpath(cells)
+    assert "from 200 blocks" in many
+    small = [Results(tmp_path / "800").sensitivity(name).loc["u"].S1 for name in ("up", "down")]
+    assert -0.0005 < min(small) < -1e-5
+    rows = pages[800].xpath("//h2[@id='sensitivity']/following::tr[td/code='u']/td[2]")
+    assert [row.text_content() for row in rows[1:3]] == ["0.000", "0.000"]
 
 
 def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_done(
@@ -135,9 +139,9 @@ def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_do
 ) -> None:
     failed = len(Results(done).failed)
     assert main(["study", str(done.parent / "plan.toml"), "-o", str(done)]) == 1
-    told = capsys.readouterr()
-    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in told.out.replace("\n", " ")
-    assert told.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
+    printed = capsys.readouterr()
+    assert f"600 runs, {failed} failed, {600 - failed} incomplete" in printed.out.replace("\n", " ")
+    assert printed.err == f"rov-fmu: {done}: no run is done, with all its figures\n"
 
 
 def test_another_page_of_this_name_is_not_overwritten(
@@ -146,32 +150,10 @@ def test_another_page_of_this_name_is_not_overwritten(
     own = tmp_path / "study.html"
     own.write_text("<p>My studies</p>")
     assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
-    told = "is no page of this tool and would be overwritten: choose another folder"
-    assert capsys.readouterr().err == f"rov-fmu: {own}: {told}\n"
+    reason = "is no page of this tool and would be overwritten: choose another folder"
+    assert capsys.readouterr().err == f"rov-fmu: {own}: {reason}\n"
     assert [*tmp_path.iterdir()] == [own]
     assert own.read_text() == "<p>My studies</p>"
-
-
-def test_an_index_of_nothing_has_no_sign(foreign: Callable[..., Path], tmp_path: Path, scheduler: str) -> None:
-    """What brings a millionth of the variance has an index of 0.000, which chance makes negative as often as not."""
-    (tmp_path / "plan.toml").write_text(f"""fmu = "{beside(foreign(), tmp_path)}"
-stop_time = 1.0
-step = 0.5
-runs = 200
-sampler = "saltelli"
-[vary]
-a.uniform = [0.0, 1.0]
-u.uniform = [0.0, 1.0]
-[figures]
-up = "a + u / 1000"
-down = "a - u / 1000"
-""")
-    results = tmp_path / "results"
-    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(results), "--scheduler", scheduler]) == 0
-    small = [Results(results).sensitivity(name).loc["u"].S1 for name in ("up", "down")]
-    assert -0.0005 < min(small) < -1e-5
-    rows = html.parse(results / "study.html").xpath("//h2[@id='sensitivity']/following::tr[td/code='u']/td[2]")
-    assert [row.text_content() for row in rows[:2]] == ["0.000", "0.000"]
 
 
 def test_reasons_that_are_not_shown_are_counted(
@@ -189,8 +171,8 @@ figures.end = "t[-1]"
 """)
     results = tmp_path / "results"
     assert main(["study", str(tmp_path / "plan.toml"), "-o", str(results), "--scheduler", scheduler]) == 1
-    said = [line.strip() for line in capsys.readouterr().out.splitlines() if " runs: " in line]
-    assert len(said) == 6
-    assert said[-1] == "4 runs: other reasons (2), which are on the page"
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines() if " runs: " in line]
+    assert len(lines) == 6
+    assert lines[-1] == "4 runs: other reasons (2), which are on the page"
     page = (results / "study.html").read_text(encoding="utf-8")
     assert all(f"index {n} is out of bounds" in page for n in range(3, 10))

@@ -1,4 +1,4 @@
-"""The parameters of a run depend only on its number and the seed, and are distributed as the plan says."""
+"""The parameters of a run depend only on its number and the seed, and have the distributions of the plan."""
 
 import numpy as np
 import pytest
@@ -26,8 +26,8 @@ def _variable(name: str) -> Variable:
 
 
 def _design(sampler: str, runs: int | None, seed: int = 7, names: str = "abcden") -> Design:
-    told = {"sampler": sampler, "runs": runs, "seed": seed, "stop_time": 1.0, "step": 1.0}
-    plan = Plan.model_validate({**told, "vary": {name: VARIED[name] for name in names}})
+    keys = {"sampler": sampler, "runs": runs, "seed": seed, "stop_time": 1.0, "step": 1.0}
+    plan = Plan.model_validate({**keys, "vary": {name: VARIED[name] for name in names}})
     return Design(plan, {name: _variable(name) for name in names})
 
 
@@ -47,16 +47,14 @@ def test_the_parameters_are_distributed_as_the_plan_says(sampler: str) -> None:
     a, b, c, d, e, n = _design(sampler, 8000).rows(0, 8000).T
     cut = stats.truncnorm(-0.5, np.inf, 1.0, 2.0)  # the FMU's minimum is 0
     for found, expected in ((a, stats.uniform(2.0, 1.0)), (b, cut), (c, stats.lognorm(0.5, scale=3.0))):
-        assert (
-            stats.kstest(found, expected.cdf).statistic < 0.025
-        )  # by chance, of independent ones, less than 1 in 10^4
+        assert stats.kstest(found, expected.cdf).statistic < 0.025  # independent numbers exceed this once in 10^4 times
     for found, values in ((d, [1.0, 4.0, 9.0]), (e, [-1.0, -0.5, 0.0, 0.5, 1.0]), (n, [1, 2, 3, 4, 5, 6])):
         there, counts = np.unique(found, return_counts=True)
         assert there.tolist() == values
         assert counts == pytest.approx(8000 / len(values), rel=0.12)
 
 
-def test_runs_of_saltelli_are_whole_blocks_and_it_is_told() -> None:
+def test_runs_of_saltelli_are_whole_blocks_with_a_warning() -> None:
     rounded, whole = _design("saltelli", 9, names="ab"), _design("saltelli", 8, names="ab")
     assert (rounded.runs, whole.runs) == (12, 8)
     assert [*rounded.warnings()] == ["runs = 9 becomes 12, which are 3 whole blocks of 4"]
@@ -74,7 +72,7 @@ def test_a_grid_has_every_combination_once() -> None:
 
 
 def test_blocks_of_saltelli_are_in_the_order_of_salib() -> None:
-    """SALib's own sample is of another scramble; what is equal within a block is what its analysis needs."""
+    """SALib scrambles its sample differently, but its analysis needs only the same equal values within each block."""
     ours = _design("saltelli", 5 * 64, names="abc").rows(0, 5 * 64).reshape(64, 5, 3)
     theirs = salib.sample({"num_vars": 3, "names": list("abc"), "bounds": [[0, 1]] * 3}, 64, calc_second_order=False)
     equal = [(block[:, None, :] == block[None, :, :]).tolist() for block in theirs.reshape(64, 5, 3)]

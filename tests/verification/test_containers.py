@@ -10,31 +10,13 @@ import pytest
 
 from rov_fmu.study import Results, study
 from tests.folders import beside
+from tests.study.test_kinds import PLAN
 from verification.interoperability.importers import HERE, IMPORTERS
-
-PLAN = """fmu = "{fmu}"
-stop_time = 4.0
-step = 0.1
-runs = 24
-seed = 3
-[inputs]
-u_l.ramps = [[0.0, 0.0], [1.0, 0.5], [2.0, 0.5], [2.0, -0.2]]
-u_r = 0.3
-[vary]
-alpha_u.normal = {{ mean = 1.1, sd = 0.1 }}
-m_rov.uniform = [6.0, 7.0]
-V_N.values = [0.0, 0.2]
-[keep]
-outputs = ["u", "psi"]
-[figures]
-final_x = "final(x)"
-drift = "mean(out['der(x)'])"
-"""
 
 
 def _done(fmu: Path, folder: Path) -> Results:
     plan = folder / f"{fmu.stem}.toml"
-    plan.write_text(PLAN.format(fmu=beside(fmu, folder)), encoding="utf-8")
+    plan.write_text(f'fmu = "{beside(fmu, folder)}"\n{PLAN}', encoding="utf-8")
     return study(plan, folder / f"results of {fmu.stem}", workers=1)
 
 

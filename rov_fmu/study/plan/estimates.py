@@ -96,5 +96,8 @@ class Estimates:
 
 
 def _listed(words: Sequence[str]) -> str:
-    some = [*words[:_SHOWN], *([f"{len(words) - _SHOWN} more"] if len(words) > _SHOWN else [])]
-    return " and ".join(filter(None, [", ".join(some[:-1]), some[-1]]))
+    """Return the first words as a list in a sentence."""
+    some = [*words[:_SHOWN]]
+    if len(words) > _SHOWN:
+        some.append(f"{len(words) - _SHOWN} more")
+    return f"{', '.join(some[:-1])} and {some[-1]}" if len(some) > 1 else some[0]

@@ -42,7 +42,7 @@ _Term = Callable[[Mapping[str, _Value]], _Value]
 
 
 class ExpressionError(ValueError):
-    """Why a text is not an expression that a figure may have."""
+    """A text is not an expression that a figure may have; the message is the reason."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Function:
 
     @classmethod
     def by_name(cls, compute: Callable[..., _Value]) -> "Function":
-        """A function whose values may be given by the names of its parameters."""
+        """Return a function whose values may be given by the names of its parameters."""
         parameters = signature(compute).parameters
         needed = sum(p.default is Parameter.empty for p in parameters.values())
         return cls(compute, needed, len(parameters), tuple(parameters))
@@ -80,41 +80,10 @@ def _round(y: _Value, decimals: float = 0.0) -> _Value:
 
 
 _OF_ONE_VALUE = (
-    "abs",
-    "all",
-    "any",
-    "arccos",
-    "arcsin",
-    "arctan",
-    "argmax",
-    "argmin",
-    "ceil",
-    "cos",
-    "cosh",
-    "cumsum",
-    "degrees",
-    "diff",
-    "exp",
-    "floor",
-    "isfinite",
-    "isnan",
-    "log",
-    "log10",
-    "mean",
-    "median",
-    "prod",
-    "ptp",
-    "radians",
-    "sign",
-    "sin",
-    "sinh",
-    "sqrt",
-    "std",
-    "sum",
-    "tan",
-    "tanh",
-    "unwrap",
-    "var",
+    *("abs", "sign", "sqrt", "exp", "log", "log10", "ceil", "floor", "degrees", "radians", "isfinite", "isnan"),
+    *("sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh"),
+    *("all", "any", "argmax", "argmin", "mean", "median", "prod", "ptp", "std", "sum", "var"),
+    *("cumsum", "diff", "unwrap"),
 )
 """Functions of NumPy that take one value here. Their other parameters are left out: `out` writes into an array."""
 _OF_TWO_VALUES = ("arctan2", "hypot", "maximum", "minimum", "percentile", "searchsorted")
@@ -187,7 +156,7 @@ class Expression:
         """For each call of a function whose parameters have names: the numbers given in the text, by parameter."""
 
     def value(self, values: Mapping[str, _Value]) -> _Value:
-        """Its value, a number or an array, for the values of all its names. May raise any exception."""
+        """Return the value, a number or an array, for the values of all names. May raise any exception."""
         return self._term(values)
 
 
@@ -213,7 +182,7 @@ class _Reader:
         }
 
     def term(self, node: ast.expr) -> _Term:
-        """The term of a node. Raises ExpressionError."""
+        """Return the term of a node. Raises ExpressionError."""
         if self._depth == _DEEPEST:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels")
         self._depth += 1
@@ -336,7 +305,7 @@ class _Reader:
 
 
 def _called(compute: Callable[..., _Value], terms: list[_Term], names: list[str]) -> _Term:
-    """The call of a function with the values of these terms, the last ones by name."""
+    """Return the call of a function with the values of these terms, the last ones by name."""
     places = len(terms) - len(names)
 
     def call(values: Mapping[str, _Value]) -> _Value:

@@ -1,7 +1,7 @@
 """The figures of a run: expressions over its outputs, and the functions of time that they may call."""
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from math import isfinite, isnan, nan
 from typing import Any
 
@@ -15,8 +15,6 @@ from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, E
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
 """The last part of a window; the mean over it is the steady value."""
-_NEVER = ("must be one number", "TypeError")
-"""The beginnings of the reasons that hold for every run."""
 _MOST_WINDOWS = 1000
 _BAND = 0.05
 """The share of the whole change within which a response has settled."""
@@ -41,20 +39,20 @@ class Responses:
         """The functions by their names in an expression."""
 
     def at(self, y: Array, time: float) -> float:
-        """y at a time, interpolated linearly."""
+        """Return y at a time, interpolated linearly."""
         self._check_times(time)
         return float(np.interp(time, self._times, y))
 
     def final(self, y: Array) -> float:
-        """The last y."""
+        """Return the last y."""
         return float(y[-1])
 
     def steady(self, y: Array, start: float | None = None, end: float | None = None) -> float:
-        """Steady y: its mean over the last tenth of the time from `start` to `end`."""
+        """Return the steady y: its mean over the last tenth of the time from `start` to `end`."""
         return float(y[self._window(start, end)[1]].mean())
 
     def time_constant(self, y: Array, start: float | None = None, end: float | None = None) -> float:
-        """Time from `start` until y has made 1 - 1/e of its change to the steady value; NaN without a change."""
+        """Return the time from `start` until 1 - 1/e of the change to the steady value; NaN without a change."""
         change, t = self._change(y, start, end)
         n = int((change >= RISE).argmax())
         if not change[n] >= RISE:
@@ -63,14 +61,14 @@ class Responses:
         return float(t[n - 1] + share * (t[n] - t[n - 1]) - t[0])
 
     def overshoot(self, y: Array, start: float | None = None, end: float | None = None) -> float:
-        """How far y goes beyond its steady value, divided by its change: 0.1 is 10 %. NaN without a change."""
+        """Return the largest excess of y over its steady value, divided by its change; NaN without a change."""
         change, _ = self._change(y, start, end)
         return float(np.maximum(change.max() - 1.0, 0.0))
 
     def settling_time(
         self, y: Array, start: float | None = None, end: float | None = None, band: float = _BAND
     ) -> float:
-        """Time from `start` until y stays within a band around its steady value; NaN if it never does.
+        """Return the time from `start` until y stays within a band around its steady value; NaN if it never does.
 
         A band of 0.05 is 5 % of the change to the steady value.
         """
@@ -102,7 +100,7 @@ class Responses:
                 raise ValueError(f"there is no time {time:g} s in a run from {first:g} to {last:g} s")
 
     def wrong_times(self, given: Mapping[str, Any]) -> str:
-        """What is wrong with the times among the constant values of a call, by parameter; an empty text if nothing."""
+        """Return the mistake in the times among the constant values of a call, by parameter, or an empty text."""
         try:
             self._window(given.get("time"), None)
             self._window(given.get("start"), given.get("end"))
@@ -118,14 +116,19 @@ class Responses:
         return (part - part[0]) / (whole or nan), self._times[window]
 
 
+def _functions(times: Array) -> dict[str, Function]:
+    """Return all functions that an expression may call."""
+    return {**FUNCTIONS, **Responses(times).functions}
+
+
 def read_expression(text: str) -> Expression:
     """Read an expression without a run. Raises ExpressionError with the reason if it is not allowed."""
-    return Expression(text, {**FUNCTIONS, **Responses(np.zeros(1)).functions})
+    return Expression(text, _functions(np.zeros(1)))
 
 
 def meaning(name: str) -> str:
     """Return a hint about a name that an expression cannot use as a value, or an empty text."""
-    if name in {**FUNCTIONS, **Responses(np.zeros(1)).functions}:
+    if name in _functions(np.zeros(1)):
         return f"{name} is a function: write {name}(...)"
     if name == BY_NAME:
         return f'{BY_NAME} gives a variable by its name: write {BY_NAME}["der(u)"]'
@@ -136,7 +139,7 @@ class Figures:
     """The figures of a plan, for one thread at a time. Raises ExpressionError."""
 
     def __init__(self, expressions: Mapping[str, str], times: Array) -> None:
-        functions = {**FUNCTIONS, **Responses(times).functions}
+        functions = _functions(times)
         self._expressions = {name: Expression(text, functions) for name, text in expressions.items()}
         self._constants = {**CONSTANTS, TIME: times}
 
@@ -146,41 +149,59 @@ class Figures:
         found, reasons = [], []
         with np.errstate(all="ignore"):
             for name, expression in self._expressions.items():
-                value, reason = _number(expression, values)
-                found.append(nan if reason else value)
-                reasons += [f"{name}: {reason}"] if reason else []
+                try:
+                    found.append(_number(expression, values))
+                except _NoNumberError as error:
+                    found.append(nan)
+                    reasons.append(f"{name}: {error}")
         return found, "; ".join(reasons)
 
 
-def _number(expression: Expression, values: Mapping[str, Any]) -> tuple[float, str]:
-    """The value of an expression, or NaN with the reason why it is not one finite number."""
+class _NoNumberError(Exception):
+    """The value of an expression is not one finite number; the text is the reason."""
+
+
+class _ArrayError(_NoNumberError):
+    """The value of an expression is an array."""
+
+
+def _number(expression: Expression, values: Mapping[str, Any]) -> float:
+    """Return the value of an expression. Raises _NoNumberError."""
     try:
         value = expression.value(values)
-    except ZeroDivisionError:  # Python's message differs between versions
-        return nan, "ZeroDivisionError: division by zero"
+    except ZeroDivisionError as error:  # Python's message differs between versions
+        raise _NoNumberError("ZeroDivisionError: division by zero") from error
     except Exception as error:  # NumPy raises many kinds
-        return nan, brief(f"{type(error).__name__}: {error}")
+        raise _NoNumberError(brief(f"{type(error).__name__}: {error}")) from error
     if isinstance(value, np.ndarray):
-        return nan, f"must be one number, and not {shown(value)}"
+        raise _ArrayError(f"must be one number, and not {shown(value)}")
     number = float(value)
-    return number, "" if isfinite(number) else f"is {'NaN' if isnan(number) else 'infinite'}"
+    if not isfinite(number):
+        raise _NoNumberError(f"is {'NaN' if isnan(number) else 'infinite'}")
+    return number
 
 
-def unusable(text: str, variables: Iterable[str], varied: Iterable[str], run_times: Array) -> str:
+def unusable(text: str, variables: Iterable[str], varied: Collection[str], run_times: Array) -> str:
     """Return why an expression cannot be a figure of any run, or an empty text if that depends on the run.
 
     `run_times` is empty if the plan does not give valid times.
     """
-    expression = read_expression(text)
     if run_times.size:
         responses = Responses(run_times)
-        for given in expression.constant_values:
+        for given in read_expression(text).constant_values:
             if reason := responses.wrong_times(given):
                 return reason
     times = np.linspace(0.0, 1.0, 11)
-    run = {**dict.fromkeys(variables, times), **dict.fromkeys(varied, 1.0)}
-    with warnings.catch_warnings():  # from NumPy, about values that do not come from the FMU
-        warnings.simplefilter("ignore", RuntimeWarning)
-        reason = Figures({"": text}, times).of(run)[1].removeprefix(": ")
-    is_constant = expression.names <= CONSTANTS.keys()
-    return reason if is_constant or reason.startswith(_NEVER) else ""
+    expression = Expression(text, _functions(times))
+    values = {**CONSTANTS, TIME: times, **dict.fromkeys(variables, times), **dict.fromkeys(varied, 1.0)}
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)  # from NumPy, about values that do not come from the FMU
+        try:
+            _number(expression, values)
+        except _NoNumberError as error:
+            is_wrong_type = isinstance(error.__cause__, TypeError)
+            if is_wrong_type and (numbers := expression.names.intersection(varied)):
+                return f"{error}; {min(numbers)} varies, and what varies is a number"
+            if is_wrong_type or isinstance(error, _ArrayError) or expression.names <= CONSTANTS.keys():
+                return str(error)
+    return ""

@@ -1,6 +1,5 @@
 """The plan of a study: the TOML file that says what is run, what is varied, what is kept and what is computed."""
 
-import hashlib
 import json
 import os
 from collections.abc import Iterator
@@ -52,29 +51,29 @@ class Normal(Strict):
     """A normal distribution, cut off where the FMU's variable has its bounds."""
 
     mean: Finite
-    """In the variable's unit."""
+    """The mean, in the variable's unit."""
     sd: Positive
-    """Standard deviation, in the variable's unit."""
+    """The standard deviation, in the variable's unit."""
 
 
 class LogNormal(Strict):
     """The distribution of a positive number whose logarithm is normal, cut off at the variable's bounds."""
 
     median: Positive
-    """In the variable's unit."""
+    """The median, in the variable's unit."""
     sd: Positive
-    """Standard deviation of the natural logarithm."""
+    """The standard deviation of the natural logarithm."""
 
 
 class Range(Strict):
     """Numbers evenly from one to another."""
 
     first: Finite = Field(alias="from")
-    """The first."""
+    """The first number."""
     last: Finite = Field(alias="to")
-    """The last."""
+    """The last number."""
     count: Annotated[int, Field(ge=2, le=1_000_000)]
-    """How many, with both ends."""
+    """The number of numbers, including both ends."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -84,7 +83,7 @@ class Range(Strict):
 
 
 class Varied(Strict):
-    """How a variable of the FMU differs from run to run: in one of these ways."""
+    """How a variable of the FMU differs from run to run; exactly one of these keys is given."""
 
     normal: Normal | None = None
     """{ mean = ..., sd = ... }."""
@@ -142,18 +141,16 @@ Points = Annotated[
 
 
 class Signal(Strict):
-    """An input over time: held from point to point, or straight from point to point.
+    """An input over time, given by points between which it is held or follows a straight line.
 
-    Before its first point it has the start value of the FMU, after its last one the value of that.
+    Before the first point it has the start value of the FMU, and after the last point the value of that point.
     """
 
     steps: Points | None = None
-    """[[time, value], ...]: each value is held until the next time; communication points."""
+    """[[time, value], ...]: each value is held until the next time. The times are communication points."""
     ramps: Points | None = None
-    """[[time, value], ...]: straight between them; two of the same time are a jump, at a communication point.
-
-    An FMU takes what a step begins with for all of it: that is the value of the middle of the step.
-    """
+    """[[time, value], ...]: straight lines between the points; two points of one time are a jump, at a communication
+    point. An FMU holds an input over a step, so it gets the value at the middle of the step."""
 
     @model_validator(mode="after")
     def _either(self) -> Self:
@@ -185,17 +182,12 @@ _Beside = Annotated[str, AfterValidator(_beside)]
 
 
 class InputFile(Strict):
-    """Inputs in a CSV file: the time (s) in a column `time`, a variable of the FMU in each other one."""
+    """Inputs in a CSV file: the column `time` holds the time (s), each other column a variable of the FMU."""
 
     path: _Beside
-    """A file beside the plan, or in a folder beside it."""
+    """A file in the folder of the plan, or in a folder inside it."""
     between: Literal["steps", "ramps"] = "ramps"
-    """Whether a row is held until the next one, or is reached on a straight line."""
-
-    @property
-    def is_held(self) -> bool:
-        """True when each row is held until the next one."""
-        return self.between == "steps"
+    """steps: a row is held until the next one; ramps: there are straight lines between the rows."""
 
 
 def _once(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -211,14 +203,14 @@ def _ascending(times: tuple[float, ...]) -> tuple[float, ...]:
 
 
 class Keep(Strict):
-    """The trajectories that are kept; without this table none are, and figures alone remain."""
+    """The trajectories that are kept. Without this table none are kept, and only the figures remain."""
 
     outputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_some), AfterValidator(_once)]
     """Names of variables."""
     every: Positive | None = None
-    """s, from the start on; a multiple of the step. Every step where neither this nor `at` is given."""
+    """The time between kept points, s; a multiple of the step. The default is every step."""
     at: Annotated[_List, AfterValidator(_ascending)] | None = None
-    """Times instead, s."""
+    """The times of the kept points, s, in place of `every`."""
 
     @model_validator(mode="after")
     def _not_both(self) -> Self:
@@ -242,9 +234,9 @@ class Plan(Strict):
     """A study: many runs of one FMU."""
 
     fmu: Annotated[str, AfterValidator(_file)] | None = None
-    """An FMU for Co-Simulation beside the plan, or in a folder beside it; or `vehicle`."""
+    """An FMU for Co-Simulation in the folder of the plan, or in a folder inside it. A plan has this or `vehicle`."""
     vehicle: _Beside | None = None
-    """A vehicle file beside the plan, or the name of one that ships: its FMU is built for this machine."""
+    """A vehicle file beside the plan, or the name of a vehicle that ships. Its FMU is built for this machine."""
     start_time: Finite = 0.0
     """s."""
     stop_time: Finite
@@ -254,37 +246,42 @@ class Plan(Strict):
     tolerance: Positive | None = None
     """Relative, for an FMU whose solver takes one."""
     time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = 300.0
-    """s on the clock: a run that takes longer fails."""
+    """The time that a run may take, s; a run that takes longer fails."""
     runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
-    """How many; a grid has as many as it has points. Of sampler saltelli rounded up to a multiple of (number of
-    varied variables + 2), where those that are correlated count as one."""
+    """The number of runs. A grid has one for each of its points. For the sampler saltelli it is rounded up to a
+    multiple of (number of varied variables + 2), where variables that are correlated with each other count as one."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
-    """The parameters of a run depend on this and on the run's number alone."""
+    """The parameters of a run depend only on this and on the run's number."""
     sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
-    """How the numbers are drawn; saltelli is what Sobol indices are computed from."""
+    """The method by which the values are drawn. Sobol indices need saltelli."""
     vary_from: _Beside | None = None
-    """A vehicle file beside the plan, or the name of a vehicle that ships: its coefficients vary by the errors and
-    correlations that identification wrote there, but for those in [vary] and [set]."""
+    """A vehicle file beside the plan, or the name of a vehicle that ships. Its coefficients vary with the errors and
+    correlations that identification wrote there, except for those in [vary] and [set]."""
     vary: dict[str, Varied] = Field({}, max_length=_MOST_NAMED)
-    """By variable: what differs from run to run. An input that varies is held."""
+    """The variables that differ from run to run. An input that varies is held during a run."""
     set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({}, max_length=_MOST_NAMED)
-    """By variable: a start value for all runs in place of the FMU's."""
+    """Start values of variables for all runs, in place of the FMU's."""
     inputs: dict[str, Annotated[Signal, BeforeValidator(_held)]] = Field({}, max_length=_MOST_NAMED)
-    """By input: a number, steps or ramps."""
+    """The inputs over time: each is a number, steps or ramps."""
     input_file: InputFile | None = None
     """Inputs from a CSV file."""
     keep: Keep | None = None
-    """Which trajectories are kept."""
+    """The trajectories that are kept."""
     figures: dict[
         Annotated[str, AfterValidator(not_blank)],
         Annotated[str, Field(min_length=1, max_length=2000), AfterValidator(_expression)],
     ] = Field({})
-    """By name: an expression over the outputs."""
+    """Expressions over the outputs, by the names of their columns."""
 
     @property
     def steps(self) -> int:
         """The number of steps of a run."""
         return round((self.stop_time - self.start_time) / self.step)
+
+    @property
+    def points(self) -> int:
+        """The number of points of a grid."""
+        return prod(len(varied.choices or ()) for varied in self.vary.values())
 
     def step_at(self, time: float) -> int | None:
         """Return the number of steps until a time of the run, or None if it is not a multiple of the step."""
@@ -333,11 +330,8 @@ def check_plan(plan: Plan) -> Iterator[str]:
         yield from _unreachable(plan, plan.keep)
     if plan.sampler == "grid" and plan.runs is not None:
         yield key_line("runs", "a grid has as many as it has points; leave this out", plan.runs)
-    if (
-        plan.sampler == "grid"
-        and (points := prod(len(varied.choices or ()) for varied in plan.vary.values())) > _MOST_RUNS
-    ):
-        yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {points:.3g}")
+    if plan.sampler == "grid" and plan.points > _MOST_RUNS:
+        yield key_line("vary", f"a grid must have at most {_MOST_RUNS} points, and not {plan.points:.3g}")
     if plan.sampler != "grid" and plan.runs is None:
         yield "runs: this key is missing"
     if not plan.keep and not plan.figures:
@@ -355,8 +349,3 @@ def _unreachable(plan: Plan, keep: Keep) -> Iterator[str]:
             rule = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
             yield key_line("keep.at", rule, list(keep.at or ()))
             return
-
-
-def digest(content: bytes) -> str:
-    """Return the SHA-256 digest in hexadecimal digits."""
-    return hashlib.sha256(content).hexdigest()

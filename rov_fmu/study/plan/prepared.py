@@ -32,7 +32,6 @@ Array = npt.NDArray[np.float64]
 class Prepared:
     """A plan that fits its FMU."""
 
-    plan: Plan
     job: Job
     design: Design
     mark: Mapping[str, Any]
@@ -50,7 +49,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
         from_file = _file_inputs(plan, path, model)
     except FileError as error:
         unread = [str(error)]
-    times = np.zeros(0) if own else _times(plan)
+    times = np.zeros(0) if own else plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
     words = [*own, *estimates.check(), *_check(plan, model, estimates.names, from_file, times)]
     wrong = lines_on(path, words) + unread
     if plan.input_file:
@@ -79,7 +78,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     }
     mark.pop("input_file", None)
     job = Job(f"rov-fmu-{uuid4().hex}", model, manoeuvre, plan.figures, kept, _kept_points(plan), plan.time_limit)
-    return Prepared(plan, job, design, mark, [*estimates.warnings(), *design.warnings()])
+    return Prepared(job, design, mark, [*estimates.warnings(), *design.warnings()])
 
 
 def vehicle_file(key: str, given: str, path: Path) -> Path:
@@ -95,6 +94,7 @@ def vehicle_file(key: str, given: str, path: Path) -> Path:
 
 
 def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
+    """Read the inputs in the CSV file of the plan. Raises FileError."""
     if not plan.input_file:
         return {}
     file = path.parent / plan.input_file.path
@@ -110,7 +110,7 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
     found = {}
     for name, values in columns:
         points = tuple(zip(times, values, strict=True))
-        held = plan.input_file.is_held or not model.variables[name].is_continuous
+        held = plan.input_file.between == "steps" or not model.variables[name].is_continuous
         found[name] = Signal(steps=points) if held else Signal(ramps=points)
     return found
 
@@ -129,10 +129,13 @@ def _check(
             yield key_line(key, reason)
         elif name in plan.set or name in plan.inputs or name in from_file:
             yield key_line(key, "is given in [set] or [inputs] too")
+        elif plan.sampler == "grid" and varied.choices is None:
+            yield key_line(key, "a grid needs values or a range", varied.model_dump(exclude_none=True))
         else:
-            yield from (
-                key_line(key, reason, value) for reason, value in _impossible(varied, has[name], plan.sampler == "grid")
-            )
+            for value in _extremes(varied):
+                if reason := has[name].wrong(value):
+                    yield key_line(key, reason, value)
+                    break
     if not (known or plan.vary or plan.vary_from) and plan.sampler != "grid":
         yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
     for name, value in plan.set.items():
@@ -145,20 +148,17 @@ def _check(
     yield from _check_figures(plan, has, {*known, *plan.vary}, times)
 
 
-def _impossible(varied: Varied, variable: Variable, is_grid: bool) -> Iterator[tuple[str, Any]]:
-    """Yield the reason and the value if a distribution is not possible."""
-    if is_grid and varied.choices is None:
-        yield "a grid needs values or a range", varied.model_dump(exclude_none=True)
-        return
-    numbers = varied.choices or varied.uniform or ((varied.normal.mean,) if varied.normal else ())
-    numbers = numbers or ((varied.lognormal.median,) if varied.lognormal else ())
-    for value in numbers:
-        if reason := variable.wrong(value):
-            yield reason, value
-            return
+def _extremes(varied: Varied) -> Sequence[float]:
+    """Return the values of a distribution that the variable must be able to have."""
+    if varied.normal:
+        return [varied.normal.mean]
+    if varied.lognormal:
+        return [varied.lognormal.median]
+    return varied.choices or varied.uniform or ()
 
 
 def _check_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
+    """Yield a line for each input in the plan that does not fit."""
     for name, signal in plan.inputs.items():
         key = f"inputs.{name}"
         if name not in has:
@@ -168,11 +168,10 @@ def _check_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
         elif signal.ramps and not has[name].is_continuous:
             yield key_line(key, "must be steps, for it is not continuous")
         else:
-            points = signal.points
-            yield from (key_line(key, reason, points[n][1]) for n, reason in _out_of_bounds(signal, has[name]))
-            yield from (
-                key_line(key, reason, [*points[n]]) for n, reason in _misplaced_jumps(signal, plan, has[name].start)
-            )
+            for n, reason in _out_of_bounds(signal, has[name]):
+                yield key_line(key, reason, signal.points[n][1])
+            for n, reason in _misplaced_jumps(signal, plan, has[name].start):
+                yield key_line(key, reason, [*signal.points[n]])
 
 
 def _check_rows(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
@@ -187,6 +186,7 @@ def _check_rows(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str,
 
 
 def _no_input(name: str, plan: Plan, has: Mapping[str, Variable]) -> str:
+    """Return why the plan cannot set a variable over time, or an empty text."""
     if has[name].causality != "input":
         return f"is no input of the FMU; its causality is {has[name].causality}"
     return "is given in [set] too" if name in plan.set else ""
@@ -201,7 +201,7 @@ def _out_of_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, st
 
 
 def _misplaced_jumps(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, str]]:
-    """Yield the number of the first jump that would come late, because no step begins there, and the rule."""
+    """Yield the number of the first jump that would be delayed, because no step begins there, and the rule."""
     for n in signal.jumps(before):
         time = signal.points[n][0]
         if plan.start_time < time < plan.stop_time and plan.step_at(time) is None:
@@ -218,13 +218,10 @@ def _check_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], ti
         if name in {RUN, STATUS, REASON} | varied:
             yield key_line(f"figures.{name}", "the results have another column of this name")
             continue
-        names = read_expression(text).names
-        if strange := sorted(names - CONSTANTS.keys() - {TIMES} - has.keys()):
+        if strange := sorted(read_expression(text).names - CONSTANTS.keys() - {TIMES} - has.keys()):
             reason = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
             yield key_line(f"figures.{name}", meaning(strange[0]) or reason, text)
         elif reason := unusable(text, has, varied, times):
-            if reason.startswith("TypeError") and (numbers := names & varied):
-                reason += f"; {min(numbers)} varies, and what varies is a number"
             yield key_line(f"figures.{name}", reason, text)
     if plan.keep and (taken := {RUN, TIME} & {*plan.keep.outputs}):
         yield key_line("keep.outputs", f"the results have another column {taken.pop()}")
@@ -233,12 +230,8 @@ def _check_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], ti
 # ---- Over time -------------------------------------------------------------------------------------------------------
 
 
-def _times(plan: Plan) -> Array:
-    """Return the times of the communication points, s."""
-    return plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
-
-
 def _kept_points(plan: Plan) -> Sequence[int]:
+    """Return the numbers of the communication points at which trajectories are kept."""
     if plan.keep is None:
         return ()
     if plan.keep.at:
@@ -248,7 +241,10 @@ def _kept_points(plan: Plan) -> Sequence[int]:
 
 
 def _sampled(signal: Signal, times: Array, before: float) -> Array:
-    """Return the signal at the middle of each step. Held over the step, it is exact to the second order of the step."""
+    """Return the signal at these times, the middles of the steps; `before` is the value before its first point.
+
+    Held over a step, the value at its middle is exact to the second order of the step.
+    """
     at, values = np.array(signal.points, np.float64).T
     place = np.searchsorted(at, times, side="right") - 1
     found: Array = np.where(place >= 0, values[np.maximum(place, 0)], before)

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import log, prod
+from math import log
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ _Draw = Callable[[int, int], Array]
 
 
 class Design:
-    """The varied variables and their values: first the estimates, drawn together, then those in [vary], drawn alone."""
+    """The varied variables and their values: first the estimates, drawn together, then those in [vary], independent."""
 
     def __init__(self, plan: Plan, variables: Mapping[str, Variable], known: Uncertainty = NOTHING) -> None:
         self._known, self._varied = known, plan.vary
@@ -58,7 +58,7 @@ class Design:
 
 def _runs(plan: Plan, groups: int) -> int:
     if plan.sampler == "grid":
-        return prod(len(varied.choices or ()) for varied in plan.vary.values())
+        return plan.points
     runs = plan.runs or 0
     block = groups + 2
     return -(-runs // block) * block if plan.sampler == "saltelli" else runs
@@ -102,11 +102,10 @@ def _grid(counts: Sequence[int]) -> _Draw:
     """Go through all combinations; the last variable changes fastest."""
 
     def draw(first: int, end: int) -> Array:
-        left = np.arange(first, end)
         drawn = np.empty((end - first, len(counts)))
-        for column in range(len(counts) - 1, -1, -1):
-            drawn[:, column] = (left % counts[column] + 0.5) / counts[column]
-            left = left // counts[column]
+        _, *places = np.unravel_index(np.arange(first, end), (1, *counts))  # no variable at all is one point
+        for column, place in enumerate(places):
+            drawn[:, column] = (place + 0.5) / counts[column]
         return drawn
 
     return draw

@@ -26,7 +26,10 @@ _PLOT = (3.7, 2.6)  # inches
 _BINS = 40
 _POINTS = 400
 """The number of points of a band that are drawn; more would not be visible."""
+_NUMBERS = 6
+"""The number of values of a distribution that are shown."""
 _REASONS = 50
+"""The number of reasons of failures that are shown."""
 _ROWS = 60
 """The number of rows of a grid that are shown."""
 _MARKED = 40
@@ -97,6 +100,7 @@ def _grid(results: Results) -> Sequence[str]:
 
 
 def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
+    """Return the row about a figure with its plot."""
     values = results.runs[name].to_numpy(float)
     there, unit = values[np.isfinite(values)], results.figure_units[name]
     found = {"name": name, "expression": results.plan["figures"][name], "unit": unit, "runs": there.size}
@@ -111,7 +115,7 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
         draw: Draw = partial(_draw_lines, name=name, results=results, grid=grid)
         title = f"{name} over {' and '.join(grid)}"
     else:
-        draw = partial(_draw_distribution, values=there, quantiles=quantiles, label=_axis("", unit))
+        draw = partial(_draw_distribution, values=there, quantiles=quantiles, label=axis_label("", unit))
         title = f"Distribution of {name}"
     return {**found, "plot": inline_svg(title, draw, _PLOT), "is_still": False}
 
@@ -121,9 +125,11 @@ def _is_constant(values: Any) -> bool:
     return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
 
 
-def _axis(name: str, unit: str) -> str:
-    """Return the label of an axis."""
-    return name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
+def axis_label(name: str, unit: str) -> str:
+    """Return a name with its unit; either of them may be missing."""
+    if unit in ("", "1"):
+        return name
+    return f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
 
 
 def _draw_distribution(figure: Figure, values: Any, quantiles: list[float], label: str) -> None:
@@ -150,9 +156,9 @@ def _draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str]
         marker = "o" if len(line) <= _MARKED else ""
         ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
     for other in others:
-        title = _axis(other, results.units[other])
+        title = axis_label(other, results.units[other])
         figure.legend(title=title, title_fontsize=8.5, handlelength=1.0, loc="outside right upper")
-    ax.set(xlabel=_axis(along, results.units[along]), ylabel=_axis("", results.figure_units[name]))
+    ax.set(xlabel=axis_label(along, results.units[along]), ylabel=axis_label("", results.figure_units[name]))
     _set_ticks(ax)
 
 
@@ -176,7 +182,7 @@ def _draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
     ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
     ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
     ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6)
-    ax.set(xlabel="time (s)", ylabel=_axis("", unit))
+    ax.set(xlabel="time (s)", ylabel=axis_label("", unit))
     _set_ticks(ax)
 
 
@@ -204,18 +210,21 @@ def _tells(index: "pd.Series[float]", half_width: "pd.Series[float]") -> "pd.Ser
 
 
 def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], results: Results) -> dict[str, Any]:
+    """Return the row about a varied variable: how it varies, and the values that it had."""
     distributions = dict(plan["vary"])
-    ((kind, told),) = (
-        distributions[name] if name in distributions else {"estimate": plan["vary_from"]["estimates"][name]}
-    ).items()
-    numbers = told.items() if isinstance(told, dict) else [("", value) for value in told]
-    some = [f"{key} {number(value, 4)}".strip() for key, value in numbers]
-    words = ", ".join([*some[:6], *(["…"] if len(some) > 6 else [])])
+    if name in distributions:
+        ((kind, given),) = distributions[name].items()
+    else:
+        kind, given = "estimate", plan["vary_from"]["estimates"][name]
+    pairs = given.items() if isinstance(given, dict) else [("", value) for value in given]
+    some = [f"{key} {number(value, 4)}".strip() for key, value in pairs]
+    if len(some) > _NUMBERS:
+        some[_NUMBERS:] = ["…"]
     others = [other for group in results.groups if name in group for other in group if other != name]
     values = column.to_numpy(float)
     return {
         "name": name,
-        "planned": f"{kind}: {words}",
+        "planned": f"{kind}: {', '.join(some)}",
         "others": others,
         "least": float(values.min()),
         "median": float(np.median(values)),

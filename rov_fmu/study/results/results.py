@@ -22,10 +22,7 @@ _AT_ONCE = 20_000_000
 class Results:
     """The results of the finished runs of a study. Raises FileError if the folder holds no study.
 
-    Data frames: `runs`, `failed`, `incomplete`, `trajectories()`, `bands()`, `sensitivity()`. What they describe:
-    `parameters` (the varied variables), `figures`, `outputs` (the kept variables), `units`, `figure_units`,
-    `descriptions`, `groups` (of correlated parameters), `planned` (number of runs), `plan`, `model` (the FMU's file)
-    and its digest `fmu`, `warnings`, `made_by`, `folder`.
+    The data frames are `runs`, `failed`, `incomplete`, `trajectories()`, `bands()` and `sensitivity()`.
     """
 
     def __init__(self, folder: Path | str) -> None:
@@ -59,6 +56,7 @@ class Results:
         self.warnings: tuple[str, ...] = tuple(study["warnings"])
         """Sentences about properties of the results that a reader may not expect."""
         self.made_by: str = study["made_by"]
+        """The name and the version of this tool."""
         self._points: int = study["points"]
 
     @cached_property
@@ -76,7 +74,7 @@ class Results:
     def bands(self, output: str, quantiles: Sequence[float] = QUANTILES) -> pd.DataFrame:
         """Return quantiles of an output over the runs (columns) at each time (s, the index). Raises FileError."""
         if output not in self.outputs:
-            others = f", only {', '.join(self.outputs)}" if self.outputs else ", nor any other: the plan has no [keep]"
+            others = _others(self.outputs, "[keep]")
             raise FileError(f"{self.folder}: no trajectory of {shown(output)} is kept{others}")
         trajectories = self._dataset(TRAJECTORIES)
         times = np.unique(trajectories.head(self._points, columns=[TIME])[TIME].to_numpy())
@@ -102,9 +100,7 @@ class Results:
         from SALib.analyze import sobol
 
         if figure not in self.figures:
-            others = (
-                f", only {', '.join(self.figures)}" if self.figures else ", nor any other: the plan has no [figures]"
-            )
+            others = _others(self.figures, "[figures]")
             raise FileError(f"{self.folder}: there is no figure {shown(figure)}{others}")
         if self.runs[figure].nunique() == 1:
             raise FileError(f"{self.folder}: {figure} is the same in all runs")
@@ -136,3 +132,8 @@ class Results:
         if not (paths := sorted(str(path) for path in (self.folder / name).glob("part-*.parquet"))):
             raise FileError(f"{self.folder / name}: holds no results yet")
         return ds.dataset(paths)
+
+
+def _others(names: Sequence[str], table: str) -> str:
+    """Return the end of a message about a name that does not exist: the names that do."""
+    return f", only {', '.join(names)}" if names else f", nor any other: the plan has no {table}"

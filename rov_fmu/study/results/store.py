@@ -3,7 +3,7 @@
 import json
 import re
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -51,21 +51,12 @@ class Store:
         with cleaned_up(leave, "the same command continues the study"):
             yield
 
-    def belongs_to(
-        self,
-        plan: Mapping[str, Any],
-        fmu: str,
-        vehicle: str | None,
-        runs: int,
-        columns: Mapping[str, Sequence[str]],
-        **more: Any,
-    ) -> None:
+    def belongs_to(self, plan: Mapping[str, Any], fmu: str, vehicle: str | None, runs: int, **description: Any) -> None:
         """Check that existing results belong to this plan and FMU (a digest), and write the description of the study.
 
-        `vehicle` is what the FMU was built from, if it was. Raises FileError, WriteError.
+        `vehicle` is the vehicle that the FMU was built from, if any. Raises FileError, WriteError.
         """
         path = self.folder / STUDY
-        mark = {"plan": dict(plan), "fmu": fmu}
         if self.done() and path.exists():
             old = self.description()
             if old["fmu"] != fmu:
@@ -81,8 +72,8 @@ class Store:
         if (end := max((end for _, end in self.done()), default=0)) > runs:
             raise FileError(f"{self.folder}: holds runs up to number {end - 1}, and the plan has {runs} alone")
         self._clean()
-        head = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", "runs": runs}
-        text = json.dumps({**head, **mark, "columns": columns, **more}, indent=2, ensure_ascii=False)
+        head = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", "runs": runs, "plan": dict(plan), "fmu": fmu}
+        text = json.dumps({**head, **description}, indent=2, ensure_ascii=False)
         write_whole(Output(path, f"{text}\n".encode()))
 
     def description(self) -> dict[str, Any]:

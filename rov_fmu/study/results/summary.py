@@ -4,7 +4,7 @@ import numpy as np
 from rich.text import Text
 
 from rov_fmu.report.console import console, table, text
-from rov_fmu.report.templates import pretty_unit
+from rov_fmu.study.results.page import axis_label
 from rov_fmu.study.results.results import Results
 from rov_fmu.study.run.cluster import Spent
 from rov_fmu.study.run.worker import REASON
@@ -29,8 +29,7 @@ def print_summary(results: Results, spent: Spent) -> None:
             values = runs[name].to_numpy(float)
             there = values[np.isfinite(values)]
             numbers = [*np.quantile(there, _SHOWN), there.mean()] if there.size else [np.nan] * (len(_SHOWN) + 1)
-            unit = results.figure_units[name]
-            label = name if unit in ("", "1") else f"{name} ({pretty_unit(unit)})"
+            label = axis_label(name, results.figure_units[name])
             shown.add_row(label, *(text(number, ".5g") for number in numbers), str(there.size))
         out.print(shown)
     reasons = runs[REASON].value_counts()

@@ -35,7 +35,7 @@ _AHEAD = 3
 _CHANCES = 3
 """After this many deaths of workers, all new tasks run in child processes, where a task may fail this often."""
 _GONE = (CancelledError, CommClosedError)
-"""What Dask raises when the scheduler is gone."""
+"""Exceptions of Dask when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
 _WAIT = 10.0
 """The seconds within which a scheduler or a worker must answer."""
@@ -56,7 +56,7 @@ class Progress:
 
 @dataclass
 class Spent:
-    """The time that a study took, and for what."""
+    """The runs that one call did, and the time that it took."""
 
     runs: int = 0
     failed: int = 0
@@ -64,19 +64,15 @@ class Spent:
     """The seconds until the workers had started."""
     elapsed: float = 0.0
     """The seconds from then until the last run was done."""
-    working: float = 0.0
-    """The seconds that all workers together spent on tasks."""
-    simulating: float = 0.0
-    """The part of these seconds that the FMU took."""
 
 
 def execute(
     job: Job,
     design: Design,
     store: Store,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    on_progress: Callable[[Progress], None] = lambda _: None,
+    workers: int | None,
+    scheduler: str | None,
+    on_progress: Callable[[Progress], None],
 ) -> Spent:
     """Do the runs that are missing in the store. Raises FileError, StudyError, WriteError, and KeyboardInterrupt."""
     spent, begin = Spent(), perf_counter()
@@ -84,7 +80,11 @@ def execute(
     if not missing:
         return spent
     with _client(workers, scheduler) as client:
-        _deliver(client, Delivery(job, own_cluster=scheduler is None))
+        try:
+            client.register_plugin(Delivery(job, own_cluster=scheduler is None))
+        except Exception as error:  # whatever a worker may raise
+            needs = "a worker cannot take the study; it needs the same rov-fmu[study] as here"
+            raise StudyError(f"{needs}: {brief(str(error))}") from error
         spent.started = perf_counter() - begin
         begin += spent.started
         try:
@@ -120,7 +120,7 @@ class _Runs:
         self._missing, self._spent, self._on_progress = missing, spent, on_progress
         self._done_before = design.runs - sum(end - first for first, end in missing)
         self._futures: dict[Any, tuple[int, int, bool]] = {}
-        """By future: the first run, the one after the last, and True when they are done in a child process."""
+        """The first run of a future, the run after its last one, and True when they are done in a child process."""
         self._lost: deque[tuple[int, int]] = deque()
         """The runs whose worker died; they are repeated in a child process."""
         self._deaths = 0
@@ -194,8 +194,6 @@ class _Runs:
         except Exception as error:  # the cluster raises various exceptions
             raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
         self._write(first, end, part)
-        self._spent.working += part.seconds
-        self._spent.simulating += part.simulating
         self._seconds = max(part.seconds / (end - first), 1e-6)
 
     def _repeat(self, first: int, end: int, separate: bool, error: KilledWorker) -> None:
@@ -219,16 +217,6 @@ class _Runs:
         self._on_progress(
             Progress(self._done_before + self._spent.runs, self._design.runs, self._spent.failed, link or "")
         )
-
-
-def _deliver(client: Client, delivery: Delivery) -> None:
-    try:
-        client.register_plugin(delivery)
-    except Exception as error:  # whatever a worker may raise
-        reason = brief(str(error))
-        raise StudyError(
-            f"a worker cannot take the study; it needs the same rov-fmu[study] as here: {reason}"
-        ) from error
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from hashlib import sha256
 from multiprocessing import current_process
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from rov_fmu.build import build
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.study.plan.model import Model, read_model
-from rov_fmu.study.plan.plan import Plan, digest, load_plan
+from rov_fmu.study.plan.plan import Plan, load_plan
 from rov_fmu.study.plan.prepared import prepare, vehicle_file
 from rov_fmu.study.results.results import Results
 from rov_fmu.study.results.store import Store
@@ -57,12 +58,20 @@ def run_study(
         on_warning(warning)
     with store.held():
         job, design = prepared.job, prepared.design
-        columns = {"parameters": design.names, "figures": [*job.figures], "outputs": job.kept}
-        notes = {"groups": design.groups, "warnings": prepared.warnings}
         named = [model.variables[name] for name in (*design.names, *job.manoeuvre.recorded)]
-        texts = {"units": {v.name: v.unit for v in named}, "descriptions": {v.name: v.description for v in named}}
-        more = {"points": len(job.kept_points), "model": model.name, **texts}
-        store.belongs_to(prepared.mark, digest(model.content), plan.vehicle, design.runs, columns, **more, **notes)
+        store.belongs_to(
+            prepared.mark,
+            sha256(model.content).hexdigest(),
+            plan.vehicle,
+            design.runs,
+            columns={"parameters": design.names, "figures": [*job.figures], "outputs": job.kept},
+            points=len(job.kept_points),
+            model=model.name,
+            units={variable.name: variable.unit for variable in named},
+            descriptions={variable.name: variable.description for variable in named},
+            groups=design.groups,
+            warnings=prepared.warnings,
+        )
         if plan.vehicle:
             write_whole(Output(folder / model.name, model.content))
         spent = execute(job, design, store, workers, scheduler, on_progress)

@@ -45,7 +45,7 @@ class Manoeuvre:
     varied: Sequence[str]
     """The variables that get other values in each run."""
     inputs: Mapping[str, Array]
-    """By variable: the value that is set at the beginning of each step."""
+    """The values that are set at the beginning of each step, by variable."""
     recorded: Sequence[str]
     """The variables that are read before the first step and after every step."""
 
@@ -76,22 +76,14 @@ class Simulator:
 
     def __init__(self, folder: str, description: Any, model: Model, manoeuvre: Manoeuvre) -> None:
         self._folder, self._description, self._manoeuvre, self._version = folder, description, manoeuvre, model.version
+        self._variables = model.variables
         self._logs = False
         self._fmu = self._instantiate()
         self._functions = _functions(self._fmu.dll, model.version)
         self._times: list[float] = manoeuvre.times.tolist()
-        make, points, variables = self._groups, manoeuvre.steps + 1, model.variables
-        started = [*manoeuvre.set, *manoeuvre.varied]
-        self._start = make([variables[name] for name in started], 1)
-        self._inputs = make([variables[name] for name in manoeuvre.inputs], manoeuvre.steps)
-        self._reads = make([variables[name] for name in manoeuvre.recorded], points)
-        for group in self._start:
-            for column, name in enumerate(group.names):
-                if name in manoeuvre.set:
-                    group.table[0, column] = manoeuvre.set[name]
-        for group in self._inputs:
-            for column, name in enumerate(group.names):
-                group.table[:, column] = manoeuvre.inputs[name]
+        self._start = self._groups({**manoeuvre.set, **dict.fromkeys(manoeuvre.varied, 0.0)}, 1)
+        self._inputs = self._groups(manoeuvre.inputs, manoeuvre.steps)
+        self._reads = self._groups(dict.fromkeys(manoeuvre.recorded, 0.0), manoeuvre.steps + 1)
         self._places = {name: (group, n) for group in self._start for n, name in enumerate(group.names)}
         self._changes = self._changing()
 
@@ -174,20 +166,20 @@ class Simulator:
                 found[n].append((group.set, references, count, address + n * row))
         return dict(found)
 
-    def _groups(self, variables: Sequence[Variable], rows: int) -> list[_Group]:
-        by_type = defaultdict(list)
-        for variable in variables:
-            by_type[variable.type].append(variable)
-        return [
-            _Group(
-                self._functions[f"Get{some[0].function(self._version)}"],
-                self._functions[f"Set{some[0].function(self._version)}"],
-                [variable.name for variable in some],
-                np.array([variable.reference for variable in some], np.uint32),
-                np.zeros((rows, len(some)), some[0].dtype(self._version)),
-            )
-            for some in by_type.values()
-        ]
+    def _groups(self, values: Mapping[str, float | Array], rows: int) -> list[_Group]:
+        """Return the variables with these names by type, with their values in all rows."""
+        by_type: defaultdict[str, list[Variable]] = defaultdict(list)
+        for name in values:
+            by_type[self._variables[name].type].append(self._variables[name])
+        groups = []
+        for some in by_type.values():
+            get, put = (self._functions[f"{verb}{some[0].function(self._version)}"] for verb in ("Get", "Set"))
+            references = np.array([variable.reference for variable in some], np.uint32)
+            table = np.empty((rows, len(some)), some[0].dtype(self._version))
+            for column, variable in enumerate(some):
+                table[:, column] = values[variable.name]
+            groups.append(_Group(get, put, [variable.name for variable in some], references, table))
+        return groups
 
     def _instantiate(self) -> Any:
         import fmpy.simulation

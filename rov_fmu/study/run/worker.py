@@ -7,12 +7,11 @@ import signal
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Lock, Thread, current_thread, get_ident, main_thread
 from time import monotonic, perf_counter
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -52,12 +51,6 @@ class Job:
     time_limit: float
     """The seconds that a run may take."""
 
-    @property
-    def runs_schema(self) -> pa.Schema:
-        """The schema of the table with one row for each run."""
-        numbers = [(name, pa.float64()) for name in (*self.manoeuvre.varied, *self.figures)]
-        return pa.schema([(RUN, pa.int64()), *numbers, (STATUS, pa.string()), (REASON, pa.string())])
-
 
 @dataclass(frozen=True)
 class Part:
@@ -68,8 +61,6 @@ class Part:
     failed: int
     seconds: float
     """The time that the worker took."""
-    simulating: float
-    """The part of this time that the FMU took."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +81,7 @@ class InstancePool:
         self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=folder))
         self._description = job.model.unpack(self._folder)
         self._idle: dict[bool, list[tuple[Simulator | SeparateSimulator, Figures]]] = {False: [], True: []}
-        self._one_only = Lock() if job.model.once_per_process else None
+        self._one_only = Lock() if job.model.once_per_process else nullcontext()
         self._is_watched = is_watched
         self._ends: dict[int, float] = {}
         self._closed = Event()
@@ -104,16 +95,13 @@ class InstancePool:
         On a worker that Dask does not restart, all instances are separate.
         """
         separate = separate or not self._is_watched
-        if self._one_only and not separate:
-            self._one_only.acquire()
-        try:
-            self.begin(separate)
-            yield (tools := self._tools(separate))
-            self._idle[separate].append(tools)
-        finally:
-            self._ends.pop(get_ident(), None)
-            if self._one_only and not separate:
-                self._one_only.release()
+        with nullcontext() if separate else self._one_only:
+            try:
+                self.begin(separate)
+                yield (tools := self._tools(separate))
+                self._idle[separate].append(tools)
+            finally:
+                self._ends.pop(get_ident(), None)
 
     def begin(self, separate: bool) -> None:
         """Start the time limit of a run. A worker whose run exceeds it ends its own process."""
@@ -178,7 +166,7 @@ def try_out(key: str, rows: Array, separate: bool) -> Trial:
             pool.begin(separate)
             simulator.renew()
             try:
-                first = _copied(simulator.run(values))
+                first = {name: recorded.copy() for name, recorded in simulator.run(values).items()}
                 taken = perf_counter() - start
                 for other in (rows[-1], values):
                     simulator.reset()
@@ -195,7 +183,7 @@ def try_out(key: str, rows: Array, separate: bool) -> Trial:
 
 def do_runs(key: str, first: int, rows: Array, resets: bool, separate: bool) -> Part:
     """Do the runs from number `first` on, one for each row of values. Raises LoadError."""
-    began, simulating, failed = perf_counter(), 0.0, 0
+    began = perf_counter()
     pool = _POOLS[key]
     job = pool.job
     m = job.manoeuvre
@@ -207,7 +195,6 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, separate: bool) -> 
     with pool.lent(separate) as (simulator, figures_of):
         for n, values in enumerate(rows):
             pool.begin(separate)
-            start = perf_counter()
             try:
                 run = simulator.run(values)
             except RunError as error:
@@ -215,46 +202,40 @@ def do_runs(key: str, first: int, rows: Array, resets: bool, separate: bool) -> 
                 reasons.append(str(error))
                 ended[n] = False
                 continue
-            finally:
-                simulating += perf_counter() - start
             for place, name in zip(kept, job.kept, strict=True):
                 place[n] = run[name] if all_points else run[name][points]
-            reason = ""
-            if job.figures:
-                figures[n], reason = figures_of.of({**dict(zip(m.varied, values.tolist(), strict=True)), **run})
+            figures[n], reason = figures_of.of({**dict(zip(m.varied, values.tolist(), strict=True)), **run})
             statuses.append(INCOMPLETE if reason else DONE)
             reasons.append(reason)
-            start = perf_counter()
             if resets:
                 simulator.reset()
             else:
                 simulator.renew()
-            simulating += perf_counter() - start
-    numbers = np.arange(first, first + len(rows))
-    table = _runs_table(job, first, rows, figures, statuses, reasons)
     trajectories = None
     if job.kept:
         whole = slice(None) if ended.all() else ended  # a slice makes no copy
-        times = np.tile(m.times[points], int(ended.sum()))
-        long = {RUN: np.repeat(numbers[whole], len(points)), TIME: times}
+        numbers = np.arange(first, first + len(rows))[whole]
+        long = {RUN: np.repeat(numbers, len(points)), TIME: np.tile(m.times[points], len(numbers))}
         long |= {name: place[whole].ravel() for name, place in zip(job.kept, kept, strict=True)}
         trajectories = _parquet(pa.table(long), [RUN, TIME])
-    failed = int((~ended).sum())
-    return Part(_parquet(table, [STATUS, REASON]), trajectories, failed, perf_counter() - began, simulating)
+    table = _runs_table(job, first, rows, figures, statuses, reasons)
+    return Part(table, trajectories, int((~ended).sum()), perf_counter() - began)
 
 
 def lost_runs(job: Job, first: int, rows: Array, reason: str) -> Part:
     """Return the rows of runs that did not end."""
     count = len(rows)
     none = np.full((count, len(job.figures)), np.nan)
-    table = _runs_table(job, first, rows, none, [FAILED] * count, [reason] * count)
-    return Part(_parquet(table, [STATUS, REASON]), None, count, 0.0, 0.0)
+    return Part(_runs_table(job, first, rows, none, [FAILED] * count, [reason] * count), None, count, 0.0)
 
 
 def _runs_table(
     job: Job, first: int, rows: Array, figures: Array, statuses: Sequence[str], reasons: Sequence[str]
-) -> pa.Table:
-    """Missing figures become null, because DuckDB and Polars skip it in a median but treat NaN as a large number."""
+) -> bytes:
+    """Return the table with one row for each run.
+
+    Missing figures are null, because DuckDB and Polars skip it in a median but treat NaN as a large number.
+    """
     columns = [
         np.arange(first, first + len(rows)),
         *rows.T,
@@ -262,11 +243,9 @@ def _runs_table(
         statuses,
         pa.array(reasons, pa.string(), mask=np.array(reasons) == ""),
     ]
-    return pa.table([pa.array(column) for column in columns], schema=job.runs_schema)
-
-
-def _copied(run: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
-    return {name: values.copy() for name, values in run.items()}
+    numbers = [(name, pa.float64()) for name in (*job.manoeuvre.varied, *job.figures)]
+    schema = pa.schema([(RUN, pa.int64()), *numbers, (STATUS, pa.string()), (REASON, pa.string())])
+    return _parquet(pa.table([pa.array(column) for column in columns], schema=schema), [STATUS, REASON])
 
 
 def _parquet(table: pa.Table, repeated: Sequence[str]) -> bytes:
