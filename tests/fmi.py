@@ -7,7 +7,7 @@ A function can be called by a common name, which is the name in FMI 3.0 without 
 import ctypes
 import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_char, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
 from types import TracebackType, UnionType
@@ -290,6 +290,18 @@ class Instance(ABC, Generic[AnyFmu]):
 
     @abstractmethod
     def time(self) -> float: ...
+
+    def trajectory(
+        self, steps: range, h: float = 0.1, inputs: Callable[[int], Mapping[str, float]] | None = None
+    ) -> bytes:
+        """Return the outputs after each of consecutive steps, whose inputs are given by the number of the step."""
+        found = b""
+        for n in steps:
+            if inputs:
+                assert self.set(inputs(n)) == OK
+            assert self.step(h * n, h) == OK, self.log
+            found += bytes(reals(*self.get(self.fmu.outputs)))
+        return found
 
     # ---- Derivatives ----
 

@@ -1,4 +1,4 @@
-"""The VideoRay's FMU in either version of FMI, for tests that hold for both."""
+"""The VideoRay's FMU in either version of FMI, for tests that hold for both, and builds without the FMU's page."""
 
 from pathlib import Path
 
@@ -21,3 +21,10 @@ def either_fmu(fmi: int, request: pytest.FixtureRequest) -> Path:
 def either_dir(fmi: int, request: pytest.FixtureRequest) -> Path:
     folder: Path = request.getfixturevalue({2: "videoray_dir", 3: "videoray3_dir"}[fmi])
     return folder
+
+
+@pytest.fixture
+def without_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let builds in this process leave out the FMU's page, which takes most of their time."""
+    monkeypatch.setattr("rov_fmu.build.module", lambda _: b"")
+    monkeypatch.setattr("rov_fmu.build.documentation", lambda *_, **__: {})

@@ -21,10 +21,6 @@ _LAYERS = {2: {"fmi2_host.h"}, 3: {"fmi3_host.h", "buildDescription.xml"}}
 """The files that only one version of FMI has, besides its C files."""
 
 
-def _build(output: Path, *arguments: str) -> int:
-    return main(["build", "--platform", "host", "-o", str(output), *arguments])
-
-
 def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(either_fmu: Path) -> None:
     assert validate_fmu(str(either_fmu)) == []
     for interface in ("CoSimulation", "ModelExchange"):
@@ -113,13 +109,20 @@ def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> Non
         assert [element.get(flag) for flag in flags] == ["false"] * len(flags)
 
 
-@pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.long)], indirect=True)
-def test_the_same_inputs_give_the_same_bytes(either_fmu: Path, fmi: int, tmp_path: Path) -> None:
-    """The same is tested in a notebook in tests/cli/test_start.py."""
+@pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.long)], indirect=True)
+def test_a_second_build_gives_the_same_bytes_and_says_what_it_built(
+    either_fmu: Path, fmi: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The bytes are also tested in a notebook in tests/cli/test_start.py."""
     again = tmp_path / "elsewhere" / "other name.fmu"
     again.parent.mkdir()
-    assert _build(again, "--fmi", str(fmi)) == 0
+    assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(again)]) == 0
     assert again.read_bytes() == either_fmu.read_bytes()
+    assert list(again.parent.iterdir()) == [again]
+    output = capsys.readouterr().out
+    assert str(fmu_compile.host_platform(fmi)) in output
+    assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in output
+    assert "built in" in output
 
 
 def test_another_coefficient_gives_another_guid(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
@@ -130,14 +133,6 @@ def test_another_coefficient_gives_another_guid(videoray_fmu: Path, vehicle: Veh
         guids.append(native_content(load_vehicle(path)).guid)
     assert guids[0] == guids[1] != guids[2]
     assert vehicle.rov["m_rov"] == 6.57
-
-
-def test_the_command_line_prints_what_it_built(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert _build(tmp_path / "rov.fmu") == 0
-    output = capsys.readouterr().out
-    assert str(fmu_compile.host_platform()) in output
-    assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in output
-    assert "built in" in output
 
 
 def test_build_raises_an_error_about_an_unknown_platform(vehicle: Vehicle, tmp_path: Path) -> None:

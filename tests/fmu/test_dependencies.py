@@ -10,7 +10,8 @@ from rov_fmu.fmu.model_description import NATIVE, model_description
 from rov_fmu.fmu.variables import Variable, variables
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
-from tests.vehicles import VEHICLES, a_vehicle, numbered
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.vehicles import EVERYTHING, VEHICLES, a_vehicle, numbered
 from verification.references.equations import calculated
 
 Point = dict[str, float]
@@ -31,8 +32,13 @@ def slopes(rov: Rov, point: Point, knowns: Sequence[str]) -> Slopes:
     return found
 
 
-def motion(layout: Layout, rng: random.Random) -> Point:
-    return {name: rng.uniform(-0.9, 0.9) for name in (*layout.inputs, *layout.state)}
+def motions(layout: Layout, rng: random.Random, pairs: int) -> list[Point]:
+    """Return pairs of random motions, the second of which has the opposite signs."""
+    found = []
+    for _ in range(pairs):
+        point = {name: rng.uniform(-0.9, 0.9) for name in (*layout.inputs, *layout.state)}
+        found += [point, {name: -x for name, x in point.items()}]
+    return found
 
 
 def parameters(rov: Rov, rng: random.Random, tunable: Sequence[bool]) -> Point:
@@ -56,13 +62,19 @@ def declared(rov: Rov, of: str) -> dict[tuple[str, str], str]:
     return found
 
 
-@pytest.mark.parametrize("kind", VEHICLES)
+_ROVS = {"everything": load_vehicle(EVERYTHING).rov} | VEHICLES
+# The default tests have the vehicles with most effects and with fewest.
+_SOME = ("everything", "VideoRay", "heave only", "linear drag alone, late")
+_KINDS = [pytest.param(kind, marks=() if kind in _SOME else pytest.mark.long) for kind in _ROVS]
+
+
+@pytest.mark.parametrize("kind", _KINDS)
 def test_declared_dependencies_are_those_of_the_equations(kind: str) -> None:
-    rov, rng = numbered(VEHICLES[kind].layout), random.Random(1)
+    rov, rng = numbered(_ROVS[kind].layout), random.Random(1)
     knowns = [*rov.layout.inputs, *rov.layout.state]
-    motions = [motion(rov.layout, rng) for _ in range(12)]
+    moving = motions(rov.layout, rng, 2)
     sets = [parameters(rov, rng, tunable) for tunable in ([], [False], [True])]
-    samples = [[slopes(rov, m | k, knowns) for m in motions] for k in sets]
+    samples = [[slopes(rov, m | k, knowns) for m in moving] for k in sets]
 
     def strongest(pair: tuple[str, str]) -> str | None:
         values = [[sample[pair] for sample in of_set] for of_set in samples]
@@ -79,11 +91,11 @@ def test_declared_dependencies_are_those_of_the_equations(kind: str) -> None:
     assert {pair: s for pair, s in found.items() if pair[0].startswith("der(")} == declared(rov, "Derivatives")
 
 
-@pytest.mark.parametrize("kind", VEHICLES)
+@pytest.mark.parametrize("kind", _KINDS)
 def test_declared_initial_dependencies_are_those_of_the_equations(kind: str) -> None:
     """The knowns are inputs, states and coefficients; the only kinds are constant and dependent (2.2.8)."""
-    rov, rng = numbered(VEHICLES[kind].layout), random.Random(2)
-    points = [motion(rov.layout, rng) | parameters(rov, rng, [False, True]) for _ in range(16)]
+    rov, rng = numbered(_ROVS[kind].layout), random.Random(2)
+    points = [m | parameters(rov, rng, [False, True]) for m in motions(rov.layout, rng, 3)]
     samples = [slopes(rov, point, list(point)) for point in points]
     values = {pair: [sample[pair] for sample in samples] for pair in samples[0] if pair[0] not in rov.layout.state}
     found = {pair: "dependent" if vary(of) else "constant" for pair, of in values.items() if any(of)}

@@ -105,15 +105,14 @@ def test_an_oblique_force_has_no_axis(heavy: Vehicle) -> None:
 # ---- rov-fmu build --osp -------------------------------------------------------------------------------------------
 
 
-def _build(path: Path, *arguments: str) -> int:
-    return main(["build", "--platform", "host", "-o", str(path), *arguments])
+def _build(path: Path) -> int:
+    return main(["build", str(BARE), "--platform", "host", "-o", str(path), "--osp"])
 
 
+@pytest.mark.usefixtures("without_page")
 def test_the_option_writes_it_to_the_folder_of_the_fmu(tmp_path: Path) -> None:
     vehicle = load_vehicle(BARE)
-    assert _build(tmp_path / "rov.fmu", str(BARE)) == 0
-    assert [path.name for path in tmp_path.iterdir()] == ["rov.fmu"]
-    assert _build(tmp_path / "rov.fmu", str(BARE), "--osp") == 0
+    assert _build(tmp_path / "rov.fmu") == 0
     # libcosim looks for the name of the model, not of the archive
     path = tmp_path / "bare_OspModelDescription.xml"
     assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]
@@ -121,20 +120,14 @@ def test_the_option_writes_it_to_the_folder_of_the_fmu(tmp_path: Path) -> None:
     assert path.read_bytes() == osp_model_description(vehicle.layout)
 
 
-def test_another_vehicle_has_its_own(tmp_path: Path) -> None:
-    text, other = BARE.read_text(encoding="utf-8"), tmp_path / "other.toml"
-    other.write_text(text.replace('"bare"\nversion', '"pilchard"\nversion'), encoding="utf-8")
-    assert _build(tmp_path / "other.fmu", "--osp", str(other)) == 0
-    assert (tmp_path / "pilchard_OspModelDescription.xml").is_file()
-
-
 def test_a_folder_in_its_place_stops_the_build(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "videoray_OspModelDescription.xml").mkdir()
-    assert _build(tmp_path / "rov.fmu", "--osp") == 2
-    assert "videoray_OspModelDescription.xml: cannot be written: is a folder" in capsys.readouterr().err
+    (tmp_path / "bare_OspModelDescription.xml").mkdir()
+    assert _build(tmp_path / "rov.fmu") == 2
+    assert "bare_OspModelDescription.xml: cannot be written: is a folder" in capsys.readouterr().err
     assert not (tmp_path / "rov.fmu").exists()
 
 
+@pytest.mark.usefixtures("without_page")
 def test_written_whole_or_not_at_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -148,7 +141,7 @@ def test_written_whole_or_not_at_all(
         return replace(self, target)
 
     monkeypatch.setattr(Path, "replace", full)
-    assert _build(tmp_path / "rov.fmu", str(BARE), "--osp") == 2
+    assert _build(tmp_path / "rov.fmu") == 2
     assert f"{path}: cannot be written: No space left on device" in capsys.readouterr().err
     assert path.read_text() == "as it was"
     assert sorted(tmp_path.iterdir()) == [path, tmp_path / "rov.fmu"]

@@ -88,8 +88,14 @@ def test_terminals_are_placed_around_the_icon_without_overlap(kind: str) -> None
         side.append(y1)
 
 
-@pytest.mark.parametrize("content_of", [native_content, python_content])
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize(
+    ("name", "content_of"),
+    [
+        pytest.param(name, of, marks=() if (name, of) == ("bluerov2_heavy", native_content) else pytest.mark.long)
+        for name in SHIPPED
+        for of in (native_content, python_content)
+    ],
+)
 def test_the_fmu_has_them_with_their_pictures(name: str, content_of: Callable[..., Content]) -> None:
     vehicle = load_vehicle(SHIPPED[name])
     files = content_of(vehicle, pictures(vehicle.rov)).files

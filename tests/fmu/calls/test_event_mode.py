@@ -2,21 +2,12 @@
 
 import pytest
 
-from tests.fmi import CO_SIMULATION, EVENT, MODEL_EXCHANGE, OK, STEP, WARNING, WITH_EVENTS, reals, room
-from tests.fmi3 import Fmu, Instance, Stepped, flags
+from tests.fmi import CO_SIMULATION, EVENT, MODEL_EXCHANGE, OK, STEP, WARNING, WITH_EVENTS, room
+from tests.fmi3 import Fmu, Stepped, flags
 
 MOVING = {"u_l": 0.6, "u_r": 0.2, "u_t": -0.4, "u": 0.3, "r": -0.5, "V_E": 0.1}
 CHANGES = {"beta_u": 0.7, "alpha_w": 1.3, "u_l": -0.5, "u": -0.2, "psi": 1.0, "N_ext": 0.05}
 """New values of tunable parameters, inputs and states."""
-
-
-def run(rov: Instance, first: int) -> bytes:
-    """Return the outputs after each of ten steps."""
-    result = b""
-    for i in range(first, first + 10):
-        assert rov.step(0.1 * i, 0.1) == OK
-        result += bytes(reals(*rov.get(rov.fmu.outputs)))
-    return result
 
 
 @pytest.mark.parametrize("kind", [MODEL_EXCHANGE, WITH_EVENTS])
@@ -56,14 +47,14 @@ def test_values_set_in_event_mode_hold_afterwards(fmu3: Fmu) -> None:
         assert rov.set(MOVING) == OK
         rov.reach(STEP)
         plain.start(MOVING)
-        assert run(rov, 0) == run(plain, 0)
+        assert rov.trajectory(range(10)) == plain.trajectory(range(10))
         end = dict(zip(fmu3.states, rov.get(fmu3.states), strict=True))
         rov.expect("EnterEventMode")
         assert rov.set(CHANGES) == OK
         rov.update()
         rov.expect("EnterStepMode")
         changed.start({**MOVING, **end, **CHANGES}, at=rov.time())
-        assert run(rov, 10) == run(changed, 10) != run(plain, 10)
+        assert rov.trajectory(range(10, 20)) == changed.trajectory(range(10, 20)) != plain.trajectory(range(10, 20))
         assert rov.log == plain.log == []
 
 
@@ -75,7 +66,7 @@ def test_parameters_can_be_tuned_between_steps_with_a_warning_if_event_mode_is_u
         for value in (0.5, 0.7):
             assert rov.set({"beta_u": value}) == OK
         changed.start({**MOVING, "beta_u": 0.7})
-        assert run(rov, 0) == run(changed, 0)
+        assert rov.trajectory(range(10)) == changed.trajectory(range(10))
         assert [(m.status, m.text.split()[:2]) for m in rov.log] == [(WARNING, ["fmi3SetFloat64:", "beta_u"])] * (
             kind == WITH_EVENTS
         )

@@ -61,7 +61,7 @@ def separate_steps(fmu3: fmi3.Fmu, times: list[float], control: Control) -> list
 
 
 @pytest.mark.parametrize("early", [False, True])
-@pytest.mark.parametrize("h", [0.3 * PIECE, PIECE, 1.5 * PIECE, 1e-3, 0.1, 5.0])
+@pytest.mark.parametrize("h", [0.3 * PIECE, PIECE, 1.5 * PIECE, 1e-3, 0.1, pytest.param(5.0, marks=pytest.mark.long)])
 def test_the_callback_is_called_at_the_ends_of_a_step_and_every_tenth_of_a_millisecond(
     fmu3: fmi3.Fmu, h: float, early: bool
 ) -> None:
@@ -102,15 +102,15 @@ def test_inputs_set_inside_are_held_from_then_on_and_outputs_are_those_of_that_t
 
     with moving(fmu3, control, kind=kind) as rov:
         rov.on_update = act
-        assert rov.step(0.0, 0.05) == OK
+        assert rov.step(0.0, 0.01) == OK
         first = len(seen)
         for n in (1, 2):
-            assert rov.step(0.05 * n, 0.05) == OK
+            assert rov.step(0.01 * n, 0.01) == OK
         assert rov.mode() == STEP
         assert rov.log == []
-        assert rov.get(fmu3.outputs) == seen[0.05 * 2 + 0.05]
+        assert rov.get(fmu3.outputs) == seen[0.01 * 2 + 0.01]
     expected = separate_steps(fmu3, list(seen), control)
-    assert (first, len(seen)) == (501, 1501)
+    assert (first, len(seen)) == (101, 301)
     assert list(seen.values())[:first] == expected[:first]  # to the bit; later times have rounding errors
     for outputs, reference in zip(seen.values(), expected, strict=True):
         assert outputs == pytest.approx(reference, rel=1e-12, abs=1e-13)
@@ -236,7 +236,8 @@ def test_pieces_within_a_step_are_counted_over_all_its_updates(fmu3: fmi3.Fmu) -
 # ---- A host in C ----
 
 
-@pytest.mark.parametrize("name", ["videoray", pytest.param("bluerov2_heavy", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["videoray", pytest.param("bluerov2_heavy", marks=pytest.mark.weekly)])
 def test_long_steps_with_updates_give_the_same_motion_as_short_steps(name: str, tmp_path: Path) -> None:
     sources = native_content(load_vehicle(SHIPPED[name]), fmi=3).sources
     program = compile_c(Path(__file__).with_name("intermediate.c"), tmp_path / "intermediate", sources)

@@ -23,7 +23,6 @@ from tests.fmi import (
     WITH_EVENTS,
     AnyInstance,
     Fmu,
-    reals,
 )
 
 H = 0.05
@@ -45,12 +44,7 @@ def commands(i: int) -> dict[str, float]:
 
 def run(rov: AnyInstance, first: int, last: int) -> bytes:
     """Return all outputs after each step from `first` to before `last`."""
-    result = b""
-    for i in range(first, last):
-        assert rov.set(commands(i)) == OK
-        assert rov.step(H * i, H) == OK, rov.log
-        result += bytes(reals(*rov.get(rov.fmu.outputs)))
-    return result
+    return rov.trajectory(range(first, last), H, commands)
 
 
 @pytest.fixture(scope="module")

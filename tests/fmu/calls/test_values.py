@@ -20,7 +20,6 @@ from tests.fmi import (
     AnyInstance,
     Fmu,
     integers,
-    reals,
     references,
     room,
     strings,
@@ -98,14 +97,6 @@ def test_values_that_overflow_are_logged_and_not_returned(fmu: Fmu) -> None:
             assert all("der(w) overflows" in m.text or "derivative of w overflows" in m.text for m in rov.log)
 
 
-def trajectory(rov: AnyInstance, steps: int = 5) -> bytes:
-    result = b""
-    for i in range(steps):
-        assert rov.step(0.1 * i, 0.1) == OK
-        result += bytes(reals(*rov.get(rov.fmu.outputs)))
-    return result
-
-
 @pytest.mark.parametrize("value", [nextafter(1.0, 2.0), 1.5, -1.5, 1e308, -1e308])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_beyond_full_saturates_and_is_logged_once(fmu: Fmu, command: str, value: float) -> None:
@@ -113,10 +104,10 @@ def test_a_command_beyond_full_saturates_and_is_logged_once(fmu: Fmu, command: s
     with fmu.instance() as full:
         full.start(moving | {command: 1.0 if value > 0.0 else -1.0})
         assert full.log == []
-        expected = trajectory(full)
+        expected = full.trajectory(range(5))
     with fmu.instance() as rov:
         rov.start(moving | {command: value})
-        assert trajectory(rov) == expected
+        assert rov.trajectory(range(5)) == expected
         for _ in range(3):
             assert rov.set({command: -value}) == OK
             assert rov.set({command: value}) == OK
