@@ -157,19 +157,14 @@ def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -
     assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in log.findings
 
 
-def test_another_vehicle_and_another_port_are_left_out(bluerov2: Layout, tmp_path: Path) -> None:
-    path = tlog(tmp_path / "dive.tlog", dive())
+def test_another_vehicle_another_port_and_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
+    path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
     tlog(path, [servos(100.0 + n, *[1900] * 6) for n in range(5)], system=2)
     tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
     log = read_log(path, bluerov2)
     assert not of_axis(log, "heave").thrusters["1"].any()
-    assert Finding("several vehicles", file="dive.tlog", names={"system": "1"}) in log.findings
-
-
-def test_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
-    path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
-    log = read_log(path, bluerov2)
     assert of_axis(log, "heave").thrusters["5"][0] == 0.0
+    assert Finding("several vehicles", file="dive.tlog", names={"system": "1"}) in log.findings
     assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
 
 
