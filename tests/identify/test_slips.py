@@ -244,9 +244,7 @@ def never_at_rest() -> list[Recording]:
 
 @pytest.mark.long
 @pytest.mark.parametrize(("logs", "seconds"), [(of_6000_rows, 45.0), (never_at_rest, 40.0)])
-def test_an_identification_takes_seconds(
-    logs: Callable[[], list[Recording]], seconds: float, tmp_path: Path
-) -> None:
+def test_an_identification_takes_seconds(logs: Callable[[], list[Recording]], seconds: float, tmp_path: Path) -> None:
     """The whole command runs, without the report; the limits are five times what was measured."""
     folder = write_folder(tmp_path, logs())
     began = time.process_time()  # of this process alone, whatever else the machine does

@@ -19,10 +19,14 @@ def record(vehicle: Vehicle, axis: Axis, *plan: tuple[float, float], seed: int =
 
 
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
-@pytest.mark.parametrize("command", [0.2, 0.3, 0.5, 0.7, -0.2, -0.7])
+@pytest.mark.parametrize("command", [0.2, 0.7, -0.5])
 def test_step_from_rest_gives_both(axis: Axis, command: float, vehicle: Vehicle) -> None:
     V_ss, Tau = vehicle.rov.response(axis, command)
-    (step,) = steps(record(vehicle, axis, (0.0, 3.0), (command, 12.0 * Tau + 4.0)))
+    recording = record(vehicle, axis, (0.0, 3.0), (command, 12.0 * Tau + 4.0))
+    (step,) = steps(recording)
+    assert step.steady is not None
+    assert step.steady[1] == recording.time[-1], "what is steady is so to the last sample"
+    assert step.steady[0] > 3.0
     assert step.V_ss == pytest.approx(V_ss, rel=0.01)
     assert step.Tau == pytest.approx(Tau, rel=0.1)
     assert (step.start, step.command, step.before, step.note) == (3.0, command, 0.0, "")
@@ -68,14 +72,6 @@ def test_coloured_noise_widens_the_standard_error(vehicle: Vehicle) -> None:
     assert plain.V_ss_error
     assert turbulent.V_ss_error
     assert 3.0 < turbulent.V_ss_error / plain.V_ss_error < 12.0
-
-
-def test_what_is_steady_is_so_to_the_last_sample(vehicle: Vehicle) -> None:
-    recording = record(vehicle, HEAVE, (0.0, 3.0), (0.3, 30.0))
-    (step,) = steps(recording)
-    assert step.steady is not None
-    assert step.steady[1] == recording.time[-1]
-    assert 3.0 < step.steady[0] < 25.0
 
 
 def test_hold_too_short_for_a_steady_state_has_none(vehicle: Vehicle) -> None:

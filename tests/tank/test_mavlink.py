@@ -100,11 +100,8 @@ def test_a_telemetry_log_tells_of_a_dive(bluerov2: Layout, tmp_path: Path) -> No
 
 def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
     """Motor 6 is on servo 9 and turns in the opposite direction; the lights are on servo 6."""
-    parameters = [
-        parameter("MOT_6_DIRECTION", -1.0),
-        parameter("MOT_1_DIRECTION", 1.0),
-        parameter("SERVO9_FUNCTION", 38),
-    ]
+    numbers = {"MOT_6_DIRECTION": -1.0, "MOT_1_DIRECTION": 1.0, "SERVO9_FUNCTION": 38}
+    parameters = [parameter(name, value) for name, value in numbers.items()]
     messages = []
     for n in range(N):
         down = 0.5 * (n >= 10)
@@ -329,10 +326,9 @@ def test_what_is_no_log_is_one_clear_line(
     assert capfd.readouterr() == ("", "")
 
 
-def test_more_thrusters_than_servos_and_no_motion_are_told(tmp_path: Path, bluerov2: Layout) -> None:
-    path = tlog(tmp_path / "a.tlog", [servos(0.1 * n, *[1500] * 6) for n in range(N)])
+def test_outputs_of_servos_alone_are_refused(tmp_path: Path, bluerov2: Layout) -> None:
     with pytest.raises(DataFileError, match="nothing measured"):
-        read_log(path, bluerov2)
+        read_log(tlog(tmp_path / "a.tlog", [servos(0.1 * n, *[1500] * 6) for n in range(N)]), bluerov2)
 
 
 def test_without_pymavlink_the_line_says_how_to_get_it(

@@ -29,7 +29,9 @@ def folder(tmp_path: Path) -> Path:
 # ---- What is read ----------------------------------------------------------------------------------------------------
 
 
-def test_the_folder_of_the_videoray_holds_the_measurements_of_tables_3_to_7(vehicle: Vehicle) -> None:
+def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table_9(
+    vehicle: Vehicle,
+) -> None:
     found = load_tank_tests(TESTS)
     tables = {table.axis.name: table for table in load_tables(vehicle)}
     for axis, table in tables.items():
@@ -41,19 +43,12 @@ def test_the_folder_of_the_videoray_holds_the_measurements_of_tables_3_to_7(vehi
         }
     upward = [(row.command, row.value) for row in found.steady["heave"] if row.command < 0.0]
     assert upward == [(-0.7, -0.37), (-0.5, -0.25), (-0.3, -0.17), (-0.2, -0.13)][::-1]
-
-
-def test_what_no_test_tells_is_table_9s(vehicle: Vehicle) -> None:
-    known = load_tank_tests(TESTS).given.known
+    known = found.given.known
     assert {name: q.value for name, q in known.items()} == {
         name: vehicle.rov[name] for name in ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top")
     }
     assert all("Table 9" in q.source for q in known.values())
-
-
-def test_every_input_has_its_hash() -> None:
-    inputs = load_tank_tests(TESTS).inputs
-    assert inputs == {
+    assert found.inputs == {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in TESTS.iterdir()
         if path.suffix == ".csv" or path.name == "rov.toml"
