@@ -192,7 +192,7 @@ def velocity_fit(measured: np.ndarray, modelled: np.ndarray) -> float:
 
 @pytest.mark.parametrize(
     "axis",
-    [HEAVE, pytest.param(SURGE, marks=pytest.mark.long), pytest.param(YAW, marks=pytest.mark.weekly)],
+    [pytest.param(HEAVE, marks=pytest.mark.long), *(pytest.param(a, marks=pytest.mark.weekly) for a in (SURGE, YAW))],
     ids=lambda axis: axis.name,
 )
 def test_pulses_that_were_not_fitted_are_predicted(axis: Axis) -> None:

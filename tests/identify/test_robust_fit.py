@@ -28,6 +28,7 @@ def _loads(fit: RecordingsFit) -> list[Effect]:
     return [effect for effect in fit.effects if effect.kind == "load"]
 
 
+@pytest.mark.long
 def test_an_outlier_counts_by_its_side_not_its_size(vehicle: Vehicle) -> None:
     near, far = (_fit(vehicle.rov, size) for size in (20.0, 2000.0))
     assert near.simulations[0].outliers == far.simulations[0].outliers
