@@ -445,13 +445,14 @@ def _tune(
     output: Path | None,
 ) -> None:
     """Find alpha and beta of an axis for a wanted response."""
+    from rov_fmu.identify.findings import sentences
     from rov_fmu.identify.tuning import implausible
     from rov_fmu.interface.tune_command import tune_vehicle
     from rov_fmu.report.console_results import print_tuning
 
     tuning = tune_vehicle(vehicle, AXES[axis], command, v_ss, tau, points, output)
     print_tuning(tuning)
-    for message in implausible(tuning):
+    for message in sentences(implausible(tuning)):
         _warn(message)
 
 

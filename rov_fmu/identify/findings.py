@@ -186,6 +186,15 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "inertia were {inertia}. A wrong unit or scale (of the motion, the commands, the thrust, {mass}) may cause it, "
         "or a delay or a lag that the fit does not have"
     ),
+    "implausible tuned alpha": (
+        "{alpha} = {value:.3g} is not within the usual {low:g} ... {high:g}: the {push} would be {value:.3g} times "
+        "that of the thrust curves, which tests give to better than a factor of 2. Check the wanted V_ss and its unit "
+        "({unit}), the command, and the thrust curves"
+    ),
+    "implausible tuned beta": (
+        "{beta} = {value:.3g} is not within the usual {low:g} ... {high:g}: the vehicle would move as if its inertia "
+        "were {inertia}, which no known vehicle does. Check the wanted Tau (s) and {mass}"
+    ),
     "wrong scale": _wrong_scale,
     "too fast": (
         "{files}: {quantity} [{unit}] tells of {speed:.3g} {speed_unit}, which no ROV reaches: is its unit right, and "

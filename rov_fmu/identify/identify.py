@@ -50,7 +50,7 @@ _ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
 def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Identification:
     """Identify a vehicle from its tests. Raises DataFileError, VehicleFileError."""
     given = tests.given
-    against = load_vehicle(given.against) if given.against else None
+    against = load_vehicle(given.description.against) if given.description.against else None
     on_progress("thrust curves", 0.0)
     thrust = {curve.name: fit for curve in given.rov.layout.curves if (fit := _thrust(tests, curve))}
     found = _Found(tests)
@@ -139,7 +139,7 @@ class _Found:
     def _estimates(self, together: Together) -> dict[str, Estimated]:
         """Return the standard errors and correlations of the identified coefficients, and those kept from the base."""
         given = self.tests.given
-        base = load_vehicle(given.base) if given.base else None
+        base = load_vehicle(given.description.base) if given.description.base else None
         rows = base.estimates if base else {}
         kept = {
             name
@@ -166,10 +166,10 @@ class _Found:
             **dict(given.head),
             rov=Rov(self.rov.layout, {name: self.rov[name] for name in names}),
             sources={name: self.sources[name] for name in names},
-            command_range=given.command_range or _command_range(results, self.rov),
+            command_range=given.description.command_range or _command_range(results, self.rov),
             alternatives={},
             data=None,
-            limits=(*given.limits, *delays),
+            limits=(*given.description.limits, *delays),
             intervals={name: self.intervals[name] for name in names if name in self.intervals},
             estimates=self._estimates(together),
             provenance=made,
@@ -304,7 +304,7 @@ def _next_test(result: AxisResult, rov: Rov) -> NextTest | None:
 
 
 def _weight(tests: TankTests, window: str, command: float) -> float:
-    low, high = tests.given.windows.get(window, (-1.0, 1.0))
+    low, high = tests.given.description.windows.get(window, (-1.0, 1.0))
     return float(low - 1e-9 <= command <= high + 1e-9)
 
 

@@ -19,6 +19,7 @@ from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
+from rov_fmu.tank.findings import Finding
 
 ALPHA = 0.5, 2.0
 """The range of a plausible α. Thrust that is measured in a tank is known to better than a factor of 2; the paper has α
@@ -121,22 +122,19 @@ def read_points(path: Path, rov: Rov, axis: Axis) -> tuple[Point, ...]:
     return tuple(points)
 
 
-def implausible(tuning: Tuning) -> Iterator[str]:
-    """Yield a sentence for an implausible α, and for an implausible β."""
+def implausible(tuning: Tuning) -> Iterator[Finding]:
+    """Yield a finding about an implausible α, and one about an implausible β."""
     axis, rov = tuning.axis, tuning.rov
     alpha, beta = map(axis.coefficient, ("alpha", "beta"))
     if not ALPHA[0] <= rov[alpha] <= ALPHA[1]:
-        yield (
-            f"{alpha} = {rov[alpha]:.3g} is not within the usual {ALPHA[0]:g} ... {ALPHA[1]:g}: the {axis.push} would "
-            f"be {rov[alpha]:.3g} times that of the thrust curves, which tests give to better than a factor of 2. "
-            f"Check the wanted V_ss and its unit ({axis.unit}), the command, and the thrust curves"
-        )
+        names = {"alpha": alpha, "push": axis.push, "unit": axis.unit}
+        numbers = {"value": rov[alpha], "low": ALPHA[0], "high": ALPHA[1]}
+        yield Finding("implausible tuned alpha", axis=axis.name, names=names, numbers=numbers)
     low, high, inertia = beta_range(rov, axis)
     if any(p.quantity == "Tau" for p in tuning.points) and not low <= rov[beta] <= high:
-        yield (
-            f"{beta} = {rov[beta]:.3g} is not within the usual {low:g} ... {high:g}: the vehicle would move as if "
-            f"its inertia were {inertia}, which no known vehicle does. Check the wanted Tau (s) and {axis.inertia}"
-        )
+        names = {"beta": beta, "inertia": inertia, "mass": axis.inertia}
+        numbers = {"value": rov[beta], "low": low, "high": high}
+        yield Finding("implausible tuned beta", axis=axis.name, names=names, numbers=numbers)
 
 
 def _impossible(rov: Rov, axis: Axis, point: Point) -> str | None:

@@ -16,7 +16,7 @@ from rov_fmu.report.plots.fits import plot_drag, plot_known, plot_response, plot
 from rov_fmu.report.plots.recordings import CommandStep, clearest_step, plot_recording, plot_step
 from rov_fmu.report.plots.svg import Draw, inline_svg
 from rov_fmu.report.templates import number, page
-from rov_fmu.tank.given import ROV_FILE
+from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.tank_tests import TankTests
 
 _PLOT, _WIDE = (3.7, 3.5), (4.7, 3.0)  # inches
@@ -87,8 +87,8 @@ def _holds(tests: TankTests) -> dict[str, str]:
     """Return the content of each input file, in words."""
     holds = dict.fromkeys(tests.inputs, "not used")
     holds[ROV_FILE] = "what is given beforehand: mass, geometry"
-    if tests.given.base:
-        holds[tests.given.base_name] = "the vehicle to begin from"
+    if tests.given.description.base:
+        holds[tests.given.description.base_name] = "the vehicle to begin from"
     tables = {"force": tests.thrust, "steady velocity": tests.steady, "time constant": tests.time_constants}
     for what, rows in tables.items():
         files = Counter(row.file for row in chain(*rows.values()))

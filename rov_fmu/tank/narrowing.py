@@ -20,8 +20,8 @@ from rov_fmu.model.layout import (
     coefficient_name,
 )
 from rov_fmu.model.rov import Rov
+from rov_fmu.tank.description import Description
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.given import Description
 from rov_fmu.vehicle.form import Head
 from rov_fmu.vehicle.geometry import check_layout, places
 from rov_fmu.vehicle.quantity import Quantity
@@ -35,6 +35,8 @@ _COUPLED_AXES = (SURGE, SWAY, YAW)
 class Given:
     """What is known about the vehicle before the identification."""
 
+    description: Description
+    """The vehicle as rov.toml describes it."""
     head: Head
     rov: Rov
     """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
@@ -46,17 +48,6 @@ class Given:
     """The sources of each thruster's direction and position."""
     lag: tuple[str, ...]
     """The curves whose thrusters' lag is fitted."""
-    windows: Mapping[str, tuple[float, float]]
-    """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
-    command_range: tuple[float, float] | None
-    against: Path | None
-    """A vehicle file to compare with."""
-    base: Path | None = None
-    """A vehicle file that gives what the tests do not."""
-    base_name: str = ""
-    """The value of `base` in rov.toml."""
-    limits: tuple[str, ...] = ()
-    """Sentences about what the model leaves out."""
 
 
 @dataclass(frozen=True)
@@ -113,17 +104,12 @@ def narrowed(description: Description, tested: Tested, folder: Path) -> Narrowed
 def _given(description: Description, head: Head, layout: Layout, known: Mapping[str, Quantity]) -> Given:
     names = layout.coefficients
     return Given(
+        description=description,
         head=head,
         rov=Rov(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
         known={name: known[name] for name in names if name in known},
         thruster_sources={t.name: description.thruster_sources[t.name] for t in layout.thrusters},
         lag=tuple(curve.name for curve in layout.curves if curve.name in description.lag),
-        windows=description.windows,
-        command_range=description.command_range,
-        against=description.against,
-        base=description.base,
-        base_name=description.base_name,
-        limits=description.limits,
     )
 
 

@@ -22,8 +22,8 @@ from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import FileError, did_you_mean
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.model.layout import AXES, Axis, Layout
+from rov_fmu.tank.description import ROV_FILE, Description, read_description
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.given import ROV_FILE, Description, read_description
 from rov_fmu.tank.logs import read_log
 from rov_fmu.tank.narrowing import Given, Narrowed, Tested, narrowed
 from rov_fmu.tank.recording import Recording
@@ -191,8 +191,8 @@ class _Reader:
             if kind != "thrust" or subject in curves:
                 rows[kind][subject] = tuple(found)
         inputs = {ROV_FILE: _hash(self.folder / ROV_FILE)}
-        if given.base:
-            inputs[given.base_name] = _hash(given.base)
+        if given.description.base:
+            inputs[given.description.base_name] = _hash(given.description.base)
         return TankTests(
             self.folder,
             given,

@@ -6,6 +6,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from rov_fmu.identify.effects.coupling import EAST, NORTH
 from rov_fmu.identify.effects.extras import EffectKind, Extra
@@ -65,7 +66,8 @@ def test_a_short_dive_is_solved_from_afar() -> None:
     model, _ = simulator(dived(60.0).recorded())
     thin = replace(model, data=tuple(d.thinned(300) for d in model.data))
     coefficients = {name: (0.5 if name.startswith("beta") else 2.0) * TRUTH[name] for name in NAMES}
-    found = solve(thin, thin.start(coefficients, {}), "linear", 1e-6).x
+    with threadpool_limits(1, user_api="blas"):  # as in fit_recordings()
+        found = solve(thin, thin.start(coefficients, {}), "linear", 1e-6).x
     rov, flow = thin.rov(found), thin.extra_values(found)
     assert [rov[f"beta_{v}"] for v in "uv"] == pytest.approx([1.0, 1.0], rel=0.03)
     for v in "uvr":  # drag at a usual velocity: a_d and b_d are hardly told apart in a minute

@@ -1,8 +1,7 @@
 """Fits to points, and a whole folder of tests to a vehicle file."""
 
 import shutil
-import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from rov_fmu.cli import main
 from rov_fmu.identify.identification import AxisResult, Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
@@ -20,7 +18,6 @@ from rov_fmu.identify.points.response_fit import fit_response
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.report import report_page
-from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.paper import PAPER
@@ -89,6 +86,7 @@ def test_covariance_correlation_and_band_are_those_of_a_straight_line() -> None:
     assert ((low < fit.value(COMMANDS)) & (fit.value(COMMANDS) < high)).all()
 
 
+@pytest.mark.long
 def test_intervals_and_bands_of_thrust_cover_the_truth() -> None:
     """The share of 500 seeds within the intervals is 95 %, within three standard deviations of 1 %."""
     truth = 42.9 * COMMANDS**2 + 2.711 * COMMANDS
@@ -123,11 +121,9 @@ def test_two_points_have_a_curve_but_no_interval() -> None:
 # ---- V_ss and Tau ----------------------------------------------------------------------------------------------------
 
 
-def points_of(m: Axis, k: Rov, commands: tuple[float, ...], scatter: Array | None = None) -> list[Point]:
-    """Return V_ss and Tau of the model, with relative errors."""
-    found = [Point(q, c, k.response(m, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
-    factors = 1.0 + (np.zeros(len(found)) if scatter is None else scatter)
-    return [replace(p, value=p.value * f) for p, f in zip(found, factors.tolist(), strict=True)]
+def points_of(m: Axis, k: Rov, commands: tuple[float, ...]) -> list[Point]:
+    """Return V_ss and Tau of the model."""
+    return [Point(q, c, k.response(m, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in commands]
 
 
 @pytest.mark.parametrize("m", [SURGE, HEAVE, YAW], ids=lambda m: m.name)
@@ -140,19 +136,6 @@ def test_points_of_a_model_give_the_model(m: Axis, vehicle: Vehicle) -> None:
         assert fit.rov[name] == pytest.approx(k[name], rel=1e-5)
     assert fit.rms("V_ss") < 1e-7
     assert fit.rms("Tau", leave_one_out=True) < 1e-6
-
-
-@pytest.mark.long
-def test_intervals_of_points_cover_the_truth(vehicle: Vehicle) -> None:
-    """With 1 % scatter, 90-99 % of 60 seeds are within the intervals, and drag is never negative."""
-    k, random = vehicle.rov, np.random.default_rng(2)
-    hits: dict[str, list[bool]] = {}
-    for _ in range(60):
-        fit = fit_response(SURGE, points_of(SURGE, k, (0.2, 0.3, 0.5, 0.7), 0.01 * random.standard_normal(8)), k)
-        for name, (low, high) in fit.estimate.intervals.items():
-            assert low >= 0.0
-            hits.setdefault(name, []).append(low <= k[name] <= high)
-    assert all(0.9 <= np.mean(share) <= 0.99 for share in hits.values()), {n: np.mean(s) for n, s in hits.items()}
 
 
 def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
@@ -208,7 +191,7 @@ def test_recordings_of_vehicles_that_differ_disagree(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write thrust tests with noise, and nine recordings of 60 s at 50 Hz of the VideoRay with α = 1."""
+    """Write thrust tests with noise, and a recording of 60 s at 40 Hz of each axis of the VideoRay with α = 1."""
     folder, random = tmp_path_factory.mktemp("full"), np.random.default_rng(0)
     write_rov(folder)
     k = load_vehicle(VIDEORAY).rov.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0})
@@ -216,16 +199,16 @@ def full_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         rows = [(c, k.force(m, c) + 0.05 * random.standard_normal()) for c in np.arange(0.1, 0.81, 0.1).tolist()]
         write_csv(folder / f"thrust_{thruster}.csv", "command [1],force [N]", rows)
     for m in AXES:
-        for n, plan in enumerate(PLANS[m.name], 1):
-            write_log(folder, str(n), clean(k, m, plan, 50.0).noisy(random))
+        _, slow, fast = PLANS[m.name]
+        write_log(folder, "1", clean(k, m, (*slow[:3], *fast[1:3]), 40.0).noisy(random))
     return folder
 
 
-def write_rov(folder: Path, **windows: tuple[float, float]) -> None:
+def write_rov(folder: Path, known: str = "", **windows: tuple[float, float]) -> None:
     """Write rov.toml with mass and geometry of the VideoRay."""
-    head, known = (TESTS / "rov.toml").read_text(encoding="utf-8").split("[known]")
-    lines = [line for line in known.splitlines() if line.startswith(("m_rov", "I_r", "R ", "gamma"))]
-    text = head.replace('against = "videoray"', "") + "[known]\n" + "\n".join(lines) + "\n[windows]\n"
+    head, table = (TESTS / "rov.toml").read_text(encoding="utf-8").split("[known]")
+    lines = [line for line in table.splitlines() if line.startswith(("m_rov", "I_r", "R ", "gamma"))]
+    text = head.replace('against = "videoray"', "") + "[known]\n" + known + "\n".join(lines) + "\n[windows]\n"
     text += "".join(f"{name} = [{low}, {high}]\n" for name, (low, high) in windows.items())
     (folder / "rov.toml").write_text(text, encoding="utf-8")
 
@@ -236,10 +219,7 @@ def write_csv(path: Path, header: str, rows: list[tuple[float, float]]) -> None:
 
 @pytest.fixture(scope="module")
 def full(full_folder: Path) -> Identification:
-    start = time.process_time()  # of this process alone, whatever else the machine does
-    found = identify(load_tank_tests(full_folder))
-    assert time.process_time() - start <= 20.0
-    return found
+    return identify(load_tank_tests(full_folder))
 
 
 def test_full_folder_gives_the_vehicle_back(full: Identification, full_folder: Path) -> None:
@@ -262,20 +242,10 @@ def test_full_folder_gives_the_vehicle_back(full: Identification, full_folder: P
     assert full.vehicle.command_range == (0.2, 0.7)
 
 
-@pytest.mark.parametrize("by", ["writer", pytest.param("command", marks=pytest.mark.long)])
-def test_full_folder_reaches_the_vehicle_file(
-    by: str, full_folder: Path, full: Identification, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_full_folder_reaches_the_vehicle_file(full: Identification, tmp_path: Path) -> None:
     path = tmp_path / "full.toml"
-    if by == "command":
-        start = time.process_time()
-        assert main(["identify", str(full_folder), "-o", str(path)]) == 0
-        assert time.process_time() - start <= 20.0
-        assert "log_yaw_3.csv" in capsys.readouterr().out
-    else:
-        write_vehicle(full.vehicle, path)
+    write_vehicle(full.vehicle, path)
     read, made = load_vehicle(path), full.vehicle
-    assert [p.name for p in tmp_path.iterdir()] == ["full.toml"]
     for name in PAPER.coefficients:
         assert read.rov[name] == pytest.approx(made.rov[name], rel=1e-5)
     assert read.intervals.keys() == made.intervals.keys()
@@ -287,7 +257,7 @@ def test_full_folder_reaches_the_vehicle_file(
     assert one.correlation == pytest.approx(other.correlation, abs=1e-6)
     assert replace(read, rov=made.rov, intervals=made.intervals, estimates=made.estimates) == made
     assert read.provenance
-    assert "heave: output error over 3 recordings" in read.provenance.method
+    assert "heave: output error over 1 recording" in read.provenance.method
 
 
 def test_points_of_a_comparison_stand_beside_the_model(full: Identification) -> None:
@@ -312,12 +282,21 @@ STEADY = {
 }
 
 
+Tables = Mapping[str, list[tuple[float, float]]]
+
+
 def folder_with(
-    folder: Path, tables: Mapping[str, list[tuple[float, float]]] | None = None, **windows: tuple[float, float]
+    folder: Path,
+    tables: Tables | None = None,
+    axes: Sequence[str] = ("surge", "heave", "yaw"),
+    known: str = "",
+    **windows: tuple[float, float],
 ) -> Identification:
-    """Identify a small folder, with other tables by file name."""
-    write_rov(folder, **windows)
-    all_tables = {"thrust_rear": FORCES, "thrust_top": TOP, **{f"steady_{axis}": rows for axis, rows in STEADY.items()}}
+    """Identify a small folder with thrust and steady velocities of some axes, and with other tables by file name."""
+    write_rov(folder, known, **windows)
+    all_tables = {f"steady_{axis}": STEADY[axis] for axis in axes}
+    all_tables |= {"thrust_top": TOP} if "heave" in axes else {}
+    all_tables |= {"thrust_rear": FORCES} if {"surge", "yaw"} & {*axes} else {}
     for name, rows in {**all_tables, **(tables or {})}.items():
         velocity = "velocity [rad/s]" if "yaw" in name else "velocity [m/s]"
         kind = "force [N]" if "thrust" in name else "time constant [s]" if "time" in name else velocity
@@ -325,68 +304,61 @@ def folder_with(
     return identify(load_tank_tests(folder))
 
 
-Tables = Mapping[str, list[tuple[float, float]]]
-FOUND: dict[str, tuple[Tables, Finding]] = {
-    "no Tau": ({}, Finding("assumed beta", "surge", names={"beta": "beta_u", "inertia": "m_rov"})),
-    "no Tau in yaw": ({}, Finding("assumed beta", "yaw", names={"beta": "beta_r", "inertia": "I_r"})),
-    "few points": (
-        {"steady_heave": [(0.3, 0.15), (0.5, 0.29), (0.7, 0.38)]},
-        Finding("inseparable drag", "heave", names={"a_d": "a_d_w", "b_d": "b_d_w"}),
+FOUND: list[tuple[Tables, list[Finding]]] = [
+    (
+        {
+            "steady_heave": [(0.3, 0.15), (0.5, 0.29), (0.7, 0.38)],
+            "steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)],
+            "thrust_top": TOP[:3],
+        },
+        [
+            Finding("assumed beta", "surge", names={"beta": "beta_u", "inertia": "m_rov"}),
+            Finding("assumed beta", "yaw", names={"beta": "beta_r", "inertia": "I_r"}),
+            Finding("inseparable drag", "heave", names={"a_d": "a_d_w", "b_d": "b_d_w"}),
+            Finding("leave-one-out error", "yaw", names={"quantity": "V_ss"}),
+            Finding("untested thrust", "heave", curve="top", numbers={"tested_low": 0.1, "tested_high": 0.5}),
+        ],
     ),
-    "as many as coefficients": (
-        {"steady_yaw": [(0.3, 1.5), (0.6, 3.1)]},
-        Finding("drag without freedom", "yaw"),
+    (
+        {
+            "steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)],
+            "steady_yaw": [(0.3, 1.5), (0.6, 3.1)],
+            "thrust_rear": [(0.3, 1.0), (0.5, 11.5), (0.7, 30.0)],
+        },
+        [
+            Finding("drag at zero", "heave", names={"coefficient": "b_d_w"}),
+            Finding("drag without freedom", "yaw"),
+            Finding("backward thrust", curve="rear", numbers={"command": 0.27}),
+        ],
     ),
-    "drag at its bound": (
-        {"steady_heave": [(0.2, 0.2), (0.5, 0.28), (0.7, 0.36)]},
-        Finding("drag at zero", "heave", names={"coefficient": "b_d_w"}),
-    ),
-    "one thrust carries": (
-        {"steady_yaw": [(0.2, 1.6), (0.4, 2.0), (0.7, 3.7)]},
-        Finding("leave-one-out error", "yaw", names={"quantity": "V_ss"}),
-    ),
-    "thrust that points backward": (
-        {"thrust_rear": [(0.3, 1.0), (0.5, 11.5), (0.7, 30.0)]},
-        Finding("backward thrust", curve="rear", numbers={"command": 0.27}),
-    ),
-    "weak reverse thrust": (
-        {"thrust_rear": [*FORCES, (-0.5, -8.0)]},
-        Finding("asymmetry", curve="rear", numbers={"measured": -0.34}),
-    ),
-    "slow upward": (
-        {"steady_heave": [*STEADY["heave"], (-0.5, -0.25)]},
-        Finding("asymmetry", "heave", numbers={"measured": -0.11}),
-    ),
-    "thrust not tested": (
-        {"thrust_top": TOP[:3]},
-        Finding("untested thrust", "heave", curve="top", numbers={"tested_low": 0.1, "tested_high": 0.5}),
-    ),
-    "motion in the dead band": (
+    (
         {
             "thrust_top": [(0.1, 0.0), (0.2, 0.0), (0.3, 0.42), (0.4, 0.98), (0.5, 1.62), (0.6, 2.37), (0.7, 3.2)],
-            "steady_heave": [(0.1, 0.08), *STEADY["heave"]],
+            "steady_heave": [(0.1, 0.08), *STEADY["heave"], (-0.5, -0.25)],
         },
-        Finding("no push", "heave", names={"commands": "10%"}),
+        [
+            Finding("no push", "heave", names={"commands": "10%"}),
+            Finding("asymmetry", "heave", numbers={"measured": -0.11}),
+        ],
     ),
-    "two thrusts": (
+    (
         {"thrust_top": TOP[1:3], "steady_heave": [(0.3, 0.163), (0.5, 0.28)]},
-        Finding("thrust without freedom", curve="top", numbers={"count": 2}),
+        [Finding("thrust without freedom", curve="top", numbers={"count": 2})],
     ),
-}
-"""Tables, and a finding about them with some of its names and numbers."""
+]
+"""Tables, and findings about them with some of their names and numbers."""
 
 
-_SOME = ("no Tau", "few points", "drag at its bound", "one thrust carries", "weak reverse thrust", "two thrusts")
-
-
-@pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in _SOME else pytest.mark.long) for c in FOUND])
-def test_findings(case: str, tmp_path: Path) -> None:
-    tables, expected = FOUND[case]
-    results = folder_with(tmp_path, tables)
-    subject = expected.kind, expected.axis, expected.curve
-    (found,) = (f for f in results.findings if (f.kind, f.axis, f.curve) == subject)
-    assert {name: found.names[name] for name in expected.names} == expected.names
-    assert {name: found.numbers[name] for name in expected.numbers} == pytest.approx(expected.numbers, abs=0.005)
+@pytest.mark.parametrize("case", range(len(FOUND)))
+def test_findings(case: int, tmp_path: Path) -> None:
+    tables, findings = FOUND[case]
+    about = {finding.axis or {"rear": "surge", "top": "heave"}[finding.curve] for finding in findings}
+    results = folder_with(tmp_path, tables, [axis for axis in STEADY if axis in about])
+    for expected in findings:
+        subject = expected.kind, expected.axis, expected.curve
+        (found,) = (f for f in results.findings if (f.kind, f.axis, f.curve) == subject)
+        assert {name: found.names[name] for name in expected.names} == expected.names
+        assert {name: found.numbers[name] for name in expected.numbers} == pytest.approx(expected.numbers, abs=0.005)
     assert results.vehicle.provenance
     assert results.vehicle.provenance.warnings == results.warnings
 
@@ -399,15 +371,21 @@ def test_enough_good_data_raise_no_finding(tmp_path: Path, k: Rov) -> None:
     assert folder_with(tmp_path, tables).findings == ()
 
 
-def test_window_takes_reverse_thrust_out(tmp_path: Path) -> None:
+def test_window_takes_reverse_thrust_out(tmp_path: Path, k: Rov) -> None:
     tables = {"thrust_rear": [*FORCES, (-0.5, -8.0)]}
-    both = folder_with(tmp_path, tables)
-    forward = folder_with(tmp_path, tables, thrust_rear=(0.0, 1.0))
+    both = folder_with(tmp_path, tables, ["surge"])
+    (asymmetry,) = (f for f in both.findings if (f.kind, f.curve) == ("asymmetry", "rear"))
+    assert asymmetry.numbers["measured"] == pytest.approx(-0.34, abs=0.005)
+    forward = folder_with(tmp_path, tables, ["surge"], thrust_rear=(0.0, 1.0))
     assert forward.thrust["rear"].weights.tolist() == [1.0] * 4 + [0.0]
     assert forward.vehicle.rov["a_t_rear"] == pytest.approx(42.9, rel=1e-3)
     assert both.thrust["rear"].leave_one_out_error > 1.0
     assert forward.vehicle.sources["a_t_rear"] == "(7) over 4 forces"
     assert both.vehicle.sources["a_t_rear"] == "(6) over 5 forces"
+    drag = axis_of(forward, "surge").drag
+    assert drag, "drag as in the paper stands beside the fit of the response"
+    assert drag.y == pytest.approx([k.force(SURGE, c) for c, _ in STEADY["surge"]], rel=1e-4)
+    assert drag.a == pytest.approx(k["a_d_u"], rel=0.2)
 
 
 @pytest.fixture(scope="module")
@@ -424,7 +402,7 @@ def by_direction(tmp_path_factory: pytest.TempPathFactory) -> Identification:
     tables["steady_heave"] = [(c, k.response(HEAVE, c)[0]) for c in ahead]
     tables["steady_heave"] += [(-c, -up.response(HEAVE, c)[0]) for c in ahead]
     tables["time_constant_heave"] = [(c, k.response(HEAVE, c)[1]) for c in ahead]
-    return folder_with(tmp_path_factory.mktemp("by_direction"), tables)
+    return folder_with(tmp_path_factory.mktemp("by_direction"), tables, ["surge", "heave"])
 
 
 def test_thrust_and_drag_by_direction_reach_the_vehicle_file(
@@ -451,32 +429,18 @@ def test_report_says_what_is_by_direction(by_direction: Identification) -> None:
     assert "a_d_w_reverse" in page
 
 
-def test_drag_as_in_the_paper_stands_beside(tmp_path: Path, k: Rov) -> None:
-    drag = axis_of(folder_with(tmp_path), "surge").drag
-    assert drag
-    assert drag.y == pytest.approx([k.force(SURGE, c) for c, _ in STEADY["surge"]], rel=1e-4)
-    assert drag.a == pytest.approx(k["a_d_u"], rel=0.2)
-
-
 def test_tables_are_checked_against_recordings(full_folder: Path, tmp_path: Path) -> None:
-    folder = Path(shutil.copytree(full_folder, tmp_path / "both"))
-    write_csv(folder / "steady_surge.csv", "command [1],velocity [m/s]", [(0.3, 0.6), (0.5, 1.2)])
-    for path in (*folder.glob("log_heave*"), *folder.glob("log_yaw*")):
-        path.unlink()
-    for axis in ("heave", "yaw"):
-        unit = "rad/s" if axis == "yaw" else "m/s"
-        write_csv(folder / f"steady_{axis}.csv", f"command [1],velocity [{unit}]", STEADY[axis])
-    found = identify(load_tank_tests(folder))
-    assert [axis.chosen for axis in found.axes] == ["recordings", "points", "points"]
+    shutil.copy(full_folder / "log_surge_1.csv", tmp_path)
+    found = folder_with(tmp_path, {"steady_surge": [(0.3, 0.6), (0.5, 1.2)]}, ["surge"])
+    assert [axis.chosen for axis in found.axes] == ["recordings"]
     assert ("tables against recordings", "surge") in [(finding.kind, finding.axis) for finding in found.findings]
 
 
 def test_known_coefficients_are_kept(tmp_path: Path) -> None:
-    folder_with(tmp_path)
-    rov = tmp_path / "rov.toml"
-    known = '[known]\nbeta_u = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
-    rov.write_text(rov.read_text(encoding="utf-8").replace("[known]\n", known), encoding="utf-8")
-    found = identify(load_tank_tests(tmp_path))
+    """All tests are at one command, and the vehicle holds a twentieth of full thrust around it."""
+    known = 'beta_u = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'
+    found = folder_with(tmp_path, {"steady_surge": [(0.3, 0.43)]}, ["surge"], known)
+    assert found.vehicle.command_range == pytest.approx((0.25, 0.35))
     assert (found.vehicle.rov["beta_u"], found.vehicle.sources["beta_u"]) == (0.8, "a guess")
     assert found.vehicle.intervals["beta_u"] == (0.7, 0.9)
     assert not any("beta_u" in warning for warning in found.warnings)
@@ -488,14 +452,3 @@ def test_estimate_without_freedom_has_no_interval() -> None:
     low, high = estimate.interval("beta_u") or (0.0, 0.0)
     assert low * high == pytest.approx(4.0), "a factor's interval is symmetric in its logarithm"
     assert np.isnan(estimate.correlation[0, 0])
-
-
-def test_tests_at_one_command_hold_a_twentieth_around_it(tmp_path: Path) -> None:
-    shutil.copytree(TESTS, tmp_path / "tests")
-    for path in (tmp_path / "tests").glob("*.csv"):
-        head, *rows = path.read_text(encoding="utf-8").splitlines()
-        path.write_text("\n".join([head, *(row for row in rows if row.startswith("30,"))]) + "\n", encoding="utf-8")
-        if path.name == "steady_heave_up.csv":
-            path.unlink()
-    low, high = identify(load_tank_tests(tmp_path / "tests")).vehicle.command_range
-    assert (low, high) == pytest.approx((0.25, 0.35))

@@ -40,23 +40,3 @@ def test_a_delay_moves_the_motion_in_time() -> None:
     k = with_more(VIDEORAY, T_top=0.3, F_0_w=0.0)
     assert late(k, 0.2)[4:] == pytest.approx(late(k, 0.0)[:-4], abs=1e-9)
     assert np.abs(late(k, 0.2) - late(k, 0.0)).max() > 0.01
-
-
-def test_noise_is_as_strong_as_asked_and_repeats() -> None:
-    clean = run(VIDEORAY, HEAVE, ((0.0, 100.0),), 50.0)
-    for colour in (0.0, 0.9):
-        errors = [clean.recorded(np.random.default_rng(1), "depth", noise=2.0, colour=colour).values for _ in range(2)]
-        assert (errors[0] == errors[1]).all()
-        assert np.std(errors[0]) == pytest.approx(0.01, rel=0.1)
-        assert np.corrcoef(errors[0][1:], errors[0][:-1])[0, 1] == pytest.approx(colour, abs=0.05)
-
-
-def test_a_current_carries_distances_and_the_velocity_over_ground() -> None:
-    plan = ((0.0, 4.0),)
-    drifting = run(VIDEORAY, HEAVE, plan, 10.0)
-    assert not drifting.position.any()
-    from_there = run(VIDEORAY, VIDEORAY.layout.axes[0].axis, plan, 10.0, current=0.1)
-    assert from_there.position == pytest.approx(0.1 * from_there.time)
-    assert not from_there.velocity.any()
-    quiet = from_there.recorded(np.random.default_rng(0), "velocity", noise=0.0)
-    assert quiet.values == pytest.approx(0.1)

@@ -6,6 +6,7 @@ from math import atanh, exp, inf, sqrt
 import numpy as np
 import pytest
 
+from rov_fmu.identify.choice import MARGIN
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.drag_forms import LEFT_OUT, Point
 from rov_fmu.identify.points.response_fit import ResponseFit, fit_response, response_band
@@ -52,12 +53,6 @@ def kept(fit: ResponseFit) -> list[str]:
     return [choice.what for choice in fit.choices if choice.kept]
 
 
-def test_any_vehicle_and_axis(sway: Rov) -> None:
-    fit = fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0)), sway)
-    assert fit.estimate.named == pytest.approx({"a_d_v": 15.0, "b_d_v": 4.0, "beta_v": 0.8}, rel=1e-5)
-    assert kept(fit) == []
-
-
 def test_thrusters_of_a_bluerov2_with_their_curve_by_direction() -> None:
     """Four thrusters drive sway, two of them in reverse."""
     k = load_vehicle(SHIPPED["bluerov2"]).rov
@@ -80,14 +75,12 @@ def test_drag_by_direction_where_the_points_tell_it(sway: Rov) -> None:
 
 
 @pytest.mark.parametrize(
-    "seeds",
-    [range(1, 5), pytest.param(range(100), marks=pytest.mark.long)],
-    ids=len,
+    "seeds", [pytest.param(30, marks=pytest.mark.long), pytest.param(100, marks=pytest.mark.weekly)]
 )
-def test_drag_alike_both_ways_stays_so(seeds: range, sway: Rov) -> None:
+def test_drag_alike_both_ways_stays_so(seeds: int, sway: Rov) -> None:
     """With 3 % scatter, at most one of ten fits has drag by direction."""
-    fits = [fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0), 0.03, seed), sway) for seed in seeds]
-    assert sum("a_d_v_reverse" in fit.estimate.names for fit in fits) <= 0.1 * len(seeds)
+    fits = [fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0), 0.03, seed), sway) for seed in range(seeds)]
+    assert sum("a_d_v_reverse" in fit.estimate.names for fit in fits) <= 0.1 * seeds
 
 
 def test_one_command_in_reverse_tells_no_direction(sway: Rov) -> None:
@@ -109,6 +102,14 @@ def test_drag_that_has_no_linear_part_is_fitted_without(sway: Rov) -> None:
         least, most = alone.estimate.intervals[name]
         assert high - low > most - least, "what is left out keeps its share in the intervals"
     assert fit.estimate.intervals["b_d_v"][1] > 0.0
+
+
+def test_fewer_coefficients_need_no_margin(sway: Rov) -> None:
+    """A form with fewer coefficients is taken although AICc prefers it by less than the margin of one with more."""
+    points = points_of((15.0, 0.6), (15.0, 0.6), 0.05, 10, commands=tuple(0.2 + 0.05 * n for n in range(12)))
+    (choice,) = (c for c in fit_response(SWAY, points, sway).choices if c.what == "quadratic drag alone")
+    assert choice.kept
+    assert 0.0 < choice.gain < MARGIN
 
 
 @pytest.mark.parametrize("drag", [(0.0, 9.0), (15.0, 0.0), (15.0, 9.0)])
@@ -155,18 +156,28 @@ def test_upward_points_of_the_paper_ask_for_no_direction(vehicle: Vehicle) -> No
     assert next(choice for choice in fit.choices if choice.what == "drag by direction").gain < 0.0
 
 
+ALIKE, STRONGER = 1.0, 1.5
+"""The drag in reverse, relative to that ahead."""
+
+
 @pytest.mark.parametrize(
-    ("seeds", "least"),
-    [pytest.param(40, 0.825, marks=pytest.mark.long), pytest.param(200, 0.88, marks=pytest.mark.weekly)],
+    ("seeds", "least", "drag", "reverse"),
+    [
+        pytest.param(20, 0.75, (15.0, 4.0), STRONGER, marks=pytest.mark.long),
+        pytest.param(20, 0.75, (15.0, 0.0), ALIKE, marks=pytest.mark.long),
+        *(
+            pytest.param(200, 0.88, (15.0, linear), reverse, marks=pytest.mark.weekly)
+            for linear in (4.0, 0.5, 0.0)
+            for reverse in (ALIKE, STRONGER)
+        ),
+    ],
 )
-@pytest.mark.parametrize("drag", [(15.0, 4.0), (15.0, 0.5), (15.0, 0.0)])
-@pytest.mark.parametrize("reverse", [1.0, 1.5])
 def test_intervals_cover_the_truth(
     sway: Rov, drag: tuple[float, float], reverse: float, seeds: int, least: float
 ) -> None:
     """The intervals hold for 3 % scatter, with and without linear drag.
 
-    An interval covers at least 88 % of 200 seeds. A 95 % interval misses more than 7 of 40 seeds once in 1,000 cases.
+    An interval covers at least 88 % of 200 seeds. A 95 % interval misses more than 5 of 20 seeds once in 1,000 cases.
     """
     back = drag[0] * reverse, drag[1] * reverse
     hits: dict[str, list[bool]] = {}

@@ -10,6 +10,8 @@ from rov_fmu.identify.recordings.runs import prepare
 from rov_fmu.identify.recordings.simulator import Simulator
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.pool import run
 from tests.vehicles import VIDEORAY
 
@@ -89,9 +91,6 @@ def test_what_a_pool_does_is_what_the_simulator_does() -> None:
 
 def test_an_axis_of_a_vehicle_of_any_form() -> None:
     """The BlueROV2 has vectored thrusters, sway, a reverse curve and a dead band."""
-    from rov_fmu.vehicle.shipped import SHIPPED
-    from rov_fmu.vehicle.vehicle import load_vehicle
-
     rov = load_vehicle(SHIPPED["bluerov2"]).rov
     signs = {name.removeprefix("u_"): sign for name, sign in rov.layout.signs(SWAY).items()}
     straight = replace(rov.layout, coupled=False)

@@ -2,7 +2,7 @@
 
 import re
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -14,7 +14,7 @@ from rov_fmu.cli import main
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.slips.search import Tables, beta_out_of_range, slips
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -118,10 +118,10 @@ def test_a_slip_is_named_or_refused(kind: str, how_many: str, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "axis", [HEAVE, *(pytest.param(axis, marks=pytest.mark.long) for axis in (SURGE, YAW))], ids=lambda axis: axis.name
+    ("axis", "number"), [(YAW, 2), *(pytest.param(axis, 3, marks=pytest.mark.long) for axis in AXES)]
 )
-def test_nothing_is_said_of_logs_without_slip(axis: Axis, tmp_path: Path) -> None:
-    assert not told(write_folder(tmp_path, recordings(axis)))
+def test_nothing_is_said_of_logs_without_slip(axis: Axis, number: int, tmp_path: Path) -> None:
+    assert not told(write_folder(tmp_path, recordings(axis)[:number]))
 
 
 # ---- Other vehicles, other logs --------------------------------------------------------------------------------------
@@ -148,7 +148,7 @@ def sensed(name: str, axis: Axis, seed: int = 0) -> list[Recording]:
 
 @pytest.mark.parametrize(
     ("name", "axis"),
-    [pytest.param(*case, marks=[] if case[0] == "bluerov2" else [pytest.mark.long]) for case in CASES],
+    [pytest.param(*case, marks=[] if case == ("bluerov2", SWAY) else [pytest.mark.long]) for case in CASES],
     ids=lambda part: getattr(part, "name", part),
 )
 def test_slips_of_other_vehicles_are_told_from_none(name: str, axis: Axis) -> None:
@@ -217,25 +217,18 @@ def test_a_beta_that_no_vehicle_has_is_told() -> None:
 # ---- Time ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
-def test_nine_recordings_of_6000_rows_take_20_seconds(tmp_path: Path) -> None:
-    """The recordings have 60 s at 100 Hz each; the test runs the whole command without the report."""
+def of_6000_rows() -> list[Recording]:
+    """Return nine recordings of 60 s at 100 Hz."""
     random = np.random.default_rng(0)
-    logs = [
+    return [
         run(K, axis, plan, 100.0).recorded(random, SENSOR[axis.name], f"log_{axis.name}_{n}.csv")
         for axis in AXES
         for n, plan in enumerate(PLANS[axis.name])
     ]
-    assert all(len(log.time) == 6000 for log in logs)
-    folder = write_folder(tmp_path, logs)
-    began = time.process_time()  # of this process alone, whatever else the machine does
-    assert main(["identify", str(folder)]) == 0
-    assert time.process_time() - began <= 20.0
 
 
-@pytest.mark.long
-def test_five_recordings_whose_command_never_rests_take_10_seconds(tmp_path: Path) -> None:
-    """A joystick gives another command at each of 3,000 rows."""
+def never_at_rest() -> list[Recording]:
+    """Return five recordings of a joystick, which gives another command at each of 3,000 rows."""
     rate, at = 50.0, np.arange(3000) / 50.0
     random = np.random.default_rng(0)
     logs = []
@@ -244,7 +237,14 @@ def test_five_recordings_whose_command_never_rests_take_10_seconds(tmp_path: Pat
         commands = 0.45 * np.sin(low * at) + 0.25 * np.sin(high * at)
         stick = run(K, HEAVE, [(c, 1.0 / rate) for c in commands.tolist()], rate)
         logs.append(stick.recorded(random, "depth", f"log_heave_{n}.csv"))
-    folder = write_folder(tmp_path, logs)
+    return logs
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("logs", "seconds"), [(of_6000_rows, 45.0), (never_at_rest, 40.0)])
+def test_an_identification_takes_seconds(logs: Callable[[], list[Recording]], seconds: float, tmp_path: Path) -> None:
+    """The whole command runs, without the report; the limits are five times what was measured."""
+    folder = write_folder(tmp_path, logs())
     began = time.process_time()  # of this process alone, whatever else the machine does
     assert main(["identify", str(folder)]) == 0
-    assert time.process_time() - began <= 10.0
+    assert time.process_time() - began <= seconds

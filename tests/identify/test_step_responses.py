@@ -19,10 +19,14 @@ def record(vehicle: Vehicle, axis: Axis, *plan: tuple[float, float], seed: int =
 
 
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
-@pytest.mark.parametrize("command", [0.2, 0.3, 0.5, 0.7, -0.2, -0.7])
+@pytest.mark.parametrize("command", [0.2, 0.7, -0.5])
 def test_step_from_rest_gives_both(axis: Axis, command: float, vehicle: Vehicle) -> None:
     V_ss, Tau = vehicle.rov.response(axis, command)
-    (step,) = steps(record(vehicle, axis, (0.0, 3.0), (command, 12.0 * Tau + 4.0)))
+    recording = record(vehicle, axis, (0.0, 3.0), (command, 12.0 * Tau + 4.0))
+    (step,) = steps(recording)
+    assert step.steady is not None
+    assert step.steady[1] == recording.time[-1], "what is steady is so to the last sample"
+    assert step.steady[0] > 3.0
     assert step.V_ss == pytest.approx(V_ss, rel=0.01)
     assert step.Tau == pytest.approx(Tau, rel=0.1)
     assert (step.start, step.command, step.before, step.note) == (3.0, command, 0.0, "")
@@ -39,29 +43,23 @@ def test_steps_up_and_down_in_both_directions(axis: Axis, vehicle: Vehicle) -> N
         assert (step.Tau is None) == (step.before != 0.0), "Tau (17) is that of a start from rest"
 
 
-def test_standard_errors_tell_the_scatter(vehicle: Vehicle) -> None:
+@pytest.mark.parametrize(
+    "axis", [YAW, *(pytest.param(a, marks=pytest.mark.long) for a in (SURGE, HEAVE))], ids=lambda m: m.name
+)
+def test_standard_errors_tell_the_scatter(axis: Axis, vehicle: Vehicle) -> None:
     """Over 8 seeds, about 95 % are within two standard errors, which are not much larger than the scatter."""
-    for axis in AXES:
-        recordings = [clean(vehicle.rov, axis, plan) for plan in PLANS[axis.name]]
-        found: list[StepResponse] = []
-        for seed in range(8):
-            random = np.random.default_rng(seed)
-            found += [step for recording in recordings for step in steps(recording.noisy(random))]
-        for deviations in (
-            [
-                (s.V_ss - vehicle.rov.response(axis, s.command)[0]) / s.V_ss_error
-                for s in found
-                if s.V_ss is not None and s.V_ss_error
-            ],
-            [
-                (s.Tau - vehicle.rov.response(axis, s.command)[1]) / s.Tau_error
-                for s in found
-                if s.Tau is not None and s.Tau_error
-            ],
-        ):
-            assert len(deviations) >= 15
-            assert np.mean(np.abs(deviations) < 2.0) > 0.85
-            assert 0.4 < np.std(deviations) < 1.3
+    recordings = [clean(vehicle.rov, axis, plan, 50.0) for plan in PLANS[axis.name]]
+    found: list[StepResponse] = []
+    for seed in range(8):
+        random = np.random.default_rng(seed)
+        found += [step for recording in recordings for step in steps(recording.noisy(random))]
+    true = {step.command: vehicle.rov.response(axis, step.command) for step in found}
+    steady = [(s.V_ss - true[s.command][0]) / s.V_ss_error for s in found if s.V_ss is not None and s.V_ss_error]
+    taus = [(s.Tau - true[s.command][1]) / s.Tau_error for s in found if s.Tau is not None and s.Tau_error]
+    for deviations in (steady, taus):
+        assert len(deviations) >= 15
+        assert np.mean(np.abs(deviations) < 2.0) > 0.85
+        assert 0.4 < np.std(deviations) < 1.3
 
 
 def test_coloured_noise_widens_the_standard_error(vehicle: Vehicle) -> None:
@@ -74,14 +72,6 @@ def test_coloured_noise_widens_the_standard_error(vehicle: Vehicle) -> None:
     assert plain.V_ss_error
     assert turbulent.V_ss_error
     assert 3.0 < turbulent.V_ss_error / plain.V_ss_error < 12.0
-
-
-def test_what_is_steady_is_so_to_the_last_sample(vehicle: Vehicle) -> None:
-    recording = record(vehicle, HEAVE, (0.0, 3.0), (0.3, 30.0))
-    (step,) = steps(recording)
-    assert step.steady is not None
-    assert step.steady[1] == recording.time[-1]
-    assert 3.0 < step.steady[0] < 25.0
 
 
 def test_hold_too_short_for_a_steady_state_has_none(vehicle: Vehicle) -> None:
@@ -112,7 +102,7 @@ def test_spikes_and_gaps_do_not_matter(vehicle: Vehicle) -> None:
     assert step.Tau == pytest.approx(clear.Tau, rel=0.05)
 
 
-@pytest.mark.parametrize("rate", [10.0, 25.0, 250.0])
+@pytest.mark.parametrize("rate", [10.0, 250.0])
 def test_any_rate(rate: float, vehicle: Vehicle) -> None:
     V_ss, Tau = vehicle.rov.response(YAW, 0.5)
     (step,) = steps(record(vehicle, YAW, (0.0, 4.0), (0.5, 16.0), rate=rate))

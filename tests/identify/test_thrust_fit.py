@@ -133,12 +133,8 @@ def test_known_coefficients_stay() -> None:
     assert fit.values["c_0_x"] == 0.06
     assert fit.estimate.names == ("a_t_x", "b_t_x")
     assert DEAD not in taken(fit)
-
-
-def test_a_vehicle_that_has_more_keeps_only_what_the_forces_tell() -> None:
-    """The file gives the reverse coefficients, and only commands ahead are tested."""
-    fit = fit_thrust(Curve("x", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "T")), ONE_WAY, truth(ONE_WAY, 20.0, 5.0))
-    assert fit.curve.keys == ("a_t", "b_t", "T")
+    more = Curve("x", ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "T"))
+    assert fit_thrust(more, ONE_WAY, truth(ONE_WAY, 20.0, 5.0)).curve.keys == ("a_t", "b_t", "T"), "not tested"
 
 
 def test_thrusts_left_out_are_left_out_both_ways() -> None:
@@ -182,33 +178,30 @@ def shares(c: Any, seeds: int, noise: float = NOISE, **of_truth: float) -> tuple
     return {name: float(np.mean(found)) for name, found in hits.items()}, np.mean(bands, axis=0), wrong / seeds
 
 
-def test_intervals_hold_for_weak_reverse_thrust() -> None:
-    found, bands, wrong = shares(BOTH_WAYS, 20, reverse=0.6)
-    assert all(share >= 0.8 for share in found.values()), found
-    assert (bands >= 0.8).all()
-    assert wrong <= 0.15
+FORMS: dict[str, tuple[Any, float, dict[str, float]]] = {
+    "one way": (ONE_WAY, NOISE, {}),
+    "alike": (BOTH_WAYS, NOISE, {}),
+    "weak reverse": (BOTH_WAYS, NOISE, {"reverse": 0.6}),
+    "weak reverse and dead band": (FINE, 0.1, {"reverse": 0.6, "c_0": 0.08}),
+}
 
 
 @pytest.mark.parametrize(
-    "seeds", [pytest.param(50, marks=pytest.mark.long), pytest.param(200, marks=pytest.mark.weekly)]
-)
-@pytest.mark.parametrize(
-    ("c", "noise", "of_truth"),
+    ("form", "seeds", "most_wrong"),
     [
-        (ONE_WAY, NOISE, {}),
-        (BOTH_WAYS, NOISE, {}),
-        (BOTH_WAYS, NOISE, {"reverse": 0.6}),
-        (FINE, 0.1, {"reverse": 0.6, "c_0": 0.08}),
+        ("weak reverse", 10, 0.15),
+        *(pytest.param(form, 30, 0.1, marks=pytest.mark.long) for form in FORMS),
+        *(pytest.param(form, 200, 0.07, marks=pytest.mark.weekly) for form in FORMS),
     ],
-    ids=["one way", "alike", "weak reverse", "weak reverse and dead band"],
 )
-def test_intervals_cover_the_truth(c: Any, noise: float, of_truth: dict[str, float], seeds: int) -> None:
+def test_intervals_cover_the_truth(form: str, seeds: int, most_wrong: float) -> None:
     """Of 200 seeds, 90-99 % are covered, and a few percent have the wrong form.
 
-    With 50 seeds, a 95 % interval may miss more often by chance, or never.
+    With fewer seeds, a 95 % interval may miss more often by chance, or never.
     """
+    c, noise, of_truth = FORMS[form]
     found, bands, wrong = shares(c, seeds, noise, **of_truth)
     low, high = (0.9, 0.99) if seeds == 200 else (float(binom.ppf(1e-3, seeds, 0.95)) / seeds, 1.0)
     assert all(low <= share <= high for share in found.values()), found
     assert ((bands >= low) & (bands <= high)).all(), bands
-    assert wrong <= (0.07 if seeds == 200 else 0.1)
+    assert wrong <= most_wrong

@@ -26,12 +26,6 @@ def k(vehicle: Vehicle) -> Rov:
     return vehicle.rov
 
 
-def test_heave_at_30_percent_gives_table_9_again(k: Rov) -> None:
-    tuning = tune(k, HEAVE, 0.3, 0.175, 2.209)
-    assert f"{tuning.rov['alpha_w']:.2f}" == "1.14"
-    assert f"{tuning.rov['beta_w']:.2f}" == "0.59"
-
-
 def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
     """For a turn to starboard, the left thruster pushes ahead and the right one astern, by the paper's (4)."""
     points = [Point("V_ss", command, sign * 0.5, 1.0, "") for command, sign in ((0.3, 1), (-0.4, -1))]
@@ -41,12 +35,20 @@ def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.Capt
     assert "A command of -40% of yaw: u_l = -0.4, u_r = 0.4\n" in said
 
 
-def test_a_deviation_of_nothing_has_no_sign(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_printout_names_a_lag_and_gives_no_sign_to_a_deviation_of_nothing(
+    k: Rov, capsys: pytest.CaptureFixture[str]
+) -> None:
     tuned = tune(k, HEAVE, 0.3, 0.175)
     print_tuning(replace(tuned, points=(Point("V_ss", 0.3, 0.175 * (1.0 + 1e-5), 1.0, ""),)))
     said = capsys.readouterr().out
     assert "+0.0%" in said
     assert "-0.0%" not in said
+    assert "lag" not in said
+    curves = tuple(replace(curve, keys=(*curve.keys, "T")) for curve in k.layout.curves)
+    late = Rov(replace(k.layout, curves=curves), {**k.coefficients, "T_rear": 0.15, "T_top": 0.2})
+    print_tuning(tune(late, HEAVE, 0.3, 0.175, 2.209))
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "lag" in line)
+    assert "curve top, T = 0.2 s" in line
 
 
 @pytest.mark.parametrize("axis", AXES, ids=lambda m: m.name)
@@ -56,18 +58,6 @@ def test_tuned_model_has_the_wanted_response(axis: Axis, command: float, V_ss: f
     V_ss = V_ss if command > 0.0 else -V_ss
     tuned = tune(k, axis, command, V_ss, Tau).rov
     assert tuned.response(axis, command) == pytest.approx((V_ss, Tau), rel=1e-12)
-
-
-def test_without_time_constant_beta_stays(k: Rov) -> None:
-    assert tune(k, YAW, 0.3, 1.5).rov["beta_r"] == k["beta_r"]
-
-
-def test_many_points_of_a_tuned_model_give_its_tuning(k: Rov) -> None:
-    wanted = [Point(q, c, k.response(YAW, c)[q == "Tau"], 1.0, "") for q in ("V_ss", "Tau") for c in (0.2, 0.4, -0.7)]
-    tuning = tune_over(k, YAW, wanted)
-    assert [tuning.rov["alpha_r"], tuning.rov["beta_r"]] == pytest.approx([1.2, 0.12], rel=1e-6)
-    assert tuning.estimate
-    assert tuning.estimate.degrees_of_freedom == 4.0
 
 
 def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
@@ -89,6 +79,7 @@ def test_scattered_points_have_intervals_and_the_least_error(k: Rov) -> None:
 
 
 def test_steady_velocities_alone_leave_beta(k: Rov) -> None:
+    assert tune(k, YAW, 0.3, 1.5).rov["beta_r"] == k["beta_r"]
     tuning = tune_over(k, SURGE, [Point("V_ss", c, V, 1.0, "") for c, V in ((0.2, 0.31), (0.5, 0.86), (0.7, 1.47))])
     assert tuning.rov["beta_u"] == k["beta_u"]
     assert tuning.estimate
@@ -134,27 +125,10 @@ BUOYANT = Rov(
             Thruster("aside", "prop", (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
         ),
     ),
-    {
-        "m_rov": 11.0,
-        "m_a_w": 14.0,
-        "a_d_v": 60.0,
-        "b_d_v": 2.0,
-        "alpha_v": 0.9,
-        "beta_v": 0.8,
-        "a_d_w": 40.0,
-        "b_d_w": 5.0,
-        "a_d_w_reverse": 70.0,
-        "b_d_w_reverse": 3.0,
-        "F_0_w": -3.0,
-        "alpha_w": 1.1,
-        "beta_w": 0.7,
-        "a_t_prop": 30.0,
-        "b_t_prop": 31.0,
-        "a_t_prop_reverse": 22.0,
-        "b_t_prop_reverse": 25.0,
-        "c_0_prop": 0.08,
-        "c_0_prop_reverse": 0.1,
-    },
+    {"m_rov": 11.0, "m_a_w": 14.0, "a_d_v": 60.0, "b_d_v": 2.0, "alpha_v": 0.9, "beta_v": 0.8}
+    | {"a_d_w": 40.0, "b_d_w": 5.0, "a_d_w_reverse": 70.0, "b_d_w_reverse": 3.0, "F_0_w": -3.0}
+    | {"alpha_w": 1.1, "beta_w": 0.7, "a_t_prop": 30.0, "b_t_prop": 31.0, "c_0_prop": 0.08}
+    | {"a_t_prop_reverse": 22.0, "b_t_prop_reverse": 25.0, "c_0_prop_reverse": 0.1},
 )
 
 
@@ -174,8 +148,7 @@ def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
 
 
 @pytest.mark.parametrize(
-    ("command", "V_ss", "Tau"),
-    [(0.5, 0.6, 0.9), (-0.5, -0.5, 0.9), (-0.9, -0.3, 4.0), (0.12, -0.15, 2.0), (1.0, 0.01, 0.5)],
+    ("command", "V_ss", "Tau"), [(0.5, 0.6, 0.9), (-0.5, -0.5, 0.9), (0.12, -0.15, 2.0), (1.0, 0.01, 0.5)]
 )
 def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float, Tau: float) -> None:
     tuned = tune(BUOYANT, HEAVE, command, V_ss, Tau).rov
@@ -192,6 +165,8 @@ def test_both_directions_are_tuned_together() -> None:
     assert wanted[0].value * wanted[3].value < 0.0
     tuning = tune_over(BUOYANT, HEAVE, wanted)
     assert [tuning.rov["alpha_w"], tuning.rov["beta_w"]] == pytest.approx([1.3, 0.4], rel=1e-6)
+    assert tuning.estimate
+    assert tuning.estimate.degrees_of_freedom == 6.0
 
 
 def test_thruster_that_pushes_to_port_moves_to_starboard_in_reverse() -> None:
@@ -295,13 +270,3 @@ def test_bad_points(content: str, named: str, tmp_path: Path, capsys: pytest.Cap
 )
 def test_bad_options(options: list[str], named: str, capsys: pytest.CaptureFixture[str]) -> None:
     check_refused(["tune", str(VIDEORAY), "--axis", "heave", *options], named, capsys)
-
-
-def test_lag_of_the_thrust_is_told(k: Rov, capsys: pytest.CaptureFixture[str]) -> None:
-    print_tuning(tune(k, HEAVE, 0.3, 0.175, 2.209))
-    assert "lag" not in capsys.readouterr().out
-    curves = tuple(replace(curve, keys=(*curve.keys, "T")) for curve in k.layout.curves)
-    late = Rov(replace(k.layout, curves=curves), {**k.coefficients, "T_rear": 0.15, "T_top": 0.2})
-    print_tuning(tune(late, HEAVE, 0.3, 0.175, 2.209))
-    (line,) = (line for line in capsys.readouterr().out.splitlines() if "lag" in line)
-    assert "curve top, T = 0.2 s" in line

@@ -206,6 +206,11 @@ REFUSED = {
     "neutral alone": ("time [s],u_t [us 1500],depth [m]", "0,1,1", "must be [us], or [us NEUTRAL SPAN] such as"),
     "span in words": ("time [s],u_t [us 1500 wide],depth [m]", "0,1,1", "only numbers may follow us"),
     "a number behind %": ("time [s],u_t [% 100],depth [m]", "0,1,1", "must be [%] alone"),
+    "two kinds": (
+        "time [s],command [%],u_t [%],depth [m]",
+        "0,0,0,0",
+        "columns 'u_t [%]', 'command [%]'",
+    ),
     "twice": ("time [s],u_t [%],t [1],depth [m]", "0,1,1,1", "there is such a column before"),
     "percent as fractions": ("time [s],u_t [1],depth [m]", "0,30,1", "line 2, column 'u_t [1]' = '30': must be at"),
     "fractions as pulses": ("time [s],u_t [us],depth [m]", "0,0.5,1", "no pulse beyond 1 us: fractions under [us]?"),
@@ -217,15 +222,10 @@ REFUSED = {
 def test_what_cannot_be_is_one_clear_line(case: str, tmp_path: Path) -> None:
     header, row, told = REFUSED[case]
     with pytest.raises(DataFileError) as error:
-        read(tmp_path, header, [row])
+        read(tmp_path, header, [row], HEAVE if case == "two kinds" else None)
     assert str(error.value).startswith(str(tmp_path / "log.csv"))
     assert told in str(error.value)
     assert len(str(error.value).splitlines()) == 1
-
-
-def test_two_kinds_of_commands_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataFileError, match=r"columns 'u_t \[%\]', 'command \[%\]': the commands of the axis"):
-        read(tmp_path, "time [s],command [%],u_t [%],depth [m]", ["0,0,0,0"], HEAVE)
 
 
 def test_nothing_of_use_is_a_line_for_each_axis(tmp_path: Path) -> None:

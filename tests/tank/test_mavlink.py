@@ -100,11 +100,8 @@ def test_a_telemetry_log_tells_of_a_dive(bluerov2: Layout, tmp_path: Path) -> No
 
 def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
     """Motor 6 is on servo 9 and turns in the opposite direction; the lights are on servo 6."""
-    parameters = [
-        parameter("MOT_6_DIRECTION", -1.0),
-        parameter("MOT_1_DIRECTION", 1.0),
-        parameter("SERVO9_FUNCTION", 38),
-    ]
+    numbers = {"MOT_6_DIRECTION": -1.0, "MOT_1_DIRECTION": 1.0, "SERVO9_FUNCTION": 38}
+    parameters = [parameter(name, value) for name, value in numbers.items()]
     messages = []
     for n in range(N):
         down = 0.5 * (n >= 10)
@@ -157,19 +154,14 @@ def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -
     assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in log.findings
 
 
-def test_another_vehicle_and_another_port_are_left_out(bluerov2: Layout, tmp_path: Path) -> None:
-    path = tlog(tmp_path / "dive.tlog", dive())
+def test_another_vehicle_another_port_and_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
+    path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
     tlog(path, [servos(100.0 + n, *[1900] * 6) for n in range(5)], system=2)
     tlog(path, [servos(100.0 + n, *[1900] * 6, port=1) for n in range(5)])
     log = read_log(path, bluerov2)
     assert not of_axis(log, "heave").thrusters["1"].any()
-    assert Finding("several vehicles", file="dive.tlog", names={"system": "1"}) in log.findings
-
-
-def test_outputs_that_are_none(bluerov2: Layout, tmp_path: Path) -> None:
-    path = tlog(tmp_path / "dive.tlog", [servos(99.0, *[0] * 5, 65535), *dive()])
-    log = read_log(path, bluerov2)
     assert of_axis(log, "heave").thrusters["5"][0] == 0.0
+    assert Finding("several vehicles", file="dive.tlog", names={"system": "1"}) in log.findings
     assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
 
 
@@ -334,10 +326,9 @@ def test_what_is_no_log_is_one_clear_line(
     assert capfd.readouterr() == ("", "")
 
 
-def test_more_thrusters_than_servos_and_no_motion_are_told(tmp_path: Path, bluerov2: Layout) -> None:
-    path = tlog(tmp_path / "a.tlog", [servos(0.1 * n, *[1500] * 6) for n in range(N)])
+def test_outputs_of_servos_alone_are_refused(tmp_path: Path, bluerov2: Layout) -> None:
     with pytest.raises(DataFileError, match="nothing measured"):
-        read_log(path, bluerov2)
+        read_log(tlog(tmp_path / "a.tlog", [servos(0.1 * n, *[1500] * 6) for n in range(N)]), bluerov2)
 
 
 def test_without_pymavlink_the_line_says_how_to_get_it(

@@ -25,10 +25,3 @@ def test_without_spikes_leaves_the_rest_alone() -> None:
     assert found[[50, 51, 200]] == pytest.approx(values[[50, 51, 200]], abs=0.1)
     assert np.mean(found != spiked) < 0.02
     assert without_spikes(np.zeros(30)).tolist() == [0.0] * 30
-
-
-def test_velocity_is_smoothed_over_half_a_second() -> None:
-    time = np.arange(300) / 100.0
-    values = np.random.default_rng(0).standard_normal(300)
-    half, default = velocity(time, values, is_position=False, window=0.5), velocity(time, values, is_position=False)
-    assert (half[1] == default[1]).all()

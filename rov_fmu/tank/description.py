@@ -121,7 +121,7 @@ class Description:
     thruster_sources: Mapping[str, Mapping[str, str]]
     """The sources of each thruster's direction and position."""
     windows: Mapping[str, tuple[float, float]]
-    """The range of commands that count, by axis or by thrust_<curve>."""
+    """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     lag: tuple[str, ...]
     """The curves whose thrusters' lag is fitted."""
     command_range: tuple[float, float] | None

@@ -11,8 +11,8 @@ from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
+from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.given import ROV_FILE
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -131,17 +131,9 @@ def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
     tables = {"thrust_t200.csv": pulled(30.0, 20.0)}
     known = {"m_rov": 6.57, "I_r": 0.105, "m_a_v": 7.1, "a_t_t200": 30.0, "b_t_t200": 20.0}
     drag = {"a_d_u": 18.0, "b_d_u": 4.0, "a_d_v": 22.0, "b_d_v": 6.0, "a_d_r": 1.5, "b_d_r": 0.1}
-    placeholder = read(
-        tmp_path / "all",
-        VECTORED,
-        tables
-        | {
-            "steady_surge.csv": f"{SPEED}\n0.1,0.1\n",
-            "steady_sway.csv": f"{SPEED}\n0.1,0.1\n",
-            "steady_yaw.csv": f"{RATE}\n0.1,0.1\n",
-        },
-    )
-    layout = placeholder.given.rov.layout
+    placeholders = {f"steady_{name}.csv": f"{SPEED}\n0.1,0.1\n" for name in ("surge", "sway")}
+    placeholders["steady_yaw.csv"] = f"{RATE}\n0.1,0.1\n"
+    layout = read(tmp_path / "all", VECTORED, tables | placeholders).given.rov.layout
     true = Rov(layout, dict.fromkeys(layout.coefficients, 1.0) | known | drag)
     for axis in (SURGE, SWAY, YAW):
         tables |= responses(true, axis)
@@ -152,14 +144,6 @@ def test_four_vectored_thrusters_are_identified(tmp_path: Path) -> None:
     assert found.vehicle.sources["m_a_v"] == "a strip"
     assert found.vehicle.thruster_sources["3"] == {"direction": "drawn: 3", "position": "drawn too"}
     assert found.vehicle.layout.signs(SWAY) == {"u_1": 1.0, "u_2": -1.0, "u_3": 1.0, "u_4": -1.0}
-    read_again(found, tmp_path / "mine.toml")
-
-
-def test_one_thruster_down(tmp_path: Path) -> None:
-    rows = f"{SPEED}\n0.2,0.2\n0.4,0.35\n0.8,0.6\n"
-    found = identify(read(tmp_path / "tests", DOWN, {"thrust_t200.csv": pulled(30.0, 20.0), "steady_heave.csv": rows}))
-    assert [*found.vehicle.layout.kinds] == ["heave"]
-    assert found.vehicle.rov["m_rov"] == 6.57
     read_again(found, tmp_path / "mine.toml")
 
 
@@ -240,8 +224,7 @@ def test_lag_to_be_found(lag: str, curves: tuple[str, ...], tmp_path: Path) -> N
 
 
 def test_the_lag_of_a_base_is_found_anew_where_asked(tmp_path: Path) -> None:
-    rows = {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}
-    given = read(tmp_path, f"{BLUEROV2}[fit]\nlag = true\n", rows).given
+    given = read(tmp_path, f"{BLUEROV2}[fit]\nlag = true\n", {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
     assert given.lag == ("t200",)
     assert "T_t200" not in given.rov.layout.coefficients
 
@@ -257,7 +240,7 @@ a_d_v = { value = 25.0, unit = "N.s2/m2", source = "a tow" }
     assert (given.rov["a_d_v"], given.known["a_d_v"].source) == (25.0, "a tow")
     assert "b_d_v" not in given.known
     assert given.known["I_r"].source == base.sources["I_r"]
-    assert given.limits == base.limits
+    assert given.description.limits == base.limits
 
 
 def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:
@@ -269,8 +252,11 @@ def test_a_curve_whose_reverse_and_dead_band_are_given(tmp_path: Path) -> None:
     rows = "".join(f"{c},{(30.0 * (c - 0.1) + 20.0) * (c - 0.1):.6f}\n" for c in (0.2, 0.5, 0.8))
     rov = DOWN.replace("[curves.t200]\n", f"[curves.t200]\n{curve}")
     heave = f"{SPEED}\n0.3,0.2\n0.6,0.4\n0.8,0.5\n"
-    found = identify(read(tmp_path, rov, {"thrust_t200.csv": f"{FORCE}\n{rows}", "steady_heave.csv": heave})).vehicle
-    values = [found.rov[f"{key}_t200{end}"] for end in ("", "_reverse") for key in ("a_t", "b_t")]
+    tables = {"thrust_t200.csv": f"{FORCE}\n{rows}", "steady_heave.csv": heave}
+    found = identify(read(tmp_path / "tests", rov, tables))
+    assert [*found.vehicle.layout.kinds] == ["heave"]
+    read_again(found, tmp_path / "mine.toml")
+    values = [found.vehicle.rov[f"{key}_t200{end}"] for end in ("", "_reverse") for key in ("a_t", "b_t")]
     assert values == pytest.approx([30.0, 20.0, 20.0, 15.0], rel=1e-4)
 
 
