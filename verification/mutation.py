@@ -114,9 +114,9 @@ def _is_code(node: Any) -> bool:
         return not node.get_code(include_prefix=False).startswith("strict")
     if parent.type in ("tfpdef", "annassign"):  # `name: type` of a parameter, `: type = value` of a variable
         return node is not parent.children[2 if parent.type == "tfpdef" else 1]
-    return node.type not in ("decorator", "decorators", "raise_stmt") and node is not getattr(
-        parent, "annotation", None
-    )
+    if node.type in ("decorator", "decorators", "raise_stmt"):
+        return False
+    return node is not getattr(parent, "annotation", None)
 
 
 def _python_mutants(text: str) -> _Mutants:
@@ -219,15 +219,17 @@ def _copy(folder: Path) -> Path:
     return folder
 
 
-def _pass(tests: Sequence[str], folder: Path, processes: int = 0) -> bool:
-    """Return True when the tests pass in a copy of the checkout, none of them taking longer than _LONGEST seconds."""
+def _pass(tests: Sequence[str], folder: Path, processes: int = 0, longest: float | None = None) -> bool:
+    """Return True when the tests pass in a copy of the checkout, each in _LONGEST and all in `longest` seconds."""
     limit = ["-o", f"faulthandler_timeout={_LONGEST}", "-o", "faulthandler_exit_on_timeout=true"]
     command = [sys.executable, "-m", "pytest", "-n", str(processes), "-x", "-p", "no:cacheprovider", *limit, *tests]
     process = subprocess.Popen(
         command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
     try:
-        return process.wait() == 0
+        return process.wait(longest) == 0
+    except subprocess.TimeoutExpired:  # a mutant may also hang when it is imported
+        return False
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)  # with what the tests have started
@@ -242,12 +244,14 @@ def survivors(mutants: Sequence[Mutant], jobs: int) -> list[Mutant]:
         tests, began = sorted({test for mutant in mutants for test in tests_of(mutant.file)}), time.monotonic()
         if not _pass(tests, Path(temporary, "0"), jobs):
             raise click.ClickException(f"the tests fail without a mutant: pytest {' '.join(tests)}")
-        click.echo(f"the tests pass without a mutant, in {time.monotonic() - began:.0f} s")
+        took = time.monotonic() - began
+        click.echo(f"the tests pass without a mutant, in {took:.0f} s")
+        longest = _LONGEST + jobs * took
 
         def survives(mutant: Mutant) -> tuple[bool, float]:
             folder, began = copies.get(), time.monotonic()
             (folder / mutant.file).write_text(mutant.text, encoding="utf-8")
-            passed = _pass(tests_of(mutant.file), folder)
+            passed = _pass(tests_of(mutant.file), folder, longest=longest)
             shutil.copy2(ROOT / mutant.file, folder / mutant.file)
             copies.put(folder)
             return passed, time.monotonic() - began
