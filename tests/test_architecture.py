@@ -45,6 +45,15 @@ LARGER_FOLDERS = {"tests": 13, "tests/fmu": 15, "tests/fmu/calls": 13, "tests/id
 """The folders that have more than a dozen modules, without their __init__.py."""
 
 
+def _python_files(folder: Path) -> Iterator[Path]:
+    """Yield the Python files in a folder. Folders that begin with a point hold installed importers."""
+    for path in folder.iterdir():
+        if path.is_dir() and not path.name.startswith("."):
+            yield from _python_files(path)
+        elif path.suffix == ".py":
+            yield path
+
+
 def _module(path: Path) -> str:
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
@@ -52,8 +61,7 @@ def _module(path: Path) -> str:
 FILES = {
     _module(path): path
     for folder in ("rov_fmu", "verification", "examples", "tests")
-    for path in ROOT.glob(f"{folder}/**/*.py")
-    if not any(part.startswith(".") for part in path.relative_to(ROOT).parts)  # installed importers
+    for path in _python_files(ROOT / folder)
 }
 
 

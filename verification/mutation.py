@@ -37,6 +37,8 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 ROOT = Path(__file__).parents[1]
 LEAST = 0.85
 """The share of the mutants that the tests must kill."""
+_LONGEST = 120
+"""The longest time (s) of one test; one that takes longer has noticed its mutant."""
 FILES = (
     *(f"rov_fmu/{folder}/**/*.py" for folder in ("model", "engine", "vehicle", "identify", "fmu")),
     "fmu_src/c/*.c",
@@ -55,9 +57,10 @@ TESTS = {
     "rov_fmu/identify/*": "identify/test_simulator.py identify/test_trajectory.py identify",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
 }
-"""The default tests of each file, in the folder tests/, quick ones first. The first pattern that fits counts."""
+"""The default tests of each file, in the folder tests/, besides those that import it. The first pattern counts."""
 # Their mutants need arguments, change a decorator, or raise a TypeError wherever they run. `is` still becomes `is not`.
 _LEFT_OUT_OPERATORS = re.compile(r"Variable|Decorator|Shift|Bit|Invert|NoOp|(Eq|Lt|LtE|Gt|GtE)_Is|Is(Not)?_(?!Is)")
+_C_STRING = re.compile(r'"(?:\\.|[^"\\\n])*"')
 
 
 @dataclass(frozen=True)
@@ -78,9 +81,13 @@ def files() -> list[str]:
 
 
 def tests_of(file: str) -> list[str]:
-    """Return the files and folders of tests for a file, quick ones first."""
+    """Return the files and folders of tests for a file: those that import it, then those of the table."""
+    *packages, name = Path(file).with_suffix("").parts
+    is_imported = re.compile(rf"{re.escape('.'.join(packages))}(\.{name} import| import (.*, )?{name}\b)")
+    tests = sorted((ROOT / "tests" / packages[1]).glob("test_*.py"), key=lambda path: path.stem != f"test_{name}")
+    importing = [path.relative_to(ROOT).as_posix() for path in tests if is_imported.search(path.read_text("utf-8"))]
     names = next(names for pattern, names in TESTS.items() if fnmatch.fnmatch(file, pattern))
-    return [f"tests/{name}" for name in names.split()]
+    return list(dict.fromkeys([*importing, *(f"tests/{name}" for name in names.split())]))
 
 
 _Mutants = Mapping[int, list[Callable[[], str]]]
@@ -98,7 +105,8 @@ def _operators() -> list[type]:
 
 
 def _is_code(node: Any) -> bool:
-    """Return False for a node of parso that is a decorator, an annotation, a type-checking block or zip's `strict`."""
+    """Return False for a node of parso that is a decorator, an annotation, a type-checking block, zip's `strict`, or an
+    error with its message."""
     parent = node.parent
     if node.type == "if_stmt":
         return "TYPE_CHECKING" not in node.children[1].get_code()
@@ -106,7 +114,9 @@ def _is_code(node: Any) -> bool:
         return not node.get_code(include_prefix=False).startswith("strict")
     if parent.type in ("tfpdef", "annassign"):  # `name: type` of a parameter, `: type = value` of a variable
         return node is not parent.children[2 if parent.type == "tfpdef" else 1]
-    return node.type not in ("decorator", "decorators") and node is not getattr(parent, "annotation", None)
+    if node.type in ("decorator", "decorators", "raise_stmt"):
+        return False
+    return node is not getattr(parent, "annotation", None)
 
 
 def _python_mutants(text: str) -> _Mutants:
@@ -162,14 +172,24 @@ def _c_sources(fmi: int) -> Mapping[str, str]:
     return native_content(load_vehicle(SHIPPED["bluerov2_heavy"]), fmi=fmi).sources
 
 
-def _is_valid_c(file: str, after: str) -> bool:
-    """Return True when the compiler accepts the changed file, without warnings, as a build demands."""
-    name = Path(file).name
+@cache
+def _object(name: str, text: str) -> bytes | None:
+    """Return the compiled FMU with this text of a C file, or None when a build would not accept it without warnings."""
     with tempfile.TemporaryDirectory() as folder:
-        for source, text in {**_c_sources(3 if name.startswith("fmi3") else 2), name: after}.items():
-            Path(folder, source).write_text(text, encoding="utf-8")
-        command = [*compiler(), *C_FLAGS, *WARNINGS, "-isystem", str(fmi_headers()), "-fsyntax-only", UNITY_FILE]
-        return subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode == 0
+        for source, content in {**_c_sources(3 if name.startswith("fmi3") else 2), name: text}.items():
+            Path(folder, source).write_text(content, encoding="utf-8")
+        # It is compiled only to be compared, so the loops of a step need not be unrolled.
+        flags = [*C_FLAGS, *WARNINGS, "-g0", "-Dalways_inline=noinline", "-isystem", str(fmi_headers())]
+        command = [*compiler(), *flags, "-c", UNITY_FILE, "-o", "fmu.o"]
+        accepted = subprocess.run(command, cwd=folder, capture_output=True, check=False).returncode == 0
+        return Path(folder, "fmu.o").read_bytes() if accepted else None
+
+
+def _is_valid_c(file: str, before: str, after: str) -> bool:
+    """Return True when the compiler accepts the changed file, and more than its messages and its layout has changed."""
+    old, new = (_C_STRING.sub('""', text) for text in (before, after))
+    compiled = old != new and _object(Path(file).name, after)
+    return bool(compiled) and compiled != _object(Path(file).name, before)
 
 
 def draw(seed: int) -> Iterator[Mutant]:
@@ -180,7 +200,7 @@ def draw(seed: int) -> Iterator[Mutant]:
     for file, line in lines:
         if choices := _mutants(file).get(line):
             before, after = (ROOT / file).read_text(encoding="utf-8"), generator.choice(choices)()
-            if _is_valid_python(before, after) if file.endswith(".py") else _is_valid_c(file, after):
+            if _is_valid_python(before, after) if file.endswith(".py") else _is_valid_c(file, before, after):
                 old, new = before.splitlines()[line - 1], after.splitlines()[line - 1]
                 yield Mutant(file, line, old.strip(), new.strip(), after)
 
@@ -199,15 +219,16 @@ def _copy(folder: Path) -> Path:
     return folder
 
 
-def _pass(tests: Sequence[str], folder: Path, longest: float | None = None) -> bool:
-    """Return True when the tests pass in a copy of the checkout within `longest` seconds."""
-    command = [sys.executable, "-B", "-m", "pytest", "-n", "0", "-x", "-p", "no:cacheprovider", *tests]
+def _pass(tests: Sequence[str], folder: Path, processes: int = 0, longest: float | None = None) -> bool:
+    """Return True when the tests pass in a copy of the checkout, each in _LONGEST and all in `longest` seconds."""
+    limit = ["-o", f"faulthandler_timeout={_LONGEST}", "-o", "faulthandler_exit_on_timeout=true"]
+    command = [sys.executable, "-m", "pytest", "-n", str(processes), "-x", "-p", "no:cacheprovider", *limit, *tests]
     process = subprocess.Popen(
         command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
     try:
         return process.wait(longest) == 0
-    except subprocess.TimeoutExpired:
+    except subprocess.TimeoutExpired:  # a mutant may also hang when it is imported
         return False
     finally:
         with contextlib.suppress(ProcessLookupError):
@@ -220,29 +241,25 @@ def survivors(mutants: Sequence[Mutant], jobs: int) -> list[Mutant]:
         copies: SimpleQueue[Path] = SimpleQueue()
         for n in range(jobs):
             copies.put(_copy(Path(temporary, str(n))))
+        tests, began = sorted({test for mutant in mutants for test in tests_of(mutant.file)}), time.monotonic()
+        if not _pass(tests, Path(temporary, "0"), jobs):
+            raise click.ClickException(f"the tests fail without a mutant: pytest {' '.join(tests)}")
+        took = time.monotonic() - began
+        click.echo(f"the tests pass without a mutant, in {took:.0f} s")
+        longest = _LONGEST + jobs * took
 
-        def duration(tests: Sequence[str]) -> float:
+        def survives(mutant: Mutant) -> tuple[bool, float]:
             folder, began = copies.get(), time.monotonic()
-            passed = _pass(tests, folder)
-            copies.put(folder)
-            if not passed:
-                raise click.ClickException(f"the tests fail without a mutant: pytest -n 0 {' '.join(tests)}")
-            return time.monotonic() - began
-
-        def survives(mutant: Mutant) -> bool:
-            folder, tests = copies.get(), tests_of(mutant.file)
             (folder / mutant.file).write_text(mutant.text, encoding="utf-8")
-            passed = _pass(tests, folder, 60.0 + 3.0 * durations[" ".join(tests)])
+            passed = _pass(tests_of(mutant.file), folder, longest=longest)
             shutil.copy2(ROOT / mutant.file, folder / mutant.file)
             copies.put(folder)
-            return passed
+            return passed, time.monotonic() - began
 
-        each = sorted({tuple(tests_of(mutant.file)) for mutant in mutants})
-        durations = {" ".join(tests): took for tests, took in zip(each, pool.map(duration, each), strict=True)}
-        click.echo(f"the tests pass without a mutant, in {sum(durations.values()):.0f} s")
         left = []
-        for n, (mutant, survived) in enumerate(zip(mutants, pool.map(survives, mutants), strict=True), 1):
-            click.echo(f"{n}/{len(mutants)} {'survived' if survived else 'killed'} {mutant.file}:{mutant.line}")
+        for n, (mutant, (survived, took)) in enumerate(zip(mutants, pool.map(survives, mutants), strict=True), 1):
+            verdict = "survived" if survived else "killed"
+            click.echo(f"{n}/{len(mutants)} {verdict} after {took:.0f} s: {mutant.file}:{mutant.line}")
             left += [mutant] if survived else []
         return left
 

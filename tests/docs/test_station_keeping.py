@@ -2,6 +2,7 @@
 
 import zipfile
 from collections.abc import Callable, Iterator
+from functools import cache
 from math import degrees, pi, radians, sin
 from pathlib import Path
 
@@ -12,9 +13,9 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
 
-from examples.station_keeping import run
+from examples.station_keeping import engines, run
 from examples.station_keeping.autopilot import Thruster
-from examples.station_keeping.engines import ENGINES, NAMES, Trajectory, plain
+from examples.station_keeping.engines import ENGINES, NAMES, Trajectory
 from examples.station_keeping.system import (
     DEFAULT,
     GROUPS,
@@ -28,16 +29,25 @@ from examples.station_keeping.system import (
 from examples.systems import PARAMETER_SET
 from rov_fmu.model.layout import Curve, Layout
 from rov_fmu.model.rov import Rov
+from tests.conftest import Made
 from verification.references.fmpy_slave import keep_loaded
 
 SETS = tuple(parameter_sets())
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("station keeping") / "system"
-    build_system(path)
-    return path
+def _build(folder: Path) -> None:
+    """Build the system into a folder, and unzip its FMUs there."""
+    build_system(folder)
+    for name in ("Autopilot", "videoray"):
+        fmpy.extract(str(folder / f"{name}.fmu"), unzipdir=str(folder / name))
+
+
+@pytest.fixture(scope="session")
+def folder(made_once: Made) -> Path:
+    return made_once("station keeping", _build)
+
+
+plain = cache(engines.plain)
 
 
 class Fmu:
@@ -80,21 +90,14 @@ class Fmu:
 Start = Callable[..., Fmu]
 
 
-@pytest.fixture(scope="module")
-def unzipped(folder: Path) -> Path:
-    for name in ("Autopilot", "videoray"):
-        fmpy.extract(str(folder / f"{name}.fmu"), unzipdir=str(folder / name))
-    keep_loaded(folder / "Autopilot")
-    return folder
-
-
 @pytest.fixture
-def start(unzipped: Path) -> Iterator[Start]:
-    """Start an FMU with values; all are stopped in the end."""
+def start(folder: Path) -> Iterator[Start]:
+    """Return a function that starts an FMU with values. All are stopped in the end."""
+    keep_loaded(folder / "Autopilot")
     running = []
 
     def start_one(name: str, **values: float | bool) -> Fmu:
-        running.append(Fmu(unzipped / name, **values))
+        running.append(Fmu(folder / name, **values))
         return running[-1]
 
     yield start_one
@@ -154,12 +157,17 @@ def test_heading_goes_before_speed(start: Start) -> None:
     assert rear.force(u_l) - rear.force(u_r) == pytest.approx(2.0 * rear.force(0.5))
 
 
-@pytest.mark.parametrize("loop", ["depth", "heading"])
+LOOPS = {
+    "depth": ("depth_hold", "z_ref", "z", "heave", "u_t"),
+    "heading": ("heading_hold", "psi_ref", "psi", "yaw", "u_l"),
+}
+"""The switch, target, measured value, stick and command of each loop."""
+
+
+@pytest.mark.parametrize("loop", LOOPS)
 def test_the_integral_does_not_wind_up(start: Start, loop: str) -> None:
-    switch, target, measured, command, away = {
-        "depth": ("depth_hold", "z_ref", "z", "u_t", 2.0),
-        "heading": ("heading_hold", "psi_ref", "psi", "u_l", 2.0),
-    }[loop]
+    switch, target, measured, _, command = LOOPS[loop]
+    away = 2.0
 
     def steps_at_the_limit(T_t: float) -> int:
         """It is held fast for a minute, comes free and passes the target: how long the command stays at its limit."""
@@ -177,13 +185,10 @@ def test_the_integral_does_not_wind_up(start: Start, loop: str) -> None:
     assert wound_up >= 1000
 
 
-@pytest.mark.parametrize("loop", ["depth", "heading"])
+@pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize("rate", [0.0, 0.12])
 def test_a_hold_goes_on_without_a_jump(start: Start, loop: str, rate: float) -> None:
-    switch, target, measured, stick, command = {
-        "depth": ("depth_hold", "z_ref", "z", "heave", "u_t"),
-        "heading": ("heading_hold", "psi_ref", "psi", "yaw", "u_l"),
-    }[loop]
+    switch, target, measured, stick, command = LOOPS[loop]
     autopilot = start("Autopilot", **{stick: 0.45, target: 3.0})
     for n in range(40):
         autopilot.step(**{measured: rate * n * STEP})
@@ -252,6 +257,10 @@ def test_fmpy_holds_and_agrees(folder: Path, expected: tuple[str, Trajectory]) -
     assert np.ptp(result["rov.z"]) > 4.9  # it did dive
     assert degrees(np.ptp(result["rov.psi"])) > 89.0
     assert result["rov.z"].max() < 5.0 + 0.02  # and not beyond
+    if parameters == DEFAULT:  # the stick balances current and tether, and it faces the current
+        assert trajectory["rov.u"][-1] == pytest.approx(-SEA["V_E"], abs=0.01)
+        assert MISSION["psi_ref"] == pytest.approx(pi / 2)
+        assert sin(trajectory["rov.psi"][-1]) == pytest.approx(1.0)
 
 
 @pytest.mark.long
@@ -296,20 +305,15 @@ def test_the_ssp_is_one_that_engines_read(folder: Path, parameters: str) -> None
     system = read_ssd(str(path)).system  # checked against the schemas of SSP 1.0
     assert system.connectors == []
     with zipfile.ZipFile(path) as archive:
-        assert [name for name in archive.namelist() if name.endswith(".ssd")] == ["SystemStructure.ssd"]
-        text = archive.read("SystemStructure.ssd").decode()
-        assert "<ssd:SystemStructureDescription" in text
-        assert "<ssc:Real" in text
-        assert {c.source for c in system.elements} <= set(archive.namelist())
+        names, text = archive.namelist(), archive.read("SystemStructure.ssd")
+    assert [name for name in names if name.endswith(".ssd")] == ["SystemStructure.ssd"]
+    assert b"<ssd:SystemStructureDescription" in text
+    assert b"<ssc:Real" in text
+    assert {c.source for c in system.elements} <= set(names)
     # FMPy sets every input connector at every step, connected or not
     ends = {(c.endElement, c.endConnector) for c in system.connections}
     assert {(e.name, c.name) for e in system.elements for c in e.connectors if c.kind == "input"} == ends
-
-
-@pytest.mark.parametrize("parameters", SETS)
-def test_a_component_has_one_parameter_binding(folder: Path, parameters: str) -> None:
-    with zipfile.ZipFile(system_files(folder, parameters)[0]) as archive:
-        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    root = etree.fromstring(text)
     validate_tree(root, "SystemStructureDescription.xsd")
     bindings = [len(list(component.iter("{*}ParameterBinding"))) for component in root.iter("{*}Component")]
     assert bindings == [1, 1]
@@ -318,22 +322,11 @@ def test_a_component_has_one_parameter_binding(folder: Path, parameters: str) ->
     assert [s.get("name") for s in sets] == [PARAMETER_SET] * 2, "Ecos takes those of one name"
     for values in sets:
         validate_tree(values, "SystemStructureParameterValues.xsd")
-
-
-@pytest.mark.parametrize("parameters", SETS)
-def test_omsimulator_finds_a_master_with_fixed_steps(folder: Path, parameters: str) -> None:
-    with zipfile.ZipFile(system_files(folder, parameters)[0]) as archive:
-        root = etree.fromstring(archive.read("SystemStructure.ssd"))
-    # It looks for literal tags, and at the system's first annotation only.
+    # OMSimulator finds a master with fixed steps. It looks for literal tags, at the system's first annotation only.
     tags = {element: f"{element.prefix}:{etree.QName(element).localname}" for element in root.iter(etree.Element)}
     found = next(element for element in root if tags[element] == "ssd:System")
-    for tag in (
-        "ssd:Annotations",
-        "ssc:Annotation",
-        "oms:Annotations",
-        "oms:SimulationInformation",
-        "oms:FixedStepMaster",
-    ):
+    below = "ssd:Annotations ssc:Annotation oms:Annotations oms:SimulationInformation oms:FixedStepMaster"
+    for tag in below.split():
         found = next(element for element in found if tags[element] == tag)
         assert tag != "ssc:Annotation" or found.get("type") == "org.openmodelica"
     assert dict(found.attrib) == {"description": "oms-ma", "stepSize": "0.05", "relativeTolerance": "1e-4"}
@@ -376,13 +369,6 @@ def test_the_groups_of_the_osp_configuration_fit(folder: Path, parameters: str) 
         assert {e.get("variable") for e in simulator.iter("{*}InitialValue")} <= set(variables)
     opposite = {"input": "output", "output": "input"}
     assert [[opposite[c] for c in group] for group in causality[0]] == causality[1]
-
-
-def test_the_stick_balances_current_and_tether() -> None:
-    result = plain(DEFAULT)
-    assert result["rov.u"][-1] == pytest.approx(-SEA["V_E"], abs=0.01)
-    assert MISSION["psi_ref"] == pytest.approx(pi / 2)
-    assert sin(result["rov.psi"][-1]) == pytest.approx(1.0)  # it faces the current
 
 
 @pytest.mark.long

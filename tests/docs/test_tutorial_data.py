@@ -10,22 +10,27 @@ from pymavlink import mavutil
 from examples import dive_log, tank_tests
 
 
-def test_tank_tests_are_the_same_every_time(tmp_path: Path) -> None:
-    for name in "ab":
-        done = CliRunner().invoke(tank_tests.main, [str(tmp_path / name)], catch_exceptions=False)
-        assert done.exit_code == 0
-    files = sorted(path.name for path in (tmp_path / "a").iterdir())
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the tank tests, by the command of the tutorial."""
+    path = tmp_path_factory.mktemp("tank") / "tests"
+    assert CliRunner().invoke(tank_tests.main, [str(path)], catch_exceptions=False).exit_code == 0
+    return path
+
+
+def test_tank_tests_are_the_same_every_time(folder: Path, tmp_path: Path) -> None:
+    tank_tests.write_tests(tmp_path)
+    files = sorted(path.name for path in folder.iterdir())
     kinds = [f"log_{axis}_{n}.csv" for axis in ("heave", "surge", "yaw") for n in (1, 2, 3)]
     assert files == [*kinds, "rov.toml", "thrust_rear.csv", "thrust_top.csv"]
     for name in files:
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
-    assert sum(path.stat().st_size for path in (tmp_path / "a").iterdir()) < 1_000_000
+        assert (folder / name).read_bytes() == (tmp_path / name).read_bytes()
+    assert sum(path.stat().st_size for path in folder.iterdir()) < 1_000_000
 
 
-def test_forces_scatter_about_the_curves(tmp_path: Path) -> None:
-    tank_tests.write_tests(tmp_path)
+def test_forces_scatter_about_the_curves(folder: Path) -> None:
     for curve, spread in (("rear", 0.25), ("top", 0.08)):
-        command, force = np.loadtxt(tmp_path / f"thrust_{curve}.csv", delimiter=",", skiprows=1).T
+        command, force = np.loadtxt(folder / f"thrust_{curve}.csv", delimiter=",", skiprows=1).T
         true = np.array([tank_tests.bollard_pull(curve, c) for c in (command / 100.0).tolist()])
         assert not true[np.abs(command) <= 5.0].any()
         assert force[command == 100.0].mean() > -1.3 * force[command == -100.0].mean()

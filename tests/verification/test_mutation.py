@@ -12,6 +12,8 @@ def test_every_file_has_tests() -> None:
     files = mutation.files()
     assert {"rov_fmu/model/step.py", "rov_fmu/identify/slips/search.py", "fmu_src/c/step.c"} <= {*files}
     assert not [test for file in files for test in mutation.tests_of(file) if not (mutation.ROOT / test).exists()]
+    tests = mutation.tests_of("rov_fmu/model/riccati.py")
+    assert tests[0] == "tests/model/test_riccati.py", "those that import it are the first"
 
 
 @pytest.fixture
@@ -35,13 +37,14 @@ def test_only_code_is_mutated(source: Path) -> None:
         "def f(\n"
         "    a: list[1],\n"
         ") -> list[2]:\n"
+        '    raise ValueError(f"{1 + 2}")\n'
         "    return zip(a, a, strict=True)\n"
         "if TYPE_CHECKING:\n"
         "    x = 1\n"
         "b = 1 < 2\n"
     )
     mutants = [mutant for seed in range(20) for mutant in mutation.draw(seed)]
-    assert {mutant.line for mutant in mutants} == {5, 12}
+    assert {mutant.line for mutant in mutants} == {5, 13}
     assert {mutant.after.replace(" ", "") for mutant in mutants if mutant.line == 5} == {"x:list[1]=4", "x:list[1]=2"}
     assert [mutant.after for mutant in mutation.draw(1)] == [mutant.after for mutant in mutation.draw(1)]
 
@@ -52,6 +55,23 @@ def test_a_line_of_c_is_changed_in_one_place() -> None:
     mutants = mutation._c_mutants("/* a + b */\nx = a + b;\n")
     assert set(mutants) == {2}
     assert "/* a + b */\nx = a - b;\n" in [make() for make in mutants[2]]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("line", "changed", "is_mutant"),
+    [
+        ("size >= SERIALIZED_SIZE,", "size > SERIALIZED_SIZE,", True),
+        ("size >= SERIALIZED_SIZE,", "size >= SERIALIZED_SIZE + 0,", False),
+        ("size >= SERIALIZED_SIZE,", "size >= ,", False),
+        ("the state is NULL.", "the state == NULL.", False),
+    ],
+    ids=["another condition", "the same object code", "not C", "a message"],
+)
+def test_a_mutant_of_c_compiles_to_other_code(line: str, changed: str, is_mutant: bool) -> None:
+    text = (mutation.ROOT / "fmu_src" / "c" / "saved.c").read_text(encoding="utf-8")
+    assert line in text
+    assert mutation._is_valid_c("fmu_src/c/saved.c", text, text.replace(line, changed)) is is_mutant
 
 
 @pytest.mark.long

@@ -4,6 +4,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from itertools import product
 from pathlib import Path
@@ -60,8 +61,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{row}, {importer.interface}")
         return 0
     if options.install:
-        # The other kits are installed even if one fails.
-        return max([_install(kit, tools, console) for kit in dict.fromkeys(importer.kit for importer in importers)])
+        kits = list(dict.fromkeys(importer.kit for importer in importers))
+        # All at once, because they use the network and the processors at different times. The other kits are installed
+        # even if one fails.
+        with console.status(f"installing {', '.join(kits)}"), ThreadPoolExecutor() as pool:
+            return max(pool.map(partial(_install, tools=tools, console=console), kits))
     outcomes = []
     with tempfile.TemporaryDirectory() as folder:
         vehicles = [options.vehicle] if options.vehicle else MANOEUVRES
@@ -79,8 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _install(kit: str, tools: Path, console: Console) -> int:
     """Install a kit and return the exit code."""
     try:
-        with console.status(f"installing {kit}"):
-            install(kit, tools, console.print)
+        install(kit, tools, console.print)
     except InstallError as error:
         print(f"interop: {error}", file=sys.stderr)
         return 1

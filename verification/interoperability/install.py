@@ -54,9 +54,10 @@ def _install(kit: str, programs: tuple[str, ...], tools: Path, say: Callable[[st
 
 def _install_python(requirements: str, tools: Path) -> None:
     place = tools / environment(requirements)
-    _call([sys.executable, "-m", "venv", "--clear", str(place)], tools)
-    pip = [str(place / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    _call([*pip, "-r", str(HERE / requirements)], tools)
+    _call([sys.executable, "-m", "venv", "--clear", "--without-pip", str(place)], tools)
+    # Most of the modules are never imported, so they are not compiled here.
+    options = ["--python", str(place), "--quiet", "--disable-pip-version-check", "install", "--no-compile"]
+    _call([sys.executable, "-m", "pip", *options, "-r", str(HERE / requirements)], tools)
 
 
 def _install_java(importer: Importer, tools: Path) -> None:

@@ -14,7 +14,7 @@ several rows for one time the first counts; rows between communication points ar
 """
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import cycle
@@ -105,20 +105,24 @@ class Manoeuvre:
         """Return the largest difference of any output at any communication point (SI units). Raises ResultError."""
         try:
             with result.open(newline="") as file:
-                rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-        except (OSError, TypeError, ValueError, AttributeError) as error:
+                return max(self._differences(filter(None, csv.reader(file)), result.name))
+        except (OSError, ValueError, IndexError) as error:
             raise ResultError(f"{result.name} cannot be read: {error}") from error
-        if missing := [name for name in ("time", *self.outputs) if not rows or name not in rows[0]]:
-            raise ResultError(f"{result.name} has no column {missing[0]}")
-        largest, remaining = 0.0, iter(rows)
+
+    def _differences(self, rows: Iterator[list[str]], file: str) -> Iterator[float]:
+        """Yield the largest difference of any output at each communication point. Raises ResultError."""
+        header = next(rows, [])
+        if missing := [name for name in ("time", *self.outputs) if name not in header]:
+            raise ResultError(f"{file} has no column {missing[0]}")
+        time, columns = header.index("time"), [header.index(name) for name in self.outputs]
         for point in self.reference:
-            row = next((row for row in remaining if row["time"] > point["time"] - 1e-6), None)
-            if row is None or row["time"] > point["time"] + 1e-6:
-                raise ResultError(f"{result.name} has no row for t = {point['time']}")
-            if strange := [name for name in self.outputs if not isfinite(row[name])]:
-                raise ResultError(f"{result.name} has {strange[0]} = {row[strange[0]]} at t = {point['time']}")
-            largest = max(largest, *(abs(row[name] - point[name]) for name in self.outputs))
-        return largest
+            row = next((row for row in rows if float(row[time]) > point["time"] - 1e-6), None)
+            if row is None or float(row[time]) > point["time"] + 1e-6:
+                raise ResultError(f"{file} has no row for t = {point['time']}")
+            values = {name: float(row[column]) for name, column in zip(self.outputs, columns, strict=True)}
+            if strange := [name for name, value in values.items() if not isfinite(value)]:
+                raise ResultError(f"{file} has {strange[0]} = {values[strange[0]]} at t = {point['time']}")
+            yield max(abs(value - point[name]) for name, value in values.items())
 
 
 def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
