@@ -19,9 +19,9 @@ FMI3_Export fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi
  * more than MOST_PIECES pieces. */
 static const double PIECE = 1e-4;
 
-/* Call the callback of intermediate update at the current state, `elapsed` seconds after t. The callback may read variables and
- * set inputs. If it ends the step early, *length becomes shorter. */
-static void update(fmu *f, double t, double elapsed, double *length, bool is_inside)
+/* Call the callback of intermediate update at the current state, `gone` seconds after t. The callback may read variables and set
+ * inputs. If it ends the step early, *length becomes shorter. */
+static void update(fmu *f, double t, double gone, double *length, bool is_inside)
 {
     const char *const function = f->function;
     const bool may_return = is_inside && f->host.may_return_early;
@@ -33,7 +33,7 @@ static void update(fmu *f, double t, double elapsed, double *length, bool is_ins
     f->now.mode = STEP;
     f->function = function;
     if (early && may_return && wanted < end) {
-        *length = fmax(wanted - t, elapsed);
+        *length = fmax(wanted - t, gone);
     }
 }
 
@@ -42,17 +42,17 @@ static outcome step_in_pieces(fmu *f, double t, double h, double *last)
 {
     const double pieces = fmin(fmax(1.0, ceil(h / PIECE * (1.0 - 1e-9))), MOST_PIECES);
     int cuts = 0;
-    double length = h, elapsed = 0.0; /* measured from t: a piece may be shorter than the last digit of a large t */
+    double length = h, gone = 0.0; /* measured from t: a piece may be shorter than the last digit of a large t */
     TRY(check_step(f, t, h));
     warn_of_jump(f, f->now.time, t, h);
     f->now.time = t;
-    update(f, t, elapsed, &length, false);
-    for (double n = 1.0; elapsed < length; n++) {
-        const double from = elapsed;
-        elapsed = n < pieces ? fmin(length, h * (n / pieces)) : length;
-        TRY(advance(f, t + from, elapsed - from, &cuts));
-        f->now.time = *last = t + elapsed; /* without the rounding of a sum over pieces */
-        update(f, t, elapsed, &length, elapsed < length);
+    update(f, t, gone, &length, false);
+    for (double n = 1.0; gone < length; n++) {
+        const double from = gone;
+        gone = n < pieces ? fmin(length, h * (n / pieces)) : length;
+        TRY(advance(f, t + from, gone - from, &cuts));
+        f->now.time = *last = t + gone; /* without the rounding of a sum over pieces */
+        update(f, t, gone, &length, gone < length);
     }
     return DONE;
 }
