@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from math import sqrt
 from pathlib import Path
 
-from rov_fmu.model.layout import AXES, CURVE, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.layout import AXES, AXIS, CURVE, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -40,36 +40,14 @@ _MIX = {
     "aside": {"1": -1.0, "2": 1.0, "3": -1.0, "4": 1.0},
     "turn": {"1": -0.5, "2": 0.5, "3": 0.5, "4": -0.5},
 }
-_NUMBERS = {  # the coefficients of a BlueROV2 Heavy, and plausible values for those that it does not have
-    "m_rov": 13.5,
-    "I_r": 0.37,
-    "R": 0.2,
-    "gamma": 0.5,
-    "m_a_u": 6.3567,
-    "m_a_v": 7.1206,
-    "m_a_w": 18.6863,
-    "m_a_r": 0.2215,
-    "a_d_u": 141.0,
-    "b_d_u": 13.7,
-    "a_d_v": 217.0,
-    "b_d_v": 0.0,
-    "a_d_w": 190.0,
-    "b_d_w": 33.0,
-    "a_d_r": 1.5,
-    "b_d_r": 0.0,
-    "a_d_u_reverse": 190.0,
-    "b_d_u_reverse": 4.0,
-    "a_d_v_reverse": 100.0,
-    "b_d_v_reverse": 3.0,
-    "a_d_w_reverse": 150.0,
-    "b_d_w_reverse": 20.0,
-    "a_d_r_reverse": 0.7,
-    "b_d_r_reverse": 0.2,
-    "F_0_u": 0.1,
-    "F_0_v": 0.3,
-    "F_0_w": -1.5,
-    "F_0_r": 0.01,
+_BODY_NUMBERS = {"m_rov": 13.5, "I_r": 0.37, "R": 0.2, "gamma": 0.5}
+_AXIS_NUMBERS = {  # m_a, a_d, b_d, a_d_reverse, b_d_reverse, F_0
+    "u": (6.3567, 141.0, 13.7, 190.0, 4.0, 0.1),
+    "v": (7.1206, 217.0, 0.0, 100.0, 3.0, 0.3),
+    "w": (18.6863, 190.0, 33.0, 150.0, 20.0, -1.5),
+    "r": (0.2215, 1.5, 0.0, 0.7, 0.2, 0.01),
 }
+"""The coefficients of a BlueROV2 Heavy, and plausible values for those that it does not have."""
 _CURVE_NUMBERS = {
     "a_t": 29.33,
     "b_t": 31.48,
@@ -85,7 +63,10 @@ assert _CURVE_NUMBERS.keys() == CURVE.keys()
 def numbered(layout: Layout, **values: float) -> Rov:
     """Return a vehicle with the Heavy's numbers, except for the given values, and without tuning."""
     numbers = {curve.coefficient(key): _CURVE_NUMBERS[key] for curve in layout.curves for key in curve.keys}
-    numbers |= _NUMBERS | values
+    for form in layout.axes:
+        row = _AXIS_NUMBERS[form.axis.velocity]
+        numbers |= {form.axis.coefficient(key): value for key, value in zip(AXIS, row, strict=True)}
+    numbers |= _BODY_NUMBERS | values
     return Rov(layout, {name: 1.0 if meta.tunable else numbers[name] for name, meta in layout.coefficients.items()})
 
 

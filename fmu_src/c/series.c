@@ -1,4 +1,4 @@
-/* The Taylor series of the states of equation.h: y(t tau) = sum of c[n] t^n, with the unit of time tau. Every product of two
+/* The Taylor series of the states of equation.h: y(t unit) = sum of c[n] t^n, with a unit of time. Every product of two
  * states is a Cauchy product, so each coefficient follows from those before it. The last coefficients show how far the series
  * may be used (Jorba and Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
  * 2005). */
@@ -21,8 +21,8 @@ typedef struct {
     unsigned moving;               /* one bit for each component; it is set where the states are not constant */
     unsigned blocks;               /* one bit for each block of equation.h; it is set where the states are not constant */
     double size[N_SERIES];         /* for each state, the size of its group */
-    double tau;                    /* the unit of time, s */
-    double pace[N_SERIES];         /* tau, or 0 for the states that are constant */
+    double unit;                   /* the unit of time, s */
+    double pace[N_SERIES];         /* the unit of time, or 0 for the states that are constant */
     double c[ORDER + 1][N_SERIES]; /* the coefficients */
 } series;
 

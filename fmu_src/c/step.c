@@ -5,14 +5,14 @@ enum { MOST_PIECES = 10000 }; /* of a step */
 typedef struct {
     const model_numbers *n;
     model_held q;
-    double y[N_SERIES];       /* the states at the start of a piece */
-    double lost[N_SERIES];    /* the rounding error of each state, to be added to its next change */
-    double gone[N_SERIES];    /* the changes so far of the integrals, which are the states from N_USED on */
-    double scale[N_SERIES];   /* the size of each group of states, or an earlier size divided by 4 for each piece since, if larger */
-    double largest[N_SERIES]; /* the largest size of each group so far */
-    double covered[N_USED];   /* the integral of each state's size over time, to within a factor of two */
-    unsigned settled;         /* one bit for each component; it is set once the component has settled */
-    int reverse[N_MONITORED]; /* 1 for each velocity whose coefficients are those of the negative direction */
+    double y[N_SERIES];            /* the states at the start of a piece */
+    double lost[N_SERIES];         /* the rounding error of each state, to be added to its next change */
+    double displacement[N_SERIES]; /* the changes so far of the integrals, which are the states from N_USED on */
+    double scale[N_SERIES];        /* the size of each group of states, or an earlier size / 4 per piece since, if larger */
+    double largest[N_SERIES];      /* the largest size of each group so far */
+    double covered[N_USED];        /* the integral of each state's size over time, to within a factor of two */
+    unsigned settled;              /* one bit for each component; it is set once the component has settled */
+    int reverse[N_MONITORED];      /* 1 for each velocity whose coefficients are those of the negative direction */
 } motion;
 
 /* Return the sum of the sizes of the states in a group. */
@@ -68,11 +68,11 @@ static void motion_grow_slowly(motion *m, series *s)
 }
 
 /* Begin a series at the current states: compute its first two coefficients, the directions, and which components move. */
-INLINE void motion_begin(motion *m, double tau, series *s)
+INLINE void motion_begin(motion *m, double unit, series *s)
 {
     double rate[N_SERIES];
     bool turned = false;
-    s->tau = tau;
+    s->unit = unit;
     s->moving = s->blocks = 0;
     for (int i = 0; i < N_MONITORED; i++) {
         m->reverse[i] = m->y[i] < 0.0;
@@ -82,7 +82,7 @@ INLINE void motion_begin(motion *m, double tau, series *s)
     for (int i = 0; i < N_SERIES; i++) {
         const unsigned bit = 1U << COMPONENT_OF[i];
         s->c[0][i] = m->y[i];
-        s->c[1][i] = m->settled & bit ? 0.0 : tau * rate[i];
+        s->c[1][i] = m->settled & bit ? 0.0 : unit * rate[i];
         s->moving |= s->c[1][i] != 0.0 ? bit : 0U;
     }
     for (int k = 0; k < N_COMPONENTS; k++) {
@@ -100,7 +100,7 @@ INLINE void motion_begin(motion *m, double tau, series *s)
     for (int i = 0; i < N_SERIES; i++) {
         const bool moves = s->moving >> COMPONENT_OF[i] & 1U;
         s->c[1][i] = moves ? s->c[1][i] : 0.0;
-        s->pace[i] = moves ? tau : 0.0;
+        s->pace[i] = moves ? unit : 0.0;
         s->blocks |= moves ? 1U << BLOCK_OF[i] : 0U;
         s->size[i] = m->scale[GROUP[i]] + group_size(s->c[1], GROUP[i]);
     }
@@ -178,11 +178,11 @@ INLINE void motion_move(motion *m, const series *s, double length, double change
         }
     }
     for (int i = 0; i < N_USED; i++) {
-        m->covered[i] += fabs(m->y[i]) * length * s->tau;
+        m->covered[i] += fabs(m->y[i]) * length * s->unit;
         motion_add(&m->y[i], change[i], &m->lost[i]);
     }
     for (int i = N_USED; i < N_SERIES; i++) {
-        motion_add(&m->gone[i], change[i], &m->lost[i]);
+        motion_add(&m->displacement[i], change[i], &m->lost[i]);
     }
 }
 
@@ -247,20 +247,32 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
     return !all;
 }
 
+/* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
+static bool motion_coasts(motion *m, double rest)
+{
+    if (m->settled != (1U << N_DYNAMIC) - 1U) {
+        return false;
+    }
+    model_coast(m->n, &m->q, rest, m->y, m->displacement);
+    return true;
+}
+
 /* Compute the states after h > 0 seconds with the inputs held. They are finite unless a result overflows. Return the
  * number of pieces, or 0 when more than MOST_PIECES would be needed. */
 static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES])
 {
     const double *const state = at + FIRST_STATE;
-    double done = 0.0, lost = 0.0, tau = h, change[N_SERIES]; /* rounding has taken `lost` from `done` */
+    double done = 0.0, lost = 0.0; /* the length of all pieces so far, and its rounding error */
+    double rest = h;               /* the time that remains */
+    double unit = h;               /* the longest unit of time for the next series */
+    double change[N_SERIES];
     int pieces = 0;
     motion m;
     series s;
     memset(&m, 0, sizeof m);
     m.n = n;
     model_start(at, n, &m.q, m.y, m.scale);
-    while (++pieces <= MOST_PIECES && tau > 0.0) {
-        const double rest = h - done - lost;
+    while (++pieces <= MOST_PIECES && unit > 0.0) {
         for (int i = 0; i < N_USED; i++) {
             if (GROUP[i] == i) {
                 const double size = group_size(m.y, i);
@@ -268,24 +280,23 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
                 m.largest[i] = fmax(m.largest[i], size);
             }
         }
-        motion_begin(&m, fmin(rest, tau), &s);
+        motion_begin(&m, fmin(rest, unit), &s);
         double reach = 1.0;
         if (!motion_grow_short(&m, &s)) {
             if (pieces == 1) { /* the step is long, and some states may have settled before it */
-                motion_settle(&m, h);
-                if (m.settled == (1U << N_DYNAMIC) - 1U) {
-                    model_coast(n, &m.q, h, m.y, m.gone);
+                motion_settle(&m, rest);
+                if (motion_coasts(&m, rest)) {
                     break;
                 }
                 if (m.settled != 0U) {
-                    motion_begin(&m, s.tau, &s);
+                    motion_begin(&m, s.unit, &s);
                     motion_grow_short(&m, &s);
                 }
             }
             reach = motion_grow_long(&m, &s);
         }
         if (reach == 0.0) {
-            tau = 1e-3 * s.tau;
+            unit = 1e-3 * s.unit;
             continue;
         }
         double length = reach;
@@ -307,25 +318,25 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
         if (HAS_LAG) {
             model_arrive(at, n, &m.q, m.y, m.scale);
         }
-        motion_add(&done, length * s.tau, &lost);
-        if (length * s.tau >= rest) {
+        if (length * s.unit >= rest) {
             break;
         }
-        tau = 2.0 * s.tau * reach;
+        motion_add(&done, length * s.unit, &lost);
+        rest = h - done - lost;
+        unit = 2.0 * s.unit * reach;
         if (motion_is_slow(&m, &s, change)) {
-            motion_settle(&m, h - done - lost);
+            motion_settle(&m, rest);
         }
-        if (m.settled == (1U << N_DYNAMIC) - 1U) {
-            model_coast(n, &m.q, h - done - lost, m.y, m.gone);
+        if (motion_coasts(&m, rest)) {
             break;
         }
     }
-    if (!(tau > 0.0)) { /* even the shortest piece overflows */
+    if (!(unit > 0.0)) { /* even the shortest piece overflows */
         for (int i = 0; i < N_STATES; i++) {
             next[i] = INFINITY;
         }
         return pieces;
     }
-    model_finish(state, &m.q, m.y, m.gone, next);
+    model_finish(state, &m.q, m.y, m.displacement, next);
     return pieces <= MOST_PIECES ? pieces : 0;
 }

@@ -86,7 +86,7 @@ class EquationSource:
 
     def coasting(self) -> list[str]:
         """Return the integrals with constant rates while all velocities are steady: all, but x and y not in a turn."""
-        return [name for name in self.equation.states if not self.used(name) and not self._turns(name)]
+        return [name for name in self.equation.states if name not in self.equation.used and not self._turns(name)]
 
     def _turns(self, name: str) -> bool:
         """Return True when the rate of a state depends on the heading."""
@@ -97,9 +97,10 @@ class EquationSource:
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
 
     def dynamic(self) -> int:
-        """Return the number of components that are not kinematic. These components come first."""
-        kinematic = {"cos_psi", "sin_psi", "x", "y", "z", "psi"}
-        return sum(not kinematic & set(group) for group in self.equation.components)
+        """Return the number of components that may settle. They come first, so the C code needs only their number."""
+        equation = self.equation
+        assert equation.components[: len(equation.dynamic)] == equation.dynamic
+        return len(equation.dynamic)
 
     def finish(self) -> list[str]:
         """Return statements that assign the states of the vehicle after a step."""
@@ -107,10 +108,10 @@ class EquationSource:
         for name in self.layout.state:
             if name in self.equation.lagging:
                 end = f"q->{name}"
-            elif self.used(name):
+            elif name in self.equation.used:
                 end = f"y[Y_{name}]"
             else:
-                end = f"state[REF_{name} - FIRST_STATE] + gone[Y_{name}]"
+                end = f"state[REF_{name} - FIRST_STATE] + displacement[Y_{name}]"
             lines.append(f"next[REF_{name} - FIRST_STATE] = {end};")
         return lines
 
@@ -135,10 +136,11 @@ class EquationSource:
     def blocks(self) -> list[tuple[str, ...]]:
         """Return groups of states whose coefficients are computed together. No group depends on a later one."""
         depth: dict[str, int] = {}
+        used = self.equation.used
         for group in self.equation.components:
             level = 1 + max((depth[name] for name in self._inputs(group)), default=0)
             last = 1 + len(self.equation.components)
-            depth |= dict.fromkeys(group, level if any(map(self.used, group)) else last)
+            depth |= dict.fromkeys(group, level if used & set(group) else last)
         levels = sorted(set(depth.values()))
         return [tuple(name for name in self.equation.states if depth[name] == level) for level in levels]
 
@@ -201,14 +203,10 @@ class EquationSource:
         """Return one bit for each other component that a component depends on."""
         return sum(1 << other for other in {self.component_of(name) for name in self._inputs(group)})
 
-    def used(self, name: str) -> bool:
-        """Return True when a term contains the state."""
-        return any(name in inputs for inputs in self.equation.inputs_of.values())
-
     def needed_with(self, group: Sequence[str]) -> int:
         """Return bits for the states that let a component act on others unless they are 0, or all bits for always."""
         always, partners = 2**32 - 1, 0
-        if not any(map(self.used, group)) or set(group) & set(self.equation.monitored):
+        if self.equation.used.isdisjoint(group) or set(group) & set(self.equation.monitored):
             return always
         for name in set(self.equation.states) - set(group):
             for factors in (term.factors for term in self.equation.rows[name] if set(term.factors) & set(group)):
@@ -220,7 +218,7 @@ class EquationSource:
 
     def n_used(self) -> int:
         """Return the number of states that terms contain. These states come first."""
-        return sum(map(self.used, self.equation.states))
+        return len(self.equation.used)
 
     def lagging_ends(self) -> list[tuple[str, str]]:
         """Return each force that lags, and its formula in C after a piece that ends at y."""

@@ -98,6 +98,11 @@ class Equation:
         }
 
     @cached_property
+    def used(self) -> frozenset[str]:
+        """The states that a term contains. The other states are integrals of these."""
+        return frozenset().union(*self.inputs_of.values())
+
+    @cached_property
     def components(self) -> tuple[tuple[str, ...], ...]:
         """Groups of states that depend on each other. Each group comes after those that it depends on."""
         reach = {name: set(inputs) for name, inputs in self.inputs_of.items()}
@@ -117,6 +122,12 @@ class Equation:
             done.append(following)
             groups.remove(following)
         return tuple(done)
+
+    @cached_property
+    def dynamic(self) -> tuple[tuple[str, ...], ...]:
+        """The components that may settle. The others are kinematic: only the heading and integrals."""
+        settling = self.used - self.heading.keys()
+        return tuple(group for group in self.components if not settling.isdisjoint(group))
 
     @cached_property
     def heading(self) -> dict[str, str]:

@@ -42,6 +42,8 @@ class Axis:
     """The coefficient that resists acceleration, together with the added mass: m_rov or I_r."""
     equations: tuple[str, str]
     """The numbers of the paper's equations of drag and motion."""
+    place: int
+    """The place of the axis's direction, x, y or z, in a vector."""
 
     def coefficient(self, key: str) -> str:
         """Return the name of a coefficient of the axis by its key: a_d, b_d_reverse, alpha ..."""
@@ -53,11 +55,22 @@ class Axis:
         return "thrust" if self.load == "N" else "torque"
 
 
-SURGE = Axis("surge", "u", "m/s", "forward", "astern", "distance", "m", "N", "X_ext", "m_rov", ("(14)", "(18a)"))
-SWAY = Axis("sway", "v", "m/s", "to starboard", "to port", "distance", "m", "N", "Y_ext", "m_rov", ("(18)", "(18)"))
-HEAVE = Axis("heave", "w", "m/s", "down", "up", "depth", "m", "N", "Z_ext", "m_rov", ("(15)", "(18b)"))
+SURGE = Axis("surge", "u", "m/s", "forward", "astern", "distance", "m", "N", "X_ext", "m_rov", ("(14)", "(18a)"), 0)
+SWAY = Axis("sway", "v", "m/s", "to starboard", "to port", "distance", "m", "N", "Y_ext", "m_rov", ("(18)", "(18)"), 1)
+HEAVE = Axis("heave", "w", "m/s", "down", "up", "depth", "m", "N", "Z_ext", "m_rov", ("(15)", "(18b)"), 2)
 YAW = Axis(
-    "yaw", "r", "rad/s", "bow to starboard", "bow to port", "heading", "rad", "N.m", "N_ext", "I_r", ("(16)", "(18c)")
+    "yaw",
+    "r",
+    "rad/s",
+    "bow to starboard",
+    "bow to port",
+    "heading",
+    "rad",
+    "N.m",
+    "N_ext",
+    "I_r",
+    ("(16)", "(18c)"),
+    2,
 )
 AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, YAW)}
 """All kinds of axes by name, in the order of their states."""
@@ -192,12 +205,13 @@ class Thruster:
 
     def effect(self, axis: Axis) -> float:
         """Return the force along an axis, or the torque, of a force of 1 N. An arm's torque is in units of R sin γ."""
-        if axis is not YAW:
-            return self.direction[(SURGE, SWAY, HEAVE).index(axis)]
+        X, Y, Z = self.direction
+        if axis.push == "thrust":
+            return (X, Y, Z)[axis.place]
         if self.position is None:
             return float(self.arm)
-        x, y, _ = self.position
-        return x * self.direction[1] - y * self.direction[0]
+        x, y, z = self.position
+        return (y * Z - z * Y, z * X - x * Z, x * Y - y * X)[axis.place]
 
 
 @dataclass(frozen=True)
@@ -294,11 +308,8 @@ class Layout:
     @cached_property
     def coefficients(self) -> dict[str, Declaration]:
         """The coefficients, in the order of the FMU's variables."""
-        found: dict[str, Declaration] = {}
-        if self.has(SURGE, SWAY, HEAVE):
-            found["m_rov"] = BODY["m_rov"].meta()
-        if self.has(YAW):
-            found["I_r"] = BODY["I_r"].meta()
+        inertias = {form.axis.inertia for form in self.axes}
+        found = {name: kind.meta() for name, kind in BODY.items() if name in inertias}
         if self.has_arm:
             found |= {key: kind.meta() for key, kind in ARM.items()}
         for curve in self.curves:

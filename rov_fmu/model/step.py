@@ -55,18 +55,16 @@ class Table:
         self.coefficients = list(formulas)
         self.hold = compiled({**equation.program, **equation.forces, **formulas})
         self.arrive = compiled({force: after for force, (_, after) in equation.lagging.items()})
-        factors = [factors for row in self.rows for _, factors in row]
-        self.products = sorted({pair for pair in factors if len(pair) == 2})
-        self.used = {state for pair in factors for state in pair}
+        self.products = sorted({factors for row in self.rows for _, factors in row if len(factors) == 2})
+        self.used = {place[name] for name in equation.used}
         """The states that a term contains. The others are integrals of them."""
         self.heading = {place[name] for name in equation.heading}
         self.dynamic: list[tuple[set[int], set[int]]] = []
         """The components that may settle, in their order: the states of each, and the other states it depends on."""
-        for component in equation.components:
+        for component in equation.dynamic:
             group = {place[name] for name in component}
-            if group & (self.used - self.heading):
-                inputs = {place[name] for state in component for name in equation.inputs_of[state]}
-                self.dynamic.append((group, inputs - group))
+            inputs = {place[name] for state in component for name in equation.inputs_of[state]}
+            self.dynamic.append((group, inputs - group))
 
 
 def step(table: Table, values: Mapping[str, float], h: float) -> dict[str, float]:

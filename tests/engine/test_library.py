@@ -108,16 +108,33 @@ def test_where_the_compiler_fails_one_line_says_so(cache: Cache, monkeypatch: py
 
 
 _PROGRAM = f"""
+import sys, time
+from pathlib import Path
 import rov_fmu
+from rov_fmu.engine import library
+
+def compile_engine(texts):
+    time.sleep(0.5)  # so that both processes compile
+    return Path(sys.argv[1]).read_bytes()
+
+library.compile_engine = compile_engine
 print(rov_fmu.load({str(BARE)!r}).simulate([0, 1, 2], {{}}, start={{"w": 1.0}})["w"].tolist())
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux uses XDG_CACHE_HOME")
-def test_two_processes_at_once_do_not_clash(tmp_path: Path) -> None:
+def test_two_processes_at_once_do_not_clash(cache: Cache, tmp_path: Path) -> None:
+    load_library(ROV)
+    (compiled,) = cache.files()
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}
     both = [
-        subprocess.Popen([sys.executable, "-c", _PROGRAM], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
+        subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM, str(compiled)],
+            cwd=ROOT,
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
         for _ in range(2)
     ]
     one, other = (process.communicate(timeout=300)[0] for process in both)

@@ -73,7 +73,6 @@ def test_a_coefficient_that_is_set_by_hand_is_no_estimate() -> None:
 def test_the_vehicle_builds_itself(tmp_path: Path) -> None:
     built = rov_fmu.load(BARE).with_(m_rov=12).build(tmp_path / "x.fmu", platforms="host")
     assert built.path == tmp_path / "x.fmu"
-    assert "set by hand: m_rov = 12 kg" in documentation_page(rov_fmu.load(BARE).with_(m_rov=12))
     assert built.note.startswith("valid; runs")
 
 
@@ -246,8 +245,8 @@ WRONG: dict[str, tuple[Call, str]] = {
         r"inputs\['u_l'\]: .* or \(vehicles, 1\), or \(vehicles, 3\), and has the shape \(1000,\)",
     ),
     "too large": (
-        lambda v: v.simulate_many(np.arange(1e6), coefficients={"a_d_u": np.full(10_000_000, 1.0)}),
-        "time, record: the result takes 8.8e.05 GB, more than there is",
+        lambda v: v.simulate_many(np.arange(1e6), coefficients={"a_d_u": np.full(1_000_000, 1.0)}),
+        "time, record: the result takes 8.8e.04 GB, more than there is",
     ),
 }
 

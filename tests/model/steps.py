@@ -1,52 +1,17 @@
 """Steps of a vehicle in Python and in C, and their errors."""
 
-import ctypes
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
-from rov_fmu.engine.source import sources
-from rov_fmu.fmu.variables import variables
 from rov_fmu.model.rov import Rov
 from tests.fmi import OK
 from tests.fmi2 import Fmu
 from tests.vehicles import State, Values
 from verification.references import reference
-from verification.references.c_programs import compile_c
 
 Step = Callable[[Rov, Values, Values, float], State]
 POSE = ("x", "y", "z", "psi")
 ROUNDING = 2.0**-52
-
-
-class Motion:
-    """The generated C of a vehicle, compiled without FMI."""
-
-    def __init__(self, rov: Rov, folder: Path) -> None:
-        self.rov = rov
-        self.names = [variable.name for variable in variables(rov)]
-        program = Path(__file__).with_name("program.c")
-        output = compile_c(program, folder / "terms.so", sources(rov), "-shared", "-fPIC")
-        self._library = ctypes.CDLL(str(output))
-        self._library.step.argtypes = (ctypes.c_void_p, ctypes.c_double)
-
-    def values(self, values: Values) -> "ctypes.Array[ctypes.c_double]":
-        return (ctypes.c_double * len(self.names))(*(values.get(name, 0.0) for name in self.names))
-
-    def step(self, rov: Rov, inputs: Values, state: Values, h: float) -> dict[str, float]:
-        at = self.values({**rov.coefficients, **inputs, **state})
-        assert self._library.step(at, h) > 0
-        return {name: at[self.names.index(name)] for name in state}
-
-    def calculate(self, values: Values) -> dict[str, float]:
-        at = self.values(values)
-        self._library.calculate(at)
-        return dict(zip(self.names, at, strict=True))
-
-    def tangent(self, values: Values, changes: Values) -> dict[str, float]:
-        d = self.values(changes)
-        self._library.tangent(self.values(values), d)
-        return dict(zip(self.names, d, strict=True))
 
 
 def in_python(rov: Rov, inputs: Values, state: Values, h: float, steps: int = 1) -> State:

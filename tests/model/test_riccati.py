@@ -15,7 +15,7 @@ from verification.references.closed_form import advance, time_to_rest
 from verification.references.reference import axis
 
 
-@pytest.fixture(params=[7, pytest.param(1, marks=pytest.mark.long)], ids=["every 7th case", "every case"])
+@pytest.fixture(params=[29, pytest.param(1, marks=pytest.mark.long)], ids=["every 29th case", "every case"])
 def stride(request: pytest.FixtureRequest) -> int:
     """The distance between the cases of a list that are tested."""
     return int(request.param)
@@ -38,11 +38,10 @@ def random_case(rng: random.Random) -> Case:
 
 
 @pytest.mark.parametrize(
-    ("seed", "cases"),
-    [(1, 150), pytest.param(2, 3_000, marks=pytest.mark.long), pytest.param(2, 20_000, marks=pytest.mark.weekly)],
+    "cases", [100, pytest.param(3_000, marks=pytest.mark.long), pytest.param(20_000, marks=pytest.mark.weekly)]
 )
-def test_velocity_and_distance_are_exact_over_random_motions(seed: int, cases: int) -> None:
-    rng = random.Random(seed)
+def test_velocity_and_distance_are_exact_over_random_motions(cases: int) -> None:
+    rng = random.Random(cases)
     check(random_case(rng) for _ in range(cases))
 
 
@@ -76,26 +75,28 @@ def test_exact_without_drag_force_or_motion() -> None:
     check(product((0.0, 0.3), (0.0, 1.7), (-2.5, 0.0, 2.5), (-1.2, 0.0, 1.2), (1e-5, 1e-2, 1.0, 1e3)))
 
 
-@pytest.mark.parametrize("q", [0.8, -0.8, 3.2])
-def test_exact_on_both_sides_of_the_fractions(q: float) -> None:
+def test_exact_on_both_sides_of_the_fractions(stride: int) -> None:
     """The continued fractions of the closed form end at these q = (B h/2)^2 + A C h^2."""
     motions = product((1e-3, 0.3, 50.0), (0.0, 1e-3, 1.0), (0.0, 0.1, 20.0), (-1e-3, -1e-15, 0.0, 1e-15, 1e-3))
-    check((A, B, (q * (1.0 + offset) - 0.25 * B * B) / A, v0, 1.0) for A, B, v0, offset in motions)
+    cases = product(motions, (0.8, -0.8, 3.2))
+    check(((A, B, (q * (1.0 + by) - 0.25 * B * B) / A, v0, 1.0) for (A, B, v0, by), q in cases), min(stride, 4))
 
 
-def test_the_steady_velocity_stays() -> None:
+def test_the_steady_velocity_stays(stride: int) -> None:
+    cases: list[Case] = []
     for A, B, C in product((0.0, 1e-4, 0.3, 1e3), (1e-4, 1.7, 1e3), (1e-4, 0.1, 1e4)):
         V = steady_velocity(A, B, C)
-        check(product((A,), (B,), (C,), (V, nextafter(V, inf), V * (1.0 - 1e-9)), (1e-5, 1.0, 1e3, 1e15)))
+        velocities = V, nextafter(V, inf), V * (1.0 - 1e-9)
+        cases += product((A,), (B,), (C,), velocities, (1e-5, 1.0, 1e3, 1e15))
+    check(cases, min(stride, 5))
 
 
 # ---- Far outside what an ROV does ----
 
 
-@pytest.mark.parametrize("h", [1e6, 1e9, 1e15])
-def test_huge_steps_are_exact(h: float, stride: int) -> None:
+def test_huge_steps_are_exact(stride: int) -> None:
     drags = (0.0, 1e-4, 0.3, 1e3), (0.0, 1e-4, 1.7, 1e3)
-    check(product(*drags, (-1e4, -0.1, 0.0, 0.1), (0.0, 0.01, 30.0), (h,)), stride)
+    check(product(*drags, (-1e4, -0.1, 0.0, 0.1), (0.0, 0.01, 30.0), (1e6, 1e9, 1e15)), stride)
 
 
 def test_huge_coefficients_are_exact(stride: int) -> None:
@@ -104,10 +105,12 @@ def test_huge_coefficients_are_exact(stride: int) -> None:
     check(product(drag, drag, (-1e18, -1.0, 0.0, 1e9, 1e18), (0.0, 1.0, 1e6), (1e-5, 1.0, 1e3)), stride)
 
 
-@pytest.mark.parametrize("tiny", [1e-12, 1e-300, SMALLEST])
-def test_tiny_and_subnormal_numbers_are_exact_to_the_last_subnormal_digit(tiny: float) -> None:
-    small = 0.0, tiny, 1.0
-    check(product(small, small, (-1.0, -tiny, tiny), small, (tiny, 1.0)))
+def test_tiny_and_subnormal_numbers_are_exact_to_the_last_subnormal_digit(stride: int) -> None:
+    cases: list[Case] = []
+    for tiny in (1e-12, 1e-300, SMALLEST):
+        small = 0.0, tiny, 1.0
+        cases += product(small, small, (-1.0, -tiny, tiny), small, (tiny, 1.0))
+    check(cases, min(stride, 5))
 
 
 # ---- Steady velocity and time constant ----

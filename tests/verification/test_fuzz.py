@@ -127,8 +127,8 @@ PLANTED = {
     ),
     "drag pushes a motion": (
         "step.c",
-        "s->c[1][i] = m->settled & bit ? 0.0 : tau * rate[i];",
-        "s->c[1][i] = m->settled & bit ? 0.0 : 1.0001 * tau * rate[i];",
+        "s->c[1][i] = m->settled & bit ? 0.0 : unit * rate[i];",
+        "s->c[1][i] = m->settled & bit ? 0.0 : 1.0001 * unit * rate[i];",
         "beyond its equilibrium|a step and its parts|at no more than",
     ),
     "a long step stops at low order": (
@@ -145,8 +145,8 @@ PLANTED = {
     ),
     "a dive goes further than its fastest": (
         "step.c",
-        "motion_add(&m->gone[i], change[i], &m->lost[i]);",
-        "motion_add(&m->gone[i], 1.000001 * change[i], &m->lost[i]);",
+        "motion_add(&m->displacement[i], change[i], &m->lost[i]);",
+        "motion_add(&m->displacement[i], 1.000001 * change[i], &m->lost[i]);",
         "goes from|at no more than",
     ),
 }
