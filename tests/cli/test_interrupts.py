@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import product
 from pathlib import Path
@@ -30,7 +30,13 @@ PATIENCE = 300.0
 class Command:
     """A command in its own terminal; its stderr is read separately."""
 
-    def __init__(self, arguments: list[str], folder: Path, is_controlled: bool = True, **environment: str) -> None:
+    def __init__(
+        self,
+        arguments: list[str],
+        folder: Path,
+        is_controlled: bool = True,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
         """`is_controlled` makes the terminal control the command, so that all its processes end with the first one."""
         self.temporary = folder / "temporary files"
         self.temporary.mkdir()
@@ -50,7 +56,7 @@ class Command:
             stdout=inside,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {"TERM": "xterm", "TMPDIR": str(self.temporary)} | environment,
+            env=os.environ | {"TERM": "xterm", "TMPDIR": str(self.temporary)} | dict(environment or {}),
             start_new_session=True,
             preexec_fn=own_terminal,  # noqa: PLW1509
         )
@@ -96,8 +102,10 @@ class Command:
 
 
 @contextmanager
-def command(arguments: list[str], folder: Path, is_controlled: bool = True, **environment: str) -> Iterator[Command]:
-    begun = Command(arguments, folder, is_controlled, **environment)
+def command(
+    arguments: list[str], folder: Path, is_controlled: bool = True, environment: Mapping[str, str] | None = None
+) -> Iterator[Command]:
+    begun = Command(arguments, folder, is_controlled, environment)
     try:
         yield begun
     finally:
@@ -119,17 +127,20 @@ figures = {{ V = "u[-1]" }}
 
 _MOMENTS = (None, 0.0, 0.02, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
 """Seconds after the first worker of a study has started; None is when the first runs are written."""
-_STUDIES = {(Command.press_ctrl_c, 0.0): (), (Command.terminate, None): ()}
-_STUDIES |= {(Command.press_ctrl_c, later): pytest.mark.long for later in (None, 0.3, 1.0)}
-_STUDIES |= {(Command.terminate, later): pytest.mark.long for later in (0.0, 0.6)}
+_DEFAULT = [(Command.press_ctrl_c, 0.0), (Command.terminate, None)]
+_LONG = [(Command.press_ctrl_c, None), (Command.press_ctrl_c, 0.3), (Command.press_ctrl_c, 1.0)]
+_LONG += [(Command.terminate, 0.0), (Command.terminate, 0.6)]
+
+
+def _marks(case: tuple[Any, float | None]) -> Any:
+    if case in _DEFAULT:
+        return ()
+    return pytest.mark.long if case in _LONG else pytest.mark.weekly
 
 
 @pytest.mark.parametrize(
     ("end", "later"),
-    [
-        pytest.param(*case, marks=_STUDIES.get(case, pytest.mark.weekly))
-        for case in product((Command.press_ctrl_c, Command.terminate), _MOMENTS)
-    ],
+    [pytest.param(*case, marks=_marks(case)) for case in product((Command.press_ctrl_c, Command.terminate), _MOMENTS)],
 )
 def test_a_study_ends_with_one_line(
     end: Callable[[Command], str], later: float | None, videoray_fmu: Path, tmp_path: Path
@@ -187,7 +198,7 @@ def test_a_worker_that_dask_restarts_prints_nothing(videoray_fmu: Path, tmp_path
 def test_a_compiler_ends_with_its_command(name: str, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     arguments = ["-m", "rov_fmu", name, str(BARE), "-o", str(tmp_path / "out" / "x")]
-    with command(arguments, tmp_path, **endless_compiler(tmp_path)) as begun:
+    with command(arguments, tmp_path, environment=endless_compiler(tmp_path)) as begun:
         begun.wait_until((tmp_path / "number").exists)
         assert begun.press_ctrl_c() == LINE
     assert not [*(tmp_path / "out").iterdir()]
@@ -211,7 +222,7 @@ def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_pat
     output.write_bytes(b"the old one")
     report = str(output.with_name("report.html"))
     arguments = ["-m", "rov_fmu", "identify", str(folder), "--force", "-o", str(output), "--report", report]
-    with command(arguments, tmp_path, NO_COLOR="1") as identification:
+    with command(arguments, tmp_path, environment={"NO_COLOR": "1"}) as identification:
         identification.wait_until(lambda: moment in identification.shown)
         assert identification.press_ctrl_c() == LINE
         shown = identification.shown
@@ -224,6 +235,6 @@ def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_pat
 def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
     begun = tmp_path / "begun"
     (tmp_path / "click.py").write_text(f"import pathlib, time\npathlib.Path({str(begun)!r}).touch()\ntime.sleep(600)\n")
-    with command(["-m", "rov_fmu", "tables"], tmp_path, PYTHONPATH=str(tmp_path)) as tables:
+    with command(["-m", "rov_fmu", "tables"], tmp_path, environment={"PYTHONPATH": str(tmp_path)}) as tables:
         tables.wait_until(begun.exists)
         assert tables.press_ctrl_c() == LINE

@@ -58,9 +58,11 @@ def test_an_fmu_of_fmi_3_has_it_in_its_name_and_shows_no_progress_without_a_term
 
 def test_fly_opens_the_page_that_it_wrote(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)  # type: ignore[func-returns-value]
     assert main(["fly", str(BARE), "--against", str(BARE)]) == 0
-    path = Path(capsys.readouterr().out.strip())
+    out, err = capsys.readouterr()
+    assert err == ""
+    path = Path(out.strip())
     assert opened == [path.as_uri()]
     text = path.read_text(encoding="utf-8")
     assert "The ghost is Bare, under the same commands." in text

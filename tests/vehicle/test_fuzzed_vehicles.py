@@ -46,8 +46,8 @@ def check_usable(vehicle: Vehicle) -> None:
     """Check that all numbers are within their bounds, and that a step gives finite numbers."""
     layout = vehicle.layout
     assert set(vehicle.rov.coefficients) == set(layout.coefficients) == set(vehicle.sources)
-    for name, meta in layout.coefficients.items():
-        assert meta.minimum <= vehicle.rov[name] <= meta.maximum
+    for name, declaration in layout.coefficients.items():
+        assert declaration.minimum <= vehicle.rov[name] <= declaration.maximum
     low, high = vehicle.command_range
     assert 0.0 <= low < high <= 1.0
     assert all(isfinite(end) for interval in vehicle.intervals.values() for end in interval)
@@ -70,7 +70,7 @@ def description(vehicle: Vehicle, folder: Path) -> ModelDescription:
 
 
 @pytest.mark.parametrize(
-    "examples", [30, pytest.param(200, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
+    "examples", [15, pytest.param(100, marks=pytest.mark.long), pytest.param(1000, marks=pytest.mark.weekly)]
 )
 def test_any_file_is_a_usable_vehicle_or_one_clear_line(examples: int, path: Path) -> None:
     usable = 0
@@ -96,7 +96,7 @@ def test_any_file_is_a_usable_vehicle_or_one_clear_line(examples: int, path: Pat
 
 
 @pytest.mark.parametrize(
-    "examples", [20, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
+    "examples", [10, pytest.param(40, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
 )
 def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> None:
     tuned = 0
@@ -123,7 +123,7 @@ def test_any_file_that_can_be_read_can_be_tuned(examples: int, path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    "examples", [10, pytest.param(80, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
+    "examples", [5, pytest.param(40, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
 )
 def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path: Path) -> None:
     written = path.with_name("written.toml")
@@ -149,7 +149,7 @@ def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path:
 
 
 @pytest.mark.parametrize(
-    "examples", [5, pytest.param(40, marks=pytest.mark.long), pytest.param(100, marks=pytest.mark.weekly)]
+    "examples", [3, pytest.param(20, marks=pytest.mark.long), pytest.param(100, marks=pytest.mark.weekly)]
 )
 def test_every_command_prints_the_same_lines_and_writes_nothing(
     examples: int, path: Path, capsys: pytest.CaptureFixture[str]

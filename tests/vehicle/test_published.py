@@ -1,10 +1,7 @@
 """Tables 6–8: V_ss and Tau from trajectories of the FMU against closed form, printed and measured values."""
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -276,20 +273,16 @@ def test_rounds_to_printed_digits(printed: str, computed: float, rounds: bool) -
 # ---- rov-fmu tables -------------------------------------------------------------------------------------
 
 
-def test_command_prints_the_tables_side_by_side(tables: Mapping[str, ResponseTable]) -> None:
-    run = subprocess.run(
-        [sys.executable, "-m", "rov_fmu", "tables"],
-        cwd=VIDEORAY.parent.parent,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        check=True,
-        env={**os.environ, "PYTHONUTF8": "1", "COLUMNS": "80", "FORCE_COLOR": ""},
-    )
-    assert run.stderr == ""
-    assert max(map(len, run.stdout.splitlines())) <= 110
+def test_command_prints_the_tables_side_by_side(
+    tables: Mapping[str, ResponseTable], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["tables"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert max(map(len, out.splitlines())) <= 110
     for table in tables.values():
-        block = re.search(rf"^Table {table.number}\. {table.axis.name.capitalize()}.*?^$", run.stdout, re.M | re.S)
+        block = re.search(rf"^Table {table.number}\. {table.axis.name.capitalize()}.*?^$", out, re.M | re.S)
         assert block
         lines = iter(line.split() for line in block[0].splitlines() if re.match(r"\d+ %", line))
         for quantity, row in product(("V_ss", "Tau"), table.rows):
