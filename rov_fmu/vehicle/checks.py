@@ -172,7 +172,7 @@ def _check_needed_tables(parts: Parts, lost: set[str]) -> Iterator[str]:
     if parts.arm:
         yield from _check_needed_keys("arm", parts.arm, ARM, dict.fromkeys(ARM, YAW) if has_arm else {})
     elif has_arm:
-        yield key_line("arm", "this table with R and gamma is missing, and a thruster says arm")
+        yield key_line("arm", "this table with R and gamma is missing, and a thruster has the key arm")
 
 
 def _check_reverse_pairs(table: str, keys: Mapping[str, Quantity]) -> Iterator[str]:
@@ -252,7 +252,9 @@ def _check_estimates(rows: Mapping[str, Estimated], quantities: Mapping[str, Qua
     from rov_fmu.vehicle.uncertainty import LEAST_EIGENVALUE, least_eigenvalue  # NumPy, which few files need
 
     if (least := least_eigenvalue(rows)) < LEAST_EIGENVALUE:
-        yield key_line("estimates", f"no numbers have these correlations: the least eigenvalue is {least:.3g}, not 0")
+        yield key_line(
+            "estimates", f"these correlations contradict each other: the least eigenvalue is {least:.3g}, not 0"
+        )
 
 
 def _wrong_correlation(name: str, other: str, rows: Mapping[str, Estimated]) -> str | None:
