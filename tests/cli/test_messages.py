@@ -395,7 +395,8 @@ def test_a_wrong_table_is_one_line(case: str, tmp_path: Path, capsys: Capsys) ->
 
 def test_wrong_inputs_of_a_plan_are_one_line(here: Path, videoray_fmu: Path, capsys: Capsys) -> None:
     pytest.importorskip("dask")
-    plan = FILES["plan.toml"].replace('vehicle = "videoray"', f"fmu = '{videoray_fmu}'")
+    shutil.copy(videoray_fmu, here / "rov.fmu")
+    plan = FILES["plan.toml"].replace('vehicle = "videoray"', 'fmu = "rov.fmu"')
     plan = plan.replace("runs = 2", 'sampler = "grid"\ninput_file = { path = "in.csv" }')
     (here / "plan.toml").write_text(plan, encoding="utf-8")
     for text, expected in (
