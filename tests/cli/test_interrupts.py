@@ -13,10 +13,15 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
+import numpy as np
 import psutil
 import pytest
 
+from rov_fmu.model.layout import HEAVE
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT, TESTS, endless_compiler
+from tests.recordings import PLANS, clean, write_log
 
 fcntl = pytest.importorskip("fcntl", reason="terminals and signals are POSIX")
 termios = pytest.importorskip("termios", reason="terminals and signals are POSIX")
@@ -218,6 +223,9 @@ def test_a_proof_that_starts_its_process_ends_with_one_line(later: float, videor
 def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_path: Path) -> None:
     """The moment is a word beside the bar; the last one is the drawing of the report."""
     folder, output = Path(shutil.copytree(TESTS, tmp_path / "tests")), tmp_path / "out" / "rov.toml"
+    rov, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(0)
+    for n, plan in enumerate(PLANS["heave"]):  # so that it works for long enough
+        write_log(folder, str(n), clean(rov, HEAVE, plan).noisy(random))
     output.parent.mkdir()
     output.write_bytes(b"the old one")
     report = str(output.with_name("report.html"))
