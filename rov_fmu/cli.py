@@ -360,14 +360,14 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     if workers and scheduler is not None:
         raise click.UsageError("study: --scheduler has the workers that it has: leave --workers out")
     try:
-        from rov_fmu.study.results.page import page_output, see_place
+        from rov_fmu.study.results.page import check_place, page_output
         from rov_fmu.study.results.summary import print_summary
         from rov_fmu.study.run.run_study import run_study
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
     from rov_fmu.report.progress import runs_bar
 
-    see_place(output)
+    check_place(output)
     with runs_bar() as bar:
         spent, results = run_study(plan, output, workers, scheduler, bar.update, bar.warn)
     write_whole(page_output(results))

@@ -55,6 +55,12 @@ def folder_of(folder: Path, rov: str, tables: Mapping[str, str]) -> Path:
     return folder
 
 
+def small_folder(folder: Path) -> Path:
+    """Write a folder of a few tests of a vehicle with one thruster, which are quickly identified."""
+    tables = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
+    return folder_of(folder, DOWN, tables)
+
+
 def responses(k: Rov, axis: Axis) -> dict[str, str]:
     """Return tables of steady velocities and time constants of a vehicle, in closed form."""
     rows = [(c, *k.response(axis, c)) for c in COMMANDS]

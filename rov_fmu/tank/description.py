@@ -27,7 +27,7 @@ from rov_fmu.io.toml_file import (
 )
 from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Declaration, Layout, VehicleAxis, coefficient_name
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
-from rov_fmu.vehicle.form import Head, Validity
+from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Finite, Quantity
 from rov_fmu.vehicle.schema import NOT_GIVEN, OpenHardware, where
@@ -62,7 +62,7 @@ def _check_vehicle_name(name: str, info: ValidationInfo) -> str:
 
 def _vehicle_file(name: str, path: Path) -> Path | None:
     """Return the vehicle file at `path`, or the one that ships under `name`, or None."""
-    return path if os.path.isfile(path) else SHIPPED.get(name)  # noqa: PTH113 (as in form.py)
+    return path if os.path.isfile(path) else SHIPPED.get(name)  # noqa: PTH113 (as in vehicle/description.py)
 
 
 def _check_curve_names(value: object) -> object:

@@ -22,8 +22,8 @@ from rov_fmu.model.layout import (
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.description import Description
 from rov_fmu.tank.findings import Finding
-from rov_fmu.vehicle.form import Head
-from rov_fmu.vehicle.geometry import check_layout, places
+from rov_fmu.vehicle.description import Head
+from rov_fmu.vehicle.geometry import check_layout, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity
 
 UNKNOWN = 1.0
@@ -91,7 +91,7 @@ def narrowed(description: Description, tested: Tested, folder: Path) -> Narrowed
     if not layout.axes:
         line = f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
         return Narrowed(None, test_mistakes=(line,))
-    hardware = [*places(_with_axes(wide, axes))] or [*check_layout(layout)]
+    hardware = [*check_thruster_places(_with_axes(wide, axes))] or [*check_layout(layout)]
     hardware += _missing_hardware(description, layout, known)
     tests = [*_missing_or_doubled_tests(description, tested, layout, known)]
     if hardware or tests or description.head is None:

@@ -24,18 +24,18 @@ from rov_fmu.model.layout import (
     Declaration,
     Layout,
 )
-from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_variable_names, places
+from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places, check_variable_names
 from rov_fmu.vehicle.quantity import Quantity, within
 from rov_fmu.vehicle.schema import Estimated, Hardware, Parts, given_quantities
 
-_Form = TypeVar("_Form", bound=Hardware)
+_Model = TypeVar("_Model", bound=Hardware)
 _TABLES_OF_TABLES = ("curves", "thruster", "axes", "inputs", "alternatives", "estimates", "known", "windows")
 """If an entry of one of these tables has a mistake, the other entries can still be checked."""
 
 
 def readable_parts(
-    data: Toml, problems: Sequence[ErrorDetails], context: Mapping[str, object], form: type[_Form]
-) -> tuple[_Form, set[str]]:
+    data: Toml, problems: Sequence[ErrorDetails], context: Mapping[str, object], model: type[_Model]
+) -> tuple[_Model, set[str]]:
     """Return the file without the tables that have a mistake of form, and the names of its top tables that have one."""
     parts: dict[str, Any] = dict(data)
     wrong: dict[str, set[int | str | None]] = {}
@@ -48,7 +48,7 @@ def readable_parts(
                 parts[name] = [entry for n, entry in enumerate(table) if n not in wrong_entries]
             elif isinstance(table, dict):
                 parts[name] = {key: entry for key, entry in table.items() if key not in wrong_entries}
-    readable, _ = validate(parts, form, **context)
+    readable, _ = validate(parts, model, **context)
     assert readable is not None, "every table with a mistake is left out"
     return readable, {*wrong}
 
@@ -62,7 +62,7 @@ def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     if lost & {"thruster", "axes", "inputs"} or not parts.axis_tables:
         return
     layout = parts.layout
-    wrong_places = [*places(layout), *_check_arm(parts, layout)]
+    wrong_places = [*check_thruster_places(layout), *_check_arm(parts, layout)]
     yield from wrong_places or check_axes(layout)
     if not (wrong_places or wrong_names):
         yield from check_inputs(layout)
@@ -147,9 +147,9 @@ def _check_keys(parts: Hardware) -> Iterator[str]:
         unpaired = [*_check_reverse_pairs(f"curves.{name}", quantities)]
         yield from unpaired
         if not unpaired and {"a_t", "b_t"} <= quantities.keys():
-            form = Curve(name, tuple(quantities))
-            values = {form.coefficient(key): q.value for key, q in quantities.items()}
-            yield from no_thrust(form, values, f"curves.{name}")
+            thrust = Curve(name, tuple(quantities))
+            values = {thrust.coefficient(key): q.value for key, q in quantities.items()}
+            yield from no_thrust(thrust, values, f"curves.{name}")
         if curve.c_0_reverse and not curve.c_0:
             yield key_line(f"curves.{name}.c_0", "this key is missing, and c_0_reverse is there")
     for axis, table in parts.axis_tables.items():
@@ -172,7 +172,7 @@ def _check_needed_tables(parts: Parts, lost: set[str]) -> Iterator[str]:
     if parts.arm:
         yield from _check_needed_keys("arm", parts.arm, ARM, dict.fromkeys(ARM, YAW) if has_arm else {})
     elif has_arm:
-        yield key_line("arm", "this table with R and gamma is missing, and a thruster says arm")
+        yield key_line("arm", "this table with R and gamma is missing, and a thruster has the key arm")
 
 
 def _check_reverse_pairs(table: str, keys: Mapping[str, Quantity]) -> Iterator[str]:
@@ -252,7 +252,9 @@ def _check_estimates(rows: Mapping[str, Estimated], quantities: Mapping[str, Qua
     from rov_fmu.vehicle.uncertainty import LEAST_EIGENVALUE, least_eigenvalue  # NumPy, which few files need
 
     if (least := least_eigenvalue(rows)) < LEAST_EIGENVALUE:
-        yield key_line("estimates", f"no numbers have these correlations: the least eigenvalue is {least:.3g}, not 0")
+        yield key_line(
+            "estimates", f"these correlations contradict each other: the least eigenvalue is {least:.3g}, not 0"
+        )
 
 
 def _wrong_correlation(name: str, other: str, rows: Mapping[str, Estimated]) -> str | None:
@@ -266,16 +268,18 @@ def _wrong_correlation(name: str, other: str, rows: Mapping[str, Estimated]) -> 
     return None
 
 
-def check_quantities(table: str, found: Mapping[str, Quantity], metas: Mapping[str, Declaration]) -> Iterator[str]:
+def check_quantities(
+    table: str, found: Mapping[str, Quantity], declarations: Mapping[str, Declaration]
+) -> Iterator[str]:
     """Yield a line for each coefficient that is unknown, has a wrong unit, or is out of its bounds."""
     for name, quantity in found.items():
         key = f"{table}.{name}"
-        if (meta := metas.get(name)) is None:
-            yield key_line(key, f"there is no such coefficient of this vehicle{did_you_mean(name, metas)}")
+        if (declaration := declarations.get(name)) is None:
+            yield key_line(key, f"there is no such coefficient of this vehicle{did_you_mean(name, declarations)}")
             continue
-        if quantity.unit != meta.unit:
-            yield key_line(f"{key}.unit", f"must be {meta.unit!r}", quantity.unit)
+        if quantity.unit != declaration.unit:
+            yield key_line(f"{key}.unit", f"must be {declaration.unit!r}", quantity.unit)
         try:
-            within(quantity.value, meta)
+            within(quantity.value, declaration)
         except ValueError as error:
             yield key_line(f"{key}.value", str(error), quantity.value)

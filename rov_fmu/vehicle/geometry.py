@@ -14,7 +14,7 @@ _PARALLEL = 1e-6
 
 def check_layout(layout: Layout) -> Iterator[str]:
     """Yield a line for each mistake in the thrusters, axes, inputs and names of a vehicle."""
-    wrong_places = [*places(layout)]
+    wrong_places = [*check_thruster_places(layout)]
     if wrong_places:
         yield from wrong_places
     else:
@@ -23,7 +23,7 @@ def check_layout(layout: Layout) -> Iterator[str]:
     yield from check_variable_names(layout)
 
 
-def places(layout: Layout) -> Iterator[str]:
+def check_thruster_places(layout: Layout) -> Iterator[str]:
     """Check that each thruster has either a position or an arm, where yaw needs one."""
     for thruster in layout.thrusters:
         key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction
@@ -37,7 +37,7 @@ def places(layout: Layout) -> Iterator[str]:
 
 def check_axes(layout: Layout) -> Iterator[str]:
     """Check that each thruster acts on an axis, and that the thrusters can drive each axis without the others."""
-    axes = [form.axis for form in layout.axes]
+    axes = [vehicle_axis.axis for vehicle_axis in layout.axes]
     for thruster in layout.thrusters:
         if not any(thruster in layout.drivers(axis) for axis in axes):
             reason = f"acts on no axis of the vehicle, which are {join_names([axis.name for axis in axes])}"
@@ -64,7 +64,7 @@ def check_axes(layout: Layout) -> Iterator[str]:
 
 def check_inputs(layout: Layout) -> Iterator[str]:
     """Check that each input drives an axis; if all do, check that each axis has an input."""
-    driven = {form.axis: layout.signs(form.axis) for form in layout.axes if layout.drivers(form.axis)}
+    driven = {axis: layout.signs(axis) for axis in (one.axis for one in layout.axes) if layout.drivers(axis)}
     idle = [name for name in layout.mix if not any(f"u_{name}" in signs for signs in driven.values())]
     for name in idle:
         yield key_line(f"inputs.{name}", "drives no axis of the vehicle: its gains cancel")

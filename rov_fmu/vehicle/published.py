@@ -12,7 +12,7 @@ from pathlib import Path
 from rov_fmu.io.csv_table import Column, DataFileError, read_columns
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.form import TABLES
+from rov_fmu.vehicle.description import TABLES
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Cells = tuple[Decimal | None, ...]
@@ -101,7 +101,7 @@ STEP_TESTS = (
 
 def untuned(rov: Rov) -> Rov:
     """Return the vehicle with every α and β equal to 1, which is the paper's non-linear model."""
-    return rov.replaced({name: 1.0 for name, meta in rov.layout.coefficients.items() if meta.tunable})
+    return rov.replaced({name: 1.0 for name, declaration in rov.layout.coefficients.items() if declaration.tunable})
 
 
 def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:

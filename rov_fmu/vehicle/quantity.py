@@ -70,19 +70,22 @@ class Quantity(Strict):
     """The 95 % confidence interval: [low, high] around the value."""
 
 
-def within(value: float, meta: Declaration) -> float:
+def within(value: float, declaration: Declaration) -> float:
     """Return the value if it is within the bounds of its coefficient. Raises ValueError."""
-    if not meta.minimum <= value <= meta.maximum:
-        unit = "" if meta.unit == "1" else f" {meta.unit}"
-        raise ValueError(f"must be within {meta.minimum:.12g} ... {meta.maximum:.12g}{unit}")
+    if not declaration.minimum <= value <= declaration.maximum:
+        unit = "" if declaration.unit == "1" else f" {declaration.unit}"
+        raise ValueError(f"must be within {declaration.minimum:.12g} ... {declaration.maximum:.12g}{unit}")
     return value
 
 
-def quantity(name: str, meta: Declaration) -> Any:
+def quantity(name: str, declaration: Declaration) -> Any:
     """Return a kind of Quantity that has the unit and the bounds of a coefficient."""
-    bounds = {"type": "number", "minimum": meta.minimum, "maximum": meta.maximum}
+    bounds = {"type": "number", "minimum": declaration.minimum, "maximum": declaration.maximum}
     fields: dict[str, Any] = {
-        "value": (Annotated[Finite, AfterValidator(lambda value: within(value, meta)), WithJsonSchema(bounds)], ...),
-        "unit": (Literal[meta.unit], ...),
+        "value": (
+            Annotated[Finite, AfterValidator(lambda value: within(value, declaration)), WithJsonSchema(bounds)],
+            ...,
+        ),
+        "unit": (Literal[declaration.unit], ...),
     }
-    return table_of(name, Quantity, fields, meta.description)
+    return table_of(name, Quantity, fields, declaration.description)

@@ -21,7 +21,7 @@ from rov_fmu.model.layout import (
     Layout,
     VehicleAxis,
 )
-from rov_fmu.vehicle.form import FileHead, Made, Validity
+from rov_fmu.vehicle.description import FileHead, Made, Validity
 from rov_fmu.vehicle.quantity import Finite, Name, Quantity, Symbol, Text, not_blank, quantity
 
 FORMAT = 2
@@ -36,16 +36,19 @@ _MOST_COEFFICIENTS = 1000
 
 
 def _coefficients(
-    name: str, metas: Mapping[str, Declaration], kinds: Mapping[str, CoefficientKind] | None = None, words: str = ""
+    name: str,
+    declarations: Mapping[str, Declaration],
+    kinds: Mapping[str, CoefficientKind] | None = None,
+    words: str = "",
 ) -> Any:
     """Return a table with a key for each coefficient. A key is required if its kind says so; without kinds, none is."""
     fields: dict[str, Any] = {}
-    for key, meta in metas.items():
-        one = quantity(f"{name}_{key}", meta)
+    for key, declaration in declarations.items():
+        one = quantity(f"{name}_{key}", declaration)
         if kinds and key in kinds and kinds[key].needed:
-            fields[key] = (one, Field(description=meta.description))
+            fields[key] = (one, Field(description=declaration.description))
         else:
-            fields[key] = (one | None, Field(None, description=meta.description))
+            fields[key] = (one | None, Field(None, description=declaration.description))
     return table_of(f"_{name}", Strict, fields, words)
 
 
@@ -332,6 +335,7 @@ def where(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
     for curve in of.curves:
         yield from ((curve.coefficient(key), ("curves", curve.name, key)) for key in CURVE if key in curve.keys)
     for keys in (AXIS, TUNING):
-        for form in of.axes:
-            present = keys if keys is TUNING else (key for key in keys if key in form.keys)
-            yield from ((form.axis.coefficient(key), ("axes", form.axis.name, key)) for key in present)
+        for vehicle_axis in of.axes:
+            axis = vehicle_axis.axis
+            present = keys if keys is TUNING else (key for key in keys if key in vehicle_axis.keys)
+            yield from ((axis.coefficient(key), ("axes", axis.name, key)) for key in present)

@@ -120,20 +120,20 @@ def uncertainty(
     rov: Rov, intervals: Mapping[str, tuple[float, float]], estimates: Mapping[str, Estimated]
 ) -> Uncertainty:
     """Return the distribution of the coefficients by the intervals and estimates of a vehicle file."""
-    metas = rov.layout.coefficients
-    names = tuple(name for name in metas if name in intervals)
+    declarations = rov.layout.coefficients
+    names = tuple(name for name in declarations if name in intervals)
     errors = []
     for name in names:
         if name in estimates:
             errors.append(estimates[name].error)
         else:
-            errors.append(_half_width(name, rov[name], intervals[name], metas[name]) / _NORMAL)
+            errors.append(_half_width(name, rov[name], intervals[name], declarations[name]) / _NORMAL)
     return Uncertainty(
         names,
         np.array([rov[name] for name in names]),
         np.array(errors),
         correlation(names, estimates),
-        np.array([(metas[name].minimum, metas[name].maximum) for name in names]).reshape(-1, 2),
+        np.array([(declarations[name].minimum, declarations[name].maximum) for name in names]).reshape(-1, 2),
     )
 
 
@@ -173,7 +173,7 @@ def quantile(degrees_of_freedom: float) -> float:
 _NORMAL = quantile(inf)
 
 
-def _half_width(name: str, value: float, interval: tuple[float, float], meta: Declaration) -> float:
+def _half_width(name: str, value: float, interval: tuple[float, float], declaration: Declaration) -> float:
     """Return half the width of an interval; for a factor, the value times half the width in logarithms.
 
     A side that ends at a physical bound is cut, so only the other side counts. If both are cut, the larger one counts.
@@ -181,8 +181,8 @@ def _half_width(name: str, value: float, interval: tuple[float, float], meta: De
     low, high = interval
     logarithmic = is_factor(name) and value > 0.0
     sides = []
-    if high < meta.maximum:
+    if high < declaration.maximum:
         sides.append(value * log(high / value) if logarithmic else high - value)
-    if low > meta.minimum:
+    if low > declaration.minimum:
         sides.append(value * log(value / low) if logarithmic else value - low)
     return sum(sides) / len(sides) if sides else max(high - value, value - low)

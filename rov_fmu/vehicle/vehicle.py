@@ -15,7 +15,7 @@ from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
-from rov_fmu.vehicle.form import PICTURES, TABLES
+from rov_fmu.vehicle.description import PICTURES, TABLES
 from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
 
@@ -127,9 +127,9 @@ class Vehicle:
     def _by_hand(self, before: str, after: str = "") -> str:
         """Return the list of coefficients that were set by hand, or an empty text if there are none."""
         items = []
-        for name, meta in self.layout.coefficients.items():
+        for name, declaration in self.layout.coefficients.items():
             if self.sources[name] == BY_HAND:
-                unit = "" if meta.unit == "1" else f" {meta.unit}"
+                unit = "" if declaration.unit == "1" else f" {declaration.unit}"
                 items.append(f"{name} = {self.rov[name]:.12g}{unit}")
         return f"{before}{BY_HAND}: {', '.join(items)}{after}" if items else ""
 

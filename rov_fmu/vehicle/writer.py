@@ -15,7 +15,7 @@ from rov_fmu.io.reading import read_text
 from rov_fmu.io.seal import sealed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import Curve, Declaration, Thruster
-from rov_fmu.vehicle.form import Head
+from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
 from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
 
@@ -62,7 +62,7 @@ def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item]) -> dict[str, Any
     tables["thruster"] = tomlkit.aot()
     for thruster in layout.thrusters:
         tables["thruster"].append(tomlkit.item(_thruster(thruster, vehicle.thruster_sources[thruster.name])))
-    tables["axes"] = {form.axis.name: {} for form in layout.axes}
+    tables["axes"] = {vehicle_axis.axis.name: {} for vehicle_axis in layout.axes}
     if layout.mix:
         tables["inputs"] = {name: _inline_table(gains) for name, gains in layout.mix.items()}
     for name, (*above, key) in where(layout):
@@ -197,10 +197,10 @@ def _thruster(thruster: Thruster, sources: Mapping[str, str]) -> dict[str, Any]:
 
 def _alternative(vehicle: Vehicle, alternative: Alternative) -> dict[str, Any]:
     """Return the table of a set of published coefficients that the model does not use."""
-    metas = vehicle.layout.coefficients
+    declarations = vehicle.layout.coefficients
     table: dict[str, Any] = {"description": alternative.description}
     for name, value in alternative.values.items():
-        table[name] = _quantity_table(value, metas[name], alternative.sources[name])
+        table[name] = _quantity_table(value, declarations[name], alternative.sources[name])
     return table
 
 
@@ -221,10 +221,12 @@ def _estimated(row: Estimated) -> InlineTable:
     return _inline_table(entry)
 
 
-def _quantity_table(value: float, meta: Declaration, source: str, interval: list[float] | None = None) -> InlineTable:
+def _quantity_table(
+    value: float, declaration: Declaration, source: str, interval: list[float] | None = None
+) -> InlineTable:
     """Return the table of a value with its unit and source."""
     ends = {"interval": interval} if interval else {}
-    return _inline_table({"value": value, "unit": meta.unit, **ends, "source": source})
+    return _inline_table({"value": value, "unit": declaration.unit, **ends, "source": source})
 
 
 def _inline_table(entries: Mapping[str, Any]) -> InlineTable:

@@ -6,19 +6,15 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
-from rov_fmu.model.layout import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE, BARE, COMMANDS, ROOT, TESTS, start
-from tests.recordings import PLANS, clean, write_log
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
 OLD = b"the old one"
@@ -112,8 +108,13 @@ def test_of_two_builds_at_once_one_is_whole(tmp_path: Path) -> None:
 # ---- Interrupted -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("signal_", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
-@pytest.mark.parametrize("command", ["identify", pytest.param("tune", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("command", "signal_"),
+    [
+        ("tune", signal.SIGINT),
+        pytest.param("identify", signal.SIGTERM, marks=pytest.mark.long),
+    ],
+)
 def test_an_interrupted_command_says_so_and_leaves_nothing(
     command: str, signal_: signal.Signals, tmp_path: Path
 ) -> None:
@@ -189,44 +190,10 @@ def _interrupted(action: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize(
-    "moment", [b"heave", pytest.param(b"reading", marks=pytest.mark.long), pytest.param(b"dra", marks=pytest.mark.long)]
-)
-def test_an_identification_that_is_cancelled_as_it_works_loses_nothing(moment: bytes, tmp_path: Path) -> None:
-    target, report = tmp_path / "out" / "rov.toml", tmp_path / "out" / "report.html"
-    target.parent.mkdir()
-    target.write_bytes(OLD)
-    folder = Path(shutil.copytree(TESTS, tmp_path / "tests"))
-    rov, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(0)
-    for n, plan in enumerate(PLANS["heave"]):  # so that it works for long enough
-        write_log(folder, str(n), clean(rov, HEAVE, plan).noisy(random))
-    ours, theirs = os.openpty()
-    process = start(
-        ["identify", str(folder), "--force", "-o", str(target), "--report", str(report)],
-        environment={"TERM": "xterm", "NO_COLOR": "1"},
-        stdout=theirs,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    os.close(theirs)
-    shown = b""
-    while moment not in shown:
-        shown += os.read(ours, 4096)  # of a terminal that is closed this fails
-    process.send_signal(signal.SIGINT)
-    with suppress(OSError):  # so Linux ends a terminal
-        while part := os.read(ours, 4096):
-            shown += part
-    os.close(ours)
-    assert process.communicate(timeout=300)[1] == "rov-fmu: interrupted, no file is half-written\n"
-    assert process.returncode == 130
-    assert b"Coefficients" not in shown
-    assert [path.name for path in target.parent.iterdir()] == [target.name]
-    assert target.read_bytes() == OLD
+_SLOW = [pytest.param(name, marks=pytest.mark.long) for name in ("the vehicle", "the report", "the figures")]
 
 
-_DRAWN = [pytest.param(name, marks=pytest.mark.long) for name in ("the report", "the figures")]
-
-
-@pytest.mark.parametrize("name", ["the vehicle", "the tuned vehicle", *_DRAWN])
+@pytest.mark.parametrize("name", ["the tuned vehicle", *_SLOW])
 def test_an_interrupt_before_the_last_move_leaves_nothing(name: str, tmp_path: Path) -> None:
     command = COMMANDS[name]
     target = tmp_path / "out" / command.name
@@ -283,31 +250,19 @@ def test_a_vehicle_out_of_a_pipe_is_refused_where_it_must_be_read_twice(
 
 # ---- What is printed -------------------------------------------------------------------------------------------------
 
-PRINTING = {
-    "tables": ["tables"],
-    "tune": ["tune", str(VIDEORAY), "--axis=yaw", "--command=0.3", "--v-ss=1"],
-    "help": ["--help"],
-    "help of build": ["build", "--help"],
-}
-_QUICK = ("tables", "help")
-_CASES = [*_QUICK, *(pytest.param(case, marks=pytest.mark.long) for case in PRINTING if case not in _QUICK)]
 
-
-@pytest.mark.parametrize("case", _CASES)
-def test_who_does_not_read_on_gets_no_message(case: str) -> None:
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize("command", ["tables", "--help"])
+def test_output_that_nobody_reads_or_that_has_no_room(command: str) -> None:
+    """The first prints with Rich, the second with click."""
     end, start_ = os.pipe()
     os.close(end)
-    process = start(PRINTING[case], stdout=start_)
+    process = start([command], stdout=start_)
     os.close(start_)
     _, err = process.communicate(timeout=300)
     assert (process.returncode, err) == (1, "")
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-@pytest.mark.parametrize("case", _CASES)
-def test_output_that_has_no_room_is_one_line(case: str) -> None:
     with Path("/dev/full").open("w", encoding="utf-8") as full:
-        process = start(PRINTING[case], stdout=full)
+        process = start([command], stdout=full)
         _, err = process.communicate(timeout=300)
     assert err == "rov-fmu: the output, or a temporary file: cannot be written: No space left on device\n"
     assert process.returncode == 2
@@ -321,9 +276,8 @@ def test_a_command_without_any_output_works(tmp_path: Path) -> None:
     assert load_vehicle(target)
 
 
-@pytest.mark.parametrize("name", ["Röv α", "Röv \udcff"])
-def test_a_terminal_that_knows_ascii_alone_gets_every_line(name: str, tmp_path: Path) -> None:
-    path = tmp_path / f"{name}.toml"
+def test_a_terminal_with_ascii_only_gets_every_line(tmp_path: Path) -> None:
+    path = tmp_path / "Röv \udcff.toml"
     try:
         path.write_text(VIDEORAY.read_text(encoding="utf-8").replace("VideoRay Pro 4", "Röv α"), encoding="utf-8")
     except OSError:
@@ -345,53 +299,33 @@ def test_a_terminal_that_knows_ascii_alone_gets_every_line(name: str, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    ("arguments", "begin"),
     [
-        ["tune", str(VIDEORAY), "--axis", "sway"],
-        ["tune", str(VIDEORAY), "--axis", "yaw", "--command", ""],
-        [],
-        ["build", "--platform", "amiga"],
-        ["build", "--backend", ""],
-        ["build", "--fmi", "1"],
-        ["build", "a", "b"],
+        (["tune", str(VIDEORAY), "--axis", "sway"], "rov-fmu: "),
+        (["tune", str(VIDEORAY), "--axis", "yaw", "--command", ""], "rov-fmu: "),
+        ([], "rov-fmu: "),
+        (["build", "--platform", "amiga"], "rov-fmu: "),
+        (["build", "--backend", ""], "rov-fmu: "),
+        (["build", "--fmi", "1"], "rov-fmu: "),
+        (["build", "a", "b"], "rov-fmu: "),
+        (["build", "-o", ""], "rov-fmu: "),
+        (["build", "", "-o", "x.fmu"], "rov-fmu: "),
+        (["build", "--platform", "host", "--backend", "pythonfmu"], "rov-fmu: "),
+        (["build", "--fmi", "3", "--backend=pythonfmu"], "rov-fmu: --fmi 3: PythonFMU makes FMI 2.0 alone\n"),
+        (["build", "--fmi", "3", "--osp"], "rov-fmu: --fmi 3: libcosim and the OSP tools, "),
     ],
 )
-def test_options_that_do_not_exist_end_with_what_is_allowed(
-    arguments: list[str], capsys: pytest.CaptureFixture[str]
+def test_wrong_and_clashing_options_are_one_line(
+    arguments: list[str],
+    begin: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert err.startswith("rov-fmu: ")
+    assert err.startswith(begin)
     assert err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    "arguments", [["-o", ""], ["", "-o", "x.fmu"], ["--platform", "host", "--backend", "pythonfmu"]]
-)
-def test_empty_and_clashing_options_of_the_build_are_one_line(
-    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["build", *arguments]) in (1, 2)
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("rov-fmu: ")
-    assert err.count("\n") == 1
-    assert not any(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("option", "reason"),
-    [
-        ("--backend=pythonfmu", "PythonFMU makes FMI 2.0 alone"),
-        ("--osp", "libcosim and the OSP tools, which --osp is for, read FMI 2.0 alone"),
-    ],
-)
-def test_what_is_of_fmi_2_alone_is_refused_with_fmi_3(
-    option: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["build", "--fmi", "3", option]) == 2
-    assert capsys.readouterr() == ("", f"rov-fmu: --fmi 3: {reason}\n")
     assert not any(tmp_path.iterdir())

@@ -103,12 +103,10 @@ WRONG = [
 ]
 
 
-_WORKS = {"the icon", "the report", "a drawing", "a drawing of the FMU in Python"}
+_SLOW = {"the icon", "the report", "a drawing", "a drawing of the FMU in Python"}
 """The cases that read their file in the middle of a build. Only one of them runs by default."""
 _CASES = [
-    pytest.param(
-        case, what, marks=[pytest.mark.long] * (what is _gone_as_it_is_read and case in _WORKS - {"a drawing"})
-    )
+    pytest.param(case, what, marks=[pytest.mark.long] * (what is _gone_as_it_is_read and case in _SLOW - {"a drawing"}))
     for case, what in sorted(WRONG, key=str)
 ]
 
@@ -127,39 +125,32 @@ def test_what_is_no_file_is_one_line_that_names_it(
     _check(capsys.readouterr().err, Path(name).name)
 
 
+FOLDERS: list[tuple[str, int, str]] = [("tests", 0o600, "rov.toml"), ("tables", 0o000, "a published table")]
+MORE_FOLDERS = [*FOLDERS, ("tests", 0o000, "rov.toml"), ("tests", 0o300, "rov.toml")]
+MORE_FOLDERS += [("tables", 0o600, "a published table")]
+"""Folders that may not be read, their modes, and the case of READING with the command that needs them."""
 SOME = ("the vehicle of the tables", "the points", "a published table", "rov.toml", "a tank test")
 """The quick cases; the long tests try all."""
 
 
-@pytest.mark.parametrize("cases", [SOME, pytest.param(tuple(READING), marks=pytest.mark.long)], ids=len)
-def test_what_may_not_be_read_is_one_line_that_names_it(cases: tuple[str, ...], copied: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("cases", "folders"),
+    [(SOME, FOLDERS), pytest.param(tuple(READING), MORE_FOLDERS, marks=pytest.mark.long)],
+    ids=["some", "all"],
+)
+def test_what_may_not_be_read_is_one_line_that_names_it(
+    cases: tuple[str, ...], folders: list[tuple[str, int, str]], copied: Path, tmp_path: Path
+) -> None:
     (tmp_path / "temporary").mkdir()
-    commands = []
-    for case in cases:
-        name, arguments = READING[case]
-        folder = Path(shutil.copytree(copied, tmp_path / case))
-        (folder / name).chmod(0)
-        commands.append((Command(name, arguments), folder))
+    commands, locked = [], []
+    for n, (name, mode, case) in enumerate([*((READING[case][0], 0, case) for case in cases), *folders]):
+        folder = Path(shutil.copytree(copied, tmp_path / str(n)))
+        locked.append(folder / name)
+        locked[-1].chmod(mode)
+        commands.append((Command(name, READING[case][1]), folder))
     ends = run_elsewhere(commands, tmp_path / "temporary", bound_by_permissions())
-    for (command, _), (code, err) in zip(commands, ends, strict=True):
-        assert code == 2, command.name
-        assert "cannot be read: Permission denied" in err
-        _check(err, Path(command.name).name)
-
-
-_MORE = [pytest.param(*of, marks=pytest.mark.long) for of in (("tests", 0o000), ("tests", 0o300), ("tables", 0o600))]
-
-
-@pytest.mark.parametrize(("name", "mode"), [("tests", 0o600), ("tables", 0o000), *_MORE])
-def test_a_folder_that_may_not_be_read_is_named(copied: Path, tmp_path: Path, name: str, mode: int) -> None:
-    (tmp_path / "temporary").mkdir()
-    commands = {
-        "tests": Command("tests", lambda f: ["identify", str(f / "tests")]),
-        "tables": Command("tables", lambda f: ["tables", str(f / "videoray.toml")]),
-    }
-    (copied / name).chmod(mode)
-    ((code, err),) = run_elsewhere([(commands[name], copied)], tmp_path / "temporary", bound_by_permissions())
-    (copied / name).chmod(0o755)
-    assert code == 2
-    assert "Permission denied" in err
-    _check(err, str(copied / name))
+    for path, (code, err) in zip(locked, ends, strict=True):
+        path.chmod(0o755)
+        assert code == 2, path
+        assert ("Permission denied" if path.is_dir() else "cannot be read: Permission denied") in err
+        _check(err, str(path) if path.is_dir() else path.name)

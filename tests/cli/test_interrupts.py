@@ -6,16 +6,22 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from itertools import product
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+import numpy as np
 import psutil
 import pytest
 
-from tests.commands import BARE, ROOT, TESTS
+from rov_fmu.model.layout import HEAVE
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import BARE, ROOT, TESTS, endless_compiler
+from tests.recordings import PLANS, clean, write_log
 
 fcntl = pytest.importorskip("fcntl", reason="terminals and signals are POSIX")
 termios = pytest.importorskip("termios", reason="terminals and signals are POSIX")
@@ -29,7 +35,13 @@ PATIENCE = 300.0
 class Command:
     """A command in its own terminal; its stderr is read separately."""
 
-    def __init__(self, arguments: list[str], folder: Path, is_controlled: bool = True, **environment: str) -> None:
+    def __init__(
+        self,
+        arguments: list[str],
+        folder: Path,
+        is_controlled: bool = True,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
         """`is_controlled` makes the terminal control the command, so that all its processes end with the first one."""
         self.temporary = folder / "temporary files"
         self.temporary.mkdir()
@@ -49,7 +61,7 @@ class Command:
             stdout=inside,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {"TERM": "xterm", "TMPDIR": str(self.temporary)} | environment,
+            env=os.environ | {"TERM": "xterm", "TMPDIR": str(self.temporary)} | dict(environment or {}),
             start_new_session=True,
             preexec_fn=own_terminal,  # noqa: PLW1509
         )
@@ -95,8 +107,10 @@ class Command:
 
 
 @contextmanager
-def command(arguments: list[str], folder: Path, is_controlled: bool = True, **environment: str) -> Iterator[Command]:
-    begun = Command(arguments, folder, is_controlled, **environment)
+def command(
+    arguments: list[str], folder: Path, is_controlled: bool = True, environment: Mapping[str, str] | None = None
+) -> Iterator[Command]:
+    begun = Command(arguments, folder, is_controlled, environment)
     try:
         yield begun
     finally:
@@ -116,34 +130,37 @@ figures = {{ V = "u[-1]" }}
     return path
 
 
-def _long(*values: float) -> list[Any]:
-    return [pytest.param(value, marks=pytest.mark.long) for value in values]
+_MOMENTS = (None, 0.0, 0.02, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
+"""Seconds after the first worker of a study has started; None is when the first runs are written."""
+_DEFAULT = [(Command.press_ctrl_c, 0.0), (Command.terminate, None)]
+_LONG = [(Command.press_ctrl_c, None), (Command.press_ctrl_c, 0.3), (Command.press_ctrl_c, 1.0)]
+_LONG += [(Command.terminate, 0.0), (Command.terminate, 0.6)]
 
 
-@pytest.mark.parametrize("later", [0.0, *_long(0.02, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)])
-@pytest.mark.parametrize("end", [Command.press_ctrl_c, pytest.param(Command.terminate, marks=pytest.mark.long)])
-def test_a_study_that_starts_its_workers_ends_with_one_line(
-    end: Callable[[Command], str], later: float, videoray_fmu: Path, tmp_path: Path
+def _marks(case: tuple[Any, float | None]) -> Any:
+    if case in _DEFAULT:
+        return ()
+    return pytest.mark.long if case in _LONG else pytest.mark.weekly
+
+
+@pytest.mark.parametrize(
+    ("end", "later"),
+    [pytest.param(*case, marks=_marks(case)) for case in product((Command.press_ctrl_c, Command.terminate), _MOMENTS)],
+)
+def test_a_study_ends_with_one_line(
+    end: Callable[[Command], str], later: float | None, videoray_fmu: Path, tmp_path: Path
 ) -> None:
     plan, results = _plan(tmp_path, videoray_fmu), tmp_path / "results"
     arguments = ["-m", "rov_fmu", "study", str(plan), "-o", str(results), "--workers", "2"]
     with command(arguments, tmp_path, is_controlled=end is Command.press_ctrl_c) as study:
-        study.wait_until(study.workers)
-        time.sleep(later)
+        if later is None:
+            study.wait_until(lambda: [*results.glob("runs/part-*.parquet")])
+        else:
+            study.wait_until(study.workers)
+            time.sleep(later)
         assert end(study) == LINE_OF_A_STUDY
     if later == 0.0:
         assert not results.exists()
-
-
-@pytest.mark.parametrize("end", [Command.press_ctrl_c, Command.terminate])
-def test_a_study_that_runs_ends_with_one_line(
-    end: Callable[[Command], str], videoray_fmu: Path, tmp_path: Path
-) -> None:
-    plan, results = _plan(tmp_path, videoray_fmu), tmp_path / "results"
-    arguments = ["-m", "rov_fmu", "study", str(plan), "-o", str(results), "--workers", "2"]
-    with command(arguments, tmp_path, is_controlled=end is Command.press_ctrl_c) as study:
-        study.wait_until(lambda: [*results.glob("runs/part-*.parquet")])
-        assert end(study) == LINE_OF_A_STUDY
     assert not [*results.glob("*/.*")]
 
 
@@ -182,27 +199,17 @@ def test_a_worker_that_dask_restarts_prints_nothing(videoray_fmu: Path, tmp_path
         assert study.terminate() == LINE_OF_A_STUDY
 
 
-def _endless_compiler(folder: Path) -> str:
-    """A folder for PYTHONPATH, with a compiler that never ends and has a child process."""
-    zig = folder / "endless" / "ziglang" / "zig"
-    zig.parent.mkdir(parents=True)
-    zig.with_name("__init__.py").touch()
-    zig.write_text(f"#!/bin/sh\nsleep 6000 &\ntouch '{folder}/begun'\nwait\n", encoding="utf-8")
-    zig.chmod(0o755)
-    return str(zig.parent.parent)
-
-
-@pytest.mark.parametrize("name", ["build", "fly"])
+@pytest.mark.parametrize("name", ["fly", pytest.param("build", marks=pytest.mark.long)])
 def test_a_compiler_ends_with_its_command(name: str, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     arguments = ["-m", "rov_fmu", name, str(BARE), "-o", str(tmp_path / "out" / "x")]
-    with command(arguments, tmp_path, PYTHONPATH=_endless_compiler(tmp_path)) as begun:
-        begun.wait_until((tmp_path / "begun").exists)
+    with command(arguments, tmp_path, environment=endless_compiler(tmp_path)) as begun:
+        begun.wait_until((tmp_path / "number").exists)
         assert begun.press_ctrl_c() == LINE
     assert not [*(tmp_path / "out").iterdir()]
 
 
-@pytest.mark.parametrize("later", [0.0, *_long(0.1, 0.2, 0.3)])
+@pytest.mark.parametrize("later", [0.0, pytest.param(0.2, marks=pytest.mark.long)])
 def test_a_proof_that_starts_its_process_ends_with_one_line(later: float, videoray_fmu: Path, tmp_path: Path) -> None:
     with command(["-m", "rov_fmu", "prove", str(videoray_fmu)], tmp_path) as proof:
         proof.wait_until(proof.workers)
@@ -212,53 +219,30 @@ def test_a_proof_that_starts_its_process_ends_with_one_line(later: float, videor
         assert proof.press_ctrl_c() == LINE
 
 
-def test_an_identification_ends_with_one_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("moment", [b"heave", *(pytest.param(m, marks=pytest.mark.long) for m in (b"reading", b"dra"))])
+def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_path: Path) -> None:
+    """The moment is a word beside the bar; the last one is the drawing of the report."""
     folder, output = Path(shutil.copytree(TESTS, tmp_path / "tests")), tmp_path / "out" / "rov.toml"
+    rov, random = load_vehicle(VIDEORAY).rov, np.random.default_rng(0)
+    for n, plan in enumerate(PLANS["heave"]):  # so that it works for long enough
+        write_log(folder, str(n), clean(rov, HEAVE, plan).noisy(random))
     output.parent.mkdir()
-    with command(["-m", "rov_fmu", "identify", str(folder), "-o", str(output)], tmp_path) as identification:
-        identification.wait_until(lambda: b"\xe2\x94\x81" in identification.shown)  # the bar
+    output.write_bytes(b"the old one")
+    report = str(output.with_name("report.html"))
+    arguments = ["-m", "rov_fmu", "identify", str(folder), "--force", "-o", str(output), "--report", report]
+    with command(arguments, tmp_path, environment={"NO_COLOR": "1"}) as identification:
+        identification.wait_until(lambda: moment in identification.shown)
         assert identification.press_ctrl_c() == LINE
         shown = identification.shown
     assert shown.rstrip().endswith(b"\x1b[2K"), "the bar is gone"
     assert b"\x1b[?25h" in shown, "the cursor is back"
-    assert not [*output.parent.iterdir()]
+    assert [*output.parent.iterdir()] == [output]
+    assert output.read_bytes() == b"the old one"
 
 
 def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
     begun = tmp_path / "begun"
     (tmp_path / "click.py").write_text(f"import pathlib, time\npathlib.Path({str(begun)!r}).touch()\ntime.sleep(600)\n")
-    with command(["-m", "rov_fmu", "tables"], tmp_path, PYTHONPATH=str(tmp_path)) as tables:
+    with command(["-m", "rov_fmu", "tables"], tmp_path, environment={"PYTHONPATH": str(tmp_path)}) as tables:
         tables.wait_until(begun.exists)
         assert tables.press_ctrl_c() == LINE
-
-
-_WARNING = """
-import sys, time
-import rov_fmu.study.run.run_study as run
-from rov_fmu.cli import main
-from rov_fmu.io.messages import FileError
-def warns(plan, output, workers, scheduler, tell, warn):
-    time.sleep(0.5)  # until the bar is there
-    warn("the plan is odd")
-    time.sleep(0.5)
-    raise FileError("that is all")
-run.run_study = warns
-sys.stderr = sys.stdout
-sys.exit(main(["study", "plan.toml", "-o", sys.argv[1]]))
-"""
-
-
-def test_a_warning_is_printed_above_the_bar(tmp_path: Path) -> None:
-    """The warning is not appended to the line of the bar: that line is cleared before."""
-    with command(["-c", _WARNING, str(tmp_path / "results")], tmp_path) as study:
-        study.process.communicate(timeout=PATIENCE)
-        assert study.process.returncode == 2
-        deadline = time.monotonic() + PATIENCE
-        while b"that is all\r\n" not in study.shown:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-    bar, warning, after = study.shown.partition(b"rov-fmu: warning: the plan is odd\r\n")
-    assert warning
-    assert b"starting the workers" in bar
-    assert b"starting the workers" in after
-    assert bar.endswith(b"\r\x1b[2K")

@@ -14,17 +14,13 @@ from pathlib import Path
 import pytest
 from pythonfmu import FmuBuilder
 
-from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
-from rov_fmu.engine.compile import compile_all
-from rov_fmu.fmu.archive import native_content
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.proof import prove
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE, start
-from tests.conftest import unzipped
 
 Capsys = pytest.CaptureFixture[str]
 Files = Mapping[str, str | None]
@@ -67,21 +63,16 @@ def test_a_vehicle_with_lag_and_coupling_proves_itself(heavy_dir: Path, tmp_path
     assert "manoeuvre" in capsys.readouterr().out
 
 
-def test_a_binary_that_goes_another_way_is_found(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
-    """The results of the VideoRay in the FMU of one that is heavier by a millionth."""
+def test_a_binary_with_another_motion_is_found(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+    """The VideoRay's FMU with the results of a vehicle that is heavier by a millionth."""
     vehicle = tmp_path / "heavier.toml"
     vehicle.write_text(ALONE.replace("6.57", "6.57000657"), encoding="utf-8")
-    bare = Path(shutil.make_archive(str(tmp_path / "heavier"), "zip", unzipped(vehicle, tmp_path / "heavier")))
     results = {name: content.decode() for name, content in reference_results(load_vehicle(vehicle)).items()}
-    own = main(["prove", str(_with(bare, results, tmp_path / "heavier.fmu"))])
-    with zipfile.ZipFile(videoray_fmu) as archive:
-        files = {n: archive.read(n).decode() for n in archive.namelist() if n.startswith(FOLDER)}
-    other = _with(bare, files, tmp_path / "other.fmu")
-    capsys.readouterr()
-    assert (own, main(["prove", str(other)])) == (0, 1)
+    other = _with(videoray_fmu, results, tmp_path / "other.fmu")
+    assert main(["prove", str(other)]) == 1
     out, err = capsys.readouterr()
     failed = [line.split() for line in out.splitlines() if "FAIL" in line]
-    assert err == f"rov-fmu: {other}: {len(failed)} of 63 results are not as expected\n"
+    assert err == f"rov-fmu: {other}: {len(failed)} of 43 results are not as expected\n"
     assert {line[1] for line in failed} == {"u", "w", "x", "y", "z"}, "its mass has no part in yaw"
     assert main(["prove", str(other), "--tolerance", "1e-5"]) == 0
 
@@ -158,7 +149,7 @@ def test_an_fmu_of_another_exporter_is_proved(foreign: Path, capsys: Capsys) -> 
         ("my tests/u.csv", "time,u\n0,10\n", "step - inf 1.0e-06 FAIL fmi2DoStep failed with status"),
     ],
 )
-def test_what_deviates_or_fails_is_told(
+def test_what_deviates_or_fails_is_printed(
     name: str, text: str, line: str, foreign: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
     fmu = _with(foreign, {f"{FOLDER}/{name}": text}, tmp_path / "other.fmu")
@@ -192,9 +183,18 @@ WHY: dict[str, tuple[str, Callable[[bytes], bytes], str]] = {
 }
 
 
-@pytest.mark.parametrize("version", ["videoray_fmu", "videoray3_fmu"])
-@pytest.mark.parametrize("case", WHY)
-def test_an_fmu_tells_why_it_fails(case: str, version: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+@pytest.mark.parametrize(
+    ("case", "version"),
+    [
+        ("out of bounds", "videoray_fmu"),
+        ("a wrong token", "videoray3_fmu"),
+        pytest.param("out of bounds", "videoray3_fmu", marks=pytest.mark.long),
+        pytest.param("a wrong token", "videoray_fmu", marks=pytest.mark.long),
+    ],
+)
+def test_the_reason_why_an_fmu_fails_is_given(
+    case: str, version: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     begin, change, reason = WHY[case]
     first = prove(_changed(request.getfixturevalue(version), begin, change, tmp_path / "other.fmu"))[0]
     assert not first.passed
@@ -218,31 +218,20 @@ def test_an_fmu_that_ends_its_process_is_one_line(videoray_fmu: Path, tmp_path: 
 
 
 _HANGS = """
-#include <stdio.h>
-#include <stdlib.h>
-
-static void hang(void)
-{
-    volatile int on = 1;
-    fclose(fopen(getenv("HANGS"), "w"));
-    while (on) {
-    }
-}
-
+    def do_step(self, current_time, step_size):
+        import ctypes, os
+        open(os.environ["HANGS"], "w").close()
+        mutex = ctypes.create_string_buffer(256)
+        while True:  # the second call waits forever for the first one
+            ctypes.PyDLL(None).pthread_mutex_lock(mutex)
 """
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="signals are POSIX, and the binary is of linux64")
-def test_an_fmu_that_hangs_is_ended_by_an_interrupt(videoray_fmu: Path, vehicle: Vehicle, tmp_path: Path) -> None:
+@pytest.mark.skipif(sys.platform != "linux", reason="signals and mutexes are POSIX")
+def test_an_fmu_that_hangs_is_ended_by_an_interrupt(foreign: Path, tmp_path: Path) -> None:
     """It hangs in compiled code, which Python cannot interrupt."""
-    content = native_content(vehicle)
-    name = "fmi2_co_simulation.c"
-    step = content.sources[name].replace("    OPEN(fmi2DoStep,", "    hang();\n    OPEN(fmi2DoStep,")
-    (library,) = compile_all(
-        chosen_platforms(["host"]), {**content.sources, name: _HANGS + step}, content.identifier
-    ).values()
     fmu, folder, begun = tmp_path / "hangs.fmu", tmp_path / "tmp", tmp_path / "begun"
-    _changed(videoray_fmu, "binaries/", lambda _: library, fmu)
+    _changed(foreign, "resources/counter.py", lambda old: old + _HANGS.encode(), fmu)
     folder.mkdir()
     process = start(
         ["prove", str(fmu)],
@@ -389,7 +378,7 @@ def test_a_damaged_archive_is_one_line(case: str, foreign: Path, tmp_path: Path,
     assert capsys.readouterr().err.startswith(f"rov-fmu: {tmp_path / 'bad.fmu'}: {reason}")
 
 
-def test_what_an_fmu_does_not_have_is_told(foreign: Path, videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+def test_what_an_fmu_does_not_have_is_named(foreign: Path, videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
     assert main(["prove", str(foreign), "--interface", "model-exchange"]) == 2
     assert capsys.readouterr().err == f"rov-fmu: {foreign}: has no model-exchange, only co-simulation\n"
     with zipfile.ZipFile(videoray_fmu) as archive:

@@ -12,7 +12,7 @@ from rov_fmu.io.output import WriteError
 from rov_fmu.io.seal import check_replaced, sealed
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import REFIT, TESTS
-from tests.folders import DOWN, SPEED, folder_of, pulled
+from tests.folders import small_folder
 
 Capsys = pytest.CaptureFixture[str]
 
@@ -20,8 +20,7 @@ Capsys = pytest.CaptureFixture[str]
 @pytest.fixture(scope="module")
 def tank_tests(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small folder of tank tests."""
-    tables = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
-    return folder_of(tmp_path_factory.mktemp("tests"), DOWN, tables)
+    return small_folder(tmp_path_factory.mktemp("tests"))
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,10 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable
+from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fmpy import read_model_description
@@ -16,13 +18,13 @@ from fmpy import read_model_description
 from rov_fmu.build import build
 from rov_fmu.cli import main
 from rov_fmu.engine.compile import PLATFORMS
+from rov_fmu.io.messages import FileError
 from rov_fmu.model.layout import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, ROOT, TESTS, endless_compiler, start
+from tests.commands import BARE, ROOT, TESTS, endless_compiler
 
 _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2"]
-_posix = pytest.mark.skipif(os.name != "posix", reason="terminals and signals are POSIX")
 
 # ---- By name ---------------------------------------------------------------------------------------------------------
 
@@ -33,19 +35,22 @@ def test_a_vehicle_that_ships_is_built_by_its_name(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
+    monkeypatch.setattr("rov_fmu.build.reference_results", lambda _: {})
     assert main(["build", name, "--backend", "pythonfmu"]) == 0
     assert capsys.readouterr().out.startswith(f"{name}-python.fmu  ")
     assert [path.name for path in tmp_path.iterdir()] == [f"{name}-python.fmu"]
 
 
-def test_an_fmu_of_fmi_3_bears_it_in_its_name(
+def test_an_fmu_of_fmi_3_has_it_in_its_name_and_shows_no_progress_without_a_terminal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["build", str(BARE), "--fmi", "3", "--platform", "host"]) == 0
-    out = capsys.readouterr().out
+    out, err = capsys.readouterr()
+    assert err == ""
     assert out.startswith("bare.fmi3.fmu  ")
-    assert "compiling" not in out
+    assert len(out.splitlines()) == 4  # the file, the platform, what the run gave, the time
+    assert not any(shown in out for shown in ("compiling", "\x1b", "\r"))
     (path,) = tmp_path.iterdir()
     assert path.name == "bare.fmi3.fmu"
     assert read_model_description(str(path)).fmiVersion == "3.0"
@@ -53,9 +58,11 @@ def test_an_fmu_of_fmi_3_bears_it_in_its_name(
 
 def test_fly_opens_the_page_that_it_wrote(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)  # type: ignore[func-returns-value]
     assert main(["fly", str(BARE), "--against", str(BARE)]) == 0
-    path = Path(capsys.readouterr().out.strip())
+    out, err = capsys.readouterr()
+    assert err == ""
+    path = Path(out.strip())
     assert opened == [path.as_uri()]
     text = path.read_text(encoding="utf-8")
     assert "The ghost is Bare, under the same commands." in text
@@ -76,122 +83,145 @@ def test_an_unknown_name_is_one_line_with_those_that_ship(
 
 _SLOW = ("asyncio", "jinja2", "lxml", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 """The packages that take long to import."""
-NEEDED: dict[str, tuple[list[str], set[str]]] = {
-    "--help": (["--help"], set()),
-    "help of build": (["build", "--help"], set()),
-    "--version": (["--version"], set()),
-    "tables": (["tables"], {"pydantic", "rich"}),
-    "tune": (_TUNE, {"numpy", "pydantic", "rich", "scipy"}),
-    "identify": (["identify", str(TESTS)], {"numpy", "pydantic", "rich", "scipy"}),
-}
-"""The arguments of a command, and the slow packages that it may import."""
+_NEEDED: list[tuple[list[str], set[str]]] = [
+    (["--help"], set()),
+    (["build", "--help"], set()),
+    (["--version"], set()),
+    (["tables"], {"pydantic", "rich"}),
+    (_TUNE, {"numpy", "pydantic", "rich", "scipy"}),
+]
+"""The arguments of commands that run one after the other, and the slow packages that are imported at most."""
+_IMPORTED = """
+import sys
+before = set(sys.modules)
+from rov_fmu.cli import main
+for arguments in {!r}:
+    try:
+        code = main(arguments)
+    except SystemExit as end:
+        code = end.code
+    print(code or 0, *sorted(set(sys.modules) - before), file=sys.stderr)
+"""
 
 
-@pytest.mark.parametrize("case", [c if c != "identify" else pytest.param(c, marks=pytest.mark.long) for c in NEEDED])
-def test_a_command_imports_what_it_uses(case: str) -> None:
-    arguments, allowed = NEEDED[case]
-    script = (
-        "import sys\nbefore = set(sys.modules)\nfrom rov_fmu.cli import main\n"
-        f"try:\n    code = main({arguments!r})\nexcept SystemExit as end:\n    code = end.code\n"
-        "print(code or 0, *sorted(set(sys.modules) - before), file=sys.stderr)"
-    )
+@pytest.mark.parametrize(
+    "commands", [_NEEDED, pytest.param([(["identify", str(TESTS)], _NEEDED[-1][1])], marks=pytest.mark.long)]
+)
+def test_a_command_imports_what_it_uses(commands: list[tuple[list[str], set[str]]]) -> None:
+    script = _IMPORTED.format([arguments for arguments, _ in commands])
     ran = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    code, *imported = ran.stderr.split()
-    assert code == "0"
-    assert "click" in imported
-    assert set(imported) & set(_SLOW) <= allowed
+    for (arguments, allowed), line in zip(commands, ran.stderr.splitlines(), strict=True):
+        code, *imported = line.split()
+        assert code == "0", arguments
+        assert "click" in imported
+        assert set(imported) & set(_SLOW) <= allowed, arguments
 
 
 # ---- Completion ------------------------------------------------------------------------------------------------------
 
 
-def _completed(*words: str, shell: str = "bash") -> list[str]:
-    asked = {
-        "_ROV_FMU_COMPLETE": f"{shell}_complete",
-        "COMP_WORDS": " ".join(["rov-fmu", *words]),
-        "COMP_CWORD": str(len(words)) if shell == "bash" else words[-1],
-    }
-    process = start([], environment=asked, stdout=subprocess.PIPE)
-    out, err = process.communicate(timeout=300)
-    assert (process.returncode, err) == (0, "")
-    return out.splitlines()
+Complete = Callable[..., list[str]]
+"""A function that returns what a shell completes after the words of a command."""
 
 
-def test_the_shell_completes_commands_vehicles_platforms_and_axes() -> None:
+@pytest.fixture
+def complete(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Complete:
+    def run(*words: str) -> list[str]:
+        monkeypatch.setenv("_ROV_FMU_COMPLETE", "bash_complete")
+        monkeypatch.setenv("COMP_WORDS", " ".join(["rov-fmu", *words]))
+        monkeypatch.setenv("COMP_CWORD", str(len(words)))
+        with pytest.raises(SystemExit, match=r"^0$"):
+            main([])
+        out, err = capsys.readouterr()
+        assert err == ""
+        return out.splitlines()
+
+    return run
+
+
+def test_the_shell_completes_commands_vehicles_platforms_and_axes(complete: Complete) -> None:
     commands = ["build", "figures", "fly", "identify", "prove", "schema", "simulate", "study", "tables", "tune"]
-    assert _completed("") == [f"plain,{name}" for name in commands]
-    assert _completed("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
-    assert _completed("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
-    assert _completed("tune", "./my") == ["file,./my"]
-    assert _completed("build", "--platform", "") == [f"plain,{name}" for name in ("host", *PLATFORMS)]
-    assert _completed("build", "--backend", "p") == ["plain,pythonfmu"]
-    assert _completed("build", "--fmi", "") == ["plain,2", "plain,3"]
-    assert _completed("tune", "videoray", "--axis", "") == [f"plain,{name}" for name in AXES]
+    assert complete("") == [f"plain,{name}" for name in commands]
+    assert complete("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
+    assert complete("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
+    assert complete("tune", "./my") == ["file,./my"]
+    assert complete("build", "--platform", "") == [f"plain,{name}" for name in ("host", *PLATFORMS)]
+    assert complete("build", "--backend", "p") == ["plain,pythonfmu"]
+    assert complete("build", "--fmi", "") == ["plain,2", "plain,3"]
+    assert complete("tune", "videoray", "--axis", "") == [f"plain,{name}" for name in AXES]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_script_for_a_shell_is_there(shell: str) -> None:
+def test_the_script_for_a_shell_is_there(
+    shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     if shell == "bash" and not shutil.which("bash"):
         pytest.skip("click asks bash for its version")
-    process = start([], environment={"_ROV_FMU_COMPLETE": f"{shell}_source"}, stdout=subprocess.PIPE)
-    out, err = process.communicate(timeout=300)
-    assert (process.returncode, err) == (0, "")
-    assert f"_ROV_FMU_COMPLETE={shell}_complete" in out
+    monkeypatch.setenv("_ROV_FMU_COMPLETE", f"{shell}_source")
+    with pytest.raises(SystemExit, match=r"^0$"):
+        main([])
+    assert f"_ROV_FMU_COMPLETE={shell}_complete" in capsys.readouterr().out
 
 
 # ---- Progress --------------------------------------------------------------------------------------------------------
 
-_BUILD = ["build", str(BARE), "--platform=host", "-o"]
+
+class Terminal(StringIO):
+    """A text that the commands take for a terminal."""
+
+    def isatty(self) -> bool:
+        """Return True."""
+        return True
 
 
-@_posix
-def test_a_build_tells_its_progress_on_a_terminal(tmp_path: Path) -> None:
-    shown = _on_a_terminal([*_BUILD, str(tmp_path / "x.fmu")])
-    assert b"compiling " in shown
-    assert shown.index(b"compiling ") < shown.index(b"built in")
-    assert b"\x1b[2K" in shown, "the lines of the progress are taken back"
+def _terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Return a terminal that is stdout and stderr during a test."""
+    both = Terminal()
+    monkeypatch.setattr(sys, "stdout", both)
+    monkeypatch.setattr(sys, "stderr", both)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("NO_COLOR", "1")
+    return both
 
 
-@_posix
-@pytest.mark.long
-def test_an_identification_tells_its_progress_on_a_terminal() -> None:
-    shown = _on_a_terminal(["identify", str(TESTS)])
-    before = shown[: shown.index(b"Coefficients")]
-    assert b"%" in before
-    assert b"heave" in before
-    assert b"\x1b[2K" in shown, "the bar is taken back"
-
-
-def _on_a_terminal(arguments: Sequence[str]) -> bytes:
-    """Return what a command that succeeds prints on a terminal."""
-    ours, theirs = os.openpty()
-    process = start(arguments, environment={"TERM": "xterm", "NO_COLOR": "1"}, stdout=theirs)
-    os.close(theirs)
-    shown = b""
-    while part := _read(ours):
-        shown += part
-    os.close(ours)
-    assert process.communicate(timeout=300)[1] == ""
-    assert process.returncode == 0
-    return shown
-
-
-def _read(terminal: int) -> bytes:
-    try:
-        return os.read(terminal, 4096)
-    except OSError:  # on Linux the end of a terminal is an error
-        return b""
+def test_a_build_shows_its_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    terminal = _terminal(monkeypatch)
+    assert main(["build", str(BARE), "--platform=host", "-o", str(tmp_path / "x.fmu")]) == 0
+    shown = terminal.getvalue()
+    assert "compiling " in shown
+    assert shown.index("compiling ") < shown.index("built in")
+    assert "\x1b[2K" in shown, "the lines of the progress are cleared"
 
 
 @pytest.mark.long
-def test_a_build_is_quiet_where_there_is_no_terminal(tmp_path: Path) -> None:
-    process = start([*_BUILD, str(tmp_path / "x.fmu")], stdout=subprocess.PIPE)
-    out, err = process.communicate(timeout=300)
-    assert (process.returncode, err) == (0, "")
-    assert "compiling" not in out
-    assert "\x1b" not in out
-    assert "\r" not in out
-    assert len(out.splitlines()) == 4  # the file, the platform, what the run gave, the time
+def test_an_identification_shows_its_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = _terminal(monkeypatch)
+    assert main(["identify", str(TESTS)]) == 0
+    shown = terminal.getvalue()
+    before = shown[: shown.index("Coefficients")]
+    assert "%" in before
+    assert "heave" in before
+    assert "\x1b[2K" in shown, "the bar is cleared"
+
+
+def test_a_warning_is_printed_above_the_bar(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The warning is not appended to the line of the bar: that line is cleared before."""
+    pytest.importorskip("dask")
+    terminal = _terminal(monkeypatch)
+
+    def warns(*arguments: Any) -> None:
+        warn = arguments[-1]
+        warn("the plan is odd")
+        raise FileError("that is all")
+
+    monkeypatch.setattr("rov_fmu.study.run.run_study.run_study", warns)
+    assert main(["study", "plan.toml", "-o", str(tmp_path / "results")]) == 2
+    bar, warning, after = terminal.getvalue().partition("rov-fmu: warning: the plan is odd\n")
+    assert warning
+    assert "starting the workers" in bar
+    assert "starting the workers" in after
+    assert bar.endswith("\r\x1b[2K")
+    assert after.endswith("rov-fmu: that is all\n")
 
 
 # ---- Not installed ---------------------------------------------------------------------------------------------------
@@ -242,7 +272,9 @@ def test_a_checkout_that_is_not_installed_builds_the_same(videoray_fmu: Path, tm
     assert (tmp_path / "x.fmu").read_bytes() == videoray_fmu.read_bytes()
 
 
-@pytest.mark.parametrize("missing", ["click", "fat_macho", "pydantic", "matplotlib"])
+@pytest.mark.parametrize(
+    "missing", ["click", "matplotlib", *(pytest.param(m, marks=pytest.mark.long) for m in ("fat_macho", "pydantic"))]
+)
 def test_a_dependency_that_is_not_there_is_named(missing: str, tmp_path: Path) -> None:
     ran = _checkout(tmp_path, missing)
     assert ran.returncode == 1
@@ -281,7 +313,8 @@ asyncio.new_event_loop().run_until_complete(cell())
 """
 
 
-@_posix
+@pytest.mark.long
+@pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 def test_an_interrupted_build_in_a_notebook_ends_at_once_and_leaves_nothing(tmp_path: Path) -> None:
     """The compiler never ends by itself; the time limits only end a test that hangs."""
     (tmp_path / "tmp").mkdir()

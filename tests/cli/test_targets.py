@@ -15,6 +15,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import BARE, COMMANDS, REFIT, TESTS, Command, run_elsewhere
+from tests.folders import small_folder
 
 Capsys = pytest.CaptureFixture[str]
 OLD = b"the old one"
@@ -46,7 +47,7 @@ IMPOSSIBLE: dict[str, tuple[Callable[[Path], object], str]] = {
 
 # The figures are drawn before the check, which takes a second each time.
 _CASES = [
-    pytest.param(command, case, marks=[pytest.mark.long] * (name == "the figures" and case != "a folder"))
+    pytest.param(command, case, marks=[pytest.mark.long] * (name == "the figures"))
     for name, command in COMMANDS.items()
     for case in IMPOSSIBLE
 ]
@@ -254,7 +255,7 @@ def test_a_link_is_replaced_and_what_it_leads_to_stays(there: bool, tmp_path: Pa
     assert not there or other.read_bytes() == OLD
 
 
-def test_a_path_of_any_characters_is_written_and_told(tmp_path: Path, capsys: Capsys) -> None:
+def test_a_path_of_any_characters_is_written_and_printed(tmp_path: Path, capsys: Capsys) -> None:
     for name in ("Röv [bold] 4 [", "\udcff", "a\nb", "n" * 250):
         folder = tmp_path / name[:200]
         try:
@@ -267,8 +268,9 @@ def test_a_path_of_any_characters_is_written_and_told(tmp_path: Path, capsys: Ca
         capsys.readouterr()
         assert COMMANDS["the tuned vehicle"].run(folder) == 2
         one_line(capsys)
+    tests = small_folder(tmp_path / "tests")
     there = sorted(tmp_path.rglob("*"))
-    assert main(["identify", str(TESTS), "-o", str(tmp_path / "x"), "--report", str(tmp_path / "\udcff.html")]) == 2
+    assert main(["identify", str(tests), "-o", str(tmp_path / "x"), "--report", str(tmp_path / "\udcff.html")]) == 2
     assert "not Unicode" in one_line(capsys)
     assert sorted(tmp_path.rglob("*")) == there
     assert COMMANDS["the FMU"].run(tmp_path / "Röv [bold] 4 [" / "] [bold] x.fmu") == 0

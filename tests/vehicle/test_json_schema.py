@@ -27,11 +27,15 @@ def test_it_has_every_kind_of_coefficient_with_unit_and_bounds() -> None:
         **{f"_{axis.name.capitalize()}": metas_of(axis) for axis in AXIS_KINDS.values()},
     }
     assert {*kinds["_Yaw"]} == {*AXIS, *TUNING}
-    for table, metas in kinds.items():
-        for key, meta in metas.items():
+    for table, declarations in kinds.items():
+        for key, declaration in declarations.items():
             entry = tables[tables[table]["properties"][key]["$ref"].removeprefix("#/$defs/")]
             value, unit = (entry["properties"][name] for name in ("value", "unit"))
-            assert (value["minimum"], value["maximum"], unit["const"]) == (meta.minimum, meta.maximum, meta.unit)
+            assert (value["minimum"], value["maximum"], unit["const"]) == (
+                declaration.minimum,
+                declaration.maximum,
+                declaration.unit,
+            )
             assert {"value", "unit", "source"} <= set(entry["required"])
 
 

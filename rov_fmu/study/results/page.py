@@ -49,7 +49,7 @@ def page_output(results: Results) -> Output:
     return Output(results.folder / PAGE, study_page(results).encode())
 
 
-def see_place(folder: Path) -> None:
+def check_place(folder: Path) -> None:
     """Raise FileError if the page would overwrite another file."""
     path = folder / PAGE
     if path.exists() and _KIND not in path.read_bytes():

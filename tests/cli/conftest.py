@@ -1,0 +1,36 @@
+"""Builds in this process compile the same C once."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+
+import pytest
+
+from rov_fmu.engine import compile as compilation
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiled_once() -> Iterator[None]:
+    """Let builds in this process compile the same sources only once."""
+
+    @cache
+    def library(name: str, sources: tuple[tuple[str, str], ...], identifier: str, fmi: int) -> bytes:
+        return compilation.compile_all([name], dict(sources), identifier, fmi=fmi)[name]
+
+    def compile_all(
+        platforms: Sequence[str],
+        sources: Mapping[str, str],
+        identifier: str,
+        on_done: Callable[[str], None],
+        fmi: int,
+    ) -> dict[str, bytes]:
+        libraries = {}
+        for name in platforms:
+            libraries[name] = library(name, tuple(sources.items()), identifier, fmi)
+            on_done(name)
+        return libraries
+
+    module = cache(lambda sources: compilation.compile_module(dict(sources)))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("rov_fmu.build.compile_all", compile_all)
+        patched.setattr("rov_fmu.fmu.module.compile_module", lambda sources: module(tuple(sources.items())))
+        yield
