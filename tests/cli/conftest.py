@@ -8,29 +8,30 @@ import pytest
 from rov_fmu.engine import compile as compilation
 
 
-@pytest.fixture(scope="session", autouse=True)
+@cache
+def _library(name: str, sources: tuple[tuple[str, str], ...], identifier: str, fmi: int) -> bytes:
+    return compilation.compile_all([name], dict(sources), identifier, fmi=fmi)[name]
+
+
+@cache
+def _module(sources: tuple[tuple[str, str], ...]) -> bytes:
+    return compilation.compile_module(dict(sources))
+
+
+def _compile_all(
+    platforms: Sequence[str], sources: Mapping[str, str], identifier: str, on_done: Callable[[str], None], fmi: int
+) -> dict[str, bytes]:
+    libraries = {}
+    for name in platforms:
+        libraries[name] = _library(name, tuple(sources.items()), identifier, fmi)
+        on_done(name)
+    return libraries
+
+
+@pytest.fixture(scope="package", autouse=True)
 def _compiled_once() -> Iterator[None]:
-    """Let builds in this process compile the same sources only once."""
-
-    @cache
-    def library(name: str, sources: tuple[tuple[str, str], ...], identifier: str, fmi: int) -> bytes:
-        return compilation.compile_all([name], dict(sources), identifier, fmi=fmi)[name]
-
-    def compile_all(
-        platforms: Sequence[str],
-        sources: Mapping[str, str],
-        identifier: str,
-        on_done: Callable[[str], None],
-        fmi: int,
-    ) -> dict[str, bytes]:
-        libraries = {}
-        for name in platforms:
-            libraries[name] = library(name, tuple(sources.items()), identifier, fmi)
-            on_done(name)
-        return libraries
-
-    module = cache(lambda sources: compilation.compile_module(dict(sources)))
+    """Let builds of the tests in this folder compile the same sources only once."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("rov_fmu.build.compile_all", compile_all)
-        patched.setattr("rov_fmu.fmu.module.compile_module", lambda sources: module(tuple(sources.items())))
+        patched.setattr("rov_fmu.build.compile_all", _compile_all)
+        patched.setattr("rov_fmu.fmu.module.compile_module", lambda sources: _module(tuple(sources.items())))
         yield

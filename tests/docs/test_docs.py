@@ -328,7 +328,7 @@ def test_every_set_of_tests_is_run_and_told() -> None:
     markers = {marker.partition(":")[0] for marker in found["ini_options"]["markers"]}
     assert markers == {"long", "interop", "weekly"}
     assert found["ini_options"]["addopts"].endswith("-m 'not long and not weekly and not interop'")
-    assert {"pytest -rs -m long", "pytest -rs -m interop"} <= {*lines_of[".ci/run"]}
+    assert {"pytest -rs -m long --durations=20", "pytest -rs -m interop"} <= {*lines_of[".ci/run"]}
     assert not any("-m weekly" in line and not line.startswith("#") for line in lines_of[".ci/run"])
     assert {"  schedule:", "      - run: pytest -rs -m weekly", "      - run: .ci/run"} <= {*lines_of[WEEKLY]}
     contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

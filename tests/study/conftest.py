@@ -32,16 +32,16 @@ def foreign(made_once: Made) -> Callable[..., Path]:
     return lambda reset=0: folder / f"{reset}" / "foreign.fmu"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
-    """A worker with two threads that tests share, because starting workers for each test takes seconds."""
+    """A worker with two threads that the tests of this folder share, because starting workers for each test takes seconds."""
     folder = tmp_path_factory.mktemp("cluster")
     places = {"dashboard_address": "127.0.0.1:0", "local_directory": folder}
     with LocalCluster(n_workers=1, threads_per_worker=2, **places) as started:
         yield started
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def scheduler(cluster: LocalCluster) -> str:
     """The address of the shared worker's scheduler."""
     return str(cluster.scheduler_address)
