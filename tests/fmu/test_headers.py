@@ -12,9 +12,11 @@ import random
 import re
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import lief
 import pytest
@@ -126,28 +128,40 @@ def shipped(fmu: fmi2.Fmu) -> bytes:
     return _values(fmu)
 
 
-def _assert_same_values(fmu: Fmu, library: Path, shipped: bytes) -> None:
-    assert _values(type(fmu)(fmu.folder, library)) == shipped
-
-
 def _exports(library: Path) -> set[str]:
     binary = lief.parse(str(library))
     assert isinstance(binary, lief.ELF.Binary | lief.PE.Binary | lief.MachO.Binary)
     return {name for function in binary.exported_functions if re.search("fmi[23]", name := str(function.name))}
 
 
-# Every header, compiler and C standard occurs once; the weekly tests have all combinations.
 _STANDARDS, _NAMES = ("c99", "c11"), list(COMPILERS)
-_SOME = {(release, _NAMES[i % len(_NAMES)], _STANDARDS[i % 2]) for i, release in enumerate(RELEASES)}
-_MATRIX = [
-    pytest.param(r, c, s, marks=() if (r, c, s) in _SOME else pytest.mark.weekly)
-    for r in RELEASES
-    for c in COMPILERS
-    for s in _STANDARDS
-]
+_CPP = ("-x", "c++", "-std=c++17", "-O2")
+_needs_fma = pytest.mark.skipif(
+    platform.machine() != "x86_64" or not _HAS_FMA, reason="needs an x86-64 processor with FMA"
+)
 
 
-@pytest.mark.parametrize(("release", "name", "standard"), _MATRIX)
+def _builds() -> Iterator[Any]:
+    """Yield header, compiler and flags of each library.
+
+    The default tests have one library of each version and one with fused multiplication. The long ones have every
+    header, compiler and C standard, and C++. The weekly ones have all combinations.
+    """
+    for i, release in enumerate(RELEASES):
+        for name, standard in product(COMPILERS, _STANDARDS):
+            is_chosen = (name, standard) == (_NAMES[i % len(_NAMES)], _STANDARDS[i % 2])
+            by_default = release in ("2.0.1", "3.0")
+            marks = pytest.mark.weekly if not is_chosen else () if by_default else pytest.mark.long
+            yield pytest.param(release, name, (f"-std={standard}", "-O2"), marks=marks)
+    yield pytest.param("3.0", "zig", _CPP, marks=pytest.mark.long)
+    yield pytest.param("2.0.0", "zig", _CPP, marks=pytest.mark.weekly)
+    fused = (("-O2", "-march=haswell"), ("-O3", "-mfma", "-std=c99"), ("-O1", "-mfma", "-std=gnu11"))
+    for name, flags in product(COMPILERS, fused):
+        by_default = (name, flags) == ("gcc", fused[0])
+        yield pytest.param("2.0.0", name, flags, marks=[_needs_fma] if by_default else [_needs_fma, pytest.mark.weekly])
+
+
+@pytest.mark.parametrize(("release", "name", "flags"), list(_builds()))
 def test_a_shared_library_has_plain_names_and_gives_the_same_values(
     fmus: dict[int, Fmu],
     headers: dict[str, Path],
@@ -155,49 +169,35 @@ def test_a_shared_library_has_plain_names_and_gives_the_same_values(
     tmp_path: Path,
     release: str,
     name: str,
-    standard: str,
+    flags: Sequence[str],
 ) -> None:
+    """Compound literals are an extension of GCC and Clang in C++, so the flag -pedantic is left out there."""
     fmu = fmus[_version(release)]
-    command = [*COMPILERS[name], f"-std={standard}", "-O2", *_PLAIN.get(release, ())]
-    library = _compile(fmu, headers[release], command, tmp_path / "videoray.so")
+    warnings = _STRICT if flags != _CPP else _STRICT[1:]
+    command = [*COMPILERS[name], *flags, *_PLAIN.get(release, ())]
+    library = _compile(fmu, headers[release], command, tmp_path / "videoray.so", warnings)
     assert _exports(library) == _exports(fmu.library)
-    _assert_same_values(fmu, library, shipped)
+    assert _values(type(fmu)(fmu.folder, library)) == shipped
 
 
-@pytest.mark.parametrize("release", [pytest.param("2.0.0", marks=pytest.mark.weekly), "3.0"])
-def test_the_sources_compile_as_cpp_and_give_the_same_values(
-    fmus: dict[int, Fmu], headers: dict[str, Path], shipped: bytes, tmp_path: Path, release: str
+@pytest.mark.parametrize(
+    ("release", "is_requested"),
+    [
+        ("2.0.4", False),
+        pytest.param("2.0.0", True, marks=pytest.mark.long),
+        pytest.param("3.0", False, marks=pytest.mark.long),
+        *(pytest.param(release, True, marks=pytest.mark.weekly) for release in ("2.0.1", "2.0.4", "3.0")),
+    ],
+)
+def test_the_exports_of_a_static_library_have_a_prefix(
+    fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, is_requested: bool
 ) -> None:
-    """The flag -pedantic is left out, because compound literals are an extension of GCC and Clang in C++."""
+    """Some headers add it unless they are told not to; all of them do when it is requested."""
     fmu = fmus[_version(release)]
-    command = [*compiler(), "-x", "c++", "-std=c++17", "-O2", *_PLAIN.get(release, ())]
-    library = _compile(fmu, headers[release], command, tmp_path / "videoray.so", ("-Wall", "-Wextra", "-Werror"))
-    assert _exports(library) == _exports(fmu.library)
-    _assert_same_values(fmu, library, shipped)
-
-
-# Each behaviour of a release occurs once; the weekly tests have all combinations.
-_SOME_PREFIXES = {("2.0.0", False), ("2.0.4", False), ("2.0.4", True)}
-_PREFIXES = [
-    pytest.param(r, o, marks=() if (r, o) in _SOME_PREFIXES else pytest.mark.weekly)
-    for o in (False, True)
-    for r in ("2.0.0", "2.0.1", "2.0.4", "3.0")
-]
-
-
-@pytest.mark.parametrize(("release", "override"), _PREFIXES)
-def test_the_prefix_reaches_the_exports_only_where_it_is_meant_to(
-    fmus: dict[int, Fmu], headers: dict[str, Path], tmp_path: Path, release: str, override: bool
-) -> None:
-    fmu = fmus[_version(release)]
-    plain = _exports(fmu.library)
-    prefixed = {f"videoray_{name}" for name in plain}
-    command = [*compiler(), "-O0", *_PLAIN.get(release, _PLAIN["2.0.4"]) * override]
-    library = _compile(fmu, headers[release], command, tmp_path / "a.so")
-    assert _exports(library) == (prefixed if release in _PLAIN and not override else plain)
-    if not override:  # a prefix is requested, for a static library
-        command = [*compiler(), "-O0", f"-DFMI{_version(release)}_FUNCTION_PREFIX=videoray_"]
-        assert _exports(_compile(fmu, headers[release], command, tmp_path / "b.so")) == prefixed
+    request = [f"-DFMI{_version(release)}_FUNCTION_PREFIX=videoray_"] * is_requested
+    library = _compile(fmu, headers[release], [*COMPILERS[_NAMES[-1]], "-O0", *request], tmp_path / "a.so")
+    prefix = "videoray_" if is_requested or release in _PLAIN else ""
+    assert _exports(library) == {f"{prefix}{name}" for name in _exports(fmu.library)}
 
 
 _MAIN = r"""
@@ -226,7 +226,7 @@ _DECLARE = {
     ("releases", "sister"),
     [
         *(pytest.param((release,) * 2, "sister", marks=pytest.mark.weekly) for release in ("2.0.0", "2.0.4", "3.0")),
-        (("2.0.4", "3.0"), "videoray"),
+        pytest.param(("2.0.4", "3.0"), "videoray", marks=pytest.mark.long),
     ],
     ids=["2.0.0", "2.0.4", "3.0", "one model in both versions"],
 )
@@ -255,22 +255,6 @@ def test_two_models_link_into_one_program_under_their_prefixes(
     pointers = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.split()
     assert len(pointers) == len(set(pointers)) == 2
     assert "(nil)" not in pointers
-
-
-@pytest.mark.skipif(platform.machine() != "x86_64" or not _HAS_FMA, reason="needs an x86-64 processor with FMA")
-@pytest.mark.parametrize(
-    ("name", "flags"),
-    [
-        pytest.param(name, flags, marks=() if name != "zig" and "-O2" in flags else pytest.mark.weekly)
-        for name in COMPILERS
-        for flags in (("-O2", "-march=haswell"), ("-O3", "-mfma", "-std=c99"), ("-O1", "-mfma", "-std=gnu11"))
-    ],
-)
-def test_fused_multiplication_does_not_change_a_bit(
-    fmu: fmi2.Fmu, headers: dict[str, Path], shipped: bytes, tmp_path: Path, name: str, flags: tuple[str, ...]
-) -> None:
-    library = _compile(fmu, headers["2.0.0"], [*COMPILERS[name], *flags], tmp_path / "videoray.so")
-    _assert_same_values(fmu, library, shipped)
 
 
 _OF_ONE = ("fabs", "ceil", "sqrt", "sin", "cos", "exp", "log", "log1p", "expm1", "atan", "atanh")

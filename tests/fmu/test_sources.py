@@ -28,7 +28,7 @@ def zig_as_cc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("fmi", [3, 2], indirect=True)
+@pytest.mark.parametrize("fmi", [pytest.param(3, marks=pytest.mark.weekly), 2], indirect=True)
 @pytest.mark.usefixtures("zig_as_cc")
 def test_fmpy_compiles_and_runs_them(either_dir: Path, tmp_path: Path) -> None:
     folder = tmp_path / "source fmu"
@@ -39,7 +39,8 @@ def test_fmpy_compiles_and_runs_them(either_dir: Path, tmp_path: Path) -> None:
     _assert_same_simulation(folder, either_dir)
 
 
-@pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.long)], indirect=True)
+@pytest.mark.long
+@pytest.mark.parametrize("fmi", [3, pytest.param(2, marks=pytest.mark.weekly)], indirect=True)
 @pytest.mark.usefixtures("zig_as_cc")
 def test_the_cmake_project_that_fmpy_creates_builds_and_simulates(
     either_fmu: Path, either_dir: Path, tmp_path: Path
@@ -65,7 +66,7 @@ def _assert_same_simulation(built: Path, shipped: Path) -> None:
         assert ours[name] == pytest.approx(theirs[name], rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("optimization", [pytest.param("-O0", marks=pytest.mark.long), "-O3"])
+@pytest.mark.parametrize("optimization", ["-O0", pytest.param("-O3", marks=pytest.mark.long)])
 def test_no_warning_under_the_strictest_flags(either_dir: Path, tmp_path: Path, optimization: str) -> None:
     more = ["-Wshadow", "-Wundef", "-Wstrict-prototypes", "-Wcast-qual", "-Wvla"]
     flags = ["-std=c11", *WARNINGS, *more, optimization, "-isystem", str(fmi_headers())]

@@ -30,16 +30,16 @@ def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls
 
 
 @pytest.mark.parametrize(
-    "calls", [20_000, pytest.param(200_000, marks=pytest.mark.long), pytest.param(2_000_000, marks=pytest.mark.weekly)]
-)
-@pytest.mark.parametrize(
-    ("fmi", "sanitizers"),
+    ("fmi", "sanitizers", "calls"),
     [
-        (2, "thread"),
-        (3, "thread"),
+        pytest.param(2, "thread", 40_000, marks=pytest.mark.long),
+        (3, "thread", 5_000),
+        pytest.param(3, "address,undefined", 40_000, marks=pytest.mark.long),  # the corpus test has it, too
         *(
-            pytest.param(fmi, "address,undefined", marks=pytest.mark.long) for fmi in (2, 3)
-        ),  # the corpus test has it, too
+            pytest.param(fmi, sanitizers, 2_000_000, marks=pytest.mark.weekly)
+            for fmi in (2, 3)
+            for sanitizers in ("thread", "address,undefined")
+        ),
     ],
 )
 def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
@@ -54,20 +54,12 @@ def test_eight_threads_get_what_one_thread_gets_without_a_race_or_a_leak(
     assert counts["messages"] > 0.1 * calls
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("sanitizers", "file", "line", "fault", "report"),
     [
-        (
-            "thread",
-            "step.c",
-            "    motion m;\n",
-            "    static motion m;\n",
-            "data race",
-        ),
-        pytest.param(
-            *("address", "fmi2_common.c", "    free(c);\n", "(void)c;\n", "detected memory leaks"),
-            marks=pytest.mark.long,
-        ),
+        ("thread", "step.c", "    motion m;\n", "    static motion m;\n", "data race"),
+        ("address", "fmi2_common.c", "    free(c);\n", "(void)c;\n", "detected memory leaks"),
     ],
     ids=["shared variable", "lost instance"],
 )

@@ -1,32 +1,21 @@
 """The FMUs of FMI 2.0 and 3.0 give the same values to the bit."""
 
 import random
-from pathlib import Path
 
 import pytest
 
-from rov_fmu.vehicle.shipped import SHIPPED
 from tests import fmi2, fmi3
-from tests.conftest import unzipped
 from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, AnyInstance, reals
 
-BUILT = {"videoray": ("videoray_dir", "videoray3_dir"), "bluerov2_heavy": ("heavy_dir", "heavy3_dir")}
-"""The fixtures of the vehicles whose FMUs other tests use, too."""
-_NAMES = [name if name in BUILT else pytest.param(name, marks=pytest.mark.long) for name in SHIPPED]
+_FOLDERS = {"videoray": ("videoray_dir", "videoray3_dir"), "bluerov2_heavy": ("heavy_dir", "heavy3_dir")}
+"""The fixtures with the FMUs of two vehicles in both versions."""
 
 
-@pytest.fixture(scope="module", params=_NAMES)
-def both(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[fmi2.Fmu, fmi3.Fmu]:
-    """Return both FMUs of a shipped vehicle."""
-    name: str = request.param
-
-    def folder(version: int) -> Path:
-        if name in BUILT:
-            found: Path = request.getfixturevalue(BUILT[name][version - 2])
-            return found
-        return unzipped(SHIPPED[name], tmp_path_factory.mktemp(f"{name}{version}"), version)
-
-    return fmi2.Fmu(folder(2)), fmi3.Fmu(folder(3))
+@pytest.fixture(scope="module", params=_FOLDERS)
+def both(request: pytest.FixtureRequest) -> tuple[fmi2.Fmu, fmi3.Fmu]:
+    """Return both FMUs of a vehicle."""
+    two, three = map(request.getfixturevalue, _FOLDERS[request.param])
+    return fmi2.Fmu(two), fmi3.Fmu(three)
 
 
 def inputs(rov: AnyInstance, rng: random.Random) -> dict[str, float]:
@@ -47,7 +36,7 @@ def run(rov: AnyInstance, steps: int) -> list[bytes]:
     return seen
 
 
-@pytest.mark.parametrize("steps", [300, pytest.param(30_000, marks=pytest.mark.long)])
+@pytest.mark.parametrize("steps", [300, pytest.param(30_000, marks=pytest.mark.weekly)])
 def test_co_simulation_gives_the_same_bits(both: tuple[fmi2.Fmu, fmi3.Fmu], steps: int) -> None:
     runs = []
     for fmu in both:
