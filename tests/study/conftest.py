@@ -34,7 +34,7 @@ def foreign(made_once: Made) -> Callable[..., Path]:
 
 @pytest.fixture(scope="package")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
-    """A worker with two threads that the tests of this folder share, because starting workers for each test takes seconds."""
+    """A worker with two threads that the tests of this folder share, because a start takes seconds."""
     folder = tmp_path_factory.mktemp("cluster")
     places = {"dashboard_address": "127.0.0.1:0", "local_directory": folder}
     with LocalCluster(n_workers=1, threads_per_worker=2, **places) as started:
