@@ -62,7 +62,7 @@ class Equation:
     thrust: Mapping[str, str]
     """Formulas from the commands to the steady thrust of every thruster."""
     forces: Mapping[str, str]
-    """Formulas from the thrust and the loads to the accelerations that are constant while the inputs are held."""
+    """Formulas for torques and other outputs, and for the accelerations that are constant while the inputs are held."""
     rows: Mapping[str, tuple[Term, ...]]
     """The terms in the rate of every state of the table."""
     starts: Mapping[str, str]

@@ -50,9 +50,14 @@ class Axis:
         return coefficient_name(key, self.velocity)
 
     @property
+    def is_rotation(self) -> bool:
+        """True for an axis to turn about."""
+        return self.unit == "rad/s"
+
+    @property
     def push(self) -> str:
         """The word for the effect of thrusters along the axis: thrust or torque."""
-        return "thrust" if self.load == "N" else "torque"
+        return "torque" if self.is_rotation else "thrust"
 
 
 SURGE = Axis("surge", "u", "m/s", "forward", "astern", "distance", "m", "N", "X_ext", "m_rov", ("(14)", "(18a)"), 0)
@@ -344,7 +349,7 @@ class Layout:
             axis = form.axis
             example = "ballast" if axis is HEAVE else "contact"
             words = f"Load from outside in {axis.name} (tether, {example}), positive {axis.positive}"
-            found[axis.external] = Declaration(axis.load, words, nominal=1.0 if axis is YAW else 10.0)
+            found[axis.external] = Declaration(axis.load, words, nominal=1.0 if axis.is_rotation else 10.0)
         if self.has(SURGE, SWAY):
             for name, direction in (("V_N", "northward"), ("V_E", "eastward")):
                 found[name] = Declaration("m/s", f"Velocity of a steady horizontal current, {direction}")
@@ -355,7 +360,7 @@ class Layout:
         """The velocities through the water, which are the first states."""
         found = {}
         for axis in (form.axis for form in self.axes):
-            through = "" if axis is YAW else " through the water"
+            through = "" if axis.is_rotation else " through the water"
             words = f"{axis.name.capitalize()} velocity {axis.velocity}{through}, positive {axis.positive}"
             found[axis.velocity] = Declaration(axis.unit, words)
         return found
@@ -387,7 +392,7 @@ class Layout:
 
     @cached_property
     def thrust(self) -> dict[str, Declaration]:
-        """The calculated variables of the thrusters, before the tuning α.
+        """The calculated variables that are neither states nor rates: thrust and torque, before the tuning α.
 
         They are the forces that are not states, and the torque of the thrusters of each curve.
         """
@@ -429,7 +434,7 @@ def metas_of(axis: Axis) -> dict[str, Declaration]:
         "load": axis.load,
         "length": axis.position_unit,
         "inertia": BODY[axis.inertia].unit,
-        "what": "moment of inertia" if axis is YAW else "mass",
+        "what": "moment of inertia" if axis.is_rotation else "mass",
         "positive": axis.positive,
         "negative": axis.negative,
     }

@@ -6,7 +6,7 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from rov_fmu.identify.identification import Comparison, Identification, compare
+from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
 from rov_fmu.identify.recordings.recordings_fit import count
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.io.output import Output
@@ -34,6 +34,8 @@ def report_page(results: Identification) -> str:
     predicted = tuple(unseen(results, comparisons))
     fits = [result.recordings for result in results.axes if result.recordings]
     closeups = {fit.axis.name: step for fit in fits if (step := clearest_step(fit))}
+    of_points = {result.axis.name: [*_plots_of_points(results, result, comparisons)] for result in results.axes}
+    plots = chain(_plots(results, found, closeups), *of_points.values())
     return page(
         "report.html.j2",
         vehicle=results.vehicle,
@@ -44,9 +46,8 @@ def report_page(results: Identification) -> str:
         unseen_fit=dict(part for row in predicted for part in row.parts),
         known=found,
         closeups=closeups,
-        plots={
-            label: inline_svg(label, draw, size) for label, draw, size in _plots(results, comparisons, found, closeups)
-        },
+        plots={label: inline_svg(label, draw, size) for label, draw, size in plots},
+        of_points={name: [label for label, _, _ in some] for name, some in of_points.items()},
         holds=_holds(results.tests),
         effects=effects,
         acting=acting,
@@ -55,31 +56,36 @@ def report_page(results: Identification) -> str:
     )
 
 
-def _plots(
-    results: Identification,
-    comparisons: tuple[Comparison, ...],
-    found: tuple[Known, ...],
-    closeups: Mapping[str, CommandStep],
-) -> Iterator[tuple[str, Draw, tuple[float, float]]]:
-    """Yield the label of each plot, the function that draws it, and its size in inches."""
+Plot = tuple[str, Draw, tuple[float, float]]
+"""The label of a plot, the function that draws it, and its size in inches."""
+
+
+def _plots_of_points(
+    results: Identification, result: AxisResult, comparisons: tuple[Comparison, ...]
+) -> Iterator[Plot]:
+    """Yield the plots of an axis that show its measured points."""
+    name = result.axis.name
+    if result.points or result.recordings:
+        compared = {c.quantity: c for c in comparisons if c.result is result}
+        for quantity in ("V_ss", "Tau"):
+            response = partial(plot_response, quantity=quantity, comparison=compared.get(quantity))
+            yield f"{quantity} over the command: {name}", partial(response, results=results, result=result), _PLOT
+        if result.drag:
+            yield f"Drag: {name}", partial(plot_drag, results=results, result=result), _PLOT
+    if result.points:
+        yield f"Step responses: {name}", partial(plot_steps, results=results, result=result), _PLOT
+
+
+def _plots(results: Identification, found: tuple[Known, ...], closeups: Mapping[str, CommandStep]) -> Iterator[Plot]:
+    """Yield the other plots."""
     if found:
         yield "What is known", partial(plot_known, found=found), (4.6, 0.7 + 0.23 * len(found))
     for name, fit in results.thrust.items():
         yield f"Thrust: {name}", partial(plot_thrust, results=results, fit=fit), _PLOT
     for result in results.axes:
-        name = result.axis.name
-        if result.points or result.recordings:
-            compared = {c.quantity: c for c in comparisons if c.result is result}
-            for quantity in ("V_ss", "Tau"):
-                response = partial(plot_response, quantity=quantity, comparison=compared.get(quantity))
-                yield f"{quantity} over the command: {name}", partial(response, results=results, result=result), _PLOT
-            if result.drag:
-                yield f"Drag: {name}", partial(plot_drag, results=results, result=result), _PLOT
-        if result.points:
-            yield f"Step responses: {name}", partial(plot_steps, results=results, result=result), _PLOT
         for s in result.recordings.simulations if result.recordings else ():
             yield f"Recording: {s.recording.file}", partial(plot_recording, result=result, simulation=s), _WIDE
-        if step := closeups.get(name):
+        if step := closeups.get(result.axis.name):
             yield f"Step in {step.simulation.recording.file}", partial(plot_step, result=result, step=step), _WIDE
 
 

@@ -35,6 +35,8 @@ from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, recordings_of,
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order; with more, the file holds two logs."""
 _COMMAND = "command"
+_READERS = dict.fromkeys(LOG_SUFFIXES, read_mavlink)
+"""The function that reads a log, by the suffix of the file. Other logs are CSV."""
 _POSITION_NAMES = {HEAVE: "z", YAW: "psi"}
 """The names of the positions in the FMU."""
 
@@ -50,8 +52,8 @@ class Log:
 
 def read_log(path: Path, layout: Layout, axis: Axis | None = None) -> Log:
     """Read a recording of every axis that the log measures, or of `axis` alone. Raises DataFileError."""
-    if path.suffix.lower() in LOG_SUFFIXES:
-        commands, signals, findings = read_mavlink(path, layout)
+    if read := _READERS.get(path.suffix.lower()):
+        commands, signals, findings = read(path, layout)
         return _log(path, layout, commands, signals, findings, axis)
     sensors = _sensors([axis] if axis else [form.axis for form in layout.axes], of_one=axis is not None)
     kinds = {"inputs": _inputs(layout), "thrusters": _thrusters(layout), "axis": {_COMMAND: _LOGGED} if axis else {}}

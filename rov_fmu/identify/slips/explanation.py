@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite, log10, pi, sqrt
 
 from rov_fmu.identify.slips.single_recording import Alone
-from rov_fmu.model.layout import YAW, Axis
+from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 
 FASTEST = {"m/s": 4.0, "rad/s": 8.0}
@@ -73,7 +73,7 @@ class Files:
 
     def explanations(self) -> list[Explanation]:
         """Return the best explanation for each scale and set of files, sorted by cost, including that without files."""
-        factors = _ANGLES if self.axis is YAW else _LENGTHS
+        factors = _ANGLES if self.axis.is_rotation else _LENGTHS
         found = {(e.factor, e.files): e for e in sorted(self._all((1.0, *factors)), key=lambda e: -e.cost)}
         return sorted(found.values(), key=lambda e: e.cost)
 
@@ -108,7 +108,7 @@ class Files:
         """Return the cost of implausible proportions."""
         inertia, drag = proportions(self.axis, self.base, vehicle)
         typical, spread = (1.0, 0.25) if self._added else (2.0, 0.3)
-        cost = (log10(drag / (1.0 if self.axis is YAW else 1.5)) / 0.45) ** 2 if drag > 0.0 else _MOST
+        cost = (log10(drag / (1.0 if self.axis.is_rotation else 1.5)) / 0.45) ** 2 if drag > 0.0 else _MOST
         return min(cost, _MOST) + (min((log10(inertia / typical) / spread) ** 2, _MOST) if isfinite(inertia) else 0.0)
 
     @property
@@ -119,7 +119,7 @@ class Files:
 def proportions(axis: Axis, base: Rov, vehicle: Alone) -> tuple[float, float]:
     """Return m/β relative to the given mass and added mass, and drag relative to size and speed; see the module."""
     mass, v = base[axis.inertia], vehicle.speed
-    size = 0.5 * _RHO * (6.0 * mass / _RHO if axis is YAW else (mass / _RHO) ** (2.0 / 3.0))
+    size = 0.5 * _RHO * (6.0 * mass / _RHO if axis.is_rotation else (mass / _RHO) ** (2.0 / 3.0))
     return vehicle.inertia / base.inertia(base.layout.kinds[axis.name]), vehicle.drag(v) / (size * v * v)
 
 
