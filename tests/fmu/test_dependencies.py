@@ -72,7 +72,7 @@ _KINDS = [pytest.param(kind, marks=() if kind in _SOME else pytest.mark.long) fo
 def test_declared_dependencies_are_those_of_the_equations(kind: str) -> None:
     rov, rng = numbered(_ROVS[kind].layout), random.Random(1)
     knowns = [*rov.layout.inputs, *rov.layout.state]
-    moving = motions(rov.layout, rng, 2)
+    moving = motions(rov.layout, rng, 6)
     sets = [parameters(rov, rng, tunable) for tunable in ([], [False], [True])]
     samples = [[slopes(rov, m | k, knowns) for m in moving] for k in sets]
 
@@ -95,7 +95,7 @@ def test_declared_dependencies_are_those_of_the_equations(kind: str) -> None:
 def test_declared_initial_dependencies_are_those_of_the_equations(kind: str) -> None:
     """The knowns are inputs, states and coefficients; the only kinds are constant and dependent (2.2.8)."""
     rov, rng = numbered(_ROVS[kind].layout), random.Random(2)
-    points = [m | parameters(rov, rng, [False, True]) for m in motions(rov.layout, rng, 3)]
+    points = [m | parameters(rov, rng, [False, True]) for m in motions(rov.layout, rng, 8)]
     samples = [slopes(rov, point, list(point)) for point in points]
     values = {pair: [sample[pair] for sample in samples] for pair in samples[0] if pair[0] not in rov.layout.state}
     found = {pair: "dependent" if vary(of) else "constant" for pair, of in values.items() if any(of)}

@@ -104,7 +104,9 @@ def outliers(recording: Recording, random: np.random.Generator) -> Recording:
     return replace(recording, values=recording.values + far)
 
 
-@pytest.mark.parametrize("seeds", [pytest.param(6, marks=pytest.mark.long), pytest.param(40, marks=pytest.mark.weekly)])
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(15, marks=pytest.mark.long), pytest.param(40, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize("disturb", [turbulence, outliers])
 def test_intervals_hold_with_coloured_noise_and_outliers(disturb: Disturb, k: Rov, seeds: int) -> None:
     shares = round_trip(k, HEAVE, range(seeds), disturb, 100.0)
