@@ -48,13 +48,16 @@ TESTS = {
     "fmu_src/c/s*.c": "model/test_c_step.py fmu/calls/test_values.py fmu/calls model/test_exactness.py engine",
     "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls",
     "rov_fmu/model/riccati.py": "model/test_riccati.py model/test_rov.py vehicle/test_published.py",
+    "rov_fmu/model/layout.py": "model/test_layout.py docs/test_docs.py model/test_rov.py vehicle/test_vehicle.py model",
     "rov_fmu/model/*": "model/test_rov.py model/test_step.py model/test_symmetries.py model",
     "rov_fmu/engine/source.py": "model/test_c_step.py fmu/test_sources.py engine model",
     "rov_fmu/engine/*": "fmu/test_build_failures.py engine",
+    "rov_fmu/vehicle/vehicle.py": "interface/test_model.py vehicle/test_vehicle.py vehicle",
     "rov_fmu/vehicle/*": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_writer.py vehicle",
     "rov_fmu/identify/points/*": "identify/test_response_fit.py identify/test_thrust_fit.py identify",
     "rov_fmu/identify/slips/*": "identify/test_slips.py identify",
     "rov_fmu/identify/*": "identify/test_simulator.py identify/test_trajectory.py identify",
+    "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
 }
 """The default tests of each file, in the folder tests/, besides those that import it. The first pattern counts."""

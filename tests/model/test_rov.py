@@ -6,6 +6,7 @@ from math import copysign, cos, pi, sin
 import pytest
 from mpmath import mp
 
+from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import HEAVY, VEHICLES, State, Values, at_rest, random_case, random_inputs, random_vehicle, still
@@ -75,6 +76,17 @@ def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations(cases: int) -
             size = 1.0 + sum(abs(float(rate)) for rate in rates.values())
             expected = {name: float(rate) for name, rate in rates.items()}
         assert rov.derivatives(inputs, state) == pytest.approx(expected, rel=1e-13, abs=1e-13 * size)
+
+
+@pytest.mark.parametrize("stronger", ["forward", "reverse"])
+def test_the_strongest_thrust_is_that_of_the_better_direction(stronger: str) -> None:
+    better, worse = (29.30, 31.51), (21.76, 25.52)  # a_t and b_t of a T200
+    forward, reverse = (better, worse) if stronger == "forward" else (worse, better)
+    ends = (forward[0], forward[1], reverse[0], reverse[1], 0.0872)
+    keys = ("a_t_t200", "b_t_t200", "a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200")
+    rov = HEAVY.replaced(dict(zip(keys, ends, strict=True)))
+    m = 1.0 - 0.0872
+    assert rov.strongest(HEAVE) == pytest.approx(4.0 * (better[0] * m + better[1]) * m, rel=1e-12)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
