@@ -1,6 +1,7 @@
 """The FMUs under test, built for this machine once in a run, by the command line of the exporter."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import fmpy
@@ -15,6 +16,7 @@ from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi2 import Fmu
+from tests.model.steps import Step, in_fmu, in_python
 from tests.vehicles import EVERYTHING
 
 
@@ -130,3 +132,9 @@ def heavy3_dir(made_once: Made) -> Path:
 def fmu(videoray_dir: Path) -> Fmu:
     """Return the VideoRay's FMU, with its shared library loaded for one file of tests."""
     return Fmu(videoray_dir)
+
+
+@pytest.fixture
+def steps(fmu: Fmu) -> list[Step]:
+    """The steps of the VideoRay in Python and in C."""
+    return [in_python, partial(in_fmu, fmu)]

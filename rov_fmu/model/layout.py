@@ -43,7 +43,7 @@ class Axis:
     equations: tuple[str, str]
     """The numbers of the paper's equations of drag and motion."""
     place: int
-    """The place of the axis's direction, x, y or z, in a vector."""
+    """The index of the axis in a vector (x, y, z)."""
 
     def coefficient(self, key: str) -> str:
         """Return the name of a coefficient of the axis by its key: a_d, b_d_reverse, alpha ..."""
@@ -51,7 +51,7 @@ class Axis:
 
     @property
     def is_rotation(self) -> bool:
-        """True for an axis to turn about."""
+        """True when the vehicle turns about the axis instead of moving along it."""
         return self.unit == "rad/s"
 
     @property

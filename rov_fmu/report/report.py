@@ -77,7 +77,7 @@ def _plots_of_points(
 
 
 def _plots(results: Identification, found: tuple[Known, ...], closeups: Mapping[str, CommandStep]) -> Iterator[Plot]:
-    """Yield the other plots."""
+    """Yield the plots of the report besides those of `_plots_of_points`."""
     if found:
         yield "What is known", partial(plot_known, found=found), (4.6, 0.7 + 0.23 * len(found))
     for name, fit in results.thrust.items():

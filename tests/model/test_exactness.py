@@ -43,12 +43,6 @@ EVERY = pytest.mark.parametrize("stride", [4, pytest.param(1, marks=LONG)])
 
 
 @pytest.fixture
-def steps(fmu: Fmu) -> list[Step]:
-    """The steps of the VideoRay in Python and in C."""
-    return [in_python, partial(in_fmu, fmu)]
-
-
-@pytest.fixture
 def heavy(heavy_dir: Path) -> list[Step]:
     """The step of the Heavy in C."""
     return [partial(in_fmu, Fmu(heavy_dir))]

@@ -28,12 +28,6 @@ from tests.vehicles import (
 )
 
 
-@pytest.fixture
-def steps(fmu: Fmu) -> list[Step]:
-    """The steps of the VideoRay in Python and in C."""
-    return [in_python, partial(in_fmu, fmu)]
-
-
 def negated(values: Values, *names: str) -> State:
     return {name: -value if name in names else value for name, value in values.items()}
 
