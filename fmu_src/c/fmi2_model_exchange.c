@@ -10,8 +10,11 @@ FMI2_Export fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi
 {
     OPEN(fmi2NewDiscreteStates, MAY_UPDATE);
     GIVEN(fmi2eventInfo != NULL, "eventInfo");
-    memset(fmi2eventInfo, 0, sizeof *fmi2eventInfo); /* the model has no events of its own */
-    return fmi2OK;
+    bool has_next = false;
+    memset(fmi2eventInfo, 0, sizeof *fmi2eventInfo); /* the only events of the model are commands after a dead time */
+    const outcome done = update_discrete(f, &has_next, &fmi2eventInfo->nextEventTime);
+    fmi2eventInfo->nextEventTimeDefined = has_next ? fmi2True : fmi2False;
+    return (fmi2Status)done;
 }
 
 FMI2_Export fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
@@ -26,9 +29,11 @@ FMI2_Export fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean 
     OPEN(fmi2CompletedIntegratorStep, MAY_INTEGRATE);
     (void)noSetFMUStatePriorToCurrentPoint;
     GIVEN(enterEventMode != NULL && terminateSimulation != NULL, "enterEventMode or terminateSimulation");
-    *enterEventMode = fmi2False;
-    *terminateSimulation = fmi2False;
-    return fmi2OK;
+    const outcome completed = complete_step(f);
+    if (completed == DONE) {
+        *enterEventMode = *terminateSimulation = fmi2False;
+    }
+    return (fmi2Status)completed;
 }
 
 FMI2_Export fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)

@@ -44,7 +44,7 @@ static outcome step_in_pieces(fmu *f, double t, double h, double *last)
     int cuts = 0;
     double length = h, gone = 0.0; /* measured from t: a piece may be shorter than the last digit of a large t */
     TRY(check_step(f, t, h));
-    warn_of_jump(f, f->now.time, t, h);
+    follow_jump(f, f->now.time, t, h);
     f->now.time = t;
     update(f, t, gone, &length, false);
     for (double n = 1.0; gone < length; n++) {

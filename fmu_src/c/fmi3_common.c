@@ -148,9 +148,8 @@ FMI3_Export fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boole
               && valuesOfContinuousStatesChanged != NULL && nextEventTimeDefined != NULL && nextEventTime != NULL,
           "one of what is asked for");
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = false;
-    *valuesOfContinuousStatesChanged = *nextEventTimeDefined = false;
-    *nextEventTime = 0.0;
-    return fmi3OK;
+    *valuesOfContinuousStatesChanged = false;
+    return (fmi3Status)update_discrete(f, nextEventTimeDefined, nextEventTime);
 }
 
 /* ---- Getting and setting values ---- */
@@ -253,7 +252,7 @@ static outcome differentiate_adjoint(fmu *f, const unsigned unknowns[], size_t n
         for (size_t k = 0; k < n_knowns; k++) {
             double d[N_VARIABLES] = {0.0}, sum = 0.0;
             d[place_of(knowns[k])] = 1.0;
-            model_tangent(f->now.values, d);
+            add_changes(f, d);
             for (size_t i = 0; i < n_unknowns; i++) {
                 sum += seed[i] * d[place_of(unknowns[i])];
             }

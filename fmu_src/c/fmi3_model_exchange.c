@@ -12,8 +12,11 @@ FMI3_Export fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Bo
     OPEN(fmi3CompletedIntegratorStep, MAY_INTEGRATE);
     (void)noSetFMUStatePriorToCurrentPoint;
     GIVEN(enterEventMode != NULL && terminateSimulation != NULL, "enterEventMode or terminateSimulation");
-    *enterEventMode = *terminateSimulation = false;
-    return fmi3OK;
+    const outcome completed = complete_step(f);
+    if (completed == DONE) {
+        *enterEventMode = *terminateSimulation = false;
+    }
+    return (fmi3Status)completed;
 }
 
 FMI3_Export fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)

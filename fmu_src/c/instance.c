@@ -30,6 +30,7 @@ static void start(fmu *f)
         f->log_enabled[i] = f->logging_on || (LOGS_PROBLEMS_ALWAYS && i != logEvents);
     }
     model_prepare(f->now.values, &f->numbers);
+    model_begin(f->now.values, &f->now.heading);
 }
 
 /* Write a line that explains why there is no instance, and return NULL. */
@@ -105,6 +106,7 @@ static outcome initialize(fmu *f)
 
 static outcome run(fmu *f)
 {
+    REQUIRE(model_is_definite(&f->numbers), "the mass matrix of these parameters is not positive definite.");
     return enter(f, f->now.type == TYPE_MODEL_EXCHANGE || has_event_mode(&f->host) ? EVENT : STEP);
 }
 
@@ -128,7 +130,7 @@ static outcome reset(fmu *f)
 /* Compute the thrust and the derivatives, which is done only when they are read. */
 static void calculate(fmu *f)
 {
-    model_calculate(f->now.values, &f->numbers);
+    model_calculate(f->now.values, &f->numbers, f->now.heading);
 }
 
 /* Return the value at a place, or the time where FMI declares it as a variable. Return NULL when there is no such variable. */
@@ -173,15 +175,21 @@ static bool may_set(const fmu *f, variable_kind kind)
 {
     switch (f->now.mode) {
     case INSTANTIATED:
-    case INITIALIZATION: return kind != CALCULATED;
-    case EVENT: return kind == INPUT || kind == TUNABLE || (kind == STATE && EVENTS_SET_STATES);
+    case INITIALIZATION: return kind != CALCULATED && kind != CALCULATED_STATE && kind != MEMORY;
+    case EVENT: return kind == INPUT || kind == TUNABLE || ((kind == STATE || kind == CALCULATED_STATE) && EVENTS_SET_STATES);
     case STEP: return kind == INPUT || kind == TUNABLE;
-    case CONTINUOUS: return kind == INPUT || kind == STATE || kind == TUNABLE;
+    case CONTINUOUS: return kind == INPUT || kind == STATE || kind == CALCULATED_STATE || kind == TUNABLE;
     case INTERMEDIATE: return kind == INPUT;
     case TERMINATED:
     case FAILED: break;
     }
     return false;
+}
+
+/* True when a variable is a command that changes only in events, because it acts after a dead time. */
+static bool is_discrete(unsigned place)
+{
+    return HAS_DEAD_TIME && place < N_COMMANDS;
 }
 
 /* True when the standard asks for Event Mode before a parameter is changed. For Step Mode, FMI 3.0 contradicts itself: section
@@ -201,7 +209,8 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
                 HAS_TIME && place == TIME ? " to be set" : "");
         const variable_info *const info = &VARIABLES[place];
         const double old = f->now.values[place];
-        REQUIRE(may_set(f, info->kind), "%s must not be set in %s.", info->name, mode_name(f->now.mode));
+        REQUIRE(may_set(f, info->kind) && !(is_discrete(place) && (f->now.mode & (CONTINUOUS | INTERMEDIATE)) != 0),
+                "%s must not be set in %s.", info->name, mode_name(f->now.mode));
         if (!isfinite(value[i])) {
             DISCARD(f, "%s = %g is not a finite number; it stays %.15g.", info->name, value[i], old);
         }
@@ -227,6 +236,9 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
     }
     if (coefficient) {
         model_prepare(f->now.values, &f->numbers);
+        if (f->now.mode == INSTANTIATED || f->now.mode == INITIALIZATION) {
+            model_begin(f->now.values, &f->now.heading);
+        }
     }
     return DONE;
 }
@@ -249,7 +261,24 @@ static outcome set_states(fmu *f, const double x[], size_t n)
                     f->now.values[FIRST_STATE + i]);
         }
     }
+    if (!model_has_attitude(x)) {
+        DISCARD(f, "the quaternion is 0, which is no attitude; the states stay as they are.");
+    }
     memcpy(&f->now.values[FIRST_STATE], x, N_STATES * sizeof x[0]);
+    return DONE;
+}
+
+/* Count the turns of the heading at the end of an integrator's step. */
+static outcome complete_step(fmu *f)
+{
+    if (HAS_ATTITUDE) {
+        calculate(f);
+        const double heading = model_heading(f->now.values);
+        if (!isfinite(heading)) {
+            DISCARD(f, "psi is not a finite number; the heading stays %.15g.", f->now.heading);
+        }
+        f->now.heading = heading;
+    }
     return DONE;
 }
 
@@ -294,6 +323,25 @@ static outcome get_indicators(fmu *f, size_t n)
     return DONE;
 }
 
+/* Update the commands that act after a dead time. Return in *next when the next change arrives, and whether there is one. */
+static outcome update_discrete(fmu *f, bool *has_next, double *next)
+{
+    *has_next = false;
+    *next = 0.0;
+#if HAS_DEAD_TIME
+    if (f->now.type == TYPE_MODEL_EXCHANGE) {
+        delay_line *const line = &f->now.line;
+        REQUIRE(delay_send(line, f->now.values, f->now.time),
+                "too many changes of commands wait for the dead time at t = %g.", f->now.time);
+        delay_receive(line, f->now.values, f->now.time);
+        *has_next = line->waiting > 0;
+        *next = *has_next ? line->time[0] : 0.0;
+    }
+#endif
+    (void)f;
+    return DONE;
+}
+
 /* A time beyond stopTime is allowed. Solvers pass the end before they interpolate back to it, and CasADi sets stopTime to 1
  * whatever it integrates over. The model does not depend on time, so it is valid there too. */
 static outcome set_time(fmu *f, double time)
@@ -317,13 +365,15 @@ static bool is_known(const fmu *f, unsigned reference)
 {
     const unsigned place = place_of(reference);
     const variable_kind kind = place < N_VARIABLES ? VARIABLES[place].kind : CALCULATED;
-    return kind == INPUT || kind == STATE || (kind != CALCULATED && f->now.mode == INITIALIZATION);
+    return kind == INPUT || kind == STATE || kind == CALCULATED_STATE
+           || (kind != CALCULATED && kind != MEMORY && f->now.mode == INITIALIZATION);
 }
 
 static bool is_unknown(unsigned reference)
 {
     const unsigned place = place_of(reference);
-    return place < N_VARIABLES && (VARIABLES[place].kind == STATE || VARIABLES[place].kind == CALCULATED);
+    const variable_kind kind = place < N_VARIABLES ? VARIABLES[place].kind : INPUT;
+    return kind == STATE || kind == CALCULATED_STATE || kind == CALCULATED;
 }
 
 static outcome check_partial(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[], size_t n_knowns,
@@ -344,6 +394,15 @@ static outcome check_partial(fmu *f, const unsigned unknowns[], size_t n_unknown
     return DONE;
 }
 
+/* Compute the changes of the calculated variables from those of the others in d. */
+static void add_changes(const fmu *f, double d[N_VARIABLES])
+{
+    if (f->now.mode == INITIALIZATION) {
+        model_begin_tangent(f->now.values, d);
+    }
+    model_tangent(f->now.values, d);
+}
+
 /* Compute sensitivity = J seed. */
 static outcome differentiate(fmu *f, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
                              size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],
@@ -354,7 +413,7 @@ static outcome differentiate(fmu *f, const unsigned unknowns[], size_t n_unknown
     for (size_t i = 0; i < n_knowns; i++) {
         d[place_of(knowns[i])] += seed[i];
     }
-    model_tangent(f->now.values, d);
+    add_changes(f, d);
     for (size_t i = 0; i < n_unknowns; i++) {
         REQUIRE(isfinite(d[place_of(unknowns[i])]), "that of %s is not a finite number.", name_of(unknowns[i]));
     }
@@ -409,9 +468,13 @@ static outcome check_step(fmu *f, double t, double h)
     return DONE;
 }
 
-static void warn_of_jump(fmu *f, double time, double t, double h)
+/* Warn when a step from t does not begin at `time`, where the FMU is. The changes that wait for the dead time move along. */
+static void follow_jump(fmu *f, double time, double t, double h)
 {
     if (fabs(t - time) > time_tolerance(time, h)) {
+#if HAS_DEAD_TIME
+        delay_move(&f->now.line, t - time);
+#endif
         WARN_ONCE(f, TIME_JUMPED, "the step from t = %.15g does not begin at t = %.15g, where the FMU is; done from its "
                   "state, and said once.", t, time);
     }
@@ -420,8 +483,9 @@ static void warn_of_jump(fmu *f, double time, double t, double h)
 /* Advance the states by h seconds from t with the inputs held. Add to *cuts the number of pieces beyond the first one. */
 static outcome advance(fmu *f, double t, double h, int *cuts)
 {
-    double next[N_STATES], sum = 0.0; /* it stays 0 while every state is finite: 0 times infinity or NaN is NaN */
-    const int pieces = model_step(f->now.values, &f->numbers, h, next);
+    double next[N_STATES], heading = f->now.heading, sum = 0.0; /* it stays 0 while every state is finite: 0 times infinity or NaN is NaN */
+    const int pieces = delayed_step(f->now.values, &f->numbers, &f->now.line, f->now.time, h, next, &heading);
+    REQUIRE(pieces >= 0, "too many changes of commands wait for the dead time at t = %g; change them less often.", t);
     *cuts += pieces - 1;
     if (pieces == 0 || *cuts >= MOST_PIECES) {
         f->now.mode = FAILED;
@@ -436,6 +500,8 @@ static outcome advance(fmu *f, double t, double h, int *cuts)
         FAIL(f, "the motion over %g s from t = %g overflows; the state from before is kept.", h, t);
     }
     memcpy(&f->now.values[FIRST_STATE], next, sizeof next);
+    delay_commit(f->now.values, &f->now.line, f->now.time, h);
+    f->now.heading = heading;
     f->now.time = t + h; /* the model is autonomous: whatever t says, h seconds have passed */
     return DONE;
 }
@@ -446,6 +512,6 @@ static outcome step(fmu *f, double t, double h)
     int cuts = 0;
     TRY(check_step(f, t, h));
     TRY(advance(f, t, h, &cuts));
-    warn_of_jump(f, time, t, h);
+    follow_jump(f, time, t, h);
     return DONE;
 }

@@ -67,8 +67,9 @@ typedef struct {
     interface_type type;
     lifecycle mode;
     bool experiment_defined, stop_defined;
-    double time, stop;
+    double time, stop, heading; /* the heading counts turns; only a vehicle with an attitude uses it */
     double values[N_VARIABLES]; /* by place */
+    delay_line line;            /* the changes of commands that wait for the dead time */
 } fmu_state;
 
 /* The warnings that an instance gives once. Inputs that saturate come first, each at its place; the others are calls of

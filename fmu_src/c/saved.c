@@ -1,12 +1,18 @@
 /* Saving, restoring and serializing the complete state (FMI 2.0, section 2.1.8; FMI 3.0, section 2.2.7.4). */
 
-/* The serialized state consists of: magic, token, type, mode, flags, time, stop, values, checksum. Each number has its least
+/* The serialized state consists of: magic, token, type, mode, flags, time, stop, the heading of
+ * a vehicle with an attitude, values, the changes that wait for the dead time, checksum. Each number has its least
  * significant byte first. */
+#if HAS_DEAD_TIME
+enum { N_DELAY_WORDS = 1 + MOST_WAITING * (1 + N_COMMANDS) };
+#else
+enum { N_DELAY_WORDS = 0 };
+#endif
 enum {
     MAGIC_SIZE = 8,
     TOKEN_SIZE = sizeof MODEL_TOKEN - 1,
-    N_HEADER_WORDS = 5,
-    SERIALIZED_SIZE = MAGIC_SIZE + TOKEN_SIZE + 8 * (N_HEADER_WORDS + N_VARIABLES + 1)
+    N_HEADER_WORDS = 5 + HAS_ATTITUDE,
+    SERIALIZED_SIZE = MAGIC_SIZE + TOKEN_SIZE + 8 * (N_HEADER_WORDS + N_VARIABLES + N_DELAY_WORDS + 1)
 };
 
 static const char MAGIC[MAGIC_SIZE + 1] = "ROVSTATE";
@@ -51,6 +57,44 @@ static uint64_t checksum(const unsigned char *bytes, size_t size) /* FNV-1a */
     return hash;
 }
 
+/* Serialize the changes of commands that wait for the dead time. */
+static void put_line(unsigned char **to, const delay_line *line)
+{
+#if HAS_DEAD_TIME
+    put_word(to, (uint64_t)line->waiting);
+    for (int n = 0; n < MOST_WAITING; n++) {
+        put_double(to, n < line->waiting ? line->time[n] : 0.0);
+        for (int i = 0; i < N_COMMANDS; i++) {
+            put_double(to, n < line->waiting ? line->commands[n][i] : 0.0);
+        }
+    }
+#else
+    (void)to, (void)line;
+#endif
+}
+
+/* Deserialize them. Return false when no call of FMI functions could have led to them. */
+static bool get_line(const unsigned char **from, delay_line *line)
+{
+    bool valid = true;
+#if HAS_DEAD_TIME
+    const uint64_t waiting = get_word(from);
+    line->waiting = waiting <= MOST_WAITING ? (int)waiting : 0;
+    valid = waiting <= MOST_WAITING;
+    for (int n = 0; n < MOST_WAITING; n++) {
+        line->time[n] = get_double(from);
+        valid = valid && isfinite(line->time[n]) && (n == 0 || n >= line->waiting || line->time[n] > line->time[n - 1]);
+        for (int i = 0; i < N_COMMANDS; i++) {
+            line->commands[n][i] = get_double(from);
+            valid = valid && isfinite(line->commands[n][i]);
+        }
+    }
+#else
+    (void)from, (void)line;
+#endif
+    return valid;
+}
+
 /* Refuse a state in a mode that this instance does not have. In Co-Simulation, Event Mode is optional. */
 static outcome check_mode_of(fmu *f, const fmu_state *s)
 {
@@ -64,7 +108,7 @@ static outcome check_mode_of(fmu *f, const fmu_state *s)
 /* True when calls of FMI functions could have led to this state. */
 static bool is_valid(const fmu_state *s)
 {
-    bool valid = isfinite(s->time) && !isnan(s->stop)
+    bool valid = isfinite(s->time) && !isnan(s->stop) && isfinite(s->heading)
                  && (s->experiment_defined || s->mode == INSTANTIATED);
     for (size_t i = 0; i < N_VARIABLES; i++) {
         const double value = s->values[i];
@@ -156,9 +200,13 @@ static outcome serialize(fmu *f, void *state, unsigned char bytes[], size_t size
     put_word(&to, (s->experiment_defined ? 1u : 0u) | (s->stop_defined ? 2u : 0u));
     put_double(&to, s->time);
     put_double(&to, s->stop);
+    if (HAS_ATTITUDE) {
+        put_double(&to, s->heading);
+    }
     for (size_t i = 0; i < N_VARIABLES; i++) {
         put_double(&to, VARIABLES[i].kind == CALCULATED ? 0.0 : s->values[i]);
     }
+    put_line(&to, &s->line);
     put_word(&to, checksum(bytes, SERIALIZED_SIZE - 8));
     return DONE;
 }
@@ -182,11 +230,13 @@ static outcome deserialize(fmu *f, const unsigned char bytes[], size_t size, voi
     s.stop_defined = (flags & 2u) != 0;
     s.time = get_double(&from);
     s.stop = get_double(&from);
+    s.heading = HAS_ATTITUDE ? get_double(&from) : 0.0;
     for (size_t i = 0; i < N_VARIABLES; i++) {
         s.values[i] = get_double(&from);
     }
+    const bool valid_line = get_line(&from, &s.line);
     TRY(check_mode_of(f, &s));
-    REQUIRE(is_valid(&s), "the bytes hold values that no run can reach.");
+    REQUIRE(is_valid(&s) && valid_line, "the bytes hold values that no run can reach.");
     saved_state *const saved = state_memory(state);
     REQUIRE(saved != NULL, "out of memory, or *state is no state of this FMU.");
     saved->state = s;

@@ -13,6 +13,13 @@
 #else
 #define INLINE static inline
 #endif
+#if HAS_ATTITUDE && defined __GNUC__ /* the unrolled loops of so many terms take minutes to compile and are not faster */
+#define SERIES_UNROLLED static __attribute__((noinline))
+#elif HAS_ATTITUDE
+#define SERIES_UNROLLED static
+#else
+#define SERIES_UNROLLED INLINE
+#endif
 
 enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save */
 
@@ -79,7 +86,7 @@ INLINE void series_squares(double c[ORDER + 1][N_SERIES], int a, int lanes, int 
 #define SERIES_BLOCK(name)                                                                                      \
     INLINE void name(const model_numbers *n, const model_held *q, unsigned blocks, const double pace[N_SERIES], \
                      double c[ORDER + 1][N_SERIES], int m)
-#define SERIES_TERMS INLINE void series_terms(const model_numbers *n, const model_held *q, series *s, int m)
+#define SERIES_TERMS SERIES_UNROLLED void series_terms(const model_numbers *n, const model_held *q, series *s, int m)
 #define GROW(bit, block, first, size)                    \
     if (s->blocks >> (bit) & 1U) {                       \
         block(n, q, s->blocks, s->pace, s->c, m);        \

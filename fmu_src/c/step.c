@@ -248,18 +248,18 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
 }
 
 /* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
-static bool motion_coasts(motion *m, double rest)
+static bool motion_coasts(motion *m, double rest, double *heading)
 {
     if (m->settled != (1U << N_DYNAMIC) - 1U) {
         return false;
     }
-    model_coast(m->n, &m->q, rest, m->y, m->displacement);
+    model_coast(m->n, &m->q, rest, m->y, m->displacement, heading);
     return true;
 }
 
 /* Compute the states after h > 0 seconds with the inputs held. They are finite unless a result overflows. Return the
  * number of pieces, or 0 when more than MOST_PIECES would be needed. */
-static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES])
+static int model_step(const double at[], const model_numbers *n, double h, double next[N_STATES], double *heading)
 {
     const double *const state = at + FIRST_STATE;
     double done = 0.0, lost = 0.0; /* the length of all pieces so far, and its rounding error */
@@ -285,7 +285,7 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
         if (!motion_grow_short(&m, &s)) {
             if (pieces == 1) { /* the step is long, and some states may have settled before it */
                 motion_settle(&m, rest);
-                if (motion_coasts(&m, rest)) {
+                if (motion_coasts(&m, rest, heading)) {
                     break;
                 }
                 if (m.settled != 0U) {
@@ -303,6 +303,9 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
         int reversed = NONE;
         if (reach < 1.0 || !series_keeps_directions(&s)) {
             reversed = series_cut(&s, &length);
+        }
+        if (HAS_ATTITUDE) {
+            *heading = heading_after_piece(&s, length, *heading);
         }
         if (length == 1.0) { /* with a constant, the compiler leaves out the multiplications */
             motion_move(&m, &s, 1.0, change);
@@ -327,7 +330,7 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
         if (motion_is_slow(&m, &s, change)) {
             motion_settle(&m, rest);
         }
-        if (motion_coasts(&m, rest)) {
+        if (motion_coasts(&m, rest, heading)) {
             break;
         }
     }
@@ -340,3 +343,24 @@ static int model_step(const double at[], const model_numbers *n, double h, doubl
     model_finish(state, &m.q, m.y, m.displacement, next);
     return pieces <= MOST_PIECES ? pieces : 0;
 }
+
+#if HAS_DEAD_TIME
+#include "delay.c"
+#else
+/* Without a dead time, commands act at once, and nothing waits. */
+typedef struct {
+    char nothing;
+} delay_line;
+
+static inline int delayed_step(const double at[], const model_numbers *n, const delay_line *line, double t, double h,
+                               double next[N_STATES], double *heading)
+{
+    (void)line, (void)t;
+    return model_step(at, n, h, next, heading);
+}
+
+static inline void delay_commit(const double at[], const delay_line *line, double t, double h)
+{
+    (void)at, (void)line, (void)t, (void)h;
+}
+#endif

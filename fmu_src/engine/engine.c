@@ -28,10 +28,25 @@ static inline double number(const table *t, ptrdiff_t vehicle, ptrdiff_t time)
     return t->at[vehicle * t->per_vehicle + time * t->per_time];
 }
 
+/* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that differ by whole
+ * turns, the one nearest to psi_0 is taken. */
+static void begin(double at[], const model_numbers *numbers, double *heading)
+{
+    double state[N_STATES];
+    const bool is_given = HAS_ATTITUDE && model_has_attitude(at + FIRST_STATE);
+    memcpy(state, at + FIRST_STATE, sizeof state);
+    model_begin(at, heading);
+    if (is_given) {
+        memcpy(at + FIRST_STATE, state, sizeof state);
+        model_calculate(at, numbers, *heading);
+        *heading = model_heading(at);
+    }
+}
+
 /* Simulate the vehicles from `first` to `last` - 1. The simulation ends early when *stop becomes nonzero.
  *
  * `given` contains at the place of each variable the values of the inputs, which are held from each time to the next, of the
- * states at the first time, and of the coefficients. `recorded` contains the places of the variables that are recorded at every
+ * states at the first time, and of the parameters. `recorded` contains the places of the variables that are recorded at every
  * time in result[record][vehicle][time]. failed[vehicle] becomes the index of the first time that cannot be computed, or `times`.
  * From that time on, nothing is recorded. */
 void simulate(const table given[N_VARIABLES], const double *time, const int *recorded, double *result, ptrdiff_t *failed,
@@ -43,8 +58,10 @@ void simulate(const table given[N_VARIABLES], const double *time, const int *rec
         calculates |= recorded[k] >= FIRST_CALCULATED && recorded[k] < FIRST_COEFFICIENT;
     }
     for (ptrdiff_t vehicle = first; vehicle < last; vehicle++) {
-        double at[N_VARIABLES] = {0.0}, next[N_STATES];
+        double at[N_VARIABLES] = {0.0}, next[N_STATES], heading = 0.0;
+        delay_line line;
         model_numbers numbers;
+        memset(&line, 0, sizeof line);
         for (int i = 0; i < FIRST_CALCULATED; i++) {
             at[i] = number(&given[i], vehicle, 0);
         }
@@ -52,13 +69,14 @@ void simulate(const table given[N_VARIABLES], const double *time, const int *rec
             at[i] = number(&given[i], vehicle, 0);
         }
         model_prepare(at, &numbers);
+        begin(at, &numbers, &heading);
         failed[vehicle] = times;
         for (ptrdiff_t n = 0; n < times && *stop == 0; n++) {
             for (int i = 0; i < N_INPUTS; i++) {
                 at[i] = number(&given[i], vehicle, n);
             }
             if (calculates) {
-                model_calculate(at, &numbers);
+                model_calculate(at, &numbers, heading);
             }
             double *to = result + vehicle * times + n;
             for (ptrdiff_t k = 0; k < records; k++) {
@@ -67,7 +85,7 @@ void simulate(const table given[N_VARIABLES], const double *time, const int *rec
             if (n + 1 == times) {
                 break;
             }
-            bool finite = model_step(at, &numbers, time[n + 1] - time[n], next) > 0;
+            bool finite = delayed_step(at, &numbers, &line, time[n], time[n + 1] - time[n], next, &heading) > 0;
             for (int i = 0; i < N_STATES; i++) {
                 finite &= isfinite(next[i]) != 0;
             }
@@ -76,6 +94,7 @@ void simulate(const table given[N_VARIABLES], const double *time, const int *rec
                 break;
             }
             memcpy(at + FIRST_STATE, next, sizeof next);
+            delay_commit(at, &line, time[n], time[n + 1] - time[n]);
         }
     }
 }

@@ -57,6 +57,9 @@ def simulate(
     By default, inputs and states are 0, and coefficients are those of the vehicle. `record` names the variables to
     record, by default the states. The results do not depend on the number of workers.
 
+    The attitude of a vehicle with roll or pitch begins at the Euler angles phi_0, theta_0 and psi_0, which are 0 by
+    default, or at the quaternion among the states.
+
     Raises BuildError when the engine cannot be compiled. The arguments are not checked.
     """
     layout = rov.layout
@@ -68,7 +71,7 @@ def simulate(
     tables = np.zeros(len(places), _TABLE)
     tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(places))
     arrays = []  # keeps the arrays alive while C uses their addresses
-    for name, value in {**rov.coefficients, **values}.items():
+    for name, value in {**rov.coefficients, **layout.usual_inputs, **values}.items():
         array = np.require(value, np.float64, ["C", "A"])
         if array.ndim == 0:
             numbers[places[name]] = array

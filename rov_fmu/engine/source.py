@@ -1,9 +1,11 @@
 """The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
 
 from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.io.templates import render
+from rov_fmu.model.attitude import QUATERNION, start_formulas
 from rov_fmu.model.equation import Equation, Term, equation_of, rate_formula
 from rov_fmu.model.formula import names, tangent, to_c
 from rov_fmu.model.layout import Layout
@@ -56,8 +58,8 @@ class EquationSource:
         lines: list[str] = []
         local: list[str] = []
         held = self.held_names()
-        for name, formula in self.equation.thrust.items():
-            text = self._c(formula, local)
+        for name in _needed(self.equation.thrust, held):
+            text = self._c(self.equation.thrust[name], local)
             if name in held:
                 lines.append(f"q->{name} = {text};")
             else:
@@ -75,8 +77,12 @@ class EquationSource:
 
     def starts(self) -> list[str]:
         """Return statements that set the states of the table at the start of a step."""
-        starts = self.equation.starts
-        return [f"y[Y_{name}] = {self._c(starts[name]) if name in starts else '0.0'};" for name in self.equation.states]
+        starts, states = self.equation.starts, self.equation.states
+        local = [name for name in starts if name not in states]
+        lines = [f"const double {name} = {self._c(starts[name], local)};" for name in local]
+        for name in states:
+            lines.append(f"y[Y_{name}] = {self._c(starts[name], local) if name in starts else '0.0'};")
+        return lines
 
     def lagging_curves(self) -> list[tuple[str, list[str]]]:
         """Return each curve with lag, and the names of its thrusters."""
@@ -86,7 +92,19 @@ class EquationSource:
 
     def coasting(self) -> list[str]:
         """Return the integrals with constant rates while all velocities are steady: all, but x and y not in a turn."""
+        if self.layout.has_attitude:
+            return []
         return [name for name in self.equation.states if name not in self.equation.used and not self._turns(name)]
+
+    def turning(self) -> list[str]:
+        """Return the entries of the rotation matrix that still change while all velocities are steady."""
+        kinematic = self.equation.components[self.dynamic() :]
+        rotating = {name for group in kinematic for name in group} & {*self.equation.heading}
+        return [name for name in self.equation.states if name in rotating] if self.layout.has_attitude else []
+
+    def first_rotation(self) -> str:
+        """Return the first angular velocity."""
+        return next(form.axis.velocity for form in self.layout.axes if form.axis.is_rotation)
 
     def _turns(self, name: str) -> bool:
         """Return True when the rate of a state depends on the heading."""
@@ -94,6 +112,8 @@ class EquationSource:
 
     def group(self, name: str) -> str:
         """Return the first state of a state's group. The heading and the horizontal position are groups of two."""
+        if self.layout.has_attitude:
+            return "x" if name in ("y", "z") else f"R_{name[2]}1" if name.startswith("R_") else name
         return {"sin_psi": "cos_psi", "y": "x"}.get(name, name)
 
     def dynamic(self) -> int:
@@ -105,8 +125,15 @@ class EquationSource:
     def finish(self) -> list[str]:
         """Return statements that assign the states of the vehicle after a step."""
         lines = []
+        ends = self.equation.ends
+        known = {name: f"state[REF_{name} - FIRST_STATE]" for name in self.layout.state} | {name: name for name in ends}
+        known |= {name: f"y[Y_{name}]" for name in self.equation.states if name in self.equation.heading}
+        for name, formula in ends.items():
+            lines.append(f"const double {name} = {to_c(formula, lambda n: known[n])};")
         for name in self.layout.state:
-            if name in self.equation.lagging:
+            if f"next_{name}" in ends:
+                end = f"next_{name}"
+            elif name in self.equation.lagging:
                 end = f"q->{name}"
             elif name in self.equation.used:
                 end = f"y[Y_{name}]"
@@ -123,7 +150,7 @@ class EquationSource:
 
     def size(self, name: str) -> str:
         """Write the sum of the sizes of the terms in the rate of a state."""
-        return " + ".join(f"fabs({self._rate([term])})" for term in self.equation.rows[name])
+        return " + ".join(f"fabs({self._rate([term])})" for term in self.equation.rows[name]) or "0.0"
 
     def _rate(self, terms: Sequence[Term]) -> str:
         return self._by_states(rate_formula(terms))
@@ -141,8 +168,11 @@ class EquationSource:
             level = 1 + max((depth[name] for name in self._inputs(group)), default=0)
             last = 1 + len(self.equation.components)
             depth |= dict.fromkeys(group, level if used & set(group) else last)
-        levels = sorted(set(depth.values()))
-        return [tuple(name for name in self.equation.states if depth[name] == level) for level in levels]
+        found = []
+        for level in sorted(set(depth.values())):
+            neighbours = groupby(self.equation.states, key=lambda name: depth[name] == level)
+            found += [tuple(names) for is_level, names in neighbours if is_level]
+        return found
 
     def block_of(self, name: str) -> int:
         """Return the place of a state's block."""
@@ -164,7 +194,11 @@ class EquationSource:
             best: tuple[str, str, int] = ("", "", 0)
             for first, second in sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))):
                 place, length = states.index(second), 0
-                while place + length < len(states) and (first, states[place + length]) in candidates:
+                while (
+                    place + length < len(states)
+                    and (first, states[place + length]) in candidates
+                    and self.block_of(states[place + length]) == self.block_of(second)
+                ):
                     length += 1
                 if length > best[2]:
                     best = first, second, length
@@ -206,7 +240,8 @@ class EquationSource:
     def needed_with(self, group: Sequence[str]) -> int:
         """Return bits for the states that let a component act on others unless they are 0, or all bits for always."""
         always, partners = 2**32 - 1, 0
-        if self.equation.used.isdisjoint(group) or set(group) & set(self.equation.monitored):
+        needed = {*self.equation.monitored, *(self.equation.heading if self.layout.has_attitude else ())}
+        if self.equation.used.isdisjoint(group) or not needed.isdisjoint(group):
             return always
         for name in set(self.equation.states) - set(group):
             for factors in (term.factors for term in self.equation.rows[name] if set(term.factors) & set(group)):
@@ -228,11 +263,49 @@ class EquationSource:
 
     def derivative_lines(self) -> list[str]:
         """Return statements that assign the derivatives. Before them, the directions must have been chosen in `q`."""
-        equation = self.equation
-        known = self._in_c(equation.heading)
-        lines = [f"const double {name} = {self._c(formula)};" for name, formula in equation.heading.items()]
-        for name in self.layout.state:
-            lines.append(f"at[REF_{name} + N_STATES] = {to_c(equation.rates[name], lambda n: known[n])};")
+        return self._results({f"at[REF_{name} + N_STATES]": self.equation.rates[name] for name in self.layout.state})
+
+    def output_lines(self) -> list[str]:
+        """Return statements that assign the outputs that follow from the states."""
+        return self._results({f"at[REF_{name}]": formula for name, formula in self.equation.outputs.items()})
+
+    def _results(self, formulas: Mapping[str, str]) -> list[str]:
+        """Return statements that assign results, after the entries of the rotation matrix in them."""
+        heading = self.equation.heading
+        needed = _needed(heading, {name for formula in formulas.values() for name in names(formula)})
+        lines = [f"const double {name} = {self._c(heading[name], heading)};" for name in needed]
+        return lines + [f"{place} = {self._c(formula, heading)};" for place, formula in formulas.items()]
+
+    def beginning(self) -> list[str]:
+        """Return statements that compute the attitude at the start from its parameters."""
+        lines: list[str] = []
+        local: list[str] = []
+        for name, formula in start_formulas().items() if self.layout.has_attitude else ():
+            text = self._c(formula, local)
+            if name in self.layout.state:
+                lines.append(f"at[REF_{name}] = {text};")
+            else:
+                local.append(name)
+                lines.append(f"const double {name} = {text};")
+        return lines
+
+    def has_direction(self) -> str:
+        """Write the condition that the quaternion is not 0."""
+        parts = (f"state[REF_{name} - FIRST_STATE] != 0.0" for name in QUATERNION if name in self.layout.state)
+        return " || ".join(parts) or "true"
+
+    def beginning_tangent(self) -> list[str]:
+        """Return statements that add the changes of the attitude at the start to d."""
+        text = {name: f"at[REF_{name}]" for name in self.layout.initial}
+        text |= {f"d_{name}": f"d[REF_{name}]" for name in self.layout.initial}
+        lines: list[str] = []
+        for name, formula in start_formulas().items() if self.layout.has_attitude else ():
+            change = to_c(tangent(formula, lambda n: f"d_{n}") or "0", text.__getitem__)
+            if name in self.layout.state:
+                lines.append(f"d[REF_{name}] += {change};")
+            else:
+                lines.append(f"const double {name} = {to_c(formula, text.__getitem__)}, d_{name} = {change};")
+                text.update({name: name, f"d_{name}": f"d_{name}"})
         return lines
 
     def tangent_lines(self) -> list[str]:
@@ -246,20 +319,26 @@ class EquationSource:
         def change_of(name: str) -> str | None:
             return f"d_{name}" if name in given or f"d_{name}" in steps else None
 
-        for name, formula in equation.program.items():
+        for name, formula in {**equation.program, **equation.outputs}.items():
             steps[name] = formula
             if change := tangent(formula, change_of):
                 steps[f"d_{name}"] = change
         results = {f"d[REF_{name}]": f"d_{name}" for name in self.layout.thrust if f"d_{name}" in steps}
         for name in self.layout.state:
             results[f"d[REF_{name} + N_STATES]"] = tangent(equation.rates[name], change_of) or "0"
-        needed = {name for formula in results.values() for name in names(formula)}
-        for name in reversed(steps):
-            if name in needed:
-                needed |= {*names(steps[name])}
+        needed = _needed(steps, {name for formula in results.values() for name in names(formula)})
         text |= {name: name for name in steps}
-        lines = [f"const double {name} = {to_c(steps[name], lambda n: text[n])};" for name in steps if name in needed]
+        lines = [f"const double {name} = {to_c(steps[name], lambda n: text[n])};" for name in needed]
         return lines + [f"{place} = {to_c(formula, lambda n: text[n])};" for place, formula in results.items()]
+
+
+def _needed(formulas: Mapping[str, str], wanted: Iterable[str]) -> list[str]:
+    """Return the names of the formulas that the wanted ones need, themselves included, in the order of the formulas."""
+    needed = set(wanted)
+    for name in reversed(list(formulas)):
+        if name in needed:
+            needed |= {*names(formulas[name])}
+    return [name for name in formulas if name in needed]
 
 
 def generated_sources(layout: Layout) -> dict[str, str]:
@@ -269,15 +348,21 @@ def generated_sources(layout: Layout) -> dict[str, str]:
     sizes = {
         "inputs": len(layout.inputs),
         "states": len(layout.state),
-        "thrust": len(layout.thrust),
+        "thrust": len(layout.thrust) + len(layout.delayed),
         "commands": len(layout.commands),
-        "coefficients": len(layout.coefficients),
+        "parameters": len(layout.coefficients) + len(layout.initial),
     }
     given = {"names": layout.places, "source": source, "equation": source.equation, "formulas": formulas, "n": sizes}
     return {name: render(f"{name}.j2", **given) for name in ("model.h", "equation.h")}
 
 
+def unused_sources(layout: Layout) -> list[str]:
+    """Return the shared C files that a vehicle does not need."""
+    return [*([] if layout.has_attitude else ["heading.c"]), *([] if layout.has_dead_time else ["delay.c"])]
+
+
 def sources(rov: Rov) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
-    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in ("series.c", "step.c")}
+    names = [name for name in ("series.c", "step.c", "heading.c", "delay.c") if name not in unused_sources(rov.layout)]
+    shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in names}
     return generated_sources(rov.layout) | shared

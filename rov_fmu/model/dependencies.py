@@ -7,6 +7,7 @@ remain in a derivative give the kind: without any name, the factor is constant.
 
 from collections.abc import Mapping
 
+from .attitude import QUATERNION, start_angle_formulas, start_formulas
 from .equation import equation_of
 from .formula import names, tangent
 from .layout import Layout
@@ -35,12 +36,19 @@ def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
 
 
 def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
-    """Return for each rate and calculated variable the parameters that it depends on, in the order of the FMU."""
+    """Return for each variable that is calculated at the start the parameters that it depends on, in the FMU's order.
+
+    The parameters are the coefficients and the Euler angles at the start, which the quaternion follows from.
+    """
     formulas = _formulas(layout)
+    if layout.has_attitude:
+        formulas = start_formulas() | formulas | start_angle_formulas()
     found: dict[str, set[str]] = {}
     for name, formula in formulas.items():
         found[name] = set().union(*(found.get(other, {other}) for other in names(formula)))
-    return {name: tuple(p for p in layout.coefficients if p in found[name]) for name in _calculated(layout)}
+    parameters = (*layout.coefficients, *layout.initial)
+    calculated = (*_calculated(layout), *(name for name in QUATERNION if name in layout.state))
+    return {name: tuple(p for p in parameters if p in found[name]) for name in calculated}
 
 
 def _calculated(layout: Layout) -> tuple[str, ...]:
@@ -50,12 +58,13 @@ def _calculated(layout: Layout) -> tuple[str, ...]:
 def _formulas(layout: Layout) -> dict[str, str]:
     """Return all formulas of a vehicle. Each uses only inputs, states, parameters and formulas before it."""
     equation = equation_of(layout)
-    return equation.program | {f"der({name})": equation.rates[name] for name in layout.state}
+    return equation.program | {f"der({name})": equation.rates[name] for name in layout.state} | dict(equation.outputs)
 
 
 def _kinds(layout: Layout, formulas: Mapping[str, str]) -> dict[str, int]:
     """Return for each name its kind as a factor, which is an index of KINDS."""
     found = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
+    found |= dict.fromkeys(layout.delayed, KINDS.index("fixed"))  # they change only in events
     for name, meta in layout.coefficients.items():
         found[name] = KINDS.index("tunable" if meta.tunable else "fixed")
     for name, formula in formulas.items():

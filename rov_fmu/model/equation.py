@@ -9,11 +9,16 @@ formula for each coefficient. `step.py` computes a step from it in Python, and t
 effect is a new term with its formula.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from .layout import HEAVE, REVERSE, SURGE, SWAY, YAW, Curve, Layout, VehicleAxis
+from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
+from .forces import Force, forces_of
+from .formula import joined, weighted
+from .layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, ThrustTable, VehicleAxis, cross_name
+from .mass import MassMatrix
+from .thrust import thrust_formulas
 
 
 @dataclass(frozen=True)
@@ -73,6 +78,13 @@ class Equation:
 
     The progress p rises from 0 towards 1 during a piece of a step, and each force is then F + (steady - F) p."""
 
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    """Formulas for calculated variables that follow from the states and the other formulas."""
+    ends: Mapping[str, str] = field(default_factory=dict)
+    """Formulas for the states of the vehicle that are neither in the table nor lag, from the states of the table."""
+    tables: Mapping[str, ThrustTable] = field(default_factory=dict)
+    """The thrust tables that the formulas call, by their names."""
+
     @cached_property
     def states(self) -> tuple[str, ...]:
         """The states of the table."""
@@ -99,8 +111,8 @@ class Equation:
 
     @cached_property
     def used(self) -> frozenset[str]:
-        """The states that a term contains. The other states are integrals of these."""
-        return frozenset().union(*self.inputs_of.values())
+        """The states that a term contains, and all of the attitude. The other states are integrals of these."""
+        return frozenset(self.heading.keys() & self.rows.keys()).union(*self.inputs_of.values())
 
     @cached_property
     def components(self) -> tuple[tuple[str, ...], ...]:
@@ -121,13 +133,16 @@ class Equation:
             following = next(g for g in groups if all(reach[name] <= placed | set(g) for name in g))
             done.append(following)
             groups.remove(following)
-        return tuple(done)
+        settling = self.used - self.heading.keys()
+        settling = settling.union(*(reach[name] for name in settling))
+        return tuple(sorted(done, key=settling.isdisjoint))
 
     @cached_property
     def dynamic(self) -> tuple[tuple[str, ...], ...]:
         """The components that may settle. The others are kinematic: only the heading and integrals."""
         settling = self.used - self.heading.keys()
-        return tuple(group for group in self.components if not settling.isdisjoint(group))
+        last = max(n for n, group in enumerate(self.components) if not settling.isdisjoint(group))
+        return self.components[: last + 1]
 
     @cached_property
     def heading(self) -> dict[str, str]:
@@ -148,6 +163,8 @@ class Equation:
         found = {name: rate for name, (rate, _) in self.lagging.items()}
         for name, terms in self.rows.items():
             found[name] = rate_formula(term for term in terms if not self._is_lag(term))
+        if self.ends:
+            found |= quaternion_rates(frozenset(self.states))
         return found
 
     def _is_lag(self, term: Term) -> bool:
@@ -157,156 +174,193 @@ class Equation:
     @cached_property
     def monitored(self) -> tuple[str, ...]:
         """The velocities whose reversals end a piece of a step."""
-        return tuple(dict.fromkeys(directed.velocity for directed in self.directed.values()))
+        found = {directed.velocity for directed in self.directed.values()}
+        return tuple(name for name in self.states if name in found)
 
 
 def rate_formula(terms: Iterable[Term]) -> str:
     """Write the rate of a state as one formula."""
-    return _joined(term.formula for term in terms)
+    return joined(term.formula for term in terms) or "0"
 
 
 def equation_of(layout: Layout) -> Equation:
     """Derive the equation of motion of a vehicle: (18) with the coupling, the lags and the kinematics."""
-    parameters = _parameters(layout)
+    mass = _mass(layout)
+    parameters = _parameters(layout, mass)
     directed: dict[str, Directed] = {}
+    held = _held_forces(layout, mass)
     rows: dict[str, tuple[Term, ...]] = {}
     for form in layout.axes:
         v = form.axis.velocity
-        linear = [f"-gain_{v} * {form.coefficient('b_d' + end)}" for end in ("", REVERSE)]
-        quadratic = [f"{sign}gain_{v} * {form.coefficient('a_d' + end)}" for sign, end in (("-", ""), ("", REVERSE))]
-        directed[f"linear_{v}"] = Directed(v, *linear)
-        directed[f"quadratic_{v}"] = Directed(v, *quadratic)
-        remaining = [
-            Term(f"remaining_{v}_{curve.name}", (f"progress_{curve.name}",)) for curve in _lagging(layout, form)
-        ]
-        drag = Term(f"linear_{v}", (v,)), Term(f"quadratic_{v}", (v, v))
-        rows[v] = (Term(f"held_{v}"), *remaining, *drag, *_coupling(layout, form))
-    lags = {}
+        lagging = _lagging(layout, mass, v)
+        terms = [Term(f"held_{v}"), *(Term(f"remaining_{v}_{curve}", (f"progress_{curve}",)) for curve in lagging)]
+        for name, force in _accelerations(layout, mass, v).items():
+            if force.velocity and force.is_held:
+                held[name] = force.coefficient
+                directed[f"direction_{force.velocity}"] = Directed(force.velocity, "1", "-1")
+                terms.append(Term(f"direction_{force.velocity} * {name}", force.factors))
+                continue
+            if force.velocity:
+                directed[name] = Directed(force.velocity, force.coefficient, force.reverse)
+            else:
+                (held if force.is_held else parameters)[name] = force.coefficient
+            terms.append(Term(name, force.factors))
+        coriolis = mass.coriolis(v) if layout.coupled else {}
+        for factors, formula in coriolis.items():
+            name = f"coupling_{v}" if len(coriolis) == 1 else f"coupling_{v}_{''.join(factors)}"
+            parameters[name] = formula
+            terms.append(Term(name, factors))
+        rows[v] = tuple(terms)
+    attitude = _attitude(layout)
+    if layout.restoring and attitude:  # the restoring forces contain the third row
+        rows |= {entry(3, n): attitude.pop(entry(3, n)) for n in (1, 2, 3)}
+    lags: dict[str, dict[str, str]] = {}
     for curve in layout.curves:
         if curve.has_lag:
             progress = f"progress_{curve.name}"
             rows[progress] = (Term(f"rate_{curve.name}"), Term(f"-rate_{curve.name}", (progress,)))
             lags[progress] = {f"F_{t.name}": f"steady_{t.name}" for t in layout.thrusters if t.curve == curve.name}
+    rows |= attitude
     rows |= _kinematics(layout)
     starts = {form.axis.velocity: form.axis.velocity for form in layout.axes}
     if "cos_psi" in rows:
         starts |= {"cos_psi": "cos(psi)", "sin_psi": "sin(psi)"}
-    return Equation(parameters, directed, _thrust(layout), _forces(layout), rows, starts, lags)
+    tables = {table.name: table for curve in layout.curves for table in curve.tables}
+    equation = Equation(parameters, directed, thrust_formulas(layout), held, rows, starts, lags, tables=tables)
+    if not layout.has_attitude:
+        return equation
+    starts |= rotation_formulas()
+    return replace(equation, outputs=angle_formulas(), ends=quaternion_formulas())
 
 
 # ---- Parts of the equation -------------------------------------------------------------------------------------------
 
 
-def _parameters(layout: Layout) -> dict[str, str]:
-    """Return formulas for the acceleration per load β/m (18), the arm (4), the rates of the lags, and the coupling."""
+def _accelerations(layout: Layout, mass: MassMatrix, axis: str) -> dict[str, Force]:
+    """Return the forces as accelerations of an axis, by the names of their coefficients.
+
+    Forces along several axes accelerate the axis through the inverse of the mass matrix; equal products are added.
+    """
+    inverse = mass.inverse(axis)
+    sums: dict[str, list[Force]] = {}
+    for force in forces_of(layout):
+        if force.axis in inverse:
+            others = dict.fromkeys(factor for factor in force.factors if factor != axis or force.effect not in _DRAG)
+            sums.setdefault("_".join((force.effect, axis, *others)), []).append(force)
     found = {}
+    for name, forces in sums.items():
+        forward = joined(_times(inverse[force.axis], force.coefficient) for force in forces)
+        reverse = joined(_times(inverse[force.axis], force.reverse or force.coefficient) for force in forces)
+        found[name] = replace(forces[0], axis=axis, coefficient=forward, reverse=reverse)
+    return found
+
+
+_DRAG = ("linear", "quadratic")
+
+
+def _times(inverse: str, coefficient: str) -> str:
+    """Write an acceleration: an acceleration per load times a load, which may begin with a minus."""
+    sign = "-" if coefficient.startswith("-") else ""
+    return f"{sign}{inverse} * {coefficient.removeprefix('-')}"
+
+
+def _mass(layout: Layout) -> MassMatrix:
+    """Return the mass matrix with the tuning of (18)."""
+    gains = {}
     for form in layout.axes:
         axis = form.axis
         inertia = f"({axis.inertia} + {form.coefficient('m_a')})" if "m_a" in form.keys else axis.inertia
-        found[f"gain_{axis.velocity}"] = f"{axis.coefficient('beta')} / {inertia}"
+        gains[axis.velocity] = f"{axis.coefficient('beta')} / {inertia}"
+    parts: dict[tuple[str, str], list[str]] = {}
+    for key, *axes in layout.cross:
+        if key == "m_a":
+            parts.setdefault((axes[0], axes[1]), []).append(cross_name(key, *axes))
+    moves = layout.coupled and layout.has(SURGE, SWAY, HEAVE)  # momentum along a missing axis has an effect
+    for pair, signed in _OF_CENTRE.items():
+        present = [axis for axis in pair if axis in gains]
+        if signed[-3:] in layout.restoring and (len(present) == 2 or (present and moves)):
+            parts.setdefault(pair, []).append(("-" if signed[0] == "-" else "") + f"m_rov * {signed[-3:]}")
+    entries = {}
+    for pair, sums in parts.items():
+        betas = " * ".join(f"beta_{axis}" for axis in pair if axis in gains)
+        entries[pair] = f"({joined(sums)}) / sqrt({betas})"
+    return MassMatrix(gains, entries)
+
+
+_OF_CENTRE = {
+    ("u", "q"): "z_G",
+    ("u", "r"): "-y_G",
+    ("v", "p"): "-z_G",
+    ("v", "r"): "x_G",
+    ("w", "p"): "y_G",
+    ("w", "q"): "-x_G",
+}
+"""The entries of the mass matrix by a centre of mass outside of the origin, in units of the mass."""
+
+
+def _parameters(layout: Layout, mass: MassMatrix) -> dict[str, str]:
+    """Return formulas for the inverse of the mass matrix (18), the arm (4), the lags' rates, and restoring."""
+    found = mass.parameters()
     if layout.has_arm:
         found["arm"] = "R * sin(gamma)"
     for curve in layout.curves:
         if curve.has_lag:
             found[f"rate_{curve.name}"] = f"1 / {curve.coefficient('T')}"
-    if layout.coupled:  # with M = m/β, these are M_v/M_u, -M_u/M_v and (M_u - M_v)/M_r
-        found["coupling_u"] = "gain_u / gain_v"
-        found["coupling_v"] = "-(gain_v / gain_u)"
-        found["coupling_r"] = "gain_r / gain_u - gain_r / gain_v"
+    if layout.restoring:
+        found["net_weight"] = "W - B"
+        for axis in "xyz":
+            centres = (("W", f"{axis}_G"), ("-B", f"{axis}_B"))
+            found[f"righting_{axis}"] = joined(f"{k} * {c}" for k, c in centres if c in layout.restoring) or "0"
     return found
 
 
-def _coupling(layout: Layout, form: VehicleAxis) -> tuple[Term, ...]:
-    """Return the Coriolis and Munk terms of an axis, for a diagonal mass matrix."""
-    products = {"u": ("v", "r"), "v": ("u", "r"), "r": ("u", "v")}
-    v = form.axis.velocity
-    return (Term(f"coupling_{v}", products[v]),) if layout.coupled and v in products else ()
-
-
-def _thrust(layout: Layout) -> dict[str, str]:
-    """Return formulas for the steady thrust (2), (9), (10) of every thruster.
-
-    Each input saturates at ±1, and so does each sum of inputs.
-    """
-    found: dict[str, str] = {}
-    for thruster in layout.thrusters:
-        name, curve, gains = thruster.name, layout.curve_of[thruster.name], layout.gains[thruster.name]
-        parts = []
-        for command, gain in gains.items():
-            found[f"saturated_{command}"] = _saturated(command)
-            parts.append((gain, f"saturated_{command}"))
-        if list(gains.values()) == [1.0]:
-            found[f"command_{name}"] = parts[0][1]
-        else:
-            found[f"mixed_{name}"] = _weighted(parts)
-            found[f"command_{name}"] = _saturated(f"mixed_{name}")
-        found |= _steady_thrust(name, curve)
-    return found
-
-
-def curve_formulas(curve: Curve) -> dict[str, str]:
-    """Return formulas for the steady thrust of one thruster: from its command u_one to the thrust, the last formula."""
-    return {"command_one": _saturated("u_one"), **_steady_thrust("one", curve)}
-
-
-def _saturated(name: str) -> str:
-    return f"1 if {name} > 1 else -1 if {name} < -1 else {name}"
-
-
-def _steady_thrust(name: str, curve: Curve) -> dict[str, str]:
-    """Return formulas from the command of a thruster to its steady thrust, a_t m^2 + b_t m.
-
-    m is the part of the command beyond the dead band. The coefficients are those for the direction of the
-    command. Adding 0 turns a negative zero into a positive one.
-    """
-    is_reverse = f"command_{name} < 0"
-
-    def chosen(key: str) -> str:
-        forward, reverse = curve.coefficient(key), curve.coefficient(key + REVERSE)
-        return forward if forward == reverse else f"({reverse} if {is_reverse} else {forward})"
-
-    share = f" * {1.0 / curve.together!r}" if curve.together != 1 else ""
-    signed = f"(-magnitude_{name} if {is_reverse} else magnitude_{name})"
-    dead = f" - {chosen('c_0')}" if "c_0" in curve.keys else ""
-    beyond = f"beyond_{name}"
-    if dead:
-        signed = f"(0 if {beyond} < 0 or {beyond} == 0 and {chosen('c_0')} > 0 else {signed})"
-    return {
-        beyond: f"abs(command_{name}){dead}",
-        f"magnitude_{name}": f"({chosen('a_t')} * {beyond} + {chosen('b_t')}) * {beyond}{share}",
-        f"steady_{name}" if curve.has_lag else f"F_{name}": f"{signed} + 0",
-    }
-
-
-def _forces(layout: Layout) -> dict[str, str]:
+def _held_forces(layout: Layout, mass: MassMatrix) -> dict[str, str]:
     """Return formulas for the torque of every curve, (4), and for the held accelerations of every axis, (18).
 
     A lag gives the axis a second one: the change of acceleration that remains until the thrust is steady.
     """
-    found: dict[str, str] = {}
-    for curve in layout.turning_curves:
-        found[f"tau_{curve.name}"] = _weighted(_torques(layout, curve, "F_{}"))
+    found = {f"tau_{curve.name}": weighted(_torques(layout, curve, "F_{}")) for curve in layout.turning_curves}
+    loads = {form.axis.velocity: _load(layout, form) for form in layout.axes}
+    lagging = [curve for curve in layout.curves if curve.has_lag]
     for form in layout.axes:
-        axis, v = form.axis, form.axis.velocity
-        if axis is YAW:
-            thrust = [(1.0, f"tau_{curve.name}") for curve in layout.turning_curves]
-        else:
-            thrust = [(t.effect(axis), f"F_{t.name}") for t in layout.drivers(axis)]
-        parts = [f"{axis.coefficient('alpha')} * ({_weighted(thrust)})"] if thrust else []
-        parts += [axis.external, *([form.coefficient("F_0")] if "F_0" in form.keys else [])]
-        found[f"held_{v}"] = f"gain_{v} * ({_joined(parts)})"
-        for curve in _lagging(layout, form):
-            change = "(steady_{0} - F_{0})"
-            if axis is YAW:
-                changes = _torques(layout, curve, change)
-            else:
-                drivers = [t for t in layout.drivers(axis) if t.curve == curve.name]
-                changes = [(t.effect(axis), change.format(t.name)) for t in drivers]
-            found[f"remaining_{v}_{curve.name}"] = f"gain_{v} * ({axis.coefficient('alpha')} * ({_weighted(changes)}))"
-    for name, current in (("x", "V_N"), ("y", "V_E")):
-        if name in layout.pose:
+        v = form.axis.velocity
+        inverse = mass.inverse(v)
+        found[f"held_{v}"] = joined(f"{gain} * ({loads[other]})" for other, gain in inverse.items())
+        for curve in lagging:
+            changes = {other: _remaining(layout, layout.by_velocity[other].axis, curve) for other in inverse}
+            if any(changes.values()):
+                found[f"remaining_{v}_{curve.name}"] = joined(
+                    f"{inverse[other]} * ({change})" for other, change in changes.items() if change
+                )
+    for name, current in (("x", "V_N"), ("y", "V_E"), ("z", "V_D")):
+        if name in layout.pose and current in layout.inputs:
             found[f"held_{name}"] = current
     return found
+
+
+def _load(layout: Layout, form: VehicleAxis) -> str:
+    """Return the force or moment along an axis that is constant while the inputs are held."""
+    axis = form.axis
+    if axis is YAW:
+        thrust = [(1.0, f"tau_{curve.name}") for curve in layout.turning_curves]
+    else:
+        thrust = [(t.effect(axis), f"F_{t.name}") for t in layout.drivers(axis)]
+    parts = [f"{axis.coefficient('alpha')} * ({weighted(thrust)})"] if thrust else []
+    parts += [axis.external, *([form.coefficient("F_0")] if "F_0" in form.keys else [])]
+    if axis is HEAVE and layout.restoring and not layout.has_attitude:
+        parts.append("net_weight")
+    return joined(parts)
+
+
+def _remaining(layout: Layout, axis: Axis, curve: Curve) -> str:
+    """Return the change of the thrust along an axis until a curve's thrust is steady, or an empty text."""
+    change = "(steady_{0} - F_{0})"
+    if axis is YAW:
+        changes = _torques(layout, curve, change)
+    else:
+        drivers = [t for t in layout.drivers(axis) if t.curve == curve.name]
+        changes = [(t.effect(axis), change.format(t.name)) for t in drivers]
+    return f"{axis.coefficient('alpha')} * ({weighted(changes)})" if changes else ""
 
 
 def _torques(layout: Layout, curve: Curve, force: str) -> list[tuple[float, str]]:
@@ -319,10 +373,22 @@ def _torques(layout: Layout, curve: Curve, force: str) -> list[tuple[float, str]
     return found
 
 
-def _lagging(layout: Layout, form: VehicleAxis) -> list[Curve]:
-    """Return the curves with lag whose thrusters act on an axis."""
-    drivers = {t.curve for t in layout.drivers(form.axis)}
-    return [curve for curve in layout.curves if curve.has_lag and curve.name in drivers]
+def _lagging(layout: Layout, mass: MassMatrix, axis: str) -> list[str]:
+    """Return the curves with lag whose thrusters accelerate an axis."""
+    forms = [layout.by_velocity[other] for other in mass.inverse(axis)]
+    drivers = {thruster.curve for form in forms for thruster in layout.drivers(form.axis)}
+    return [curve.name for curve in layout.curves if curve.has_lag and curve.name in drivers]
+
+
+def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
+    """Return the rows of the rotation matrix, if the vehicle rolls or pitches."""
+    rows: dict[str, tuple[Term, ...]] = {}
+    if layout.has_attitude:
+        velocities = frozenset(layout.velocities)
+        for row in (1, 2, 3):
+            for name, terms in rotation_terms(row, velocities).items():
+                rows[name] = tuple(Term(sign, factors) for sign, factors in terms)
+    return rows
 
 
 def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
@@ -331,6 +397,13 @@ def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
     A vehicle that heads north has cos_psi = 1, sin_psi = 0.
     """
     rows: dict[str, tuple[Term, ...]] = {}
+    if layout.has_attitude:
+        velocities = frozenset(layout.velocities)
+        for row, name in enumerate("xyz", 1):
+            if name in layout.pose:
+                moving = [Term("1", (v, entry(row, n))) for n, v in enumerate("uvw", 1) if v in velocities]
+                rows[name] = (Term(f"held_{name}"), *moving)
+        return rows
     if layout.has(SURGE, SWAY):
         turns = layout.has(YAW)
         if turns:
@@ -349,26 +422,3 @@ def _kinematics(layout: Layout) -> dict[str, tuple[Term, ...]]:
     if layout.has(YAW):
         rows["psi"] = (Term("1", ("r",)),)
     return rows
-
-
-# ---- Formulas --------------------------------------------------------------------------------------------------------
-
-
-def _joined(parts: Iterable[str]) -> str:
-    """Write a sum as one formula. A part that begins with a minus is subtracted."""
-    text = ""
-    for part in parts:
-        if not text:
-            text = part
-        elif part.startswith("-"):
-            text += f" - {part[1:]}"
-        else:
-            text += f" + {part}"
-    return text
-
-
-def _weighted(parts: Sequence[tuple[float, str]]) -> str:
-    """Write a weighted sum as one formula. Each part must be a product, or need no brackets in one."""
-    return _joined(
-        part if weight == 1.0 else f"-{part}" if weight == -1.0 else f"{weight!r} * {part}" for weight, part in parts
-    )

@@ -1,16 +1,20 @@
 """Formulas as text. They are evaluated in Python, differentiated, and translated to C.
 
 A formula is a Python expression of names, numbers, + - * /, comparisons, `and`, `or`, a choice `a if test else b`, and
-the functions sin, cos and abs. Its value is a float.
+the functions sin, cos, abs, sqrt, pow, log and atan2. A name that is called and is none of these is a
+thrust table. Its value is a float.
 """
 
 import ast
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
+from types import MappingProxyType
 
-FUNCTIONS = {"sin": "sin", "cos": "cos", "abs": "fabs"}
+FUNCTIONS = {"sin": "sin", "cos": "cos", "abs": "fabs", "sqrt": "sqrt", "pow": "pow", "log": "log", "atan2": "atan2"}
 """The functions that a formula may call, with their names in C."""
+SLOPE = "slope_of_"
+"""The name of the derivative of a thrust table begins with this."""
 _OPERATORS: Mapping[type[ast.AST], str] = {
     ast.Add: "+",
     ast.Sub: "-",
@@ -40,33 +44,67 @@ def parsed(formula: str) -> ast.expr:
 @cache
 def names(formula: str) -> tuple[str, ...]:
     """Return the names in a formula without functions, each once, in the order of their first use."""
+    tree = parsed(formula)
+    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     found = sorted(
-        (node for node in ast.walk(parsed(formula)) if isinstance(node, ast.Name) and node.id not in FUNCTIONS),
+        (node for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called),
         key=lambda node: (node.lineno, node.col_offset),
     )
     return tuple(dict.fromkeys(node.id for node in found))
 
 
+def joined(parts: Iterable[str]) -> str:
+    """Write a sum as one formula. A part that begins with a minus is subtracted."""
+    text = ""
+    for part in parts:
+        if not text:
+            text = part
+        elif part.startswith("-"):
+            text += f" - {part[1:]}"
+        else:
+            text += f" + {part}"
+    return text
+
+
+def weighted(parts: Sequence[tuple[float, str]]) -> str:
+    """Write a weighted sum as one formula. Each part must be a product, or need no brackets in one."""
+    return joined(
+        part if weight == 1.0 else f"-{part}" if weight == -1.0 else f"{weight!r} * {part}" for weight, part in parts
+    )
+
+
 # ---- Python ----------------------------------------------------------------------------------------------------------
 
-_IN_PYTHON = {"__builtins__": {}, "sin": math.sin, "cos": math.cos, "abs": abs}
+_IN_PYTHON = {
+    "__builtins__": {},
+    "sin": math.sin,
+    "cos": math.cos,
+    "abs": abs,
+    "sqrt": math.sqrt,
+    "pow": math.pow,
+    "log": math.log,
+    "atan2": math.atan2,
+}
 
 
-def compiled(formulas: Mapping[str, str]) -> Callable[[Mapping[str, float]], dict[str, float]]:
+def compiled(
+    formulas: Mapping[str, str], tables: Mapping[str, Callable[[float], float]] = MappingProxyType({})
+) -> Callable[[Mapping[str, float]], dict[str, float]]:
     """Compile formulas into one function. It takes values by name, and adds the values of the formulas to them.
 
-    The formulas are evaluated in their order, and each may use those before it. Raises ValueError when one of the texts
-    is not a formula.
+    The formulas are evaluated in their order, and each may use those before it. `tables` are the functions that they
+    call besides FUNCTIONS, by their names. Raises ValueError when one of the texts is not a formula.
     """
     lines: list[ast.stmt] = []
     for name, formula in formulas.items():
         to_c(formula, str)  # raises ValueError for any syntax that a formula may not have
         lines.append(ast.Assign([ast.Name(name, ast.Store())], parsed(formula)))
+    known = {**_IN_PYTHON, **tables}
     code = compile(ast.fix_missing_locations(ast.Module(lines, [])), "<formulas>", "exec")
 
     def evaluate(values: Mapping[str, float]) -> dict[str, float]:
         found = dict(values)
-        exec(code, _IN_PYTHON, found)
+        exec(code, known, found)
         return found
 
     return evaluate
@@ -106,8 +144,8 @@ def _c(node: ast.expr, name_in_c: Callable[[str], str]) -> tuple[str, int]:  # n
             return f" {operator} ".join(part(value, 3) for value in node.values), _PRECEDENCE[operator]
         case ast.IfExp():
             return f"{part(node.test, 1)} ? {part(node.body, 1)} : {part(node.orelse, 0)}", 0
-        case ast.Call(func=ast.Name(id=function), args=[argument]):
-            return f"{FUNCTIONS[function]}({part(argument, 0)})", 9
+        case ast.Call(func=ast.Name(id=function), args=arguments):
+            return f"{FUNCTIONS.get(function, function)}({', '.join(part(argument, 0) for argument in arguments)})", 9
     raise ValueError(f"{ast.unparse(node)}: a formula has no such part")
 
 
@@ -124,7 +162,7 @@ def tangent(formula: str, change_of: Callable[[str], str | None]) -> str | None:
     return ast.unparse(node) if node is not None else None
 
 
-def _tangent(  # noqa: PLR0911 - a case for each syntax
+def _tangent(  # noqa: PLR0911, PLR0912 - a case for each syntax
     node: ast.expr, change_of: Callable[[str], str | None]
 ) -> ast.expr | None:
     def change(part: ast.expr) -> ast.expr | None:
@@ -162,8 +200,35 @@ def _tangent(  # noqa: PLR0911 - a case for each syntax
             if function == "abs":
                 is_negative = ast.Compare(argument, [ast.Lt()], [ast.Constant(0.0)])
                 return ast.IfExp(is_negative, _negative(inner), inner)
+            if function == "sqrt":
+                return ast.BinOp(inner, ast.Div(), _times(ast.Constant(2.0), node))
+            if function not in FUNCTIONS:
+                return _times(ast.Call(ast.Name(f"{SLOPE}{function}"), [argument], []), inner)
             slope = ast.Call(ast.Name("cos" if function == "sin" else "sin"), [argument], [])
             return _times(slope if function == "sin" else _negative(slope), inner)
+        case ast.Call(func=ast.Name(id="pow"), args=[base, exponent]):  # the base is not negative
+            first, second = change(base), change(exponent)
+            less = ast.BinOp(exponent, ast.Sub(), ast.Constant(1.0))
+            power = ast.Call(ast.Name("pow"), [base, less], [])
+            logarithm = ast.IfExp(
+                ast.Compare(base, [ast.Gt()], [ast.Constant(0.0)]),
+                ast.Call(ast.Name("log"), [base], []),
+                ast.Constant(0.0),
+            )
+            return _added(
+                None if first is None else _times(_times(exponent, power), first),
+                ast.Add(),
+                None if second is None else _times(_times(node, logarithm), second),
+            )
+        case ast.Call(func=ast.Name(id="atan2"), args=[above, below]):
+            first, second = change(above), change(below)
+            total = _added(
+                None if first is None else _times(first, below),
+                ast.Sub(),
+                None if second is None else _times(second, above),
+            )
+            square = ast.BinOp(_times(above, above), ast.Add(), _times(below, below))
+            return None if total is None else ast.BinOp(total, ast.Div(), square)
     raise ValueError(f"{ast.unparse(node)}: a formula has no such part")
 
 

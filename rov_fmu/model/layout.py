@@ -9,10 +9,14 @@ A coefficient is declared by its key in the vehicle file. Its name in the FMU al
 which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the curve t200 gives a_t_t200_reverse.
 """
 
+import re
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, sin
+
+from .attitude import INITIAL, QUATERNION
 
 # ---- Axes ------------------------------------------------------------------------------------------------------------
 
@@ -63,6 +67,23 @@ class Axis:
 SURGE = Axis("surge", "u", "m/s", "forward", "astern", "distance", "m", "N", "X_ext", "m_rov", ("(14)", "(18a)"), 0)
 SWAY = Axis("sway", "v", "m/s", "to starboard", "to port", "distance", "m", "N", "Y_ext", "m_rov", ("(18)", "(18)"), 1)
 HEAVE = Axis("heave", "w", "m/s", "down", "up", "depth", "m", "N", "Z_ext", "m_rov", ("(15)", "(18b)"), 2)
+ROLL = Axis(
+    "roll",
+    "p",
+    "rad/s",
+    "starboard side down",
+    "port side down",
+    "roll angle",
+    "rad",
+    "N.m",
+    "K_ext",
+    "I_p",
+    ("(18)", "(18)"),
+    0,
+)
+PITCH = Axis(
+    "pitch", "q", "rad/s", "bow up", "bow down", "pitch angle", "rad", "N.m", "M_ext", "I_q", ("(18)", "(18)"), 1
+)
 YAW = Axis(
     "yaw",
     "r",
@@ -77,7 +98,7 @@ YAW = Axis(
     ("(16)", "(18c)"),
     2,
 )
-AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, YAW)}
+AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, ROLL, PITCH, YAW)}
 """All kinds of axes by name, in the order of their states."""
 
 
@@ -85,6 +106,45 @@ AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, YAW)}
 
 REVERSE = "_reverse"
 """The end of the keys of coefficients for negative commands or velocities."""
+
+
+def cross_name(key: str, *velocities: str) -> str:
+    """Return the name in the FMU of a coefficient of two or three axes: m_a_uq, or Y_ur for lift."""
+    if key == "lift":
+        along, *factors = velocities
+        return f"{dict(zip('uvwpqr', 'XYZKMN', strict=True))[along]}_{''.join(factors)}"
+    return f"{key}_{''.join(velocities)}"
+
+
+def cross_of(name: str) -> tuple[str, ...] | None:
+    """Return the key and the velocities of a coefficient of two or three axes, by its name, or None."""
+    if found := re.fullmatch(r"(m_a|b_d|a_d)_([uvwpqr])([uvwpqr])", name):
+        return found.groups()
+    if found := re.fullmatch(r"([XYZKMN])_([uvwpqr])([uvwpqr])", name):
+        return ("lift", "uvwpqr"["XYZKMN".index(found[1])], found[2], found[3])
+    return None
+
+
+def cross_declaration(key: str, *velocities: str) -> "Declaration":
+    """Return the declaration of a coefficient of two or three axes."""
+    axes = {axis.velocity: axis for axis in AXES.values()}
+    first, *others = (axes[velocity] for velocity in velocities)
+    rotations = sum(axis.is_rotation for axis in (first, *others))
+    lengths = ".".join(axis.position_unit for axis in others)
+    return CROSS[key].meta(
+        inertia=("kg", "kg.m", "kg.m2")[min(rotations, 2)],
+        load=first.load,
+        axis=first.name,
+        other=others[0].name,
+        axes=" and ".join(axis.name for axis in (others if key == "lift" else (first, *others))),
+        length=others[0].position_unit,
+        lengths={"m.m": "m2", "rad.rad": "rad2"}.get(lengths, "(m.rad)"),
+    )
+
+
+def delayed_name(command: str) -> str:
+    """Return the name of a command that acts after the dead time."""
+    return f"delayed_{command}"
 
 
 def coefficient_name(key: str, of: str) -> str:
@@ -103,6 +163,8 @@ class Declaration:
     maximum: float = inf
     nominal: float = 1.0
     tunable: bool = False
+    start: float = 0.0
+    """The value of an input that is not given."""
 
 
 @dataclass(frozen=True)
@@ -124,13 +186,46 @@ class CoefficientKind:
 
 BODY = {
     "m_rov": CoefficientKind("kg", "Mass m_rov, (3a), (3b)", 1e-3, 1e6),
+    "I_p": CoefficientKind("kg.m2", "Moment of inertia about the longitudinal axis I_p", 1e-6, 1e6),
+    "I_q": CoefficientKind("kg.m2", "Moment of inertia about the transverse axis I_q", 1e-6, 1e6),
     "I_r": CoefficientKind("kg.m2", "Moment of inertia about the vertical axis I_r, (3c)", 1e-6, 1e6),
 }
+RESTORING = {
+    "W": CoefficientKind("N", "Weight W", 0.0, 1e8),
+    "B": CoefficientKind("N", "Buoyancy B", 0.0, 1e8),
+    "x_G": CoefficientKind("m", "Position of the centre of mass, forward x_G", -100.0, 100.0, needed=False),
+    "y_G": CoefficientKind("m", "Position of the centre of mass, to starboard y_G", -100.0, 100.0, needed=False),
+    "z_G": CoefficientKind("m", "Position of the centre of mass, down z_G", -100.0, 100.0, needed=False),
+    "x_B": CoefficientKind("m", "Position of the centre of buoyancy, forward x_B", -100.0, 100.0, needed=False),
+    "y_B": CoefficientKind("m", "Position of the centre of buoyancy, to starboard y_B", -100.0, 100.0, needed=False),
+    "z_B": CoefficientKind("m", "Position of the centre of buoyancy, down z_B", -100.0, 100.0, needed=False),
+}
+"""The weight and the buoyancy of a vehicle, with their centres."""
+CROSS = {
+    "m_a": CoefficientKind("{inertia}", "Added mass m_a of {axes}", -1e6, 1e6),
+    "b_d": CoefficientKind("{load}.s/{length}", "Linear damping b_d in {axis} by {other}", -1e6, 1e6),
+    "a_d": CoefficientKind("{load}.s2/{length}2", "Quadratic damping a_d in {axis} by {other}", -1e6, 1e6),
+    "lift": CoefficientKind("{load}.s2/{lengths}", "Lift in {axis} by {axes}", -1e6, 1e6),
+}
+"""Coefficients of two or three axes. Names end in the velocities: m_a_uq; of lift, they begin with the force: Y_ur."""
+COMMANDS = {"T_d": CoefficientKind("s", "Dead time T_d from a command to its effect", 1e-4, 1.0, needed=False)}
+"""The coefficients of all commands together."""
 ARM = {
     "R": CoefficientKind("m", "Distance from the centre of mass to a rear thruster R, (4)", 0.0, 100.0),
     "gamma": CoefficientKind("rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, pi / 2),
 }
+FIN = {
+    "lift": CoefficientKind("N.s2/(m2.rad)", "Lift of the {fin} per u|u| and angle", 0.0, 1e6),
+    "drag": CoefficientKind("N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, False),
+    "angle_max": CoefficientKind("rad", "Angle of the {fin} at full command", 1e-3, pi / 2),
+}
+"""The coefficients of a control surface."""
 CURVE = {
+    "k_t": CoefficientKind("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, False),
+    "V_0": CoefficientKind("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, False),
+    "n_V": CoefficientKind(
+        "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, False
+    ),
     "a_t": CoefficientKind("N", "Quadratic thrust coefficient a_t of the {curve}, {equation}", -1e6, 1e6),
     "b_t": CoefficientKind("N", "Linear thrust coefficient b_t of the {curve}, {equation}", -1e6, 1e6),
     "a_t_reverse": CoefficientKind(
@@ -143,6 +238,12 @@ CURVE = {
         "1", "Dead band c_0 of the {curve}: the command at which thrust begins", 0.0, 0.9, needed=False
     ),
     "c_0_reverse": CoefficientKind("1", "Dead band c_0 of the {curve} in reverse", 0.0, 0.9, False),
+    "d": CoefficientKind(
+        "N.s/m", "Loss of thrust d of the {curve} per speed of advance at full command", 0.0, 1e6, needed=False
+    ),
+    "d_reverse": CoefficientKind(
+        "N.s/m", "Loss of thrust d of the {curve} per speed of advance in reverse", 0.0, 1e6, needed=False
+    ),
     "T": CoefficientKind(
         "s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False
     ),
@@ -172,6 +273,39 @@ LEAST_BETA = 1e-3
 
 
 @dataclass(frozen=True)
+class ThrustTable:
+    """Measured forces of one thruster, with a monotone cubic between the commands."""
+
+    name: str
+    commands: tuple[float, ...]
+    """The commands, from -1 to 1 in rising order."""
+    forces: tuple[float, ...]
+    """The force at each command, N."""
+    slopes: tuple[float, ...]
+    """The derivative of the force by the command at each command, N."""
+    voltage: float = 0.0
+    """The voltage at which the table was measured, V; 0 if the curve has only this table."""
+
+    def force(self, command: float) -> float:
+        """Return the force at a command between -1 and 1: the cubic that has the forces and slopes at its ends."""
+        n, h, t = self._place(command)
+        f, g, a, b = self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1]
+        return f + t * (a + t * (3.0 * (g - f) - 2.0 * a - b + t * (a + b - 2.0 * (g - f))))
+
+    def slope(self, command: float) -> float:
+        """Return the derivative of `force`."""
+        n, h, t = self._place(command)
+        f, g, a, b = self.forces[n], self.forces[n + 1], h * self.slopes[n], h * self.slopes[n + 1]
+        return (a + t * (2.0 * (3.0 * (g - f) - 2.0 * a - b) + t * 3.0 * (a + b - 2.0 * (g - f)))) / h
+
+    def _place(self, command: float) -> tuple[int, float, float]:
+        """Return the interval of a command, its length, and the command's place in it between 0 and 1."""
+        n = min(max(bisect_right(self.commands, command) - 1, 0), len(self.commands) - 2)
+        h = self.commands[n + 1] - self.commands[n]
+        return n, h, (command - self.commands[n]) / h
+
+
+@dataclass(frozen=True)
 class Curve:
     """A thrust curve: F(c) = a_t (c - c_0)^2 + b_t (c - c_0) the sum for `together` thrusters, mirrored for c < 0."""
 
@@ -182,6 +316,8 @@ class Curve:
     description: str = ""
     equation: str = "(2)"
     """The number of the paper's equation."""
+    tables: tuple[ThrustTable, ...] = ()
+    """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
 
     def coefficient(self, key: str) -> str:
         """Return the name of a coefficient by its key: that of forward when the curve has none for reverse."""
@@ -191,6 +327,17 @@ class Curve:
     def has_lag(self) -> bool:
         """True when the force follows the command with a lag."""
         return "T" in self.keys
+
+
+Vector = tuple[float, float, float]
+
+
+def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
+    """Return the part of a force along an axis, or its moment about the axis."""
+    (X, Y, Z), (x, y, z) = force, position
+    if axis.is_rotation:
+        return (y * Z - z * Y, z * X - x * Z, x * Y - y * X)[axis.place]
+    return force[axis.place]
 
 
 @dataclass(frozen=True)
@@ -210,13 +357,31 @@ class Thruster:
 
     def effect(self, axis: Axis) -> float:
         """Return the force along an axis, or the torque, of a force of 1 N. An arm's torque is in units of R sin γ."""
-        X, Y, Z = self.direction
-        if axis.push == "thrust":
-            return (X, Y, Z)[axis.place]
-        if self.position is None:
-            return float(self.arm)
-        x, y, z = self.position
-        return (y * Z - z * Y, z * X - x * Z, x * Y - y * X)[axis.place]
+        if self.position is None and axis.is_rotation:
+            return float(self.arm) if axis is YAW else 0.0
+        return effect_along(axis, self.direction, self.position or (0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Fin:
+    """A control surface: its lift, which is proportional to its angle, and its place."""
+
+    name: str
+    direction: tuple[float, float, float]
+    """The direction of the lift at a positive command ahead: a unit vector in the body frame."""
+    position: tuple[float, float, float]
+    """The position relative to the centre of mass, m."""
+    has_drag: bool = False
+    description: str = ""
+
+    def effect(self, axis: Axis) -> float:
+        """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
+        found = effect_along(axis, self.direction, self.position)
+        return found if abs(found) > FAINT else 0.0
+
+    def coefficient(self, key: str) -> str:
+        """Return the name of a coefficient by its key."""
+        return f"{key}_{self.name}"
 
 
 @dataclass(frozen=True)
@@ -232,7 +397,7 @@ class VehicleAxis:
         return self.axis.coefficient(key if key in self.keys else key.removesuffix(REVERSE))
 
 
-_FAINT = 1e-9  # a smaller effect, in m or N per N, is a rounding error of a direction
+FAINT = 1e-9  # a smaller effect, in m or N per N, is a rounding error of a direction
 
 
 @dataclass(frozen=True)
@@ -246,7 +411,16 @@ class Layout:
     mix: Mapping[str, Mapping[str, float]] = field(default_factory=dict, hash=False)
     """For each input, the gains of the thrusters that it drives. If this is empty, each thruster has its own input."""
     coupled: bool = False
-    """True when surge, sway and yaw are coupled by the Coriolis and Munk terms of a diagonal mass matrix."""
+    """True when the axes are coupled by the Coriolis and Munk terms of the mass matrix."""
+    cross: tuple[tuple[str, ...], ...] = ()
+    """The coefficients of two or three axes: the key of CROSS, then the velocities."""
+    restoring: tuple[str, ...] = ()
+    """The keys of RESTORING that the vehicle has."""
+    fins: tuple[Fin, ...] = ()
+    has_dead_time: bool = False
+    """True when commands act after the dead time T_d."""
+    voltage: float | None = None
+    """The usual voltage of the battery, V, if the thrust depends on it."""
 
     def extended(self, names: Iterable[str]) -> "Layout":
         """Return the layout with additional coefficients of its curves and axes, by their names."""
@@ -269,6 +443,11 @@ class Layout:
         return {form.axis.name: form for form in self.axes}
 
     @cached_property
+    def by_velocity(self) -> dict[str, VehicleAxis]:
+        """The axes by their velocities."""
+        return {form.axis.velocity: form for form in self.axes}
+
+    @cached_property
     def curve_of(self) -> dict[str, Curve]:
         """The curve of each thruster, by its name."""
         curves = {curve.name: curve for curve in self.curves}
@@ -284,18 +463,33 @@ class Layout:
         return self.has(YAW) and any(t.position is None and t.arm for t in self.thrusters)
 
     @cached_property
+    def has_attitude(self) -> bool:
+        """True when the vehicle rolls or pitches, so that its attitude is a quaternion."""
+        return self.has(ROLL, PITCH)
+
+    @cached_property
+    def memory(self) -> tuple[str, ...]:
+        """The variables besides the states that a step continues: the heading, which counts turns."""
+        return ("psi",) if self.has_attitude else ()
+
+    @cached_property
+    def driven(self) -> "tuple[Thruster | Fin, ...]":
+        """The thrusters and the fins, which commands drive."""
+        return (*self.thrusters, *self.fins)
+
+    @cached_property
     def gains(self) -> dict[str, dict[str, float]]:
-        """For each thruster, the gains of the inputs that drive it."""
+        """For each thruster and each fin, the gains of the inputs that drive it."""
         if not self.mix:
-            return {t.name: {f"u_{t.name}": 1.0} for t in self.thrusters}
+            return {driven.name: {f"u_{driven.name}": 1.0} for driven in self.driven}
         return {
-            t.name: {f"u_{name}": gains[t.name] for name, gains in self.mix.items() if gains.get(t.name)}
-            for t in self.thrusters
+            driven.name: {f"u_{name}": gains[driven.name] for name, gains in self.mix.items() if gains.get(driven.name)}
+            for driven in self.driven
         }
 
     def drivers(self, axis: Axis) -> list[Thruster]:
         """Return the thrusters that act on an axis."""
-        return [t for t in self.thrusters if abs(t.effect(axis)) > _FAINT]
+        return [t for t in self.thrusters if abs(t.effect(axis)) > FAINT]
 
     def signs(self, axis: Axis) -> dict[str, float]:
         """Return the commands that drive an axis in its positive direction: 1 or -1 for every input that acts on it.
@@ -306,7 +500,7 @@ class Layout:
         for thruster in self.drivers(axis):
             for name, gain in self.gains[thruster.name].items():
                 effects[name] = effects.get(name, 0.0) + gain * thruster.effect(axis)
-        return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > _FAINT}
+        return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > FAINT}
 
     # -- declarations --
 
@@ -315,45 +509,76 @@ class Layout:
         """The coefficients, in the order of the FMU's variables."""
         inertias = {form.axis.inertia for form in self.axes}
         found = {name: kind.meta() for name, kind in BODY.items() if name in inertias}
+        found |= {key: RESTORING[key].meta() for key in self.restoring}
         if self.has_arm:
             found |= {key: kind.meta() for key, kind in ARM.items()}
+        if self.has_dead_time:
+            found |= {key: kind.meta() for key, kind in COMMANDS.items()}
         for curve in self.curves:
             words = {"curve": curve.description or f"curve {curve.name}", "equation": curve.equation}
             found |= {curve.coefficient(key): kind.meta(**words) for key, kind in CURVE.items() if key in curve.keys}
+        for fin in self.fins:
+            fins = {"fin": fin.description or f"fin {fin.name}"}
+            keys = (key for key in FIN if key != "drag" or fin.has_drag)
+            found |= {fin.coefficient(key): FIN[key].meta(**fins) for key in keys}
         for form in self.axes:
             metas = metas_of(form.axis)
             found |= {form.coefficient(key): metas[key] for key in AXIS if key in form.keys}
         for form in self.axes:
             metas = metas_of(form.axis)
             found |= {form.axis.coefficient(key): metas[key] for key in TUNING}
-        if self.coupled:  # all effective inertias m/β must be finite
-            for beta in (axis.coefficient("beta") for axis in (SURGE, SWAY, YAW)):
+        for key, *velocities in self.cross:
+            found[cross_name(key, *velocities)] = cross_declaration(key, *velocities)
+        if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
+            for axis in (form.axis for form in self.axes if self.has_attitude or form.axis is not HEAVE):
+                beta = axis.coefficient("beta")
                 found[beta] = replace(found[beta], minimum=LEAST_BETA)
         return found
 
     @cached_property
     def commands(self) -> dict[str, Declaration]:
-        """The inputs that drive the thrusters: fractions of full thrust."""
+        """The inputs that drive the thrusters and the fins: fractions of full thrust, or of the largest angle."""
         if not self.mix:
-            return {f"u_{t.name}": _command(t) for t in self.thrusters}
+            return {f"u_{driven.name}": _command(driven) for driven in self.driven}
         return {
             f"u_{name}": Declaration("1", f"Command u_{name} of {_listed(gains)}; saturates at ±1", -1.0, 1.0)
             for name, gains in self.mix.items()
         }
 
     @cached_property
+    def delayed(self) -> dict[str, Declaration]:
+        """The commands that act after the dead time, if the vehicle has one."""
+        if not self.has_dead_time:
+            return {}
+        return {
+            delayed_name(name): Declaration(meta.unit, f"Command {name} that acts after the dead time")
+            for name, meta in self.commands.items()
+        }
+
+    @cached_property
     def inputs(self) -> dict[str, Declaration]:
-        """The inputs: commands, loads from outside, current."""
+        """The inputs: commands, loads from outside, current, voltage."""
         found = dict(self.commands)
         for form in self.axes:
             axis = form.axis
             example = "ballast" if axis is HEAVE else "contact"
             words = f"Load from outside in {axis.name} (tether, {example}), positive {axis.positive}"
             found[axis.external] = Declaration(axis.load, words, nominal=1.0 if axis.is_rotation else 10.0)
-        if self.has(SURGE, SWAY):
+        if self.has(SURGE, SWAY) or (self.has_attitude and self.has(HEAVE)):
             for name, direction in (("V_N", "northward"), ("V_E", "eastward")):
                 found[name] = Declaration("m/s", f"Velocity of a steady horizontal current, {direction}")
+            if self.has_attitude:
+                found["V_D"] = Declaration("m/s", "Velocity of a steady current, downward")
+        if self.voltage is not None:
+            voltages = [table.voltage for curve in self.curves for table in curve.tables if table.voltage]
+            low, high = (min(voltages), max(voltages)) if voltages else (0.0, inf)
+            found["voltage"] = Declaration("V", "Voltage of the battery", low, high, 10.0, start=self.voltage)
         return found
+
+    @cached_property
+    def usual_inputs(self) -> dict[str, float]:
+        """The inputs that are not given: no command, load or current, and the usual voltage."""
+        return {name: declaration.start for name, declaration in self.inputs.items()}
 
     @cached_property
     def velocities(self) -> dict[str, Declaration]:
@@ -369,6 +594,13 @@ class Layout:
     def pose(self) -> dict[str, Declaration]:
         """The position and heading, as far as the axes change them; these states follow the velocities."""
         found = {}
+        if self.has_attitude:
+            if self.has(SURGE, SWAY, HEAVE):
+                found["x"] = Declaration("m", "Position north x", nominal=10.0)
+                found["y"] = Declaration("m", "Position east y", nominal=10.0)
+                found["z"] = Declaration("m", "Depth z, positive down", nominal=10.0)
+            found |= {name: Declaration("1", f"Attitude quaternion {name}") for name in QUATERNION}
+            return found
         if self.has(SURGE, SWAY):
             found["x"] = Declaration("m", "Position north x", nominal=10.0)
             found["y"] = Declaration("m", "Position east y", nominal=10.0)
@@ -406,14 +638,40 @@ class Layout:
             by_arm = any(t.curve == curve.name and t.position is None for t in self.drivers(YAW))
             words = f"Torque τ_{curve.name} of the thrusters with the curve {of}{', (4)' if by_arm else ''}"
             found[f"tau_{curve.name}"] = Declaration("N.m", f"{words}, positive bow to starboard")
-        return found
+        return found | self.angles
+
+    @cached_property
+    def angles(self) -> dict[str, Declaration]:
+        """The Euler angles, which are calculated from the quaternion."""
+        if not self.has_attitude:
+            return {}
+        return {
+            "phi": Declaration("rad", "Roll angle φ, positive starboard side down", -pi, pi),
+            "theta": Declaration("rad", "Pitch angle θ, positive bow up", -pi / 2, pi / 2),
+            "psi": Declaration("rad", "Heading ψ, positive north to east, not wrapped"),
+        }
+
+    @cached_property
+    def at_rest(self) -> dict[str, float]:
+        """The states of the vehicle at rest in the origin, level and heading north."""
+        return dict.fromkeys(self.state, 0.0) | ({"eta": 1.0} if self.has_attitude else {})
+
+    @cached_property
+    def initial(self) -> dict[str, Declaration]:
+        """The parameters that give the attitude at the start."""
+        if not self.has_attitude:
+            return {}
+        return {name: Declaration("rad", f"{words} at the start") for name, words in INITIAL.items()}
 
     @cached_property
     def places(self) -> dict[str, int]:
         """The place of each variable in the arrays of the C code. The place of der(x) is len(state) after that of x."""
         found = {name: place for place, name in enumerate([*self.inputs, *self.state])}
         first = len(found) + len(self.state)
-        return found | {name: first + place for place, name in enumerate([*self.thrust, *self.coefficients])}
+        return found | {
+            name: first + place
+            for place, name in enumerate([*self.thrust, *self.delayed, *self.coefficients, *self.initial])
+        }
 
     @cached_property
     def turning_curves(self) -> tuple[Curve, ...]:
@@ -451,20 +709,22 @@ def _pushes(direction: tuple[float, float, float]) -> str:
     words = [
         axis.positive if part > 0.0 else axis.negative
         for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True)
-        if abs(part) > _FAINT
+        if abs(part) > FAINT
     ]
     return " and ".join(words)
 
 
-def _command(thruster: Thruster) -> Declaration:
-    words = f"Command u_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
-    return Declaration("1", f"{words}, positive {_pushes(thruster.direction)}; saturates at ±1", -1.0, 1.0)
+def _command(driven: Thruster | Fin) -> Declaration:
+    kind = "fin" if isinstance(driven, Fin) else "thruster"
+    words = f"Command u_{driven.name}: {driven.description or f'{kind} {driven.name}'}"
+    return Declaration("1", f"{words}, positive {_pushes(driven.direction)}; saturates at ±1", -1.0, 1.0)
 
 
 def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
     words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
     share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
-    return Declaration("N", f"{words}, {curve.equation}{share}, positive {_pushes(thruster.direction)}")
+    rest = ", in water at rest" if "d" in curve.keys else ""
+    return Declaration("N", f"{words}, {curve.equation}{share}{rest}, positive {_pushes(thruster.direction)}")
 
 
 def arm(R: float, gamma: float) -> float:

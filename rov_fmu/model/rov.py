@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from math import inf
 
-from .equation import curve_formulas, equation_of
+from .attitude import unwrapped
+from .equation import equation_of
 from .formula import compiled
-from .layout import ARM, YAW, Axis, Curve, Layout, Thruster, VehicleAxis, arm
+from .layout import ARM, HEAVE, YAW, Axis, Curve, Layout, Thruster, VehicleAxis, arm, delayed_name
 from .riccati import Riccati
 from .step import Table, step
+from .thrust import curve_formulas
 
 Values = Mapping[str, float]
 
@@ -25,12 +27,13 @@ class _Formulas:
         rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
         self.table = Table(equation)
         self.parameters = compiled(equation.parameters)
-        self.thrust = compiled(equation.thrust)
-        self.calculate = compiled({**equation.program, **rates})
+        tables = {name: measured.force for name, measured in equation.tables.items()}
+        self.thrust = compiled(equation.thrust, tables)
+        self.calculate = compiled({**equation.program, **rates, **equation.outputs}, tables)
 
 
 _formulas_of = lru_cache(maxsize=100)(_Formulas)
-_thrust_of = cache(lambda curve: compiled(curve_formulas(curve)))
+_thrust_of = cache(lambda curve: compiled(curve_formulas(curve), {table.name: table.force for table in curve.tables}))
 
 
 @dataclass(frozen=True)
@@ -65,28 +68,51 @@ class Rov:
 
     def curve_force(self, curve: Curve, command: float) -> float:
         """Return the steady thrust (2) of one thruster (N) for a command."""
-        *_, force = _thrust_of(curve)({**self.coefficients, "u_one": command}).values()
+        values = {"u_one": command, "voltage": self.layout.voltage or 0.0}
+        *_, force = _thrust_of(curve)({**self.coefficients, **values}).values()
         return force
 
     def commanded(self, inputs: Values) -> dict[str, float]:
         """Return the steady thrust of every thruster (N), by its name, for the commands."""
-        found = self._formulas.thrust({**self.coefficients, **inputs})
+        found = self._steady(inputs)
         thrust = {}
         for name, curve in self.layout.curve_of.items():
             thrust[name] = found[f"steady_{name}" if curve.has_lag else f"F_{name}"]
         return thrust
+
+    def _steady(self, inputs: Values) -> dict[str, float]:
+        """Return the values of all formulas from the commands to the steady thrust."""
+        return self._formulas.thrust({**self.coefficients, **inputs, **self._acting(inputs)})
+
+    def loss(self, axis: Axis, inputs: Values) -> float:
+        """Return the loss of thrust along an axis per velocity (N.s/m, N.m.s/rad) under the commands, before α."""
+        lossy = [t for t in self.layout.drivers(axis) if "d" in self.layout.curve_of[t.name].keys]
+        if not lossy:
+            return 0.0
+        found = self._steady(inputs)
+        return sum(t.effect(axis) ** 2 * found[f"loss_{t.name}"] for t in lossy)
+
+    def _acting(self, inputs: Values) -> dict[str, float]:
+        """Return the commands that act after the dead time: those that are given, or else the present ones."""
+        if not self.layout.has_dead_time:
+            return {}
+        return {delayed_name(name): inputs.get(delayed_name(name), inputs[name]) for name in self.layout.commands}
 
     def _values(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the coefficients, the inputs and the states by name. Other names in the mappings are left out."""
         return {
             **self.coefficients,
             **{name: inputs[name] for name in self.layout.inputs},
+            **self._acting(inputs),
             **{name: state[name] for name in self.layout.state},
+            **{name: state[name] for name in self.layout.memory if name in state},
         }
 
     def thrust(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the calculated variables of the thrusters by name."""
         found = self._formulas.calculate(self._values(inputs, state))
+        for name in self.layout.memory:
+            found[name] = unwrapped(found[name], state.get(name, found[name]))
         return {name: found[name] for name in self.layout.thrust}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
@@ -108,7 +134,7 @@ class Rov:
         It is not finite when the motion overflows or takes too many pieces (rov_fmu/model/step.py).
         """
         after = step(self._formulas.table, self._values(inputs, state), h)
-        return {name: after[name] for name in self.layout.state}
+        return {name: after[name] for name in (*self.layout.state, *self.layout.memory)}
 
     # ---- One axis alone ----
 
@@ -127,33 +153,39 @@ class Rov:
         return self.inertia(form) / beta if beta > 0.0 else inf
 
     def load(self, form: VehicleAxis) -> float:
-        """Return the constant load F_0 (N, N.m), or 0 when the axis has none."""
-        return self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0
+        """Return the constant load (N, N.m): F_0, and in heave the weight less the buoyancy of a level vehicle."""
+        net_weight = self["W"] - self["B"] if form.axis is HEAVE and self.layout.restoring else 0.0
+        return net_weight + (self[form.coefficient("F_0")] if "F_0" in form.keys else 0.0)
 
-    def acceleration_of(self, form: VehicleAxis, thrust: float, load: float = 0.0) -> Riccati:
-        """Return the equation of an axis alone, (18), under a held thrust (before α) and load.
+    def acceleration_of(self, form: VehicleAxis, thrust: float, load: float = 0.0, loss: float = 0.0) -> Riccati:
+        """Return the equation of an axis alone, (18), under a held thrust (before α), load, and loss of thrust.
 
-        The equation is m v' = β (α F + F_ext + F_0 - a_d |v| v - b_d v).
+        The equation is m v' = β (α (F - loss v) + F_ext + F_0 - a_d |v| v - b_d v), of a level vehicle in heave.
         """
         gain = self.gain(form)
+        alpha = self[form.axis.coefficient("alpha")]
         A, B = (gain * self[form.coefficient(key)] for key in ("a_d", "b_d"))
+        lost = gain * alpha * loss
         reverse = None
         if not {"a_d_reverse", "b_d_reverse"}.isdisjoint(form.keys):
-            reverse = gain * self[form.coefficient("a_d_reverse")], gain * self[form.coefficient("b_d_reverse")]
-        return Riccati(A, B, gain * (self[form.axis.coefficient("alpha")] * thrust + load + self.load(form)), reverse)
+            a, b = (gain * self[form.coefficient(key)] for key in ("a_d_reverse", "b_d_reverse"))
+            reverse = a, b + lost
+        return Riccati(A, B + lost, gain * (alpha * thrust + load + self.load(form)), reverse)
 
     def axes(self, inputs: Values) -> tuple[Riccati, ...]:
         """Return the equation of each axis alone under held inputs, once the thrust is steady."""
         F = self.commanded(inputs)
         return tuple(
-            self.acceleration_of(form, self._along(form.axis, F), inputs[form.axis.external])
+            self.acceleration_of(
+                form, self._along(form.axis, F), inputs[form.axis.external], self.loss(form.axis, inputs)
+            )
             for form in self.layout.axes
         )
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
-        """Return all inputs: the commands that drive an axis at a fraction of full thrust, the others 0."""
+        """Return all inputs: an axis driven at a fraction of full thrust, the other inputs as usual."""
         signs = self.layout.signs(axis)
-        return {name: command * signs.get(name, 0.0) for name in self.layout.inputs}
+        return self.layout.usual_inputs | {name: command * sign for name, sign in signs.items()}
 
     def force(self, axis: Axis, command: float) -> float:
         """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α: (9), (10), (4)."""
@@ -168,7 +200,8 @@ class Rov:
 
     def held(self, axis: Axis, command: float) -> Riccati:
         """Return the equation of an axis alone, (18), under a held command, once the thrust is steady."""
-        return self.acceleration_of(self.layout.kinds[axis.name], self.force(axis, command))
+        loss = self.loss(axis, self.held_inputs(axis, command))
+        return self.acceleration_of(self.layout.kinds[axis.name], self.force(axis, command), loss=loss)
 
     def response(self, axis: Axis, command: float) -> tuple[float, float]:
         """Return the signed V_ss, and Tau (17) from rest in s, in closed form."""

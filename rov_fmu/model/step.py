@@ -11,10 +11,11 @@ ends at the first reversal of a monitored velocity. States that have settled are
 them have settled, the rest of the step is straight or circular motion.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from math import copysign, hypot, inf, isfinite, nan, prod, sin
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import atan2, ceil, copysign, hypot, inf, isfinite, nan, prod, sin, tau
 from operator import mul
 
+from .attitude import QUATERNION, followed, unwrapped
 from .equation import Equation
 from .formula import compiled, names
 
@@ -53,12 +54,14 @@ class Table:
                 self.velocities.append(place[directed[0].velocity] if directed else None)
                 formulas[f"coefficient_{len(formulas)}"] = term.coefficient
         self.coefficients = list(formulas)
-        self.hold = compiled({**equation.program, **equation.forces, **formulas})
+        tables = {name: measured.force for name, measured in equation.tables.items()}
+        self.hold = compiled({**equation.program, **equation.forces, **formulas}, tables)
         self.arrive = compiled({force: after for force, (_, after) in equation.lagging.items()})
         self.products = sorted({factors for row in self.rows for _, factors in row if len(factors) == 2})
         self.used = {place[name] for name in equation.used}
         """The states that a term contains. The others are integrals of them."""
-        self.heading = {place[name] for name in equation.heading}
+        self.heading = {place[name] for name in equation.heading if name in place}
+        self.finish = compiled(equation.ends)
         self.dynamic: list[tuple[set[int], set[int]]] = []
         """The components that may settle, in their order: the states of each, and the other states it depends on."""
         for component in equation.dynamic:
@@ -82,6 +85,7 @@ def step(table: Table, values: Mapping[str, float], h: float) -> dict[str, float
             return motion.end()
         unit = min(unit, h - done)
         series = motion.series(unit)
+        motion.unit = unit
         reach = motion.reach(series)
         if reach == 0.0:
             unit *= 1e-3
@@ -111,6 +115,12 @@ class _Motion:
         self.scale = [0.0] * len(self.y)  # the largest size of each state so far
         self.start = dict(self.values)
         self.settled: set[int] = set()
+        self.unit = 0.0  # the unit of time of the current series, s
+        self.heading = 0.0
+        """The unwrapped heading of a vehicle with an attitude."""
+        if table.equation.ends:
+            angle = self.angle(self.y)
+            self.heading = unwrapped(angle, values.get("psi", angle))
         self.hold()
 
     def hold(self) -> None:
@@ -146,6 +156,20 @@ class _Motion:
         rows = [[self.k[n] * prod(y[i] for i in factors) for n, factors in row] for row in self.table.rows]
         return [_sum(row) for row in rows], [_sum(map(abs, row)) for row in rows]
 
+    # ---- Heading ----
+
+    def angle(self, y: Sequence[float]) -> float:
+        """Return the heading between -pi and pi."""
+        place = self.table.place
+        return atan2(y[place["R_21"]], y[place["R_11"]])
+
+    def follow(self, y_at: Callable[[float], Sequence[float]], end: float, turn: float) -> None:
+        """Follow the heading from time 0 to the end of a motion, in which the vehicle turns by at most `turn`."""
+        parts = min(ceil(turn), MOST_PIECES) or 1
+        for n in range(parts):
+            times = end * n / parts, end * (n + 1) / parts
+            self.heading = followed(lambda t: self.angle(y_at(t)), *times, self.heading)
+
     # ---- Settled states ----
 
     def settle(self) -> None:
@@ -180,18 +204,38 @@ class _Motion:
         Only the heading still changes, by a rotation y' = L y with L^3 = -w^2 L. The integrals rise by h times their
         rates at the mean of y, which is y + (1 - cos wh)/(w^2 h) L y + (1 - sin(wh)/(wh))/w^2 L^2 y.
         """
-        table, mean = self.table, list(self.y)
+        table, mean, end = self.table, list(self.y), list(self.y)
+        turning = table.heading - self.settled
         first = self.rates(mean)[0]
-        second = self.rates([first[i] if i in table.heading else x for i, x in enumerate(mean)])[0]
-        slope, bend = (hypot(*(rates[i] for i in table.heading)) for rates in (first, second))
+        second = self.rates([first[i] if i in turning else x for i, x in enumerate(mean)])[0]
+        slope, bend = (hypot(*(rates[i] for i in turning)) for rates in (first, second))
         if slope and bend:
             w = bend / slope
             angle = w * h
             half, whole = (sin(0.5 * angle), sin(angle)) if isfinite(angle) else (nan, nan)
-            for i in table.heading:
-                mean[i] += 2.0 * half * half / angle * (first[i] / w) + (1.0 - whole / angle) * (second[i] / w / w)
+            for i in turning:
+                along, across = first[i] / w, second[i] / w / w
+                mean[i] += 2.0 * half * half / angle * along + (1.0 - whole / angle) * across
+                end[i] += whole * along + 2.0 * half * half * across
+            if table.equation.ends:
+                self.follow_circle(first, second, w, angle)
         rates, _ = self.rates(mean)
-        self.y = [x if i in table.used else x + h * rates[i] for i, x in enumerate(self.y)]
+        self.y = [x if i in table.used else x + h * rates[i] for i, x in enumerate(end)]
+
+    def follow_circle(self, first: Sequence[float], second: Sequence[float], w: float, angle: float) -> None:
+        """Follow the heading through a rotation with constant velocities; every whole turn changes it alike."""
+        start = self.y
+
+        def y_at(t: float) -> list[float]:
+            change = (
+                (sin(t) * a / w + 2.0 * sin(0.5 * t) ** 2 * b / w / w) for a, b in zip(first, second, strict=True)
+            )
+            return [x + dx for x, dx in zip(start, change, strict=True)]
+
+        before = self.heading
+        self.follow(y_at, tau, tau)
+        self.heading = before + (self.heading - before) * (angle // tau)
+        self.follow(y_at, angle % tau, tau)
 
     # ---- A piece ----
 
@@ -234,6 +278,8 @@ class _Motion:
             end, is_reversal = _sign_kept(series[v], length)
             if is_reversal or end < length:
                 length, reversed_velocity = end, v if is_reversal else None
+        if self.table.equation.ends:
+            self.follow_series(series, length)
         changes = [_change(c, length) + lost for c, lost in zip(series, self.lost, strict=True)]
         before, self.y = self.y, [x + change for x, change in zip(self.y, changes, strict=True)]
         self.lost = [change - (x - y) for change, x, y in zip(changes, self.y, before, strict=True)]
@@ -246,12 +292,30 @@ class _Motion:
             self.hold()
         return length
 
+    def follow_series(self, series: Series, length: float) -> None:
+        """Follow the heading through a piece."""
+        place, n = self.table.place, [self.table.place[name] for name in ("R_11", "R_21")]
+        rates = [
+            sum(abs(x) * length**k for k, x in enumerate(series[place[v]])) for v in "pqr" if v in place
+        ]  # bounds of the angular velocities
+
+        def y_at(t: float) -> list[float]:
+            y = list(self.y)
+            for i in n:
+                y[i] = series[i][0] + _change(series[i], t)
+            return y
+
+        self.follow(y_at, length, hypot(*rates) * self.unit * length)
+
     def end(self) -> dict[str, float]:
         """Return the vehicle's states by their names."""
         equation, found = self.table.equation, {force: self.values[force] for force in self.table.equation.lagging}
         for name, x in zip(self.table.states, self.y, strict=True):
             if name in self.start:  # an integral has only counted the change
                 found[name] = x if name in equation.starts else self.start[name] + x
+        if equation.ends:
+            after = self.table.finish({**self.start, **dict(zip(self.table.states, self.y, strict=True))})
+            found |= {name: after[f"next_{name}"] for name in QUATERNION} | {"psi": self.heading}
         return found
 
 
