@@ -10,7 +10,7 @@ from types import MappingProxyType
 from uuid import UUID
 
 from rov_fmu.engine.compile import C_SOURCES, UNITY_FILE, fmi_headers
-from rov_fmu.engine.source import generated_sources
+from rov_fmu.engine.source import generated_sources, unused_sources
 from rov_fmu.fmu.model_description import NATIVE, PYTHON, PYTHON_NOTE, build_description, model_description
 from rov_fmu.fmu.python_flavour import python_files, python_sources
 from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
@@ -47,7 +47,8 @@ def native_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     """Return the FMU in C, for Co-Simulation and Model Exchange. `pages` are further files, by their paths."""
     declared = variables(vehicle.rov)
     other_version = f"fmi{5 - fmi}_"
-    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(other_version)]
+    left_out = (other_version, *unused_sources(vehicle.layout))
+    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(left_out)]
     sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
     sources |= generated_sources(vehicle.layout)
     source_files = (UNITY_FILE,) if fmi == 2 else ()

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 from rov_fmu import __version__
 from rov_fmu.engine.compile import UNITY_FILE
-from rov_fmu.fmu.variables import LOG_CATEGORIES, UNITS, Variable
+from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable, unit_of
 from rov_fmu.io.templates import render
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.dependencies import parameters_of
 from rov_fmu.model.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -41,7 +42,7 @@ NATIVE = {
         },
     },
     3: {
-        "ModelExchange": {**_COMMON_3, "needsCompletedIntegratorStep": "false"},
+        "ModelExchange": _COMMON_3,
         "CoSimulation": {
             **_COMMON_3,
             "canHandleVariableCommunicationStepSize": "true",
@@ -93,13 +94,16 @@ def model_description(
     }
     if fmi == 3:
         variables = (*variables, Variable("time", len(variables), "Time", "s", "independent", "continuous"))
+        if "ModelExchange" in interfaces:  # the turns of a vehicle with an attitude are counted in this function
+            needs = {"needsCompletedIntegratorStep": "true" if vehicle.layout.has_attitude else "false"}
+            interfaces = {**interfaces, "ModelExchange": {**interfaces["ModelExchange"], **needs}}
     number = {v.name: v.index for v in variables}
     return render(
         "modelDescription.xml.j2",
         head=head,
         interfaces={name: {"modelIdentifier": vehicle.identifier, **can} for name, can in interfaces.items()},
         source_files=source_files,
-        units={name: UNITS[name] for name in dict.fromkeys(v.unit for v in variables)},
+        units={name: unit_of(name) for name in dict.fromkeys(v.unit for v in variables)},
         types={_type_name(v): _type(v) for v in variables} if fmi == 3 else {},
         type_name=_type_name,
         log_categories=LOG_CATEGORIES,
@@ -165,7 +169,9 @@ def _structure(
         if v.derivative_of:
             add(derivatives, v, v.dependencies)
         if v.initial == "calculated":
-            # In Initialization Mode no parameter is fixed, so the only kinds are constant and dependent (2.2.8).
-            at_start = {n: "constant" if kind == "constant" else "dependent" for n, kind in v.dependencies.items()}
+            # In Initialization Mode no parameter is fixed, so the only kinds are constant and dependent (2.2.8). The
+            # quaternion is not known yet: it follows from parameters.
+            known = {n: kind for n, kind in v.dependencies.items() if n not in QUATERNION}
+            at_start = {n: "constant" if kind == "constant" else "dependent" for n, kind in known.items()}
             add(initial, v, at_start | dict.fromkeys(parameters.get(v.name, ()), "dependent"))
     return lists

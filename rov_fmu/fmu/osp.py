@@ -7,10 +7,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from rov_fmu.io.templates import render
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, Layout
+from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Layout
 
 _ELEMENTS = {
     "1": "Generic",
+    "V": "Generic",
     "N": "Force",
     "N.m": "Torque",
     "m/s": "LinearVelocity",
@@ -36,20 +38,25 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
     for n in range(0, len(commands), _MAX_MEMBERS):
         number = f"_{n // _MAX_MEMBERS + 1}" if len(commands) > _MAX_MEMBERS else ""
         yield f"thruster_commands{number}", dict.fromkeys(commands[n : n + _MAX_MEMBERS])
+    yield "battery", {"voltage": None}
     along = tuple(zip((SURGE, SWAY, HEAVE), "xyz", strict=True))
     yield "external_force", {axis.external: letter for axis, letter in along}
     for thruster in layout.thrusters:
         only = [letter for part, (_, letter) in zip(thruster.direction, along, strict=True) if abs(part) > 1.0 - 1e-9]
         yield f"thrust_{thruster.name}", {f"F_{thruster.name}": next(iter(only), None)}
-    yield "external_torque", {"N_ext": "z"}
+    about = tuple(zip((ROLL, PITCH, YAW), "xyz", strict=True))
+    yield "external_torque", {axis.external: letter for axis, letter in about}
     for curve in layout.turning_curves:
         yield f"{curve.name}_torque", {f"tau_{curve.name}": "z"}
-    yield "current", {"V_N": "x", "V_E": "y"}
+    yield "current", {"V_N": "x", "V_E": "y", "V_D": "z"}
     yield "velocity", {axis.velocity: letter for axis, letter in along}
-    yield "yaw_rate", {"r": "z"}
+    yield "angular_velocity" if layout.has_attitude else "yaw_rate", {axis.velocity: letter for axis, letter in about}
     yield "position", {"x": "x", "y": "y"}
     yield "depth", {"z": "z"}
-    yield "heading", {"psi": "z"}
+    yield "attitude" if layout.has_attitude else "heading", {"phi": "x", "theta": "y", "psi": "z"}
+    scalar, *vector = QUATERNION
+    yield "quaternion_scalar", {scalar: None}
+    yield "quaternion_vector", dict.fromkeys(vector)
 
 
 def osp_model_description(layout: Layout) -> bytes:

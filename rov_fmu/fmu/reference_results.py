@@ -7,11 +7,15 @@ Python, and not with the C code that they prove.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import ceil, hypot, isfinite, sqrt
 
 from rov_fmu.fmu.experiments import FOLDER, NAME
 from rov_fmu.io.templates import render
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Declaration
+from rov_fmu.model.attitude import QUATERNION, start_formulas
+from rov_fmu.model.delay import DelayLine
+from rov_fmu.model.equation import equation_of
+from rov_fmu.model.formula import compiled
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Cell, ResponseRow, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -27,9 +31,13 @@ _DIGITS = ".11g"
 _MULTIPLES = (1, 2, 4, 8)
 """The times at which a step response is compared, in multiples of Tau."""
 _STEPS = 10
-"""The number of communication steps in Tau, and in a phase of the manoeuvre."""
+"""The least number of communication steps in Tau, and in a phase of the manoeuvre."""
+_MOST_PARTS = 200
+"""The largest number of steps in these times, which an attitude that changes quickly needs."""
 _LONGEST_TAU = 10.0
 """The longest Tau that an experiment uses (s)."""
+_HORIZON = 40.0
+"""The longest experiment in time constants; a vehicle turns by as many radians at most. Half of it with an attitude."""
 _COUPLING_FACTOR = 4.0
 """The weight of the coupling in `_horizon`: small differences grow in coupled motion, so experiments are shorter."""
 _NEGLIGIBLE = 1e-8
@@ -60,7 +68,7 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
     if any(vehicle.rov[name] != 1.0 for name in _tunable(vehicle.rov)):
         sets["untuned"] = untuned(vehicle.rov)
     files: dict[str, str] = {}
-    experiments = [*_step_responses(vehicle, sets, files), *_manoeuvre(vehicle, files)]
+    experiments = [*_step_responses(vehicle, sets, files), *_manoeuvre(vehicle, files), *_attitude(vehicle, files)]
     descriptions = {"tuned": "alpha and beta as identified", "untuned": "alpha = beta = 1: without tuning"}
     related = []
     if len(sets) > 1:
@@ -69,6 +77,8 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
                 "parameters.ssv.j2", name=name, values={key: repr(rov[key]) for key in _tunable(rov)}
             )
             related.append(_related(f"{name}.ssv", PARAMETERS, "parameter", descriptions[name]))
+    if "attitude.ssv" in files:
+        related.append(_related("attitude.ssv", PARAMETERS, "parameter", "Euler angles at the start"))
     files["experiments.exp"] = render(
         "experiments.exp.j2",
         experiments=experiments,
@@ -121,12 +131,12 @@ def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, 
                 times = [time_units[name] * n for n in _MULTIPLES]
                 trajectory = _trajectory(rov, [(inputs, times)])
                 files[f"{stem}.csv"] = _csv([(t, _commanded(vehicle, inputs)) for t in (0.0, longest)])
-                files[references] = _csv(_moving(trajectory, rov.layout.velocities | rov.layout.pose))
+                files[references] = _csv(_moving(trajectory, rov.layout.velocities | _place(rov.layout)))
                 yield ExperimentFiles(
                     experiment,
                     _description(rov, axis, percent, name if len(sets) > 1 else "", table, row),
                     _text(times[-1]),
-                    _text(time_units[name] / _STEPS),
+                    _text(time_units[name] / _parts(rov, inputs, time_units[name], _STEPS)),
                     name if len(sets) > 1 else None,
                     f"{stem}.csv",
                     references,
@@ -147,18 +157,53 @@ def _time_unit(rov: Rov, axis: Axis, command: float, inputs: Values) -> float:
 
 
 def _horizon(rov: Rov, inputs: Values) -> float:
-    """Return 40 times the shortest time constant of the vehicle, but at most the time of a turn by 40 rad (s)."""
-    rates = [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
+    """Return up to _HORIZON times the shortest time constant, but at most the time of a turn by as many radians (s).
+
+    The time constant of a restoring force is that of the oscillation that follows from it.
+    """
+    rates = _swings(rov)
+    rates += [1.0 / rov[c.coefficient("T")] for c in rov.layout.curves if c.has_lag]
     for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
         A, B = motion.drag(motion.C)
-        turning = sqrt(abs(motion.C)) if form.axis is YAW else 0.0
+        turning = sqrt(abs(motion.C)) if form.axis.is_rotation else 0.0
         rates.append(B + 2.0 * sqrt(A * abs(motion.C)) + turning)
         V = motion.steady_velocity()
-        if form.axis is YAW and isfinite(V):
+        if form.axis.is_rotation and isfinite(V):
             rates.append(abs(V))
-        if rov.layout.coupled and isfinite(V):
-            rates.append(_COUPLING_FACTOR * sum(abs(rov.parameters[f"coupling_{v}"]) for v in "uvr") * abs(V))
-    return 40.0 / max(rates) if any(rates) else _LONGEST_TAU
+        if rov.layout.coupled and isfinite(V) and not rov.layout.has_attitude:
+            couplings = (abs(x) for name, x in rov.parameters.items() if name.startswith("coupling_"))
+            rates.append(_COUPLING_FACTOR * sum(couplings) * abs(V))
+    if rov.layout.has_attitude:
+        rates.append(_coupling_rate(rov, inputs))
+    horizon = 0.5 * _HORIZON if rov.layout.has_attitude else _HORIZON
+    return horizon / max(rates) if any(rates) else _LONGEST_TAU
+
+
+def _swings(rov: Rov) -> list[float]:
+    """Return the angular frequencies of the oscillations by restoring forces (1/s)."""
+    rows = equation_of(rov.layout).rows
+    terms = [term for form in rov.layout.axes if form.axis.is_rotation for term in rows[form.axis.velocity]]
+    return [sqrt(abs(rov.parameters[t.coefficient])) for t in terms if t.coefficient.startswith("restoring_")]
+
+
+def _coupling_rate(rov: Rov, inputs: Values) -> float:
+    """Return how fast axes of a vehicle with an attitude change each other's velocities near the steady ones (1/s).
+
+    Velocities are divided by the roots of their effective masses, as in the kinetic energy, to compare all axes.
+    """
+    root, size = {}, {}
+    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
+        v, V = form.axis.velocity, motion.steady_velocity()
+        root[v] = sqrt(rov.effective_inertia(form))
+        size[v] = root[v] * abs(V) if isfinite(root[v] * V) else 0.0
+    changes = []
+    for v in rov.layout.velocities:
+        for term in equation_of(rov.layout).rows[v]:
+            if term.coefficient.startswith(("coupling_", "lift_")):
+                a, b = term.factors
+                k = rov.parameters[term.coefficient] * root[v] / (root[a] * root[b])
+                changes += [k * size[a], k * size[b]]
+    return hypot(*(x for x in changes if isfinite(x)))
 
 
 def _description(
@@ -173,20 +218,23 @@ def _description(
         found = ", ".join(f"{origin} {value}" for origin, value in values.items() if value is not None)
         return f" ({found})" if found else ""
 
-    without_lag = ", without the lag" if rov.layout.lagging else ""
+    neglected = ["the lag"] if rov.layout.lagging else []
+    neglected += ["the dead time"] if rov.layout.has_dead_time else []
+    neglected += ["righting moments"] if rov.layout.has_attitude and rov.layout.restoring else []
+    without = f", without {' and '.join(neglected)}" if neglected else ""
     return (
         f"{f'Table {table.number}: ' if table else ''}{axis.name}, {percent:g} % from rest{', ' * bool(name)}{name}: "
         f"V_ss = {V_ss:.4g} {axis.unit}{published(model.V_ss if model else None)}, "
-        f"Tau = {Tau:.4g} s{published(model.Tau if model else None)}{without_lag}"
+        f"Tau = {Tau:.4g} s{published(model.Tau if model else None)}{without}"
     )
 
 
 # ---- A manoeuvre -----------------------------------------------------------------------------------------------------
 
 _PHASES: tuple[tuple[Mapping[Axis, float], float], ...] = (
-    ({SURGE: 0.8, HEAVE: 0.5}, 0.0),
-    ({SURGE: 0.4, SWAY: 0.3, YAW: 0.3}, 1.0),
-    ({SURGE: -0.5, HEAVE: -0.4, YAW: -0.2}, 1.0),
+    ({SURGE: 0.8, HEAVE: 0.5, ROLL: 0.1}, 0.0),
+    ({SURGE: 0.4, SWAY: 0.3, PITCH: 0.2, YAW: 0.3}, 1.0),
+    ({SURGE: -0.5, HEAVE: -0.4, ROLL: -0.2, PITCH: -0.1, YAW: -0.2}, 1.0),
     ({}, 0.0),
 )
 """The phases of the manoeuvre: shares of the largest command by axis, and of loads and current."""
@@ -197,28 +245,71 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFi
     rov, layout = vehicle.rov, vehicle.layout
     phases = []
     for shares, load in _PHASES:
-        inputs = dict.fromkeys(layout.inputs, 0.0)
+        inputs = dict(layout.usual_inputs)
         for axis in filter(layout.has, shares):
             for name, sign in layout.signs(axis).items():
                 inputs[name] = round(inputs[name] + shares[axis] * sign * vehicle.command_range[1], 6)
         for name, meta in layout.inputs.items():
-            inputs[name] = max(-1.0, min(1.0, inputs[name])) if name in layout.commands else 0.05 * load * meta.nominal
+            if name in layout.commands:
+                inputs[name] = max(-1.0, min(1.0, inputs[name]))
+            else:
+                inputs[name] += 0.05 * load * meta.nominal
         phases.append(inputs)
     length = float(f"{min(_PHASE, *(_horizon(rov, inputs) for inputs in phases)):.1g}")
     ends = [length * n for n in range(len(phases) + 1)]
     stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
     held = [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
     trajectory = _trajectory(rov, held)
+    needed = max(_parts(rov, inputs, length) for inputs in phases)
+    steps = next(
+        n for n in (_STEPS, 20, 50, 100, _MOST_PARTS) if n >= needed
+    )  # a phase ends with a step, in decimals too
     files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
-    files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.state))
+    files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.velocities | _place(layout) | layout.lagging))
     yield ExperimentFiles(
         "manoeuvre",
         "All axes at once, with loads, a current and reversals, then all off",
         _text(ends[-1]),
-        _text(length / _STEPS),
+        _text(length / steps),
         None,
         "manoeuvre.csv",
         "manoeuvre_expected.csv",
+    )
+
+
+# ---- An attitude ----------------------------------------------------------------------------------------------------
+
+_ATTITUDE = {"phi_0": 0.6, "theta_0": -0.4, "psi_0": 1.0}
+"""The Euler angles at the start of an experiment. They stay far from a vertical nose, where they are undetermined."""
+
+
+def _attitude(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFiles]:
+    """Write an experiment in which a vehicle with roll or pitch starts tilted and turned, with all inputs zero."""
+    rov, layout = vehicle.rov, vehicle.layout
+    if not layout.has_attitude:
+        return
+    still = layout.usual_inputs
+    loads = (sqrt(abs(x.C)) for f, x in zip(layout.axes, rov.axes(still), strict=True) if f.axis.is_rotation)
+    length = float(f"{0.5 / max(0.5 / _PHASE, *loads, *_swings(rov)):.1g}")
+    start = compiled(start_formulas())(_ATTITUDE)
+    state = layout.at_rest | {name: start[name] for name in QUATERNION} | {"psi": _ATTITUDE["psi_0"]}
+    rows = []
+    for t in (0.0, 0.5 * length, length):
+        after = rov.step(still, state, t) if t else state
+        rows.append((t, after | {name: rov.thrust(still, after)[name] for name in layout.angles}))
+    files["attitude.ssv"] = render(
+        "parameters.ssv.j2", name="attitude", values={name: repr(angle) for name, angle in _ATTITUDE.items()}
+    )
+    files["attitude.csv"] = _csv([(t, _commanded(vehicle, still)) for t in (0.0, length)])
+    files["attitude_expected.csv"] = _csv(_moving(rows, layout.velocities | layout.pose | layout.angles))
+    yield ExperimentFiles(
+        "attitude",
+        "Tilted and turned at the start, then free, with all inputs zero",
+        _text(length),
+        _text(length / _STEPS),
+        "attitude",
+        "attitude.csv",
+        "attitude_expected.csv",
     )
 
 
@@ -227,12 +318,40 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFi
 
 def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> list[_Row]:
     """Return the states from rest at the times of each phase, during which the inputs are held."""
-    found: list[_Row] = [(0.0, dict.fromkeys(rov.layout.state, 0.0))]
+    line = DelayLine(rov.layout)
+    found: list[_Row] = [(0.0, rov.layout.at_rest)]
     for inputs, times in phases:
         for t in times:
             before, state = found[-1]
-            found.append((t, rov.step(inputs, state, t - before)))
+            parts = _parts(rov, inputs, t - before)
+            h = (t - before) / parts
+            for n in range(parts):
+                state = line.step(rov, inputs, state, before + n * h, h)
+            found.append((t, state))
     return found
+
+
+def _parts(rov: Rov, inputs: Values, length: float, least: int = 1) -> int:
+    """Return the number of steps for a time in which a vehicle with an attitude turns by less than half a turn each.
+
+    The sign of the quaternion is then that of a continuous motion. The coupling may double the velocities.
+    """
+    if not rov.layout.has_attitude:
+        return least
+    rate = 0.0
+    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
+        if form.axis.is_rotation:
+            V = motion.steady_velocity()
+            rate += abs(V) if isfinite(V) else _HORIZON * sqrt(abs(motion.C))
+    return max(least, min(_MOST_PARTS, ceil(rate * length)))
+
+
+def _place(layout: Layout) -> dict[str, Declaration]:
+    """Return the position, and the heading where it is a state.
+
+    A quaternion is left out: after more than half a turn, its sign depends on how the turn is divided into steps.
+    """
+    return {name: meta for name, meta in layout.pose.items() if name not in QUATERNION}
 
 
 def _moving(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> list[_Row]:

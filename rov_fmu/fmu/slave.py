@@ -6,32 +6,42 @@ kept, and the call returns fmi2OK.
 """
 
 import json
-from math import isfinite
+from collections.abc import Iterable, Mapping
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.model import layout, rov
+from rov_fmu.model import attitude, delay, formula, layout, rov
 
 
 def layout_of(given: Any) -> layout.Layout:
     """Return the layout of a vehicle from the JSON of its dataclasses.asdict."""
-
-    def parts(kind: str) -> list[dict[str, Any]]:
-        return [
-            {key: tuple(value) if isinstance(value, list) else value for key, value in part.items()}
-            for part in given[kind]
-        ]
-
-    return layout.Layout(
-        tuple(layout.VehicleAxis(layout.AXES[form["axis"]["name"]], form["keys"]) for form in parts("axes")),
-        tuple(layout.Curve(**curve) for curve in parts("curves")),
-        tuple(layout.Thruster(**thruster) for thruster in parts("thrusters")),
-        given["mix"],
-        given["coupled"],
+    parts = {key: _tuples(value) for key, value in given.items()}
+    axes = ((layout.AXES[form["axis"]["name"]], form["keys"]) for form in parts["axes"])
+    parts["axes"] = tuple(layout.VehicleAxis(*form) for form in axes)
+    parts["curves"] = tuple(
+        layout.Curve(**{**curve, "tables": tuple(layout.ThrustTable(**table) for table in curve["tables"])})
+        for curve in parts["curves"]
     )
+    parts["fins"] = tuple(layout.Fin(**fin) for fin in parts["fins"])
+    parts["thrusters"] = tuple(layout.Thruster(**thruster) for thruster in parts["thrusters"])
+    return layout.Layout(**parts)
+
+
+def _tuples(value: Any) -> Any:
+    """Return a value of JSON with tuples instead of lists."""
+    if isinstance(value, dict):
+        return {key: _tuples(one) for key, one in value.items()}
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def _limited(variable: dict[str, Any], value: float) -> float:
+    """Return the value, or the bound of a variable that it is beyond."""
+    low, high = variable["minimum"], variable["maximum"]
+    return float(max(-inf if low is None else low, min(inf if high is None else high, value)))
 
 
 def _time_tolerance(t: float, h: float) -> float:
@@ -40,7 +50,7 @@ def _time_tolerance(t: float, h: float) -> float:
 
 
 class Rov(Fmi2Slave):  # type: ignore[misc]
-    """The slave. Its values are ordered by value reference: inputs, state, derivatives, thrust, coefficients."""
+    """The slave. Its values are ordered by value reference, as rov_fmu/fmu/variables.py declares them."""
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
@@ -50,11 +60,14 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.declared: list[dict[str, Any]] = declaration["variables"]
         self.layout = layout_of(declaration["layout"])
         inputs, states = len(self.layout.inputs), len(self.layout.state)
-        self.states = slice(inputs, inputs + states)
         self.calculated = slice(inputs + states, inputs + 2 * states + len(self.layout.thrust))
+        self.place = {v["name"]: place for place, v in enumerate(self.declared)}
+        self.begin = formula.compiled(attitude.start_formulas())
         self.values: list[float] = [v["start"] or 0.0 for v in self.declared]
+        self._set_attitude()
         self.time = 0.0
         self.stop_time: float | None = None
+        self.line = delay.DelayLine(self.layout)
         self.warned: set[int | str] = set()
         for reference, v in enumerate(self.declared):
             self.register_variable(
@@ -81,8 +94,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             v = self.declared[reference]
             if self._is_calculated(reference):
                 raise ValueError(f"{v['name']} is calculated and must not be set")
-            parameter = v["causality"] == "parameter"
-            if not isfinite(value) or (parameter and not v["minimum"] <= value <= v["maximum"]):
+            if not isfinite(value) or (v["causality"] == "parameter" and _limited(v, value) != value):
                 self.log(
                     f"{v['name']} = {value!r} is refused; it stays {self.values[reference]!r}.", Fmi2Status.discard
                 )
@@ -90,9 +102,11 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         for reference, value in zip(references, values, strict=True):
             v = self.declared[reference]
             self.values[reference] = value
-            if v["causality"] == "input" and v["minimum"] is not None and not v["minimum"] <= value <= v["maximum"]:
-                limit = max(v["minimum"], min(v["maximum"], value))
+            limit = _limited(v, value)
+            if v["causality"] == "input" and limit != value:
                 self._warn_once(reference, f"{v['name']} = {value!r} saturates at {limit:g}")
+        if not self.layout.initial.keys().isdisjoint(self.declared[reference]["name"] for reference in references):
+            self._set_attitude()
 
     def get_real(self, references: list[int]) -> list[float]:
         """Return values, and calculate those that depend on others."""
@@ -112,14 +126,34 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             self.log(f"a step of {step_size!r} s passes the stop time {self.stop_time!r}.", Fmi2Status.error)
             return False
         model, inputs, state = self._model()
-        after = list(model.step(inputs, state, step_size).values())
-        if not all(map(isfinite, after)):
+        try:
+            after = self.line.step(model, inputs, state, self.time, step_size)
+        except ValueError as error:
+            self.log(f"{error}.", Fmi2Status.error)
+            return False
+        if not all(map(isfinite, after.values())):
             self.log(f"the motion overflows within {step_size!r} s.", Fmi2Status.error)
             return False
         if abs(current_time - self.time) > _time_tolerance(self.time, step_size):
+            self.line.move(current_time - self.time)
             self._warn_once("time", f"the step from t = {current_time!r} does not begin at t = {self.time!r}")
-        self.values[self.states], self.time = after, end
+        self._put({**after, **self.line.delayed})
+        self.time = end
         return True
+
+    def _put(self, values: Mapping[str, float]) -> None:
+        for name, value in values.items():
+            self.values[self.place[name]] = value
+
+    def _set_attitude(self) -> None:
+        """Set the quaternion and the heading to those of the Euler angles at the start."""
+        if self.layout.has_attitude:
+            angles = self._named(self.layout.initial)
+            found = self.begin(angles)
+            self._put({**{name: found[name] for name in attitude.QUATERNION}, "psi": angles["psi_0"]})
+
+    def _named(self, names: Iterable[str]) -> dict[str, float]:
+        return {name: self.values[self.place[name]] for name in names}
 
     def _warn_once(self, what: int | str, text: str) -> None:
         if what not in self.warned:
@@ -127,19 +161,20 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             self.log(f"{text}; said once.", Fmi2Status.warning)
 
     def _is_calculated(self, reference: int) -> bool:
-        return self.calculated.start <= reference < self.calculated.stop
+        return bool(self.declared[reference]["initial"] == "calculated")
 
     def _model(self) -> tuple[rov.Rov, dict[str, float], dict[str, float]]:
         """Return the vehicle, its inputs and its state."""
-        inputs, states, k = self.layout.inputs, self.layout.state, self.layout.coefficients
         return (
-            rov.Rov(self.layout, dict(zip(k, self.values[self.calculated.stop :], strict=True))),
-            dict(zip(inputs, self.values, strict=False)),
-            dict(zip(states, self.values[self.states], strict=True)),
+            rov.Rov(self.layout, self._named(self.layout.coefficients)),
+            self._named((*self.layout.inputs, *self.layout.delayed)),
+            self._named((*self.layout.state, *self.layout.memory)),
         )
 
     def _get_fmu_state(self) -> dict[str, Any]:
-        return {"values": list(self.values), "time": self.time, "stop_time": self.stop_time}
+        line = {"acting": dict(self.line.acting), "waiting": list(self.line.waiting)}
+        return {"values": list(self.values), "time": self.time, "stop_time": self.stop_time, **line}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self.values, self.time, self.stop_time = list(state["values"]), state["time"], state["stop_time"]
+        self.line.acting, self.line.waiting = dict(state["acting"]), list(state["waiting"])

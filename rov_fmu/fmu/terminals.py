@@ -29,16 +29,21 @@ class Terminal:
 
 def terminals(layout: Layout) -> list[Terminal]:
     """Return the terminals of a vehicle. Every input and output is in exactly one."""
+    battery = ("voltage",) if layout.voltage is not None else ()
     loads = tuple(form.axis.external for form in layout.axes)
-    current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads})
-    thrust = layout.lagging | layout.thrust
+    current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads, *battery})
+    thrust = tuple(name for name in layout.lagging | layout.thrust if name not in layout.angles)
+    water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
+    driven = "thrusters and fins" if layout.fins else "thrusters"
     found = [
-        Terminal("thrusters", "input", "bus", "Commands to the thrusters, -1 to 1", tuple(layout.commands)),
+        Terminal("thrusters", "input", "bus", f"Commands to the {driven}, -1 to 1", tuple(layout.commands)),
+        Terminal("battery", "input", "bus", "Voltage of the battery", battery),
         Terminal("load", "input", "bus", "Forces and torque from outside, body frame", loads),
-        Terminal("current", "input", "bus", "Velocity of the water, north and east", current),
+        Terminal("current", "input", "bus", f"Velocity of the water, {water}", current),
         Terminal("body_velocity", "output", "plug", "Velocity through the water, body frame", tuple(layout.velocities)),
-        Terminal("pose", "output", "plug", "Position north, east, down, and heading", tuple(layout.pose)),
-        Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", tuple(thrust)),
+        Terminal("pose", "output", "plug", f"Position north, east, down, and {turned}", tuple(layout.pose)),
+        Terminal("attitude", "output", "plug", "Euler angles: roll, pitch and heading", tuple(layout.angles)),
+        Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", thrust),
     ]
     return [terminal for terminal in found if terminal.members]
 

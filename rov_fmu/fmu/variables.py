@@ -5,12 +5,14 @@ derived from `variables`. Their order is: inputs, state, derivatives, thrust, co
 variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees, isfinite
 from typing import Any
 
 from rov_fmu.io.templates import render
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.dependencies import dependencies_of
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Declaration, Layout
 from rov_fmu.model.rov import Rov
@@ -27,25 +29,34 @@ class Unit:
 
 _KNOT = 1852.0 / 3600.0  # m/s
 
-UNITS: dict[str, Unit] = {
-    "1": Unit({}, "%", 100.0),
-    "kg": Unit({"kg": 1}),
-    "m": Unit({"m": 1}),
-    "s": Unit({"s": 1}),
-    "rad": Unit({"rad": 1}, "deg", degrees(1.0)),
-    "m/s": Unit({"m": 1, "s": -1}, "knot", 1.0 / _KNOT),
-    "rad/s": Unit({"rad": 1, "s": -1}, "deg/s", degrees(1.0)),
-    "m/s2": Unit({"m": 1, "s": -2}),
-    "rad/s2": Unit({"rad": 1, "s": -2}),
-    "N": Unit({"kg": 1, "m": 1, "s": -2}),
-    "N/s": Unit({"kg": 1, "m": 1, "s": -3}),
-    "N.m": Unit({"kg": 1, "m": 2, "s": -2}),
-    "kg.m2": Unit({"kg": 1, "m": 2}),
-    "N.s/m": Unit({"kg": 1, "s": -1}),
-    "N.s2/m2": Unit({"kg": 1, "m": -1}),
-    "N.m.s/rad": Unit({"kg": 1, "m": 2, "s": -1, "rad": -1}),
-    "N.m.s2/rad2": Unit({"kg": 1, "m": 2, "rad": -2}),
+_BASE = {
+    "kg": {"kg": 1},
+    "m": {"m": 1},
+    "s": {"s": 1},
+    "rad": {"rad": 1},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "1": {},
 }
+"""The exponents of the FMI base units in each symbol of a unit."""
+_DISPLAYS = {
+    "1": ("%", 100.0),
+    "rad": ("deg", degrees(1.0)),
+    "m/s": ("knot", 1.0 / _KNOT),
+    "rad/s": ("deg/s", degrees(1.0)),
+}
+
+
+def unit_of(text: str) -> Unit:
+    """Return a unit that is written as N.m.s2/rad2 or N.s2/(m.rad). A power is a digit after its symbol."""
+    exponents: Counter[str] = Counter()
+    above, _, below = text.partition("/")
+    for sign, symbols in ((1, above), (-1, below.strip("()"))):
+        for symbol in filter(None, symbols.split(".")):
+            name = symbol.rstrip("23") if symbol != "1" else symbol
+            for base, exponent in _BASE[name].items():
+                exponents[base] += sign * exponent * int(symbol[len(name) :] or 1)
+    return Unit({base: exponent for base, exponent in exponents.items() if exponent}, *_DISPLAYS.get(text, ()))
 
 
 @dataclass(frozen=True)
@@ -87,7 +98,11 @@ class Variable:
             return "INPUT"
         if self.causality == "parameter":
             return self.variability.upper()
-        return "STATE" if self.initial == "exact" else "CALCULATED"
+        if self.initial == "exact":
+            return "STATE"
+        if self.variability == "discrete":
+            return "MEMORY"
+        return "CALCULATED_STATE" if self.name in QUATERNION else "CALCULATED"
 
 
 # ---- Descriptions of the derivatives ---------------------------------------------------------------------------------
@@ -100,10 +115,14 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
         found[axis.velocity] = Declaration(
             f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {axis.equations[1]}"
         )
-    if layout.has(SURGE, SWAY):
+    if layout.has_attitude:
+        for name, direction in (("x", "northward"), ("y", "eastward"), ("z", "downward")):
+            found[name] = Declaration("m/s", f"Velocity over ground {direction}")
+        found |= {name: Declaration("1/s", f"Rate of change of {name}") for name in QUATERNION}
+    elif layout.has(SURGE, SWAY):
         found["x"] = _over_ground(layout, "northward", "V_N", {"u": "+ u cos ψ", "v": "- v sin ψ"})
         found["y"] = _over_ground(layout, "eastward", "V_E", {"u": "+ u sin ψ", "v": "+ v cos ψ"})
-    if layout.has(HEAVE):
+    if layout.has(HEAVE) and not layout.has_attitude:
         found["z"] = Declaration("m/s", "Rate of change of depth, w")
     if layout.has(YAW):
         found["psi"] = Declaration("rad/s", "Rate of change of heading, r")
@@ -130,19 +149,19 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
 
     def add(name: str, meta: Declaration, causality: str, variability: str, **rest: Any) -> None:
         bounds = {end: x for end, x in (("minimum", meta.minimum), ("maximum", meta.maximum)) if isfinite(x)}
-        given = {"display_unit": UNITS[meta.unit].display, **bounds, **rest}
+        given = {"display_unit": unit_of(meta.unit).display, **bounds, **rest}
         result.append(Variable(name, len(result), meta.description, meta.unit, causality, variability, **given))
 
     for name, meta in layout.inputs.items():
-        add(name, meta, "input", "continuous", start=0.0, nominal=meta.nominal)
+        variability = "discrete" if layout.has_dead_time and name in layout.commands else "continuous"
+        add(name, meta, "input", variability, start=meta.start, nominal=meta.nominal)
     for name, meta in layout.state.items():
         add(
             name,
             meta,
             "output",
             "continuous",
-            initial="exact",
-            start=0.0,
+            **({"initial": "calculated"} if name in QUATERNION else {"initial": "exact", "start": 0.0}),
             nominal=meta.nominal,
             dependencies={name: "constant"},
         )
@@ -161,6 +180,8 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
         add(
             name, meta, "output", "continuous", initial="calculated", display_unit=None, dependencies=dependencies[name]
         )
+    for name, meta in layout.delayed.items():
+        add(name, meta, "local", "discrete", initial="calculated")
     for name, meta in layout.coefficients.items():
         add(
             name,
@@ -169,8 +190,10 @@ def variables(rov: Rov) -> tuple[Variable, ...]:
             "tunable" if meta.tunable else "fixed",
             initial="exact",
             start=rov[name],
-            display_unit=None if meta.unit == "1" else UNITS[meta.unit].display,
+            display_unit=None if meta.unit == "1" else unit_of(meta.unit).display,
         )
+    for name, meta in layout.initial.items():
+        add(name, meta, "parameter", "fixed", initial="exact", start=0.0)
     return tuple(result)
 
 
