@@ -47,7 +47,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     It is 0 when the command is done, 1 when a build, a proof or a study failed, 2 for bad input, and 130 when the
     command was interrupted.
     """
-    return exit_code("rov-fmu", lambda: _commands.main(arguments, "rov-fmu", standalone_mode=False), _EXIT_CODES)
+
+    def run() -> None:
+        with _warnings_printed():
+            _commands.main(arguments, "rov-fmu", standalone_mode=False)
+
+    return exit_code("rov-fmu", run, _EXIT_CODES)
 
 
 # ---- Types of arguments and options ----------------------------------------------------------------------------------
@@ -239,8 +244,7 @@ def _simulate(
     opens = plot == Path()
     check_outputs(output, None if opens else plot, [path for path in (vehicle, commands) if path])
     loaded = load(vehicle)
-    with _warnings_printed():
-        result = run(loaded, settings, commands, stop, step)
+    result = run(loaded, settings, commands, stop, step)
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
     write_results(result, output, picture)
     if opens and picture:
@@ -251,12 +255,14 @@ def _simulate(
 
 @contextmanager
 def _warnings_printed() -> Iterator[None]:
-    """Print the warnings for the user once the block is done, each in one line."""
+    """Print the warnings for the user once the block is done, each in one line and once."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
-        yield
-    for warning in caught:
-        _warn(str(warning.message))
+        try:
+            yield
+        finally:
+            for message in dict.fromkeys(str(warning.message) for warning in caught):
+                _warn(message)
 
 
 def _warn(message: str) -> None:

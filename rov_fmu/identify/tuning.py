@@ -74,6 +74,10 @@ def _each_median(rov: Rov, axis: Axis, points: Sequence[Point]) -> Rov:
 
     Tau is inversely proportional to β.
     """
+    if rov.loss(axis, rov.held_inputs(axis, 1.0)):
+        raise TuningError(
+            f"{axis.name}: its thrust falls with the speed of advance, which tuning cannot consider: remove d"
+        )
     for p in points:
         if reason := _impossible(rov, axis, p):
             raise TuningError(f"{axis.name}: {reason}")

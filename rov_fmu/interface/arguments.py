@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rov_fmu.io.messages import InputError, brief, did_you_mean, shown
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.layout import Declaration, Layout
 from rov_fmu.vehicle.quantity import within
 
@@ -67,6 +68,20 @@ def checked_values(
     return found
 
 
+def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> dict[str, Array]:
+    """Return the states and the Euler angles at the start as arrays, by name.
+
+    Raises InputError if one cannot be used, or if the attitude is given both as a quaternion and as angles.
+    """
+    found = checked_values("start", given, layout.state | layout.initial, many=many)
+    if quaternion := [found[name] for name in QUATERNION if name in found]:
+        if angles := found.keys() & layout.initial.keys() - {"psi_0"}:
+            raise InputError(f"start[{min(angles)!r}]: the attitude is given as a quaternion, too: give one of the two")
+        if np.any(sum(map(np.abs, quaternion)) == 0.0):
+            raise InputError(f"start: the quaternion {', '.join(QUATERNION)} is 0 and has no direction")
+    return found
+
+
 class Commands:
     """The inputs of a simulation, and the times at which they may change."""
 
@@ -94,7 +109,7 @@ class Commands:
                 _check_shape(key, found, len(time if own is None else own), many)
                 if own is not None and found.ndim and found.shape[-1] == len(own):
                     place = np.searchsorted(own, self.time, side="right") - 1
-                    found = np.where(place >= 0, found[..., np.maximum(place, 0)], 0.0)
+                    found = np.where(place >= 0, found[..., np.maximum(place, 0)], layout.inputs[name].start)
             self.values[name] = found
             if name in layout.commands and (most := float(np.max(np.abs(found), initial=0.0))) > 1.0:
                 warnings.warn(f"{name} reaches ±{most:.6g}: commands saturate at ±1", UserWarning, stacklevel=4)

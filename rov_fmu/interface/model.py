@@ -15,6 +15,7 @@ from rov_fmu.interface.arguments import (
     Commands,
     Inputs,
     checked_record,
+    checked_start,
     checked_times,
     checked_values,
     checked_workers,
@@ -22,6 +23,7 @@ from rov_fmu.interface.arguments import (
 )
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import InputError, shown
+from rov_fmu.model.delay import MOST_WAITING
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 
@@ -65,9 +67,13 @@ class VehicleModel(Vehicle):
         instead. Each value is held from its time up to the next, also between output times; the inputs are 0 before the
         first time.
 
-        `start` maps names of states to their values at the first time; all other states are 0. `record` names the
-        variables to return: inputs, states, derivatives such as `der(u)`, thrust. The default is the outputs of the
-        FMU: states and thrust.
+        `start` maps names of states to their values at the first time; all other states are 0. A vehicle with roll or
+        pitch begins at the Euler angles phi_0, theta_0 and psi_0 (rad), which `start` may contain, too. They are 0 by
+        default: level and heading north. Instead of them, `start` may contain the quaternion, with psi_0 to choose the
+        turn of the heading.
+
+        `record` names the variables to return: inputs, states, derivatives such as `der(u)`, thrust. The default is the
+        outputs of the FMU: states and thrust.
 
         The first simulation of a kind of vehicle compiles the engine, which takes seconds, and keeps it in the user's
         cache folder.
@@ -79,6 +85,8 @@ class VehicleModel(Vehicle):
         if len(result.failed):
             first = int(np.argmax(np.isnan(next(iter(result.values())))))
             reason = "it overflows, or changes too fast for its step: check the inputs, the start and the coefficients"
+            if self.layout.has_dead_time:
+                reason += f"; at most {MOST_WAITING} changes of commands can wait for the dead time"
             raise InputError(f"the motion cannot be computed up to time[{first}] = {result.time[first]:g} s: {reason}")
         return result
 
@@ -140,7 +148,7 @@ class VehicleModel(Vehicle):
         commands = Commands(layout, times, inputs, many=many)
         values: dict[str, Array] = {
             **commands.values,
-            **checked_values("start", start, layout.state, many=many),
+            **checked_start(start, layout, many=many),
             **checked_values("coefficients", coefficients, layout.coefficients, many=many),
         }
         units = {v.name: v.unit for v in variables(self.rov) if v.causality != "parameter"}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.io.messages import InputError, UnknownNameError, did_you_mean
+from rov_fmu.model.attitude import QUATERNION
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,8 +62,15 @@ class Result(Mapping[str, Array]):
 
     @property
     def final(self) -> dict[str, Array]:
-        """The recorded states at the last time, by name: the `start` of a simulation that continues this one."""
-        return {name: self.arrays[name][..., -1][()] for name in self.states}
+        """The recorded states at the last time, by name: the `start` of a simulation that continues this one.
+
+        Of a vehicle with roll or pitch it also contains psi_0, so that the heading counts on. Changes of commands that wait
+        for a dead time are not part of it.
+        """
+        found = {name: self.arrays[name][..., -1][()] for name in self.states}
+        return found | (
+            {"psi_0": self.arrays["psi"][..., -1][()]} if {*QUATERNION, "psi"} <= self.arrays.keys() else {}
+        )
 
     def to_dataframe(self) -> "pd.DataFrame":
         """Return a pandas data frame with a column for each variable.

@@ -53,12 +53,13 @@ def run(
     coefficients: dict[str, float] = {}
     start: dict[str, float] = {}
     layout = vehicle.layout
-    for name, value in _read_settings(settings, [*layout.inputs, *layout.state, *layout.coefficients]).items():
+    at_start = [*layout.state, *layout.initial]
+    for name, value in _read_settings(settings, [*layout.inputs, *at_start, *layout.coefficients]).items():
         if name in inputs:
             raise InputError(f"--set {name}: {commands} has this input, too")
         if name in layout.inputs:
             inputs[name] = value
-        elif name in layout.state:
+        elif name in at_start:
             start[name] = value
         else:
             coefficients[name] = value

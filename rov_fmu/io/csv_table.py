@@ -351,3 +351,24 @@ def _find_unit(word: str, column: Column) -> str | None:
 def _title(name: str, column: Column) -> str:
     """Return the header of a column in its first unit."""
     return f"{name} [{next(iter(column.units))}]"
+
+
+# ---- Pulses ----------------------------------------------------------------------------------------------------------
+
+NEUTRAL, SPAN = 1500.0, 400.0
+"""The pulse that stops a thruster, and the distance from it to full thrust, µs (ArduSub, T200)."""
+NO_OUTPUT = (0.0, 65535.0)
+"""The values that autopilots log where they give no pulse, µs."""
+PULSES = ("us", "µs")
+"""The unit of a pulse, as files spell it."""
+
+
+def pulses(numbers: tuple[float, ...] = ()) -> Conversion:
+    """Return the conversion of a pulse (µs) to a command that is not yet saturated. Raises ValueError.
+
+    The numbers are neutral and span. The span is negative for a thruster that turns in the opposite direction.
+    """
+    neutral, span = numbers if len(numbers) == 2 else (NEUTRAL, 0.0 if numbers else SPAN)
+    if span == 0.0 or neutral <= 0.0:
+        raise ValueError("must be [us], or [us NEUTRAL SPAN] such as [us 1500 400]")
+    return lambda pulse: 0.0 if pulse in NO_OUTPUT else (pulse - neutral) / span

@@ -3,7 +3,7 @@
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,6 +24,11 @@ class Strict(BaseModel):
     """A table of a TOML file. It may have no other keys, and no number in quotes. Editors show its docstrings."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True)
+
+    @staticmethod
+    def hint(_key: str, /) -> str:
+        """Return the end of the message about an unknown key that has another name or place here, or an empty text."""
+        return ""
 
 
 DOCUMENTED = ConfigDict(use_attribute_docstrings=True)
@@ -122,7 +127,7 @@ def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Stri
             yield ""
         elif problem["type"] != "missing" or not _is_misspelt(place, unknown.get(place[:-1], ()), schema):
             number += 1
-            yield _problem_line(problem, data, schema)
+            yield _problem_line(problem, data, schema, model.hint)
 
 
 def join_names(names: Iterable[str]) -> str:
@@ -200,7 +205,7 @@ def _is_misspelt(place: _Place, unknown: Sequence[_Place], schema: _Schema) -> b
     return any(schema.nearest(other) == place[-1] for other in unknown[:_COMPARED])
 
 
-def _problem_line(problem: ErrorDetails, data: Toml, schema: _Schema) -> str:
+def _problem_line(problem: ErrorDetails, data: Toml, schema: _Schema, hint_of: Callable[[str], str]) -> str:
     """Return the line for one problem."""
     place, value, kind = problem["loc"], problem["input"], problem["type"]
     key, is_table = brief(_key(place, data)), isinstance(value, dict)
@@ -212,6 +217,8 @@ def _problem_line(problem: ErrorDetails, data: Toml, schema: _Schema) -> str:
         constant = _constant(schema.at(place))
         return f"{key}: this key is missing" + (f": write {place[-1]} = {json.dumps(constant)}" if constant else "")
     if kind == "extra_forbidden":
+        if hint := hint_of(str(place[-1])):
+            return f"{key}: there is no such key{hint}"
         allowed = schema.keys(place[:-1])
         hint = did_you_mean(str(place[-1]), allowed)
         only = "" if hint and len(allowed) > _LISTED else f", only {join_names(allowed)}"

@@ -4,32 +4,14 @@ Numbers are converted to SI units, and commands to fractions of full thrust. The
 number outside is a mistake; without bounds, fits could overflow.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from math import pi
 
-from rov_fmu.io.csv_table import Column, Columns, DataFileError
+from rov_fmu.io.csv_table import PULSES, Column, Columns, DataFileError, pulses
 from rov_fmu.io.messages import shown
 from rov_fmu.model.layout import Axis
 
-NEUTRAL, SPAN = 1500.0, 400.0
-"""The pulse that stops a thruster, and the distance from it to full thrust, µs (ArduSub, T200)."""
-NO_OUTPUT = (0.0, 65535.0)
-"""The values that autopilots log where they give no pulse, µs."""
-
-
-def pulses(numbers: tuple[float, ...] = ()) -> Callable[[float], float]:
-    """Return the conversion of a pulse (µs) to a command that is not yet saturated. Raises ValueError.
-
-    The numbers are neutral and span. The span is negative for a thruster that turns in the opposite direction.
-    """
-    neutral, span = numbers if len(numbers) == 2 else (NEUTRAL, 0.0 if numbers else SPAN)
-    if span == 0.0 or neutral <= 0.0:
-        raise ValueError("must be [us], or [us NEUTRAL SPAN] such as [us 1500 400]")
-    return lambda pulse: 0.0 if pulse in NO_OUTPUT else (pulse - neutral) / span
-
-
-PULSES = ("us", "µs")
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
 TIMES = {"s": 1.0, "ms": 1000.0}

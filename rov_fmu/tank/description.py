@@ -28,10 +28,9 @@ from rov_fmu.io.toml_file import (
 from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Declaration, Layout, VehicleAxis, coefficient_name
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.description import Head, Validity
-from rov_fmu.vehicle.paper import PAPER, PAPER_SOURCES
 from rov_fmu.vehicle.quantity import Finite, Quantity
 from rov_fmu.vehicle.schema import NOT_GIVEN, OpenHardware, where
-from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.shipped import PAPER, PAPER_SOURCES, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
@@ -243,6 +242,7 @@ def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]], kn
 def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> Iterator[str]:
     """Yield a line for every unknown name, impossible number, and missing half of a pair."""
     layout = description.layout
+    yield from _unknown_effects(layout)
     yield from _mistakes_in_known(file, description)
     if "known" not in lost:
         yield from _missing_halves(file, description)
@@ -259,6 +259,23 @@ def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> 
             yield key_line("fit.lag", f"there is no such curve, only {join_names(curves)}{hint}", name)
         elif T in description.named:
             yield key_line("fit.lag", f"{T} is given, so it cannot be fitted too", name)
+
+
+def _unknown_effects(layout: Layout) -> Iterator[str]:
+    """Yield a line for each effect that identification does not know, and that would make its coefficients wrong."""
+    for curve in layout.curves:
+        for key, given in (("table", curve.tables), ("V_0", "V_0" in curve.keys), ("d", "d" in curve.keys)):
+            if given:
+                reason = (
+                    "identification does not know this effect: leave it out here, and add it to the vehicle file later"
+                )
+                yield key_line(f"curves.{curve.name}.{key}", reason)
+    if layout.fins:
+        yield key_line(
+            "fin", "identification does not know fins: leave them out here, and add them to the vehicle file later"
+        )
+    if layout.has_dead_time:
+        yield key_line("commands.T_d", "identification finds delays itself: leave it out here")
 
 
 def _mistakes_in_known(file: _ReadableFile, description: Description) -> Iterator[str]:

@@ -13,15 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.io.csv_table import Column, Columns, DataFileError, read_columns
+from rov_fmu.io.csv_table import NO_OUTPUT, PULSES, Column, Columns, DataFileError, read_columns
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.model.layout import HEAVE, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import (
     LOGGED_COMMAND,
-    NO_OUTPUT,
-    PULSES,
     TIME,
     position_column,
     refuse_slips,

@@ -23,12 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.csv_table import NO_OUTPUT, DataFileError, pulses
 from rov_fmu.io.file_kinds import DATAFLASH_SUFFIX
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Layout
 from rov_fmu.tank.arrays import Array, Flags
-from rov_fmu.tank.columns import NO_OUTPUT, pulses
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal
 

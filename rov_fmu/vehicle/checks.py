@@ -10,11 +10,16 @@ from rov_fmu.io.messages import did_you_mean, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line, validate
 from rov_fmu.model.layout import (
     ARM,
+    AXES,
     AXIS,
     BODY,
     CURVE,
+    HEAVE,
     LEAST_BETA,
+    PITCH,
+    RESTORING,
     REVERSE,
+    ROLL,
     SURGE,
     SWAY,
     YAW,
@@ -23,10 +28,13 @@ from rov_fmu.model.layout import (
     Curve,
     Declaration,
     Layout,
+    cross_declaration,
+    cross_name,
+    cross_of,
 )
-from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places, check_variable_names
-from rov_fmu.vehicle.quantity import Quantity, within
-from rov_fmu.vehicle.schema import Estimated, Hardware, Parts, given_quantities
+from rov_fmu.vehicle.geometry import check_axes, check_inputs, check_thruster_places, check_variable_names, in_words
+from rov_fmu.vehicle.quantity import Quantity, derivative_hint, within
+from rov_fmu.vehicle.schema import Body, Estimated, Hardware, Parts, given_quantities
 
 _Model = TypeVar("_Model", bound=Hardware)
 _TABLES_OF_TABLES = ("curves", "thruster", "axes", "inputs", "alternatives", "estimates", "known", "windows")
@@ -58,10 +66,16 @@ def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     wrong_names = [*_check_names(parts, lost, data)]
     yield from wrong_names
     yield from _check_keys(parts)
+    if "curves" not in lost and "battery" not in lost:
+        yield from _check_tables_of_thrust(parts)
+    if "axes" not in lost:
+        yield from _check_cross(parts)
     yield from _check_needed_tables(parts, lost)
     if lost & {"thruster", "axes", "inputs"} or not parts.axis_tables:
         return
     layout = parts.layout
+    if "fin" not in lost:
+        yield from _check_fins(parts, layout)
     wrong_places = [*check_thruster_places(layout), *_check_arm(parts, layout)]
     yield from wrong_places or check_axes(layout)
     if not (wrong_places or wrong_names):
@@ -83,6 +97,8 @@ def check_names_and_keys(parts: Hardware, lost: set[str], data: Toml) -> Iterato
     """
     yield from _check_names(parts, lost, data)
     yield from _check_keys(parts)
+    if "axes" not in lost:
+        yield from _check_cross(parts)
 
 
 # ---- Names and keys --------------------------------------------------------------------------------------------------
@@ -108,7 +124,7 @@ def _check_names(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
         if name not in used:
             yield key_line(f"curves.{name}", "no thruster has this curve")
     if "inputs" not in lost:
-        yield from _check_gains(parts.inputs, [name for _, name in names])
+        yield from _check_gains(parts.inputs, [*(name for _, name in names), *(fin.name for fin in parts.fin)])
 
 
 def _check_distinct(names: Sequence[tuple[str, str]], key: str = "") -> Iterator[str]:
@@ -150,10 +166,70 @@ def _check_keys(parts: Hardware) -> Iterator[str]:
             thrust = Curve(name, tuple(quantities))
             values = {thrust.coefficient(key): q.value for key, q in quantities.items()}
             yield from no_thrust(thrust, values, f"curves.{name}")
-        if curve.c_0_reverse and not curve.c_0:
-            yield key_line(f"curves.{name}.c_0", "this key is missing, and c_0_reverse is there")
+        for key in ("c_0", "d"):
+            if key + REVERSE in quantities and key not in quantities:
+                yield key_line(f"curves.{name}.{key}", f"this key is missing, and {key}{REVERSE} is there")
     for axis, table in parts.axis_tables.items():
         yield from _check_reverse_pairs(f"axes.{axis.name}", given_quantities(table, AXIS))
+
+
+def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
+    """Check that each curve has either coefficients or tables, and that its voltages are complete."""
+    needs_voltage = False
+    for name, curve in parts.curves.items():
+        given = given_quantities(curve, CURVE)
+        place, key = f"curves.{name}", "table" if curve.table else "tables" if curve.tables else None
+        if curve.table and curve.tables:
+            yield key_line(f"{place}.tables", "must not stand beside table")
+        if key:
+            replaced = (
+                "a_t",
+                "b_t",
+                "a_t_reverse",
+                "b_t_reverse",
+                "c_0",
+                "c_0_reverse",
+                *(("V_0", "n_V") if curve.tables else ()),
+            )
+            yield from (
+                key_line(f"{place}.{other}", f"must not stand beside {key}") for other in replaced if other in given
+            )
+        else:
+            yield from (
+                key_line(f"{place}.{other}", "this key is missing") for other in ("a_t", "b_t") if other not in given
+            )
+            if "k_t" in given:
+                yield key_line(f"{place}.k_t", "scales a table, and this curve has none: give table, or leave k_t out")
+        for one, other in (("V_0", "n_V"), ("n_V", "V_0"), ("d_reverse", "d")):
+            if one in given and other not in given:
+                yield key_line(f"{place}.{other}", f"this key is missing, and {one} is there")
+        needs_voltage |= "V_0" in given or bool(curve.tables)
+        if curve.tables and parts.battery:
+            low, high = curve.tables[0].voltage, curve.tables[-1].voltage
+            if not low <= parts.battery.voltage.value <= high:
+                reason = f"must be within the {low:g} ... {high:g} V of the tables of curves.{name}"
+                yield key_line("battery.voltage.value", reason, parts.battery.voltage.value)
+    if needs_voltage and not parts.battery:
+        yield key_line("battery", "this table with the voltage is missing, and the thrust of a curve depends on it")
+    elif parts.battery and not needs_voltage:
+        yield key_line(
+            "battery", "no thrust depends on the voltage: give a curve V_0 and n_V, or tables; or leave it out"
+        )
+
+
+def _check_fins(parts: Parts, layout: Layout) -> Iterator[str]:
+    """Check that each fin acts on an axis, and that the vehicle has surge, on whose velocity its force depends."""
+    for fin in layout.fins:
+        if not layout.has(SURGE):
+            yield key_line(
+                f"fin.{fin.name}", "its force depends on the velocity in surge, which the vehicle does not have"
+            )
+        elif not any(fin.effect(form.axis) for form in layout.axes):
+            axes = join_names([form.axis.name for form in layout.axes])
+            yield key_line(f"fin.{fin.name}", f"its lift acts on no axis of the vehicle, which are {axes}")
+    for n, name in enumerate(names := [*(t.name for t in parts.thruster), *(fin.name for fin in parts.fin)]):
+        if n >= len(parts.thruster) and name in names[:n]:
+            yield key_line(f"fin.{name}", "a thruster or a fin before it has this name")
 
 
 def _check_needed_tables(parts: Parts, lost: set[str]) -> Iterator[str]:
@@ -161,11 +237,12 @@ def _check_needed_tables(parts: Parts, lost: set[str]) -> Iterator[str]:
     if "axes" in lost:
         return
     if not parts.axis_tables:
-        yield key_line("axes", "must have at least one of surge, sway, heave, yaw")
+        yield key_line("axes", "must have at least one of surge, sway, heave, roll, pitch, yaw")
         return
     if parts.body:
         inertias = {axis.inertia: axis for axis in reversed(parts.axis_tables)}
         yield from _check_needed_keys("body", parts.body, BODY, inertias)
+        yield from _check_restoring(parts, parts.body)
     if lost & {"thruster", "arm"}:
         return
     has_arm = parts.layout.has_arm
@@ -204,7 +281,52 @@ def _check_needed_keys(
         if key in needed and key not in quantities:
             yield key_line(f"{name}.{key}", f"this key is missing, and the vehicle has {needed[key].name}")
         elif key in quantities and key not in needed:
-            yield key_line(f"{name}.{key}", "nothing of this vehicle needs it")
+            yield key_line(f"{name}.{key}", f"only {_users(key)}: remove it")
+
+
+_WITHOUT_TILTING = {"W": HEAVE, "B": HEAVE, "x_G": YAW, "y_G": YAW}
+"""The axes in which some keys of RESTORING act without roll and pitch."""
+
+
+def _users(key: str) -> str:
+    """Return the axes, in words, that need a coefficient of [body] or [arm]."""
+    if key in ARM:
+        return "yaw with thrusters that have the key arm needs it"
+    first, *others = (axis.name for axis in AXES.values() if axis.inertia == key)
+    return f"{in_words([first, *others])} need it" if others else f"{first} needs it, and there is no [axes.{first}]"
+
+
+def _check_restoring(parts: Parts, body: Body) -> Iterator[str]:
+    """Check that weight, buoyancy and their centres act on the vehicle, and that W and B are given together."""
+    given = given_quantities(body, RESTORING)
+    for key in given:
+        axes = [axis for axis in (_WITHOUT_TILTING.get(key), ROLL, PITCH) if axis]
+        if not {*axes} & {*parts.axis_tables}:
+            yield key_line(f"body.{key}", f"acts only in {in_words([a.name for a in axes])}: remove it, or add an axis")
+    for key in ("W", "B"):
+        if given and key not in given:
+            yield key_line(f"body.{key}", f"this key is missing, and {next(iter(given))} is there")
+
+
+def _check_cross(parts: Hardware) -> Iterator[str]:
+    """Check that the coefficients in [cross] are of axes that the vehicle has, and are named in one way only."""
+    has = {axis.velocity for axis in parts.axis_tables}
+    for name, quantity in parts.cross.items():
+        key, row = f"cross.{name}", cross_of(name)
+        if row is None or len({*row[1:]}) == 1:
+            default = ", only m_a_uq, b_d_uq, a_d_uq and Y_ur, or others of two axes; drag of one axis is in [axes]"
+            yield key_line(key, f"there is no such key{derivative_hint(name) or default}")
+            continue
+        kind, *velocities = row
+        missing = [axis.name for axis in AXES.values() if axis.velocity in velocities and axis.velocity not in has]
+        free = 1 if kind == "lift" else 0 if kind == "m_a" else 2
+        ordered = cross_name(kind, *velocities[:free], *sorted(velocities[free:], key="uvwpqr".index))
+        if missing:
+            yield key_line(key, f"the vehicle has no {' and no '.join(missing)}: remove this key, or add the axis")
+        elif ordered != name:
+            yield key_line(key, f"write {ordered}, which is the same coefficient")
+        else:
+            yield from check_quantities("cross", {name: quantity}, {name: cross_declaration(kind, *velocities)})
 
 
 # ---- Arm, coupling, coefficients -------------------------------------------------------------------------------------
@@ -220,9 +342,10 @@ def _check_arm(parts: Parts, layout: Layout) -> Iterator[str]:
 
 def _check_coupling(parts: Parts, layout: Layout) -> Iterator[str]:
     """Check that a coupled vehicle has the axes for it, and that β leaves each of them a finite inertia."""
-    if not layout.coupled:
+    has_entries = "m_a" in {key for key, *_ in layout.cross} or not {"x_G", "y_G", "z_G"}.isdisjoint(layout.restoring)
+    if not (layout.coupled or has_entries):
         return
-    coupled = (SURGE, SWAY, YAW)
+    coupled = tuple(parts.axis_tables) if layout.has_attitude or has_entries else (SURGE, SWAY, YAW)
     if missing := [axis.name for axis in coupled if not layout.has(axis)]:
         yield key_line("body.coupling", f"needs surge, sway and yaw; there is no {' and no '.join(missing)}")
         return

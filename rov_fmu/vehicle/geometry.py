@@ -1,13 +1,20 @@
-"""Checks whether the thrusters of a vehicle can drive its axes; each mistake gives one line."""
+"""Checks whether the thrusters of a vehicle can drive its axes, and whether its mass, damping and weight are possible.
+
+Each mistake gives one line.
+"""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from math import hypot
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from math import hypot, sqrt
+from typing import Any
 
 from rov_fmu.io.toml_file import join_names, key_line
-from rov_fmu.model.layout import YAW, Layout
+from rov_fmu.model.layout import PITCH, ROLL, YAW, Axis, Layout, cross_name
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.schema import where
 
+_RIGHTED = (ROLL, PITCH)
 _PARALLEL = 1e-6
 """Thrusters can drive two axes only together if the sine of the angle between the axes' rows of effects is smaller."""
 
@@ -24,29 +31,39 @@ def check_layout(layout: Layout) -> Iterator[str]:
 
 
 def check_thruster_places(layout: Layout) -> Iterator[str]:
-    """Check that each thruster has either a position or an arm, where yaw needs one."""
+    """Check that each thruster has either a position or an arm, where the vehicle turns."""
+    losing = {curve.name for curve in layout.curves if "d" in curve.keys}
     for thruster in layout.thrusters:
         key, (x, y, _) = f"thruster.{thruster.name}", thruster.direction
         if thruster.arm and thruster.position:
             yield key_line(f"{key}.arm", "must not stand beside position")
         elif thruster.arm and x <= 0.0:
             yield key_line(f"{key}.arm", "must be of a thruster that pushes ahead; give its position instead")
-        elif layout.has(YAW) and not thruster.arm and thruster.position is None and hypot(x, y) > _PARALLEL:
-            yield key_line(f"{key}.position", "this key, or arm, is missing, and the vehicle has yaw")
+        elif thruster.arm and thruster.curve in losing:
+            yield key_line(f"{key}.arm", f"d of the curve {thruster.curve} needs a place: give the thruster's position")
+        elif not thruster.arm and thruster.position is None:
+            turning = [axis.name for axis in (ROLL, PITCH, YAW) if layout.has(axis)]
+            if layout.has_attitude or (turning and hypot(x, y) > _PARALLEL):
+                yield key_line(f"{key}.position", f"this key, or arm, is missing, and the vehicle has {turning[0]}")
 
 
 def check_axes(layout: Layout) -> Iterator[str]:
-    """Check that each thruster acts on an axis, and that the thrusters can drive each axis without the others."""
+    """Check that each thruster acts on an axis, and that the thrusters can drive each axis without the others.
+
+    Roll and pitch need no thruster, because weight and buoyancy right the vehicle. An axis without thrusters may have
+    fins.
+    """
     axes = [vehicle_axis.axis for vehicle_axis in layout.axes]
     for thruster in layout.thrusters:
         if not any(thruster in layout.drivers(axis) for axis in axes):
             reason = f"acts on no axis of the vehicle, which are {join_names([axis.name for axis in axes])}"
             yield key_line(f"thruster.{thruster.name}", reason)
     independent: list[tuple[str, list[float]]] = []  # axes, with orthonormal rows of the thrusters' effects
-    for axis in axes:
+    for axis in (axis for axis in axes if axis not in _RIGHTED):
+        if not layout.drivers(axis) and any(fin.effect(axis) for fin in layout.fins):
+            continue
         if not layout.drivers(axis):
-            reason = "no thruster has an arm about the vertical axis" if axis is YAW else "no thruster drives it"
-            yield key_line(f"axes.{axis.name}", reason)
+            yield key_line(f"axes.{axis.name}", _undriven(axis))
             continue
         rest = _unit([thruster.effect(axis) for thruster in layout.thrusters])
         coupled = []
@@ -59,19 +76,31 @@ def check_axes(layout: Layout) -> Iterator[str]:
             independent.append((axis.name, _unit(rest)))
         else:
             reason = f"the thrusters cancel: they drive it only together with {join_names(coupled)}"
-            yield key_line(f"axes.{axis.name}", reason)
+            yield key_line(f"axes.{axis.name}", f"{reason}; correct a direction or a position, or remove this table")
+
+
+def _undriven(axis: Axis) -> str:
+    """Return what to do about an axis that no thruster drives."""
+    if axis is YAW:
+        return "no thruster turns the vehicle: give one a position beside the line of its force, or remove this table"
+    return f"no thruster drives it: give one a direction with a part {axis.positive}, or remove this table"
 
 
 def check_inputs(layout: Layout) -> Iterator[str]:
     """Check that each input drives an axis; if all do, check that each axis has an input."""
     driven = {axis: layout.signs(axis) for axis in (one.axis for one in layout.axes) if layout.drivers(axis)}
-    idle = [name for name in layout.mix if not any(f"u_{name}" in signs for signs in driven.values())]
+    steering = {name for fin in layout.fins for name in layout.gains[fin.name]}
+    idle = [
+        name
+        for name in layout.mix
+        if f"u_{name}" not in steering and not any(f"u_{name}" in signs for signs in driven.values())
+    ]
     for name in idle:
         yield key_line(f"inputs.{name}", "drives no axis of the vehicle: its gains cancel")
     if idle:
         return
     for axis, signs in driven.items():
-        if not signs:
+        if not signs and axis not in _RIGHTED:
             yield key_line(f"axes.{axis.name}", "no input drives it: the gains cancel")
 
 
@@ -87,3 +116,116 @@ def check_variable_names(layout: Layout) -> Iterator[str]:
     for name, count in Counter(names).items():
         if count > 1:
             yield key_line(name, "two variables of the FMU would have this name; rename a curve or a thruster")
+
+
+# ---- Mass, damping, weight -------------------------------------------------------------------------------------------
+
+_GRAVITY = 9.81
+_TOLERANCE = 0.03
+"""The largest relative difference between W and 9.81 m_rov that gives no warning."""
+_LEAST = 1e-9
+"""The smallest eigenvalue of a positive definite matrix, whose diagonal is 1."""
+
+
+def check_mass(rov: Rov) -> Iterator[str]:
+    """Yield a line if the mass matrix is not positive definite: the vehicle would accelerate against its load."""
+    entries = [(a, b) for key, a, b, *_ in rov.layout.cross if key == "m_a"]
+    if not entries and not any(rov.coefficients.get(f"{axis}_G") for axis in "xyz"):
+        return
+    try:
+        mass = {name[5:]: value for name, value in rov.parameters.items() if name.startswith("mass_")}
+    except ZeroDivisionError:  # a pivot of a singular matrix, or a β
+        yield key_line(
+            "cross", "the mass matrix must be positive definite, not singular: reduce m_a_.., or x_G, y_G, z_G"
+        )
+        return
+    axes = [name[0] for name in mass if name[0] == name[1]]
+    names = [rov.layout.by_velocity[velocity].axis.name for velocity in axes]
+    for a, b in combinations(axes, 2):
+        most = sqrt(mass[a + a] * mass[b + b])
+        if abs(mass.get(a + b, 0.0)) >= most:
+            scale = sqrt(rov[f"beta_{a}"] * rov[f"beta_{b}"])
+            pair = in_words([names[axes.index(a)], names[axes.index(b)]])
+            key = cross_name("m_a", a, b)
+            place = f"cross.{key}" if (a, b) in entries else f"body.{(key := _centre(a, b))}"
+            allowed = f"within ±{most * scale:.4g} for a positive definite matrix, but it is {mass[a + b] * scale:.4g}"
+            reason = f"the entry of the mass matrix for {pair}, with that of the centre of mass, must be {allowed}"
+            yield key_line(f"{place}.value", reason, rov[key])
+            return
+    matrix = [[_entry(mass, a, b) / sqrt(mass[a + a] * mass[b + b]) for b in axes] for a in axes]
+    if axes and _least_eigenvalue(matrix) < _LEAST:
+        reduce = join_names([cross_name("m_a", a, b) for a, b in entries])
+        reason = f"the mass matrix of {in_words(names)} must be positive definite: reduce {reduce or 'x_G, y_G, z_G'}"
+        yield key_line("cross" if entries else "body", reason)
+
+
+def doubts(rov: Rov) -> Iterator[str]:
+    """Yield a line about each combination of numbers that is possible but probably wrong."""
+    yield from _doubts_of_damping(rov)
+    yield from _doubts_of_weight(rov)
+
+
+def _doubts_of_damping(rov: Rov) -> Iterator[str]:
+    """Doubt a linear damping that adds energy to some motions: its symmetric part has a negative eigenvalue."""
+    cross = {(a, b): rov[cross_name("b_d", a, b)] for key, a, b, *_ in rov.layout.cross if key == "b_d"}
+    if not cross:
+        return
+    damping = {}
+    for form in rov.layout.axes:
+        ends = {rov[form.coefficient(key)] for key in ("b_d", "b_d_reverse")}
+        damping[form.axis.velocity] = min(ends)
+    entries = {pair: (cross.get(pair, 0.0) + cross.get(pair[::-1], 0.0)) / 2.0 for pair in combinations(damping, 2)}
+    adds = "the linear damping adds energy to some slow motions of"
+    names = {form.axis.velocity: form.axis.name for form in rov.layout.axes}
+    for (a, b), entry in entries.items():
+        if abs(entry) > (most := sqrt(damping[a] * damping[b])) * (1.0 + _LEAST):
+            given = [cross_name("b_d", *pair) for pair in ((a, b), (b, a)) if pair in cross]
+            total = f"{' + '.join(given)} should be within ±{2.0 * most:.4g}"
+            yield key_line(f"cross.{given[0]}.value", f"{adds} {names[a]} and {names[b]}: {total}", rov[given[0]])
+            return
+    scale = {velocity: sqrt(value) or 1.0 for velocity, value in damping.items()}
+    full = {(a, a): value for a, value in damping.items()} | entries
+    matrix = [[full.get((a, b), full.get((b, a), 0.0)) / scale[a] / scale[b] for b in damping] for a in damping]
+    if _least_eigenvalue(matrix) < -_LEAST:
+        coupled = {velocity for pair in cross for velocity in pair}
+        yield key_line(
+            "cross", f"{adds} {in_words([name for v, name in names.items() if v in coupled])}: reduce its b_d_.."
+        )
+
+
+def _doubts_of_weight(rov: Rov) -> Iterator[str]:
+    """Doubt a weight that does not fit the mass, and a buoyancy that turns the vehicle upside down."""
+    k = rov.coefficients
+    if "W" not in k:
+        return
+    mass = k.get("m_rov", 0.0)
+    if mass and abs(k["W"] / (_GRAVITY * mass) - 1.0) > _TOLERANCE:
+        weighs = f"m_rov = {mass:g} kg weighs {_GRAVITY * mass:.4g} N: one of the two is probably wrong"
+        yield key_line("body.W.value", weighs, k["W"])
+    z_G, z_B = (k.get(name, 0.0) for name in ("z_G", "z_B"))
+    if k["W"] * z_G < k["B"] * z_B:
+        below = f"buoyancy acts below the centre of mass, z_G = {z_G:g} m, and turns the vehicle upside down"
+        yield key_line("body.z_B.value", f"{below}; z is positive down, so a centre of buoyancy above has less z", z_B)
+
+
+def in_words(names: Sequence[str]) -> str:
+    """Return names as a sentence lists them: surge, sway and yaw."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _centre(a: str, b: str) -> str:
+    """Return the coordinate of the centre of mass in the entry of the mass matrix of a velocity and a rate."""
+    return f"{'xyz'[3 - 'uvw'.index(a) - 'pqr'.index(b)]}_G"
+
+
+def _entry(entries: Mapping[str, float], a: str, b: str) -> float:
+    """Return an entry of a symmetric matrix, of which one half is given."""
+    return entries.get(a + b, entries.get(b + a, 0.0))
+
+
+def _least_eigenvalue(matrix: Sequence[Sequence[float]]) -> Any:
+    """Return the smallest eigenvalue of a symmetric matrix."""
+    from numpy.linalg import eigvalsh  # NumPy, which few files need
+
+    return eigvalsh(matrix)[0]

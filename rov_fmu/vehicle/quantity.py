@@ -1,4 +1,8 @@
-"""The building blocks of the tables of a vehicle file: texts, names, and values with their unit and source."""
+"""The building blocks of the tables of a vehicle file: texts, names, and values with their unit and source.
+
+Hydrodynamic derivatives in the notation of Fossen and SNAME (X_udot, X_u|u|, X_u) are negative; hints say what to give
+instead of them.
+"""
 
 import re
 from typing import Annotated, Any, Literal
@@ -6,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from rov_fmu.io.toml_file import Strict, as_tuple, table_of
-from rov_fmu.model.layout import Declaration
+from rov_fmu.model.layout import AXES, Axis, Declaration, cross_name
 
 
 def _printable(text: str) -> str:
@@ -78,14 +82,67 @@ def within(value: float, declaration: Declaration) -> float:
     return value
 
 
-def quantity(name: str, declaration: Declaration) -> Any:
-    """Return a kind of Quantity that has the unit and the bounds of a coefficient."""
+def quantity(name: str, declaration: Declaration, negative: str = "") -> Any:
+    """Return a kind of Quantity that has the unit and the bounds of a coefficient.
+
+    `negative` says what to give instead of a negative value.
+    """
+
+    def check(value: float) -> float:
+        try:
+            return within(value, declaration)
+        except ValueError as error:
+            raise ValueError(f"{error}{negative if value < 0.0 else ''}") from error
+
     bounds = {"type": "number", "minimum": declaration.minimum, "maximum": declaration.maximum}
     fields: dict[str, Any] = {
         "value": (
-            Annotated[Finite, AfterValidator(lambda value: within(value, declaration)), WithJsonSchema(bounds)],
+            Annotated[Finite, AfterValidator(check), WithJsonSchema(bounds)],
             ...,
         ),
         "unit": (Literal[declaration.unit], ...),
     }
     return table_of(name, Quantity, fields, declaration.description)
+
+
+# ---- Fossen's notation -----------------------------------------------------------------------------------------------
+
+_LETTERS = "XYZKMN"
+_AXES = {axis.velocity: axis for axis in AXES.values()}
+_VELOCITY = "([uvwpqr])"
+_BARS = r"(?:_?\|_?|_?abs_?)"
+_FORMS = {
+    "m_a": re.compile(f"([XYZKMN])_?(?:{_VELOCITY}_?(?:dot|d)|(?:dot_?|d){_VELOCITY})"),
+    "a_d": re.compile(
+        f"([XYZKMN])_?(?:{_BARS}{_VELOCITY}{_BARS}?{_VELOCITY}|{_VELOCITY}{_BARS}{_VELOCITY}{_BARS}?|{_VELOCITY}{_BARS}"
+        rf"|{_VELOCITY}\7)"
+    ),
+    "b_d": re.compile(f"([XYZKMN])_?{_VELOCITY}"),
+}
+"""How programs write the derivatives of added mass, quadratic and linear damping."""
+
+
+def derivative(key: str, axis: Axis) -> str:
+    """Return the derivative of an axis that m_a, a_d or b_d replaces, in Fossen's notation: X_udot, X_u|u| or X_u."""
+    v = axis.velocity
+    return f"{_LETTERS['uvwpqr'.index(v)]}_{v}{ {'m_a': 'dot', 'a_d': f'|{v}|', 'b_d': ''}[key] }"
+
+
+def derivative_hint(key: str) -> str:
+    """Return what to write instead of a key that is a derivative or a moment of inertia in another notation, or ""."""
+    if inertia := re.fullmatch(r"I_?([xyz])\1?", key):
+        return f"; write I_{dict(zip('xyz', 'pqr', strict=True))[inertia[1]]} in [body]"
+    for name, form in _FORMS.items():
+        if not (found := form.fullmatch(key)):
+            continue
+        along = _AXES["uvwpqr"[_LETTERS.index(found[1])]]
+        velocities = [velocity for velocity in found.groups()[1:] if velocity]
+        if {*velocities} == {along.velocity}:
+            return f"; give -{derivative(name, along)}, which is positive, as {name} of [axes.{along.name}]"
+        pair = [along.velocity, velocities[-1]]
+        if name == "m_a":
+            pair.sort(key="uvwpqr".index)
+        elif len({*velocities}) > 1:
+            return ""
+        return f"; give its negative as {cross_name(name, *pair)} in [cross]"
+    return ""

@@ -1,28 +1,49 @@
 """The pydantic models of the vehicle file, with every table and key; `model.layout` declares the coefficients."""
 
+import os
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from math import hypot
+from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo, WithJsonSchema
 
-from rov_fmu.io.toml_file import DOCUMENTED, Strict, as_tuple, table_of
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.paths import inside_or_shipped
+from rov_fmu.io.toml_file import DOCUMENTED, Strict, as_tuple, folder_of, table_of
 from rov_fmu.model import layout
 from rov_fmu.model.layout import (
     ARM,
     AXES,
     AXIS,
     BODY,
+    COMMANDS,
     CURVE,
+    FIN,
+    RESTORING,
     TUNING,
     Axis,
     CoefficientKind,
     Declaration,
     Layout,
+    ThrustTable,
     VehicleAxis,
 )
 from rov_fmu.vehicle.description import FileHead, Made, Validity
-from rov_fmu.vehicle.quantity import Finite, Name, Quantity, Symbol, Text, not_blank, quantity
+from rov_fmu.vehicle.quantity import (
+    Finite,
+    Name,
+    Quantity,
+    Symbol,
+    Text,
+    derivative,
+    derivative_hint,
+    not_blank,
+    quantity,
+)
+from rov_fmu.vehicle.thrust_table import ThrustFile, read_thrust
 
 FORMAT = 2
 UNTUNED = 1.0
@@ -40,11 +61,15 @@ def _coefficients(
     declarations: Mapping[str, Declaration],
     kinds: Mapping[str, CoefficientKind] | None = None,
     words: str = "",
+    negative: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Return a table with a key for each coefficient. A key is required if its kind says so; without kinds, none is."""
+    """Return a table with a key for each coefficient. A key is required if its kind says so; without kinds, none is.
+
+    `negative` says, by the key, what to give instead of a negative value.
+    """
     fields: dict[str, Any] = {}
     for key, declaration in declarations.items():
-        one = quantity(f"{name}_{key}", declaration)
+        one = quantity(f"{name}_{key}", declaration, negative.get(key, ""))
         if kinds and key in kinds and kinds[key].needed:
             fields[key] = (one, Field(description=declaration.description))
         else:
@@ -76,13 +101,19 @@ def _all_optional(table: Any, kinds: Mapping[str, CoefficientKind]) -> Any:
 # ---- Body, arm, curves, axes -----------------------------------------------------------------------------------------
 
 
-class Body(_coefficients("Body", {key: kind.meta() for key, kind in BODY.items()})):  # type: ignore[misc]
-    """The mass, needed for surge, sway and heave, and the moment of inertia, needed for yaw."""
+class Body(_coefficients("Body", {key: kind.meta() for key, kind in (BODY | RESTORING).items()})):  # type: ignore[misc]
+    """The mass, needed for surge, sway and heave; the moments of inertia about the origin, needed for roll, pitch and
+    yaw; weight and buoyancy with their centres, which act in roll and pitch."""
 
     model_config = DOCUMENTED
 
     coupling: bool = False
-    """True if surge, sway and yaw are coupled by the Coriolis and Munk terms of a diagonal mass matrix."""
+    """True if the axes are coupled by the Coriolis and Munk terms of the mass matrix. Without roll and pitch, these act
+    in surge, sway and yaw."""
+
+
+class Commands(_coefficients("Commands", {key: kind.meta() for key, kind in COMMANDS.items()})):  # type: ignore[misc]
+    """The way of the commands to the thrusters and fins."""
 
 
 class Arm(_coefficients("Arm", {key: kind.meta() for key, kind in ARM.items()}, ARM)):  # type: ignore[misc]
@@ -92,9 +123,41 @@ class Arm(_coefficients("Arm", {key: kind.meta() for key, kind in ARM.items()}, 
 _CURVE = {key: kind.meta(curve="curve", equation="(2)") for key, kind in CURVE.items()}
 
 
-class Curve(_coefficients("Curve", _CURVE, CURVE)):  # type: ignore[misc]
-    """A thrust curve a_t m² + b_t m, where m is the command beyond the dead band. In reverse the curve is mirrored,
-    unless it has its own coefficients there."""
+def _thrust_file(name: object, info: ValidationInfo) -> ThrustFile:
+    """Read a table of thrust beside the vehicle file. Raises ValueError."""
+    if not isinstance(name, str):
+        raise ValueError("must be text in quotes")
+    path = inside_or_shipped(folder_of(info), name)
+    if not os.path.isfile(path):  # noqa: PTH113 (Path.is_file raises an exception if the name is too long)
+        raise ValueError("there is no such file beside the vehicle file")
+    try:
+        return read_thrust(path)
+    except DataFileError as error:
+        raise ValueError(str(error).splitlines()[0]) from error
+
+
+_Thrust = Annotated[InstanceOf[ThrustFile], BeforeValidator(_thrust_file), WithJsonSchema({"type": "string"})]
+
+
+class TableAtVoltage(Strict):
+    """A table of thrust that was measured at a voltage."""
+
+    voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
+    """The voltage, V."""
+    table: _Thrust
+    """The name of the CSV file."""
+
+
+def _rising(tables: list[TableAtVoltage]) -> list[TableAtVoltage]:
+    """Return the tables if there are at least two and their voltages rise. Raises ValueError."""
+    if len(tables) < 2 or any(low.voltage >= high.voltage for low, high in pairwise(tables)):
+        raise ValueError("must be at least two tables with rising voltages")
+    return tables
+
+
+class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
+    """A thrust curve: a_t m² + b_t m, where m is the command beyond the dead band, or a measured table. In reverse the
+    coefficients hold as ahead, unless the curve has its own there."""
 
     model_config = DOCUMENTED
 
@@ -104,11 +167,43 @@ class Curve(_coefficients("Curve", _CURVE, CURVE)):  # type: ignore[misc]
     """The equation or table in which the curve is published."""
     together: Annotated[int, Field(ge=1, le=MOST)] = 1
     """The number of thrusters that gave the force together when the curve was measured."""
+    table: _Thrust | None = None
+    """The name of a CSV file beside this one, or of one that ships (`bluerov2/t200/t200_16_v.csv`), with the columns
+    `command [1]`, `[%]` or `[us]`, and `thrust [N]`, `[kgf]` or `[lbf]`. It replaces a_t, b_t and c_0."""
+    tables: Annotated[list[TableAtVoltage], AfterValidator(_rising), Field(max_length=MOST)] | None = None
+    """Tables at several voltages, which replace `table`. Between two voltages, the thrust is interpolated linearly."""
+
+    @property
+    def thrust_files(self) -> tuple[Path, ...]:
+        """The paths of the tables."""
+        if self.table:
+            return (self.table.path,)
+        return tuple(row.table.path for row in self.tables or ())
+
+    def plain(self, name: str) -> layout.Curve:
+        """Return the curve of the model."""
+        keys = _coefficient_keys(self, CURVE)
+        measured: tuple[ThrustTable, ...] = ()
+        if self.table:
+            measured = (self.table.table(f"thrust_{name}"),)
+        elif self.tables:
+            rows = enumerate(self.tables, 1)
+            measured = tuple(row.table.table(f"thrust_{name}_{n}", row.voltage) for n, row in rows)
+        if measured:
+            keys = ("k_t", *(key for key in keys if key in ("V_0", "n_V", "d", "d_reverse", "T")))
+        words = self.description or ""
+        return layout.Curve(name, keys, self.together, words, self.equation, measured)
 
 
 _AXIS_DESCRIPTION = "Velocity {0.velocity} in {0.unit}, positive {0.positive}."
 _tables = {
-    axis.name: _coefficients(axis.name.capitalize(), layout.metas_of(axis), AXIS, _AXIS_DESCRIPTION.format(axis))
+    axis.name: _coefficients(
+        axis.name.capitalize(),
+        layout.metas_of(axis),
+        AXIS,
+        _AXIS_DESCRIPTION.format(axis),
+        {key: f"; give -{derivative(key, axis)} as a positive {key}" for key in ("m_a", "a_d", "b_d")},
+    )
     for axis in AXES.values()
 }
 _axes: dict[str, Any] = {name: (table | None, None) for name, table in _tables.items()}
@@ -119,7 +214,7 @@ class Axes(table_of("_Axes", Strict, _axes)):  # type: ignore[misc]
     """The axes that the vehicle has."""
 
 
-OpenArm, OpenCurve = _all_optional(Arm, ARM), _all_optional(Curve, CURVE)
+OpenArm = _all_optional(Arm, ARM)
 OpenAxes = table_of("_OpenAxes", Strict, _open_axes, Axes.__doc__)
 
 
@@ -151,6 +246,15 @@ def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     return vector
 
 
+def _unit_vector(direction: layout.Vector) -> layout.Vector:
+    """Return a direction as a unit vector."""
+    x, y, z = direction
+    length = hypot(x, y, z)
+    if abs(length - 1.0) <= 1e-12:  # a unit vector stays as it is
+        length = 1.0
+    return x / length, y / length, z / length
+
+
 _Vector = Annotated[
     tuple[Finite, Finite, Finite],
     BeforeValidator(_vector),
@@ -168,8 +272,9 @@ class Direction(Strict):
 
 
 class Position(Strict):
-    """The position from the centre of mass: forward, starboard, down. It is needed for yaw, unless the thruster has
-    the key `arm` or acts straight up or down."""
+    """The position from the origin of the body frame, which is the centre of mass unless [body] says otherwise:
+    forward, starboard, down. It is needed for roll, pitch and yaw, unless the thruster has the key `arm`, or only turns
+    in yaw and acts straight up or down."""
 
     value: Annotated[_Vector, AfterValidator(_near)]
     """Three numbers: forward, starboard, down."""
@@ -194,18 +299,41 @@ class Thruster(Strict):
 
     def plain(self) -> layout.Thruster:
         """Return the thruster of the model, with a unit vector as its direction."""
-        x, y, z = self.direction.value
-        length = hypot(x, y, z)
-        if abs(length - 1.0) <= 1e-12:  # a unit vector stays as it is
-            length = 1.0
         return layout.Thruster(
             self.name,
             self.curve,
-            (x / length, y / length, z / length),
+            _unit_vector(self.direction.value),
             self.position.value if self.position else None,
             {None: 0, "port": 1, "starboard": -1}[self.arm],
             self.description or "",
         )
+
+
+class Fin(_coefficients("Fin", {key: kind.meta(fin="fin") for key, kind in FIN.items()}, FIN)):  # type: ignore[misc]
+    """A control surface: its lift is `lift` u|u| δ, its drag is `drag` u|u| δ², and its angle δ is angle_max times the
+    command."""
+
+    model_config = DOCUMENTED
+
+    name: Symbol
+    """The name. The FMU's variable for the command contains it: `u_<name>`."""
+    description: Name | None = None
+    """A short description, for example "rudder"."""
+    direction: Direction
+    """The direction of the lift at a positive command while the vehicle moves ahead."""
+    position: Position
+
+    def plain(self) -> layout.Fin:
+        """Return the fin of the model, with a unit vector as its direction."""
+        unit = _unit_vector(self.direction.value)
+        return layout.Fin(self.name, unit, self.position.value, self.drag is not None, self.description or "")
+
+
+class Battery(Strict):
+    """The battery, on whose voltage the thrust depends."""
+
+    voltage: quantity("Battery_voltage", Declaration("V", "Voltage of the battery", 0.1, 1000.0))  # type: ignore[valid-type]
+    """The value of the FMU's input `voltage` that holds unless it is set."""
 
 
 # ---- The file --------------------------------------------------------------------------------------------------------
@@ -250,12 +378,21 @@ class _Opening(Strict):
 class Hardware(Strict):
     """The tables that describe the body, the thrusters, the axes and the inputs of a vehicle."""
 
+    hint = staticmethod(derivative_hint)
+
     body: Body | None = None
     arm: Arm | None = None
     curves: dict[Symbol, Curve] = Field(default={}, max_length=MOST)
     """The thrust curves by name. The names of their coefficients in the FMU contain it: `a_t_<name>`."""
     thruster: list[Thruster] = Field(default=[], max_length=MOST)
+    fin: list[Fin] = Field(default=[], max_length=MOST)
+    """The control surfaces, one table [[fin]] each."""
+    battery: Battery | None = None
+    commands: Commands | None = None
     axes: Axes | None = None
+    cross: dict[Symbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
+    """Coefficients of two or three axes by their names in the FMU: added mass `m_a_uq`, damping `b_d_uq` and `a_d_uq`,
+    lift `Y_ur`."""
     inputs: dict[Symbol, dict[str, _Gain]] = Field(default={}, max_length=MOST)
     """Commands that drive several thrusters. Each has a table of the thrusters that it drives, with their gains."""
 
@@ -268,29 +405,40 @@ class Hardware(Strict):
     def layout(self) -> Layout:
         """The layout of the vehicle, for the model."""
         axes = tuple(VehicleAxis(axis, _coefficient_keys(table, AXIS)) for axis, table in self.axis_tables.items())
-        curves = tuple(
-            layout.Curve(name, _coefficient_keys(curve, CURVE), curve.together, curve.description or "", curve.equation)
-            for name, curve in self.curves.items()
-        )
+        curves = tuple(curve.plain(name) for name, curve in self.curves.items())
         coupled = bool(self.body and self.body.coupling)
-        return Layout(axes, curves, tuple(t.plain() for t in self.thruster), self.inputs, coupled)
+        thrusters = tuple(t.plain() for t in self.thruster)
+        cross = tuple(filter(None, map(layout.cross_of, self.cross)))
+        restoring = tuple(key for key in RESTORING if self.body and getattr(self.body, key) is not None)
+        fins = tuple(fin.plain() for fin in self.fin)
+        voltage = self.battery.voltage.value if self.battery else None
+        return Layout(
+            axes, curves, thrusters, self.inputs, coupled, cross, restoring, fins, self.has_dead_time, voltage
+        )
+
+    @property
+    def has_dead_time(self) -> bool:
+        """True when the file gives a dead time."""
+        return bool(self.commands and self.commands.T_d)
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
         """Return what these tables give for each coefficient of a vehicle; None where they do not give it."""
         found: dict[str, Quantity | None] = {}
-        for name, place in where(of):
-            table: Any = self
-            for key in place:
+        fins = {fin.name: fin for fin in self.fin}
+        for name, (first, *keys) in where(of):
+            table: Any = fins if first == "fin" else getattr(self, first)
+            for key in keys:
                 table = table.get(key) if isinstance(table, dict) else getattr(table, key, None)
             found[name] = table
         return found
 
     @property
     def thruster_sources(self) -> dict[str, dict[str, str]]:
-        """The sources of `direction` and `position`, by the name of the thruster."""
+        """The sources of `direction` and `position`, by the name of the thruster or the fin."""
+        driven: list[Thruster | Fin] = [*self.thruster, *self.fin]
         return {
             t.name: {"direction": t.direction.source} | ({"position": t.position.source} if t.position else {})
-            for t in self.thruster
+            for t in driven
         }
 
 
@@ -298,7 +446,6 @@ class OpenHardware(Hardware):
     """The tables of Hardware, in which the coefficients that are still to be identified may be missing."""
 
     arm: OpenArm | None = None  # type: ignore[valid-type]
-    curves: dict[Symbol, OpenCurve] = Field(default={}, max_length=MOST)  # type: ignore[valid-type]
     axes: OpenAxes | None = None  # type: ignore[valid-type]
 
 
@@ -330,12 +477,16 @@ class File(Parts):
 
 def where(of: Layout) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield the name of each coefficient in the FMU, and its place in the vehicle file: the tables and the key."""
-    yield from ((key, ("body", key)) for key in BODY if key in of.coefficients)
+    yield from ((key, ("body", key)) for key in (*BODY, *RESTORING) if key in of.coefficients)
     yield from ((key, ("arm", key)) for key in ARM if key in of.coefficients)
+    yield from ((key, ("commands", key)) for key in COMMANDS if key in of.coefficients)
     for curve in of.curves:
         yield from ((curve.coefficient(key), ("curves", curve.name, key)) for key in CURVE if key in curve.keys)
+    for fin in of.fins:
+        yield from ((fin.coefficient(key), ("fin", fin.name, key)) for key in FIN if key != "drag" or fin.has_drag)
     for keys in (AXIS, TUNING):
         for vehicle_axis in of.axes:
             axis = vehicle_axis.axis
             present = keys if keys is TUNING else (key for key in keys if key in vehicle_axis.keys)
             yield from ((axis.coefficient(key), ("axes", axis.name, key)) for key in present)
+    yield from ((name, ("cross", name)) for name in (layout.cross_name(*row) for row in of.cross))

@@ -1,14 +1,32 @@
-"""The vehicles that ship, by name."""
+"""The vehicles that ship, by name, and the layout of the paper's vehicle."""
 
 from pathlib import Path
 
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_suffix
 from rov_fmu.io.messages import FileError, did_you_mean
 from rov_fmu.io.paths import MODELS
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Curve, Layout, Thruster, VehicleAxis
 
 SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODELS.iterdir()) if folder.is_dir()}
 """The vehicle files that ship, by name."""
 VIDEORAY = SHIPPED["videoray"]
+
+PAPER = Layout(
+    axes=(VehicleAxis(SURGE), VehicleAxis(HEAVE), VehicleAxis(YAW)),
+    curves=(
+        Curve("rear", together=2, description="rear pair", equation="(9)"),
+        Curve("top", description="top thruster", equation="(10)"),
+    ),
+    thrusters=(
+        Thruster("l", "rear", (1.0, 0.0, 0.0), arm=1, description="left thruster"),
+        Thruster("r", "rear", (1.0, 0.0, 0.0), arm=-1, description="right thruster"),
+        Thruster("t", "top", (0.0, 0.0, 1.0), description="top thruster"),
+    ),
+)
+"""The layout of the paper's vehicle: surge, heave and yaw, a pair of rear thrusters and one on top."""
+_SOURCE = "the form of the paper's vehicle: two rear thrusters ahead, one down"
+PAPER_SOURCES = {thruster.name: {"direction": _SOURCE} for thruster in PAPER.thrusters}
+"""The sources of the thrusters' directions, by the name of the thruster."""
 
 
 def find_vehicle(given: str | Path) -> Path:

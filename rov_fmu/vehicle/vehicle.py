@@ -1,5 +1,6 @@
 """The class Vehicle, and reading and checking vehicle files (TOML)."""
 
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite, sin
@@ -10,12 +11,13 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
-from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, shown
+from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, one_line, shown
 from rov_fmu.io.toml_file import key_line, problem_lines, read_toml, validate
 from rov_fmu.model.layout import Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.checks import check_parts, no_thrust, readable_parts
 from rov_fmu.vehicle.description import PICTURES, TABLES
+from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
 
@@ -84,6 +86,10 @@ class Vehicle:
     estimates: Mapping[str, Estimated] = field(default_factory=dict)
     """The standard errors and correlations of identified coefficients, by name."""
     provenance: Provenance | None = None
+    voltage_source: str = ""
+    """The source of the battery's voltage."""
+    thrust_files: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
+    """The files of the thrust tables, by curve, in the order of the curve's tables."""
     thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """The sources of `direction` and `position`, by the name of the thruster."""
 
@@ -180,14 +186,18 @@ def _number(name: str, value: object) -> float:
 
 def _contradictions(rov: Rov) -> Iterator[str]:
     """Yield a line about coefficients that are within their bounds but impossible together."""
-    for curve in rov.layout.curves:
+    for curve in (curve for curve in rov.layout.curves if not curve.tables):
         yield from no_thrust(curve, rov.coefficients, f"curve {curve.name}")
     if rov.layout.has_arm and rov["R"] * sin(rov["gamma"]) == 0.0:
         yield "R, gamma: must both be more than 0, because R sin γ is the arm of the thrusters"
+    yield from check_mass(rov)
 
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
-    """Read a vehicle file. Raises VehicleFileError. `coming` is a report that need not exist yet."""
+    """Read a vehicle file. Raises VehicleFileError, and warns about numbers that are probably wrong.
+
+    `coming` is a report that need not exist yet.
+    """
     path = Path(path)
     data = read_toml(path, VehicleFileError)
     check_keys(path, data, VEHICLE_FILE, VehicleFileError)
@@ -206,6 +216,11 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         raise VehicleFileError(*lines_on(path, mistakes))
     head, made, layout = file.vehicle, file.provenance, file.layout
     folders, found = head.folders_from(path.parent), file.quantities(layout)
+    rov = Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()})
+    if mistakes := [*check_mass(rov)]:
+        raise VehicleFileError(*lines_on(path, mistakes))
+    for doubt in doubts(rov):
+        warnings.warn(one_line(f"{path}: {doubt}"), UserWarning, stacklevel=2)
     provenance = None
     if made:
         provenance = Provenance(made.tool, made.method, made.inputs, made.warnings, made.report_in(path.parent))
@@ -215,7 +230,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         version=head.version,
         description=head.description,
         source=head.source,
-        rov=Rov(layout, {name: q.value if q else UNTUNED for name, q in found.items()}),
+        rov=rov,
         sources={name: q.source if q else NOT_GIVEN for name, q in found.items()},
         command_range=file.validity.command_range,
         alternatives={
@@ -232,5 +247,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         intervals={name: q.interval for name, q in found.items() if q and q.interval},
         estimates=file.estimates,
         provenance=provenance,
+        voltage_source=file.battery.voltage.source if file.battery else "",
+        thrust_files={name: curve.thrust_files for name, curve in file.curves.items() if curve.thrust_files},
         thruster_sources=file.thruster_sources,
     )

@@ -1,6 +1,6 @@
 """Writing vehicle files (TOML), completely or not at all."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,7 +14,7 @@ from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.seal import sealed
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import Curve, Declaration, Thruster
+from rov_fmu.model.layout import Curve, Declaration, Fin, Thruster
 from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
 from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
@@ -38,7 +38,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     document["vehicle"] = {key: getattr(vehicle, key) for key in Head.model_fields} | folders
     document["validity"] = {"command_min": low, "command_max": high} | _texts("limits", vehicle.limits)
     quantities = {name: _quantity(vehicle, name) for name, source in vehicle.sources.items() if source != NOT_GIVEN}
-    for key, table in _hardware(vehicle, quantities).items():
+    for key, table in _hardware(vehicle, quantities, folder).items():
         document[key] = table
     if vehicle.alternatives:
         document["alternatives"] = {name: _alternative(vehicle, one) for name, one in vehicle.alternatives.items()}
@@ -52,23 +52,62 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     return sealed(text, "# {}") if vehicle.provenance else text
 
 
-def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item]) -> dict[str, Any]:
-    """Return the tables of the body, the curves, the thrusters, the axes and the inputs."""
+def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) -> dict[str, Any]:
+    """Return the tables of the body, the curves, the thrusters, the fins, the axes and the inputs."""
     layout = vehicle.layout
     tables: dict[str, Any] = {"body": {"coupling": True} if layout.coupled else {}}
     if layout.has_arm:
         tables["arm"] = {}
-    tables["curves"] = {curve.name: _curve(curve) for curve in layout.curves}
+    if layout.has_dead_time:
+        tables["commands"] = {}
+    if layout.voltage is not None:
+        tables["battery"] = {
+            "voltage": _inline_table({"value": layout.voltage, "unit": "V", "source": vehicle.voltage_source})
+        }
+    tables["curves"] = {
+        curve.name: _curve(curve) | _thrust_tables(curve, vehicle.thrust_files.get(curve.name, ()), folder)
+        for curve in layout.curves
+    }
     tables["thruster"] = tomlkit.aot()
     for thruster in layout.thrusters:
         tables["thruster"].append(tomlkit.item(_thruster(thruster, vehicle.thruster_sources[thruster.name])))
+    fins = {fin.name: tomlkit.item(_fin(fin, vehicle.thruster_sources[fin.name])) for fin in layout.fins}
+    if fins:
+        tables["fin"] = tomlkit.aot()
+        for fin in fins.values():
+            tables["fin"].append(fin)
     tables["axes"] = {vehicle_axis.axis.name: {} for vehicle_axis in layout.axes}
+    if layout.cross:
+        tables["cross"] = {}
     if layout.mix:
         tables["inputs"] = {name: _inline_table(gains) for name, gains in layout.mix.items()}
     for name, (*above, key) in where(layout):
         if name in quantities:
-            _table_at(tables, above)[key] = quantities[name]
+            table = fins[above[1]] if above[0] == "fin" else _table_at(tables, above)
+            table[key] = quantities[name]
     return tables
+
+
+def _thrust_tables(curve: Curve, files: Sequence[Path], folder: Path) -> dict[str, Any]:
+    """Return the keys that name the thrust tables of a curve. Raises ValueError."""
+    names = [name_of(file, folder) for file in files]
+    if not names:
+        return {}
+    if not curve.tables[0].voltage:
+        return {"table": names[0]}
+    rows = zip(curve.tables, names, strict=True)
+    return {"tables": [_inline_table({"voltage": table.voltage, "table": name}) for table, name in rows]}
+
+
+def _fin(fin: Fin, sources: Mapping[str, str]) -> dict[str, Any]:
+    """Return the table of a fin, without its coefficients."""
+    words = {"description": fin.description} if fin.description else {}
+    return {
+        "name": fin.name,
+        **words,
+        "direction": _inline_table({"value": [*fin.direction], "source": sources["direction"]}),
+        "position": _inline_table({"value": [*fin.position], "unit": "m", "source": sources["position"]}),
+    }
 
 
 def _table_at(tables: Any, path: Iterable[str]) -> Any:
@@ -112,7 +151,7 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
         if (value := _rounded(exact)) == _rounded(vehicle.rov[name]):
             continue
         *above, key = places[name]
-        table = _table_at(document, above)
+        table = _fin_of(document, above[1]) if above[0] == "fin" else _table_at(document, above)
         if key in table:
             table[key]["value"], table[key]["source"] = value, reason
             table[key].pop("interval", None)
@@ -120,6 +159,11 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
             table[key] = _quantity_table(value, vehicle.layout.coefficients[name], reason)
         _remove_estimate(document, name)
     write_whole(_moved(document, source, path))
+
+
+def _fin_of(document: Any, name: str) -> Any:
+    """Return the table of a fin."""
+    return next(fin for fin in document["fin"] if fin["name"] == name)
 
 
 def _remove_estimate(document: Any, name: str) -> None:
@@ -147,15 +191,26 @@ def _read_document(source: Path) -> Any:
 
 def _moved(document: Any, source: Path, path: Path) -> Output:
     """Return the file to write. It names its folders and report relative to its new place. Raises VehicleFileError."""
-    for table, key in (("vehicle", "data"), ("vehicle", "pictures"), ("provenance", "report")):
-        if key in document.get(table, {}):
-            name = document[table][key]
-            try:
-                document[table][key] = name_of(inside_or_shipped(source.parent, name), path.parent)
-            except ValueError as error:
-                reason = f"must be inside the folder of the new file: write that beside {source}, or leave this key out"
-                raise VehicleFileError(f"{path}: {key_line(f'{table}.{key}', reason, str(name))}") from error
+    for place, table, key in _names_of_files(document):
+        name = table[key]
+        try:
+            table[key] = name_of(inside_or_shipped(source.parent, name), path.parent)
+        except ValueError as error:
+            reason = f"must be inside the folder of the new file: write that beside {source}, or leave this key out"
+            raise VehicleFileError(f"{path}: {key_line(f'{place}.{key}', reason, str(name))}") from error
     return _checked(path, tomlkit.dumps(document))
+
+
+def _names_of_files(document: Any) -> Iterator[tuple[str, Any, str]]:
+    """Yield each key that names a folder or another file: the name of its table, the table and the key."""
+    tables = [(name, document.get(name, {})) for name in ("vehicle", "provenance")]
+    for name, curve in document["curves"].items():
+        tables.append((f"curves.{name}", curve))
+        tables += [(f"curves.{name}.tables", row) for row in curve.get("tables", ())]
+    for name, table in tables:
+        for key in ("data", "pictures", "report", "table"):
+            if key in table:
+                yield name, table, key
 
 
 def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
