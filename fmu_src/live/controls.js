@@ -55,6 +55,7 @@ class Live {
     this.sliders = [...part("controls").querySelectorAll("input")].filter((input) => input.type === "range");
     this.track = pilot.has("x") ? new TrackView(part("track"), this.flight) : null;
     this.compass = pilot.has("psi") ? new Compass(part("compass")) : null;
+    this.horizon = pilot.has("phi") ? new Horizon(part("horizon")) : null;
     this.depth = pilot.has("z") ? new DepthTape(part("depth")) : null;
     this.charts = this.vehicle.axes.map((axis, n) => new Chart(part(`chart-${axis.name}`), axis, n));
     this.isSeen = true;
@@ -128,6 +129,9 @@ class Live {
       this.flight.ghostShown ||= !this.flight.isOther && this.isTuned();
     } else if (slider.dataset.kind === "load") {
       this.flight.set({ [name]: Number(slider.value) });
+    } else if (slider.dataset.kind === "start") {
+      this.takeOver();
+      this.flight.beginAt(name, (Number(slider.value) * Math.PI) / 180);
     } else {
       this.takeOver();
     }
@@ -339,12 +343,14 @@ class Live {
     const ghost = flight.ghostShown;
     this.track?.draw(flight);
     this.compass?.draw(flight, ghost);
+    this.horizon?.draw(flight, ghost);
     this.depth?.draw(flight, ghost);
     for (const chart of this.charts) chart.draw(flight, this.span, ghost);
-    const heading = ((Math.round((model.get("psi") * 180) / Math.PI) % 360) + 360) % 360;
+    const [roll, pitch, heading] = attitudeOf(model);
     const readings = [`${shown(flight.time, 1)} s`];
     if (model.has("x")) readings.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);
     if (model.has("z")) readings.push(`depth ${shown(model.get("z"), 2)} m`);
+    if (model.has("phi")) readings.push(`roll ${shown(roll, 0)}°`, `pitch ${shown(pitch, 0)}°`);
     if (model.has("psi")) readings.push(`heading ${shown(heading, 0)}°`);
     part("readings").textContent = readings.join(" · ");
   }

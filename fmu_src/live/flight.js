@@ -102,6 +102,12 @@ class Flight {
     for (const since of this.since) Object.assign(since, { time: 0, velocity: 0 });
   }
 
+  /** Begins anew with another Euler angle at the start. @param {string} name @param {number} angle */
+  beginAt(name, angle) {
+    for (const { model } of [this.pilot, this.ghost]) model.set(name, angle);
+    this.reset();
+  }
+
   /** Sets inputs of both vehicles by name. @param {Record<string, number>} given */
   set(given) {
     const { model } = this.pilot;
@@ -213,14 +219,14 @@ function handedOver(from, to, get) {
 }
 
 /**
- * Returns the commands for demands along axes. Each axis drives its commands with their signs.
+ * Returns the commands for demands along axes. Each axis drives its commands by their shares.
  * @param {Vehicle} vehicle @param {Map<string, number>} demands @returns {Record<string, number>}
  */
 function commandsOf(vehicle, demands) {
   /** @type {Record<string, number>} */
   const commands = Object.fromEntries(vehicle.commands.map((name) => [name, 0]));
-  for (const { name, signs } of vehicle.axes) {
-    for (const [command, sign] of Object.entries(signs)) commands[command] += sign * (demands.get(name) ?? 0);
+  for (const { name, shares } of vehicle.axes) {
+    for (const [command, share] of Object.entries(shares)) commands[command] += share * (demands.get(name) ?? 0);
   }
   for (const name of vehicle.commands) commands[name] = Math.max(-1, Math.min(1, commands[name]));
   return commands;

@@ -6,12 +6,16 @@
 
 IMPORTED(sin) double sin(double x);
 IMPORTED(cos) double cos(double x);
+IMPORTED(atan2) double atan2(double y, double x);
 IMPORTED(expm1) double expm1(double x);
 IMPORTED(atanh) double atanh(double x);
+IMPORTED(log) double log(double x);
 IMPORTED(pow) double pow(double x, double y);
 
 #define INFINITY __builtin_inf()
 #define isfinite(x) __builtin_isfinite(x)
+#define ceil(x) __builtin_ceil(x)
+#define floor(x) __builtin_floor(x)
 #define fabs(x) __builtin_fabs(x)
 #define sqrt(x) __builtin_sqrt(x)
 

@@ -3,9 +3,9 @@
 
 /**
  * An axis: the names of its velocity, load and position, their units, the commands that drive it with their signs, and the letters
- * of the keys that drive it in its positive and in its negative direction.
+ * of the keys that drive it in its positive and in its negative direction. `shares` are the commands by which the keys drive it.
  * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string,
- *   signs: Record<string, number>, keys: string}} Axis
+ *   signs: Record<string, number>, shares: Record<string, number>, keys: string}} Axis
  */
 /**
  * A thruster: the variable of its force, its place (x, y) and direction (x, y, z) in the body frame, its strongest force in N.
@@ -22,8 +22,8 @@
  */
 /**
  * The exports of fmu_src/live/module.c.
- * @typedef {{memory: WebAssembly.Memory, variables: () => number, marks: () => number, tune: () => void, step: (h: number) => number,
- *   observe: () => void}} Exports
+ * @typedef {{memory: WebAssembly.Memory, variables: () => number, marks: () => number, tune: () => void, begin: () => void,
+ *   step: (h: number) => number, observe: () => void}} Exports
  */
 
 class Model {
@@ -40,6 +40,7 @@ class Model {
     this.marks = new Float64Array(memory.buffer, marks(), 2 * vehicle.axes.length);
     this.places = new Map(vehicle.variables.map(([name], place) => [name, place]));
     this.values.set(vehicle.variables.map(([, start]) => start));
+    this.exports.begin();
     this.tune();
   }
 
@@ -82,7 +83,19 @@ class Model {
   reset() {
     const { inputs, states, variables } = this.vehicle;
     for (let i = inputs; i < inputs + states; i++) this.values[i] = variables[i][1];
+    this.exports.begin();
     this.exports.observe();
+  }
+
+  /** Sets the quaternion to that of the Euler angles, which may have been set, if the vehicle has an attitude. */
+  turn() {
+    const angles = ["phi", "theta", "psi"].filter((name) => this.has(`${name}_0`));
+    const starts = angles.map((name) => this.get(`${name}_0`));
+    for (const name of angles) this.set(`${name}_0`, this.get(name));
+    this.exports.begin();
+    angles.forEach((name, n) => {
+      this.set(`${name}_0`, starts[n]);
+    });
   }
 
   /** Steps h seconds with the inputs held. Returns false, and changes nothing, when that overflows. @param {number} h */

@@ -10,11 +10,15 @@
 
 static double at[N_VARIABLES];       /* the variables, by their places */
 static double marks[N_MONITORED][2]; /* V_ss and Tau of each velocity */
+static double heading;               /* counts turns */
+static double elapsed;               /* seconds since the start */
+static delay_line line;              /* the commands that wait for the dead time */
 static model_numbers numbers;        /* these follow from the coefficients */
 
 EXPORT("variables") double *variables_start(void);
 EXPORT("marks") double *marks_start(void);
 EXPORT("tune") void tune(void);
+EXPORT("begin") void begin(void);
 EXPORT("step") int step(double h);
 EXPORT("observe") void observe(void);
 
@@ -34,16 +38,31 @@ void tune(void)
     model_prepare(at, &numbers);
 }
 
+/* Begin at rest with the attitude of the parameters at the start, and with no command on its way. */
+void begin(void)
+{
+    model_begin(at, &heading);
+    elapsed = 0.0;
+#if HAS_DEAD_TIME
+    line.waiting = 0;
+    for (int i = 0; i < N_COMMANDS; i++) {
+        at[FIRST_DELAYED + i] = 0.0;
+    }
+#endif
+}
+
 /* Step h > 0 seconds with the inputs held. Return 0, and change nothing, when the step is refused or its result overflows. */
 int step(double h)
 {
     double next[N_STATES];
-    bool done = model_step(at, &numbers, h, next);
+    bool done = delayed_step(at, &numbers, &line, elapsed, h, next, &heading) > 0;
     for (int i = 0; i < N_STATES; i++) {
         done &= isfinite(next[i]) != 0;
     }
     if (done) {
         memcpy(at + FIRST_STATE, next, sizeof next);
+        delay_commit(at, &line, elapsed, h);
+        elapsed += h;
     }
     return done;
 }
@@ -53,7 +72,7 @@ int step(double h)
 void observe(void)
 {
     double C[N_MONITORED], A[N_MONITORED], B[N_MONITORED];
-    model_calculate(at, &numbers);
+    model_calculate(at, &numbers, heading);
     model_alone(at, &numbers, C, A, B);
     for (int a = 0; a < N_MONITORED; a++) {
         const double force = fabs(C[a]), p = -expm1(-1.0);

@@ -142,7 +142,7 @@ function columnOf(header, file, vehicle) {
   }
   for (const [axis, { name, velocity, position, positionUnit }] of axes.entries()) {
     const own = axis === alone;
-    const words = { z: "depth", psi: "heading" }[position ?? ""];
+    const words = { z: "depth", phi: "roll angle", theta: "pitch angle", psi: "heading" }[position ?? ""];
     const isPosition = [position, words, `${name} distance`].includes(title) || (own && title === "distance");
     const isVelocity = [velocity, `${name} velocity`].includes(title) || (own && title === "velocity");
     if (!isPosition && !isVelocity) continue;
@@ -213,6 +213,7 @@ class Playback {
         if (name) craft.model.set(name, this.measured[n].now);
         else craft.distances[axis] = this.measured[n].now;
       });
+      craft.model.turn();
       craft.track = [];
       craft.forget(1);
       craft.keep();
@@ -264,6 +265,7 @@ class Playback {
       else distances[axis] = isPosition ? now : distances[axis] + now * h;
     });
     const [u, v, psi] = ["u", "v", "psi"].map((name) => model.get(name));
+    model.turn();
     model.set("x", model.get("x") + h * (u * Math.cos(psi) - v * Math.sin(psi) + model.get("V_N")));
     model.set("y", model.get("y") + h * (u * Math.sin(psi) + v * Math.cos(psi) + model.get("V_E")));
     return true;

@@ -54,16 +54,26 @@ class Figure {
 
   /** @param {Model} model @param {number} east The centre in px. @param {number} north @param {number} scale px per m */
   draw(model, east, north, scale) {
-    const angle = (model.get("psi") * 180) / Math.PI;
-    place(this.group, {
-      transform: `translate(${east.toFixed(1)} ${north.toFixed(1)}) rotate(${angle.toFixed(2)}) scale(${scale.toFixed(3)})`,
-    });
+    const [forward, starboard] = fromAbove(model);
+    const entries = [starboard[1], -starboard[0], -forward[1], forward[0]].map((x) => (x * scale).toFixed(3));
+    place(this.group, { transform: `matrix(${entries.join(" ")} ${east.toFixed(1)} ${north.toFixed(1)})` });
     const { size, thrusters } = this.vehicle;
     thrusters.forEach(({ at, along, force, most }, n) => {
       const share = model.get(force) / most;
       this.forces[n].setAttribute("d", Math.abs(share) < 0.004 ? "" : forceOf(at, along, share, size));
     });
   }
+}
+
+/** Returns the directions forward and to starboard, north and east, as they are seen from above. @param {Model} model */
+function fromAbove(model) {
+  const [phi, theta, psi] = ["phi", "theta", "psi"].map((name) => model.get(name));
+  const [s, c] = [Math.sin(psi), Math.cos(psi)];
+  const [along, aside] = [Math.sin(phi) * Math.sin(theta), Math.cos(phi)];
+  return [
+    [c * Math.cos(theta), s * Math.cos(theta)],
+    [along * c - aside * s, along * s + aside * c],
+  ];
 }
 
 /** Returns the path for a thruster's force: an arrow, a cross for a force down, or a diamond for a force up.
@@ -187,6 +197,50 @@ class Compass {
       place(this.needles[n], { transform: `rotate(${turned} 60 60)`, visibility: n || ghost ? "visible" : "hidden" });
     });
   }
+}
+
+/** An artificial horizon: it sinks when the bow rises, and leans to port when the starboard side goes down. */
+class Horizon {
+  /** @param {Element} svg */
+  constructor(svg) {
+    const window = drawn(svg, "svg", { x: 10, y: 2, width: 100, height: 100, viewBox: "-50 -50 100 100" });
+    drawn(window, "rect", { class: "above", x: -50, y: -50, width: 100, height: 100 });
+    this.world = drawn(window, "g");
+    drawn(this.world, "rect", { class: "below", x: -200, y: 0, width: 400, height: 400 });
+    drawn(this.world, "path", { class: "scale", d: "M-200 0H200" });
+    for (const angle of [-60, -30, 30, 60]) {
+      drawn(this.world, "path", { class: "scale thin", d: `M-12 ${angle * HORIZON_SCALE}H12` });
+      drawn(this.world, "text", { x: 15, y: angle * HORIZON_SCALE + 4 }).textContent = `${Math.abs(angle)}`;
+    }
+    this.ghost = drawn(window, "path", { class: "line ghostly", d: "M-200 0H200" });
+    drawn(window, "path", { class: "force", d: "M-34 0H-14L-8 6M34 0H14L8 6M0 0h.1" });
+    drawn(svg, "rect", { class: "frame", x: 10, y: 2, width: 100, height: 100 });
+    this.angles = [
+      drawn(svg, "text", { x: 10, y: 116 }),
+      drawn(svg, "text", { class: "right", x: 110, y: 116 }),
+      drawn(svg, "text", { class: "centred", x: 60, y: 130 }),
+    ];
+  }
+
+  /** @param {Flight} flight @param {boolean} ghost */
+  draw(flight, ghost) {
+    const [other, own] = [flight.ghost, flight.pilot].map(({ model }) => attitudeOf(model));
+    const transform = (/** @type {number[]} */ [phi, theta]) =>
+      `rotate(${(-phi).toFixed(1)}) translate(0 ${(theta * HORIZON_SCALE).toFixed(1)})`;
+    place(this.world, { transform: transform(own) });
+    place(this.ghost, { transform: transform(other), visibility: ghost ? "visible" : "hidden" });
+    own.forEach((angle, n) => {
+      this.angles[n].textContent = `${"φθψ"[n]} ${shown(angle, 0)}°`;
+    });
+  }
+}
+
+const HORIZON_SCALE = 0.8; // of the picture, per degree
+
+/** Returns the roll angle, the pitch angle and the heading (from 0 to 359) in degrees. @param {Model} model */
+function attitudeOf(model) {
+  const [phi, theta, psi] = ["phi", "theta", "psi"].map((name) => (model.get(name) * 180) / Math.PI);
+  return [phi, theta, ((Math.round(psi) % 360) + 360) % 360];
 }
 
 /** A tape of depths that runs past a mark. */

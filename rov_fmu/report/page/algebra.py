@@ -34,10 +34,11 @@ class Group:
 
 @dataclass(frozen=True)
 class Call:
-    """A function of a sum: sin, cos, abs, or sgn (the sign)."""
+    """A function of a sum: sin, cos, abs, sqrt, sgn (the sign), or atan2, which has a second argument."""
 
     function: str
     inner: Sum
+    second: Sum = ()
 
 
 @dataclass(frozen=True)
@@ -92,8 +93,8 @@ class Reader:
                 return times(self._read(node.left), self._read(node.right))
             case ast.BinOp(op=ast.Div()):
                 return times(self._read(node.left), inverse(self._read(node.right)))
-            case ast.Call(func=ast.Name(id=function), args=[argument]):
-                return (Product(1, (Call(function, self._read(argument)),)),)
+            case ast.Call(func=ast.Name(id=function), args=arguments):
+                return (Product(1, (Call(function, *map(self._read, arguments)),)),)
             case ast.IfExp():
                 return self._choice(node)
         raise ValueError(f"{ast.unparse(node)}: there is no way to show this")
@@ -186,6 +187,8 @@ def _directed(subject: Product, forward: Sum, reverse: Sum) -> Sum:
 
     Parameters that differ become a `Choice`; if the signs differ, the product gets the factor sgn.
     """
+    if not forward and not reverse:
+        return ()
     sign = Product(1, (Call("sgn", (subject,)),))
     if forward == negative(reverse):
         return times((sign,), (_single(forward),))
@@ -236,7 +239,7 @@ def _tidied(factor: Factor) -> Factor:
 def _with_common_factors(terms: Sum) -> Sum:
     """Return the sum with a common first factor of several products before a bracket: a x - a y becomes a (x - y).
 
-    Numbers count as equal if their first four digits are.
+    Numbers count as equal if their first twelve digits are.
     """
     together: dict[object, list[Product]] = {}
     for place, product in enumerate(terms):
@@ -245,7 +248,7 @@ def _with_common_factors(terms: Sum) -> Sum:
         if head is None:
             key = place  # a product of one factor shares it with no other
         elif isinstance(head, float):
-            key = f"{head:.4g}"
+            key = f"{head:.12g}"
         together.setdefault(key, []).append(product)
     found: list[Product] = []
     for first, *others in together.values():

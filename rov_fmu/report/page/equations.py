@@ -6,8 +6,22 @@ from itertools import groupby
 
 from markupsafe import escape
 
+from rov_fmu.model.attitude import rotation_formulas
 from rov_fmu.model.equation import Equation, equation_of
-from rov_fmu.model.layout import AXIS, BODY, CURVE, REVERSE, TUNING, YAW, Curve, Layout, Thruster
+from rov_fmu.model.layout import (
+    AXIS,
+    BODY,
+    CURVE,
+    RESTORING,
+    REVERSE,
+    TUNING,
+    YAW,
+    Curve,
+    Layout,
+    Thruster,
+    VehicleAxis,
+    cross_name,
+)
 from rov_fmu.report.page.algebra import Call, Cases, Choice, Factor, Group, Product, Reader, Sum, arranged, inverse
 from rov_fmu.report.templates import RAISED, number
 
@@ -35,6 +49,8 @@ class Line:
     right: Sum
     reference: str = ""
     """The number of the equation in the paper, or another publication of it."""
+    coupled: tuple[tuple[str, str], ...] = ()
+    """The other rates on the left: the names of their factors and of the variables."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +60,8 @@ class CurveLines:
     curve: Curve
     thrusters: list[Thruster]
     thrust: list[Line]
+    advance: list[Line]
+    """The loss of thrust per speed of advance, if there is one."""
     lag: list[Line]
     torque: list[Line]
 
@@ -54,22 +72,30 @@ class Equations:
 
     motion: list[Line]
     inertia: list[Line]
-    """The effective inertias M, if axes are coupled or have an added mass."""
+    """The entries of the effective mass matrix M, if axes are coupled or have an added mass."""
     commands: list[Line]
-    """The command of each thruster, if inputs are mixed."""
+    """The command of each thruster, if inputs are mixed, and the angle of each fin."""
     curves: list[CurveLines]
     pose: list[Line]
+    rotation: list[Line]
+    """The entries of the rotation matrix R, if the vehicle rolls or pitches."""
+    angles: list[Line]
+    """The Euler angles, if the vehicle rolls or pitches."""
 
     def __iter__(self) -> Iterator[Line]:
         """Iterate over all equations in the order of the page."""
-        of_curves = (line for curve in self.curves for line in (*curve.thrust, *curve.lag, *curve.torque))
-        yield from (*self.motion, *self.inertia, *self.commands, *of_curves, *self.pose)
+        of_curves = (
+            line for curve in self.curves for line in (*curve.thrust, *curve.advance, *curve.lag, *curve.torque)
+        )
+        yield from (*self.motion, *self.inertia, *self.commands, *of_curves)
+        yield from (*self.pose, *self.rotation, *self.angles)
 
 
 def of(layout: Layout) -> Equations:
     """Return the equations of a vehicle."""
     equation = equation_of(layout)
     inlined = _inlined(layout, equation)
+    rotation = [name for name in equation.heading if name.startswith("R_")]
     reader = Reader(inlined)
 
     def line(name: str, formula: str, reference: str = "") -> Line:
@@ -83,50 +109,91 @@ def of(layout: Layout) -> Equations:
             right = tuple(Product(p.sign, p.above, tuple(f for f in p.below if f != factor)) for p in right)
         return Line(tuple(below), name, True, arranged(right), reference)
 
+    entries = _mass_entries(equation)
+
+    def motion(form: VehicleAxis) -> Line:
+        """Return the equation of motion of an axis: with effective masses on the left, if the axis has several."""
+        v = form.axis.velocity
+        found = rate(v, equation.rates[v], form.axis.equations[1])
+        pairs = [((b if a == v else a), name) for (a, b), name in entries.items() if v in (a, b)]
+        others = [(name, other) for other, name in pairs if other in layout.by_velocity]
+        return replace(found, factors=(f"M_{v}",), coupled=tuple(others)) if others else found
+
     inertia = []
-    for v in (form.axis.velocity for form in layout.axes if _has_effective_inertia(layout)):
-        inertia.append(Line((), f"M_{v}", False, inverse(Reader({}).read(equation.parameters[f"gain_{v}"]))))
+    if _has_effective_inertia(layout, equation):
+        for v in layout.by_velocity:
+            inertia.append(Line((), f"M_{v}", False, inverse(Reader({}).read(equation.parameters[f"gain_{v}"]))))
+        for (a, b), name in entries.items():
+            inertia.append(Line((), name, False, arranged(Reader({}).read(equation.parameters[f"mass_{a}{b}"]))))
     curves = []
     for curve in layout.curves:
         thrusters = [t for t in layout.thrusters if t.curve == curve.name]
         first = thrusters[0].name
         name = f"steady_{first}" if curve.has_lag else f"F_{first}"
         thrust = [line(name, equation.thrust[name], curve.equation)]
-        if f"beyond_{first}" not in inlined:
+        if f"beyond_{first}" in equation.thrust and f"beyond_{first}" not in inlined:
             thrust.append(line(f"beyond_{first}", equation.thrust[f"beyond_{first}"]))
+        loss = f"loss_{first}"
+        advance = [line(loss, equation.thrust[loss])] if loss in equation.thrust else []
         lag = [rate(f"F_{first}", equation.lagging[f"F_{first}"][0])] if curve.has_lag else []
         by_arm = any(t.position is None for t in layout.drivers(YAW) if t in thrusters)
         tau = f"tau_{curve.name}"
         torque = [line(tau, equation.forces[tau], "(4)" if by_arm else "")] if tau in equation.forces else []
-        curves.append(CurveLines(curve, thrusters, thrust, lag, torque))
+        curves.append(CurveLines(curve, thrusters, thrust, advance, lag, torque))
     mixed = [t.name for t in layout.thrusters if f"mixed_{t.name}" in equation.thrust]
     return Equations(
-        [rate(f.axis.velocity, equation.rates[f.axis.velocity], f.axis.equations[1]) for f in layout.axes],
+        [motion(form) for form in layout.axes],
         inertia,
-        [line(f"command_{name}", f"mixed_{name}") for name in mixed],
+        [
+            *(line(f"command_{name}", f"mixed_{name}") for name in mixed),
+            *(line(f"angle_{fin.name}", equation.thrust[f"angle_{fin.name}"]) for fin in layout.fins),
+        ],
         curves,
         [rate(name, equation.rates[name]) for name in layout.pose],
+        [line(name, equation.heading[name]) for name in rotation],
+        [line(name, formula) for name, formula in equation.outputs.items()],
     )
+
+
+def coupled(layout: Layout) -> list[str]:
+    """Return the names of the axes with Coriolis and Munk terms."""
+    coefficients = " ".join(equation_of(layout).parameters)
+    return [form.axis.name for form in layout.axes if f"coupling_{form.axis.velocity}" in coefficients]
+
+
+def _mass_entries(equation: Equation) -> dict[tuple[str, str], str]:
+    """Return the entries of the mass matrix off the diagonal: by two velocities, the name on the page."""
+    pairs = [(name[-2], name[-1]) for name in equation.parameters if name.startswith("mass_")]
+    return {(a, b): f"m_{a}{b}" for a, b in pairs if a != b}
 
 
 def _inlined(layout: Layout, equation: Equation) -> dict[str, str]:
     """Return the formulas to write in place of their names. A name with an equation of its own stays."""
     found = {
-        name: formula for name, formula in equation.program.items() if not name.startswith(("F_", "tau_", "steady_"))
+        name: formula
+        for name, formula in equation.program.items()
+        if not name.startswith(("F_", "tau_", "steady_", "loss_", "R_", "table_", "angle_", "battery"))
     }
+    if layout.has_attitude:
+        found["square_length"] = "1"
     for thruster in layout.thrusters:
         if f"mixed_{thruster.name}" in equation.thrust:
             del found[f"command_{thruster.name}"]
         if "c_0" in layout.curve_of[thruster.name].keys:
             del found[f"beyond_{thruster.name}"]
-    if _has_effective_inertia(layout):
-        found |= {f"gain_{form.axis.velocity}": f"1 / M_{form.axis.velocity}" for form in layout.axes}
+    if _has_effective_inertia(layout, equation):
+        found |= {f"gain_{v}": f"1 / M_{v}" for v in layout.by_velocity}
+    found |= {f"mass_{v}{v}": f"M_{v}" for v in layout.by_velocity}
+    found |= {f"mass_{a}{b}": name for (a, b), name in _mass_entries(equation).items()}
+    for name in equation.parameters:  # the page multiplies by the mass matrix instead of its inverse
+        if name.startswith("inverse_"):
+            found[name] = "1" if name[-1] == name[-2] else "0"
     return found
 
 
-def _has_effective_inertia(layout: Layout) -> bool:
+def _has_effective_inertia(layout: Layout, equation: Equation) -> bool:
     """Return True if the effective inertias have equations of their own."""
-    return layout.coupled or any("m_a" in form.keys for form in layout.axes)
+    return layout.coupled or bool(_mass_entries(equation)) or any("m_a" in form.keys for form in layout.axes)
 
 
 def choices(lines: Iterable[Line]) -> list[Choice]:
@@ -150,11 +217,24 @@ def _choices(terms: Sum) -> Iterator[Choice]:
 
 def symbols(layout: Layout) -> dict[str, Symbol]:
     """Return the symbol of every name in the equations of a vehicle."""
-    found = {name: Symbol(name) for name in (*layout.velocities, *layout.pose)} | {"psi": Symbol("ψ")}
-    found |= {name: Symbol(*name.split("_", 1)) for name in (*layout.inputs, *BODY)}
+    found = {name: Symbol(name) for name in (*layout.velocities, *layout.pose)}
+    found |= {"phi": Symbol("φ"), "theta": Symbol("θ"), "psi": Symbol("ψ"), "eta": Symbol("η")}
+    found |= {f"epsilon_{n}": Symbol("ε", f"{n}") for n in (1, 2, 3)}
+    found |= {name: Symbol(*name.split("_", 1)) for name in (*layout.inputs, *BODY, *RESTORING, *rotation_formulas())}
     found |= {"R": Symbol("R"), "gamma": Symbol("γ")}
+    for key, *velocities in layout.cross:
+        name = cross_name(key, *velocities)
+        letter, _, rest = name.partition("_")
+        found[name] = Symbol(letter, *rest.split("_"))
+    found |= {name: Symbol("u", name.removeprefix("delayed_u_"), "d") for name in layout.delayed}
+    found |= {"battery": Symbol("U"), "T_d": Symbol("T", "d")}
+    for fin in layout.fins:
+        found[f"angle_{fin.name}"] = Symbol("δ", fin.name)
+        found |= {fin.coefficient(key): Symbol(letter, fin.name) for key, letter in (("lift", "l"), ("drag", "d"))}
+        found[fin.coefficient("angle_max")] = Symbol("δ", "max", fin.name)
     for t in layout.thrusters:
-        letters = {"F": "F", "command": "c", "beyond": "m"}
+        found[f"table_{t.name}"] = Symbol("f", t.curve)
+        letters = {"F": "F", "command": "c", "beyond": "m", "loss": "k"}
         found |= {f"{word}_{t.name}": Symbol(letter, t.name) for word, letter in letters.items()}
         found[f"steady_{t.name}"] = Symbol("F", t.name, mark="*")
     for curve in layout.curves:
@@ -165,6 +245,7 @@ def symbols(layout: Layout) -> dict[str, Symbol]:
         found |= {form.coefficient(key): _coefficient(key, v) for key in AXIS if key in form.keys}
         found |= {form.axis.coefficient(key): Symbol({"alpha": "α", "beta": "β"}[key], v) for key in TUNING}
         found[f"M_{v}"] = Symbol("M", v)
+        found |= {f"m_{v}{other}": Symbol("m", f"{v}{other}") for other in layout.velocities}
     return found
 
 
@@ -192,6 +273,9 @@ class Text:
         "bracket": "({})",
         "abs": "|{}|",
         "sgn": "sgn({})",
+        "sqrt": "√({})",
+        "atan2": "atan2({}, {})",
+        "pow": "({})^{}",
         "function": "{} {}",
         "cases": "{1} where {0} > 0, else {2}",
     }
@@ -203,7 +287,11 @@ class Text:
         """Write one equation."""
         name = self.factor(line.name)
         rate = self.write("dotted", name) if line.is_rate else name
-        return self.write("equal", self.side_by_side([*map(self.factor, line.factors), rate]), self.sum(line.right))
+        left = self.side_by_side([*map(self.factor, line.factors), rate])
+        for factor, other in line.coupled:
+            left += self.write("sign", "+")
+            left += self.side_by_side([self.factor(factor), self.write("dotted", self.factor(other))])
+        return self.write("equal", left, self.sum(line.right))
 
     def sum(self, terms: Sum) -> str:
         """Write a sum."""
@@ -239,9 +327,9 @@ class Text:
             case Group():
                 return self.write("bracket", self.sum(factor.inner))
             case Call():
-                inner = self.sum(factor.inner)
+                parts = self.sum(factor.inner), self.sum(factor.second)
                 is_own = factor.function in self.forms
-                return self.write(factor.function, inner) if is_own else self.write("function", factor.function, inner)
+                return self.write(*([] if is_own else ["function"]), factor.function, *parts)
             case Cases():
                 values = self.sum(factor.otherwise), self.sum(factor.at_most_zero)
                 return self.write("cases", self.factor(factor.name), *values)
@@ -274,11 +362,22 @@ class MathML(Text):
         "power": "<msup>{0}<mn>{1}</mn></msup>",
         "bracket": '<mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow>',
         "abs": '<mrow><mo stretchy="false">|</mo>{}<mo stretchy="false">|</mo></mrow>',
+        "sqrt": "<msqrt>{}</msqrt>",
+        "atan2": '<mi>atan2</mi><mrow><mo stretchy="false">(</mo>{}<mo>,</mo>{}<mo stretchy="false">)</mo></mrow>',
+        "pow": '<msup><mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow><mrow>{}</mrow></msup>',
         "sgn": '<mi>sgn</mi><mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow>',
         "function": '<mspace width=".17em"/><mi>{}</mi><mspace width=".17em"/>{}<mspace width=".17em"/>',
         "cases": f"<mrow><mo>{{{{</mo><mtable><mtr>{_CELL}{{1}}</mtd>"
         f"{_CELL}<mtext>for\xa0</mtext>{{0}}<mo>&gt;</mo><mn>0</mn></mtd></mtr><mtr>{_CELL}{{2}}</mtd>{_CELL}<mtext>otherwise</mtext></mtd></mtr></mtable></mrow>",
     }
+
+    def terms(self, line: Line) -> Iterator[str]:
+        """Yield the left side with the first term, and then each term: a line may break between them."""
+        first, *others = line.right
+        yield self.line(replace(line, right=(first,)))
+        for product in others:
+            sign = "−" if product.sign < 0 else "+"
+            yield f'<mo form="infix">{sign}</mo>{self.sum((replace(product, sign=1),))}'
 
     def symbol(self, symbol: Symbol) -> str:
         letter, index, upper = (

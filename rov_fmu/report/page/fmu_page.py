@@ -1,6 +1,6 @@
 """The page documentation/index.html of an FMU: one file with the numbers and plots of its vehicle."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Decimal
 from functools import partial
@@ -37,6 +37,8 @@ from rov_fmu.report.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
+_AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
+"""The axes in the order in which the page names those that a vehicle does not have."""
 _PANEL = (3.7, 2.9)  # inches
 _PICTURES = {
     "from_above.svg": "The vehicle from above: x forward, y to starboard",
@@ -65,7 +67,8 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
     axes = [form.axis for form in layout.axes]
     first = axes[0]
     start = {name: 0.3 * sign for name, sign in layout.signs(first).items()}
-    rest = dict.fromkeys([*layout.inputs, *layout.state], 0.0)
+    rest = {**layout.usual_inputs, **layout.at_rest}
+    shown = equations.of(layout)
     own = [(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))]
     return page(
         "index.html.j2",
@@ -77,7 +80,11 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
         report=REPORT if vehicle.provenance and vehicle.provenance.report else None,
         groups=[list(group) for _, group in groupby(variables(rov), lambda v: (v.causality, v.variability, v.initial))],
         reversing=_reversing,
-        equations=equations.of(layout),
+        settable=[v.name for v in variables(rov) if v.name in layout.state and v.start is not None] + [*layout.initial],
+        other_axes=_listed(name for name in _AXES if name not in layout.kinds).capitalize(),
+        coupled=_listed(equations.coupled(layout)),
+        has_full_mass=any(line.coupled for line in shown.motion),
+        equations=shown,
         mathml=equations.MathML(layout),
         choices=equations.choices,
         mirrored=_mirrored(layout),
@@ -92,7 +99,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
         moved=float(simulate(rov, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
         moves_at_rest=any(rov.derivatives(rest, rest).values()),
         held=held,
-        motions=[motion for axis in axes for motion in _motions(rov, axis, held)],
+        motions=[motion for axis in axes if layout.signs(axis) for motion in _motions(rov, axis, held)],
         frames=[image(label, path) for label, path in own],
         thrusters=[
             _plot(f"Thrusters {view}", partial(draw_thrusters, rov=rov, scene=scene), scene.inches)
@@ -203,7 +210,7 @@ def _reversing(layout: Layout, values: Mapping[str, float]) -> list[tuple[str, f
 
 def _mirrored(layout: Layout) -> str:
     """Return, in words, which thrust curves and axes behave in reverse as forward."""
-    curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys]
+    curves = [curve.name for curve in layout.curves if "a_t_reverse" not in curve.keys and not curve.tables]
     axes = [form.axis.name for form in layout.axes if "a_d_reverse" not in form.keys]
     found = []
     if curves:
@@ -211,6 +218,12 @@ def _mirrored(layout: Layout) -> str:
     if axes:
         found.append("drag" if len(axes) == len(layout.axes) else f"drag in {', '.join(axes)}")
     return " and ".join(found)
+
+
+def _listed(words: Iterable[str]) -> str:
+    """Return words as a list in a sentence: surge, sway and yaw."""
+    *first, last = [*words] or [""]
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _is_tuned(rov: Rov) -> bool:

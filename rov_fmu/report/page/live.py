@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import floor, log10
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from rov_fmu.engine.compile import MODULE_SOURCES
@@ -102,7 +103,7 @@ def _data(flown: Flown) -> dict[str, Any]:
         "states": len(layout.state),
         "commands": list(layout.commands),
         "mixed": bool(layout.mix),
-        "axes": [_axis(layout, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
+        "axes": [_axis(rov, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
         "thrusters": [_thruster(rov, thruster) for thruster in layout.thrusters],
         "tunable": [name for name, meta in layout.coefficients.items() if meta.tunable],
         "tests": list(_tests(vehicle)),
@@ -116,8 +117,8 @@ def _keys(layout: Layout) -> list[str]:
     return [_KEYS[form.axis.name] if form.axis.name in _KEYS else next(spare) for form in layout.axes]
 
 
-def _axis(layout: Layout, axis: Axis, keys: str) -> dict[str, Any]:
-    position = {"heave": "z", "yaw": "psi"}.get(axis.name)
+def _axis(rov: Rov, axis: Axis, keys: str) -> dict[str, Any]:
+    position = {"heave": "z", "roll": "phi", "pitch": "theta", "yaw": "psi"}.get(axis.name)
     return {
         "name": axis.name,
         "velocity": axis.velocity,
@@ -125,9 +126,32 @@ def _axis(layout: Layout, axis: Axis, keys: str) -> dict[str, Any]:
         "external": axis.external,
         "position": position,
         "positionUnit": axis.position_unit,
-        "signs": layout.signs(axis),
+        "signs": rov.layout.signs(axis),
+        "shares": _shares(rov, axis),
         "keys": keys,
     }
+
+
+def _shares(rov: Rov, axis: Axis) -> dict[str, float]:
+    """Return the commands by which a key drives an axis, the largest of them ±1.
+
+    Those of a vehicle that rolls or pitches leave the other axes at rest, as far as thrust is linear in the commands.
+    """
+    layout = rov.layout
+    if not layout.has_attitude:
+        return layout.signs(axis)
+    axes = [form.axis for form in layout.axes]
+    effects = [
+        [
+            sum(rov.effect(t, one) * layout.gains[t.name].get(name, 0.0) for t in layout.thrusters)
+            for name in layout.commands
+        ]
+        for one in axes
+    ]
+    shares = np.linalg.pinv(np.array(effects), rcond=1e-9)[:, axes.index(axis)]
+    most = np.abs(shares).max(initial=0.0)
+    found = {name: round(float(x / (most or 1.0)), 4) for name, x in zip(layout.commands, shares, strict=True)}
+    return {name: share for name, share in found.items() if share}
 
 
 def _thruster(rov: Rov, thruster: Thruster) -> dict[str, Any]:
