@@ -80,7 +80,7 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
             yield from sections.plain_c(plan, measured)
             if picture_file:
                 write_whole(Output(picture_file, picture.cost_error_picture(plan, measured).encode()))
-        with say("a vehicle with coupling and lag in plain C"):
+        with say("a vehicle with six axes and lag in plain C"):
             heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
             heavier = HeavyPlan(heavy.rov, effort.commands, max(4, effort.known // 4))
             heavy_c = PlainC(heavy, Path(tempfile.mkdtemp(dir=folder)))

@@ -47,10 +47,10 @@ def _direction(straight: bool) -> str:
 
 
 def heavy(plan: HeavyPlan, measured: Measured) -> Section:
-    """Return the cost of a step of a vehicle with coupling and lag."""
+    """Return the cost of a step of a vehicle with six axes and lag."""
     rows = {"ours, without FMI": plan.ours, _NAMES[RK4]: plan.rk4}
     return [
-        ["BlueROV2 Heavy, coupling and lag", *_STEPS],
+        ["BlueROV2 Heavy, six axes and lag", *_STEPS],
         *(
             [name, *(f"{duration(measured.cost(job))}  {error(measured.error(job)):>5}" for job in jobs.values())]
             for name, jobs in rows.items()
@@ -151,7 +151,7 @@ def archive(builds: Mapping[str, tuple[int, float, float]], loaded: Sequence[flo
     ]
 
 
-FINE = 1e-10
+FINE = 1e-12
 """The error at which the Heavy is compared with RK4."""
 _SHORT = (0.001, SUBSTEP)
 _TO_RK4 = {(0.001, False): 1.5, (SUBSTEP, False): 1.7, (0.001, True): 2.2, (SUBSTEP, True): 2.2}
@@ -189,7 +189,7 @@ def promises(
     at_most("turning, with fmi2SetReal and fmi2DoStep, 10 ms", set_too, 2.0)
     for h in _SHORT:
         ratio = _ratio(measured_heavy, heavier.ours[h], heavier.rk4[h])
-        at_most(f"Heavy, coupling and lag, to one of RK4, {1000 * h:g} ms", ratio, 2.5)
+        at_most(f"Heavy, six axes and lag, to one of RK4, {1000 * h:g} ms", ratio, 16.0)
     worst = max(measured.error(plan.job(CORE, h, straight)) for h in (SUBSTEP, 1.0) for straight in (False, True))
     made.append(("its error after 1 s, in steps of 10 ms and 1 s", error(worst), "≤ 1e-13", worst <= 1e-13))
     longest = measured.cost(plan.job(CORE, H[-1], straight=True))
@@ -198,7 +198,7 @@ def promises(
         times = compared(measured, plan.sweeps[method], plan.job(CORE, 1.0))[1]
         at_least(f"{NAMES[method]} to ours, at {error(TARGET)} a command of 1 s", times, limit)
     finer = compared(measured_heavy, heavier.sweep, heavier.ours[SUBSTEP], FINE)[1]
-    at_least(f"RK4 to ours of the Heavy, to {error(FINE)}", finer, 5.0)
+    at_least(f"RK4 to ours of the Heavy, to {error(FINE)}", finer, 2.0)
     fmu, bare = (measured.seconds[plan.job(method, SUBSTEP, straight=True)] for method in (FMU, CORE))
     layer = max(0.0, float(np.median(fmu - bare)))
     made.append(("what FMI adds to a step of 10 ms", duration(layer), "≤ 20 ns", layer <= 20e-9))

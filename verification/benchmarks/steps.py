@@ -107,7 +107,7 @@ class Plan:
 
 
 class HeavyPlan:
-    """The jobs of a vehicle with coupling and lag: our steps, and RK4 with ever shorter steps."""
+    """The jobs of a vehicle with six axes and lag: our steps, and RK4 with ever shorter steps."""
 
     def __init__(self, rov: Rov, commands: int, starts: int) -> None:
         short, long = (Work(rov, False, hold, commands, known) for hold, known in ((1.0, starts), (100.0, starts // 4)))

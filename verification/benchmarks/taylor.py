@@ -7,7 +7,7 @@ commands must not turn any velocity back. It computes no thrust and looks for no
 
 import time
 from importlib.util import find_spec
-from math import cos, sin
+from math import atan2, cos, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from rov_fmu.model.equation import Term, equation_of
 from rov_fmu.model.rov import Rov
 
 NOT_INSTALLED = 'not measured: it is not installed (pip install "rov-fmu[benchmarks]")'
-_FUNCTIONS = {"sin": sin, "cos": cos, "abs": abs}
+_FUNCTIONS = {"sin": sin, "cos": cos, "abs": abs, "sqrt": sqrt, "atan2": atan2}
 Reals = NDArray[np.float64]
 
 
@@ -45,7 +45,6 @@ class Heyoka:
 
         system = [(symbols[name], heyoka.sum([product(term) for term in terms])) for name, terms in rows.items()]
         self._integrator = heyoka.taylor_adaptive(system, np.zeros(len(rows)), pars=np.zeros(len(self._parameters)))
-        self._places = [self._equation.states.index(name) for name in rov.layout.state]
 
     def hold(self, h: float, steps: int, commands: Reals, start: Reals) -> tuple[float, Reals]:
         """Hold commands one after the other, each for `steps` steps of h. Return seconds per step, and the final state.
@@ -55,25 +54,37 @@ class Heyoka:
         """
         integrator, end, seconds = self._integrator, start.copy(), 0
         for command in commands:
-            values, initial = self._values(command, end)
+            at = self._at(command, end)
+            values, initial = [eval(text, _FUNCTIONS, at) for text in self._parameters], self._initial(at)
             integrator.time = 0.0
             integrator.state[:], integrator.pars[:] = initial, values
             began = time.thread_time_ns()
             _, _, _, taken, *_ = integrator.propagate_for(h * steps, max_delta_t=h)
             seconds += time.thread_time_ns() - began
             assert taken >= steps
-            end = integrator.state[self._places]
+            end = self._end(at, integrator.state)
         return 1e-9 * seconds / (len(commands) * steps), end
 
-    def _values(self, command: Reals, state: Reals) -> tuple[list[float], list[float]]:
-        """Return the runtime parameters and the states of the equation at the start of a held command."""
+    def _initial(self, at: dict[str, float]) -> list[float]:
+        return [at.get(name, 0.0) for name in self._equation.states]
+
+    def _end(self, at: dict[str, float], state: Reals) -> Reals:
+        """Return the states of the vehicle. Forces that lag and the quaternion are not states of the equation."""
+        at = at | dict(zip(self._equation.states, state.tolist(), strict=True))
+        found = at | {force: eval(after, _FUNCTIONS, at) for force, (_, after) in self._equation.lagging.items()}
+        for name, formula in self._equation.ends.items():
+            at[name] = found[name.removeprefix("next_")] = eval(formula, _FUNCTIONS, at)
+        return np.array([found[name] for name in self._rov.layout.state])
+
+    def _at(self, command: Reals, state: Reals) -> dict[str, float]:
+        """Return the values of all formulas at the start of a held command."""
         layout, equation = self._rov.layout, self._equation
         at = dict.fromkeys(layout.inputs, 0.0) | dict(zip(layout.commands, command.tolist(), strict=True))
         at |= {**self._rov.coefficients, **dict(zip(layout.state, state.tolist(), strict=True))}
-        for name, formula in equation.program.items():
+        for name, formula in {**equation.program, **equation.forces}.items():
             at[name] = eval(formula, _FUNCTIONS, at)
         for name, directed in equation.directed.items():  # a velocity at rest goes where its force pushes it
             v = directed.velocity
             is_reverse = at[v] < 0.0 or (at[v] == 0.0 and at[f"held_{v}"] < 0.0)
             at[name] = eval(directed.reverse if is_reverse else directed.forward, _FUNCTIONS, at)
-        return [eval(text, _FUNCTIONS, at) for text in self._parameters], [at.get(n, 0.0) for n in equation.states]
+        return at

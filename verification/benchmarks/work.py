@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.rov import Rov
-from verification.references import reference
+from verification.references import reference, rigid_vehicle
 
 SEED = 1
 Values = Mapping[str, float]
@@ -69,17 +70,27 @@ class Work:
 
     @cached_property
     def ends(self) -> list[list[reference.Number]]:
-        """The states at the end of the first commands, to 50 digits."""
+        """The states at the end of the first commands, to 50 digits, or to 13 for a vehicle with an attitude."""
         names = list(self.rov.layout.state)
-        return [
-            list(reference.step(self.rov, command, dict(zip(names, start, strict=True)), self.hold).state.values())
-            for command, start in zip(self.sequence, self.states.tolist(), strict=False)
-        ]
+        found = []
+        for command, start in zip(self.sequence, self.states.tolist(), strict=False):
+            state = dict(zip(names, start, strict=True))
+            if self.rov.layout.has_attitude:
+                found.append(rigid_vehicle.end(self.rov, command, state, self.hold))
+            else:
+                found.append(list(reference.step(self.rov, command, state, self.hold).state.values()))
+        return found
 
     def error(self, found: Iterable[Sequence[float]]) -> float:
         """Return the largest error of any of these states (SI units)."""
         return max(
             abs(float(exact - value))
             for end, values in zip(self.ends, found, strict=True)
-            for exact, value in zip(end, values, strict=False)
+            for exact, value in zip(self._signed(end), self._signed(values), strict=True)
         )
+
+    def _signed(self, state: Sequence[reference.Number]) -> list[reference.Number]:
+        """Return a state with eta >= 0, because a quaternion and its negative are the same attitude."""
+        named = dict(zip(self.rov.layout.state, state, strict=True))
+        sign = -1.0 if named.get("eta", 1.0) < 0.0 else 1.0
+        return [sign * x if name in QUATERNION else x for name, x in named.items()]

@@ -28,12 +28,14 @@ _ROUND = 60  # s
 VEHICLES = {
     "bluerov2_heavy": SHIPPED["bluerov2_heavy"],
     "videoray": VIDEORAY,
+    "thrust": Path(__file__).with_name("thrust.toml"),
     "bare": Path(__file__).with_name("bare.toml"),
 }
-"""The vehicles: one with lag, coupling, reverse thrust and dead band; the default; and the smallest possible one.
+"""The vehicles: one with six axes, lag, reverse thrust and dead band; the default; one with all that thrust can depend
+on; and the smallest possible one."""
 
-The slowest is first, because each one starts with the inputs that the vehicles before it have found.
-"""
+EVERY = {"bluerov2_heavy": 20, "thrust": 4}
+"""The vehicles that begin with every n-th input of the corpus, because their steps are slow under the sanitizers."""
 
 
 def _positive(text: str) -> int:
@@ -76,6 +78,9 @@ def _command(
         with ThreadPoolExecutor(jobs) as pool:  # each thread waits for a compiler
             list(pool.map(_build, targets, targets.values()))
         unpack_corpus(corpus)
+        corpora = {vehicle: corpus.with_name(f"corpus of {vehicle}") for vehicle in EVERY}
+        for vehicle, folder in corpora.items():
+            unpack_corpus(folder, EVERY[vehicle])
         limit, share = seconds or (None if calls else _ROUND), len(targets)
         for (vehicle, version), target in targets.items():
             what = f"{vehicle}, FMI {version}.0"
@@ -83,7 +88,13 @@ def _command(
                 if inputs:
                     print(f"{what}: {replay(target, inputs, Path(name)).total():,} calls, nothing found")
                     continue
-                counts = _campaign(target, corpus, jobs, calls and calls // share, limit and max(1, limit // share))
+                counts = _campaign(
+                    target,
+                    corpora.get(vehicle, corpus),
+                    jobs,
+                    calls and calls // share,
+                    limit and max(1, limit // share),
+                )
                 _print_counts(what, *counts)
             except FindingError as finding:
                 again = [_keep(f"--vehicle {vehicle} --fmi {version}", found) for found in finding.inputs]

@@ -37,10 +37,10 @@ def build_target(sources: Mapping[str, str], output: Path, fmi: int = 2) -> None
     compile_c(TARGET_SOURCE, output, content, *flags, sanitizers="fuzzer,address,undefined")
 
 
-def unpack_corpus(folder: Path) -> None:
-    """Write the inputs of the corpus into a folder, one file each."""
+def unpack_corpus(folder: Path, every: int = 1) -> None:
+    """Write every input of the corpus, or every n-th one, into a folder, one file each."""
     with zipfile.ZipFile(CORPUS) as kept:
-        kept.extractall(folder)
+        kept.extractall(folder, kept.namelist()[::every])
 
 
 def pack_corpus(targets: Sequence[Path], folder: Path) -> int:

@@ -93,7 +93,8 @@ class Manoeuvre:
     def reference(self) -> list[dict[str, float]]:
         """The time and the outputs at each communication point by `rov_fmu.model.rov`."""
         rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
-        state, rows = dict.fromkeys(rov.layout.state, 0.0), []
+        state: Mapping[str, float] = rov.layout.at_rest
+        rows = []
         for time in TIMES:
             if time > 0.0:
                 state = rov.step(inputs, state, STEP)
@@ -132,6 +133,7 @@ def _write(path: Path, header: Iterable[str], rows: Iterable[Iterable[object]]) 
 
 _CURRENT = {"V_N": 0.3, "V_E": -0.2}
 _LOADS = {"X_ext": -6.0, "Z_ext": 3.0, "N_ext": 0.2, **_CURRENT}
+_LOADS_OF_SIX = {**_LOADS, "Y_ext": 8.0, "K_ext": 0.5, "M_ext": -0.4, "V_D": 0.1}
 
 _VIDEORAY = Manoeuvre(
     "videoray",
@@ -159,6 +161,7 @@ _VIDEORAY = Manoeuvre(
     },
 )
 
+# Buoyancy acts high above the centre of mass, so that the vehicle tilts but does not turn over.
 _HEAVY = Manoeuvre(
     "bluerov2_heavy",
     {
@@ -166,7 +169,8 @@ _HEAVY = Manoeuvre(
         "a_d_v": 190.0,
         "b_d_r": 0.1,
         "m_a_u": 7.0,
-        "F_0_w": -1.5,
+        "B": 134.0,
+        "z_B": -0.2,
         "a_t_t200_reverse": 20.0,
         "c_0_t200": 0.1,
         "T_t200": 0.15,
@@ -182,8 +186,8 @@ _HEAVY = Manoeuvre(
         8.0: {"sway": 0.4, "yaw": -0.25, "heave": 0.07},  # in the dead band
         11.0: {"surge": -0.5, "sway": -0.2, "yaw": 0.05, "heave": -0.4},
         14.0: {"sway": -0.4, "yaw": -0.1, "heave": 0.2},
-        17.0: {"surge": 0.35, "sway": 0.1, **_LOADS, "Y_ext": 8.0},
-        21.0: {"yaw": 1.0, "heave": 1.0, **_LOADS, "Y_ext": 8.0},
+        17.0: {"surge": 0.35, "sway": 0.1, **_LOADS_OF_SIX},
+        21.0: {"yaw": 1.0, "heave": 1.0, **_LOADS_OF_SIX},
         25.0: {"u_1": 0.5, "u_6": -0.3, **_CURRENT},
         28.0: {"u_2": 0.2, **_CURRENT},
     },

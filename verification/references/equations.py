@@ -5,11 +5,13 @@ They use a vehicle's declarations (its axes, curves, thrusters, inputs) and numb
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from mpmath import mp
+from scipy.interpolate import PchipInterpolator
 
-from rov_fmu.model.layout import Curve, Thruster
+from rov_fmu.model.layout import Curve, Thruster, ThrustTable
 from rov_fmu.model.rov import Rov
 
 Number = Any  # an mpmath number
@@ -80,7 +82,38 @@ def _limited(command: Number) -> Number:
     return min(mp.one, max(-mp.one, command))
 
 
-def thrust(rov: Rov, curve: Curve, command: Number) -> Number:
+def thrust(rov: Rov, curve: Curve, command: Number, voltage: Number = mp.zero) -> Number:
+    """Return the steady force of a thruster: by its tables or by its coefficients, at the voltage of the battery."""
+    by_voltage, voltage = mp.one, max(mp.mpf(voltage), mp.zero)
+    if "V_0" in curve.keys:
+        by_voltage = (voltage / mp.mpf(rov.coefficients[f"V_0_{curve.name}"])) ** mp.mpf(
+            rov.coefficients[f"n_V_{curve.name}"]
+        )
+    if not curve.tables:
+        return by_voltage * _quadratic(rov, curve, command)
+    measured = [_interpolated(table, command) for table in curve.tables]
+    for (low, low_force), (high, high_force) in pairwise(zip(curve.tables, measured, strict=True)):
+        if low.voltage <= voltage <= high.voltage:
+            share = (voltage - mp.mpf(low.voltage)) / (mp.mpf(high.voltage) - mp.mpf(low.voltage))
+            force = (1 - share) * low_force + share * high_force
+            break
+    else:
+        force = measured[0] if voltage < curve.tables[0].voltage else measured[-1]
+    return mp.mpf(rov.coefficients[f"k_t_{curve.name}"]) * by_voltage * force / curve.together
+
+
+def _interpolated(table: ThrustTable, command: Number) -> Number:
+    """Return the force of the monotone cubic, which SciPy computes, at a command."""
+    slopes = [mp.mpf(float(x)) for x in PchipInterpolator(table.commands, table.forces).derivative()(table.commands)]
+    c, F = ([mp.mpf(x) for x in row] for row in (table.commands, table.forces))
+    n = next(n for n in range(len(c) - 1) if command <= c[n + 1])
+    h = c[n + 1] - c[n]
+    t = (command - c[n]) / h
+    first, last = F[n] * (1 + 2 * t) + h * slopes[n] * t, F[n + 1] * (3 - 2 * t) - h * slopes[n + 1] * (1 - t)
+    return first * (1 - t) ** 2 + last * t**2
+
+
+def _quadratic(rov: Rov, curve: Curve, command: Number) -> Number:
     """Return F(c) = a (c - c0)^2 + b (c - c0) beyond the dead band; for c < 0, -F(-c) with the reverse coefficients."""
     keys, reverse = curve.keys, "_reverse" if command < 0 else ""
 
@@ -88,16 +121,15 @@ def thrust(rov: Rov, curve: Curve, command: Number) -> Number:
         name = f"{key}_{curve.name}{reverse}" if key + reverse in keys else f"{key}_{curve.name}"
         return mp.mpf(rov.coefficients[name])
 
-    beyond = abs(_limited(command)) - (number("c_0") if "c_0" in keys else 0)
+    beyond = abs(command) - (number("c_0") if "c_0" in keys else 0)
     if beyond <= 0:
         return mp.zero
     size = (number("a_t") * beyond**2 + number("b_t") * beyond) / curve.together
     return -size if reverse else size
 
 
-def steady_forces(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
-    """Return the force of every thruster under the commands after its lag has died out."""
-    curves = {curve.name: curve for curve in rov.layout.curves}
+def commands(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
+    """Return the command of every thruster, from -1 to 1."""
     found = {}
     for thruster in rov.layout.thrusters:
         if rov.layout.mix:
@@ -108,8 +140,15 @@ def steady_forces(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
             )
         else:
             command = mp.mpf(inputs[f"u_{thruster.name}"])
-        found[thruster.name] = thrust(rov, curves[thruster.curve], command)
+        found[thruster.name] = _limited(command)
     return found
+
+
+def steady_forces(rov: Rov, inputs: Mapping[str, Number]) -> dict[str, Number]:
+    """Return the force of every thruster under the commands after its lag has died out."""
+    of_thruster = rov.layout.curve_of
+    voltage = inputs.get("voltage", mp.zero)
+    return {name: thrust(rov, of_thruster[name], command, voltage) for name, command in commands(rov, inputs).items()}
 
 
 def effect(rov: Rov, thruster: Thruster, velocity: str) -> Number:

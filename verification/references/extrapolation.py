@@ -43,23 +43,23 @@ class _System:
         self.first_force = len(self.names) + 4
         self.axes = [
             (
-                _real(axis.C),
+                real(axis.C),
                 [
-                    (n, _real(axis.lagging[name]))
+                    (n, real(axis.lagging[name]))
                     for n, name in enumerate(self.lagging, self.first_force)
                     if axis.lagging[name] != 0
                 ],
-                [(_real(a), _real(b)) for a, b in (axis.ahead, axis.astern)],
+                [(real(a), real(b)) for a, b in (axis.ahead, axis.astern)],
             )
             for axis in equations.axes.values()
         ]
-        self.lags = [(_real(lag.target), _real(lag.T)) for lag in equations.lags.values()]
+        self.lags = [(real(lag.target), real(lag.T)) for lag in equations.lags.values()]
         self.psi = mpfr(psi)
         self.places = [self.names.index(name) if name in self.names else -1 for name in ("u", "v", "w", "r")]
         self.factors: list[Number] = []
         if equations.coupled:
             M_u, M_v, M_r = (equations.inertias[name] for name in ("u", "v", "r"))
-            self.factors = [_real(M_v / M_u), _real(M_u / M_v), _real((M_v - M_u) / M_r)]
+            self.factors = [real(M_v / M_u), real(M_u / M_v), real((M_v - M_u) / M_r)]
 
     def rates(self, signs: Sequence[int]) -> Rates:
         """Return the function that gives the time derivatives, with the drag for velocities of these signs."""
@@ -104,12 +104,12 @@ class _System:
         )
 
 
-def _real(number: Any) -> Number:
+def real(number: Any) -> Number:
     """Convert a number of mpmath to gmpy2."""
     return mpfr(mp.nstr(number, 90))
 
 
-def _leap(rates: Rates, y: Sequence[Number], start: Sequence[Number], h: Number) -> tuple[list[Number], Number]:
+def leap(rates: Rates, y: Sequence[Number], start: Sequence[Number], h: Number) -> tuple[list[Number], Number]:
     """Return the state after h and its relative error; `start` are the rates at y."""
     rows: list[list[list[Number]]] = []
     for divisions in _DIVISIONS:
@@ -136,7 +136,7 @@ def _signs(system: _System, y: Sequence[Number], h: Number) -> tuple[list[int], 
     soon = h / 2**24
     if any(y[a] == 0 for a in range(n)):
         rates = system.rates(signs)
-        later = _leap(rates, y, rates(y), soon)[0]
+        later = leap(rates, y, rates(y), soon)[0]
         signs = [signs[a] if y[a] != 0 else -1 if later[a] < 0 else 1 for a in range(n)]
     return signs, soon
 
@@ -144,9 +144,9 @@ def _signs(system: _System, y: Sequence[Number], h: Number) -> tuple[list[int], 
 def _reversal(rates: Rates, y: Sequence[Number], a: int, low: Number, high: Number) -> tuple[Number, list[Number]]:
     """Return the time between `low` and `high` at which the velocity of axis `a` is zero, and the state then."""
     start = rates(y)
-    t, sign = (low + high) / 2, _leap(rates, y, start, high)[0][a] > 0
+    t, sign = (low + high) / 2, leap(rates, y, start, high)[0][a] > 0
     for _ in range(400):
-        end = _leap(rates, y, start, t)[0]
+        end = leap(rates, y, start, t)[0]
         low, high = (low, t) if (end[a] > 0) == sign else (t, high)
         slope = rates(end)[a]
         new = t - end[a] / slope if slope else (low + high) / 2
@@ -165,7 +165,7 @@ def _dip(rates: Rates, y: Sequence[Number], end: Sequence[Number], a: int, sign:
     low, high = mpfr(0), h
     for _ in range(60):
         t = (low + high) / 2
-        middle = _leap(rates, y, start, t)[0]
+        middle = leap(rates, y, start, t)[0]
         if sign * middle[a] < 0:
             return t
         low, high = (t, high) if sign * rates(middle)[a] < 0 else (low, t)
@@ -191,7 +191,7 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
                 y = _steady_end(system, y, start, remaining)
                 paths = [path + abs(remaining * rate) for path, rate in zip(paths, _pace(start, n), strict=True)]
                 break
-            end, error = _leap(rates, y, start, size)
+            end, error = leap(rates, y, start, size)
             scale = mpfr(0.9) * (mpfr(_TOLERANCE) / error) ** (mpfr(1) / 31) if error else mpfr(4)
             if not gmpy2.is_finite(error) or error > _TOLERANCE:
                 size *= max(mpfr(0.1), scale) if gmpy2.is_finite(error) else mpfr(0.1)
@@ -209,10 +209,10 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
             fastest = [max(a, abs(b)) for a, b in zip(fastest, y, strict=False)]
             size *= min(mpfr(4), scale)
         names = [*system.names, "x", "y", "z", "psi", *(f"F_{name}" for name in system.lagging)]
-        planar, depth, turn = map(_plain, paths)
+        planar, depth, turn = map(plain, paths)
         return Ended(
-            {name: _plain(x) for name, x in zip(names, y, strict=True)},
-            {name: _plain(x) for name, x in zip(system.names, fastest, strict=True)},
+            {name: plain(x) for name, x in zip(names, y, strict=True)},
+            {name: plain(x) for name, x in zip(system.names, fastest, strict=True)},
             {"x": planar, "y": planar, "z": depth, "psi": turn},
         )
 
@@ -240,6 +240,6 @@ def _steady_end(system: _System, y: Sequence[Number], rates: Sequence[Number], h
     return end
 
 
-def _plain(number: Number) -> Any:
+def plain(number: Number) -> Any:
     """Convert a number of gmpy2 to mpmath."""
     return mp.mpf(f"{number:.70e}")

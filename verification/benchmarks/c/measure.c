@@ -48,9 +48,9 @@ void begin(const char *path)
 void core(vehicle *at, double state[N_STATES], double h, long steps)
 {
     (void)steps;
-    double next[N_STATES];
+    double next[N_STATES], heading = 0.0;
     memcpy(&at->at[FIRST_STATE], state, sizeof next);
-    CHECK(model_step(at->at, &at->numbers, h, next) > 0);
+    CHECK(model_step(at->at, &at->numbers, h, next, &heading) > 0);
     memcpy(state, next, sizeof next);
 }
 

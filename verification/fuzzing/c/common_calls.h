@@ -148,24 +148,32 @@ static void PLAY(GetReal)(slot *s)
     for (size_t i = 0; i < n && vr != NULL; i++) {
         const unsigned place = place_of(vr[i]);
         good = good && place < N_VARIABLES + (FMI_VERSION == 3); /* the time */
-        derived = derived || (place >= FIRST_CALCULATED && place < (HAS_LAG ? FIRST_COEFFICIENT : FIRST_THRUST));
+        derived = derived || (place >= FIRST_CALCULATED && place < (MAY_OVERFLOW ? FIRST_COEFFICIENT : FIRST_THRUST));
     }
     verdict wanted = legal(s, WHICH(GetReal), good);
     if (wanted == ALLOWED && derived && !is_moderate(s->f)) {
-        wanted = EITHER; /* a derivative may overflow, and so may outputs that follow from lagging forces */
+        wanted = EITHER; /* a derivative may overflow, and so may outputs that follow from states */
     }
     check_results("GetReal", CALL_AS(s, wanted, false, GetReal, s->f, vr, n, values AND(m)), values, m);
+}
+
+static bool is_state(variable_kind kind)
+{
+    return kind == STATE || kind == CALCULATED_STATE;
 }
 
 /* Return true when a variable may be set (FMI 2.0, sections 2.2.7, 3.2.3 and 4.2.4; FMI 3.0, sections 2.4.7.4 and 4.2). */
 static bool settable(const slot *s, unsigned place)
 {
     const variable_kind kind = VARIABLES[place].kind;
+    if (HAS_DEAD_TIME && place < N_COMMANDS && (s->at.mode == CONTINUOUS || s->at.mode == INTERMEDIATE)) {
+        return false; /* these commands are discrete */
+    }
     switch ((int)s->at.mode) {
     case INSTANTIATED:
-    case INITIALIZATION: return kind != CALCULATED;
-    case CONTINUOUS: return kind == INPUT || kind == STATE || kind == TUNABLE;
-    case EVENT: return kind == INPUT || kind == TUNABLE || (FMI_VERSION == 3 && kind == STATE);
+    case INITIALIZATION: return kind != CALCULATED && kind != CALCULATED_STATE && kind != MEMORY;
+    case CONTINUOUS: return kind == INPUT || is_state(kind) || kind == TUNABLE;
+    case EVENT: return kind == INPUT || kind == TUNABLE || (FMI_VERSION == 3 && is_state(kind));
     case INTERMEDIATE: return kind == INPUT;
     default: return kind == INPUT || kind == TUNABLE;
     }
@@ -264,12 +272,12 @@ static verdict may_differentiate(const slot *s, call which, const partial *p, bo
     for (size_t i = 0; i < p->n_known && good; i++) {
         const unsigned place = place_of(p->known[i]);
         const variable_kind kind = place < N_VARIABLES ? VARIABLES[place].kind : CALCULATED;
-        good = kind == INPUT || kind == STATE || (kind != CALCULATED && s->at.mode == INITIALIZATION);
+        good = kind == INPUT || is_state(kind) || (kind != CALCULATED && kind != MEMORY && s->at.mode == INITIALIZATION);
     }
     for (size_t i = 0; i < p->n_unknown && good; i++) {
         const unsigned place = place_of(p->unknown[i]);
         const variable_kind kind = place < N_VARIABLES ? VARIABLES[place].kind : INPUT;
-        good = kind == STATE || kind == CALCULATED;
+        good = is_state(kind) || kind == CALCULATED;
     }
     verdict wanted = legal(s, which, good);
     for (size_t i = 0; i < from && wanted == ALLOWED; i++) {

@@ -16,8 +16,13 @@ static void PLAY(CompletedIntegratorStep)(slot *s)
 {
     const bool given = take_byte() < 240;
     boolean event = true, stop = true, *const asked = given ? &event : NULL;
-    const bool accepted = CALL(s, given, false, CompletedIntegratorStep, s->f, take_bool(), asked, &stop);
+    verdict wanted = legal(s, WHICH(CompletedIntegratorStep), given);
+    wanted = wanted == ALLOWED && HAS_ATTITUDE && !is_moderate(s->f) ? EITHER : wanted;
+    const bool accepted = CALL_AS(s, wanted, HAS_ATTITUDE, CompletedIntegratorStep, s->f, take_bool(), asked, &stop);
     PROPERTY(event == !accepted && stop == !accepted, "an event %d or an end %d", event, stop);
+    if (accepted) {
+        check_heading(s->f, before(s)->now.heading);
+    }
 }
 
 static void PLAY(SetTime)(slot *s)
@@ -42,6 +47,7 @@ static void PLAY(SetContinuousStates)(slot *s)
     for (size_t i = 0; i < n && good; i++) {
         good = isfinite(x[i]);
     }
+    good = good && model_has_attitude(x);
     if (CALL(s, good, true, SetContinuousStates, s->f, x, n)) {
         PROPERTY(memcmp(&s->f->now.values[FIRST_STATE], x, n * sizeof *x) == 0, "not set");
     }

@@ -6,6 +6,8 @@
 
 enum { N_VELOCITIES = N_MONITORED };
 
+static const double TURN = 6.283185307179586;
+
 /* Return the place of a state or an input between two places by its name; NONE when the vehicle lacks it. */
 static int named(const char *name, int first, int end)
 {
@@ -33,6 +35,12 @@ static double of_velocity(const double v[N_VELOCITIES], const char *name)
 {
     const int place = named(name, FIRST_STATE, FIRST_STATE + N_VELOCITIES);
     return place == NONE ? 0.0 : v[place];
+}
+
+/* Return the sum of the angular velocities, which bounds how fast the vehicle turns. */
+static double turning_of(const double v[N_VELOCITIES])
+{
+    return fabs(of_velocity(v, "p")) + fabs(of_velocity(v, "q")) + fabs(of_velocity(v, "r"));
 }
 
 static bool is_coupled(int a)
@@ -122,7 +130,7 @@ static double changes_of(const fmu *f, double h)
 {
     double v[N_VELOCITIES], y[N_SERIES] = {0.0}, size[N_SERIES], rates;
     fastest(f, h, v);
-    rates = of_velocity(v, "r") + rates_up_to(f, v);
+    rates = turning_of(v) + rates_up_to(f, v);
     sizes_at(f, y, 0, size);
     for (int i = N_VELOCITIES; i < N_USED; i++) {
         rates += COMPONENT_OF[i] < N_DYNAMIC ? size[i] : 0.0; /* rates of the lags */
@@ -186,12 +194,16 @@ static void check_way(const char *name, double low, double high, double h, doubl
 /* Check that the distance through the water is at most that of the highest velocity. */
 static void check_track(const double before[], const double after[], double fastest_way, double h)
 {
-    const double current[] = {input_of(before, "V_N"), input_of(before, "V_E")};
-    const double x = state_of(before, "x"), y = state_of(before, "y");
-    const double north = state_of(after, "x"), east = state_of(after, "y");
-    const double way = hypot(north - x - current[0] * h, east - y - current[1] * h);
-    const double rounding = rounding_of_way(fastest_way, h, hypot(x, y), hypot(north, east))
-                            + rounding_of_way(hypot(current[0], current[1]), h, 0.0, 0.0);
+    static const char *const names[] = {"x", "y", "z"}, *const currents[] = {"V_N", "V_E", "V_D"};
+    double from = 0.0, to = 0.0, way = 0.0, drift = 0.0;
+    for (int i = 0; i < (HAS_ATTITUDE ? 3 : 2); i++) {
+        const double start = state_of(before, names[i]), end = state_of(after, names[i]), current = input_of(before, currents[i]);
+        from = hypot(from, start);
+        to = hypot(to, end);
+        way = hypot(way, end - start - current * h);
+        drift = hypot(drift, current);
+    }
+    const double rounding = rounding_of_way(fastest_way, h, from, to) + rounding_of_way(drift, h, 0.0, 0.0);
     PROPERTY(!isfinite(rounding) || way <= fastest_way * h + rounding, "%a at no more than %a for %a", way, fastest_way, h);
 }
 
@@ -202,8 +214,8 @@ static void check_lag(const fmu *start, const fmu *end)
     memcpy(before, start->now.values, sizeof before);
     memcpy(after, end->now.values, sizeof after);
     memcpy(after, before, N_INPUTS * sizeof after[0]);
-    model_calculate(before, &start->numbers);
-    model_calculate(after, &start->numbers);
+    model_calculate(before, &start->numbers, 0.0);
+    model_calculate(after, &start->numbers, 0.0);
     for (int i = N_VELOCITIES; i < N_STATES; i++) {
         const char *const name = VARIABLES[FIRST_STATE + i].name;
         if (name[0] == 'F') {
@@ -219,8 +231,38 @@ static void check_lag(const fmu *start, const fmu *end)
     }
 }
 
+/* Check that the heading is that of the attitude and of the same turn as the one before it, to within half a turn. */
+static void check_heading(const fmu *f, double near)
+{
+    double values[N_VARIABLES];
+    memcpy(values, f->now.values, sizeof values);
+    model_calculate(values, &f->numbers, f->now.heading);
+    const double psi = model_heading(values), size = 1.0 + fabs(near);
+    PROPERTY(!HAS_ATTITUDE || fabs(psi - f->now.heading) <= 1e-15 * size, "psi is %a beside %a", psi, f->now.heading);
+    PROPERTY(fabs(psi - near) <= 0.5 * TURN + 1e-15 * size, "the heading jumps from %a to %a", near, psi);
+}
+
+/* Check that the quaternion after a step has the length 1, and that the vehicle turned no faster than its angular velocity. */
+static void check_attitude(const fmu *start, const fmu *end, double rate, double h)
+{
+    static const char *const names[] = {"eta", "epsilon_1", "epsilon_2", "epsilon_3"};
+    double before = 0.0, after = 0.0, chord = 0.0;
+    for (int i = 0; i < 4; i++) {
+        before = hypot(before, state_of(start->now.values, names[i]));
+        after = hypot(after, state_of(end->now.values, names[i]));
+    }
+    for (int i = 0; i < 4; i++) {
+        chord = hypot(chord, state_of(end->now.values, names[i]) - state_of(start->now.values, names[i]) / before);
+    }
+    PROPERTY(fabs(after - 1.0) <= 1e-15, "a quaternion of the length %a", after);
+    PROPERTY(chord <= 0.5 * rate * h + 1e-12, "a turn of %a, at %a for %a", 2.0 * chord, rate, h);
+}
+
 static void check_step_law(const fmu *start, const fmu *end, double h)
 {
+    if (HAS_DEAD_TIME) { /* the laws know neither commands that act later nor fins */
+        return;
+    }
     const double *const from = start->now.values, *const to = end->now.values;
     double most[N_VELOCITIES], low[N_VELOCITIES], high[N_VELOCITIES];
     fastest(start, h, most);
@@ -239,7 +281,9 @@ static void check_step_law(const fmu *start, const fmu *end, double h)
     if (HAS_LAG) {
         check_lag(start, end);
     }
-    if (named("z", FIRST_STATE, FIRST_CALCULATED) != NONE) {
+    if (HAS_ATTITUDE) {
+        check_attitude(start, end, turning_of(high), h);
+    } else if (named("z", FIRST_STATE, FIRST_CALCULATED) != NONE) {
         check_way("z", of_velocity(low, "w"), of_velocity(high, "w"), h, state_of(from, "z"), state_of(to, "z"));
     }
     if (named("psi", FIRST_STATE, FIRST_CALCULATED) != NONE) {
@@ -248,7 +292,8 @@ static void check_step_law(const fmu *start, const fmu *end, double h)
     if (named("x", FIRST_STATE, FIRST_CALCULATED) != NONE) {
         const double ahead = fmax(fabs(of_velocity(low, "u")), fabs(of_velocity(high, "u")));
         const double aside = fmax(fabs(of_velocity(low, "v")), fabs(of_velocity(high, "v")));
-        check_track(from, to, hypot(ahead, aside), h);
+        const double down = HAS_ATTITUDE ? fmax(fabs(of_velocity(low, "w")), fabs(of_velocity(high, "w"))) : 0.0;
+        check_track(from, to, hypot(hypot(ahead, aside), down), h);
     }
 }
 
@@ -262,7 +307,7 @@ static void sizes_of(const fmu *f, double h, double size[N_STATES])
     double most[N_VELOCITIES], way = h * (fabs(input_of(f->now.values, "V_N")) + fabs(input_of(f->now.values, "V_E")));
     double calculated[N_VARIABLES];
     memcpy(calculated, f->now.values, sizeof calculated);
-    model_calculate(calculated, &f->numbers);
+    model_calculate(calculated, &f->numbers, 0.0);
     fastest(f, h, most);
     for (int a = 0; a < N_VELOCITIES; a++) {
         size[a] = most[a];
@@ -290,18 +335,35 @@ static void check_same(const char *what, const fmu *start, double h, const doubl
     }
 }
 
+/* True when other commands act at the end of a step than at its start, for which the sizes below do not allow. */
+static bool commands_arrived(const fmu *start, const fmu *end)
+{
+    bool arrived = false;
+#if HAS_DEAD_TIME
+    for (int i = FIRST_DELAYED; i < FIRST_DELAYED + N_COMMANDS; i++) {
+        arrived |= start->now.values[i] != end->now.values[i];
+    }
+#endif
+    (void)start, (void)end;
+    return arrived;
+}
+
 /* Check that a step ends where its parts end. */
 static void check_parts(const fmu *start, const fmu *end, double h, int parts)
 {
-    double values[N_VARIABLES];
+    double values[N_VARIABLES], heading = start->now.heading;
+    delay_line line = start->now.line;
     memcpy(values, start->now.values, sizeof values);
-    if (!(changes_of(start, h) <= 1.0) || h / parts < DBL_MIN) { /* rounding may grow; a subnormal length cannot be divided */
+    if (commands_arrived(start, end) || !(changes_of(start, h) <= 1.0) || h / parts < DBL_MIN) { /* rounding may grow; a subnormal length cannot be divided */
         return;
     }
     for (int i = 0; i < parts; i++) {
         double next[N_STATES];
-        PROPERTY(model_step(values, &start->numbers, h / parts, next) > 0, "a part of a step takes too many pieces");
+        const double from = start->now.time + i * (h / parts);
+        PROPERTY(delayed_step(values, &start->numbers, &line, from, h / parts, next, &heading) > 0,
+                 "a part of a step takes too many pieces");
         memcpy(values + FIRST_STATE, next, sizeof next);
+        delay_commit(values, &line, from, h / parts);
     }
     check_same("a step and its parts", start, h, end->now.values + FIRST_STATE, values + FIRST_STATE, 1e-9);
 }
@@ -341,7 +403,7 @@ static void check_instance(const slot *s)
     PROPERTY(memcmp(&numbers, &s->f->numbers, sizeof numbers) == 0, "the numbers are those of other coefficients");
     PROPERTY(s->f->now.mode == s->at.mode && s->f->now.type == s->at.type, "in %s instead of %s",
              mode_name(s->f->now.mode), mode_name(s->at.mode));
-    const unsigned n = HAS_LAG && !is_moderate(s->f) ? N_STATES : N_STATES + N_THRUST; /* a torque may overflow */
+    const unsigned n = MAY_OVERFLOW && !is_moderate(s->f) ? N_STATES : N_STATES + N_THRUST; /* a torque may overflow */
     before_call();
     PROPERTY(FMI(GetReal)(s->f, vr, n, values AND(n)) == 0, "the outputs cannot be read");
     PROPERTY(is_same(s, true), "to read changes the instance");

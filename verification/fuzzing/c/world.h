@@ -24,6 +24,7 @@ static void *calloc_or_not(size_t count, size_t size)
 #define PLAY(name) PASTE(call_, FMI(name))
 
 enum { N_SLOTS = 4, N_SAVED = 3, N_BUFFERS = 3 };
+enum { MAY_OVERFLOW = HAS_LAG || HAS_ATTITUDE }; /* outputs that are not derivatives follow from states */
 
 /* The state of an instance that the standard demands after its calls so far. Its values are not used. */
 typedef fmu_state expected;
@@ -177,7 +178,7 @@ static void copy_instance(unsigned char *to, const fmu *from)
     memcpy(to, from, sizeof *from);
     ((fmu *)(void *)to)->function = NULL;
     memset(&((fmu *)(void *)to)->now.values[FIRST_CALCULATED], 0,
-           (N_STATES + N_THRUST) * sizeof(double));
+           (N_STATES + N_THRUST - HAS_DEAD_TIME * N_COMMANDS) * sizeof(double)); /* the commands that act are remembered */
 }
 
 static fmu *before(const slot *s)
@@ -273,6 +274,10 @@ static bool is_moderate(const fmu *f)
     for (int i = 0; i < FIRST_CALCULATED; i++) {
         moderate = moderate && fabs(f->now.values[i]) <= 1e30;
     }
+#if HAS_ATTITUDE
+    const double *const q = &f->now.values[REF_eta];
+    moderate = moderate && hypot(hypot(q[0], q[1]), hypot(q[2], q[3])) >= 1e-30;
+#endif
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         moderate = moderate && fabs(numbers[i]) <= 1e30; /* false for a NaN */
     }

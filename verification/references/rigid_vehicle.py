@@ -1,0 +1,197 @@
+"""A coupled vehicle as the rigid body of rigid_body.py: its numbers, its outputs, and its motion.
+
+Like equations.py, it uses a vehicle's declarations and numbers, but no formula of rov_fmu/model/.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import gmpy2
+from gmpy2 import mpfr
+from mpmath import mp
+
+from rov_fmu.model.layout import cross_name
+from rov_fmu.model.rov import Rov
+
+from . import equations, rigid_body
+from .equations import commands, steady_forces
+from .extrapolation import BITS, leap, plain, real
+from .rigid_body import (
+    VELOCITIES,
+    Body,
+    Floats,
+    Number,
+    Propeller,
+    cross,
+    euler_angles,
+    rigid_body_mass,
+    rotation,
+    zeros,
+)
+
+Values = Mapping[str, Number]
+QUATERNION = ("eta", "epsilon_1", "epsilon_2", "epsilon_3")
+LOADS = ("X_ext", "Y_ext", "Z_ext", "K_ext", "M_ext", "N_ext")
+_TOLERANCE = 1e-22  # of a step of the extrapolation
+
+
+def body(rov: Rov, inputs: Values, number: Callable[[Number], Number] = float) -> Body:
+    """Return a vehicle under held inputs as a rigid body. `number` converts numbers of mpmath to those of the body."""
+    layout = rov.layout
+    held = {name: number(mp.mpf(value)) for name, value in {**rov.coefficients, **inputs}.items()}
+
+    def get(name: str, otherwise: str = "", default: float = 0.0) -> Number:
+        return held.get(name, held.get(otherwise, number(mp.mpf(default))))
+
+    def six(stem: str, default: float) -> list[Number]:
+        return [get(f"{stem}_{v}", default=default) for v in VELOCITIES]
+
+    gravity, buoyancy = ([get(f"{axis}_{point}") for axis in "xyz"] for point in "GB")
+    inertia = [[get(f"I_{v}", default=1.0) if v == other else get("") for v in "pqr"] for other in "pqr"]
+    mass = rigid_body_mass(get("m_rov", default=1.0), inertia, gravity)
+    linear, back, ahead, astern, added = zeros(), zeros(), zeros(), zeros(), six("m_a", 0.0)
+    for i, v in enumerate(VELOCITIES):
+        mass[i][i] += added[i]
+        linear[i][i], ahead[i][i] = get(f"b_d_{v}"), get(f"a_d_{v}")
+        back[i][i], astern[i][i] = get(f"b_d_{v}_reverse", f"b_d_{v}"), get(f"a_d_{v}_reverse", f"a_d_{v}")
+    lift = {}
+    for key, first, *others in layout.cross:
+        value, i, j = held[cross_name(key, first, *others)], VELOCITIES.index(first), VELOCITIES.index(others[0])
+        if key == "m_a":
+            mass[i][j] += value
+            mass[j][i] += value
+        elif key == "b_d":
+            linear[i][j] = back[i][j] = value
+        elif key == "a_d":
+            ahead[i][j] = astern[i][j] = value
+        else:
+            lift[first, others[0], others[1]] = value
+    beta = six("beta", 1.0)
+    tuned = [[m / (a * b) ** 0.5 for m, b in zip(row, beta, strict=True)] for row, a in zip(mass, beta, strict=True)]
+    loads = [get(name) + get(f"F_0_{v}") for name, v in zip(LOADS, VELOCITIES, strict=True)]
+    current = [get(name) for name in ("V_N", "V_E", "V_D")]
+    return Body(
+        "".join(layout.velocities),
+        tuned,
+        linear,
+        back,
+        ahead,
+        astern,
+        lift,
+        _fins(rov, inputs, number),
+        _propellers(rov, inputs, number),
+        six("alpha", 1.0),
+        loads,
+        get("W"),
+        get("B"),
+        gravity,
+        buoyancy,
+        current,
+    )
+
+
+def _propellers(rov: Rov, inputs: Values, number: Callable[[Number], Number]) -> list[Propeller]:
+    forces, found = steady_forces(rov, inputs), []
+    for name, command in commands(rov, inputs).items():
+        curve = rov.layout.curve_of[name]
+        thruster = next(t for t in rov.layout.thrusters if t.name == name)
+        assert thruster.position
+        position, direction = (
+            [number(mp.mpf(x)) for x in vector] for vector in (thruster.position, thruster.direction)
+        )
+        reverse = "_reverse" if command < 0 and "d_reverse" in curve.keys else ""
+        loss = mp.mpf(rov.coefficients[f"d_{curve.name}{reverse}"]) if "d" in curve.keys else mp.zero
+        lag = mp.mpf(rov.coefficients[f"T_{curve.name}"]) if curve.has_lag else mp.zero
+        numbers = (forces[name], loss * abs(command) / curve.together, lag)
+        found.append(Propeller(position, direction, *map(number, numbers)))
+    return found
+
+
+def _fins(rov: Rov, inputs: Values, number: Callable[[Number], Number]) -> dict[tuple[str, str], Number]:
+    """Return the forces of the fins along each axis as factors of |u| u, at the angles for the commands."""
+    found: dict[tuple[str, str], Number] = {}
+    for fin in rov.layout.fins:
+        command = min(mp.one, max(-mp.one, mp.mpf(inputs[f"u_{fin.name}"])))
+        k = {key: mp.mpf(rov.coefficients.get(f"{key}_{fin.name}", 0.0)) for key in ("lift", "drag", "angle_max")}
+        angle = k["angle_max"] * command
+        force = [k["lift"] * angle * mp.mpf(x) for x in fin.direction]
+        force[0] -= k["drag"] * angle**2
+        moment = cross([mp.mpf(x) for x in fin.position], force)
+        for axis, value in zip(VELOCITIES, [*force, *moment], strict=True):
+            found[axis, "u"] = found.get((axis, "u"), number(mp.zero)) + number(value)
+    return found
+
+
+def places(rov: Rov, state: Values) -> list[Number]:
+    """Return the state of the rigid body for a vehicle's state.
+
+    Without a quaternion, the attitude is that of the Euler angles at the start, or of the heading.
+    """
+    angles = (state.get("phi_0", 0.0), state.get("theta_0", 0.0), state.get("psi_0", state.get("psi", 0.0)))
+    quaternion = [state[name] for name in QUATERNION] if "eta" in state else rigid_body.quaternion_of(*angles)
+    pose = [state.get(name, 0.0) for name in "xyz"]
+    return [*(state.get(v, 0.0) for v in VELOCITIES), *quaternion, *pose, *(state[F] for F in rov.layout.lagging)]
+
+
+def compared(rov: Rov, y: Sequence[Number]) -> list[Number]:
+    """Return what two states of a rigid body are compared by: the quaternion as a rotation, only the axes there are."""
+    pose = [x for name, x in zip("xyz", y[10:13], strict=True) if name in rov.layout.pose]
+    attitude = [x for row in rotation(y[6:10]) for x in row]
+    return [*(y[VELOCITIES.index(v)] for v in rov.layout.velocities), *attitude, *pose, *y[13:]]
+
+
+def integrate(rov: Rov, inputs: Values, y: Sequence[Number], h: float) -> Floats:
+    """Return the state of the rigid body after h seconds, to some 13 digits."""
+    return rigid_body.integrate(body(rov, inputs), list(map(float, y)), h)
+
+
+def end(rov: Rov, inputs: Values, state: Values, h: float) -> list[Number]:
+    """Return the vehicle's states after h seconds, to some 13 digits."""
+    y = integrate(rov, inputs, places(rov, state), h).tolist()
+    by_name = dict(zip((*VELOCITIES, *QUATERNION, *"xyz", *rov.layout.lagging), y, strict=True))
+    return [by_name[name] for name in rov.layout.state]
+
+
+def step(rov: Rov, inputs: Values, state: Values, h: float) -> list[Number]:
+    """Return the state of the rigid body after h seconds, to some 20 digits."""
+    with mp.workdps(70), gmpy2.context(gmpy2.get_context(), precision=BITS):
+        inverse = [[real(x) for x in row] for row in body(rov, inputs, mp.mpf).inverse]
+        of_step = body(rov, inputs, real)
+
+        def rates(y: Sequence[Number]) -> list[Number]:
+            return rigid_body.rates(of_step, inverse, y)
+
+        y, rest, size = [real(mp.mpf(x)) for x in places(rov, state)], mpfr(h), mpfr(h)
+        while rest > 0:
+            size = min(size, rest)
+            end, error = leap(rates, y, rates(y), size)
+            if error <= _TOLERANCE:
+                y, rest = end, rest - size
+            size *= min(
+                mpfr(4), max(mpfr(0.1), mpfr(0.9) * (mpfr(_TOLERANCE) / error) ** (mpfr(1) / 31) if error else 4)
+            )
+        return [plain(x) for x in y]
+
+
+def calculated(rov: Rov, values: Values, number: Callable[[Number], Number] = mp.mpf) -> dict[str, Number]:
+    """Return every output and every derivative of a vehicle, for values of all inputs, states and parameters.
+
+    The attitude may be given as in `places`. The heading of a vehicle that rolls lies between -pi and pi. `number` may
+    be float for a faster result with fewer digits.
+    """
+    layout = rov.layout
+    if not layout.has_attitude:
+        return equations.calculated(rov, values)
+    k = Rov(layout, {name: values[name] for name in rov.coefficients})
+    of_vehicle = body(k, {name: values[name] for name in layout.inputs}, number)
+    y = [number(x) for x in places(k, values)]
+    rates = rigid_body.rates(of_vehicle, of_vehicle.inverse, y)
+    names = [*VELOCITIES, *QUATERNION, *"xyz", *layout.lagging]
+    found = {name: x for name, x in zip(names, y, strict=True) if name in layout.state}
+    found |= {f"der({name})": rate for name, rate in zip(names, rates, strict=True) if name in layout.state}
+    forces = {name: values.get(f"F_{name}", force) for name, force in steady_forces(k, values).items()}
+    found |= {f"F_{name}": mp.mpf(F) for name, F in forces.items()}
+    for curve in layout.turning_curves:
+        arms = {t.name: cross(t.position or (), t.direction)[2] for t in layout.thrusters if t.curve == curve.name}
+        turning = (arm * forces[name] for name, arm in arms.items())
+        found[f"tau_{curve.name}"] = mp.fsum(turning)
+    return found | dict(zip(("phi", "theta", "psi"), euler_angles(rotation(y[6:10])), strict=True))
