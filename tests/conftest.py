@@ -17,7 +17,7 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi2 import Fmu
 from tests.model.steps import Step, in_fmu, in_python
-from tests.vehicles import EVERYTHING
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -43,7 +43,8 @@ def vehicle() -> Vehicle:
 
 @pytest.fixture(scope="session")
 def heavy() -> Vehicle:
-    return load_vehicle(SHIPPED["bluerov2_heavy"])
+    """Return the BlueROV2 Heavy without roll and pitch."""
+    return four_axes(load_vehicle(SHIPPED["bluerov2_heavy"]))
 
 
 Made = Callable[[str, Callable[[Path], object]], Path]
@@ -98,9 +99,9 @@ def videoray3_dir(videoray3_fmu: Path) -> Path:
     return videoray3_fmu.with_suffix("")
 
 
-def unzipped(vehicle: Path, folder: Path, fmi: int = 2) -> Path:
+def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:
     """Write the unzipped FMU of a vehicle, without its page, to a folder, and return the folder."""
-    content = native_content(load_vehicle(vehicle), fmi=fmi)
+    content = native_content(vehicle, fmi=fmi)
     (library,) = compile_all(chosen_platforms(["host"], fmi), content.sources, content.identifier, fmi=fmi).values()
     host = fmpy.platform if fmi == 2 else fmpy.platform_tuple
     binary = f"binaries/{host}/{content.identifier}{fmpy.sharedLibraryExtension}"
@@ -111,21 +112,45 @@ def unzipped(vehicle: Path, folder: Path, fmi: int = 2) -> Path:
 
 
 @pytest.fixture(scope="session")
-def heavy_dir(made_once: Made) -> Path:
-    """Return the unzipped FMU of the BlueROV2 Heavy, which has sway, lag and coupling."""
-    return made_once("heavy", lambda folder: unzipped(SHIPPED["bluerov2_heavy"], folder))
+def heavy_dir(made_once: Made, heavy: Vehicle) -> Path:
+    """Return the unzipped FMU of the BlueROV2 Heavy without roll and pitch, which has sway, lag and coupling."""
+    return made_once("heavy", lambda folder: unzipped(heavy, folder))
 
 
 @pytest.fixture(scope="session")
 def everything_dir(made_once: Made) -> Path:
     """Return the unzipped FMU of a vehicle with every effect."""
-    return made_once("everything", lambda folder: unzipped(EVERYTHING, folder))
+    return made_once("everything", lambda folder: unzipped(load_vehicle(EVERYTHING), folder))
 
 
 @pytest.fixture(scope="session")
-def heavy3_dir(made_once: Made) -> Path:
-    """Return the unzipped FMU of FMI 3.0 of the BlueROV2 Heavy."""
-    return made_once("heavy3", lambda folder: unzipped(SHIPPED["bluerov2_heavy"], folder, fmi=3))
+def thrust_dir(made_once: Made) -> Path:
+    """Return the unzipped FMU of a vehicle with everything that thrust can depend on."""
+    return made_once("thrust", lambda folder: unzipped(load_vehicle(THRUST_EFFECTS), folder))
+
+
+@pytest.fixture(scope="session")
+def thrust3_dir(made_once: Made) -> Path:
+    """Return the unzipped FMU of FMI 3.0 of that vehicle."""
+    return made_once("thrust3", lambda folder: unzipped(load_vehicle(THRUST_EFFECTS), folder, fmi=3))
+
+
+@pytest.fixture(scope="session")
+def heavy3_dir(made_once: Made, heavy: Vehicle) -> Path:
+    """Return the unzipped FMU of FMI 3.0 of the BlueROV2 Heavy without roll and pitch."""
+    return made_once("heavy3", lambda folder: unzipped(heavy, folder, fmi=3))
+
+
+@pytest.fixture(scope="session")
+def six_dir(made_once: Made) -> Path:
+    """Return the unzipped FMU of a vehicle with six axes and every effect."""
+    return made_once("six", lambda folder: unzipped(a_vehicle(SIX), folder))
+
+
+@pytest.fixture(scope="session")
+def six3_dir(made_once: Made) -> Path:
+    """Return the unzipped FMU of FMI 3.0 of a vehicle with six axes and every effect."""
+    return made_once("six3", lambda folder: unzipped(a_vehicle(SIX), folder, fmi=3))
 
 
 @pytest.fixture(scope="module")

@@ -2,13 +2,29 @@
 
 import random
 from collections.abc import Mapping
-from math import sqrt
+from dataclasses import replace
+from itertools import combinations, permutations
+from math import hypot, prod, sqrt
 from pathlib import Path
 
-from rov_fmu.model.layout import AXES, AXIS, CURVE, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.attitude import QUATERNION
+from rov_fmu.model.layout import (
+    AXES,
+    AXIS,
+    CURVE,
+    HEAVE,
+    PITCH,
+    RESTORING,
+    ROLL,
+    Curve,
+    Layout,
+    Thruster,
+    VehicleAxis,
+    cross_name,
+    cross_of,
+)
 from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.paper import PAPER
-from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 Values = Mapping[str, float]
@@ -40,11 +56,23 @@ _MIX = {
     "aside": {"1": -1.0, "2": 1.0, "3": -1.0, "4": 1.0},
     "turn": {"1": -0.5, "2": 0.5, "3": 0.5, "4": -0.5},
 }
-_BODY_NUMBERS = {"m_rov": 13.5, "I_r": 0.37, "R": 0.2, "gamma": 0.5}
+_BODY_NUMBERS = {"m_rov": 13.5, "I_p": 0.26, "I_q": 0.23, "I_r": 0.37, "R": 0.2, "gamma": 0.5}
+_BODY_NUMBERS |= {
+    "W": 132.6,
+    "B": 131.6,
+    "x_G": 0.01,
+    "y_G": -0.02,
+    "z_G": 0.03,
+    "x_B": 0.005,
+    "y_B": 0.01,
+    "z_B": -0.02,
+}
 _AXIS_NUMBERS = {  # m_a, a_d, b_d, a_d_reverse, b_d_reverse, F_0
     "u": (6.3567, 141.0, 13.7, 190.0, 4.0, 0.1),
     "v": (7.1206, 217.0, 0.0, 100.0, 3.0, 0.3),
     "w": (18.6863, 190.0, 33.0, 150.0, 20.0, -1.5),
+    "p": (0.189, 1.19, 0.1, 0.8, 0.3, 0.02),
+    "q": (0.135, 0.47, 0.8, 0.6, 0.5, -0.03),
     "r": (0.2215, 1.5, 0.0, 0.7, 0.2, 0.01),
 }
 """The coefficients of a BlueROV2 Heavy, and plausible values for those that it does not have."""
@@ -55,7 +83,12 @@ _CURVE_NUMBERS = {
     "b_t_reverse": 25.54,
     "c_0": 0.087,
     "c_0_reverse": 0.1,
+    "d": 5.0,
+    "d_reverse": 3.0,
     "T": 0.15,
+    "k_t": 1.1,
+    "V_0": 16.0,
+    "n_V": 1.3,
 }
 assert _CURVE_NUMBERS.keys() == CURVE.keys()
 
@@ -66,6 +99,9 @@ def numbered(layout: Layout, **values: float) -> Rov:
     for form in layout.axes:
         row = _AXIS_NUMBERS[form.axis.velocity]
         numbers |= {form.axis.coefficient(key): value for key, value in zip(AXIS, row, strict=True)}
+    for key, *axes in layout.cross:
+        column = 0 if key == "m_a" else 1
+        numbers[cross_name(key, *axes)] = 0.1 * sqrt(prod(_AXIS_NUMBERS[axis][column] for axis in axes[:2]))
     numbers |= _BODY_NUMBERS | values
     return Rov(layout, {name: 1.0 if meta.tunable else numbers[name] for name, meta in layout.coefficients.items()})
 
@@ -86,7 +122,33 @@ def _rov(
 
 
 EVERYTHING = Path(__file__).parent / "vehicle" / "everything.toml"
-VIDEORAY, HEAVY = (load_vehicle(SHIPPED[name]).rov for name in ("videoray", "bluerov2_heavy"))
+THRUST_EFFECTS = EVERYTHING.with_name("thrust_effects.toml")
+SIX_AXES = EVERYTHING.with_name("six_axes.toml")
+
+
+def four_axes(vehicle: Vehicle) -> Vehicle:
+    """Return a vehicle without roll and pitch, if it has them: its net weight is then a constant load in heave."""
+    rov = vehicle.rov
+    if not rov.layout.has_attitude:
+        return vehicle
+    forms = tuple(
+        replace(form, keys=(*form.keys, "F_0")) if form.axis is HEAVE else form
+        for form in rov.layout.axes
+        if form.axis not in (ROLL, PITCH)
+    )
+    layout = replace(rov.layout, axes=forms, restoring=())
+    values = {**rov.coefficients, "F_0_w": rov["W"] - rov["B"]}
+    sources = {**vehicle.sources, "F_0_w": vehicle.sources["W"]}
+    return replace(
+        vehicle,
+        rov=Rov(layout, {name: values[name] for name in layout.coefficients}),
+        sources={name: sources[name] for name in layout.coefficients},
+    )
+
+
+VIDEORAY = load_vehicle(SHIPPED["videoray"]).rov
+HEAVY = four_axes(load_vehicle(SHIPPED["bluerov2_heavy"])).rov
+"""The BlueROV2 Heavy without roll and pitch: four axes with lag and coupling."""
 VEHICLES = {
     "VideoRay": VIDEORAY,
     "Heavy": HEAVY,
@@ -109,6 +171,36 @@ VEHICLES = {
     "linear drag alone, late": numbered(Layout(_axes("ur"), (_LAGGING,), _PAIR), a_d_u=0.0, a_d_r=0.0, b_d_r=0.3),
 }
 
+_SKEW = (
+    Thruster("a", "t200", (0.6, 0.0, 0.8), (0.2, 0.1, -0.05)),
+    Thruster("b", "t200", (0.0, 1.0, 0.0), (-0.3, 0.05, 0.1)),
+    Thruster("c", "t200", (0.0, 0.6, -0.8), (0.05, -0.25, 0.15)),
+)
+_BETWEEN = (("m_a", "u", "q"), ("m_a", "v", "r"), ("b_d", "q", "w"), ("a_d", "p", "v"), ("lift", "v", "u", "r"))
+SIX = numbered(
+    Layout(
+        _axes("uvwpqr", _ALL),
+        (Curve("t200", tuple(key for key in CURVE if key not in ("k_t", "V_0", "n_V"))),),
+        _SKEW,
+        coupled=True,
+        cross=_BETWEEN,
+        restoring=tuple(RESTORING),
+    )
+)
+"""A vehicle with six axes and every effect."""
+
+
+def with_axes(axes: str) -> Rov:
+    """Return the vehicle SIX with only some of its axes, nothing between them, and no weight."""
+    forms = tuple(form for form in SIX.layout.axes if form.axis.velocity in axes)
+    return numbered(replace(SIX.layout, axes=forms, cross=(), restoring=()))
+
+
+def frictionless(rov: Rov) -> Rov:
+    """Return a vehicle without drag, lift and constant loads."""
+    lift = {cross_name(*of) for of in rov.layout.cross if of[0] == "lift"}
+    return rov.replaced({name: 0.0 for name in rov.coefficients if name[:3] in ("a_d", "b_d", "F_0") or name in lift})
+
 
 def a_vehicle(rov: Rov) -> Vehicle:
     """Return a vehicle file's content with these coefficients and placeholders for all texts."""
@@ -122,6 +214,36 @@ def a_vehicle(rov: Rov) -> Vehicle:
 def spread(rng: random.Random, low: float, high: float, zero: float = 0.0) -> float:
     """Return a number from 10^low to 10^high with an evenly distributed logarithm, or 0 with the probability `zero`."""
     return 0.0 if rng.random() < zero else float(10.0 ** rng.uniform(low, high))
+
+
+def random_body(rng: random.Random, axes: str) -> Rov:
+    """Return a coupled vehicle with these axes, about as large as the Heavy, and with effects chosen at random.
+
+    It may have entries of the mass matrix and damping between its axes, lift, weight and buoyancy with their centres,
+    thrusters with lag, and loss of thrust by the speed of advance.
+    """
+    pairs = [(a, b) for a, b in permutations(axes, 2) if rng.random() < 0.4]
+    cross: list[tuple[str, ...]] = [("m_a", a, b) for a, b in combinations(axes, 2) if rng.random() < 0.5]
+    cross += [(rng.choice(["a_d", "b_d"]), a, b) for a, b in pairs]
+    cross += [("lift", rng.choice(axes), "u", b) for b in axes if "u" in axes and b != "u" and rng.random() < 0.5]
+    lag, advance = (rng.choice([(), keys]) for keys in (("T",), ("d", "d_reverse")))
+    thrusters = []
+    for n in range(3):
+        direction, position = ([rng.gauss(0.0, 1.0) for _ in range(3)] for _ in range(2))
+        length = sqrt(sum(x * x for x in direction))
+        x, y, z = (part / length for part in direction)
+        thrusters.append(
+            Thruster(f"t{n}", "main", (x, y, z), (0.2 * position[0], 0.2 * position[1], 0.2 * position[2]))
+        )
+    forms = tuple(VehicleAxis(form.axis, rng.choice([("m_a", *_DRAG), _ALL])) for form in _axes(axes))
+    restoring = tuple(RESTORING) if rng.random() < 0.7 else ()
+    curves = (Curve("main", (*_T200.keys, *advance, *lag)),)
+    layout = Layout(forms, curves, tuple(thrusters), coupled=True, cross=tuple(cross), restoring=restoring)
+    numbers = {name: value * rng.uniform(0.7, 1.3) for name, value in numbered(layout).coefficients.items()}
+    signed = {
+        name: value * rng.choice([-1.0, 1.0]) for name, value in numbers.items() if cross_of(name) or name[2:] in "GB"
+    }
+    return Rov(layout, numbers | signed)
 
 
 def random_layout(rng: random.Random) -> Layout:
@@ -175,16 +297,16 @@ def random_inputs(rng: random.Random, rov: Rov) -> State:
     for name in rov.layout.inputs:
         if name in rov.layout.commands:
             found[name] = rng.choice([rng.uniform(-1.1, 1.1), rng.uniform(-1.1, 1.1), 0.0])
-        elif name in ("V_N", "V_E"):
+        elif name.startswith("V_"):
             found[name] = rng.uniform(-0.5, 0.5)
         else:
-            found[name] = rng.choice([0.0, rng.gauss(0.0, 0.3 if name == "N_ext" else 10.0)])
+            found[name] = rng.choice([0.0, rng.gauss(0.0, 0.3 if name[0] in "KMN" else 10.0)])
     return found
 
 
 def random_state(rng: random.Random, rov: Rov) -> State:
     """Return velocities of a vehicle's usual size, some of them zero, a pose near the origin, and lagging forces."""
-    sizes = {"x": 20.0, "y": 20.0, "z": 20.0, "psi": 3.0, "r": 1.5}
+    sizes = {"x": 20.0, "y": 20.0, "z": 20.0, "psi": 3.0, "p": 1.5, "q": 1.5, "r": 1.5}
     found = {}
     for name in rov.layout.state:
         if name in ("x", "y", "z", "psi"):
@@ -192,7 +314,13 @@ def random_state(rng: random.Random, rov: Rov) -> State:
         else:
             size = 10.0 if name in rov.layout.lagging else sizes.get(name, 0.8)
             found[name] = rng.choice([rng.gauss(0.0, size), rng.gauss(0.0, size), rng.gauss(0.0, size), 0.0])
-    return found
+    return found | (random_quaternion(rng) if rov.layout.has_attitude else {})
+
+
+def random_quaternion(rng: random.Random, length: float = 1.0) -> State:
+    """Return a quaternion of this length; all attitudes are equally likely."""
+    parts = [rng.gauss(0.0, 1.0) for _ in QUATERNION]
+    return {name: length * part / hypot(*parts) for name, part in zip(QUATERNION, parts, strict=True)}
 
 
 def random_case(rng: random.Random, rov: Rov, shortest: float = -6.0, longest: float = 0.3) -> Case:
@@ -202,8 +330,8 @@ def random_case(rng: random.Random, rov: Rov, shortest: float = -6.0, longest: f
 
 
 def at_rest(rov: Rov) -> State:
-    """Return all states, each 0."""
-    return dict.fromkeys(rov.layout.state, 0.0)
+    """Return all states: each is 0, except for the quaternion of a level vehicle that heads north."""
+    return dict(rov.layout.at_rest)
 
 
 def still(rov: Rov) -> State:

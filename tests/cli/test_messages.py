@@ -87,10 +87,10 @@ TYPED: dict[str, tuple[list[str], str]] = {
     ),
     "an axis in capital letters": (
         ["tune", "videoray", "--axis", "Heave"],
-        "'--axis': 'Heave' must be one of surge, sway, heave, yaw; did you mean heave?",
+        "'--axis': 'Heave' must be one of surge, sway, heave, roll, pitch, yaw; did you mean heave?",
     ),
     "an axis by its velocity": (["tune", "videoray", "--axis", "w"], "did you mean heave?"),
-    "no axis": (["tune", "videoray"], "Missing option '--axis'. Choose one of surge, sway, heave, yaw."),
+    "no axis": (["tune", "videoray"], "Missing option '--axis'. Choose one of surge, sway, heave, roll, pitch, yaw."),
     "workers in words": (
         ["study", "plan.toml", "-o", "r", "--workers", "x"],
         "Invalid value for '--workers': 'x' must be a whole number from 1 to 1024",
@@ -232,8 +232,7 @@ KEYS: dict[str, tuple[str, str, str]] = {
     "a_tt": (
         "a_t = ",
         "a_tt = ",
-        "curves.rear.a_tt: there is no such key, only a_t, b_t, a_t_reverse, b_t_reverse, c_0, "
-        "c_0_reverse, T, description, equation, together; did you mean a_t?",
+        "curves.rear.a_tt: there is no such key; did you mean a_t?",
     ),
     "capital letters": (
         "a_d = ",
@@ -329,10 +328,15 @@ TABLES: dict[str, tuple[str, str, str]] = {
         _LOG.replace("time", "timestamp"),
         "column 4: 'time [s]' is missing; is it the column 'timestamp [s]'?",
     ),
-    "a log of roll": (
+    "a log of an axis that no thruster drives": (
         "log_roll_1.csv",
         _LOG.replace("depth [m]", "roll [deg]"),
-        f"log_roll_1.csv, line 1: column 'command [%]' is the command of one axis, but roll {_NAMED}: the "
+        "log_roll_1.csv: no thruster of the vehicle drives roll",
+    ),
+    "a log of no axis": (
+        "log_twist_1.csv",
+        _LOG,
+        f"log_twist_1.csv, line 1: column 'command [%]' is the command of one axis, but twist {_NAMED}: the "
         "name of the file must be log_surge*.csv or log_heave*.csv or log_yaw*.csv",
     ),
     "a log of an axis misspelt": (
@@ -364,7 +368,7 @@ TABLES: dict[str, tuple[str, str, str]] = {
         "command [%],velocity [m/s]\n20;30,0.3\n",
         "= '20;30': must be a number; what separates the cells must be the same as in the header",
     ),
-    "a table of roll": ("steady_roll.csv", "", f"steady_roll.csv: roll {_NAMED}, only surge, heave and yaw"),
+    "a table of no axis": ("steady_twist.csv", "", f"steady_twist.csv: twist {_NAMED}, only surge, heave and yaw"),
     "a table of an axis misspelt": (
         "steady_serge.csv",
         "",

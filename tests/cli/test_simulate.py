@@ -38,6 +38,17 @@ def test_the_values_at_the_end_are_printed(capsys: Capsys) -> None:
     ]
 
 
+def test_a_vehicle_that_rolls_begins_at_the_given_angles(capsys: Capsys) -> None:
+    angles = {"phi_0": 0.1, "theta_0": 0.2, "psi_0": 7.0}
+    settings = [f"--set={name}={value}" for name, value in angles.items()]
+    assert main(["simulate", "bluerov2_heavy", *settings, "--stop", "1"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    expected = rov_fmu.load("bluerov2_heavy").simulate([0, 1], start=angles)
+    values = {name: value for name, value, *_ in (line.split() for line in out.splitlines()[3:])}
+    assert {name: values[name] for name in ("phi", "psi")} == {n: f"{expected[n][-1]:.6g}" for n in ("phi", "psi")}
+
+
 def test_a_table_of_commands_gives_a_table_of_results(here: Path) -> None:
     """Up to its last time; a command holds from its own time, also between two results."""
     assert main(["simulate", "--input", "commands.csv", "--step", "0.5", "-o", "result.csv"]) == 0

@@ -5,7 +5,7 @@ from math import sqrt
 
 import pytest
 
-from docs.compared import MANOEUVRE, Table, fly, tables, without
+from docs.compared import LEVEL, MANOEUVRE, VON_BENZON, WU, Table, fly, tables, without
 from rov_fmu.io.toml_file import read_toml
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
@@ -71,4 +71,39 @@ def test_what_is_left_out_is_left_out() -> None:
     assert (not rov.layout.coupled, bool(rov.layout.lagging), rov["c_0_t200"]) == (False, True, 0.0872)
     assert (not bare.layout.coupled, bool(bare.layout.lagging), "c_0_t200" in bare.coefficients) == (True, False, False)
     assert bare.curve_force(bare.layout.curves[0], -0.5) == -bare.curve_force(bare.layout.curves[0], 0.5)
-    assert fly(without(rov)) == fly(rov)
+    level = rov.replaced({"z_B": LEVEL})
+    assert fly(without(level)) == fly(level)
+
+
+def test_the_published_equations_give_the_same_motions(computed: dict[str, Table]) -> None:
+    rows = computed["published_motion"][2:]
+    assert len(rows) == 5
+    for title, _, *values, furthest in rows:
+        assert float(furthest) < 1e-12, title
+        assert max(abs(number) for number in numbers(("", *values))) > 0.1, "it moves"
+
+
+def test_the_numbers_of_the_publications_are_those_of_the_files() -> None:
+    for name, published in (("bluerov2", WU), ("bluerov2_heavy", VON_BENZON)):
+        rov = load_vehicle(SHIPPED[name]).rov
+        for form in rov.layout.axes:
+            axis, i = form.axis, "uvwpqr".index(form.axis.velocity)
+            found = (rov[axis.inertia], *(rov[axis.coefficient(key)] for key in ("m_a", "b_d", "a_d")))
+            assert found == (published.mass[i], published.added_mass[i], published.linear[i], published.quadratic[i])
+        net_weight = rov["W"] - rov["B"] if rov.layout.has_attitude else rov["F_0_w"]
+        assert net_weight == pytest.approx(published.weight - published.buoyancy, abs=1e-12)
+
+
+def test_vehicles_tilt_as_the_page_says(computed: dict[str, Table]) -> None:
+    heavy, higher, wu, centred, gazebo = ([cell == "turns over" for cell in row[1:]] for row in computed["tilting"][2:])
+    assert heavy == wu == centred == [False, False, True, True, True]
+    assert higher == [False, False, False, False, True]
+    assert gazebo == [False, False, False, True, True]
+
+
+def test_the_heavy_turns_over_where_its_righting_moment_ends() -> None:
+    """A quarter of full command: the thrust times 8.5 cm is the buoyancy times 1 cm."""
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    curve = rov.layout.curves[0]
+    thrust = sqrt(2.0) * (rov.curve_force(curve, 0.254) - rov.curve_force(curve, -0.254))
+    assert thrust * 0.085 == pytest.approx(rov["B"] * 0.01, rel=0.01)

@@ -155,6 +155,7 @@ def workplace(tmp_path: Path, videoray_fmu: Path, videoray3_fmu: Path) -> Path:
     shutil.copy(videoray_fmu, tmp_path)
     shutil.copy(videoray3_fmu, tmp_path)
     shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", tmp_path / "my_tests")
+    shutil.copytree(ROOT / "examples" / "remus100", tmp_path / "examples" / "remus100")
     program = tmp_path / "bin" / "rov-fmu"
     program.parent.mkdir()
     program.write_text(

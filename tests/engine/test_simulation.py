@@ -15,10 +15,11 @@ from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT
-from tests.vehicles import EVERYTHING, HEAVY, VIDEORAY, random_inputs, random_state
+from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, random_inputs, random_state
 
 Array = NDArray[np.float64]
 
@@ -50,16 +51,17 @@ def fmu_states(folder: Path, rov: Rov, times: Array, inputs: dict[str, Array], s
     return np.array(rows).T
 
 
-@pytest.mark.parametrize("name", ["videoray", pytest.param("heavy", marks=pytest.mark.long), "everything"])
+@pytest.mark.parametrize("name", ["videoray", pytest.param("heavy", marks=pytest.mark.long), "everything", "six"])
 def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureRequest) -> None:
-    rov = {"videoray": VIDEORAY, "heavy": HEAVY, "everything": load_vehicle(EVERYTHING).rov}[name]
+    rov = {"videoray": VIDEORAY, "heavy": HEAVY, "everything": load_vehicle(EVERYTHING).rov, "six": SIX}[name]
     folder = request.getfixturevalue(f"{name}_dir")
     rng = random.Random(7)
     lengths = [rng.choice([2.0**-10, 2.0**-6, 2.0**-3, 1.0, 16.0]) for _ in range(200)]
     times = np.cumsum([0.0, *lengths])  # all sums are exact
     drawn = [random_inputs(rng, rov) for _ in times]
     inputs = {name: np.array([each[name] for each in drawn]) for name in rov.layout.inputs}
-    start = random_state(rng, rov)
+    start = {name: x for name, x in random_state(rng, rov).items() if name not in QUATERNION}
+    start |= {name: rng.uniform(-3.0, 3.0) for name in rov.layout.initial}
     found = simulate(rov, times, {**inputs, **start}, [*rov.layout.state, *rov.layout.thrust])
     assert found.failed == len(times)
     np.testing.assert_array_equal(found.values[:, 0], fmu_states(folder, rov, times, inputs, start))
@@ -90,7 +92,7 @@ def test_the_number_of_threads_and_vehicles_changes_no_bit() -> None:
 
 def test_calculated_variables_agree_with_python() -> None:
     rng = random.Random(3)
-    for rov in (VIDEORAY, load_vehicle(EVERYTHING).rov):
+    for rov in (VIDEORAY, load_vehicle(EVERYTHING).rov, SIX):
         layout, vehicles = rov.layout, 50
         inputs, states = ([draw(rng, rov) for _ in range(vehicles)] for draw in (random_inputs, random_state))
         values = {name: np.array([[each[name]] for each in inputs]) for name in layout.inputs}

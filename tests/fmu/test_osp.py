@@ -7,11 +7,12 @@ from lxml import etree
 
 from rov_fmu.cli import main
 from rov_fmu.fmu.osp import osp_model_description, osp_path
-from rov_fmu.fmu.variables import UNITS, variables
+from rov_fmu.fmu.variables import unit_of, variables
 from rov_fmu.model.layout import Layout
+from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
-from tests.vehicles import VEHICLES
+from tests.vehicles import SIX, VEHICLES
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
 
@@ -46,11 +47,11 @@ def references(group: etree._Element) -> list[str]:
     return [variable.get("ref") for variable in group]
 
 
-@pytest.mark.parametrize("kind", VEHICLES)
-def test_every_input_and_output_is_in_one_group(kind: str) -> None:
+@pytest.mark.parametrize("rov", [*VEHICLES.values(), SIX], ids=[*VEHICLES, "six axes"])
+def test_every_input_and_output_is_in_one_group(rov: Rov) -> None:
     """The variables of a group have the same causality and unit, and different axes."""
-    groups = groups_of(VEHICLES[kind].layout)
-    declared = {v.name: v for v in variables(VEHICLES[kind])}
+    groups = groups_of(rov.layout)
+    declared = {v.name: v for v in variables(rov)}
     grouped = sorted(name for group in groups for name in references(group))
     assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
     names = [group.get("name") for group in groups]
@@ -62,7 +63,7 @@ def test_every_input_and_output_is_in_one_group(kind: str) -> None:
         assert len({v.causality for v in members}) == 1
         assert [v.unit for v in members] == [variable.get("unit") for variable in group]
         (unit,) = {v.unit for v in members}
-        assert UNITS[unit].exponents == SEQUENCE[group.tag.removeprefix(NAMESPACE)]
+        assert unit_of(unit).exponents == SEQUENCE[group.tag.removeprefix(NAMESPACE)]
         axes = [axis for variable in group if (axis := variable.get("axis"))]
         assert set(axes) <= {"x", "y", "z"}
         assert len(set(axes)) == len(axes)
@@ -95,6 +96,14 @@ def test_what_systems_connect_by(
     (group,) = [group for group in groups if group.get("name") == name]
     assert group.tag == NAMESPACE + element
     assert {variable.get("ref"): variable.get("axis") for variable in group} == members
+
+
+def test_moments_and_rotations_have_three_axes() -> None:
+    found = {group.get("name"): {v.get("ref"): v.get("axis") for v in group} for group in groups_of(SIX.layout)}
+    assert found["external_torque"] == {"K_ext": "x", "M_ext": "y", "N_ext": "z"}
+    assert found["current"] == {"V_N": "x", "V_E": "y", "V_D": "z"}
+    assert found["angular_velocity"] == {"p": "x", "q": "y", "r": "z"}
+    assert found["attitude"] == {"phi": "x", "theta": "y", "psi": "z"}
 
 
 def test_an_oblique_force_has_no_axis(heavy: Vehicle) -> None:

@@ -15,12 +15,14 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.validation import validate_fmu
 
 from rov_fmu.cli import main
+from rov_fmu.fmu.archive import python_content
 from rov_fmu.fmu.python_flavour import python_sources
 from rov_fmu.fmu.variables import Variable, variables
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.conftest import Made
 from tests.fmi import WARNING, Message
 from tests.fmi2 import recording_callbacks
+from tests.vehicles import SIX, a_vehicle
 from verification.references.c_programs import Ended, compile_c, run_program
 from verification.references.fmpy_slave import fmpy_slave, keep_loaded
 
@@ -68,7 +70,21 @@ def test_its_modules_are_named_after_the_vehicle(python_fmu: Path) -> None:
         "resources/videoray_slave.py",
         *(
             f"resources/videoray_model/{name}.py"
-            for name in ("__init__", "dependencies", "equation", "formula", "layout", "riccati", "rov", "step")
+            for name in (
+                "__init__",
+                "attitude",
+                "delay",
+                "dependencies",
+                "equation",
+                "forces",
+                "formula",
+                "layout",
+                "mass",
+                "riccati",
+                "rov",
+                "step",
+                "thrust",
+            )
         ),
     }
 
@@ -125,6 +141,46 @@ def test_both_flavours_move_the_same_way(python_dir: Path, videoray_dir: Path, v
                 as_bytes = slave.serializeFMUstate(state)
                 slave.setFMUState(slave.deSerializeFMUstate(as_bytes) if seed % 2 else state)
             compare()
+    for slave in both:
+        slave.terminate()
+        slave.freeInstance()
+
+
+def test_both_flavours_tilt_the_same_way(tmp_path: Path, six_dir: Path) -> None:
+    """They begin at the given attitude, and a restored state continues with its heading."""
+    for name, data in python_content(a_vehicle(SIX)).files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(data)
+    keep_loaded(tmp_path)
+    rng, declared = random.Random(7), variables(SIX)
+    both = [_instance(tmp_path), _instance(six_dir)]
+    place = {v.name: v.value_reference for v in declared}
+    outputs = [v.value_reference for v in declared if v.causality != "parameter"]
+
+    def compare() -> None:
+        python, native = (slave.getReal(outputs) for slave in both)
+        assert python == pytest.approx(native, rel=1e-11, abs=1e-11)
+
+    for slave in both:
+        slave.setReal([place[name] for name in SIX.layout.initial], [0.5, -0.8, 7.0])
+        slave.enterInitializationMode()
+    compare()
+    assert both[0].getReal([place["psi"]]) == pytest.approx([7.0])
+    for slave in both:
+        slave.exitInitializationMode()
+    saved = [slave.getFMUState() for slave in both]
+    for n in range(20):
+        values = [rng.uniform(-1.2, 1.2) for _ in SIX.layout.inputs]
+        for slave in both:
+            slave.setReal([place[name] for name in SIX.layout.inputs], values)
+            slave.doStep(currentCommunicationPoint=0.1 * n, communicationStepSize=0.1)
+        compare()
+    for slave, state in zip(both, saved, strict=True):
+        slave.setFMUState(state)
+    compare()
+    assert both[0].getReal([place["psi"]]) == pytest.approx([7.0])
+    with pytest.raises(FMICallException):
+        both[0].setReal([place["eta"]], [1.0])
     for slave in both:
         slave.terminate()
         slave.freeInstance()

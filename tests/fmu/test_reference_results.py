@@ -10,19 +10,22 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+import numpy as np
 import pytest
 from lxml import etree
 
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST
 from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.layout import AXES
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.vehicles import VEHICLES, at_rest, still
-from verification.references import reference
+from tests.vehicles import SIX, VEHICLES, a_vehicle, at_rest, four_axes, still
+from verification.references import reference, rigid_vehicle
+from verification.references.rigid_body import VELOCITIES, rotation
 
 _SCHEMAS = Path(fmpy.__file__).parent
 # The standard's root element, around FMPy's copy of the attributes that all layered standards share.
@@ -47,7 +50,8 @@ _FORM = f"""
 
 @cache
 def _shipped(name: str) -> tuple[Vehicle, Mapping[str, bytes]]:
-    vehicle = load_vehicle(SHIPPED[name])
+    """Return a vehicle that ships, without roll and pitch, and its reference results."""
+    vehicle = four_axes(load_vehicle(SHIPPED[name]))
     return vehicle, reference_results(vehicle)
 
 
@@ -78,7 +82,7 @@ def test_the_files_have_the_form_of_the_standards(name: str) -> None:
             schema.assertValid(etree.fromstring(content))
     for title, experiment in _experiments(files).items():
         assert experiment.find("References").get("source") == f"{title}_expected.csv"
-    assert len(archive(files)) < 15_000
+    assert len(archive(files)) < 20_000
     if name != "videoray":
         check_experiments_of_axes(vehicle, files)
 
@@ -91,7 +95,7 @@ def check_experiments_of_axes(vehicle: Vehicle, files: Mapping[str, bytes]) -> N
         assert [x for x in experiments if x.startswith(f"{form.axis.name}_")]
         assert [x for x in experiments if x.startswith(f"{form.axis.name}_minus_")]
     moved = _rows(files, experiments["manoeuvre"].find("References").get("source"))[-1]
-    assert moved.keys() - {"time"} == vehicle.layout.state.keys()
+    assert moved.keys() - {"time"} == vehicle.layout.state.keys() - set(QUATERNION)
 
 
 def test_the_tables_of_the_paper_are_experiments() -> None:
@@ -183,3 +187,33 @@ def test_expected_values_of_a_vehicle_that_spins_fast_are_right(spinner: Vehicle
     assert spinner.rov.response(AXES["yaw"], 1.0)[0] > 1000.0
     for experiment in ("sway_100", "yaw_40", "yaw_100", "manoeuvre"):
         _check(spinner.rov, files, experiment)
+
+
+# ---- Roll and pitch --------------------------------------------------------------------------------------------------
+
+
+def test_expected_values_with_roll_and_pitch_are_those_of_the_rigid_body() -> None:
+    """Steps, the manoeuvre, and a tilted start of a vehicle with six axes."""
+    vehicle = a_vehicle(SIX)
+    files = reference_results(vehicle)
+    check_experiments_of_axes(vehicle, files)
+    parameters = etree.fromstring(files[f"{FOLDER}/attitude.ssv"])
+    angles = {p.get("name"): float(p[0].get("value")) for p in parameters.iter("{*}Parameter")}
+    assert angles.keys() == SIX.layout.initial.keys()
+    for name in ("roll_40", "manoeuvre", "attitude"):
+        stimuli, expected = (_rows(files, f"{name}{end}.csv") for end in ("", "_expected"))
+        state = at_rest(SIX) | expected[0]
+        y, t = rigid_vehicle.places(SIX, state), 0.0
+        for row in expected[1:]:
+            inputs = still(SIX) | next(x for x in reversed(stimuli) if x["time"] <= t)
+            y, t = list(rigid_vehicle.integrate(SIX, inputs, y, row["time"] - t)), row["time"]
+            moved = dict(zip([*VELOCITIES, *QUATERNION, *"xyz"], y, strict=False))
+            assert moved.keys() - set(QUATERNION) <= row.keys()
+            assert [row[v] for v in moved if v not in QUATERNION] == pytest.approx(
+                [value for v, value in moved.items() if v not in QUATERNION], abs=1e-9
+            )
+            if "eta" in row:
+                turned = rotation([row[name] for name in QUATERNION])
+                assert np.array(turned) == pytest.approx(np.array(rotation(y[6:10])), abs=1e-9)
+    assert {name: expected[0][name.removesuffix("_0")] for name in angles} == pytest.approx(angles)
+    assert expected[0]["theta"] != expected[-1]["theta"]

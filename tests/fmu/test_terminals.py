@@ -13,11 +13,12 @@ from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.pictures import pictures
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.vehicles import HEAVY, VEHICLES, VIDEORAY
+from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY
 
 SCHEMA = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd"))
-INPUTS, OUTPUTS = {"thrusters", "load", "current"}, {"thrust", "body_velocity", "pose"}
-PLUGS = {"body_velocity", "pose"}
+INPUTS, OUTPUTS = {"thrusters", "load", "current"}, {"thrust", "body_velocity", "pose", "attitude"}
+PLUGS = {"body_velocity", "pose", "attitude"}
+ROVS = {**VEHICLES, "six axes": SIX}
 
 
 def read(document: bytes) -> dict[str, etree._Element]:
@@ -34,11 +35,11 @@ def members(terminal: etree._Element) -> list[str]:
     return [member.get("variableName") for member in terminal.iter("TerminalMemberVariable")]
 
 
-@pytest.mark.parametrize("kind", VEHICLES)
+@pytest.mark.parametrize("kind", ROVS)
 def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
     """The members of a terminal have the same causality, and its name is unique."""
-    declared = {v.name: v.causality for v in variables(VEHICLES[kind])}
-    found = read(terminals_and_icons(VEHICLES[kind].layout))
+    declared = {v.name: v.causality for v in variables(ROVS[kind])}
+    found = read(terminals_and_icons(ROVS[kind].layout))
     grouped = [name for terminal in found.values() for name in members(terminal)]
     assert sorted(grouped) == sorted(name for name, causality in declared.items() if causality in {"input", "output"})
     for name, terminal in found.items():
@@ -52,29 +53,32 @@ def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "of_the_videoray", "of_the_heavy"),
+    ("name", "of_the_videoray", "of_the_heavy", "of_six_axes"),
     [
-        ("thrusters", "u_l u_r u_t", "u_1 u_2 u_3 u_4 u_5 u_6 u_7 u_8"),
-        ("load", "X_ext Z_ext N_ext", "X_ext Y_ext Z_ext N_ext"),
-        ("current", "V_N V_E", "V_N V_E"),
-        ("body_velocity", "u w r", "u v w r"),
-        ("pose", "x y z psi", "x y z psi"),
-        ("thrust", "F_l F_r F_t tau_rear", "F_1 F_2 F_3 F_4 F_5 F_6 F_7 F_8 tau_t200"),
+        ("thrusters", "u_l u_r u_t", "u_1 u_2 u_3 u_4 u_5 u_6 u_7 u_8", "u_a u_b u_c"),
+        ("load", "X_ext Z_ext N_ext", "X_ext Y_ext Z_ext N_ext", "X_ext Y_ext Z_ext K_ext M_ext N_ext"),
+        ("current", "V_N V_E", "V_N V_E", "V_N V_E V_D"),
+        ("body_velocity", "u w r", "u v w r", "u v w p q r"),
+        ("pose", "x y z psi", "x y z psi", "x y z eta epsilon_1 epsilon_2 epsilon_3"),
+        ("thrust", "F_l F_r F_t tau_rear", "F_1 F_2 F_3 F_4 F_5 F_6 F_7 F_8 tau_t200", "F_a F_b F_c tau_t200"),
     ],
 )
-def test_what_systems_connect_by(name: str, of_the_videoray: str, of_the_heavy: str) -> None:
-    for rov, expected in ((VIDEORAY, of_the_videoray), (HEAVY, of_the_heavy)):
+def test_what_systems_connect_by(name: str, of_the_videoray: str, of_the_heavy: str, of_six_axes: str) -> None:
+    for rov, expected in ((VIDEORAY, of_the_videoray), (HEAVY, of_the_heavy), (SIX, of_six_axes)):
         assert members(read(terminals_and_icons(rov.layout))[name]) == expected.split()
 
 
 def test_there_are_no_terminals_for_variables_that_a_vehicle_does_not_have() -> None:
-    assert read(terminals_and_icons(VEHICLES["heave only"].layout)).keys() == (INPUTS | OUTPUTS) - {"current"}
+    assert read(terminals_and_icons(VEHICLES["heave only"].layout)).keys() == (INPUTS | OUTPUTS) - {
+        "current",
+        "attitude",
+    }
 
 
-@pytest.mark.parametrize("kind", VEHICLES)
+@pytest.mark.parametrize("kind", ROVS)
 def test_terminals_are_placed_around_the_icon_without_overlap(kind: str) -> None:
     """Inputs are on its left and outputs on its right; each picture is a square."""
-    document = terminals_and_icons(VEHICLES[kind].layout)
+    document = terminals_and_icons(ROVS[kind].layout)
     (icon,) = etree.fromstring(document).iter("Icon")
     left, bottom, right, top = (float(icon.get(end)) for end in ("x1", "y1", "x2", "y2"))
     ends: dict[bool, list[float]] = {True: [top], False: [top]}

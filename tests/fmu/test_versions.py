@@ -13,7 +13,9 @@ from lxml import etree
 from rov_fmu.fmu.model_description import NATIVE, build_description, model_description
 from rov_fmu.fmu.variables import variables
 from rov_fmu.model.rov import Rov
-from tests.vehicles import VEHICLES, a_vehicle
+from tests.vehicles import SIX, VEHICLES, a_vehicle
+
+ROVS = VEHICLES | {"six axes": SIX}
 
 SCHEMAS = Path(fmpy.__file__).with_name("schema")
 TIME = {
@@ -81,9 +83,9 @@ def units(root: etree._Element) -> dict[str, bytes]:
     return {unit.get("name"): etree.tostring(unit, method="c14n").strip() for unit in root.iter("Unit")}
 
 
-@pytest.mark.parametrize("kind", VEHICLES)
+@pytest.mark.parametrize("kind", ROVS)
 def test_both_versions_declare_the_same(kind: str) -> None:
-    two, three = (described(VEHICLES[kind], fmi) for fmi in (2, 3))
+    two, three = (described(ROVS[kind], fmi) for fmi in (2, 3))
     variables_2, variables_3 = declared(two), declared(three)
     assert variables_3.pop("time") == TIME
     assert list(variables_3) == list(variables_2)
@@ -96,14 +98,14 @@ def test_both_versions_declare_the_same(kind: str) -> None:
     assert [dict(e.attrib) for e in three.iter(*same)] == [dict(e.attrib) for e in two.iter(*same)]
 
 
-@pytest.mark.parametrize("kind", VEHICLES)
+@pytest.mark.parametrize("kind", ROVS)
 def test_fmi_2_numbers_variables_from_0_and_fmi_3_from_1(kind: str) -> None:
     """OMSimulator takes the references in ModelStructure for positions in ModelVariables, from 1.
 
     It ends with "bad dependency on variable with index 0" where there is no such position, and else takes the variable
     at that position for the one that is meant.
     """
-    two, three = (described(VEHICLES[kind], fmi) for fmi in (2, 3))
+    two, three = (described(ROVS[kind], fmi) for fmi in (2, 3))
     of_two, of_three = ([int(v.get("valueReference")) for v in root.find("ModelVariables")] for root in (two, three))
     assert of_two == [*range(len(of_two))]
     assert of_three == [*range(1, len(of_two) + 2)]  # FMI 3.0 also has the time
@@ -112,10 +114,10 @@ def test_fmi_2_numbers_variables_from_0_and_fmi_3_from_1(kind: str) -> None:
     assert set() < meant <= {*of_three}
 
 
-@pytest.mark.parametrize("kind", VEHICLES)
+@pytest.mark.parametrize("kind", ROVS)
 def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> None:
     """FMI Library loses the unit of a variable that has bounds; fmi-sim refuses a unit on a variable."""
-    root = described(VEHICLES[kind], 3)
+    root = described(ROVS[kind], 3)
     types = {of.get("name"): of for of in root.iter("Float64Type")}
     variables_of = list(root.find("ModelVariables"))
     for v in variables_of:
@@ -130,9 +132,9 @@ def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> N
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("kind", VEHICLES)
+@pytest.mark.parametrize("kind", ROVS)
 def test_the_description_follows_its_schema(kind: str, fmi: int) -> None:
-    check_schema(described(VEHICLES[kind], fmi), f"fmi{fmi}/fmi{fmi}ModelDescription.xsd")
+    check_schema(described(ROVS[kind], fmi), f"fmi{fmi}/fmi{fmi}ModelDescription.xsd")
 
 
 def test_the_build_description_follows_its_schema_and_names_the_file_to_compile() -> None:
@@ -167,6 +169,11 @@ def test_fmi_3_declares_its_capabilities() -> None:
         declared = {key: x for key, x in root.find(interface).attrib.items() if x != "false"}
         assert declared == can
     assert root.find("ScheduledExecution") is None
+
+
+def test_an_integrator_must_complete_its_steps_where_turns_are_counted() -> None:
+    needs = {kind: described(ROVS[kind], 3).find("ModelExchange").get("needsCompletedIntegratorStep") for kind in ROVS}
+    assert {kind for kind, answer in needs.items() if answer == "true"} == {"six axes"}
 
 
 def test_only_inputs_and_outputs_are_available_in_intermediate_update() -> None:

@@ -20,9 +20,8 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.report.report import report_page
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tank_tests import load_tank_tests
-from rov_fmu.vehicle.paper import PAPER
 from rov_fmu.vehicle.published import load_tables, untuned
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import PAPER, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import TESTS

@@ -10,8 +10,7 @@ from scipy.stats import binom
 from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, forces, measured
 from rov_fmu.model.layout import Curve
 from rov_fmu.model.rov import Rov
-from rov_fmu.vehicle.paper import PAPER
-from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.shipped import PAPER, SHIPPED
 
 CURVE = Curve("x")
 ONE_WAY = np.arange(0.1, 1.01, 0.1)

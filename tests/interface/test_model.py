@@ -19,10 +19,12 @@ from rov_fmu.fmu.archive import native_content
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.messages import FileError, InputError
+from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import BY_HAND
 from tests.commands import BARE, REFIT, ROOT
+from tests.vehicles import SIX, a_vehicle
 
 TIMES = [0.0, 1.0, 2.0]
 AHEAD = {"u_l": 0.3, "u_r": 0.3}
@@ -31,6 +33,12 @@ AHEAD = {"u_l": 0.3, "u_r": 0.3}
 @pytest.fixture(scope="module")
 def videoray() -> VehicleModel:
     return rov_fmu.load("videoray")
+
+
+@pytest.fixture(scope="module")
+def six() -> VehicleModel:
+    """Return a vehicle with six axes and every effect."""
+    return VehicleModel(**vars(a_vehicle(SIX)))
 
 
 # ---- Load and change -------------------------------------------------------------------------------------------------
@@ -140,6 +148,35 @@ def test_a_simulation_goes_on_where_another_one_ended(videoray: VehicleModel) ->
     first = videoray.simulate([0.0, 1.0], {"u_l": 0.5})
     then = videoray.simulate([1.0, 2.0, 3.0], {"u_l": [-0.2, 0.3, 0.0]}, start=first.final)
     assert {name: values[1:].tolist() for name, values in whole.items()} == {n: v.tolist() for n, v in then.items()}
+
+
+def test_a_vehicle_that_rolls_starts_at_its_angles_or_at_its_quaternion(six: VehicleModel) -> None:
+    angles = {"phi_0": 0.3, "theta_0": -0.7, "psi_0": 9.0}
+    first = six.simulate([0.0, 1.0], {"N_ext": 5.0}, start={**angles, "p": 0.5})
+    assert [first[name][0] for name in ("phi", "theta", "psi")] == pytest.approx([0.3, -0.7, 9.0], abs=1e-15)
+    quaternion = {name: first[name][0] for name in QUATERNION}
+    for start in (quaternion | {"psi_0": 9.0}, {name: 0.5 * x for name, x in quaternion.items()} | {"psi_0": 6.5}):
+        again = six.simulate([0.0, 1.0], {"N_ext": 5.0}, start={**start, "p": 0.5})
+        for name in ("p", "phi", "psi", "z"):
+            assert again[name] == pytest.approx(first[name], rel=1e-13, abs=1e-13)
+    whole = six.simulate([0.0, 1.0, 2.0], {"N_ext": 5.0}, start={**angles, "p": 0.5})
+    then = six.simulate([1.0, 2.0], {"N_ext": 5.0}, start=first.final)
+    assert {name: values[1:].tolist() for name, values in whole.items()} == {n: v.tolist() for n, v in then.items()}
+    many = six.simulate_many([0.0, 1.0], {"N_ext": 5.0}, start={**angles, "phi_0": [0.0, 0.3], "p": 0.5})
+    assert many["psi"][1].tolist() == first["psi"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("start", "expected"),
+    [
+        ({"eta": 0.5, "theta_0": 0.1, "phi_0": 0.2}, r"start\['phi_0'\]: the attitude is given as a quaternion, too"),
+        ({"eta": 0.0}, "start: the quaternion eta, epsilon_1, epsilon_2, epsilon_3 is 0"),
+        ({"psi": 1.0}, r"start\['psi'\]: the vehicle has no such state, .*; did you mean psi_0"),
+    ],
+)
+def test_an_attitude_that_cannot_be_is_one_line(six: VehicleModel, start: dict[str, float], expected: str) -> None:
+    with pytest.raises(InputError, match=f"^{expected}"):
+        six.simulate([0.0, 1.0], start=start)
 
 
 @pytest.mark.parametrize("make", [dict, pd.DataFrame])

@@ -43,7 +43,7 @@ EVERY = pytest.mark.parametrize("stride", [4, pytest.param(1, marks=LONG)])
 
 
 @pytest.fixture
-def heavy(heavy_dir: Path) -> list[Step]:
+def heavy_steps(heavy_dir: Path) -> list[Step]:
     """The step of the Heavy in C."""
     return [partial(in_fmu, Fmu(heavy_dir))]
 
@@ -170,12 +170,12 @@ def test_a_turn_that_begins_at_rest_is_exact(steps: list[Step], stride: int) -> 
 
 
 @pytest.mark.parametrize("turn", [0.12, *(pytest.param(turn, marks=LONG) for turn in (0.05, 2.0))])
-def test_a_turn_of_the_heavy_that_begins_at_rest_is_exact(heavy: list[Step], turn: float) -> None:
+def test_a_turn_of_the_heavy_that_begins_at_rest_is_exact(heavy_steps: list[Step], turn: float) -> None:
     """The turn begins by a load, or by thrust that fades."""
     inputs, before, h = still(HEAVY), {**at_rest(HEAVY), "u": 0.5, "v": -0.2}, 0.01
     load = spin_up(turn, h) * (HEAVY["I_r"] + HEAVY["m_a_r"])
     thrust = {name: load for name in before if name.startswith("F_")}
-    hold(heavy, [(HEAVY, {**inputs, "N_ext": load}, before, h), (HEAVY, inputs, {**before, **thrust}, h)])
+    hold(heavy_steps, [(HEAVY, {**inputs, "N_ext": load}, before, h), (HEAVY, inputs, {**before, **thrust}, h)])
 
 
 # Axes of surge and yaw, u, r and h. Some numbers are huge, others next to nothing.

@@ -41,6 +41,7 @@ def test_loads_and_velocities_have_the_units_and_sizes_of_their_axes() -> None:
         "X_ext": ("N", 10.0),
         "Y_ext": ("N", 10.0),
         "Z_ext": ("N", 10.0),
-        "N_ext": ("N.m", 1.0),
+        **dict.fromkeys(("K_ext", "M_ext", "N_ext"), ("N.m", 1.0)),
     }
-    assert {n: d.unit for n, d in layout.velocities.items()} == {"u": "m/s", "v": "m/s", "w": "m/s", "r": "rad/s"}
+    units = dict.fromkeys("uvw", "m/s") | dict.fromkeys("pqr", "rad/s")
+    assert {n: d.unit for n, d in layout.velocities.items()} == units

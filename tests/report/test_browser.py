@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
-from rov_fmu.fmu.variables import UNITS, Variable, variables
+from rov_fmu.fmu.variables import Variable, unit_of, variables
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import TESTS
 from tests.report.conftest import Visit
@@ -191,9 +191,9 @@ def test_the_web_app_offers_the_declared_values_simulates_and_describes_the_mode
     )
     rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
     end = vehicle.rov.step(rest | COMMANDS, rest, 10.0)
-    assert titles == [f"{name} [{UNITS[unit].display or unit}]" for name, unit in SHOWN.items()]
+    assert titles == [f"{name} [{unit_of(unit).display or unit}]" for name, unit in SHOWN.items()]
     assert titles[0] == "u [knot]"
-    assert last == pytest.approx([end[name] * UNITS[unit].factor for name, unit in SHOWN.items()], abs=1e-4)
+    assert last == pytest.approx([end[name] * unit_of(unit).factor for name, unit in SHOWN.items()], abs=1e-4)
 
     page.get_by_role("tab", name="Model Info").click()
     info = page.locator("#model-info-container")

@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Callable, Mapping
-from math import copysign, cos, prod, sin
+from math import atan2, copysign, cos, prod, sin, sqrt
 
 import pytest
 from lxml import html
@@ -14,19 +14,22 @@ from rov_fmu.report.page.algebra import Call, Cases, Choice, Factor, Group, Prod
 from rov_fmu.report.page.equations import Equations, Line, MathML, Text
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.vehicles import EVERYTHING, VEHICLES, random_inputs, random_state, random_vehicle
+from tests.vehicles import EVERYTHING, SIX, VEHICLES, random_body, random_inputs, random_state, random_vehicle
 from verification.references.equations import calculated
 
 ROVS = {
     **VEHICLES,
+    "six axes": SIX,
     **{name: load_vehicle(path).rov for name, path in SHIPPED.items()},
     "everything": load_vehicle(EVERYTHING).rov,
 }
 Values = Mapping[str, float]
-FUNCTIONS: dict[str, Callable[[float], float]] = {
+FUNCTIONS: dict[str, Callable[..., float]] = {
     "sin": sin,
     "cos": cos,
     "abs": abs,
+    "sqrt": sqrt,
+    "atan2": atan2,
     "sgn": lambda x: copysign(1.0, x) if x else 0.0,
 }
 
@@ -51,20 +54,31 @@ def of_factor(factor: Factor, at: Values) -> float:
         case Group():
             return of_sum(factor.inner, at)
         case Call():
-            return FUNCTIONS[factor.function](of_sum(factor.inner, at))
+            arguments = [factor.inner, factor.second] if factor.second else [factor.inner]
+            return FUNCTIONS[factor.function](*(of_sum(argument, at) for argument in arguments))
         case Cases():
             return of_sum(factor.at_most_zero if at[factor.name] <= 0.0 else factor.otherwise, at)
 
 
+def exactly(rov: Rov, inputs: Values, state: Values) -> dict[str, float]:
+    """Return the rates and the calculated variables of a vehicle."""
+    if rov.layout.has_attitude:
+        rates = {f"der({name})": x for name, x in rov.derivatives(inputs, state).items()}
+        return rates | rov.thrust(inputs, state)
+    return {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}).items()}
+
+
 def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict[str, float]:
     """Return the value of every name to the left of an equation by what is to its right; rates as der(<name>)."""
+    exact = exactly(rov, inputs, state)
     at = {**rov.coefficients, **inputs, **state}
     at |= {name: max(-1.0, min(1.0, at[name])) for name in rov.layout.commands}
     found: dict[str, float] = {}
 
     def calculate(line: Line) -> None:
         left = prod(of_factor(factor, at) for factor in line.factors)
-        value = of_sum(line.right, at) / left
+        others = sum(at[factor] * exact[f"der({name})"] for factor, name in line.coupled)
+        value = (of_sum(line.right, at) - others) / left
         found[f"der({line.name})" if line.is_rate else line.name] = value
         if not line.is_rate:
             at[line.name] = max(-1.0, min(1.0, value)) if line in shown.commands else value
@@ -72,15 +86,21 @@ def evaluated(rov: Rov, shown: Equations, inputs: Values, state: Values) -> dict
     for line in shown.commands:
         calculate(line)
     for curve in shown.curves:
-        for line in [*curve.thrust[::-1], *curve.lag]:
+        for line in [*curve.thrust[::-1], *curve.advance, *curve.lag]:
             calculate(line)
-    for name in rov.layout.thrust:  # the page mentions these in words: "likewise"
+    for curve in shown.curves:
+        first = curve.thrusters[0].name
+        for line in curve.advance:  # the page mentions the other thrusters in words: "likewise"
+            at |= {
+                f"loss_{t.name}": of_sum(line.right, {**at, f"u_{first}": at[f"u_{t.name}"]}) for t in curve.thrusters
+            }
+    for name in rov.layout.thrust:
         if name not in at and name.startswith("F_"):
-            at[name] = float(calculated(rov, {**rov.coefficients, **inputs, **state})[name])
+            at[name] = exact[name]
     for curve in shown.curves:
         for line in curve.torque:
             calculate(line)
-    for line in [*shown.inertia, *shown.motion, *shown.pose]:
+    for line in [*shown.rotation, *shown.inertia, *shown.motion, *shown.pose, *shown.angles]:
         calculate(line)
     return found
 
@@ -90,7 +110,7 @@ def check(rov: Rov, rng: random.Random, times: int) -> set[str]:
     shown = equations.of(rov.layout)
     for _ in range(times):
         inputs, state = random_inputs(rng, rov), random_state(rng, rov)
-        exact = {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}).items()}
+        exact = exactly(rov, inputs, state)
         found = evaluated(rov, shown, inputs, state)
         largest = max(map(abs, exact.values()))
         for name in found.keys() & exact.keys():
@@ -104,7 +124,7 @@ def test_the_equations_shown_are_those_of_the_vehicle(kind: str) -> None:
     found = check(rov, random.Random(1), 10)
     states = {name for name in rov.layout.state if not name.startswith("F_")}
     assert {f"der({name})" for name in states} <= found, "every rate has its equation"
-    assert {name for name in rov.layout.thrust if name.startswith("tau_")} <= found
+    assert {name for name in rov.layout.thrust if not name.startswith("F_")} <= found
 
 
 @pytest.mark.parametrize("vehicles", [50, pytest.param(1000, marks=pytest.mark.long)])
@@ -114,6 +134,12 @@ def test_the_equations_shown_are_those_of_any_vehicle(vehicles: int) -> None:
         rov = random_vehicle(rng)
         if {t.curve for t in rov.layout.thrusters} == {curve.name for curve in rov.layout.curves}:
             check(rov, rng, 2)
+
+
+def test_the_equations_shown_are_those_of_any_vehicle_in_six_axes() -> None:
+    rng = random.Random(3)
+    for axes in ("uvwpqr", "uwq", "pq", "uvwpqr"):
+        check(random_body(rng, axes), rng, 2)
 
 
 def _text(layout: Layout) -> list[str]:
@@ -149,6 +175,24 @@ def test_lag_coupling_dead_band_and_reverse_are_shown() -> None:
         assert line in shown
 
 
+def test_a_full_mass_matrix_restoring_forces_and_attitude_are_shown() -> None:
+    shown = _text(SIX.layout)
+    (heave,) = (line for line in shown if line.startswith("M_w w'"))
+    assert heave.startswith("M_w w' + m_wp p' + m_wq q' = 0.8 α_w (F_a − F_c) + Z_ext + F_0_w − ")
+    assert "(W − B) R_33" in heave
+    (sway,) = (line for line in shown if line.startswith("M_v v'"))
+    assert "+ Y_ur u r + (W − B) R_32 " in sway
+    for line in (
+        "m_uq = (m_a_uq + m_rov z_G) / √(β_u β_q)",
+        "k_a = d_t200± |u_a|",
+        "z' = V_D + u R_31 + v R_32 + w R_33",
+        "ε_1' = 0.5 (η p + ε_2 r − ε_3 q)",
+        "R_31 = 2 (ε_1 ε_3 − ε_2 η)",
+        "θ = atan2(−R_31, √(R_32² + R_33²))",
+    ):
+        assert line in shown
+
+
 @pytest.mark.parametrize("kind", ROVS)
 def test_mathml_says_what_the_text_says(kind: str) -> None:
     """Letters, numbers and signs stand in the same order; in MathML a coefficient's marks are above its indices."""
@@ -157,7 +201,14 @@ def test_mathml_says_what_the_text_says(kind: str) -> None:
     for line in equations.of(layout):
         written = html.fromstring(f"<math>{mathml.line(line)}</math>").text_content()
         plain = text.line(line)
-        for old, new in ((" where", "for"), ("else", "otherwise"), ("_reverse", "−"), ("'", "˙"), ("²", "2")):
+        for old, new in (
+            (" where", "for"),
+            ("else", "otherwise"),
+            ("_reverse", "−"),
+            ("'", "˙"),
+            ("²", "2"),
+            ("√", ""),
+        ):
             plain = plain.replace(old, new)
         left_out = "_ \xa0,()/{"  # a fraction and the cases need no brackets in MathML
         assert sorted(c for c in written if c not in left_out) == sorted(c for c in plain if c not in left_out)

@@ -20,9 +20,10 @@ from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.templates import number
 from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.report.pages import check_is_whole, check_refers_to_itself_alone, row_of, rows, text_of
-from tests.vehicles import VEHICLES, a_vehicle
+from tests.vehicles import SIX, VEHICLES, a_vehicle
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
 
@@ -286,6 +287,43 @@ def test_the_listed_commands_drive_the_vehicle_as_listed(heavy: Vehicle, heavy_p
         m = 1.0 - k["c_0_t200"]
         force = 4.0 * (k[f"a_t_t200{end}"] * m**2 + k[f"b_t_t200{end}"] * m) + sign * k["F_0_w"]
         assert k["a_d_w"] * V**2 + k["b_d_w"] * V == pytest.approx(force, rel=2e-3)
+
+
+def test_the_page_of_six_axes_tells_of_attitude_and_weight() -> None:
+    page = page_without_plots(a_vehicle(SIX))
+    check_is_whole(page)
+    check_refers_to_itself_alone(page)
+    text = text_of(page)
+    for claim in (
+        "surge, sway, heave, roll, pitch and yaw are coupled by the terms of Coriolis and Munk",
+        "weight and buoyancy right the vehicle",
+        "Coriolis and Munk terms of the mass matrix",
+        "another entry of the symmetric mass matrix",
+        "the buoyancy B upward at the centre of buoyancy",
+        "The attitude is a quaternion from the body frame to the earth frame.",
+        "With all inputs zero, its weight and buoyancy move it.",
+        "F_a, F_b, F_c, phi_0, theta_0, psi_0.",
+        "each axis alone and level",
+        "A thruster loses k times its speed of advance",
+        "There is no delay.",
+        "A current is steady and everywhere the same.",
+    ):
+        assert claim in text, claim
+    for claim in ("Pitch and roll.", "loss of thrust", "diagonal mass", "Neutral buoyancy", "heavy by 1 N"):
+        assert claim not in text, claim
+
+
+def test_keys_leave_the_other_axes_at_rest() -> None:
+    """Each key of a vehicle with six axes pushes along its own axis only, where thrust is linear in the commands."""
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    (script,) = html.fromstring(fly_page([Flown(a_vehicle(rov), b"")])).xpath("//script[@id='live-vehicles']")
+    (data,) = json.loads(script.text)
+    assert [axis["keys"] for axis in data["axes"]] == ["WS", "EQ", "FR", "LJ", "IK", "DA"]
+    for driven in data["axes"]:
+        assert max(map(abs, driven["shares"].values())) == 1.0
+        for form in rov.layout.axes:
+            pushed = sum(t.effect(form.axis) * driven["shares"].get(f"u_{t.name}", 0.0) for t in rov.layout.thrusters)
+            assert pushed > 0.3 if form.axis.name == driven["name"] else abs(pushed) < 1e-3
 
 
 @pytest.mark.parametrize("kind", ["coupled without lag, three commands, no heave", "surge and sway without yaw"])

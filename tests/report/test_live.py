@@ -19,7 +19,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
 from tests.report.conftest import Visit
-from tests.vehicles import EVERYTHING
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
 from verification.references.fmpy_slave import fmpy_slave
 
 pytestmark = pytest.mark.interop
@@ -36,7 +36,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
     def page(kind: str) -> str:
         path = folder / f"{kind}.html"
         if not path.exists():
-            vehicle = load_vehicle(FILES[kind])
+            vehicle = four_axes(load_vehicle(FILES[kind]))
             path.write_text(fly_page([Flown(vehicle, module(vehicle.rov))]), encoding="utf-8")
         return path.as_uri()
 
@@ -137,7 +137,7 @@ def test_a_manoeuvre_is_that_of_the_native_fmu(
     kind: str, pages: Callable[[str], str], quiet: Visitor, request: pytest.FixtureRequest
 ) -> None:
     page = flying(quiet, pages(kind)).page
-    check_manoeuvre(page, load_vehicle(FILES[kind]), request.getfixturevalue(f"{kind}_dir"))
+    check_manoeuvre(page, four_axes(load_vehicle(FILES[kind])), request.getfixturevalue(f"{kind}_dir"))
 
 
 def test_a_manoeuvre_is_that_of_the_native_fmu_in_firefox(
@@ -151,9 +151,9 @@ def test_a_manoeuvre_is_that_of_the_native_fmu_in_firefox(
     assert set(seen.requests) <= {address}  # Firefox need not report the page itself, which is a file
 
 
-def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path) -> None:
+def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path, longest: float = 5.0) -> None:
     """Check that all variables equal those of the FMU in this folder after each leg."""
-    legs = a_manoeuvre(vehicle)
+    legs = [{**leg, "length": min(longest, leg["length"])} for leg in a_manoeuvre(vehicle)]
     flown = page.evaluate(_FLY, legs)
     names = [v.name for v in variables(vehicle.rov)]
     worst = 0.0
@@ -217,6 +217,67 @@ def test_a_frame_is_drawn_in_time(pages: Callable[[str], str], visit: Visitor) -
         }).sort((one, other) => one - other)[50]"""
     )
     assert took < 8.0, "half of a frame at 60 Hz is left to the browser"
+
+
+# ---- Roll and pitch --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def tilting(tmp_path: Path, quiet: Visitor) -> Any:
+    """The page of a vehicle with six axes."""
+    target = tmp_path / "six.html"
+    target.write_text(fly_page([Flown(a_vehicle(SIX), module(SIX))]), encoding="utf-8")
+    return flying(quiet, target.as_uri()).page
+
+
+def test_roll_and_pitch_are_those_of_the_native_fmu(tilting: Any, six_dir: Path) -> None:
+    check_manoeuvre(tilting, a_vehicle(SIX), six_dir, longest=0.05)  # a step of the page
+
+
+def test_the_horizon_shows_the_attitude(tilting: Any) -> None:
+    """Port side down, bow up and heading east; a reset returns to the start."""
+    tilting.evaluate("""() => {
+        live.pause(true);
+        const { model } = live.flight.pilot;
+        model.set("phi", -0.5); model.set("theta", 0.25); model.set("psi", Math.PI / 2);
+        model.turn();
+        model.observe();
+        live.draw();
+    }""")
+    words = tilting.locator("#live-horizon > text").all_text_contents()
+    assert words == ["φ −29°", "θ 14°", "ψ 90°"]
+    assert tilting.get_attribute("#live-horizon g", "transform") == "rotate(28.6) translate(0 11.5)"
+    assert tilting.inner_text("#live-readings").endswith("roll −29° · pitch 14° · heading 90°")
+    tilting.click("#live-reset")
+    until(tilting, "live.flight.pilot.model.get('phi') === 0 && live.flight.pilot.model.get('eta') === 1")
+    tilting.locator("summary", has_text="Attitude").click()
+    tilting.locator("input[name=theta_0]").fill("45")
+    until(tilting, "document.querySelectorAll('#live-horizon > text')[1].textContent === 'θ 45°'")
+
+
+@pytest.mark.parametrize(("key", "velocity"), [("KeyL", "p"), ("KeyI", "q"), ("KeyD", "r")])
+def test_each_rotation_has_its_key(tilting: Any, key: str, velocity: str) -> None:
+    tilting.focus("#live-stage")
+    tilting.keyboard.down(key)
+    until(tilting, f"live.flight.pilot.model.get('{velocity}') > 0.05")
+
+
+def test_a_command_acts_after_the_dead_time(tmp_path: Path, quiet: Visitor) -> None:
+    """The dead time is 0.1 s. A reset forgets the command on its way."""
+    vehicle, target = load_vehicle(THRUST_EFFECTS), tmp_path / "late.html"
+    target.write_text(fly_page([Flown(vehicle, module(vehicle.rov))]), encoding="utf-8")
+    before, after, anew = flying(quiet, target.as_uri()).page.evaluate("""() => {
+        live.pause(true);
+        live.flight.set({ u_bow: 1 });
+        return [0.05, 0.1, 0.05].map((h, n) => {
+            if (n === 2) live.flight.reset();
+            live.flight.advance(h);
+            return live.flight.pilot.model.get("F_bow");
+        });
+    }""")
+    assert vehicle.rov["T_d"] == 0.1
+    assert before == anew == 0.0
+    assert after > 1.0
 
 
 # ---- What a person does with it --------------------------------------------------------------------------------------

@@ -23,8 +23,7 @@ from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.report import report_page
 from rov_fmu.report.templates import number
 from rov_fmu.tank.tank_tests import load_tank_tests
-from rov_fmu.vehicle.paper import PAPER
-from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.shipped import PAPER, SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ROOT, TESTS
 from tests.folders import DOWN, SPEED, folder_of, pulled, read

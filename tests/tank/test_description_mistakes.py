@@ -129,9 +129,14 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         "/rov.toml: known.m_a_w.unit = 'N': must be 'kg' | /rov.toml: known.m_a_w.value = -1.0: must be within 0 ... 1",
     ),
     (
+        f"{BLUEROV2}[axes.heave]\n{given('Z_wdot', -1.0, 'kg')}",
+        HEAVE_ALONE,
+        "/rov.toml: axes.heave.Z_wdot: there is no such key; give -Z_wdot, which is positive, as m_a of [axes.heave]",
+    ),
+    (
         f"{BLUEROV2}[windows]\nthrust_rear = [0.0, 0.5]\n",
         HEAVE_ALONE,
-        "/rov.toml: windows.thrust_rear: there is no such key, only thrust_t200, surge, sway, heave, yaw",
+        "/rov.toml: windows.thrust_rear: there is no such key, only thrust_t200, surge, sway, heave, roll, pitch, yaw",
     ),
     (f"{BLUEROV2}[windows]\nheave = [0.2, 0.5, 0.7]\n", HEAVE_ALONE, "/rov.toml: windows.heave"),
     (f"{BLUEROV2}[windows]\nheave = [20, 70]\n", HEAVE_ALONE, "/rov.toml: windows.heave = [20, 70]: must be [low"),
@@ -201,16 +206,16 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
 
 
 def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "tests", "base =", {"thrust_any.csv": f"{FORCE}\n0.3,x\n", "steady_roll.csv": ""})
+    folder = folder_of(tmp_path / "tests", "base =", {"thrust_any.csv": f"{FORCE}\n0.3,x\n", "steady_twist.csv": ""})
     with pytest.raises(FileError) as caught:
         load_tank_tests(folder)
     told = str(caught.value).splitlines()
     assert [line[len(str(folder)) :].split(":")[0] for line in told] == [
         "/rov.toml",
-        "/steady_roll.csv",
+        "/steady_twist.csv",
         "/thrust_any.csv, line 2, column 'force [N]' = 'x'",
     ]
-    assert "roll is not an axis of any vehicle, only surge, sway, heave and yaw" in told[1]
+    assert "twist is not an axis of any vehicle, only surge, sway, heave, roll, pitch and yaw" in told[1]
 
 
 def check_lines(text: str, folder: Path) -> None:

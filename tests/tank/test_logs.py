@@ -12,7 +12,7 @@ from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve, Layout, Thruste
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.logs import Log, read_log
 from rov_fmu.tank.recording import Recording
-from rov_fmu.vehicle.paper import PAPER
+from rov_fmu.vehicle.shipped import PAPER
 
 N = 40
 STEP = [0.3 * (n >= 10) for n in range(N)]

@@ -175,7 +175,8 @@ BAD: list[tuple[str, str, str]] = [
     ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", "line 1 | 'depth [m]' or"),
     ("stedy_surge.csv", STEADY, "no name of a test | steady_"),
     ("steady_sway.csv", STEADY, "no thruster of the vehicle drives sway"),
-    ("steady_roll.csv", STEADY, "roll is not an axis | surge, heave and yaw"),
+    ("steady_roll.csv", STEADY, "no thruster of the vehicle drives roll"),
+    ("steady_twist.csv", STEADY, "twist is not an axis | surge, heave and yaw"),
     ("thrust_left.csv", STEADY, "left is not a thrust curve | rear and top"),
 ]
 """Files, their content, and all that the one line must name beside the file."""

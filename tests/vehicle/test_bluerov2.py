@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -90,6 +91,8 @@ ARDUSUB = {
     "bluerov2_heavy": _HORIZONTAL | dict.fromkeys("5678", _VERTICAL),
 }
 """ArduSub's factors of each motor for yaw, throttle (up), forward, lateral; frames vectored and vectored_6dof."""
+ROLLS = {"roll": (1, -1, 1, -1), "pitch": (-1, -1, 1, 1)}
+"""ArduSub's factors of motors 5 ... 8 of vectored_6dof; those of 5 and 6 in roll are the same in vectored."""
 STICKS = {"yaw": (0, 1.0), "heave": (1, -1.0), "surge": (2, 1.0), "sway": (3, 1.0)}
 """The index of each axis in the factors, and the sign that turns the factor into our direction."""
 
@@ -109,14 +112,24 @@ def test_thrusters_are_numbered_and_directed_as_ardusubs_motors(name: str) -> No
 @pytest.mark.parametrize("name", BOTH)
 @pytest.mark.parametrize("axis", STICKS)
 def test_a_stick_moves_its_axis_alone(name: str, axis: str) -> None:
-    """The commands of ArduSub's mixer for one stick give a force along its axis and, by symmetry, no other force."""
+    """The commands of ArduSub's mixer for one stick give a force along its axis and, by symmetry, no other force.
+
+    The horizontal thrusters push below the origin, so surge pitches the vehicle and sway rolls it.
+    """
     vehicle, (place, sign) = load_vehicle(SHIPPED[name]), STICKS[axis]
     inputs = dict.fromkeys(vehicle.layout.inputs, 0.0)
     inputs |= {f"u_{n}": 0.4 * sign * factors[place] for n, factors in ARDUSUB[name].items()}
     F = vehicle.rov.commanded(inputs)
-    for other in AXES.values():
+    for other in (AXES[name] for name in STICKS):
         force = sum(thruster.effect(other) * F[thruster.name] for thruster in vehicle.layout.thrusters)
         assert (force > 1.0) if other.name == axis else (abs(force) < 1e-12), other.name
+
+
+@pytest.mark.parametrize(("name", "axis"), [("bluerov2", "roll"), *product(["bluerov2_heavy"], ROLLS)])
+def test_vertical_thrusters_roll_and_pitch_as_ardusub_tells(name: str, axis: str) -> None:
+    thrusters = load_vehicle(SHIPPED[name]).layout.thrusters[4:]
+    signs = [1 if thruster.effect(AXES[axis]) > 0.0 else -1 for thruster in thrusters]
+    assert signs == [*ROLLS[axis]][: len(thrusters)]
 
 
 # ---- Publications ----------------------------------------------------------------------------------------------------
@@ -135,7 +148,9 @@ PUBLISHED = {
         [(6.36, 13.7, 141.0), (7.12, 0.0, 217.0), (18.68, 33.0, 190.0), (0.222, 0.0, 1.5)],
     ),
 }
-"""Mass, inertia, weight minus buoyancy, and added mass, linear and quadratic drag of surge, sway, heave and yaw."""
+"""Mass, inertia about z, net weight, and added mass, linear and quadratic drag of surge, sway, heave and yaw."""
+ROLLING = {"p": (0.26, 0.189, 0.0, 1.19), "q": (0.23, 0.135, 0.8, 0.47)}
+"""Inertia, added inertia, linear and quadratic drag of the Heavy in roll and pitch."""
 
 
 @pytest.mark.parametrize("name", BOTH)
@@ -143,9 +158,22 @@ def test_the_coefficients_are_those_of_the_publication(name: str) -> None:
     rov = load_vehicle(SHIPPED[name]).rov
     mass, inertia, weight, axes = PUBLISHED[name]
     assert (rov["m_rov"], rov["I_r"]) == (mass, inertia)
-    assert rov["F_0_w"] == pytest.approx(weight, abs=1e-12)
+    net_weight = rov["W"] - rov["B"] if rov.layout.has_attitude else rov["F_0_w"]
+    assert net_weight == pytest.approx(weight, abs=1e-12)
     for axis, numbers in zip("uvwr", axes, strict=True):
         assert tuple(rov[f"{key}_{axis}"] for key in ("m_a", "b_d", "a_d")) == numbers
+
+
+def test_the_heavy_rolls_and_pitches_as_published() -> None:
+    """The centre of buoyancy is 1 cm above that of mass, and the horizontal thrusters push 8.5 cm below it."""
+    rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+    for axis, numbers in ROLLING.items():
+        assert tuple(rov[name] for name in (f"I_{axis}", f"m_a_{axis}", f"b_d_{axis}", f"a_d_{axis}")) == numbers
+    assert (rov["W"], rov["B"], rov["z_B"]) == pytest.approx((9.82 * 13.5, 9.82 * 13.4, -0.01), abs=1e-12)
+    assert rov.layout.restoring == ("W", "B", "z_B")
+    for thruster in rov.layout.thrusters:
+        assert abs(thruster.effect(AXES["roll"])) == pytest.approx(0.06 if thruster.name in "1234" else 0.218, abs=2e-4)
+        assert abs(thruster.effect(AXES["pitch"])) == pytest.approx(0.06 if thruster.name in "1234" else 0.12, abs=2e-4)
 
 
 @pytest.mark.parametrize("name", BOTH)

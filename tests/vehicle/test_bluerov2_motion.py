@@ -1,4 +1,4 @@
-"""The motion of the BlueROV2 Heavy against DOP853. The file repeats the equations of motion as a reference."""
+"""The motion of the BlueROV2 Heavy in its plane against DOP853. This file repeats the equations of motion."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +16,7 @@ from scipy.integrate import solve_ivp
 from rov_fmu.io.toml_file import read_toml
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+from tests.vehicles import four_axes
 from verification.references.fmpy_slave import fmpy_slave
 
 HEAVY = SHIPPED["bluerov2_heavy"]
@@ -23,7 +24,10 @@ HEAVY = SHIPPED["bluerov2_heavy"]
 
 @dataclass
 class Reference:
-    """The equations of motion with the numbers of a vehicle file: coupling, lag, reverse curve and dead band."""
+    """The equations of motion without roll and pitch, with the numbers of a vehicle file.
+
+    They have coupling, lag, net weight, a reverse curve and a dead band.
+    """
 
     file: Mapping[str, Any]
     signs: list[float] = field(default_factory=lambda: [1.0] * 4)
@@ -41,7 +45,7 @@ class Reference:
         rest = [value(body["m_rov"])] * 3 + [value(body["I_r"])]
         self.M = [inertia + axis["m_a"] for inertia, axis in zip(rest, axes, strict=True)]
         self.A, self.B = ([axis[key] for axis in axes] for key in ("a_d", "b_d"))
-        self.load = [axis.get("F_0", 0.0) for axis in axes]
+        self.load = [0.0, 0.0, value(body["W"]) - value(body["B"]), 0.0]
         self.effects = []
         for thruster in self.file["thruster"]:
             d, p = (np.array(thruster[key]["value"], dtype=float) for key in ("direction", "position"))
@@ -113,7 +117,7 @@ def manoeuvre(thrusters: int) -> list[tuple[float, list[float]]]:
 @pytest.fixture(scope="module")
 def flown() -> Flown:
     """Return the duration, the inputs and the final state of every held command, after the initial state."""
-    vehicle = load_vehicle(HEAVY)
+    vehicle = four_axes(load_vehicle(HEAVY))
     assert vehicle.layout.coupled
     assert len(vehicle.layout.lagging) == 8
     names = ("u", "v", "w", "r", "x", "y", "z", "psi", *vehicle.layout.lagging)
@@ -135,7 +139,7 @@ def flown() -> Flown:
 
 @pytest.mark.parametrize("longest", [100.0, pytest.param(0.01, marks=pytest.mark.long)])
 def test_the_heavy_agrees_with_dop853(flown: Flown, longest: float) -> None:
-    rov = load_vehicle(HEAVY).rov
+    rov = four_axes(load_vehicle(HEAVY)).rov
     state, dead = flown[0][2], 0
     for h, inputs, wanted in flown[1:]:
         steps = max(1, round(h / longest))

@@ -8,12 +8,15 @@ from typing import Any
 import pytest
 import tomlkit
 
-from rov_fmu.model.layout import AXIS, CURVE, HEAVE, SURGE, SWAY, YAW
+from rov_fmu.cli import main
+from rov_fmu.io.messages import InputError
+from rov_fmu.model.layout import ARM, AXES, AXIS, BODY, CURVE, HEAVE, RESTORING, SURGE, SWAY, TUNING, YAW
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicle.test_vehicle import refusal
-from tests.vehicles import EVERYTHING
+from tests.vehicles import EVERYTHING, SIX_AXES, THRUST_EFFECTS
 
-TEXT = EVERYTHING.read_text(encoding="utf-8")
+EFFECTS = THRUST_EFFECTS.read_text(encoding="utf-8")
+TEXT, SIX = (path.read_text(encoding="utf-8") for path in (EVERYTHING, SIX_AXES))
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +27,10 @@ def everything() -> Vehicle:
 # ---- A vehicle with every key ----------------------------------------------------------------------------------------
 
 
-def test_the_file_has_every_possible_key() -> None:
-    for key in (*CURVE, *AXIS, "alpha", "beta", "R", "gamma", "m_rov", "I_r", "coupling"):
-        assert re.search(rf"^{key} = ", TEXT, re.M), key
+def test_the_files_have_every_possible_key() -> None:
+    for key in (*BODY, *RESTORING, *CURVE, *AXIS, *TUNING, *ARM, "coupling"):
+        assert re.search(rf"^{key} = ", TEXT + SIX + EFFECTS, re.M), key
+    assert set(load_vehicle(SIX_AXES).layout.kinds) == set(AXES)
 
 
 def test_every_key_is_read(everything: Vehicle) -> None:
@@ -42,7 +46,7 @@ def test_every_key_is_read(everything: Vehicle) -> None:
         1,
     )
     assert (boost.keys, boost.description, boost.equation, boost.together) == (("a_t", "b_t"), "", "(2)", 2)
-    assert set(frame.keys) == set(CURVE)
+    assert set(frame.keys) == {*_CURVE, "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse", "T"}
     assert (rov["F_0_w"], rov["a_d_w"], rov["a_d_w_reverse"], rov["T_frame"]) == (-1.0, 190.0, 210.0, 0.15)
     assert (rov["alpha_u"], rov["beta_u"], rov["alpha_r"], rov["beta_r"]) == (1.0, 1.0, 0.9, 0.8)
     assert set(rov.coefficients) == set(layout.coefficients) == set(everything.sources)
@@ -70,9 +74,9 @@ GONE = object()
 """This value removes a key."""
 
 
-def changed(changes: dict[str, Any]) -> str:
-    """Return the file with other values of some keys. A thruster is found by its name."""
-    data: Any = tomlkit.parse(TEXT).unwrap()
+def changed(changes: dict[str, Any], text: str = TEXT) -> str:
+    """Return a file with other values of some keys. A thruster is found by its name."""
+    data: Any = tomlkit.parse(text).unwrap()
     for place, value in changes.items():
         *above, key = place.split(".")
         table = data
@@ -169,12 +173,15 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "no drag": ({"axes.sway.b_d": GONE}, [("axes.sway.b_d", "missing")]),
     "no mass": ({"body.m_rov": GONE}, [("body.m_rov", "missing", "surge")]),
     "no moment of inertia": ({"body.I_r": GONE}, [("body.I_r", "missing", "yaw")]),
-    "an inertia for nothing": ({**_NO_BOOST, "axes.yaw": GONE}, [("body.I_r", "nothing of this vehicle needs it")]),
+    "an inertia for nothing": (
+        {**_NO_BOOST, "axes.yaw": GONE},
+        [("body.I_r: only yaw needs it, and there is no [axes.yaw]: remove it",)],
+    ),
     "no arm": ({"arm": GONE}, [("arm", "R and gamma", "missing", "a thruster has the key arm")]),
     "half an arm": ({"arm.gamma": GONE}, [("arm.gamma", "missing")]),
     "an arm for nothing": (
         {f"thruster.{n}.{key}": v for n in "lr" for key, v in (("arm", GONE), ("position", place(0.0, 0.1, 0.0)))},
-        [("arm.R", "nothing of this vehicle needs it"), ("arm.gamma", "nothing of this vehicle needs it")],
+        [(f"arm.{key}: only yaw with thrusters that have the key arm needs it: remove it",) for key in ("R", "gamma")],
     ),
     "an arm of no length": ({"arm.R.value": 0.0}, [("arm.R.value = 0.0", "more than 0")]),
     "two places": (
@@ -223,8 +230,8 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     "no lag": ({"curves.frame.T.value": 0.0}, [("curves.frame.T.value = 0.0", "0.001 ... 60 s")]),
     "drag in another unit": ({"axes.yaw.a_d.unit": "N.s2/m2"}, [("axes.yaw.a_d.unit = 'N.s2/m2'", "'N.m.s2/rad2'")]),
     "an unknown axis": (
-        {"axes.roll": {"a_d": quantity(1.0, "N.m.s2/rad2")}},
-        [("axes.roll: there is no such key, only surge, sway, heave, yaw",)],
+        {"axes.rol": {"a_d": quantity(1.0, "N.m.s2/rad2")}},
+        [("axes.rol: there is no such key, only surge, sway, heave, roll, pitch, yaw; did you mean roll?",)],
     ),
     "a gain out of bounds": ({"inputs.heave.5": 1e3}, [("inputs.heave.5 = 1000.0", "must be within -100 ... 100")]),
     # thrust
@@ -245,10 +252,10 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
         [("curves.boost: must give a force",)],
     ),
     # geometry
-    "no axes": ({**_NO_BOOST, "axes": {}}, [("axes", "at least one of surge, sway, heave, yaw")]),
+    "no axes": ({**_NO_BOOST, "axes": {}}, [("axes", "at least one of surge, sway, heave, roll, pitch, yaw")]),
     "an axis that no thruster drives": (
         {**_ALONE, "thruster.5.direction.value": [1, 0, 0], "thruster.5.position": place(0.0, 0.0, 0.0)},
-        [("axes.heave", "no thruster drives it")],
+        [("axes.heave: no thruster drives it: give one a direction with a part down, or remove this table",)],
     ),
     "a thruster that drives no axis": (
         {**_ALONE, "axes.heave": GONE},
@@ -256,14 +263,14 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
     ),
     "a yaw without an arm": (
         {**_NO_BOOST, **{f"thruster.{n}.position.value": [0, 0, 0] for n in "1234"}},
-        [("axes.yaw", "no thruster has an arm about the vertical axis")],
+        [("axes.yaw: no thruster turns the vehicle: give one a position beside the line of its force", "remove")],
     ),
     "thrusters that cancel": (
         {
             **_NO_BOOST,
             **{f"thruster.{n}.position.value": [x, 0.0, 0.0] for n, x in (("1", 1), ("2", 1), ("3", 1), ("4", 1))},
         },
-        [("axes.yaw", "the thrusters cancel", "sway")],
+        [("axes.yaw", "the thrusters cancel", "sway; correct a direction or a position, or remove this table")],
     ),
     "surge and sway in one": (
         {**_NO_BOOST, **{f"thruster.{n}.direction.value": [1, 1, 0] for n in "1234"}},
@@ -338,11 +345,128 @@ MISTAKES: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
 }
 
 
-@pytest.mark.parametrize("case", MISTAKES)
-def test_each_mistake_is_one_clear_line(case: str, tmp_path: Path) -> None:
-    changes, wanted = MISTAKES[case]
+_SINK = {f"body.{key}": GONE for key in ("W", "B", "x_G", "y_G", "z_G", "x_B", "y_B", "z_B")}
+MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
+    # weight and buoyancy
+    "no buoyancy": ({"body.B": GONE}, [("body.B: this key is missing, and W is there",)]),
+    "centres without a weight": (
+        {"body.W": GONE, "body.B": GONE},
+        [("body.W", "missing", "x_G is there"), ("body.B", "missing")],
+    ),
+    "a centre of buoyancy of a vehicle that does not tilt": (
+        {"body.x_B": GONE, "body.y_B": GONE, "body.z_G": GONE, "axes.roll": GONE, "axes.pitch": GONE, "cross": {}},
+        [
+            ("body.I_p: only roll needs it, and there is no [axes.roll]: remove it",),
+            ("body.I_q: only pitch needs it",),
+            ("body.z_B: acts only in roll and pitch: remove it, or add an axis",),
+        ],
+    ),
+    "a loss of thrust in reverse only": ({"curves.one.d": GONE}, [("curves.one.d", "missing", "d_reverse is there")]),
+    "a loss of thrust of an arm": (
+        {
+            "thruster.l.position": GONE,
+            "thruster.l.arm": "port",
+            "arm": {"R": quantity(0.2, "m"), "gamma": quantity(0.5, "rad")},
+        },
+        [("thruster.l.arm: d of the curve one needs a place: give the thruster's position",)],
+    ),
+    "a thruster without its place": ({"thruster.t.position": GONE}, [("thruster.t.position", "the vehicle has roll")]),
+    # cross terms
+    "a cross term of an axis that is not there": (
+        {"axes.pitch": GONE, "body.I_q": GONE, "cross.a_d_wq": GONE},
+        [("cross.m_a_uq: the vehicle has no pitch: remove this key, or add the axis",)],
+    ),
+    "a cross term in the other order": (
+        {"cross.m_a_qu": quantity(0.1, "kg.m")},
+        [("cross.m_a_qu: write m_a_uq, which is the same coefficient",)],
+    ),
+    "lift in the other order": (
+        {"cross.Y_ru": quantity(0.1, "N.s2/(m.rad)")},
+        [("cross.Y_ru: write Y_ur, which is the same",)],
+    ),
+    "a cross term in another unit": ({"cross.b_d_rv.unit": "N.s/m"}, [("cross.b_d_rv.unit = 'N.s/m'", "'N.m.s/m'")]),
+    "a cross term beyond any vehicle": ({"cross.m_a_uq.value": 1e7}, [("cross.m_a_uq.value = 10000000.0", "within")]),
+    "a cross term of one axis": (
+        {"cross.m_a_uu": quantity(1.0, "kg")},
+        [("cross.m_a_uu: there is no such key, only m_a_uq, b_d_uq, a_d_uq and Y_ur", "drag of one axis is in [axes]")],
+    ),
+    # the mass matrix
+    "an entry of the mass matrix that is too large": (
+        {"cross.m_a_uq.value": 3.0},
+        [("cross.m_a_uq.value = 3.0: the entry of the mass matrix for surge and pitch", "within ±3", "but it is 3.24")],
+    ),
+    "a centre of mass too far away": (
+        {"body.z_G.value": 0.3},
+        [("cross.m_a_uq.value = -0.1: the entry", "surge and pitch, with that of the centre of mass", "but it is 3.5")],
+    ),
+    "a centre of mass far to the side": (
+        {"body.y_G.value": 0.4},
+        [("body.y_G.value = 0.4: the entry", "surge and yaw", "within ±3.286 for a positive definite matrix", "-4.8")],
+    ),
+    "entries that are too large together": (
+        {"cross.m_a_uq.value": 1.7, "cross.m_a_ur": quantity(1.7, "kg.m"), "cross.m_a_qr": quantity(-0.3, "kg.m2")},
+        [("cross: the mass matrix of", "must be positive definite: reduce m_a_uq, m_a_pr, m_a_ur, m_a_qr")],
+    ),
+    "entries of the mass matrix of an endless inertia": (
+        {"body.coupling": GONE, "axes.heave.beta": quantity(0.0, "1")},
+        [("axes.heave.beta.value = 0.0: must be at least 0.001 where axes are coupled",)],
+    ),
+    # Fossen's notation
+    "a negative added mass": (
+        {"axes.surge.m_a.value": -6.36},
+        [("axes.surge.m_a.value = -6.36: must be within 0 ... 1000000 kg; give -X_udot as a positive m_a",)],
+    ),
+    "a negative quadratic drag": (
+        {"axes.pitch.a_d.value": -0.47},
+        [("axes.pitch.a_d.value = -0.47", "; give -M_q|q| as a positive a_d")],
+    ),
+    "a negative linear drag": ({"axes.yaw.b_d.value": -1.0}, [("axes.yaw.b_d", "; give -N_r as a positive b_d")]),
+    **{
+        f"{key} for {wanted}": (
+            {f"axes.surge.{key}": quantity(-6.36, "kg")},
+            [(f"axes.surge.{key}: there is no such key; give {wanted}",)],
+        )
+        for key, wanted in {
+            "X_udot": "-X_udot, which is positive, as m_a of [axes.surge]",
+            "Xu_dot": "-X_udot, which is positive, as m_a of [axes.surge]",
+            "Xudot": "-X_udot, which is positive, as m_a of [axes.surge]",
+            "Z_dotw": "-Z_wdot, which is positive, as m_a of [axes.heave]",
+            "X_uu": "-X_u|u|, which is positive, as a_d of [axes.surge]",
+            "Kpp": "-K_p|p|, which is positive, as a_d of [axes.roll]",
+            "X_u|u|": "-X_u|u|, which is positive, as a_d of [axes.surge]",
+            "X_uabsu": "-X_u|u|, which is positive, as a_d of [axes.surge]",
+            "Yv_abs": "-Y_v|v|, which is positive, as a_d of [axes.sway]",
+            "X_u": "-X_u, which is positive, as b_d of [axes.surge]",
+            "Nr": "-N_r, which is positive, as b_d of [axes.yaw]",
+            "M_udot": "its negative as m_a_uq in [cross]",
+            "Y_r": "its negative as b_d_vr in [cross]",
+            "N_v|v|": "its negative as a_d_rv in [cross]",
+        }.items()
+    },
+    "a derivative in [cross]": (
+        {"cross.X_uu": quantity(-1.0, "N.s2/m2"), "cross.N_vdot": quantity(-1.0, "kg.m")},
+        [
+            ("cross.X_uu: there is no such key; give -X_u|u|, which is positive, as a_d of [axes.surge]",),
+            ("cross.N_vdot: there is no such key; give its negative as m_a_vr in [cross]",),
+        ],
+    ),
+    "a moment of inertia by its axes": (
+        {"body.Ixx": quantity(1.0, "kg.m2"), "body.I_z": quantity(1.0, "kg.m2")},
+        [("body.Ixx: there is no such key; write I_p in [body]",), ("body.I_z", "write I_r in [body]")],
+    ),
+}
+
+
+CASES = [(TEXT, case) for case in MISTAKES.items()] + [(SIX, case) for case in MISTAKES_OF_SIX.items()]
+
+
+@pytest.mark.parametrize(("text", "case"), CASES, ids=[name for _, (name, _) in CASES])
+def test_each_mistake_is_one_clear_line(
+    text: str, case: tuple[str, tuple[dict[str, Any], list[tuple[str, ...]]]], tmp_path: Path
+) -> None:
+    changes, wanted = case[1]
     path = tmp_path / "rov.toml"
-    path.write_text(changed(changes), encoding="utf-8")
+    path.write_text(changed(changes, text), encoding="utf-8")
     lines = refusal(path).splitlines()
     assert len(lines) == len(wanted), lines
     for line, words in zip(lines, wanted, strict=True):
@@ -389,3 +513,73 @@ def test_a_valid_vehicle_can_be_simulated(case: str, tmp_path: Path) -> None:
     moved = vehicle.rov.step(dict.fromkeys(vehicle.layout.inputs, 0.3), start, 0.01)
     assert list(moved) == list(start)
     assert any(moved.values())
+
+
+# ---- Six axes --------------------------------------------------------------------------------------------------------
+
+DOUBTS: dict[str, tuple[dict[str, Any], str]] = {
+    "a weight in kg": (
+        {"body.W.value": 12.0},
+        "body.W.value = 12.0: m_rov = 12 kg weighs 117.7 N: one of the two is probably wrong",
+    ),
+    "a buoyancy below the centre of mass": (
+        {"body.z_B.value": 0.03},
+        "body.z_B.value = 0.03: buoyancy acts below the centre of mass, z_G = 0.02 m, and turns the vehicle upside",
+    ),
+    "linear damping that drives": (
+        {"cross.b_d_vr.value": 4.0},
+        "cross.b_d_vr.value = 4.0: the linear damping adds energy to some slow motions of sway and yaw: "
+        "b_d_vr + b_d_rv should be within ±3",
+    ),
+    "linear damping that drives three axes": (
+        {
+            "cross": {
+                "b_d_vr": quantity(2.8, "N.s/rad"),
+                "b_d_pr": quantity(0.4, "N.m.s/rad"),
+                "b_d_vp": quantity(-2.5, "N.s/rad"),
+            }
+        },
+        "cross: the linear damping adds energy to some slow motions of sway, roll and yaw: reduce its b_d_..",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", DOUBTS)
+def test_numbers_that_are_probably_wrong_give_a_warning(case: str, tmp_path: Path) -> None:
+    changes, words = DOUBTS[case]
+    path = tmp_path / "rov.toml"
+    path.write_text(changed(changes, SIX), encoding="utf-8")
+    with pytest.warns(UserWarning, match=re.escape(f"{path}: {words}")) as caught:
+        load_vehicle(path)
+    assert len(caught) == 1
+
+
+def test_the_command_line_prints_a_warning_on_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "rov.toml"
+    path.write_text(changed({"body.W.value": 12.0}, SIX), encoding="utf-8")
+    assert main(["tables", str(path)]) == 2
+    first, *_ = capsys.readouterr().err.splitlines()
+    assert first.startswith(f"rov-fmu: warning: {path}: body.W.value = 12.0: ")
+
+
+def test_a_vehicle_without_weight_is_neutral(tmp_path: Path) -> None:
+    path = tmp_path / "rov.toml"
+    path.write_text(changed(_SINK, SIX), encoding="utf-8")
+    rov = load_vehicle(path).rov
+    tilted = {**rov.layout.at_rest, "eta": sqrt(0.5), "epsilon_1": sqrt(0.5)}
+    after = rov.step(dict.fromkeys(rov.layout.inputs, 0.0), tilted, 10.0)
+    assert {name: after[name] for name in tilted} == pytest.approx(tilted, abs=1e-12)
+
+
+def test_roll_and_pitch_need_no_thruster(tmp_path: Path) -> None:
+    path = tmp_path / "rov.toml"
+    places = {f"thruster.{name}.position.value": [-0.2, y, 0.0] for name, y in (("l", -0.1), ("r", 0.1), ("s", 0.0))}
+    path.write_text(changed(places, SIX), encoding="utf-8")
+    layout = load_vehicle(path).layout
+    assert not layout.drivers(AXES["roll"])
+    assert not layout.signs(AXES["roll"])
+
+
+def test_a_coefficient_that_makes_the_mass_matrix_indefinite_cannot_be_set() -> None:
+    with pytest.raises(InputError, match=r"cross\.m_a_uq\.value = 3\.0: the entry of the mass matrix"):
+        load_vehicle(SIX_AXES).with_(m_a_uq=3.0)

@@ -9,8 +9,7 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.engine.compile import BuildError
-from rov_fmu.vehicle.paper import PAPER
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import PAPER, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
 

@@ -13,7 +13,7 @@ from rov_fmu.vehicle.vehicle import Provenance, Vehicle, VehicleFileError, load_
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
 from tests.commands import REFIT, TESTS
 from tests.vehicle.test_vehicle import check_line, edit, refusal
-from tests.vehicles import EVERYTHING
+from tests.vehicles import EVERYTHING, SIX_AXES
 
 TEXT = REFIT.read_text(encoding="utf-8")
 HASH = "0123456789abcdef" * 4
@@ -46,7 +46,13 @@ def test_a_vehicle_with_everything_reads_back(tmp_path: Path) -> None:
     assert text.count("alpha = ") == 1, "what the file does not give is not written"
 
 
-@pytest.mark.parametrize("source", [EVERYTHING, VIDEORAY], ids=lambda path: path.stem)
+def test_a_vehicle_with_six_axes_reads_back(tmp_path: Path) -> None:
+    six, path = load_vehicle(SIX_AXES), tmp_path / "made.toml"
+    write_vehicle(six, path)
+    assert load_vehicle(path) == six
+
+
+@pytest.mark.parametrize("source", [EVERYTHING, SIX_AXES, VIDEORAY], ids=lambda path: path.stem)
 def test_tuning_changes_only_the_given_coefficients(source: Path, tmp_path: Path) -> None:
     before, path = load_vehicle(source), tmp_path / "tuned.toml"
     kept = float(before.rov["alpha_w"])

@@ -1,0 +1,176 @@
+"""The dead time in the FMU: changes of commands wait in the saved state, and arrive as events in Model Exchange."""
+
+import ctypes
+import random
+from ctypes import c_bool, c_double, pointer
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from fmpy import read_model_description
+from fmpy.fmi2 import fmi2EventInfo
+from fmpy.validation import validate_model_description
+
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.model.delay import MOST_WAITING
+from tests.fmi import CONTINUOUS, ERROR, EVENT, INITIALIZATION, MODEL_EXCHANGE, OK, WARNING, AnyInstance, Fmu, reals
+from tests.fmu.calls.conftest import WRAPPERS
+from tests.model.test_thrust_effects import ROV
+
+T_d = ROV["T_d"]
+ALL_ON = dict.fromkeys(ROV.layout.commands, 0.5)
+DELAYED = {f"delayed_{name}": value for name, value in ALL_ON.items()}
+
+
+@pytest.fixture(scope="module", params=WRAPPERS, ids="FMI {}.0".format)
+def fmu(request: pytest.FixtureRequest) -> Fmu:
+    version: int = request.param
+    return WRAPPERS[version](request.getfixturevalue({2: "thrust_dir", 3: "thrust3_dir"}[version]))
+
+
+def delayed(rov: AnyInstance) -> dict[str, float]:
+    """Return the commands that act."""
+    return dict(zip(DELAYED, rov.get(list(DELAYED)), strict=True))
+
+
+def updated(rov: AnyInstance) -> float | None:
+    """Update the discrete states, and return the time of the next event, if there is one."""
+    if rov.fmu.VERSION == 2:
+        info = fmi2EventInfo()
+        rov.expect("UpdateDiscreteStates", ctypes.byref(info))
+        return float(info.nextEventTime) if info.nextEventTimeDefined else None
+    flags, next_time = [pointer(c_bool()) for _ in range(5)], pointer(c_double())
+    rov.expect("UpdateDiscreteStates", *flags, next_time)
+    assert not any(flag[0] for flag in flags[:4])
+    return next_time[0] if flags[4][0] else None
+
+
+def test_the_description_is_valid_and_no_rate_depends_on_a_command(fmu: Fmu) -> None:
+    description = read_model_description(str(fmu.folder), validate=False)
+    assert validate_model_description(description, validate_variable_names=True, validate_model_structure=True) == []
+    variables = {v.name: v for v in description.modelVariables}
+    for name in ROV.layout.commands:
+        command, acting = variables[name], variables[f"delayed_{name}"]
+        assert (command.causality, command.variability) == ("input", "discrete")
+        assert (acting.causality, acting.variability, acting.initial) == ("local", "discrete", "calculated")
+    known = {k.name for unknown in [*description.outputs, *description.derivatives] for k in unknown.dependencies}
+    assert known.isdisjoint(ROV.layout.commands)
+    assert "X_ext" in known
+    assert "voltage" in known
+
+
+def test_steps_of_any_length_are_those_of_the_engine(fmu: Fmu) -> None:
+    rng = random.Random(6)
+    times = [0.0, *np.cumsum([rng.choice((0.01, 0.07, 0.1, 0.35)) for _ in range(60)]).tolist()]
+    commands = {name: [rng.uniform(-1.0, 1.0) for _ in times] for name in ROV.layout.commands}
+    expected = simulate(ROV, np.array(times), {name: np.array(row) for name, row in commands.items()}, workers=1)
+    with fmu.instance() as rov:
+        rov.start({name: row[0] for name, row in commands.items()})
+        for n, (t, following) in enumerate(pairwise(times)):
+            assert rov.set({name: row[n] for name, row in commands.items()}) == OK
+            assert rov.step(t, following - t) == OK, rov.log
+            assert rov.get(list(ROV.layout.state)) == expected.values[:, 0, n + 1].tolist(), n
+
+
+def test_a_command_acts_after_the_dead_time_and_not_before(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        rov.start(ALL_ON)
+        assert delayed(rov) == dict.fromkeys(DELAYED, 0.0)
+        assert rov.step(0.0, 0.06) == OK
+        assert rov.set({"u_l": -1.0}) == OK
+        assert rov.step(0.06, 0.0399) == OK
+        assert (delayed(rov), rov.get(["u", "F_bow"])) == (dict.fromkeys(DELAYED, 0.0), [0.0, 0.0])
+        assert rov.step(0.0999, 0.0001) == OK
+        assert (delayed(rov), rov.get(["u"])) == (DELAYED, [0.0])
+        assert rov.get(["F_bow"])[0] > 0.0
+        assert rov.step(0.1, 0.06) == OK
+        assert delayed(rov) == DELAYED | {"delayed_u_l": -1.0}
+        rov.expect("Reset")
+        assert delayed(rov) == dict.fromkeys(DELAYED, 0.0)
+
+
+def test_a_saved_state_continues_bit_for_bit_with_the_changes_that_wait(fmu: Fmu) -> None:
+    def inputs(n: int) -> dict[str, float]:
+        return {name: 0.1 * ((n * (k + 3)) % 17 - 8) for k, name in enumerate(ROV.layout.commands)}
+
+    with fmu.instance() as rov, fmu.instance() as other:
+        rov.start()
+        other.start()
+        rov.trajectory(range(20), 0.013, inputs)
+        state = ctypes.c_void_p()
+        rov.expect("GetFMUState", ctypes.byref(state))
+        serialized = rov.save(state)
+        after = rov.trajectory(range(20, 40), 0.013, inputs)
+        rov.expect("SetFMUState", state)
+        assert rov.save() == serialized
+        assert rov.trajectory(range(20, 40), 0.013, inputs) == after
+        assert other.load(serialized) == OK
+        assert other.trajectory(range(20, 40), 0.013, inputs) == after
+        rov.expect("FreeFMUState", ctypes.byref(state))
+        damaged = bytearray(serialized)
+        damaged[-20] ^= 1
+        assert other.load(bytes(damaged)) == ERROR
+
+
+def test_too_many_changes_are_refused_and_change_nothing(fmu: Fmu) -> None:
+    h = 0.5 * T_d / MOST_WAITING
+    with fmu.instance() as rov:
+        rov.start()
+        for n in range(MOST_WAITING):
+            assert rov.set({"u_l": float(1 - n % 2)}) == OK
+            assert rov.step(n * h, h) == OK
+        assert rov.set({"u_l": 0.5}) == OK
+        before = rov.save()
+        assert rov.step(MOST_WAITING * h, h) == ERROR
+        assert "too many changes of commands wait for the dead time" in rov.log[-1].text
+        assert rov.save() == before
+        assert rov.set({"u_l": 0.0}) == OK  # the last command that was sent
+        assert rov.step(MOST_WAITING * h, T_d) == OK
+
+
+def test_an_importer_that_moves_the_time_keeps_the_dead_time(fmu: Fmu) -> None:
+    with fmu.instance() as rov:
+        rov.start(ALL_ON)
+        assert rov.step(0.0, 0.04) == OK
+        assert rov.step(100.0, 0.0599) == OK
+        assert rov.log[-1].status == WARNING
+        assert delayed(rov) == dict.fromkeys(DELAYED, 0.0)
+        assert rov.step(100.0599, 0.0002) == OK
+        assert delayed(rov) == DELAYED
+
+
+def test_changes_arrive_as_time_events_in_model_exchange(fmu: Fmu) -> None:
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        assert rov.set(ALL_ON) == OK
+        assert rov.initialize(2.0) == OK
+        assert rov.set({"delayed_u_l": 0.3}) == ERROR
+        rov.expect("ExitInitializationMode")
+        assert updated(rov) == 2.0 + T_d
+        rov.expect("EnterContinuousTimeMode")
+        assert rov.set({"u_l": 0.2}) == ERROR
+        assert "u_l must not be set in Continuous-Time Mode" in rov.log[-1].text
+        assert rov.set({"X_ext": 1.0}) == OK
+        rov.expect("SetTime", 2.0 + 0.5 * T_d)
+        rov.expect("EnterEventMode")
+        assert rov.set({"u_l": -0.5}) == OK
+        assert updated(rov) == 2.0 + T_d
+        assert delayed(rov) == dict.fromkeys(DELAYED, 0.0)
+        rov.expect("SetTime", 2.0 + T_d)
+        assert updated(rov) == pytest.approx(2.0 + 1.5 * T_d, rel=1e-15)
+        assert delayed(rov) == DELAYED
+        rov.expect("SetTime", 2.0 + 1.5 * T_d)
+        assert updated(rov) is None
+        assert delayed(rov) == DELAYED | {"delayed_u_l": -0.5}
+
+
+@pytest.mark.parametrize("mode", [INITIALIZATION, EVENT, CONTINUOUS])
+def test_no_derivative_by_a_command_or_of_a_command_that_acts(fmu: Fmu, mode: str) -> None:
+    with fmu.instance(MODEL_EXCHANGE) as rov:
+        assert rov.set(ALL_ON) == OK
+        rov.reach(mode)
+        unknowns = ["der(u)", "der(F_l)", "F_bow"]
+        assert rov.derivatives(unknowns, "u_l") == [0.0] * 3
+        assert rov.derivatives(unknowns, "X_ext")[0] > 0.0
+        arguments = (fmu.references(["der(u)"]), 1, fmu.references(["delayed_u_l"]), 1)
+        sizes = () if fmu.VERSION == 2 else (1,)
+        assert rov.call("GetDirectionalDerivative", *arguments, reals(1.0), *sizes, reals(0.0), *sizes) == ERROR

@@ -1,0 +1,176 @@
+"""Tables of thrust, the battery, the dead time and fins in a vehicle file, and their mistakes."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.model.layout import COMMANDS, CURVE, FIN
+from rov_fmu.vehicle.thrust_table import read_thrust
+from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.writer import write_tuned, write_vehicle
+from tests.vehicle.test_checks import GONE, changed, quantity
+from tests.vehicle.test_vehicle import refusal
+from tests.vehicles import EVERYTHING, THRUST_EFFECTS
+
+TEXT = THRUST_EFFECTS.read_text(encoding="utf-8")
+_FILES = ("thrust_12_v.csv", "thrust_16_v.csv")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder with the tables of thrust."""
+    for name in _FILES:
+        shutil.copy(THRUST_EFFECTS.with_name(name), tmp_path)
+    return tmp_path
+
+
+# ---- The tables ------------------------------------------------------------------------------------------------------
+
+
+def table(folder: Path, text: str) -> Path:
+    path = folder / "t.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_pulses_and_kilograms_become_commands_and_newtons(tmp_path: Path) -> None:
+    found = read_thrust(table(tmp_path, "pulse [us];thrust [kgf]\n1100;-4\n1500;0,0\n1900;5\n1900;5,2\n"))
+    assert found.commands == (-1.0, 0.0, 1.0)
+    assert found.forces == pytest.approx((-4.0 * 9.80665, 0.0, 5.1 * 9.80665), rel=1e-15)
+    with_numbers = read_thrust(table(tmp_path, "pwm [us 1500 300],force [lbf]\n1200,-9\n1500,0\n1800,11\n"))
+    assert with_numbers.forces == pytest.approx((-9.0 * 4.4482216152605, 0.0, 11.0 * 4.4482216152605), rel=1e-15)
+
+
+def test_the_makers_table_is_continued_to_full_thrust() -> None:
+    found = read_thrust(Path("models/bluerov2/t200/t200_16_v.csv")).table("t200")
+    (first, second, *_), (*_, before, last) = found.commands, found.commands
+    assert (first, second, before, last) == (-1.0, -0.99, 0.99, 1.0)
+    assert found.force(1.0) == found.forces[-2] + 0.01 * found.slopes[-2]
+    assert found.force(1.0) > found.force(0.99)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    {
+        "a command beyond full thrust": ("command [%],thrust [N]\n-120,-1\n0,0\n100,1\n", "must be at least -100"),
+        "a pulse beyond full thrust": (
+            "pulse [us],thrust [N]\n1000,-1\n1500,0\n1900,1\n",
+            "must be within full thrust",
+        ),
+        "a force against its command": (
+            "command [1],thrust [N]\n-1,1\n0,0\n1,1\n",
+            "must have the sign of its command",
+        ),
+        "force without command": ("command [1],thrust [N]\n-1,-1\n0,0.1\n1,1\n", "must give 0 N at the command 0"),
+        "no zero": ("command [1],thrust [N]\n-1,-1\n-0.1,-0.1\n0.1,0\n1,1\n", "must give 0 N at the command 0"),
+        "one half": ("command [1],thrust [N]\n0,0\n0.5,1\n1,2\n", "must cover the commands from -1 to 1"),
+        "no thrust in reverse": ("command [1],thrust [N]\n-1,0\n0,0\n1,2\n", "must give a force in reverse below 0 N"),
+        "two points": ("command [1],thrust [N]\n-1,-2\n1,2\n", "must have 3 to 2000 different commands, not 2"),
+        "no unit": ("command,thrust [N]\n-1,-2\n0,0\n1,2\n", "must be 'command [1]'"),
+    }.values(),
+)
+def test_a_table_that_is_no_thrust_curve_is_refused(text: str, wanted: str, tmp_path: Path) -> None:
+    with pytest.raises(DataFileError) as error:
+        read_thrust(table(tmp_path, text))
+    assert wanted in str(error.value)
+    assert str(error.value).startswith(str(tmp_path / "t.csv"))
+
+
+# ---- The vehicle file ------------------------------------------------------------------------------------------------
+
+
+def test_the_file_has_every_key_of_thrust() -> None:
+    text = TEXT + EVERYTHING.read_text(encoding="utf-8")
+    for key in (*CURVE, *FIN, *COMMANDS, "voltage"):
+        assert f"\n{key} = " in text or f" {key} = " in text, key
+
+
+def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
+    vehicle = load_vehicle(THRUST_EFFECTS)
+    here = folder / "here.toml"
+    here.write_text(TEXT, encoding="utf-8")
+    write_vehicle(load_vehicle(here), folder / "written.toml")
+    write_tuned(here, folder / "tuned.toml", {"lift_rudder": 10.0, "T_d": 0.2, "k_t_main": 1.1}, "by hand")
+    written, tuned = (load_vehicle(folder / f"{name}.toml") for name in ("written", "tuned"))
+    assert (written.layout, written.rov.coefficients) == (vehicle.layout, dict(vehicle.rov.coefficients))
+    assert written.sources == vehicle.sources
+    assert {name: tuned.rov[name] for name in ("lift_rudder", "T_d", "k_t_main")} == {
+        "lift_rudder": 10.0,
+        "T_d": 0.2,
+        "k_t_main": 1.1,
+    }
+
+
+MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
+    "coefficients beside a table": (
+        {"curves.bow.a_t": quantity(1.0, "N")},
+        "curves.bow.a_t: must not stand beside table",
+    ),
+    "no thrust at all": ({"curves.lift.b_t": GONE}, "curves.lift.b_t: this key is missing"),
+    "a scale without a table": ({"curves.lift.k_t": quantity(1.0, "1")}, "curves.lift.k_t: scales a table"),
+    "a table and tables": ({"curves.main.table": _FILES[0]}, "curves.main.tables: must not stand beside table"),
+    "tables and an exponent": (
+        {"curves.main.n_V": quantity(1.0, "1"), "curves.main.V_0": quantity(12.0, "V")},
+        "curves.main.V_0: must not stand beside tables",
+    ),
+    "no exponent": ({"curves.bow.n_V": GONE}, "curves.bow.n_V: this key is missing, and V_0 is there"),
+    "only a loss in reverse": ({"curves.main.d": GONE}, "curves.main.d: this key is missing, and d_reverse is there"),
+    "no such file": ({"curves.bow.table": "none.csv"}, "curves.bow.table = 'none.csv': there is no such file"),
+    "a file outside": ({"curves.bow.table": "../x.csv"}, "must lead to a place inside the folder of this file"),
+    "no file name": ({"curves.bow.table": 3}, "curves.bow.table = 3: must be text in quotes"),
+    "one table of several": (
+        {"curves.main.tables": [{"voltage": 12.0, "table": _FILES[0]}]},
+        "must be at least two tables with rising voltages",
+    ),
+    "falling voltages": (
+        {"curves.main.tables": [{"voltage": 16.0, "table": _FILES[1]}, {"voltage": 12.0, "table": _FILES[0]}]},
+        "must be at least two tables with rising voltages",
+    ),
+    "a battery beyond the tables": (
+        {"battery.voltage": quantity(18.0, "V")},
+        "battery.voltage.value = 18.0: must be within the 12 ... 16 V of the tables of curves.main",
+    ),
+    "no battery": ({"battery": GONE}, "battery: this table with the voltage is missing"),
+    "a huge dead time": (
+        {"commands.T_d": quantity(20.0, "s")},
+        "commands.T_d.value = 20.0: must be within 0.0001 ... 1 s",
+    ),
+    "a fin with a thruster's name": (
+        {"fin.rudder.name": "top"},
+        "fin.top: a thruster or a fin before it has this name",
+    ),
+    "a fin without surge": ({"axes.surge": GONE, "body.coupling": False}, "its force depends on the velocity in surge"),
+    "a fin that does nothing": (
+        {"fin.rudder.direction": {"value": [0, 0, 1], "source": "x"}, "axes.heave": GONE, "thruster.top": GONE},
+        "fin.rudder: its lift acts on no axis of the vehicle, which are surge, sway, yaw",
+    ),
+    "a huge angle": ({"fin.rudder.angle_max": quantity(90.0, "rad")}, "must be within 0.001 ... 1.5"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_a_clear_line(name: str, folder: Path) -> None:
+    changes, wanted = MISTAKES[name]
+    path = folder / "rov.toml"
+    path.write_text(changed(changes, TEXT), encoding="utf-8")
+    lines = refusal(path).splitlines()
+    assert any(wanted in line for line in lines), lines
+    assert all(line.startswith(f"{path}: ") for line in lines)
+
+
+def test_a_damaged_table_is_named_with_its_line(folder: Path) -> None:
+    (folder / _FILES[0]).write_text("command [1],thrust [N]\n-1,-2\n0,x\n1,2\n", encoding="utf-8")
+    path = folder / "rov.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    (line,) = refusal(path).splitlines()
+    assert f"{_FILES[0]}, line 3, column 'thrust [N]' = 'x': must be a number" in line
+
+
+def test_a_battery_that_nothing_needs_is_refused(folder: Path) -> None:
+    path = folder / "rov.toml"
+    text = EVERYTHING.read_text(encoding="utf-8")
+    path.write_text(text + '\n[battery]\nvoltage = { value = 12.0, unit = "V", source = "x" }\n', encoding="utf-8")
+    assert "battery: no thrust depends on the voltage" in refusal(path)
