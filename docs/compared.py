@@ -1,21 +1,23 @@
 """How the vehicles that ship compare with what is published of them: the tables of vehicles.md."""
 
 import csv
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from decimal import Decimal
-from math import degrees, hypot
+from math import degrees, hypot, radians
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import TransferFunction, step
 
 from rov_fmu.engine.simulation import simulate
-from rov_fmu.model.layout import AXES, SURGE, Layout
+from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, SURGE, Layout, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.published import Response, load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from verification.references.rigid_body import Body, euler_angles, integrate, quaternion_of, rotation, zeros
 
 Table = list[tuple[str, ...]]
 
@@ -25,6 +27,63 @@ OWN_THRUST = 30.4
 """Newton, of a thruster at full command by (18) of von Benzon et al."""
 TRANSFER = (6136.0, 108700.0), (1.0, 89.0, 9258.0, 108700.0)
 """(19) of von Benzon et al., from commanded to actual thrust."""
+
+
+@dataclass(frozen=True)
+class Publication:
+    """Coefficients as programs print them that cite a publication, each of six axes: u, v, w, p, q, r."""
+
+    axes: str
+    """Those that ship."""
+    mass: tuple[float, ...]
+    added_mass: tuple[float, ...]
+    linear: tuple[float, ...]
+    quadratic: tuple[float, ...]
+    weight: float
+    buoyancy: float
+    above: float
+    """The centre of buoyancy above the centre of mass, m."""
+
+    def body(self, load: tuple[float, ...]) -> Body:
+        """The vehicle in the reference, without thrusters."""
+        M, D, D_q = zeros(), zeros(), zeros()
+        for i in range(6):
+            M[i][i] = self.mass[i] + self.added_mass[i]
+            D[i][i], D_q[i][i] = self.linear[i], self.quadratic[i]
+        return Body(
+            self.axes,
+            mass=M,
+            linear=D,
+            linear_astern=D,
+            ahead=D_q,
+            astern=D_q,
+            load=load,
+            weight=self.weight,
+            buoyancy=self.buoyancy,
+            centre_of_buoyancy=(0.0, 0.0, -self.above),
+        )
+
+
+WU = Publication(
+    "uvwr",
+    (11.5, 11.5, 11.5, 0.16, 0.16, 0.16),
+    (5.5, 12.7, 14.57, 0.12, 0.12, 0.12),
+    (4.03, 6.22, 5.18, 0.07, 0.07, 0.07),
+    (18.18, 21.66, 36.99, 1.55, 1.55, 1.55),
+    112.8,
+    114.8,
+    0.02,
+)
+VON_BENZON = Publication(
+    "uvwpqr",
+    (13.5, 13.5, 13.5, 0.26, 0.23, 0.37),
+    (6.36, 7.12, 18.68, 0.189, 0.135, 0.222),
+    (13.7, 0.0, 33.0, 0.0, 0.8, 0.0),
+    (141.0, 217.0, 190.0, 1.19, 0.47, 1.5),
+    9.82 * 13.5,
+    9.82 * 1000.0 * 0.0134,
+    0.01,
+)
 
 
 def tables() -> dict[str, Table]:
@@ -38,6 +97,8 @@ def tables() -> dict[str, Table]:
         "t200_lag": _lag(six),
         "sticks": _sticks(eight.layout),
         "top_speeds": _top_speeds(six, eight),
+        "published_motion": _published_motion(six, eight),
+        "tilting": _tilting(six, eight),
         "left_out": _left_out(eight),
     }
 
@@ -131,6 +192,8 @@ def _sticks(layout: Layout) -> Table:
     found = _table("stick", *(f"`u_{thruster.name}`" for thruster in layout.thrusters))
     for axis in AXES.values():
         signs = layout.signs(axis)
+        if axis in (ROLL, PITCH):  # ArduSub rolls and pitches with the vertical thrusters alone
+            signs = {f"u_{t.name}": signs[f"u_{t.name}"] for t in layout.thrusters if t.direction[2]}
         cells = [{1.0: "+", -1.0: "−"}.get(signs.get(f"u_{thruster.name}", 0.0), "") for thruster in layout.thrusters]
         found.append((f"{axis.name}, {axis.positive}", *cells))
     return found
@@ -138,7 +201,7 @@ def _sticks(layout: Layout) -> Table:
 
 def _top_speeds(six: Vehicle, eight: Vehicle) -> Table:
     found = _table("full command", six.name, eight.name)
-    for axis in AXES.values():
+    for axis in (form.axis for form in six.layout.axes):
         for command, way in ((1.0, axis.positive), (-1.0, axis.negative)):
             speeds = [abs(v.rov.response(axis, command)[0]) for v in (six, eight)]
             found.append((f"{axis.name}, {way}", *(f"{speed:.2f} {axis.unit}" for speed in speeds)))
@@ -161,6 +224,10 @@ MANOEUVRE = [
 """Seconds, and the sticks held: surge, sway, yaw, heave."""
 
 
+LEVEL = -1.0
+"""The z_B of a vehicle that stays level, as if an autopilot held it."""
+
+
 def fly(rov: Rov) -> tuple[dict[str, float], float]:
     """Return where the manoeuvre ends, and the length of the track in the plane (m)."""
     layout = rov.layout
@@ -172,10 +239,16 @@ def fly(rov: Rov) -> tuple[dict[str, float], float]:
             inputs[name] += round(seconds * 10.0) * [value]
     steps = len(inputs[next(iter(inputs))])
     times = 0.1 * np.arange(steps + 1)
-    states = simulate(rov, times, {name: [*command, 0.0] for name, command in inputs.items()}).values[:, 0]
-    found = dict(zip(layout.state, states, strict=True))
+    found = run(rov, times, {name: [*command, 0.0] for name, command in inputs.items()})
     way = np.sum(np.hypot(np.diff(found["x"]), np.diff(found["y"])))
     return {name: float(values[-1]) for name, values in found.items()}, float(way)
+
+
+def run(rov: Rov, times: np.ndarray, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Return the states and the attitude over time."""
+    layout = rov.layout
+    record = [*layout.state, *(name for name in ("phi", "theta", "psi") if name in layout.thrust)]
+    return dict(zip(record, simulate(rov, times, values, record).values[:, 0], strict=True))
 
 
 def without(rov: Rov, *, coupling: bool = False, lag: bool = False, shape: bool = False) -> Rov:
@@ -193,17 +266,99 @@ def without(rov: Rov, *, coupling: bool = False, lag: bool = False, shape: bool 
 
 
 def _left_out(vehicle: Vehicle) -> Table:
-    whole, way = fly(vehicle.rov)
+    level = vehicle.rov.replaced({"z_B": LEVEL})
+    whole, way = fly(level)
     found = _table("left out", "position", "heading", "depth")
     cases = {
-        "asymmetry and dead band of the thrust": without(vehicle.rov, shape=True),
-        "coupling of surge, sway and yaw": without(vehicle.rov, coupling=True),
-        "lag of the thrust": without(vehicle.rov, lag=True),
-        "all three": without(vehicle.rov, coupling=True, lag=True, shape=True),
+        "asymmetry and dead band of the thrust": without(level, shape=True),
+        "Coriolis and Munk terms": without(level, coupling=True),
+        "lag of the thrust": without(level, lag=True),
+        "all three": without(level, coupling=True, lag=True, shape=True),
+        "the autopilot, with buoyancy 5 cm above the centre of mass": vehicle.rov.replaced({"z_B": -0.05}),
+        "the autopilot": vehicle.rov,
     }
     for name, rov in cases.items():
         end, _ = fly(rov)
         x, y, z, psi = (end[key] - whole[key] for key in ("x", "y", "z", "psi"))
         found.append((name, f"{hypot(x, y):.2f} m", f"{degrees(psi):+.1f}°", f"{z:+.2f} m"))
     found.append((f"length of the track: {way:.1f} m", "", "", ""))
+    return found
+
+
+# ---- Roll and pitch --------------------------------------------------------------------------------------------------
+
+AFTER = (0.5, 1.0, 2.0, 5.0)
+"""Seconds at which motions are compared."""
+
+
+def _published_motion(six: Vehicle, eight: Vehicle) -> Table:
+    """Motions without thrust, by the published numbers in the reference and by the C of the vehicle that ships."""
+    found = _table("", "", *(f"{t:g} s" for t in AFTER), "furthest")
+    pushed = {"X_ext": 10.0, "Y_ext": 5.0, "N_ext": 0.3}
+    cases: list[tuple[str, Vehicle, Publication, tuple[float, float], Mapping[str, float], str]] = [
+        ("BlueROV2, pushed ahead, aside and around", six, WU, (0.0, 0.0), pushed, "v"),
+        ("Heavy, pushed likewise", eight, VON_BENZON, (0.0, 0.0), pushed, "v"),
+        ("Heavy, let go at 30° of roll", eight, VON_BENZON, (radians(30.0), 0.0), {}, "phi"),
+        ("Heavy, let go at 30° of pitch", eight, VON_BENZON, (0.0, radians(30.0)), {}, "theta"),
+        ("Heavy, 1 N.m bow up", eight, VON_BENZON, (0.0, 0.0), {"M_ext": 1.0}, "theta"),
+    ]
+    for title, vehicle, published, (phi, theta), loads, name in cases:
+        load = tuple(loads.get(axis.external, 0.0) for axis in AXES.values())
+        state = [*(6 * [0.0]), *map(float, quaternion_of(phi, theta, 0.0)), *(3 * [0.0])]
+        wanted, at = [], 0.0
+        for t in AFTER:
+            state, at = list(integrate(published.body(load), state, t - at)), t
+            angles = dict(zip(("phi", "theta", "psi"), euler_angles(rotation(state[6:10])), strict=True))
+            wanted.append(float({**dict(zip("uvwpqr", state, strict=False)), **angles}[name]))
+        start = {"phi_0": phi, "theta_0": theta} if vehicle.layout.has_attitude else {}
+        moved = run(vehicle.rov, np.array([0.0, *AFTER]), {**loads, **start})[name][1:]
+        scale, unit = (degrees(1.0), "°") if name in ("phi", "theta") else (1.0, " m/s")
+        cells = [f"{scale * value:.3f}{unit}" for value in wanted]
+        furthest = max(abs(a - b) for a, b in zip(moved, wanted, strict=True))
+        found.append((title, {"v": "sway v", "phi": "roll φ", "theta": "pitch θ"}[name], *cells, f"{furthest:.0e}"))
+    return found
+
+
+def of_wu(rov: Rov, below: float, above: float) -> Rov:
+    """The BlueROV2 with Wu's roll and pitch: thrusters below, and buoyancy above the centre of mass (m)."""
+    layout = rov.layout
+    forms = {form.axis: replace(form, keys=tuple(key for key in form.keys if key != "F_0")) for form in layout.axes}
+    forms |= {axis: VehicleAxis(axis, forms[HEAVE].keys) for axis in (ROLL, PITCH)}
+    thrusters = tuple(
+        replace(t, position=(*t.position[:2], below)) if t.position and not t.direction[2] else t
+        for t in layout.thrusters
+    )
+    axes = tuple(forms[axis] for axis in AXES.values())
+    layout = replace(layout, axes=axes, thrusters=thrusters, restoring=("W", "B", "z_B"))
+    values = {**rov.coefficients, "W": WU.weight, "B": WU.buoyancy, "z_B": -above}
+    for axis in (ROLL, PITCH):
+        i = list(AXES.values()).index(axis)
+        values[axis.inertia] = WU.mass[i]
+        rows = {"m_a": WU.added_mass, "b_d": WU.linear, "a_d": WU.quadratic, "alpha": 6 * (1.0,), "beta": 6 * (1.0,)}
+        values |= {axis.coefficient(key): row[i] for key, row in rows.items()}
+    return Rov(layout, {name: values[name] for name in layout.coefficients})
+
+
+AHEAD = (0.1, 0.2, 0.3, 0.5, 1.0)
+"""Commands."""
+
+
+def _tilting(six: Vehicle, eight: Vehicle) -> Table:
+    """How far vehicles without control tilt under thrust ahead."""
+    found = _table("thrust ahead for 30 s", *(f"{command:.0%}" for command in AHEAD))
+    cases = {
+        "Heavy": eight.rov,
+        "Heavy, buoyancy 5 cm above": eight.rov.replaced({"z_B": -0.05}),
+        "Wu's roll and pitch: thrusters 8.5 cm below, buoyancy 2 cm above": of_wu(six.rov, 0.085, WU.above),
+        "the same with thrusters at the centre of mass": of_wu(six.rov, 0.0, WU.above),
+        "the same with the heights of bluerov2_gz: 1.1 cm below, 4.9 cm above": of_wu(six.rov, 0.011, 0.049),
+    }
+    for title, rov in cases.items():
+        cells = []
+        for command in AHEAD:
+            inputs = {name: sign * command for name, sign in rov.layout.signs(SURGE).items()}
+            moved = run(rov, 0.1 * np.arange(301), inputs)
+            tilt = degrees(float(np.max(np.arccos(np.cos(moved["phi"]) * np.cos(moved["theta"])))))
+            cells.append(f"{tilt:.0f}°" if tilt < 90.0 else "turns over")
+        found.append((title, *cells))
     return found

@@ -31,7 +31,9 @@ def tables() -> dict[str, Table]:
     named = {"vehicle": "FileHead", "provenance": "Made", "estimated": "Estimated"} | {
         f"axis_{name}": f"_{name.capitalize()}" for name in AXES
     }
-    named |= {name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster")}
+    named |= {
+        name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands")
+    }
     categories = [("category", "what"), ("---",) * 2, *((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())]
     found = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
     plans = {"plan": Plan, "varied": Varied, "signal": Signal, "input_file": InputFile, "keep": Keep}
