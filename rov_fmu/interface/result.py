@@ -64,8 +64,8 @@ class Result(Mapping[str, Array]):
     def final(self) -> dict[str, Array]:
         """The recorded states at the last time, by name: the `start` of a simulation that continues this one.
 
-        Of a vehicle with roll or pitch it also contains psi_0, so that the heading counts on. Changes of commands that wait
-        for a dead time are not part of it.
+        Of a vehicle with roll or pitch it also contains psi_0, so that the heading counts on. Changes of commands that
+        wait for a dead time are not part of it.
         """
         found = {name: self.arrays[name][..., -1][()] for name in self.states}
         return found | (

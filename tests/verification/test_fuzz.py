@@ -276,7 +276,8 @@ def test_every_defect_has_a_place_to_be_planted() -> None:
 
 
 # Two defects of each vehicle and version of FMI; the weekly tests have all of them.
-_SOME = {name for planted in (PLANTED, PLANTED_IN_HEAVY, PLANTED_IN_FMI3) for name in (min(planted), max(planted))}
+_SOME = {name for planted in (PLANTED, PLANTED_IN_FMI3) for name in (min(planted), max(planted))}
+_SOME.add("a quaternion grows")  # the other defects of the six-axis vehicle take minutes to be found
 
 
 @pytest.mark.parametrize(

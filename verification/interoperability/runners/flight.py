@@ -8,6 +8,8 @@ from pathlib import Path
 
 FMU = "rov.fmu"
 OUTPUTS = tuple(Path("outputs.txt").read_text().split())
+AT_START = {"eta": 1.0}
+"""The states that do not begin at 0: the quaternion is that of a level vehicle which heads north."""
 
 
 @dataclass(frozen=True)

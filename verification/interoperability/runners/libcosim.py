@@ -4,7 +4,6 @@ cs: one slave; ssp: an SSP archive; osp: an OSP configuration. The files of ssp 
 """
 
 import sys
-from functools import partial
 from pathlib import Path
 
 from libcosimpy.CosimExecution import CosimExecution
@@ -14,7 +13,7 @@ from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
 from examples.systems import write_osp, write_ssp
-from verification.interoperability.runners.flight import FMU, OUTPUTS, Step, fly, parameters
+from verification.interoperability.runners.flight import AT_START, FMU, OUTPUTS, Step, fly, parameters
 from verification.interoperability.runners.system import dive
 
 STEP = 100_000_000  # ns
@@ -43,10 +42,22 @@ execution.add_manipulator(commands)
 execution.add_observer(observer)
 
 
+stepped: list[Step] = []
+
+
 def advance(step: Step) -> None:
+    stepped.append(step)
     commands.slave_real_values(rov, [reference[name] for name in step.inputs], list(step.inputs.values()))
     if not execution.step():
         raise RuntimeError(f"the step to {step.end} s failed")
 
 
-fly(advance, partial(observer.last_real_values, rov, [reference[name] for name in OUTPUTS]))
+def outputs() -> list[float]:
+    """Return the outputs. Before the first step, libcosim shows 0 for all of them."""
+    if not stepped:
+        return [AT_START.get(name, 0.0) for name in OUTPUTS]
+    values: list[float] = observer.last_real_values(rov, [reference[name] for name in OUTPUTS])
+    return values
+
+
+fly(advance, outputs)
