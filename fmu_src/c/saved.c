@@ -1,7 +1,7 @@
 /* Saving, restoring and serializing the complete state (FMI 2.0, section 2.1.8; FMI 3.0, section 2.2.7.4). */
 
-/* The serialized state consists of: magic, token, type, mode, flags, time, stop, the heading of
- * a vehicle with an attitude, values, the changes that wait for the dead time, checksum. Each number has its least
+/* The serialized state consists of: magic, token, type, mode, flags, time, stop, the heading of a vehicle with an attitude,
+ * values, the changes of commands that wait for the dead time, checksum. Each number has its least
  * significant byte first. */
 #if HAS_DEAD_TIME
 enum { N_DELAY_WORDS = 1 + MOST_WAITING * (1 + N_COMMANDS) };

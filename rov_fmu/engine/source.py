@@ -363,6 +363,7 @@ def unused_sources(layout: Layout) -> list[str]:
 
 def sources(rov: Rov) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
-    names = [name for name in ("series.c", "step.c", "heading.c", "delay.c") if name not in unused_sources(rov.layout)]
+    unused = unused_sources(rov.layout)
+    names = [name for name in ("series.c", "step.c", "heading.c", "delay.c") if name not in unused]
     shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name in names}
     return generated_sources(rov.layout) | shared

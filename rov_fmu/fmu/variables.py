@@ -1,8 +1,9 @@
 """Declare every variable of the FMU once.
 
 modelDescription.xml, the C structs and value references, the documentation and the PythonFMU registration are all
-derived from `variables`. Their order is: inputs, state, derivatives, thrust, coefficients. The value reference of a
-variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
+derived from `variables`. Their order is: inputs, state, derivatives, thrust, commands that act after the dead time,
+coefficients, attitude at the start. The value reference of a variable is its place in this order: from 0 in FMI 2.0,
+from 1 in FMI 3.0.
 """
 
 from collections import Counter

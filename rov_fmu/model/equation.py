@@ -9,7 +9,7 @@ formula for each coefficient. `step.py` computes a step from it in Python, and t
 effect is a new term with its formula.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -84,6 +84,11 @@ class Equation:
     """Formulas for the states of the vehicle that are neither in the table nor lag, from the states of the table."""
     tables: Mapping[str, ThrustTable] = field(default_factory=dict)
     """The thrust tables that the formulas call, by their names."""
+
+    @cached_property
+    def measured(self) -> dict[str, Callable[[float], float]]:
+        """The functions of the thrust tables, from a command to the force (N), by their names."""
+        return {name: table.force for name, table in self.tables.items()}
 
     @cached_property
     def states(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The forces and moments that depend on the velocities and the attitude. A new one is a new function of `forces_of`."""
+"""The forces and moments that depend on velocities and attitude. Each kind is a function that `forces_of` calls."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Force:
     reverse: str = ""
     """The formula of the coefficient for a negative velocity."""
     is_held: bool = False
-    """True when the coefficient depends on inputs. For a negative `velocity` it has then the opposite sign."""
+    """True when the coefficient depends on inputs. Its sign changes with that of `velocity`, if one is given."""
 
 
 def forces_of(layout: Layout) -> Iterator[Force]:

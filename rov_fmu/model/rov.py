@@ -27,9 +27,8 @@ class _Formulas:
         rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
         self.table = Table(equation)
         self.parameters = compiled(equation.parameters)
-        tables = {name: measured.force for name, measured in equation.tables.items()}
-        self.thrust = compiled(equation.thrust, tables)
-        self.calculate = compiled({**equation.program, **rates, **equation.outputs}, tables)
+        self.thrust = compiled(equation.thrust, equation.measured)
+        self.calculate = compiled({**equation.program, **rates, **equation.outputs}, equation.measured)
 
 
 _formulas_of = lru_cache(maxsize=100)(_Formulas)

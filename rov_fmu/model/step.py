@@ -54,8 +54,7 @@ class Table:
                 self.velocities.append(place[directed[0].velocity] if directed else None)
                 formulas[f"coefficient_{len(formulas)}"] = term.coefficient
         self.coefficients = list(formulas)
-        tables = {name: measured.force for name, measured in equation.tables.items()}
-        self.hold = compiled({**equation.program, **equation.forces, **formulas}, tables)
+        self.hold = compiled({**equation.program, **equation.forces, **formulas}, equation.measured)
         self.arrive = compiled({force: after for force, (_, after) in equation.lagging.items()})
         self.products = sorted({factors for row in self.rows for _, factors in row if len(factors) == 2})
         self.used = {place[name] for name in equation.used}
