@@ -15,7 +15,7 @@ from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.recordings.runs import prepare
 from rov_fmu.identify.recordings.simulator import Simulator, solve
-from rov_fmu.model.layout import AXES, HEAVE, YAW
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.findings import acting
 from rov_fmu.tank.recording import Recording
@@ -109,7 +109,7 @@ def unknown() -> Rov:
 )
 def test_a_dive_is_identified(seed: int) -> None:
     fits = fit_recordings(dived(240.0, seed).recorded(seed=seed), unknown(), lag=("t200",))
-    assert [fit.axis.name for fit in fits] == list(AXES)
+    assert [fit.axis for fit in fits] == [SURGE, SWAY, HEAVE, YAW]
     for fit in fits:
         of = fit.axis.velocity
         assert fit.rov[f"a_d_{of}"] == pytest.approx(TRUTH[f"a_d_{of}"], rel=0.07)
