@@ -243,16 +243,13 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFi
     rov, layout = vehicle.rov, vehicle.layout
     phases = []
     for shares, load in _PHASES:
-        inputs = dict(layout.usual_inputs)
+        fractions = dict.fromkeys(layout.commands, 0.0)
         for axis in filter(layout.has, shares):
             for name, sign in layout.signs(axis).items():
-                inputs[name] = round(inputs[name] + shares[axis] * sign * vehicle.command_range[1], 6)
-        for name, meta in layout.inputs.items():
-            if name in layout.commands:
-                inputs[name] = max(-1.0, min(1.0, inputs[name]))
-            else:
-                inputs[name] += 0.05 * load * meta.nominal
-        phases.append(inputs)
+                fractions[name] = round(fractions[name] + shares[axis] * sign * vehicle.command_range[1], 6)
+        commands = {name: layout.command_of(max(-1.0, min(1.0, x))) for name, x in fractions.items()}
+        others = {name: meta for name, meta in layout.inputs.items() if name not in commands}
+        phases.append(commands | {name: meta.start + 0.05 * load * meta.nominal for name, meta in others.items()})
     length = float(f"{min(_PHASE, *(_horizon(rov, inputs) for inputs in phases)):.1g}")
     ends = [length * n for n in range(len(phases) + 1)]
     stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
