@@ -33,6 +33,7 @@ from rov_fmu.model.layout import (
 )
 from rov_fmu.vehicle.description import FileHead, Made, Validity
 from rov_fmu.vehicle.quantity import (
+    CrossSymbol,
     Finite,
     Name,
     Quantity,
@@ -420,7 +421,7 @@ class Hardware(Strict):
     battery: Battery | None = None
     commands: Commands | None = None
     axes: Axes | None = None
-    cross: dict[Symbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
+    cross: dict[CrossSymbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """Coefficients of two or three axes by their names in the FMU: added mass `m_a_uq`, damping `b_d_uq` and `a_d_uq`,
     lift `Y_ur`."""
     inputs: dict[Symbol, dict[str, _Gain]] = Field(default={}, max_length=MOST)

@@ -1,5 +1,6 @@
 """Tables of thrust, the battery, the dead time and fins in a vehicle file, and their mistakes."""
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,16 @@ def test_a_file_with_pulse_widths_is_read_and_written(folder: Path) -> None:
         assert vehicle.layout.pulse == (1100.0, 1480.5, 1900.0)
         assert load_vehicle(folder / "written.toml").layout == vehicle.layout
         assert vehicle.layout.has_dead_time == (T_d in text)
+
+
+def test_a_voltage_far_above_that_of_the_curves_gives_a_warning(folder: Path) -> None:
+    path = folder / "rov.toml"
+    higher = {"curves.main.tables": GONE, "curves.main.table": _FILES[0], "battery.voltage": quantity(24.5, "V")}
+    path.write_text(changed(higher, TEXT), encoding="utf-8")
+    expected = "battery.voltage.value = 24.5: is 1.53 times V_0 = 16 V of curves.bow: one of the two is probably wrong"
+    with pytest.warns(UserWarning, match=re.escape(expected)) as caught:
+        load_vehicle(path)
+    assert len(caught) == 1
 
 
 _PULSES = (
