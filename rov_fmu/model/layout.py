@@ -504,6 +504,10 @@ class Layout:
                 effects[name] = effects.get(name, 0.0) + gain * thruster.effect(axis)
         return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > FAINT}
 
+    def driving(self, axis: Axis, fraction: float) -> dict[str, float]:
+        """Return the commands that drive an axis in its positive direction with a fraction of full thrust."""
+        return {name: self.command_of(fraction * sign) for name, sign in self.signs(axis).items()}
+
     # -- declarations --
 
     @cached_property

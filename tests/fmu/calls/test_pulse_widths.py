@@ -1,20 +1,26 @@
 """An FMU whose commands are pulse widths behaves as one with fractions at the converted inputs."""
 
 import random
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import fmpy
+import numpy as np
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_model_description
 
+from rov_fmu.cli import main
+from rov_fmu.engine.simulation import simulate
 from rov_fmu.fmu.archive import python_content
 from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests import fmi2
 from tests.conftest import Made, unzipped
 from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, WARNING, Fmu
 from tests.fmu.calls.conftest import WRAPPERS
@@ -127,33 +133,52 @@ def test_a_warning_names_the_end_of_the_range_that_a_command_is_beyond(fmus: Pai
         assert expected in text
 
 
-def test_both_flavours_wait_at_neutral_for_the_dead_time(made_once: Made, tmp_path: Path) -> None:
+@pytest.mark.long
+def test_a_vehicle_file_with_pulse_widths_is_built_run_and_proved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = THRUST_EFFECTS.read_text(encoding="utf-8").replace("[commands]", f"[commands]\npulse = {[*PULSE]}")
+    file, fmu = tmp_path / "vehicle.toml", tmp_path / "delayed.fmu"
+    file.write_text(text, encoding="utf-8")
+    for table in THRUST_EFFECTS.parent.glob("thrust_*.csv"):
+        shutil.copy(table, tmp_path)
+    assert main(["build", str(file), "--platform", "host", "-o", str(fmu)]) == 0
+    assert "valid; runs: u_l = u_r = 1606 gives u = " in capsys.readouterr().out
+    assert main(["prove", str(fmu)]) == 0
+    fmpy.extract(str(fmu), unzipdir=str(tmp_path / "delayed"))
+    with fmi2.Fmu(tmp_path / "delayed").instance() as rov:
+        delayed = [f"delayed_{name}" for name in COMMANDS]
+        rov.start({"u_l": 1900.0})
+        assert rov.get(delayed) == [PULSE[1]] * len(COMMANDS)
+        assert rov.step(0.0, 0.09) == rov.step(0.09, 0.02) == OK
+        assert rov.get(delayed) == [1900.0, *[PULSE[1]] * (len(COMMANDS) - 1)]
+
+
+def test_the_python_flavour_waits_at_neutral_for_the_dead_time(tmp_path: Path) -> None:
     vehicle = replace(DELAYED, identifier="delayed_pulses", rov=pulsed(DELAYED.rov, PULSE))
-    native = made_once("delayed pulses", lambda folder: unzipped(vehicle, folder))
     for name, data in python_content(vehicle).files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(data)
     keep_loaded(tmp_path)
-    place = {v.name: v.valueReference for v in read_model_description(str(native)).modelVariables}
-    acting, outputs = [place[f"delayed_{name}"] for name in COMMANDS], [place[name] for name in STATES]
-    commands, both = commands_of(random.Random(3)), [fmpy_slave(tmp_path), fmpy_slave(native)]
-    for slave in both:
-        slave.setupExperiment(startTime=0.0)
-        slave.enterInitializationMode()
-        slave.exitInitializationMode()
-        assert slave.getReal(acting) == [PULSE[1]] * len(COMMANDS)
-    for n in range(30):
-        pulses, _ = next(commands)
-        for slave in both:
-            slave.setReal([place[name] for name in pulses], [*pulses.values()])
-            slave.doStep(currentCommunicationPoint=0.04 * n, communicationStepSize=0.04)
-        python, in_c = (slave.getReal(outputs) for slave in both)
-        assert python == pytest.approx(in_c, rel=1e-12, abs=1e-13)
-        assert both[0].getReal(acting) == both[1].getReal(acting)
-        assert any(python) == (n >= 2)
-    for slave in both:
-        slave.terminate()
-        slave.freeInstance()
+    place = {v.name: v.valueReference for v in read_model_description(str(tmp_path)).modelVariables}
+    acting, states = [place[f"delayed_{name}"] for name in COMMANDS], [place[name] for name in STATES]
+    commands, times = commands_of(random.Random(3)), 0.04 * np.arange(31)
+    rows = [next(commands)[0] for _ in times]
+    tables = {name: np.array([row[name] for row in rows]) for name in COMMANDS}
+    names = [*STATES, *(f"delayed_{name}" for name in COMMANDS)]
+    in_c = simulate(vehicle.rov, times, tables, names, workers=1).values[:, 0].T
+    slave = fmpy_slave(tmp_path)
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    for t, row, expected in zip(times.tolist(), rows, in_c.tolist(), strict=True):
+        assert slave.getReal(states + acting) == pytest.approx(expected, rel=1e-12, abs=1e-13)
+        slave.setReal([place[name] for name in row], [*row.values()])
+        slave.doStep(currentCommunicationPoint=t, communicationStepSize=0.04)
+    assert in_c[0].tolist() == [0.0] * len(STATES) + [PULSE[1]] * len(COMMANDS)
+    assert np.abs(in_c[-1, : len(STATES)]).max() > 0.1
+    slave.terminate()
+    slave.freeInstance()
 
 
 def test_the_reference_results_are_those_of_the_fractions() -> None:
