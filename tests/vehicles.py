@@ -106,6 +106,11 @@ def numbered(layout: Layout, **values: float) -> Rov:
     return Rov(layout, {name: 1.0 if meta.tunable else numbers[name] for name, meta in layout.coefficients.items()})
 
 
+def pulsed(rov: Rov, pulse: tuple[float, float, float]) -> Rov:
+    """Return a vehicle whose commands are pulse widths."""
+    return Rov(replace(rov.layout, pulse=pulse), rov.coefficients)
+
+
 def _axes(names: str, keys: tuple[str, ...] = _DRAG) -> tuple[VehicleAxis, ...]:
     return tuple(VehicleAxis(axis, keys) for axis in AXES.values() if axis.velocity in names)
 

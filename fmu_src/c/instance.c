@@ -228,7 +228,7 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
         f->now.values[place] = value[i];
         if (info->kind == INPUT && (value[i] < info->minimum || value[i] > info->maximum)) {
             WARN_ONCE(f, place, "%s = %.15g saturates at %g; said once.", info->name, value[i],
-                      value[i] < 0.0 ? info->minimum : info->maximum);
+                      value[i] < info->minimum ? info->minimum : info->maximum);
         } else if (info->kind == TUNABLE && is_for_event_mode(f)) {
             WARN_ONCE(f, TUNED_BETWEEN_EVENTS, "%s is set, though the standard wants Event Mode for it; said once.",
                       info->name);

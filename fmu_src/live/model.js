@@ -17,8 +17,9 @@
  */
 /**
  * The data of a vehicle in a page. Variables are listed by their places, with their start values. The module is deflated, in Base64.
+ * Commands are fractions in the page; `pulse` has the pulse widths of full reverse, neutral and full thrust if the model takes these.
  * @typedef {{name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[], mixed: boolean,
- *   axes: Axis[], thrusters: Thruster[], tunable: string[], tests: StepTest[], size: number}} Vehicle
+ *   pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], tunable: string[], tests: StepTest[], size: number}} Vehicle
  */
 /**
  * The exports of fmu_src/live/module.c.
@@ -39,7 +40,9 @@ class Model {
     /** V_ss and Tau of each axis. */
     this.marks = new Float64Array(memory.buffer, marks(), 2 * vehicle.axes.length);
     this.places = new Map(vehicle.variables.map(([name], place) => [name, place]));
-    this.values.set(vehicle.variables.map(([, start]) => start));
+    /** The commands as fractions, if the model takes pulse widths. @type {Map<string, number>} */
+    this.fractions = new Map();
+    for (const [name, start] of vehicle.variables) this.set(name, start);
     this.exports.begin();
     this.tune();
   }
@@ -64,13 +67,20 @@ class Model {
   /** Returns the value of a variable, or 0 if the vehicle does not have it. @param {string} name */
   get(name) {
     const place = this.places.get(name);
-    return place === undefined ? 0 : this.values[place];
+    return this.fractions.get(name) ?? (place === undefined ? 0 : this.values[place]);
   }
 
   /** Sets a variable if the vehicle has it. @param {string} name @param {number} value */
   set(name, value) {
     const place = this.places.get(name);
-    if (place !== undefined) this.values[place] = value;
+    if (place === undefined) return;
+    const { pulse, commands } = this.vehicle;
+    this.values[place] = value;
+    if (pulse && commands.includes(name)) {
+      const [low, neutral, high] = pulse;
+      this.fractions.set(name, value);
+      this.values[place] = neutral + value * (value > 0 ? high - neutral : neutral - low);
+    }
   }
 
   /** Takes over changed coefficients. */

@@ -45,9 +45,6 @@ void begin(void)
     elapsed = 0.0;
 #if HAS_DEAD_TIME
     line.waiting = 0;
-    for (int i = 0; i < N_COMMANDS; i++) {
-        at[FIRST_DELAYED + i] = 0.0;
-    }
 #endif
 }
 

@@ -277,8 +277,8 @@ class EquationSource:
         return lines + [f"{place} = {self._c(formula, heading)};" for place, formula in formulas.items()]
 
     def beginning(self) -> list[str]:
-        """Return statements that compute the attitude at the start from its parameters."""
-        lines: list[str] = []
+        """Return statements that set the commands that act, and compute the attitude from its parameters."""
+        lines = [f"at[REF_{name}] = {meta.start!r};" for name, meta in self.layout.delayed.items()]
         local: list[str] = []
         for name, formula in start_formulas().items() if self.layout.has_attitude else ():
             text = self._c(formula, local)

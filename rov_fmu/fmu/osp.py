@@ -13,6 +13,7 @@ from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Layout
 _ELEMENTS = {
     "1": "Generic",
     "V": "Generic",
+    "us": "Generic",
     "N": "Force",
     "N.m": "Torque",
     "m/s": "LinearVelocity",

@@ -7,7 +7,7 @@ Python, and not with the C code that they prove.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, hypot, isfinite, sqrt
+from math import hypot, isfinite, sqrt
 
 from rov_fmu.fmu.experiments import FOLDER, NAME
 from rov_fmu.io.templates import render
@@ -31,9 +31,7 @@ _DIGITS = ".11g"
 _MULTIPLES = (1, 2, 4, 8)
 """The times at which a step response is compared, in multiples of Tau."""
 _STEPS = 10
-"""The least number of communication steps in Tau, and in a phase of the manoeuvre."""
-_MOST_PARTS = 200
-"""The largest number of steps in these times, which an attitude that changes quickly needs."""
+"""The number of communication steps in Tau, and in a phase of the manoeuvre."""
 _LONGEST_TAU = 10.0
 """The longest Tau that an experiment uses (s)."""
 _HORIZON = 40.0
@@ -136,7 +134,7 @@ def _step_responses(vehicle: Vehicle, sets: Mapping[str, Rov], files: dict[str, 
                     experiment,
                     _description(rov, axis, percent, name if len(sets) > 1 else "", table, row),
                     _text(times[-1]),
-                    _text(time_units[name] / _parts(rov, inputs, time_units[name], _STEPS)),
+                    _text(time_units[name] / _STEPS),
                     name if len(sets) > 1 else None,
                     f"{stem}.csv",
                     references,
@@ -245,32 +243,25 @@ def _manoeuvre(vehicle: Vehicle, files: dict[str, str]) -> Iterator[ExperimentFi
     rov, layout = vehicle.rov, vehicle.layout
     phases = []
     for shares, load in _PHASES:
-        inputs = dict(layout.usual_inputs)
+        fractions = dict.fromkeys(layout.commands, 0.0)
         for axis in filter(layout.has, shares):
             for name, sign in layout.signs(axis).items():
-                inputs[name] = round(inputs[name] + shares[axis] * sign * vehicle.command_range[1], 6)
-        for name, meta in layout.inputs.items():
-            if name in layout.commands:
-                inputs[name] = max(-1.0, min(1.0, inputs[name]))
-            else:
-                inputs[name] += 0.05 * load * meta.nominal
-        phases.append(inputs)
+                fractions[name] = round(fractions[name] + shares[axis] * sign * vehicle.command_range[1], 6)
+        commands = {name: layout.command_of(max(-1.0, min(1.0, x))) for name, x in fractions.items()}
+        others = {name: meta for name, meta in layout.inputs.items() if name not in commands}
+        phases.append(commands | {name: meta.start + 0.05 * load * meta.nominal for name, meta in others.items()})
     length = float(f"{min(_PHASE, *(_horizon(rov, inputs) for inputs in phases)):.1g}")
     ends = [length * n for n in range(len(phases) + 1)]
     stimuli = [(t, inputs) for n, inputs in enumerate(phases) for t in ends[n : n + 2]]
     held = [(inputs, [end - 0.5 * length, end]) for inputs, end in zip(phases, ends[1:], strict=True)]
     trajectory = _trajectory(rov, held)
-    needed = max(_parts(rov, inputs, length) for inputs in phases)
-    steps = next(
-        n for n in (_STEPS, 20, 50, 100, _MOST_PARTS) if n >= needed
-    )  # a phase ends with a step, in decimals too
     files["manoeuvre.csv"] = _csv(_moving(stimuli, layout.inputs))
     files["manoeuvre_expected.csv"] = _csv(_moving(trajectory, layout.velocities | _place(layout) | layout.lagging))
     yield ExperimentFiles(
         "manoeuvre",
         "All axes at once, with loads, a current and reversals, then all off",
         _text(ends[-1]),
-        _text(length / steps),
+        _text(length / _STEPS),
         None,
         "manoeuvre.csv",
         "manoeuvre_expected.csv",
@@ -323,27 +314,8 @@ def _trajectory(rov: Rov, phases: Sequence[tuple[Values, Sequence[float]]]) -> l
     for inputs, times in phases:
         for t in times:
             before, state = found[-1]
-            parts = _parts(rov, inputs, t - before)
-            h = (t - before) / parts
-            for n in range(parts):
-                state = line.step(rov, inputs, state, before + n * h, h)
-            found.append((t, state))
+            found.append((t, line.step(rov, inputs, state, before, t - before)))
     return found
-
-
-def _parts(rov: Rov, inputs: Values, length: float, least: int = 1) -> int:
-    """Return the number of steps for a time in which a vehicle with an attitude turns by less than half a turn each.
-
-    The sign of the quaternion is then that of a continuous motion. The coupling may double the velocities.
-    """
-    if not rov.layout.has_attitude:
-        return least
-    rate = 0.0
-    for form, motion in zip(rov.layout.axes, rov.axes(inputs), strict=True):
-        if form.axis.is_rotation:
-            V = motion.steady_velocity()
-            rate += abs(V) if isfinite(V) else _HORIZON * sqrt(abs(motion.C))
-    return max(least, min(_MOST_PARTS, ceil(rate * length)))
 
 
 def _place(layout: Layout) -> dict[str, Declaration]:

@@ -68,6 +68,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.time = 0.0
         self.stop_time: float | None = None
         self.line = delay.DelayLine(self.layout)
+        self._put(self.line.delayed)
         self.warned: set[int | str] = set()
         for reference, v in enumerate(self.declared):
             self.register_variable(

@@ -35,8 +35,9 @@ def terminals(layout: Layout) -> list[Terminal]:
     thrust = tuple(name for name in layout.lagging | layout.thrust if name not in layout.angles)
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     driven = "thrusters and fins" if layout.fins else "thrusters"
+    commands = "pulse widths" if layout.pulse else "-1 to 1"
     found = [
-        Terminal("thrusters", "input", "bus", f"Commands to the {driven}, -1 to 1", tuple(layout.commands)),
+        Terminal("thrusters", "input", "bus", f"Commands to the {driven}, {commands}", tuple(layout.commands)),
         Terminal("battery", "input", "bus", "Voltage of the battery", battery),
         Terminal("load", "input", "bus", "Forces and torque from outside, body frame", loads),
         Terminal("current", "input", "bus", f"Velocity of the water, {water}", current),

@@ -21,11 +21,13 @@ from rov_fmu.model.rov import Rov
 
 @dataclass(frozen=True)
 class Unit:
-    """An SI unit: its exponents of the FMI base units, and a display unit; factor converts values to the latter."""
+    """A unit: its exponents of the FMI base units, and a display unit; factor converts values to the latter."""
 
     exponents: Mapping[str, int]
     display: str | None = None
     factor: float = 1.0
+    size: float = 1.0
+    """The unit in SI units."""
 
 
 _KNOT = 1852.0 / 3600.0  # m/s
@@ -34,12 +36,15 @@ _BASE = {
     "kg": {"kg": 1},
     "m": {"m": 1},
     "s": {"s": 1},
+    "us": {"s": 1},
     "rad": {"rad": 1},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
     "N": {"kg": 1, "m": 1, "s": -2},
     "1": {},
 }
 """The exponents of the FMI base units in each symbol of a unit."""
+_SIZES = {"us": 1e-6}
+"""The sizes of the units that are no SI units."""
 _DISPLAYS = {
     "1": ("%", 100.0),
     "rad": ("deg", degrees(1.0)),
@@ -57,7 +62,9 @@ def unit_of(text: str) -> Unit:
             name = symbol.rstrip("23") if symbol != "1" else symbol
             for base, exponent in _BASE[name].items():
                 exponents[base] += sign * exponent * int(symbol[len(name) :] or 1)
-    return Unit({base: exponent for base, exponent in exponents.items() if exponent}, *_DISPLAYS.get(text, ()))
+    powers = {base: exponent for base, exponent in exponents.items() if exponent}
+    display, factor = _DISPLAYS.get(text, (None, 1.0))
+    return Unit(powers, display, factor, _SIZES.get(text, 1.0))
 
 
 @dataclass(frozen=True)

@@ -111,8 +111,20 @@ class Commands:
                     place = np.searchsorted(own, self.time, side="right") - 1
                     found = np.where(place >= 0, found[..., np.maximum(place, 0)], layout.inputs[name].start)
             self.values[name] = found
-            if name in layout.commands and (most := float(np.max(np.abs(found), initial=0.0))) > 1.0:
-                warnings.warn(f"{name} reaches ±{most:.6g}: commands saturate at ±1", UserWarning, stacklevel=4)
+            if name in layout.commands and (beyond := _beyond(found, layout.commands[name])):
+                warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
+
+
+def _beyond(values: Array, command: Declaration) -> str:
+    """Return in words the value farthest beyond the range of a command, or an empty text if none is beyond."""
+    low, high = command.minimum, command.maximum
+    excess = np.maximum(low - values, values - high)
+    if np.max(excess, initial=0.0) <= 0.0:
+        return ""
+    value = values.flat[np.argmax(excess)]
+    if command.unit == "1":
+        return f"±{abs(value):.6g}: commands saturate at ±1"
+    return f"{value:.6g}: commands are pulse widths, and saturate at {low:g} and {high:g} {command.unit}"
 
 
 def _names(what: str, given: Any) -> list[str]:

@@ -44,7 +44,8 @@ def load(vehicle: str | Path) -> "VehicleModel":
 class VehicleModel(Vehicle):
     """A vehicle that can be simulated, changed and built. `rov_fmu.load` returns one.
 
-    All values are in SI units, angles in rad, and commands are fractions of full thrust from -1 to 1. The variables are
+    All values are in SI units, angles in rad, and commands are fractions of full thrust from -1 to 1
+    (pulse widths in µs if the vehicle file says so). The variables are
     those of the FMU.
     """
 

@@ -29,7 +29,7 @@ class Result(Mapping[str, Array]):
     arrays: Mapping[str, Array]
     """The arrays by name."""
     units: Mapping[str, str]
-    """The SI unit of each variable, by its name; "1" for commands."""
+    """The SI unit of each variable, by its name; "1" for commands that are fractions."""
     states: tuple[str, ...]
     """The recorded variables that are states."""
     failed: NDArray[np.intp]

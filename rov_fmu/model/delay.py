@@ -1,5 +1,8 @@
 """The dead time: a change of the commands acts T_d seconds later (standard library only)."""
 
+from copy import copy
+from math import isfinite
+
 from .layout import Layout, delayed_name
 from .rov import Rov, Values
 
@@ -24,18 +27,23 @@ class DelayLine:
     def step(self, rov: Rov, inputs: Values, state: Values, t: float, h: float) -> dict[str, float]:
         """Return the states of a vehicle after h > 0 seconds from time t with the inputs held, exact up to rounding.
 
-        Raises ValueError when more than MOST_WAITING changes wait.
+        Raises ValueError when more than MOST_WAITING changes wait. After that, and after a motion that overflows, the
+        changes on their way are those from before the step.
         """
         if not self.layout.has_dead_time:
             return rov.step(inputs, state, h)
-        self._send({name: inputs[name] for name in self.acting}, t + rov["T_d"])
+        line = copy(self)
+        line.waiting = [*self.waiting]
+        line._send({name: inputs[name] for name in self.acting}, t + rov["T_d"])
         passed, after = 0.0, dict(state)
         while passed < h:
-            self._receive(t + passed)
-            until = min(h, self.waiting[0][0] - t) if self.waiting else h
-            after = rov.step({**inputs, **self.delayed}, after, until - passed)
+            line._receive(t + passed)
+            until = min(h, line.waiting[0][0] - t) if line.waiting else h
+            after = rov.step({**inputs, **line.delayed}, after, until - passed)
             passed = until
-        self._receive(t + h)
+        line._receive(t + h)
+        if all(map(isfinite, after.values())):
+            self.acting, self.waiting = line.acting, line.waiting
         return after
 
     @property

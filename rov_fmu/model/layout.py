@@ -164,7 +164,7 @@ class Declaration:
     nominal: float = 1.0
     tunable: bool = False
     start: float = 0.0
-    """The value of an input that is not given."""
+    """The value of an input that is not given, and of a command that acts before the first one."""
 
 
 @dataclass(frozen=True)
@@ -421,6 +421,8 @@ class Layout:
     """True when commands act after the dead time T_d."""
     voltage: float | None = None
     """The usual voltage of the battery, V, if the thrust depends on it."""
+    pulse: tuple[float, float, float] | None = None
+    """The pulse widths of full reverse, no thrust and full thrust, us, if the commands are pulse widths."""
 
     def extended(self, names: Iterable[str]) -> "Layout":
         """Return the layout with additional coefficients of its curves and axes, by their names."""
@@ -502,6 +504,10 @@ class Layout:
                 effects[name] = effects.get(name, 0.0) + gain * thruster.effect(axis)
         return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > FAINT}
 
+    def driving(self, axis: Axis, fraction: float) -> dict[str, float]:
+        """Return the commands that drive an axis in its positive direction with a fraction of full thrust."""
+        return {name: self.command_of(fraction * sign) for name, sign in self.signs(axis).items()}
+
     # -- declarations --
 
     @cached_property
@@ -537,13 +543,30 @@ class Layout:
 
     @cached_property
     def commands(self) -> dict[str, Declaration]:
-        """The inputs that drive the thrusters and the fins: fractions of full thrust, or of the largest angle."""
-        if not self.mix:
-            return {f"u_{driven.name}": _command(driven) for driven in self.driven}
-        return {
-            f"u_{name}": Declaration("1", f"Command u_{name} of {_listed(gains)}; saturates at ±1", -1.0, 1.0)
-            for name, gains in self.mix.items()
-        }
+        """The inputs that drive the thrusters and the fins: fractions of full thrust, or of the largest angle.
+
+        They are pulse widths instead if the vehicle has these.
+        """
+        if self.mix:
+            words = {name: f"Command u_{name} of {_listed(gains)}" for name, gains in self.mix.items()}
+        else:
+            words = {driven.name: _command(driven) for driven in self.driven}
+        return {f"u_{name}": self._commanding(text) for name, text in words.items()}
+
+    def _commanding(self, words: str) -> Declaration:
+        """Return the declaration of a command, which `words` describe."""
+        if self.pulse is None:
+            return Declaration("1", f"{words}; saturates at ±1", -1.0, 1.0)
+        low, neutral, high = self.pulse
+        text = f"{words}; pulse width, {neutral:g} is neutral, saturates at {low:g} and {high:g}"
+        return Declaration("us", text, low, high, neutral, start=neutral)
+
+    def command_of(self, fraction: float) -> float:
+        """Return the value of a command that stands for a fraction: the fraction itself, or the pulse width."""
+        if self.pulse is None:
+            return fraction
+        low, neutral, high = self.pulse
+        return neutral + fraction * (high - neutral if fraction > 0.0 else neutral - low)
 
     @cached_property
     def delayed(self) -> dict[str, Declaration]:
@@ -551,7 +574,9 @@ class Layout:
         if not self.has_dead_time:
             return {}
         return {
-            delayed_name(name): Declaration(meta.unit, f"Command {name} that acts after the dead time")
+            delayed_name(name): Declaration(
+                meta.unit, f"Command {name} that acts after the dead time", start=meta.start
+            )
             for name, meta in self.commands.items()
         }
 
@@ -714,10 +739,10 @@ def _pushes(direction: tuple[float, float, float]) -> str:
     return " and ".join(words)
 
 
-def _command(driven: Thruster | Fin) -> Declaration:
+def _command(driven: Thruster | Fin) -> str:
     kind = "fin" if isinstance(driven, Fin) else "thruster"
     words = f"Command u_{driven.name}: {driven.description or f'{kind} {driven.name}'}"
-    return Declaration("1", f"{words}, positive {_pushes(driven.direction)}; saturates at ±1", -1.0, 1.0)
+    return f"{words}, positive {_pushes(driven.direction)}"
 
 
 def _thrust(thruster: Thruster, curve: Curve) -> Declaration:

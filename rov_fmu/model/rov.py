@@ -183,8 +183,7 @@ class Rov:
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
         """Return all inputs: an axis driven at a fraction of full thrust, the other inputs as usual."""
-        signs = self.layout.signs(axis)
-        return self.layout.usual_inputs | {name: command * sign for name, sign in signs.items()}
+        return self.layout.usual_inputs | self.layout.driving(axis, command)
 
     def force(self, axis: Axis, command: float) -> float:
         """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α: (9), (10), (4)."""

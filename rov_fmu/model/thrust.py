@@ -18,6 +18,9 @@ def thrust_formulas(layout: Layout) -> dict[str, str]:
         parts = []
         for command, gain in gains.items():
             acting = delayed_name(command) if layout.has_dead_time else command
+            if layout.pulse:
+                found[f"fraction_{command}"] = _fraction(acting, layout.pulse)
+                acting = f"fraction_{command}"
             found[f"saturated_{command}"] = _saturated(acting)
             parts.append((gain, f"saturated_{command}"))
         if list(gains.values()) == [1.0]:
@@ -39,6 +42,14 @@ def curve_formulas(curve: Curve) -> dict[str, str]:
         "command_one": _saturated("u_one"),
         **_steady_thrust("one", curve),
     }
+
+
+def _fraction(name: str, pulse: tuple[float, float, float]) -> str:
+    """Return the command that a pulse width stands for, as a fraction. The two sides of neutral may differ."""
+    low, neutral, high = pulse
+    below, above = neutral - low, high - neutral
+    span = repr(above) if below == above else f"({above!r} if {name} > {neutral!r} else {below!r})"
+    return f"({name} - {neutral!r}) / {span}"
 
 
 def _saturated(name: str) -> str:

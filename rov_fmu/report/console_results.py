@@ -160,7 +160,7 @@ def print_tuning(tuning: Tuning) -> None:
     out.print(result)
     layout = tuning.rov.layout
     for command in dict.fromkeys(p.command for p in tuning.points):
-        inputs = ", ".join(f"{name} = {command * sign:g}" for name, sign in layout.signs(tuning.axis).items())
+        inputs = ", ".join(f"{name} = {value:g}" for name, value in layout.driving(tuning.axis, command).items())
         out.print(f"A command of {command:.0%} of {tuning.axis.name}: {inputs}", soft_wrap=True)
     for curve in {thruster.curve: layout.curve_of[thruster.name] for thruster in layout.drivers(tuning.axis)}.values():
         if curve.has_lag:

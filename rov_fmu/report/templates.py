@@ -48,4 +48,4 @@ def text(value: float | None, form: str) -> str:
 
 def pretty_unit(unit: str) -> str:
     """Return a unit for readers: N.m.s2/rad2 becomes N·m·s²/rad²."""
-    return unit if unit == "1" else unit.translate(RAISED).replace(".", "·")
+    return {"1": "1", "us": "µs"}.get(unit) or unit.translate(RAISED).replace(".", "·")

@@ -276,6 +276,9 @@ def _unknown_effects(layout: Layout) -> Iterator[str]:
         )
     if layout.has_dead_time:
         yield key_line("commands.T_d", "identification finds delays itself: leave it out here")
+    if layout.pulse:
+        reason = "each log says itself what its commands are: leave it out here, and add it to the vehicle file later"
+        yield key_line("commands.pulse", reason)
 
 
 def _mistakes_in_known(file: _ReadableFile, description: Description) -> Iterator[str]:

@@ -100,6 +100,8 @@ def _recording_of_axis(path: Path, signal: Signal, command: Array) -> Recording:
 # ---- Columns ---------------------------------------------------------------------------------------------------------
 
 _LOGGED = replace(LOGGED_COMMAND, optional=True)
+_IN_PULSES = tuple(f"{left}{unit}{right}" for unit in PULSES for left, right in ("[]", "()"))
+"""The ends of headers, such as "PWM (us)", that columns of commands may have under another name."""
 
 
 @dataclass(frozen=True)
@@ -156,16 +158,18 @@ def _wrong_columns(
 ) -> Iterator[str]:
     """Yield a line for every mistake in the columns of a log, from the headers that are read and the others."""
     found = _commanding(headers, kinds)
-    unread = {title.partition("[")[0].strip(): shown(title) for title in others}
+    unread = {title.replace("(", "[").partition("[")[0].strip(): shown(title) for title in others}
     command = next((title for name, title in unread.items() if name.casefold() == _COMMAND), None)
-    if not found and command:
+    if not found and command and not kinds["axis"]:
         yield f"column {command} is the command of one axis, but {_no_axis_in_name(path, layout)}"
         return
     if not found:
         wanted = " or ".join(", ".join(columns) for columns in kinds.values() if columns)
         known = [name for columns in kinds.values() for name in columns]
         near = dict.fromkeys(unread[name] for column in known for name in similar(column, unread))
+        near |= dict.fromkeys(shown(title) for title in others if title.endswith(_IN_PULSES))
         hint = f"; is it the column {' or '.join(near)}?" if near else ""
+        hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
         yield f"no column of commands: {wanted}, each in [%], [1] or [us]{hint}"
     if len(found) > 1:
         titles = ", ".join(shown(headers[names[0]]) for names in found.values())

@@ -123,6 +123,8 @@ def check_variable_names(layout: Layout) -> Iterator[str]:
 _GRAVITY = 9.81
 _TOLERANCE = 0.03
 """The largest relative difference between W and 9.81 m_rov that gives no warning."""
+_FAR_ABOVE = 1.5
+"""The largest ratio of the battery's voltage to V_0 that gives no warning."""
 _LEAST = 1e-9
 """The smallest eigenvalue of a positive definite matrix, whose diagonal is 1."""
 
@@ -163,6 +165,7 @@ def doubts(rov: Rov) -> Iterator[str]:
     """Yield a line about each combination of numbers that is possible but probably wrong."""
     yield from _doubts_of_damping(rov)
     yield from _doubts_of_weight(rov)
+    yield from _doubts_of_voltage(rov)
 
 
 def _doubts_of_damping(rov: Rov) -> Iterator[str]:
@@ -191,6 +194,16 @@ def _doubts_of_damping(rov: Rov) -> Iterator[str]:
         yield key_line(
             "cross", f"{adds} {in_words([name for v, name in names.items() if v in coupled])}: reduce its b_d_.."
         )
+
+
+def _doubts_of_voltage(rov: Rov) -> Iterator[str]:
+    """Doubt a battery whose voltage is far above that at which a curve was measured."""
+    voltage = rov.layout.voltage or 0.0
+    for curve in rov.layout.curves:
+        if "V_0" in curve.keys and voltage > _FAR_ABOVE * (V_0 := rov[curve.coefficient("V_0")]):
+            times = f"is {voltage / V_0:.3g} times V_0 = {V_0:g} V of curves.{curve.name}"
+            yield key_line("battery.voltage.value", f"{times}: one of the two is probably wrong", voltage)
+            return
 
 
 def _doubts_of_weight(rov: Rov) -> Iterator[str]:

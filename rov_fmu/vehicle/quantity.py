@@ -44,8 +44,18 @@ def _symbol(text: str) -> str:
     return text
 
 
-Symbol = Annotated[str, AfterValidator(_symbol), WithJsonSchema({"type": "string", "pattern": "^[A-Za-z0-9_]{1,30}$"})]
+def _cross_symbol(text: str) -> str:
+    """Return the text if it can be the name of a coefficient of several axes. Raises ValueError."""
+    if "|" in text and (hint := derivative_hint(text)):
+        raise ValueError(f"is not a coefficient of several axes{hint}")
+    return _symbol(text)
+
+
+_SYMBOL = WithJsonSchema({"type": "string", "pattern": "^[A-Za-z0-9_]{1,30}$"})
+Symbol = Annotated[str, AfterValidator(_symbol), _SYMBOL]
 """A name that becomes part of the names of FMU variables."""
+CrossSymbol = Annotated[str, AfterValidator(_cross_symbol), _SYMBOL]
+"""A key of [cross], which is also a name in the FMU."""
 
 Interval = Annotated[
     tuple[Finite, Finite],

@@ -33,6 +33,7 @@ from rov_fmu.model.layout import (
 )
 from rov_fmu.vehicle.description import FileHead, Made, Validity
 from rov_fmu.vehicle.quantity import (
+    CrossSymbol,
     Finite,
     Name,
     Quantity,
@@ -112,8 +113,38 @@ class Body(_coefficients("Body", {key: kind.meta() for key, kind in (BODY | REST
     in surge, sway and yaw."""
 
 
+_PULSES = (500.0, 2500.0)
+"""The shortest and the longest pulse that a speed controller or servo understands, us."""
+_CLOSEST = 10.0
+"""The least distance of full reverse and of full thrust from neutral, us."""
+
+
+def _pulses(given: object) -> tuple[float, ...]:
+    """Return pulse widths as a tuple. Raises ValueError."""
+    low, high = _PULSES
+    numbers = given if isinstance(given, list) else []
+    usable = [float(x) for x in numbers if isinstance(x, int | float) and not isinstance(x, bool) and low <= x <= high]
+    if len(numbers) != 3 or len(usable) != 3 or any(b - a < _CLOSEST for a, b in pairwise(usable)):
+        reason = f"three rising numbers within {low:g} ... {high:g} us and at least {_CLOSEST:g} us apart"
+        raise ValueError(f"must be {reason}: full reverse, neutral, full thrust ahead")
+    return tuple(usable)
+
+
 class Commands(_coefficients("Commands", {key: kind.meta() for key, kind in COMMANDS.items()})):  # type: ignore[misc]
-    """The way of the commands to the thrusters and fins."""
+    """The form of the commands, and their way to the thrusters and fins."""
+
+    model_config = DOCUMENTED
+
+    pulse: (
+        Annotated[
+            tuple[float, float, float],
+            BeforeValidator(_pulses),
+            WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}),
+        ]
+        | None
+    ) = None
+    """The pulse widths of full reverse, neutral and full thrust ahead, in µs: `[1100, 1500, 1900]`. With this key, the
+    commands of the FMU are pulse widths in µs instead of fractions from -1 to 1."""
 
 
 class Arm(_coefficients("Arm", {key: kind.meta() for key, kind in ARM.items()}, ARM)):  # type: ignore[misc]
@@ -390,7 +421,7 @@ class Hardware(Strict):
     battery: Battery | None = None
     commands: Commands | None = None
     axes: Axes | None = None
-    cross: dict[Symbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
+    cross: dict[CrossSymbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """Coefficients of two or three axes by their names in the FMU: added mass `m_a_uq`, damping `b_d_uq` and `a_d_uq`,
     lift `Y_ur`."""
     inputs: dict[Symbol, dict[str, _Gain]] = Field(default={}, max_length=MOST)
@@ -412,8 +443,9 @@ class Hardware(Strict):
         restoring = tuple(key for key in RESTORING if self.body and getattr(self.body, key) is not None)
         fins = tuple(fin.plain() for fin in self.fin)
         voltage = self.battery.voltage.value if self.battery else None
+        pulse = self.commands.pulse if self.commands else None
         return Layout(
-            axes, curves, thrusters, self.inputs, coupled, cross, restoring, fins, self.has_dead_time, voltage
+            axes, curves, thrusters, self.inputs, coupled, cross, restoring, fins, self.has_dead_time, voltage, pulse
         )
 
     @property

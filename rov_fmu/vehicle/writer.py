@@ -58,8 +58,8 @@ def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) ->
     tables: dict[str, Any] = {"body": {"coupling": True} if layout.coupled else {}}
     if layout.has_arm:
         tables["arm"] = {}
-    if layout.has_dead_time:
-        tables["commands"] = {}
+    if layout.has_dead_time or layout.pulse:
+        tables["commands"] = {"pulse": [*layout.pulse]} if layout.pulse else {}
     if layout.voltage is not None:
         tables["battery"] = {
             "voltage": _inline_table({"value": layout.voltage, "unit": "V", "source": vehicle.voltage_source})

@@ -318,6 +318,11 @@ TABLES: dict[str, tuple[str, str, str]] = {
         "time [s],depth [m]\n" + _ROWS,
         "line 1: no column of commands: u_l, u_r, u_t or command, each in [%], [1] or [us]",
     ),
+    "a command with its unit in other brackets": (
+        "log_heave.csv",
+        "time [s],command (us),depth [m]\n" + _ROWS,
+        "is it the column 'command (us)'? Units stand in square brackets.",
+    ),
     "a command misspelt": (
         "log_heave.csv",
         _LOG.replace("command", "comand"),

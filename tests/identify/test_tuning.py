@@ -17,6 +17,7 @@ from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.recordings import AXES
+from tests.vehicles import pulsed
 
 HEAVE_AT_30 = ["--axis", "heave", "--command", "0.3", "--v-ss", "0.175", "--tau", "2.209"]
 
@@ -33,6 +34,10 @@ def test_the_printout_names_the_inputs_that_are_held(k: Rov, capsys: pytest.Capt
     said = capsys.readouterr().out
     assert "A command of 30% of yaw: u_l = 0.3, u_r = -0.3\n" in said
     assert "A command of -40% of yaw: u_l = -0.4, u_r = 0.4\n" in said
+    print_tuning(tune_over(pulsed(k, (1100.0, 1500.0, 1900.0)), YAW, points))
+    of_pulses = capsys.readouterr().out
+    assert "A command of 30% of yaw: u_l = 1620, u_r = 1380\n" in of_pulses
+    assert of_pulses.partition("A command")[0] == said.partition("A command")[0]
 
 
 def test_the_printout_names_a_lag_and_gives_no_sign_to_a_deviation_of_nothing(

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import BY_HAND
 from tests.commands import BARE, REFIT, ROOT
-from tests.vehicles import SIX, a_vehicle
+from tests.vehicles import SIX, a_vehicle, pulsed
 
 TIMES = [0.0, 1.0, 2.0]
 AHEAD = {"u_l": 0.3, "u_r": 0.3}
@@ -201,6 +202,14 @@ def test_a_command_beyond_full_saturates_with_a_warning(videoray: VehicleModel) 
     with pytest.warns(UserWarning, match=r"^u_l reaches ±1\.5: commands saturate at ±1$") as caught:
         found = videoray.simulate(TIMES, {"u_l": [-1.5, 0.0, 1.2]})
     assert caught[0].filename == __file__
+    assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-1.0, 0.0, 1.0]})["u"].tolist()
+
+
+def test_a_pulse_beyond_the_range_saturates_with_a_warning(videoray: VehicleModel) -> None:
+    pulses = replace(videoray, rov=pulsed(videoray.rov, (1100.0, 1500.0, 1900.0)))
+    expected = r"^u_l reaches 0\.3: commands are pulse widths, and saturate at 1100 and 1900 us$"
+    with pytest.warns(UserWarning, match=expected):
+        found = pulses.simulate(TIMES, {"u_l": [0.3, 1500.0, 1950.0]})
     assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-1.0, 0.0, 1.0]})["u"].tolist()
 
 

@@ -23,7 +23,7 @@ from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.report.pages import check_is_whole, check_refers_to_itself_alone, row_of, rows, text_of
-from tests.vehicles import SIX, VEHICLES, a_vehicle
+from tests.vehicles import SIX, VEHICLES, a_vehicle, pulsed
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
 
@@ -371,6 +371,16 @@ def test_the_page_names_the_axes_that_a_command_pushes_too() -> None:
     hold = "u_l = c, u_r = −c"
     assert table["Yaw bow to starboard (rad/s)"][1] == f"{hold}also pushes surge with {number(ahead - back, 3)} N"
     assert table["Surge forward (m/s)"][1] == "u_l = c, u_r = c"
+
+
+def test_the_page_of_pulse_widths_says_what_they_stand_for() -> None:
+    vehicle = a_vehicle(pulsed(VEHICLES["sway and yaw"], (1100.0, 1480.0, 1900.0)))
+    text = text_of(documentation_page(vehicle))
+    assert "1100 is full thrust in reverse, c = −1; 1480 is neutral, c = 0; 1900 is full thrust, c = 1." in text
+    assert "u is the command as a fraction: −1, 0 and 1 at pulses of 1100, 1480 and 1900 µs" in text
+    assert "all inputs at their start values" in text
+    first = next(iter(vehicle.layout.commands))
+    assert f"{first} 1606.0" in text or f"{first} 1366.0" in text
 
 
 def test_a_sum_has_its_signs_before_its_numbers() -> None:

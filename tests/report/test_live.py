@@ -3,6 +3,7 @@
 import random
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from math import exp, log
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
 from tests.report.conftest import Visit
-from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes, pulsed
 from verification.references.fmpy_slave import fmpy_slave
 
 pytestmark = pytest.mark.interop
@@ -278,6 +279,34 @@ def test_a_command_acts_after_the_dead_time(tmp_path: Path, quiet: Visitor) -> N
     assert vehicle.rov["T_d"] == 0.1
     assert before == anew == 0.0
     assert after > 1.0
+
+
+def test_pulse_widths_are_flown_by_fractions(tmp_path: Path, quiet: Visitor) -> None:
+    """The model gets pulse widths, from the sliders, the step tests and a reset alike."""
+    vehicle, target = load_vehicle(SHIPPED["videoray"]), tmp_path / "pulses.html"
+    of_pulses = replace(vehicle, rov=pulsed(vehicle.rov, (1100.0, 1480.0, 1900.0)))
+    flown = [Flown(of_pulses, module(of_pulses.rov)), Flown(vehicle, module(vehicle.rov))]
+    target.write_text(fly_page(flown), encoding="utf-8")
+    moved = flying(quiet, target.as_uri()).page.evaluate("""() => {
+        live.pause(true);
+        const { pilot, ghost } = live.flight;
+        const seen = () => [pilot, ghost].map(({ model }) => ["u", "w", "r"].map((name) => model.get(name)));
+        live.flight.advance(1);
+        const still = [...seen(), [...pilot.model.values.slice(0, 3)], live.flight.begun];
+        live.flight.set({ u_l: 0.3, u_r: -0.7, u_t: 1.5 });
+        live.flight.advance(1);
+        const given = [...seen(), [...pilot.model.values.slice(0, 3)], pilot.model.get("u_r")];
+        live.flight.set({ u_r: -0.7 });
+        live.flight.run(live.vehicle.tests[0]);
+        live.flight.advance(1);
+        return [still, given, seen()];
+    }""")
+    still, given, tested = moved
+    assert still == [[0.0] * 3, [0.0] * 3, [1480.0] * 3, False]
+    assert given[2:] == [[1480.0 + 0.3 * 420.0, 1480.0 - 0.7 * 380.0, 1480.0 + 1.5 * 420.0], -0.7]
+    for ours, others in (given[:2], tested):
+        assert ours == pytest.approx(others, rel=1e-13, abs=1e-15)
+        assert any(ours)
 
 
 # ---- What a person does with it --------------------------------------------------------------------------------------

@@ -64,6 +64,11 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         "/rov.toml: curves: this table is missing, and there is body | /rov.toml: thruster: this table is missing, and",
     ),
     (
+        f"{DOWN}[commands]\npulse = [1100, 1500, 1900]\n",
+        WITH_THRUST,
+        "/rov.toml: commands.pulse: each log says itself what its commands are: leave it out here, and add it to the",
+    ),
+    (
         DOWN.replace('curve = "t200"', 'curve = "t100"'),
         WITH_THRUST,
         "/rov.toml: thruster.v.curve = 't100': there is no such curve, only t200 | /rov.toml: curves.t200: no thruster",

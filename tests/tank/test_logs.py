@@ -200,6 +200,16 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
 
 REFUSED = {
     "no commands": ("time [s],depth [m]", "0,1", "line 1: no column of commands: u_l, u_r, u_t, each in"),
+    "a pulse under another name": (
+        "time [s],PWM (us),depth [m]",
+        "0,1500,1",
+        "each in [%], [1] or [us]; is it the column 'PWM (us)'? Units stand in square brackets.",
+    ),
+    "a unit in other brackets": (
+        "time [s],u_t (us),depth [m]",
+        "0,1500,1",
+        "each in [%], [1] or [us]; is it the column 'u_t (us)'? Units stand in square brackets.",
+    ),
     "no motion": ("time [s],u_t [%]", "0,1", "line 1: column 'surge distance [m]' or 'surge velocity [m/s]' or 'depth"),
     "no such unit": ("time [s],u_t [V],depth [m]", "0,1,1", "'u_t [V]': must be 'u_t [%]' or 'u_t [1]' or 'u_t [us]'"),
     "span of none": ("time [s],u_t [us 1500 0],depth [m]", "0,1,1", "must be [us], or [us NEUTRAL SPAN] such as"),

@@ -450,6 +450,16 @@ MISTAKES_OF_SIX: dict[str, tuple[dict[str, Any], list[tuple[str, ...]]]] = {
             ("cross.N_vdot: there is no such key; give its negative as m_a_vr in [cross]",),
         ],
     ),
+    "a derivative with bars in [cross]": (
+        {"cross.X_u|u|": quantity(-1.0, "N.s2/m2"), "cross.N_v|v|": quantity(-1.0, "N.m.s2/m2")},
+        [
+            (
+                "cross.X_u|u| = 'X_u|u|': is not a coefficient of several axes",
+                "; give -X_u|u|, which is positive, as a_d of [axes.surge]",
+            ),
+            ("cross.N_v|v| = 'N_v|v|'", "; give its negative as a_d_rv in [cross]"),
+        ],
+    ),
     "a moment of inertia by its axes": (
         {"body.Ixx": quantity(1.0, "kg.m2"), "body.I_z": quantity(1.0, "kg.m2")},
         [("body.Ixx: there is no such key; write I_p in [body]",), ("body.I_z", "write I_r in [body]")],

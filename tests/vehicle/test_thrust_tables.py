@@ -1,5 +1,6 @@
 """Tables of thrust, the battery, the dead time and fins in a vehicle file, and their mistakes."""
 
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -104,6 +105,34 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
     }
 
 
+def test_a_file_with_pulse_widths_is_read_and_written(folder: Path) -> None:
+    """Beside a dead time, and in a table of their own."""
+    T_d = 'T_d = { value = 0.1, unit = "s", source = "a speed controller" }'
+    assert T_d in TEXT
+    for text in (f"pulse = [1100, 1480.5, 1900]\n{T_d}", "pulse = [1100, 1480.5, 1900]"):
+        here = folder / "here.toml"
+        here.write_text(TEXT.replace(T_d, text), encoding="utf-8")
+        vehicle = load_vehicle(here)
+        write_vehicle(vehicle, folder / "written.toml")
+        assert vehicle.layout.pulse == (1100.0, 1480.5, 1900.0)
+        assert load_vehicle(folder / "written.toml").layout == vehicle.layout
+        assert vehicle.layout.has_dead_time == (T_d in text)
+
+
+def test_a_voltage_far_above_that_of_the_curves_gives_a_warning(folder: Path) -> None:
+    path = folder / "rov.toml"
+    higher = {"curves.main.tables": GONE, "curves.main.table": _FILES[0], "battery.voltage": quantity(24.5, "V")}
+    path.write_text(changed(higher, TEXT), encoding="utf-8")
+    expected = "battery.voltage.value = 24.5: is 1.53 times V_0 = 16 V of curves.bow: one of the two is probably wrong"
+    with pytest.warns(UserWarning, match=re.escape(expected)) as caught:
+        load_vehicle(path)
+    assert len(caught) == 1
+
+
+_PULSES = (
+    "must be three rising numbers within 500 ... 2500 us and at least 10 us apart: full reverse, neutral, full thrust "
+    "ahead"
+)
 MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     "coefficients beside a table": (
         {"curves.bow.a_t": quantity(1.0, "N")},
@@ -138,6 +167,12 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         {"commands.T_d": quantity(20.0, "s")},
         "commands.T_d.value = 20.0: must be within 0.0001 ... 1 s",
     ),
+    "reversed pulses": ({"commands.pulse": [1900, 1500, 1100]}, f"commands.pulse = [1900, 1500, 1100]: {_PULSES}"),
+    "two pulses": ({"commands.pulse": [1100, 1900]}, f"commands.pulse = [1100, 1900]: {_PULSES}"),
+    "pulses in ms": ({"commands.pulse": [1.1, 1.5, 1.9]}, f"commands.pulse = [1.1, 1.5, 1.9]: {_PULSES}"),
+    "no reverse": ({"commands.pulse": [1000, 1001, 2000]}, f"commands.pulse = [1000, 1001, 2000]: {_PULSES}"),
+    "one pulse": ({"commands.pulse": 1500}, f"commands.pulse = 1500: {_PULSES}"),
+    "pulses in quotes": ({"commands.pulse": ["1100", "1500", "1900"]}, _PULSES),
     "a fin with a thruster's name": (
         {"fin.rudder.name": "top"},
         "fin.top: a thruster or a fin before it has this name",

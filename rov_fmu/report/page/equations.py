@@ -172,7 +172,7 @@ def _inlined(layout: Layout, equation: Equation) -> dict[str, str]:
     found = {
         name: formula
         for name, formula in equation.program.items()
-        if not name.startswith(("F_", "tau_", "steady_", "loss_", "R_", "table_", "angle_", "battery"))
+        if not name.startswith(("F_", "tau_", "steady_", "loss_", "R_", "table_", "angle_", "battery", "fraction_"))
     }
     if layout.has_attitude:
         found["square_length"] = "1"
@@ -227,6 +227,8 @@ def symbols(layout: Layout) -> dict[str, Symbol]:
         letter, _, rest = name.partition("_")
         found[name] = Symbol(letter, *rest.split("_"))
     found |= {name: Symbol("u", name.removeprefix("delayed_u_"), "d") for name in layout.delayed}
+    mark = "d" if layout.has_dead_time else ""
+    found |= {f"fraction_{name}": Symbol("u", name.removeprefix("u_"), mark) for name in layout.commands}
     found |= {"battery": Symbol("U"), "T_d": Symbol("T", "d")}
     for fin in layout.fins:
         found[f"angle_{fin.name}"] = Symbol("δ", fin.name)

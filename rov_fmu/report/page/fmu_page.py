@@ -66,7 +66,7 @@ def documentation_page(vehicle: Vehicle, *, native: bool = True, fmi: int = 2, m
     held = held_commands(vehicle, tables.values())
     axes = [form.axis for form in layout.axes]
     first = axes[0]
-    start = {name: 0.3 * sign for name, sign in layout.signs(first).items()}
+    start = layout.driving(first, 0.3)
     rest = {**layout.usual_inputs, **layout.at_rest}
     shown = equations.of(layout)
     own = [(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))]

@@ -98,7 +98,8 @@ def _data(flown: Flown) -> dict[str, Any]:
     return {
         "name": vehicle.name,
         "module": base64.b64encode(zlib.compress(flown.module, 9)).decode(),
-        "variables": [(v.name, v.start or 0.0) for v in variables(rov)],
+        "variables": [(v.name, 0.0 if v.name in layout.commands else v.start or 0.0) for v in variables(rov)],
+        "pulse": layout.pulse,
         "inputs": len(layout.inputs),
         "states": len(layout.state),
         "commands": list(layout.commands),

@@ -1,0 +1,193 @@
+"""An FMU whose commands are pulse widths behaves as one with fractions at the converted inputs."""
+
+import random
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_model_description
+
+from rov_fmu.cli import main
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.fmu.archive import python_content
+from rov_fmu.fmu.experiments import FOLDER
+from rov_fmu.fmu.osp import osp_model_description
+from rov_fmu.fmu.reference_results import reference_results
+from rov_fmu.fmu.terminals import terminals
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests import fmi2
+from tests.conftest import Made, unzipped
+from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, OK, WARNING, Fmu
+from tests.fmu.calls.conftest import WRAPPERS
+from tests.model.test_thrust_effects import immediate
+from tests.vehicles import THRUST_EFFECTS, pulsed
+from verification.references.fmpy_slave import fmpy_slave, keep_loaded
+
+PULSE = (1100.0, 1480.0, 1900.0)
+DELAYED = load_vehicle(THRUST_EFFECTS)
+FRACTIONS = replace(DELAYED, identifier="fractions", rov=immediate(DELAYED.rov))
+PULSES = replace(FRACTIONS, identifier="pulses", rov=pulsed(FRACTIONS.rov, PULSE))
+COMMANDS = [*FRACTIONS.layout.commands]
+STATES = [*FRACTIONS.layout.state]
+
+Pair = tuple[Fmu, Fmu]
+
+
+@pytest.fixture(scope="module", params=WRAPPERS, ids="FMI {}.0".format)
+def fmus(request: pytest.FixtureRequest, made_once: Made) -> Pair:
+    """Return the FMU with pulse widths of a version of FMI, and one of FMI 2.0 with fractions."""
+
+    def fmu(vehicle: Vehicle, version: int) -> Fmu:
+        name = f"{vehicle.identifier}{version}"
+        return WRAPPERS[version](made_once(name, lambda folder: unzipped(vehicle, folder, fmi=version)))
+
+    return fmu(PULSES, request.param), fmu(FRACTIONS, 2)
+
+
+def fractions_of(pulses: dict[str, float]) -> dict[str, float]:
+    """Return the commands that stand for pulse widths."""
+    low, neutral, high = PULSE
+    return {name: (x - neutral) / (high - neutral if x > neutral else neutral - low) for name, x in pulses.items()}
+
+
+def commands_of(rng: random.Random) -> Iterator[tuple[dict[str, float], dict[str, float]]]:
+    """Yield pulse widths, some of them beyond full thrust, and the fractions that they stand for."""
+    while True:
+        pulses = {name: rng.choice((0.0, PULSE[1], *[rng.uniform(1000.0, 2000.0)] * 6)) for name in COMMANDS}
+        yield pulses, fractions_of(pulses)
+
+
+def test_the_description_declares_the_pulse_widths(fmus: Pair) -> None:
+    fmu, _ = fmus
+    description = read_model_description(str(fmu.folder), validate=False)
+    assert validate_model_description(description, validate_variable_names=True, validate_model_structure=True) == []
+    (unit,) = (unit for unit in description.unitDefinitions if unit.name == "us")
+    assert (unit.baseUnit.s, unit.baseUnit.factor) == (1, 1e-6)
+    for name in COMMANDS:
+        variable = fmu.variables[name]
+        declared = variable if fmu.VERSION == 2 else variable.declaredType
+        assert (declared.unit, float(variable.start)) == ("us", PULSE[1])
+        assert fmu.bounds(name) == (PULSE[0], PULSE[2])
+        assert "pulse width, 1480 is neutral, saturates at 1100 and 1900" in variable.description
+    assert b'unit="us"' in osp_model_description(PULSES.layout)
+    assert terminals(PULSES.layout)[0].description == "Commands to the thrusters and fins, pulse widths"
+
+
+def test_without_a_command_nothing_moves(fmus: Pair) -> None:
+    with fmus[0].instance() as rov:
+        rov.start()
+        assert rov.get(COMMANDS) == [PULSE[1]] * len(COMMANDS)
+        assert rov.step(0.0, 1.0) == OK
+        assert rov.get(fmus[0].outputs) == [0.0] * len(fmus[0].outputs)
+
+
+def test_steps_are_those_of_the_fractions_bit_for_bit(fmus: Pair) -> None:
+    commands = commands_of(random.Random(1))
+    with fmus[0].instance() as rov, fmus[1].instance() as other:
+        rov.start()
+        other.start()
+        for n in range(40):
+            pulses, fractions = next(commands)
+            assert rov.set(pulses) == other.set(fractions) == OK
+            assert rov.step(0.13 * n, 0.13) == other.step(0.13 * n, 0.13) == OK
+            assert rov.get(rov.fmu.outputs) == other.get(other.fmu.outputs)
+        assert max(map(abs, rov.get(STATES))) > 0.1
+
+
+def test_derivatives_in_model_exchange_are_those_of_the_fractions(fmus: Pair) -> None:
+    """The values are equal bit for bit, and the directional derivatives have the scale of a pulse width."""
+    rng = random.Random(2)
+    unknowns = [f"der({name})" for name in STATES] + [*FRACTIONS.layout.thrust]
+    low, neutral, high = PULSE
+    steep: set[str] = set()
+    with fmus[0].instance(MODEL_EXCHANGE) as rov, fmus[1].instance(MODEL_EXCHANGE) as other:
+        for one in (rov, other):
+            one.reach(CONTINUOUS)
+        for _ in range(10):
+            pulses = {name: rng.uniform(low + 1.0, high - 1.0) for name in COMMANDS}
+            state = {name: rng.uniform(-2.0, 2.0) for name in STATES}
+            assert rov.set(pulses | state) == other.set(fractions_of(pulses) | state) == OK
+            assert rov.get(unknowns) == other.get(unknowns)
+            for name, pulse in pulses.items():
+                span = high - neutral if pulse > neutral else neutral - low
+                expected = [slope / span for slope in other.derivatives(unknowns, name)]
+                steep.update(name for slope in expected if slope)
+                assert rov.derivatives(unknowns, name) == pytest.approx(expected, rel=1e-15, abs=0.0)
+        assert steep == {*COMMANDS}
+        assert rov.set({"u_top": 0.0}) == OK
+        assert rov.derivatives(["der(w)"], "u_top") == [0.0]
+
+
+def test_a_warning_names_the_end_of_the_range_that_a_command_is_beyond(fmus: Pair) -> None:
+    with fmus[0].instance() as rov:
+        rov.start({"u_l": 0.0, "u_r": 2500.0, "voltage": 8.0})
+        texts = [message.text for message in rov.log if message.status == WARNING]
+    for text, expected in zip(
+        texts, ("u_l = 0 saturates at 1100", "u_r = 2500 saturates at 1900", "voltage = 8 saturates at 12"), strict=True
+    ):
+        assert expected in text
+
+
+@pytest.mark.long
+def test_a_vehicle_file_with_pulse_widths_is_built_run_and_proved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = THRUST_EFFECTS.read_text(encoding="utf-8").replace("[commands]", f"[commands]\npulse = {[*PULSE]}")
+    file, fmu = tmp_path / "vehicle.toml", tmp_path / "delayed.fmu"
+    file.write_text(text, encoding="utf-8")
+    for table in THRUST_EFFECTS.parent.glob("thrust_*.csv"):
+        shutil.copy(table, tmp_path)
+    assert main(["build", str(file), "--platform", "host", "-o", str(fmu)]) == 0
+    assert "valid; runs: u_l = u_r = 1606 gives u = " in capsys.readouterr().out
+    assert main(["prove", str(fmu)]) == 0
+    fmpy.extract(str(fmu), unzipdir=str(tmp_path / "delayed"))
+    with fmi2.Fmu(tmp_path / "delayed").instance() as rov:
+        delayed = [f"delayed_{name}" for name in COMMANDS]
+        rov.start({"u_l": 1900.0})
+        assert rov.get(delayed) == [PULSE[1]] * len(COMMANDS)
+        assert rov.step(0.0, 0.09) == rov.step(0.09, 0.02) == OK
+        assert rov.get(delayed) == [1900.0, *[PULSE[1]] * (len(COMMANDS) - 1)]
+
+
+def test_the_python_flavour_waits_at_neutral_for_the_dead_time(tmp_path: Path) -> None:
+    vehicle = replace(DELAYED, identifier="delayed_pulses", rov=pulsed(DELAYED.rov, PULSE))
+    for name, data in python_content(vehicle).files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(data)
+    keep_loaded(tmp_path)
+    place = {v.name: v.valueReference for v in read_model_description(str(tmp_path)).modelVariables}
+    acting, states = [place[f"delayed_{name}"] for name in COMMANDS], [place[name] for name in STATES]
+    commands, times = commands_of(random.Random(3)), 0.04 * np.arange(31)
+    rows = [next(commands)[0] for _ in times]
+    tables = {name: np.array([row[name] for row in rows]) for name in COMMANDS}
+    names = [*STATES, *(f"delayed_{name}" for name in COMMANDS)]
+    in_c = simulate(vehicle.rov, times, tables, names, workers=1).values[:, 0].T
+    slave = fmpy_slave(tmp_path)
+    slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    for t, row, expected in zip(times.tolist(), rows, in_c.tolist(), strict=True):
+        assert slave.getReal(states + acting) == pytest.approx(expected, rel=1e-12, abs=1e-13)
+        slave.setReal([place[name] for name in row], [*row.values()])
+        slave.doStep(currentCommunicationPoint=t, communicationStepSize=0.04)
+    assert in_c[0].tolist() == [0.0] * len(STATES) + [PULSE[1]] * len(COMMANDS)
+    assert np.abs(in_c[-1, : len(STATES)]).max() > 0.1
+    slave.terminate()
+    slave.freeInstance()
+
+
+def test_the_reference_results_are_those_of_the_fractions() -> None:
+    found, expected = reference_results(PULSES), reference_results(FRACTIONS)
+    assert found.keys() == expected.keys()
+    results = [path for path in found if path.endswith("_expected.csv")]
+    assert results
+    for path in results:
+        assert found[path] == expected[path], path
+    stimuli = found[f"{FOLDER}/surge_100.csv"].decode().splitlines()
+    assert stimuli[0] == f"time,{','.join(COMMANDS)}"
+    assert stimuli[1] == "0,1900,1900,1480,1480,1480"
