@@ -11,10 +11,13 @@ import click
 import numpy as np
 
 from tests.identify.scenarios.catalogue import SCENARIOS, Scenario
-from tests.identify.scenarios.judge import biases, coverages, problems
+from tests.identify.scenarios.judge import biases, coverages, invented, problems
 from tests.identify.scenarios.outcome import Outcome, outcome
 
-_HEADER = f"{'scenario':42} {'covered':>8} {'bias of a_d, b_d, beta':>27} {'alarms':>7} {'refused':>7} {'CPU s':>7}"
+_HEADER = (
+    f"{'scenario':42} {'covered':>8} {'bias of a_d, b_d, beta':>29} {'alarms':>7} {'invented':>8} {'refused':>7} "
+    f"{'CPU s':>7}"
+)
 
 
 @click.command(help=__doc__)
@@ -35,7 +38,7 @@ def main(names: tuple[str, ...], seeds: int, verbose: bool) -> None:
         with TemporaryDirectory() as folder:
             outcomes = [outcome(scenario, seed, Path(folder) / str(seed)) for seed in range(seeds)]
         click.echo(row(name, scenario, outcomes))
-        for line in problems(outcomes, scenario.truth, scenario.coefficients, scenario.unexplained):
+        for line in problems(outcomes, scenario):
             click.echo(f"    {line[:160]}")
         if verbose:
             click.echo("\n".join(f"        {line}" for line in details(scenario, outcomes)))
@@ -43,9 +46,8 @@ def main(names: tuple[str, ...], seeds: int, verbose: bool) -> None:
 
 def row(name: str, scenario: Scenario, outcomes: list[Outcome]) -> str:
     """Return the row of a scenario. The biases are the largest ones over the axes."""
-    truth, coefficients = scenario.truth, scenario.coefficients
-    found = coverages(outcomes, truth, coefficients)
-    means = {b.name: b.mean for b in biases(outcomes, truth, coefficients)}
+    found = coverages(outcomes, scenario)
+    means = {b.name: b.mean for b in biases(outcomes, scenario)}
     worst = [
         max((m for n, m in means.items() if n.startswith(key)), key=abs, default=float("nan"))
         for key in ("a_d", "b_d", "beta")
@@ -53,8 +55,9 @@ def row(name: str, scenario: Scenario, outcomes: list[Outcome]) -> str:
     covered = f"{sum(c.covered for c in found)}/{sum(c.total for c in found)}"
     seconds = float(np.mean([o.seconds for o in outcomes]))
     alarms, refused = sum(bool(o.alarms) for o in outcomes), sum(bool(o.error) for o in outcomes)
+    made_up = sum(bool(invented(o, scenario)) for o in outcomes)
     bias = " ".join(f"{100.0 * mean:+7.1f} %" for mean in worst)
-    return f"{name:42} {covered:>8} {bias} {alarms:7} {refused:7} {seconds:7.1f}"
+    return f"{name:42} {covered:>8} {bias} {alarms:7} {made_up:8} {refused:7} {seconds:7.1f}"
 
 
 def details(scenario: Scenario, outcomes: list[Outcome]) -> list[str]:

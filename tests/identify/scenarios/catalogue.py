@@ -71,8 +71,14 @@ class Scenario:
     more: Mapping[str, float] = field(default_factory=dict)
     """Other coefficients of the true vehicle."""
     conditions: Conditions = NOTHING
+    currents: tuple[tuple[float, float], ...] = ()
+    """The current of each recording, where they differ."""
     rov_file: str = ""
     """More lines of rov.toml."""
+    effects: tuple[str, ...] = ()
+    """The kinds of findings about effects that are really there."""
+    vague: bool = False
+    """True when coefficients may turn out not to be identifiable: a missing interval then counts as one that covers."""
     unexplained: tuple[str, ...] = ()
     """The axes where the model cannot explain the data; none for a complete model."""
 
@@ -139,7 +145,9 @@ _REVERSE = {
     for curve in ("rear", "top")
     for key in ("a_t", "b_t")
 }
-_DELAY = Conditions(delay=0.2)
+_UP = {f"{key}_w_reverse": 1.3 * TRUTHS["videoray"][f"{key}_w"] for key in ("a_d", "b_d")}
+_DELAY, _FLOW = Conditions(delay=0.2), Conditions(current=(0.06, -0.03))
+_FLOWS = ("current north", "current east")
 _HEAVY = Scenario("bluerov2_heavy", Logs("pilot", tuple(AXES.values()), rate=20.0), ALL_ROUND, rov_file=UPRIGHT)
 _TWO = Scenario(logs=replace(_PILOT, count=2), sensors=(replace(VELOCITY, noise=0.01), DEPTH, HEADING))
 """Two recordings of 60 s for tests of the model's structure."""
@@ -157,24 +165,40 @@ def _with(sensors: Sequence[Sensor], sensor: Sensor) -> tuple[Sensor, ...]:
 
 COMPLETE: dict[str, Scenario] = {
     "clean": _usual(),
-    "load in heave": _usual(Logs(axes=(HEAVE,)), more=_LOAD),
-    "load": _usual(more=_LOAD),
-    "delay": _usual(conditions=_DELAY),
-    "lag": _usual(more=_LAG, rov_file=_FIT_LAG),
-    "delay and lag": _usual(more=_LAG, rov_file=_FIT_LAG, conditions=_DELAY),
-    "reverse": _usual(more=_REVERSE),
-    "current": _usual(sensors=_with(USUAL, DISTANCE), conditions=Conditions(current=(0.1, 0.0))),
+    **{
+        f"load of {load} N in heave": _usual(Logs(axes=(HEAVE,)), more={"F_0_w": load}, effects=("load",))
+        for load in (0.02, 0.1, 0.3)
+    },
+    "load": _usual(more=_LOAD, effects=("load",)),
+    "delay": _usual(conditions=_DELAY, effects=("delay",)),
+    "lag": _usual(more=_LAG, rov_file=_FIT_LAG, effects=("lag",)),
+    "delay and lag": _usual(more=_LAG, rov_file=_FIT_LAG, conditions=_DELAY, effects=("delay", "lag")),
+    "reverse": _usual(more=_REVERSE, effects=("reverse thrust",)),
+    "current": _usual(sensors=_with(USUAL, DISTANCE), conditions=Conditions(current=(0.1, 0.0)), effects=("current",)),
     "load, delay, reverse, correlated noise": _usual(
-        Logs(correlation_time=1.0), more=_LOAD | _REVERSE, conditions=_DELAY
+        Logs(correlation_time=1.0),
+        more=_LOAD | _REVERSE,
+        conditions=_DELAY,
+        effects=("load", "delay", "reverse thrust"),
     ),
-    "switches between rows at 10 Hz": _usual(replace(_BETWEEN, rate=10.0)),
-    "switches between rows at 5 Hz": _usual(replace(_BETWEEN, rate=5.0)),
-    "irregular stamps": _usual(Logs(rate=10.0, between_rows=True, scatter=0.8, jitter=0.005)),
+    "switches between rows at 10 Hz": _usual(replace(_BETWEEN, rate=10.0), effects=("delay",)),
+    "switches between rows at 5 Hz": _usual(replace(_BETWEEN, rate=5.0), effects=("delay",)),
+    "irregular stamps": _usual(Logs(rate=10.0, between_rows=True, scatter=0.8, jitter=0.005), effects=("delay",)),
+    "another current each time": _usual(
+        Logs(axes=(SURGE,)), sensors=(DISTANCE,), currents=((0.1, 0.0), (-0.05, 0.0), (0.07, 0.0)), effects=("current",)
+    ),
+    "dead band in heave": _usual(Logs(axes=(HEAVE,)), more={"c_0_top": 0.05}, effects=("dead band",)),
+    "more drag up than down": _usual(Logs(axes=(HEAVE,)), more=_UP, effects=("reverse drag",)),
+    **{
+        f"noise of {seconds} s in heave": _usual(Logs(axes=(HEAVE,), correlation_time=seconds), vague=seconds > 1.0)
+        for seconds in (0.2, 1.0, 3.0)
+    },
+    "jitter": _usual(Logs(jitter=0.01)),
     "gaps while turning": _usual(Logs(gaps=2)),
     "depth of 1 cm": _usual(sensors=_with(USUAL, replace(DEPTH, noise=0.003, resolution=0.01))),
     "wrap at 180 degrees": _usual(sensors=_with(USUAL, replace(HEADING, wraps=True))),
     "pilot": _usual(_PILOT),
-    "pilot in a current": _usual(_PILOT, conditions=Conditions(current=(0.06, -0.03))),
+    "pilot in a current": _usual(_PILOT, conditions=_FLOW, effects=_FLOWS),
     "two depth sensors": _usual(_PILOT, sensors=(*USUAL, Sensor(HEAVE, "velocity", 0.01))),
     "sag with voltage": replace(
         _TWO,
@@ -188,9 +212,10 @@ COMPLETE: dict[str, Scenario] = {
         conditions=_TILT,
         more={"F_0_w": 0.3},
         rov_file="[fit]\nattitude = true\n",
+        effects=("load",),
     ),
     "heavy": _HEAVY,
-    "heavy in a current": replace(_HEAVY, conditions=Conditions(current=(0.06, -0.03))),
+    "heavy in a current": replace(_HEAVY, conditions=_FLOW, effects=_FLOWS),
 }
 """The scenarios whose model is complete: intervals cover, β is unbiased, nothing is refused, nothing is unexplained."""
 

@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 from scipy.stats import binom, norm
 
-from rov_fmu.model.rov import Rov
-from tests.identify.scenarios.outcome import Outcome
+from tests.identify.scenarios.catalogue import Scenario
+from tests.identify.scenarios.outcome import EFFECTS, Estimate, Outcome
 
 LEVEL = 0.95
 """The share of intervals that should contain the truth."""
@@ -16,6 +16,8 @@ BY_CHANCE = 0.001
 """The probability that chance alone fails any of the judgements of a family."""
 _BIAS, _BIAS_IN_ERRORS = 0.02, 0.2
 """The allowed bias of β, relative and in standard errors; the larger one counts."""
+_MOST_INVENTED = 0.05
+"""The share of axes that may have an effect which is not there."""
 _MOST_ALARMS, _LEAST_ALARMS = 0.02, 0.95
 """The largest share of seeds with an alarm on a complete model, and the smallest on an incomplete one."""
 
@@ -38,14 +40,18 @@ class Coverage:
         return low if self.at_bound else min(1.0, 2.0 * min(low, high))
 
 
-def coverages(outcomes: Sequence[Outcome], truth: Rov, names: Iterable[str]) -> list[Coverage]:
-    """Return the coverage of each coefficient. A coefficient without an interval is not covered."""
-    found = []
-    for name in names:
-        intervals = [o.coefficients[name].interval if name in o.coefficients else None for o in outcomes]
-        covered = sum(i is not None and i[0] <= truth[name] <= i[1] for i in intervals)
+def coverages(outcomes: Sequence[Outcome], scenario: Scenario) -> list[Coverage]:
+    """Return the coverage of each coefficient. One without an interval is not covered, except in vague scenarios."""
+    found, truth = [], scenario.truth
+    for name in scenario.coefficients:
+        estimates = [o.coefficients.get(name) for o in outcomes]
+        covered = sum(estimate is not None and _covers(estimate, truth[name], scenario.vague) for estimate in estimates)
         found.append(Coverage(name, covered, len(outcomes), truth[name] == 0.0))
     return found
+
+
+def _covers(estimate: Estimate, truth: float, vague: bool) -> bool:
+    return estimate.interval[0] <= truth <= estimate.interval[1] if estimate.interval else vague
 
 
 def pooled(found: Iterable[Coverage]) -> list[Coverage]:
@@ -93,10 +99,10 @@ class Bias:
         return self.n > 0 and abs(self.mean) < self.limit
 
 
-def biases(outcomes: Sequence[Outcome], truth: Rov, names: Iterable[str]) -> list[Bias]:
+def biases(outcomes: Sequence[Outcome], scenario: Scenario) -> list[Bias]:
     """Return the bias of each coefficient whose truth is not 0."""
-    found = []
-    for name in (name for name in names if truth[name] != 0.0):
+    found, truth = [], scenario.truth
+    for name in (name for name in scenario.coefficients if truth[name] != 0.0):
         estimates = [o.coefficients[name] for o in outcomes if name in o.coefficients]
         errors = [estimate.value / truth[name] - 1.0 for estimate in estimates]
         halves = [0.5 * (e.interval[1] - e.interval[0]) for e in estimates if e.interval]
@@ -105,36 +111,38 @@ def biases(outcomes: Sequence[Outcome], truth: Rov, names: Iterable[str]) -> lis
     return found
 
 
+def invented(outcome: Outcome, scenario: Scenario) -> set[str]:
+    """Return the axes of which an outcome reports an effect that is not there."""
+    return {f.axis for f in outcome.findings if f.kind in EFFECTS and f.kind not in scenario.effects}
+
+
 def problems(
-    outcomes: Sequence[Outcome],
-    truth: Rov,
-    names: Iterable[str],
-    unexplained: Sequence[str] = (),
-    *,
-    by_coefficient: bool = False,
-    family: int = 0,
+    outcomes: Sequence[Outcome], scenario: Scenario, *, by_coefficient: bool = False, family: int = 0
 ) -> list[str]:
     """Return what is wrong with the outcomes of a scenario, a line each.
 
-    On a complete model intervals cover, β is unbiased and alarms are rare. On an incomplete one (`unexplained` names
-    its axes) nearly every seed raises an alarm about one of these axes. Nothing is ever refused. `family` is the number
+    On a complete model intervals cover, β is unbiased, and alarms and invented effects are rare. On an incomplete one
+    nearly every seed raises an alarm about one of its unexplained axes. Nothing is ever refused. `family` is the number
     of coverages that are judged in all scenarios.
     """
-    names = [*names]
-    wrong = [f"seed {n}: refused: {o.error}" for n, o in enumerate(outcomes) if o.error]
-    if unexplained:
-        alarmed = sum(any(f.axis in unexplained for f in o.alarms) for o in outcomes)
-        if binom.cdf(alarmed, len(outcomes), _LEAST_ALARMS) < BY_CHANCE:
-            wrong.append(f"only {alarmed} of {len(outcomes)} seeds report that {', '.join(unexplained)} is unexplained")
+    n = len(outcomes)
+    wrong = [f"seed {seed}: refused: {o.error}" for seed, o in enumerate(outcomes) if o.error]
+    if scenario.unexplained:
+        alarmed = sum(any(f.axis in scenario.unexplained for f in o.alarms) for o in outcomes)
+        if binom.cdf(alarmed, n, _LEAST_ALARMS) < BY_CHANCE:
+            wrong.append(f"only {alarmed} of {n} seeds report that {', '.join(scenario.unexplained)} is unexplained")
         return wrong
-    found = coverages(outcomes, truth, names)
+    found = coverages(outcomes, scenario)
     judged = {each.name: each for each in (found if by_coefficient else pooled(found))}
     failed = rejected({name: each.p_value for name, each in judged.items()}, family)
     wrong += [f"{name}: {judged[name].covered} of {judged[name].total} intervals cover" for name in failed]
-    betas = biases(outcomes, truth, [name for name in names if name.startswith("beta")])
+    betas = (bias for bias in biases(outcomes, scenario) if bias.name.startswith("beta"))
     wrong += [f"{b.name}: a bias of {b.mean:.1%}, at most {b.limit:.1%}" for b in betas if not b.passes]
-    alarmed = sum(bool(outcome.alarms) for outcome in outcomes)
-    if binom.sf(alarmed - 1, len(outcomes), _MOST_ALARMS) < BY_CHANCE:
-        kinds = {finding.kind for outcome in outcomes for finding in outcome.alarms}
-        wrong.append(f"{alarmed} of {len(outcomes)} seeds raise an alarm without a reason: {', '.join(sorted(kinds))}")
+    alarmed = sum(bool(o.alarms) for o in outcomes)
+    if binom.sf(alarmed - 1, n, _MOST_ALARMS) < BY_CHANCE:
+        kinds = {finding.kind for o in outcomes for finding in o.alarms}
+        wrong.append(f"{alarmed} of {n} seeds raise an alarm without a reason: {', '.join(sorted(kinds))}")
+    made_up, fits = sum(len(invented(o, scenario)) for o in outcomes), n * len(scenario.recorded)
+    if binom.sf(made_up - 1, fits, _MOST_INVENTED) < BY_CHANCE:
+        wrong.append(f"{made_up} of {fits} axes have an effect that is not there")
     return wrong

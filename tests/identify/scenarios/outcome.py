@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,10 @@ Motion = Mapping[str, Array]
 
 ALARMS = frozenset({"disagreement", "poor prediction"})
 """The kinds of findings that say that the model does not explain the data."""
+EFFECTS = frozenset(
+    {"load", "delay", "lag", "current", "current north", "current east", "dead band", "reverse thrust", "reverse drag"}
+)
+"""The kinds of findings that report an effect in the model or taken out of the data."""
 
 _PATTERNS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     "videoray": {"surge": {"l": 1.0, "r": 1.0}, "heave": {"t": 1.0}, "yaw": {"l": 1.0, "r": -1.0}},
@@ -70,11 +74,13 @@ class Flight:
     time: Array
     """n: the true times of the rows, s."""
     sensors: tuple[Sensor, ...]
+    conditions: Conditions
 
 
 def flights(scenario: Scenario, random: Random) -> Iterator[Flight]:
     """Yield the recordings of a scenario."""
-    logs, patterns = scenario.logs, _PATTERNS[scenario.vehicle]
+    logs, patterns, given = scenario.logs, _PATTERNS[scenario.vehicle], scenario.conditions
+    conditions = [replace(given, current=current) for current in scenario.currents] or [given] * logs.count
     if logs.plan == "pilot":
         for n in range(logs.count):
             sticks = {axis.name: _stick(random, logs, *_STICKS[scenario.vehicle][axis.name]) for axis in logs.axes}
@@ -86,7 +92,7 @@ def flights(scenario: Scenario, random: Random) -> Iterator[Flight]:
                     thrusters[thruster] = thrusters.get(thruster, np.zeros(len(switches))) + sign * held
             thrusters = {name: np.clip(values, -1.0, 1.0) for name, values in thrusters.items()}
             commands = Commands(switches, thrusters)
-            yield Flight(f"log_{n}.csv", commands, None, _rows(random, logs, commands), scenario.sensors)
+            yield Flight(f"log_{n}.csv", commands, None, _rows(random, logs, commands), scenario.sensors, conditions[n])
         return
     for axis in logs.axes:
         sensors = tuple(sensor for sensor in scenario.sensors if sensor.axis is axis)
@@ -97,7 +103,7 @@ def flights(scenario: Scenario, random: Random) -> Iterator[Flight]:
                 switches[1:] += random.uniform(0.0, 1.0 / logs.rate, len(switches) - 1)
             commands = Commands(switches, {name: sign * levels for name, sign in patterns[axis.name].items()})
             rows = _rows(random, logs, commands)
-            yield Flight(f"log_{axis.name}_{n}.csv", commands, levels, rows, sensors)
+            yield Flight(f"log_{axis.name}_{n}.csv", commands, levels, rows, sensors, conditions[n])
 
 
 def _stick(random: Random, logs: Logs, most: float, hold: float) -> tuple[Array, Array]:
@@ -180,7 +186,7 @@ def _table(scenario: Scenario, truth: Rov, flight: Flight, random: Random) -> di
         table |= {f"u_{t.name} [%]": 100.0 * followed[t.name] for t in truth.layout.thrusters}
     lates = {sensor.late for sensor in flight.sensors} | {0.0}
     at = np.unique(np.concatenate([rows - late for late in lates]))
-    motion = moved(truth, flight.commands, at, scenario.conditions)
+    motion = moved(truth, flight.commands, at, flight.conditions)
     for sensor in flight.sensors:
         values = true_values(sensor, motion)[np.searchsorted(at, rows - sensor.late)]
         table[_header(sensor, flight)] = _measured(sensor, values, rows, logs, random)
@@ -236,6 +242,8 @@ class Outcome:
 
     coefficients: Mapping[str, Estimate]
     """The coefficients that are judged; empty where the identification was refused."""
+    rov: Rov | None
+    """The identified vehicle; None where the identification was refused."""
     findings: tuple[Finding, ...]
     sentences: tuple[str, ...]
     error: str
@@ -256,13 +264,13 @@ def outcome(scenario: Scenario, seed: int, folder: Path) -> Outcome:
     try:
         found = identify(load_tank_tests(folder))
     except FileError as error:
-        return Outcome({}, (), (), str(error), time.process_time() - begin)
+        return Outcome({}, None, (), (), str(error), time.process_time() - begin)
     except Exception as error:  # a crash is judged like a refusal, so that the other seeds are still run
-        return Outcome({}, (), (), f"{type(error).__name__}: {error}", time.process_time() - begin)
+        return Outcome({}, None, (), (), f"{type(error).__name__}: {error}", time.process_time() - begin)
     seconds, vehicle = time.process_time() - begin, found.vehicle
     coefficients = {
         name: Estimate(vehicle.rov[name], vehicle.intervals.get(name))
         for name in scenario.coefficients
         if name in vehicle.rov.coefficients
     }
-    return Outcome(coefficients, found.findings, found.warnings, "", seconds)
+    return Outcome(coefficients, vehicle.rov, found.findings, found.warnings, "", seconds)
