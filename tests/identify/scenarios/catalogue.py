@@ -200,6 +200,9 @@ COMPLETE: dict[str, Scenario] = {
     "pilot": _usual(_PILOT),
     "pilot in a current": _usual(_PILOT, conditions=_FLOW, effects=_FLOWS),
     "two depth sensors": _usual(_PILOT, sensors=(*USUAL, Sensor(HEAVE, "velocity", 0.01))),
+    "slow depth by a late clock": _usual(
+        _PILOT, sensors=_with(USUAL, replace(DEPTH, every=4, late=0.15)), effects=("delay",)
+    ),
     "sag with voltage": replace(
         _TWO,
         logs=replace(_TWO.logs, columns=("voltage",)),
