@@ -193,7 +193,7 @@ COMPLETE: dict[str, Scenario] = {
         f"noise of {seconds} s in heave": _usual(Logs(axes=(HEAVE,), correlation_time=seconds), vague=seconds > 1.0)
         for seconds in (0.2, 1.0, 3.0)
     },
-    "jitter": _usual(Logs(jitter=0.01)),
+    "jitter": _usual(Logs(jitter=0.01), effects=("delay",)),
     "gaps while turning": _usual(Logs(gaps=2)),
     "depth of 1 cm": _usual(sensors=_with(USUAL, replace(DEPTH, noise=0.003, resolution=0.01))),
     "wrap at 180 degrees": _usual(sensors=_with(USUAL, replace(HEADING, wraps=True))),
