@@ -16,6 +16,12 @@ from verification.references.pool import Array, Commands, Conditions
 
 BY_DEFAULT = ("load of 0.1 N in heave", "pilot")
 """The quick scenarios of the default tests."""
+WEEKLY = (
+    *("load of 0.02 N in heave", "load of 0.3 N in heave", "another current each time", "dead band in heave"),
+    *("more drag up than down", "noise of 0.2 s in heave", "noise of 1.0 s in heave", "noise of 3.0 s in heave"),
+    *("jitter", "pilot in a current", "two depth sensors", "slow depth by a late clock", "heavy in a current"),
+)
+"""The scenarios that resemble another one, and are only run once a week."""
 FAMILY = sum(len(scenario.coefficients) for scenario in COMPLETE.values())
 """The number of coverages that are judged at most."""
 
@@ -39,11 +45,14 @@ NOT_YET: dict[str, str] = {
 """The scenarios that identification does not handle yet with many seeds, with the reason."""
 
 
+assert SCENARIOS.keys() >= {*BY_DEFAULT, *WEEKLY, *NOT_YET}
+
+
 def judged() -> Iterator[object]:
     """Yield each scenario with each number of seeds, and how it is marked."""
     for name in SCENARIOS:
         for seeds, marks in ((2, []), (20, [pytest.mark.long]), (200, [pytest.mark.weekly])):
-            if seeds > 2 or name in BY_DEFAULT:
+            if seeds == 200 or (seeds == 20 and name not in WEEKLY) or name in BY_DEFAULT:
                 fails = []
                 if seeds > 2 and name in NOT_YET:
                     fails = [pytest.mark.xfail(strict=True, reason=NOT_YET[name])]
