@@ -1,15 +1,21 @@
-"""The independent integrator of the pool, compared with the exact step."""
+"""The independent integrators of the pool, compared with the exact step and with what follows without integration."""
 
 import random
+from collections.abc import Callable
+from math import radians
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.pool import run, with_more
 from tests.vehicles import VEHICLES, VIDEORAY, at_rest, still
-from verification.references.pool import Array, swim
+from verification.references import pool, rigid_pool
+from verification.references.pool import Array, Commands, Conditions, Tilt, swim
 
 STEP, PLAN = 0.25, ((0.0, 1.0), (0.6, 2.0), (-0.4, 2.0))
 
@@ -40,3 +46,106 @@ def test_a_delay_moves_the_motion_in_time() -> None:
     k = with_more(VIDEORAY, T_top=0.3, F_0_w=0.0)
     assert late(k, 0.2)[4:] == pytest.approx(late(k, 0.0)[:-4], abs=1e-9)
     assert np.abs(late(k, 0.2) - late(k, 0.0)).max() > 0.01
+
+
+# ---- Commands that switch at any time, and conditions ----------------------------------------------------------------
+
+HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
+SWITCHES = np.array([0.0, 0.613, 0.977, 1.0142, 1.3])
+TIME: Array = np.array([0.0, 0.3, 0.7, 0.9, 1.0, 1.35, 1.4])
+Simulate = Callable[..., dict[str, Array]]
+
+
+def flown(k: Rov, *, most: float = 0.5) -> Commands:
+    """Return commands of every thruster."""
+    rng = np.random.default_rng(0)
+    return Commands(SWITCHES, {t.name: rng.uniform(-most, most, len(SWITCHES)) for t in k.layout.thrusters})
+
+
+@pytest.mark.parametrize(("simulate", "k"), [(pool.motion, VIDEORAY), (rigid_pool.motion, HEAVY)])
+def test_commands_may_switch_between_samples(simulate: Simulate, k: Rov) -> None:
+    """The exact step goes from each time to the next, be it that of a switch or of a sample."""
+    commands = flown(k)
+    motion = simulate(k, commands, TIME, Conditions(current=(0.1, -0.2)))
+    state, now = at_rest(k), 0.0
+    for at in np.union1d(TIME, SWITCHES)[1:].tolist():
+        held = {f"u_{name}": float(values[0]) for name, values in commands.at(np.array([now])).items()}
+        state, now = k.step(still(k) | {"V_N": 0.1, "V_E": -0.2} | held, state, at - now), at
+        if at in TIME:
+            n = int(np.searchsorted(TIME, at))
+            for symbol in {*k.layout.velocities, "x", "y", "z"}:
+                assert motion[symbol][n] == pytest.approx(state[symbol], rel=1e-7, abs=1e-8), (symbol, at)
+
+
+@pytest.mark.parametrize(("simulate", "k"), [(pool.motion, VIDEORAY), (rigid_pool.motion, HEAVY)])
+def test_conditions_of_thrust(simulate: Simulate, k: Rov) -> None:
+    """Thrust at 70 % is that of a weaker curve; saturated commands are smaller ones; a delay moves the switches."""
+
+    def same(conditions: Conditions, other: Rov, commands: Commands) -> None:
+        motion, expected = simulate(k, flown(k), TIME, conditions), simulate(other, commands, TIME)
+        for name in (*k.layout.velocities, "x", "y", "z", "psi"):
+            assert motion[name] == pytest.approx(expected[name], rel=1e-6, abs=1e-8), name
+
+    weaker = k.replaced({name: 0.7 * value for name, value in k.coefficients.items() if name[:4] in ("a_t_", "b_t_")})
+    same(Conditions(thrust=lambda _: 0.7), weaker, flown(k))
+    commands = flown(k)
+    clipped = {name: np.clip(values, -0.3, 0.3) for name, values in commands.thrusters.items()}
+    same(Conditions(saturation=0.3), k, Commands(SWITCHES, clipped))
+    same(Conditions(delay=0.25), k, Commands(SWITCHES + 0.25, commands.thrusters))
+
+
+def test_thrust_may_change_with_the_time() -> None:
+    """Thrust that ends at 1.2 s is no thrust from then on."""
+    halfway = Commands(np.append(SWITCHES[:-1], 1.2), flown(VIDEORAY).thrusters)
+    ended = Commands(halfway.switches, {n: np.append(v[:-1], 0.0) for n, v in halfway.thrusters.items()})
+    motion = pool.motion(VIDEORAY, halfway, TIME, Conditions(thrust=lambda t: float(t < 1.2)))
+    expected = pool.motion(VIDEORAY, ended, TIME)
+    for name in VIDEORAY.layout.velocities:
+        assert motion[name] == pytest.approx(expected[name], abs=1e-5), name
+
+
+def test_a_tether_holds_the_vehicle_where_it_pulls_as_the_thrusters_push() -> None:
+    commands = Commands(np.zeros(1), {"l": np.array([0.3]), "r": np.array([0.3])})
+    motion = pool.motion(VIDEORAY, commands, np.array([0.0, 300.0]), Conditions(tether=(0.5, 0.5, 0.5)))
+    thrust = VIDEORAY["alpha_u"] * (VIDEORAY["a_t_rear"] * 0.3 + VIDEORAY["b_t_rear"]) * 0.3
+    assert motion["x"][-1] == pytest.approx(thrust / 0.5, rel=1e-6)
+    assert motion["u"][-1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_tether_holds_the_heavy_in_a_current() -> None:
+    """It pulls north, against the drift, although the vehicle turns."""
+    turning = Commands(np.zeros(1), {"1": np.array([0.2]), "4": np.array([0.2])})
+    motion = rigid_pool.motion(
+        HEAVY, turning, np.array([0.0, 4.0]), Conditions(current=(-0.2, 0.0), tether=(80.0, 80.0, 80.0))
+    )
+    assert abs(motion["psi"][-1]) > 0.5
+    assert -0.25 < motion["x"][-1] < 0.0
+    assert abs(motion["y"][-1]) < 0.2 * abs(motion["x"][-1])
+
+
+def test_a_tilted_vehicle_turns_about_its_own_axis_and_moves_along_its_own_axes() -> None:
+    """Pose and velocities fit together by differences of the attitude and of the place."""
+    tilt, h = Tilt(radians(10.0)), 1e-4
+    k = with_more(VIDEORAY, F_0_w=0.5)
+    at = np.array([1.0, 2.7])
+    time = np.sort(np.concatenate([at - h, at, at + h]))
+    commands = Commands(np.zeros(1), {"l": np.array([0.6]), "r": np.array([0.4]), "t": np.array([0.3])})
+    motion = pool.motion(k, commands, time, Conditions(tilt=tilt))
+    angles = np.array([[psi, *tilt.at(t)[1::-1]] for t, psi in zip(time.tolist(), motion["psi"], strict=True)])
+    attitude = Rotation.from_euler("ZYX", angles)
+    for n in (1, 4):
+        turned = (attitude[n - 1].inv() * attitude[n + 1]).as_rotvec() / (2.0 * h)
+        assert turned[2] == pytest.approx(motion["r"][n], rel=1e-5)
+        moved = [(motion[name][n + 1] - motion[name][n - 1]) / (2.0 * h) for name in "xyz"]
+        velocity = attitude[n].apply([motion["u"][n], 0.0, motion["w"][n]])
+        assert moved == pytest.approx(velocity.tolist(), rel=1e-5, abs=1e-7)
+
+
+def test_the_net_weight_of_a_tilted_vehicle_stays_vertical() -> None:
+    """While it leans to starboard side, only a part of the weight acts along its heave axis."""
+    tilt = Tilt(radians(30.0), roll_period=4e3, pitch_period=1e9)
+    k, still_water = with_more(VIDEORAY, F_0_w=0.5), Commands(np.zeros(1), {})
+    motion = pool.motion(k, still_water, np.array([0.0, 1e3]), Conditions(tilt=tilt))
+    weight = 0.5 * np.cos(radians(30.0))
+    w = motion["w"][-1]
+    assert VIDEORAY["a_d_w"] * w * w + VIDEORAY["b_d_w"] * w == pytest.approx(weight, rel=1e-3)

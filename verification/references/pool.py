@@ -1,55 +1,147 @@
 """A simulated pool for tests of identification: the equations of motion, integrated by SciPy's DOP853.
 
 It uses the names of a vehicle's coefficients but none of the package's mathematics, so its recordings are an
-independent truth. Commands may reach the thrusters with a delay, and the water may have a current.
+independent truth. The commands switch at any times, and the integration begins anew at each of them. `Conditions` adds
+what a real dive has and a model may lack. Vehicles that roll and pitch are those of rigid_pool.py.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import copysign, cos, sin
+from math import copysign, cos, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rov_fmu.model.layout import AXES, Thruster
+from rov_fmu.model.layout import AXES, Layout, Thruster
 from rov_fmu.model.rov import Rov
 
 Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+Rates = Callable[[float, Array], list[float]]
 
 _PRECISION = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
 _ALONG = {"u": 0, "v": 1, "w": 2}  # the components of a direction: forward, starboard, down
 
 
+# ---- Runs ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """Commands that are held from their switch until the next. Before the first switch there are none."""
+
+    switches: Array
+    """J: the time of each switch, s, ascending."""
+    thrusters: Mapping[str, Array]
+    """J each, by thruster: the command, a fraction of full thrust. A thruster that is not named has no commands."""
+
+    def at(self, time: Array) -> dict[str, Array]:
+        """Return the command of each thruster at some times."""
+        held = np.searchsorted(self.switches, time, side="right") - 1
+        return {name: np.where(held < 0, 0.0, values[np.maximum(held, 0)]) for name, values in self.thrusters.items()}
+
+
+@dataclass(frozen=True)
+class Tilt:
+    """A vehicle that has neither roll nor pitch oscillates about both: phi and theta are sines of the time."""
+
+    amplitude: float
+    """The largest angle, rad."""
+    roll_period: float = 7.0
+    pitch_period: float = 11.0
+    """s."""
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Return phi, theta and the rate of theta."""
+        roll, pitch = 2.0 * pi / self.roll_period, 2.0 * pi / self.pitch_period
+        A = self.amplitude
+        return A * sin(roll * time), A * sin(pitch * time), A * pitch * cos(pitch * time)
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What acts on a vehicle in addition to its equation of motion."""
+
+    delay: float = 0.0
+    """The time from a command to its effect, s."""
+    current: tuple[float, float] = (0.0, 0.0)
+    """The velocity of the water north and east, m/s."""
+    saturation: float = 1.0
+    """The largest command that the thrusters follow."""
+    thrust: Callable[[float], float] | None = None
+    """The factor of all thrust as a function of the time (s), such as that of a battery that empties."""
+    tether: Vector = (0.0, 0.0, 0.0)
+    """The stiffness of a tether that pulls back to the start, by the displacement north, east and down, N/m."""
+    tilt: Tilt | None = None
+    """The roll and pitch of a vehicle that has neither axis. Thrust and velocity tilt with the vehicle, its net weight
+    F_0_w stays vertical. The products of its velocities with the rates of roll and pitch are left out."""
+
+
+NOTHING = Conditions()
+
+
 def swim(
     k: Rov, time: Array, thrusters: Mapping[str, Array], delay: float = 0.0, current: tuple[float, float] = (0.0, 0.0)
 ) -> dict[str, Array]:
-    """Return the velocities of the vehicle's axes and x, y, z, psi at the times (s), from rest, in SI units.
+    """Return the motion of a vehicle whose commands switch at samples: `thrusters` has a command for each time."""
+    changed = [np.diff(values) != 0.0 for values in thrusters.values()]
+    changes = np.concatenate([[0], np.flatnonzero(np.any(changed, axis=0)) + 1])
+    commands = Commands(time[changes], {name: values[changes] for name, values in thrusters.items()})
+    return motion(k, commands, time, Conditions(delay, current))
 
-    `thrusters` maps each thruster to its commands, one for each time; without commands a thruster gives no thrust. Each
-    command takes effect `delay` (s) after its time. `current` is the velocity of the water north and east (m/s). The
-    vehicle starts with a heading of north.
+
+def motion(k: Rov, commands: Commands, time: Array, conditions: Conditions = NOTHING) -> dict[str, Array]:
+    """Return the velocities of the vehicle's axes and x, y, z, psi at ascending times (s), in SI units.
+
+    The vehicle starts from rest at the first time or the first switch, whichever is earlier, with a heading of north.
+    Velocities are those through the water.
     """
-    still = np.zeros(len(time))
-    commands = np.column_stack([thrusters.get(thruster.name, still) for thruster in k.layout.thrusters])
-    changes = np.concatenate([[0], np.flatnonzero(np.any(np.diff(commands, axis=0) != 0.0, axis=1)) + 1])
-    delayed = (time[changes] + delay).tolist()
-    bounds = [float(time[0]), *(t for t in delayed if t < time[-1]), float(time[-1])]
-    held = [np.zeros(commands.shape[1]), *commands[changes]]
-    vehicle = _Vehicle.of(k)
-    state = np.zeros(vehicle.size)
-    found = np.empty((vehicle.size, len(time)))
-    found[:, 0] = state
-    for (start, end), command in zip(pairwise(bounds), held, strict=False):
-        if end > start:
-            inside = (time > start) & (time <= end)
-            at = time[inside]
-            asked = at if at.size and at[-1] == end else np.append(at, end)
-            solution = solve_ivp(vehicle.rates(command, current), (start, end), state, t_eval=asked, **_PRECISION)
-            assert solution.success, solution.message
-            found[:, inside], state = solution.y[:, : at.size], solution.y[:, -1]
+    vehicle = _Vehicle.of(k, conditions)
+    found = piecewise(vehicle.rates, k.layout, commands, time, conditions, np.zeros(vehicle.size))
     return dict(zip((*vehicle.axes, "x", "y", "z", "psi"), found, strict=False))
+
+
+def piecewise(
+    rates: Callable[[Array], Rates],
+    layout: Layout,
+    commands: Commands,
+    time: Array,
+    conditions: Conditions,
+    state: Array,
+    precision: Mapping[str, object] = _PRECISION,
+) -> Array:
+    """Return the states at the times, by an integration that begins anew when a command takes effect.
+
+    `rates` returns the derivatives of the state under held commands, one for each thruster of the layout.
+    """
+    found = np.empty((len(state), len(time)))
+    found[:, time <= (begin := min(time[0], commands.switches[0]))] = state[:, None]
+    for start, end, command in _holds(layout, commands, conditions, begin, float(time[-1])):
+        inside = (time > start) & (time <= end)
+        at = time[inside]
+        asked = at if at.size and at[-1] == end else np.append(at, end)
+        solution = solve_ivp(rates(command), (start, end), state, t_eval=asked, **precision)
+        assert solution.success, solution.message
+        found[:, inside], state = solution.y[:, : at.size], solution.y[:, -1]
+    return found
+
+
+def _holds(
+    layout: Layout, commands: Commands, conditions: Conditions, begin: float, end: float
+) -> Iterator[tuple[float, float, Array]]:
+    """Yield the start and the end of each hold, with the command that each thruster of the layout follows."""
+    still, most = np.zeros(len(commands.switches)), conditions.saturation
+    held = np.column_stack([commands.thrusters.get(thruster.name, still) for thruster in layout.thrusters])
+    held = np.vstack([np.zeros(held.shape[1]), np.clip(held, -most, most)])
+    bounds = [begin, *np.clip(commands.switches + conditions.delay, begin, end).tolist(), end]
+    for (start, stop), command in zip(pairwise(bounds), held, strict=True):
+        if stop > start:
+            yield start, stop, command
+
+
+# ---- The vehicle -----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -57,6 +149,7 @@ class _Vehicle:
     """The numbers of a vehicle, axis by axis and thruster by thruster."""
 
     k: Rov
+    conditions: Conditions
     axes: tuple[str, ...]
     """The symbols of the axes' velocities."""
     inertia: Sequence[float]
@@ -76,7 +169,7 @@ class _Vehicle:
         return len(self.axes) + 4 + len(self.lags)
 
     @classmethod
-    def of(cls, k: Rov) -> "_Vehicle":
+    def of(cls, k: Rov, conditions: Conditions) -> "_Vehicle":
         """Return the numbers of a vehicle."""
         get, names = k.coefficients.get, [axis.velocity for axis in AXES.values() if k.layout.has(axis)]
         bodies = [k["I_r" if v == "r" else "m_rov"] + get(f"m_a_{v}", 0.0) for v in names]
@@ -86,6 +179,7 @@ class _Vehicle:
         ]
         return cls(
             k,
+            conditions,
             tuple(names),
             [body / k[f"beta_{v}"] for v, body in zip(names, bodies, strict=True)],
             [(*ahead, *astern) for ahead, astern in zip(drag, reverse, strict=True)],
@@ -94,39 +188,65 @@ class _Vehicle:
             [get(f"T_{t.curve}", 0.0) for t in k.layout.thrusters],
         )
 
-    def rates(self, command: Array, current: tuple[float, float]) -> Callable[[float, Array], list[float]]:
+    def rates(self, command: Array) -> Rates:
         """Return the function that gives the derivatives of the state under held commands."""
-        k, n = self.k, len(self.axes)
+        k, n, given = self.k, len(self.axes), self.conditions
         steady = [_force(k, t, c) for t, c in zip(k.layout.thrusters, command.tolist(), strict=True)]
         lagging = [number for number, lag in enumerate(self.lags) if lag]
         immediate = self.arms @ np.array([0.0 if lag else F for F, lag in zip(steady, self.lags, strict=True)])
-        constant = (immediate + np.array(self.load)).tolist()
+        pushes = immediate.tolist()
         lagging_arms = [[(n + 4 + number, arms[number]) for number in lagging] for arms in self.arms.tolist()]
         u_at, v_at, w_at, r_at = (self.axes.index(name) if name in self.axes else -1 for name in "uvwr")
         M_u, M_v, M_r = (self.inertia[at] if k.layout.coupled else 0.0 for at in (u_at, v_at, r_at))
 
-        def derivatives(_time: float, state: Array) -> list[float]:
+        def derivatives(time: float, state: Array) -> list[float]:
             y = state.tolist()
             found = [0.0] * len(y)
+            thrust = given.thrust(time) if given.thrust else 1.0
+            phi, theta, theta_rate = given.tilt.at(time) if given.tilt else (0.0, 0.0, 0.0)
+            R = _rotation(phi, theta, y[n + 3])
+            load = self._loads(R, y[n : n + 3])
             for axis, (a, b, a_reverse, b_reverse) in enumerate(self.drag):
                 speed = y[axis]
                 resistance = (a * speed + b) * speed if speed >= 0.0 else (-a_reverse * speed + b_reverse) * speed
-                force = constant[axis] + sum(arm * y[at] for at, arm in lagging_arms[axis])
+                force = thrust * pushes[axis] + load[axis] + sum(arm * y[at] for at, arm in lagging_arms[axis])
                 found[axis] = (force - resistance) / self.inertia[axis]
             u, v, w, r = (y[at] if at >= 0 else 0.0 for at in (u_at, v_at, w_at, r_at))
             if k.layout.coupled:
                 found[u_at] += M_v * v * r / M_u
                 found[v_at] -= M_u * u * r / M_v
                 found[r_at] -= (M_v - M_u) * u * v / M_r
-            heading = y[n + 3]
-            found[n] = u * cos(heading) - v * sin(heading) + current[0]
-            found[n + 1] = u * sin(heading) + v * cos(heading) + current[1]
-            found[n + 2], found[n + 3] = w, r
+            north, east, down = (row[0] * u + row[1] * v + row[2] * w for row in R)
+            found[n], found[n + 1], found[n + 2] = north + given.current[0], east + given.current[1], down
+            found[n + 3] = (r + theta_rate * sin(phi)) / (cos(phi) * cos(theta))
             for number in lagging:
-                found[n + 4 + number] = (steady[number] - y[n + 4 + number]) / self.lags[number]
+                found[n + 4 + number] = (thrust * steady[number] - y[n + 4 + number]) / self.lags[number]
             return found
 
         return derivatives
+
+    def _loads(self, R: Sequence[Vector], place: Sequence[float]) -> list[float]:
+        """Return the load along each axis, with the net weight along the vertical and the pull of the tether."""
+        found = list(self.load)
+        earth = [-stiffness * x for stiffness, x in zip(self.conditions.tether, place, strict=True)]
+        if self.conditions.tilt and "w" in self.axes:
+            earth[2] += self.load[self.axes.index("w")]
+            found[self.axes.index("w")] = 0.0
+        if any(earth):
+            for name, column in _ALONG.items():
+                if name in self.axes:
+                    found[self.axes.index(name)] += sum(R[row][column] * earth[row] for row in range(3))
+        return found
+
+
+def _rotation(phi: float, theta: float, psi: float) -> tuple[Vector, Vector, Vector]:
+    """Return the matrix from the body to the earth frame."""
+    (cf, sf), (ct, st), (cp, sp) = ((cos(angle), sin(angle)) for angle in (phi, theta, psi))
+    return (
+        (cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf),
+        (sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf),
+        (-st, ct * sf, ct * cf),
+    )
 
 
 def _arm(k: Rov, thruster: Thruster, velocity: str) -> float:
