@@ -105,6 +105,7 @@ SENTENCES: dict[str, SentenceForm] = {
     ),
     "constant motion": "{files}: no recording of {axes}: the {quantity} never changes",
     "constant push": "{files}: no recording of {axes}: what the thrusters do along it never changes",
+    "gaps": "{files}: {count:#gap} in {axes}, by which the recording is divided: {gaps}",
     # MAVLink logs
     "damaged log": "{files}: damaged in places: what could be read is used",
     "damaged pieces": "{files}: {count:#damaged piece} left out",

@@ -6,7 +6,7 @@ Rows and cells that cannot be used are left out and counted.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -16,11 +16,12 @@ import numpy as np
 from rov_fmu.io.csv_table import NO_OUTPUT, PULSES, Column, Columns, DataFileError, read_columns
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import did_you_mean, shown, similar
-from rov_fmu.model.layout import HEAVE, YAW, Axis, Layout
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import (
     LOGGED_COMMAND,
     TIME,
+    VOLTAGE,
     position_column,
     refuse_slips,
     velocity_column,
@@ -28,15 +29,15 @@ from rov_fmu.tank.columns import (
 from rov_fmu.tank.findings import SENTENCES, Finding, refusals
 from rov_fmu.tank.mavlink import read_mavlink
 from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, recordings_of, unwrapped
+from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, context_at, gaps_of, recordings_of
 
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order; with more, the file holds two logs."""
 _COMMAND = "command"
 _READERS = dict.fromkeys(LOG_SUFFIXES, read_mavlink)
 """The function that reads a log, by the suffix of the file. Other logs are CSV."""
-_POSITION_NAMES = {HEAVE: "z", YAW: "psi"}
-"""The names of the positions in the FMU."""
+_POSITION_NAMES = {HEAVE: ("z",), ROLL: ("phi", "roll"), PITCH: ("theta", "pitch"), YAW: ("psi",)}
+"""Other names of positions that need no axis: those in the FMU, and that of the axis."""
 
 
 @dataclass(frozen=True)
@@ -53,24 +54,28 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None) -> Log:
     if read := _READERS.get(path.suffix.lower()):
         commands, signals, findings = read(path, layout)
         return _log(path, layout, commands, signals, findings, axis)
-    sensors = _sensors([axis] if axis else [form.axis for form in layout.axes], of_one=axis is not None)
+    axes = [axis] if axis else [form.axis for form in layout.axes]
+    sensors = _sensors(axes, of_one=axis is not None)
+    conditions = {name: sensor for name, sensor in _CONDITIONS.items() if name not in sensors}
     kinds = {"inputs": _inputs(layout), "thrusters": _thrusters(layout), "axis": {_COMMAND: _LOGGED} if axis else {}}
     columns = {"time": TIME, **kinds["axis"], **kinds["inputs"], **kinds["thrusters"]}
-    columns |= {name: sensor.column for name, sensor in sensors.items()}
+    columns |= {name: sensor.column for name, sensor in (sensors | conditions).items()}
     check_header = partial(_wrong_columns, path=path, layout=layout, kinds=kinds, sensors=sensors)
     table = read_columns(path, columns, others=True, loose=True, check_header=check_header)
     ((kind, commanding),) = _commanding(table.values, kinds).items()
     refuse_slips(table, commanding)
     time, values, findings = _cleaned(table, commanding)
     del table  # a long log is large
-    signals = _signals(sensors, time, values)
+    signals = [*_signals(sensors, time, values), *_signals(conditions, time, values)]
     if kind == "axis":
-        return Log((_recording_of_axis(path, signals[0], values[_COMMAND]),), tuple(findings))
+        assert axis
+        recording = _recording_of_axis(path, axis, signals, values[_COMMAND])
+        return Log((recording,), (*findings, *gaps_of(recording)))
     missing = (name for name in kinds[kind] if name not in values)
     findings += [Finding("missing column", file=path.name, names={"column": name}) for name in missing]
     thrusters = _mixed_inputs(layout, values) if kind == "inputs" else _thruster_commands(layout, values)
     del values
-    return _log(path, layout, Commands(time, thrusters), signals, findings)
+    return _log(path, layout, Commands(time, thrusters), signals, findings, axis)
 
 
 def _log(
@@ -89,12 +94,13 @@ def _log(
     return Log(recordings, (*findings, *useless))
 
 
-def _recording_of_axis(path: Path, signal: Signal, command: Array) -> Recording:
-    """Return the recording of an axis whose thrusters follow one command. Raises DataFileError."""
+def _recording_of_axis(path: Path, axis: Axis, signals: Sequence[Signal], command: Array) -> Recording:
+    """Return the recording of an axis, the first signal, whose thrusters follow one command. Raises DataFileError."""
+    signal = signals[0]
     if (count := int(np.isfinite(signal.values).sum())) < LEAST_SAMPLES:
         raise DataFileError(f"{path}: {count} samples of {signal.quantity}, at least {LEAST_SAMPLES} are needed")
-    values = unwrapped(signal.values) if signal.quantity == "heading" else signal.values
-    return Recording(path.name, signal.axis, signal.quantity, signal.time - signal.time[0], command, values)
+    time, context = signal.time - signal.time[0], context_at(signal.time, signals)
+    return Recording(path.name, axis, signal.quantity, time, command, signal.unwrapped(), context=context)
 
 
 # ---- Columns ---------------------------------------------------------------------------------------------------------
@@ -104,11 +110,18 @@ _LOGGED = replace(LOGGED_COMMAND, optional=True)
 
 @dataclass(frozen=True)
 class _Sensor:
-    """A column of measured motion."""
+    """A column of measured motion, or of a condition."""
 
-    axis: Axis
+    axis: Axis | None
     quantity: str
     column: Column
+
+
+_CONDITIONS = {
+    axis.position: _Sensor(axis, axis.position, replace(position_column(axis), also=_POSITION_NAMES[axis]))
+    for axis in (HEAVE, ROLL, PITCH)
+} | {"voltage": _Sensor(None, "voltage", VOLTAGE)}
+"""The columns that any log may have, whether or not the vehicle has their axis."""
 
 
 def _sensors(axes: Iterable[Axis], *, of_one: bool) -> dict[str, _Sensor]:
@@ -121,9 +134,10 @@ def _sensors(axes: Iterable[Axis], *, of_one: bool) -> dict[str, _Sensor]:
         for quantity in (axis.position, "velocity"):
             velocity = quantity == "velocity"
             column = velocity_column(axis, optional=True, least=0.0) if velocity else position_column(axis)
-            long_name, state = f"{axis.name} {quantity}", axis.velocity if velocity else _POSITION_NAMES.get(axis)
+            long_name = f"{axis.name} {quantity}"
+            others = (axis.velocity,) if velocity else _POSITION_NAMES.get(axis, ())
             name = quantity if of_one or (axis in _POSITION_NAMES and not velocity) else long_name
-            column = replace(column, also=tuple(filter(None, (long_name, state))))
+            column = replace(column, also=(long_name, *others))
             found[name] = _Sensor(axis, quantity, column)
     return found
 
@@ -262,11 +276,10 @@ def _thruster_commands(layout: Layout, columns: Mapping[str, Array]) -> dict[str
 
 def _signals(sensors: Mapping[str, _Sensor], time: Array, columns: Mapping[str, Array]) -> list[Signal]:
     """Return the signal of each axis: the position, unless only the velocity has enough samples."""
-    found: dict[str, Signal] = {}
+    found: dict[Axis | None, Signal] = {}
     for name, sensor in sensors.items():
         if name in columns:
-            signal = Signal(sensor.axis, sensor.quantity, time, columns[name])
-            before = found.get(sensor.axis.name)
+            before = found.get(sensor.axis)
             if not before or np.isfinite(before.values).sum() < LEAST_SAMPLES:
-                found[sensor.axis.name] = signal
+                found[sensor.axis] = Signal(sensor.axis, sensor.quantity, time, columns[name])
     return list(found.values())

@@ -7,6 +7,8 @@ The sources of each signal; the first with enough samples that change is used:
     depth     CTUN.Alt, BARO, XKF1, NKF1  GLOBAL_POSITION_INT.relative_alt, VFR_HUD.alt, SCALED_PRESSURE2
     heading   ATT.Yaw, XKF1, NKF1         ATTITUDE.yaw
     velocity  XKF1, NKF1                  LOCAL_POSITION_NED, both where the filter knows it (XKF4, EKF_STATUS_REPORT)
+    roll      ATT.Roll, XKF1, NKF1        ATTITUDE.roll; pitch from the same message
+    voltage   BAT.Volt                    SYS_STATUS.voltage_battery
 
 Thruster n of the vehicle is motor n of the autopilot: the servo that SERVOx_FUNCTION assigns to it, or else servo n. A
 motor with MOT_n_DIRECTION = -1 turns in the opposite direction.
@@ -26,10 +28,10 @@ import numpy as np
 from rov_fmu.io.csv_table import NO_OUTPUT, DataFileError, pulses
 from rov_fmu.io.file_kinds import DATAFLASH_SUFFIX
 from rov_fmu.io.reading import read_bytes
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Layout
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Layout
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal
+from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, unwrapped
 
 _DATAFLASH = b"\xa3\x95\x80"
 """The first bytes of a DataFlash log, which begin a message about the format of others."""
@@ -37,6 +39,8 @@ _WRAP = 2.0**32 * 1e-6
 """The time after which the clock of SERVO_OUTPUT_RAW starts again, s."""
 _PRESSURE_GRADIENT = 1000.0 * 9.80665
 """The pressure gradient in fresh water, Pa/m."""
+_NO_VOLTAGE = 65535
+"""The voltage in SYS_STATUS that stands for none, mV."""
 _VELOCITY_KNOWN, _CONSTANT_POSITION = 2, 128
 """Flags of the filter: it knows the horizontal velocity; it assumes that the vehicle does not move."""
 
@@ -44,7 +48,7 @@ _Samples = list[tuple[float, ...]]
 
 
 def _filtered(m: Any) -> tuple[float, ...]:
-    return m.PD, radians(m.Yaw), m.VN, m.VE
+    return m.PD, radians(m.Roll), radians(m.Pitch), radians(m.Yaw), m.VN, m.VE
 
 
 _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
@@ -55,15 +59,19 @@ _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
     "SCALED_PRESSURE2": lambda m: (m.press_abs * 100.0 / _PRESSURE_GRADIENT,),
     "CTUN": lambda m: (-m.Alt,),
     "BARO": lambda m: (-m.Alt,),
-    "ATTITUDE": lambda m: (m.yaw,),
-    "ATT": lambda m: (radians(m.Yaw),),
+    "ATTITUDE": lambda m: (m.roll, m.pitch, m.yaw),
+    "ATT": lambda m: (radians(m.Roll), radians(m.Pitch), radians(m.Yaw)),
     "LOCAL_POSITION_NED": lambda m: (m.vx, m.vy),
     "XKF1": _filtered,
     "NKF1": _filtered,
     "EKF_STATUS_REPORT": lambda m: (m.flags,),
+    "SYS_STATUS": lambda m: (m.voltage_battery / 1000.0 if m.voltage_battery != _NO_VOLTAGE else nan,),
+    "BAT": lambda m: (m.Volt,),
     "XKF4": lambda m: (m.SS,),
     "NKF4": lambda m: (m.SS,),
 }
+_INSTANCES = ("I", "Inst", "Instance", "C")
+"""The fields with the number of the sensor, of the battery or of the filter's core."""
 _PARAMETERS = {"PARAM_VALUE": ("param_id", "param_value"), "PARM": ("Name", "Value")}
 # Each source is a message and the index of the first number used.
 _SERVOS = (("SERVO_OUTPUT_RAW", 0), ("RCOU", 0))
@@ -76,8 +84,10 @@ _DEPTHS = (
     ("XKF1", 0),
     ("NKF1", 0),
 )
-_HEADINGS = (("ATTITUDE", 0), ("ATT", 0), ("XKF1", 1), ("NKF1", 1))
-_VELOCITIES = (("LOCAL_POSITION_NED", 0), ("XKF1", 2), ("NKF1", 2))
+_ATTITUDES = (("ATTITUDE", 0), ("ATT", 0), ("XKF1", 1), ("NKF1", 1))
+"""Roll, pitch and heading."""
+_VELOCITIES = (("LOCAL_POSITION_NED", 0), ("XKF1", 4), ("NKF1", 4))
+_VOLTAGES = (("SYS_STATUS", 0), ("BAT", 0))
 _STATUS = (("EKF_STATUS_REPORT", 0), ("XKF4", 0), ("NKF4", 0))
 
 
@@ -174,7 +184,7 @@ def _read_dataflash(path: Path, head: bytes) -> _Content:
     with closing(Reader(str(path))) as reader:
         while message := reader.recv_match(type=[*_NUMBERS, *_PARAMETERS]):
             stamp = getattr(message, "TimeUS", nan)
-            instance = getattr(message, "I", getattr(message, "C", 0))
+            instance = next((getattr(message, key) for key in _INSTANCES if hasattr(message, key)), 0)
             untimed += message.get_type() in _NUMBERS and not isfinite(stamp)
             log.add(message, int(instance), stamp * 1e-6)
     if untimed:
@@ -256,26 +266,29 @@ def _commands(path: Path, layout: Layout, log: _Content) -> Commands:
 
 
 def _signals(layout: Layout, log: _Content) -> Iterator[Signal]:
-    """Yield velocities, depth and heading for the axes of the vehicle."""
-    heading = log.series(_HEADINGS, varies=False)
-    if layout.has(SURGE, SWAY) and heading and (series := log.series(_VELOCITIES, width=2)):
+    """Yield velocities, depth, the angles of the attitude, and the voltage of the battery."""
+    attitude = log.series(_ATTITUDES, width=3, varies=False)
+    if layout.has(SURGE, SWAY) and attitude and (series := log.series(_VELOCITIES, width=2)):
         _, time, numbers = series
         north, east = numbers.T
         known = _is_known(log, time)
         if not known.all():
             log.add_finding("unknown velocity", count=int((~known).sum()))
-        psi = np.interp(time, heading[1], np.unwrap(heading[2][:, 0]))
+        psi = np.interp(time, attitude[1], unwrapped(attitude[1], attitude[2][:, 2]))
         along = {SURGE: north * np.cos(psi) + east * np.sin(psi), SWAY: east * np.cos(psi) - north * np.sin(psi)}
         for axis, values in along.items():
-            if layout.has(axis):
-                yield Signal(axis, "velocity", time[known], values[known])
-    if layout.has(HEAVE) and (series := log.series(_DEPTHS)):
+            yield Signal(axis, "velocity", time[known], values[known])
+    if series := log.series(_DEPTHS):
         kind, time, numbers = series
         if kind == "SCALED_PRESSURE2":
             log.add_finding("depth by pressure")
         yield Signal(HEAVE, HEAVE.position, time, numbers[:, 0])
-    if layout.has(YAW) and heading:
-        yield Signal(YAW, YAW.position, heading[1], heading[2][:, 0])
+    if attitude:
+        for axis, values in zip((ROLL, PITCH, YAW), attitude[2].T, strict=True):
+            yield Signal(axis, axis.position, attitude[1], values)
+    if series := log.series(_VOLTAGES, varies=False):
+        _, time, numbers = series
+        yield Signal(None, "voltage", time, numbers[:, 0])
 
 
 def _is_known(log: _Content, time: Array) -> Flags:

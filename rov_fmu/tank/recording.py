@@ -8,6 +8,10 @@ import numpy as np
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.arrays import Array
 
+CONTEXT = {"voltage": "V", "roll": "rad", "pitch": "rad", "depth": "m", "distance": "m"}
+"""The conditions that a recording may contain, with their units: the voltage of the battery, the angles of roll and
+pitch, the depth, and the distance over ground from where the log begins."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -28,6 +32,9 @@ class Recording:
     """n each, by thruster: the command of the thruster, if logged; otherwise all thrusters follow `command`."""
     beside: Mapping[str, Array] = field(default_factory=dict)
     """n each: the logged u, v, r and psi, smoothed and interpolated; u and v are over ground."""
+    context: Mapping[str, Array] = field(default_factory=dict)
+    """n each: what else the log tells about the conditions, interpolated between its samples. The names are those of
+    CONTEXT that the log has."""
 
     @property
     def is_position(self) -> bool:
