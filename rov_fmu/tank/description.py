@@ -77,6 +77,15 @@ class _Fit(Strict):
     """The curves whose thrusters' lag is fitted; true for all curves."""
 
 
+class Dive(Strict):
+    """A table [dives.x]: a dive whose commands and measurements are in several files, each with its own times."""
+
+    files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), Field(min_length=2)]
+    """The files, one of which has the commands."""
+    other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
+    """Those of the files whose times are of another clock than the commands'."""
+
+
 class _ReadableFile(OpenHardware):
     """The parts of rov.toml that could be read."""
 
@@ -87,6 +96,9 @@ class _ReadableFile(OpenHardware):
     windows: dict[str, _Window] = Field(default={})
     validity: Validity | None = None
     fit: _Fit = _Fit()
+    columns: dict[str, str] = Field(default={})
+    topics: dict[str, str] = Field(default={})
+    dives: dict[str, Dive] = Field(default={})
 
 
 class _RovFile(_ReadableFile):
@@ -124,6 +136,12 @@ class Description:
     lag: tuple[str, ...]
     """The curves whose thrusters' lag is fitted."""
     command_range: tuple[float, float] | None
+    columns: Mapping[str, str]
+    """What the headers of CSV logs stand for: other headers."""
+    topics: Mapping[str, str]
+    """What the topics and fields of bags and ULogs stand for, as headers."""
+    dives: Mapping[str, Dive]
+    """The dives of several files, by name."""
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
     base: Path | None
@@ -207,6 +225,9 @@ def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None)
         windows=file.windows,
         lag=tuple(curve.name for curve in layout.curves) if file.fit.lag is True else file.fit.lag,
         command_range=file.validity.command_range if file.validity else None,
+        columns=file.columns,
+        topics=file.topics,
+        dives=file.dives,
         limits=file.validity.limits if file.validity else limits,
         base=_vehicle_file(file.base, folder / file.base) if file.base else None,
         base_name=file.base or "",

@@ -59,22 +59,33 @@ class Signal:
 
 
 def recordings_of(
-    file: str, layout: Layout, commands: Commands, signals: Iterable[Signal], only: Axis | None = None
+    file: str,
+    layout: Layout,
+    commands: Commands,
+    signals: Iterable[Signal],
+    only: Axis | None = None,
+    others: Sequence[Signal] = (),
 ) -> tuple[tuple[Recording, ...], tuple[Finding, ...]]:
     """Return a recording of every useful signal, and a finding for each useless one; `only` selects one axis.
 
-    Signals of axes that the vehicle does not have are only the context of the others.
+    Signals of axes that the vehicle does not have, and those of other files, are only the context of the others.
     """
     recordings, findings, signals = [], [], list(signals)
-    for signal in signals:
-        if (axis := signal.axis) and layout.has(axis) and only in (None, axis):
-            recording = _recording(file, layout, commands, axis, signal, signals)
+    for axis in [only] if only else [form.axis for form in layout.axes]:
+        for signal in main_signals(signals, axis):
+            recording = _recording(file, layout, commands, axis, signal, (*signals, *others))
             if useless := why_useless(recording, layout):
                 findings.append(useless)
             else:
                 recordings.append(recording)
                 findings += gaps_of(recording)
     return tuple(recordings), tuple(findings)
+
+
+def main_signals(signals: Iterable[Signal], axis: Axis) -> list[Signal]:
+    """Return the signal of an axis, if there is one: the position, unless only the velocity has enough samples."""
+    found = sorted((s for s in signals if s.axis == axis), key=lambda signal: signal.quantity == "velocity")
+    return [s for s in found if np.isfinite(s.values).sum() >= LEAST_SAMPLES][:1] or found[-1:]
 
 
 def why_useless(recording: Recording, layout: Layout) -> Finding | None:
