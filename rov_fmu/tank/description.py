@@ -77,10 +77,16 @@ class _Fit(Strict):
     """The curves whose thrusters' lag is fitted; true for all curves."""
 
 
+def _check_several(files: tuple[str, ...]) -> tuple[str, ...]:
+    if len({*files}) < 2:
+        raise ValueError("must be two or more files: a log of one file needs no table")
+    return files
+
+
 class Dive(Strict):
     """A table [dives.x]: a dive whose commands and measurements are in several files, each with its own times."""
 
-    files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), Field(min_length=2)]
+    files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_several)]
     """The files, one of which has the commands."""
     other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
     """Those of the files whose times are of another clock than the commands'."""
@@ -140,8 +146,8 @@ class Description:
     """What the headers of CSV logs stand for: other headers."""
     topics: Mapping[str, str]
     """What the topics and fields of bags and ULogs stand for, as headers."""
-    dives: Mapping[str, Dive]
-    """The dives of several files, by name."""
+    dives: Mapping[str, Dive] | None
+    """The dives of several files, by name; None where the table has a mistake."""
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
     base: Path | None
@@ -166,7 +172,7 @@ def read_description(path: Path) -> tuple[Description | None, list[str]]:
     if base_mistakes or hardware_mistakes or lost & {"base", "axes", *_HARDWARE_TABLES}:
         lines = lines_on(path, (*problem_lines(problems, data, _RovFile), *hardware_mistakes))
         return None, lines + base_mistakes
-    description = _describe(path, file, data, base)
+    description = _describe(path, file, lost, data, base)
     possible = _possible_coefficients(description.layout)
     # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
     unknown = {("known", name) for name in description.named if name not in possible}
@@ -201,7 +207,7 @@ def _hardware_mistakes(file: _ReadableFile, lost: set[str], data: Toml) -> Itera
         yield from check_names_and_keys(file, lost, data)
 
 
-def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None) -> Description:
+def _describe(path: Path, file: _ReadableFile, lost: set[str], data: Toml, base: Vehicle | None) -> Description:
     """Put together the description from the parts of the file and the base."""
     own_layout, folder = file.layout, path.parent
     if base:
@@ -227,7 +233,7 @@ def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None)
         command_range=file.validity.command_range if file.validity else None,
         columns=file.columns,
         topics=file.topics,
-        dives=file.dives,
+        dives=None if "dives" in lost else file.dives,
         limits=file.validity.limits if file.validity else limits,
         base=_vehicle_file(file.base, folder / file.base) if file.base else None,
         base_name=file.base or "",

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
-from rov_fmu.io.messages import FileError, did_you_mean, lines_on, shown
+from rov_fmu.io.messages import FileError, did_you_mean, lines_on
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import AXES, Axis, Layout
@@ -67,7 +67,9 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
         what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
         raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
     description, description_mistakes = _read_description(folder / ROV_FILE)
-    dives = description.dives if description else {}
+    if description and description.dives is None:
+        raise VehicleFileError(*description_mistakes)
+    dives = (description.dives if description else None) or {}
     parts = {name for dive in dives.values() for name in dive.files}
     in_folders = (path for bag in folder.glob("*/metadata.yaml") for path in bag.parent.iterdir())
     paths = sorted(
@@ -155,24 +157,23 @@ class _Reader:
     def read_dive(self, name: str, dive: Dive) -> None:
         """Read the files of a dive together."""
         try:
+            key, paths = f"dives.{name}", [self.folder / part for part in dive.files]
             for other in dive.other_clock:
                 if other not in dive.files:
-                    raise DataFileError(
-                        f"{self.folder / ROV_FILE}: key dives.{name}.other_clock = {shown(other)}: must "
-                        f"be one of its files{did_you_mean(other, dive.files)}"
-                    )
-            paths = [self.folder / part for part in dive.files]
-            for path in paths:
-                if path.name != path.relative_to(self.folder).as_posix() or not path.is_file():
-                    raise DataFileError(
-                        f"{self.folder / ROV_FILE}: key dives.{name}.files = {shown(path.name)}: there is no such file "
-                        "in this folder"
-                    )
-                self.inputs[path.name] = _hash(path)
+                    reason = f"must be one of its files{did_you_mean(other, dive.files)}"
+                    raise DataFileError(*self._in_rov_file(f"{key}.other_clock", reason, other))
+            for part, path in zip(dive.files, paths, strict=True):
+                if path.name != part or not path.is_file():
+                    reason = "there is no such file in this folder"
+                    raise DataFileError(*self._in_rov_file(f"{key}.files", reason, part))
+                self.inputs[part] = _hash(path)
             if self.layout:
                 self._add(read_dive(paths, dive.other_clock, self.layout, self.names))
         except FileError as error:
             self.mistakes += str(error).splitlines()
+
+    def _in_rov_file(self, key: str, reason: str, value: str) -> list[str]:
+        return lines_on(self.folder / ROV_FILE, [key_line(key, reason, value)])
 
     def unknown_names(self, description: Description) -> Iterator[str]:
         """Yield a line for each entry of [columns] and [topics] that no file has."""
