@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.csv_table import NO_OUTPUT, DataFileError
 from rov_fmu.io.messages import brief
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.tank.arrays import Array
@@ -66,11 +66,15 @@ def read_bag(path: Path, wanted: Wanted) -> Content:
         reason = brief(str(error)) or type(error).__name__
         raise DataFileError(f"{path}: cannot be read as a bag: {reason}") from error
     signals = [signal for topic in sorted(topics, key=_rank) for signal in _signals(topic)]
-    commands, source = (None, "") if _has_commands(wanted) else _commands(path, topics, wanted)
+    commands, source = (None, []) if _has_commands(wanted) else _commands(path, topics, wanted)
     content = content_of(path.name, topics, wanted, commands, signals)
     content.findings, content.unread = findings, unread
+    for topic in topics:
+        if topic.name not in source and not [*_signals(topic)]:
+            content.unread[topic.name] = f"{topic.kind}, {len(topic.time)} messages: {brief(', '.join(topic.fields))}"
     if source:
-        content.findings.append(Finding("source of commands", file=path.name, names={"source": source}))
+        names = {"source": ", ".join(source)}
+        content.findings.append(Finding("source of commands", file=path.name, names=names))
     if any(_rank(topic) == _PRESSURE for topic in topics) and not any(_is_depth(topic) for topic in topics):
         content.findings.append(Finding("depth by pressure", file=path.name))
     return content
@@ -211,6 +215,10 @@ def _signals(topic: Topic) -> Iterator[Signal]:
         yield from velocity_signals(time, None, rates @ body)
 
 
+def _is_used(output: Array) -> bool:
+    return not np.isin(output, NO_OUTPUT).all()
+
+
 def _frames(topic: Topic) -> tuple[Array, Array]:
     """Return what turns the frame of the earth into north, east, down, and that of the body into forward, ..., down."""
     earth, body = topic.frames if len(topic.frames) > 1 else ("", *topic.frames[:1], "")[:2]
@@ -220,7 +228,7 @@ def _frames(topic: Topic) -> tuple[Array, Array]:
     return np.eye(3) if is_ned else _ENU, np.eye(3) if is_frd else _FLU
 
 
-def _commands(path: Path, topics: Sequence[Topic], wanted: Wanted) -> tuple[Commands | None, str]:
+def _commands(path: Path, topics: Sequence[Topic], wanted: Wanted) -> tuple[Commands | None, list[str]]:
     """Return the commands of the thrusters and the topics they come from. Raises DataFileError."""
     single = {
         int(found[1]): topic
@@ -232,12 +240,12 @@ def _commands(path: Path, topics: Sequence[Topic], wanted: Wanted) -> tuple[Comm
         values = wanted.named(fraction(str(path), topic.name, topic.fields["data"]) for topic in ordered)
         times = (topic.time for topic in ordered)
         series = {name: (time, output) for time, (name, output) in zip(times, values.items(), strict=False)}
-        return together(series), ", ".join(topic.name for topic in ordered)
+        return together(series), [topic.name for topic in ordered]
     for array, pattern in (("data", _ACTUATORS), ("channels", re.compile(""))):
         for topic in topics:
             if f"{array}[0]" in topic.fields and pattern.search(topic.name):
                 outputs = [values for name, values in topic.fields.items() if name.startswith(f"{array}[")]
-                count = len(wanted.thrusters) or len(outputs)
+                count = len(wanted.thrusters) or max(n for n, one in enumerate([True, *map(_is_used, outputs)]) if one)
                 used = wanted.named(fraction(str(path), topic.name, np.array(outputs[:count])))
-                return together({name: (topic.time, values) for name, values in used.items()}), topic.name
-    return None, ""
+                return together({name: (topic.time, values) for name, values in used.items()}), [topic.name]
+    return None, []

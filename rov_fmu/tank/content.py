@@ -12,7 +12,7 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal
 
-_PULSES = 800.0, 2200.0
+PULSE_RANGE = 800.0, 2200.0
 """The range of pulses that speed controllers get, µs."""
 
 
@@ -126,7 +126,7 @@ def fraction(file: str, source: str, outputs: Array) -> Array:
     values = np.nan_to_num(outputs)
     if (np.abs(values) <= 1.0).all():
         return values
-    low, high = _PULSES
+    low, high = PULSE_RANGE
     if (np.isin(values, NO_OUTPUT) | ((low <= values) & (values <= high))).all():
         return np.array([*map(pulses(), values.ravel().tolist())]).reshape(values.shape)
     raise DataFileError(

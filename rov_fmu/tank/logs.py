@@ -48,7 +48,8 @@ from rov_fmu.tank.ulog import read_ulog
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order; with more, the file holds two logs."""
 _COMMAND = "command"
-_READERS: dict[str, Callable[[Path, Wanted], Content]] = {
+_Command = tuple[Array, Array]
+READERS: dict[str, Callable[[Path, Wanted], Content]] = {
     **dict.fromkeys(LOG_SUFFIXES, read_mavlink),
     ULOG_SUFFIX: read_ulog,
     **dict.fromkeys(BAG_SUFFIXES, read_bag),
@@ -101,6 +102,18 @@ def names_of(layout: Layout, columns: Mapping[str, str], topics: Mapping[str, st
     return Names(columns, {source: entries[source] for source in topics if source in entries}), mistakes
 
 
+def is_column(title: str, layout: Layout, axis: Axis | None) -> bool:
+    """Return True if a log of the axis, or of several, may have a column with this header."""
+    axes = [axis] if axis else [form.axis for form in layout.axes]
+    sensors = _sensors(axes, of_one=axis is not None) | _CONDITIONS
+    columns = {"time": TIME, _COMMAND: _LOGGED, **_inputs(layout), **_thrusters(layout)}
+    columns |= {name: sensor.column for name, sensor in sensors.items()}
+    try:
+        return find_column(title, columns, others=True) is not None
+    except ValueError:
+        return False
+
+
 def _converted(convert: Conversion, sign: float, value: float) -> float:
     return sign * convert(value)
 
@@ -110,7 +123,7 @@ def read_content(path: Path, layout: Layout, names: Names) -> Content:
 
     Raises DataFileError.
     """
-    read = _READERS.get(path.suffix.lower())
+    read = READERS.get(path.suffix.lower())
     if not read:
         content, _ = _read_csv(path, layout, None, names, is_part=True)
         return content
@@ -130,12 +143,12 @@ def read_content(path: Path, layout: Layout, names: Names) -> Content:
 
 def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names = Names()) -> Log:
     """Read a recording of every axis that the log measures, or of `axis` alone. Raises DataFileError."""
-    if path.suffix.lower() in _READERS:
+    if path.suffix.lower() in READERS:
         content = read_content(path, layout, names)
     else:
         content, command = _read_csv(path, layout, axis, names)
         if axis and command is not None:
-            recording = _recording_of_axis(path, axis, content.signals, command)
+            recording = _recording_of_axis(path, axis, content.signals, command[1])
             return Log((recording,), (*content.findings, *gaps_of(recording)), frozenset(content.known))
     if not content.commands:
         raise DataFileError(
@@ -147,6 +160,11 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names 
         reasons = refusals(useless, path.parent, SENTENCES) or [f"{path}: nothing measured of any axis"]
         raise DataFileError(*reasons)
     return Log(recordings, (*content.findings, *useless), frozenset(content.known))
+
+
+def read_part(path: Path, layout: Layout, axis: Axis | None, names: Names) -> tuple[Content, _Command | None]:
+    """Read a CSV file that may have only commands or only motion, and the command of an axis. Raises DataFileError."""
+    return _read_csv(path, layout, axis, names, is_part=True)
 
 
 def read_dive(paths: Sequence[Path], other_clock: Iterable[str], layout: Layout, names: Names) -> Log:
@@ -191,10 +209,10 @@ def read_dive(paths: Sequence[Path], other_clock: Iterable[str], layout: Layout,
 
 def _read_csv(
     path: Path, layout: Layout, axis: Axis | None, names: Names, *, is_part: bool = False
-) -> tuple[Content, Array | None]:
-    """Read a CSV file, and the command of the axis if it has one. A part of a dive may have only commands or motion.
+) -> tuple[Content, _Command | None]:
+    """Read a CSV file, and the times and the command of the axis if it has one.
 
-    Raises DataFileError.
+    A part of a dive may have only commands or only motion. Raises DataFileError.
     """
     axes = [axis] if axis else [form.axis for form in layout.axes]
     sensors = _sensors(axes, of_one=axis is not None)
@@ -212,7 +230,7 @@ def _read_csv(
     del table  # a long log is large
     content.signals = [*_signals(sensors, time, values), *_signals(conditions, time, values)]
     if kind == "axis":
-        return content, values[_COMMAND]
+        return content, (time, values[_COMMAND])
     missing = (name for name in kinds.get(kind, ()) if name not in values)
     content.findings += [Finding("missing column", file=path.name, names={"column": name}) for name in missing]
     if kind:
