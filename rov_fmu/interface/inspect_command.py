@@ -48,7 +48,7 @@ def _changing(inspection: Inspection) -> int:
 def write_draft(path: Path, text: str) -> None:
     """Write a draft of rov.toml. Raises WriteError where there is one."""
     if path.exists():
-        raise WriteError(errno.EEXIST, "is there already, and is not replaced by a draft", str(path))
+        raise WriteError(errno.EEXIST, "the file there is not replaced by a draft", str(path))
     write_whole(Output(path, text.encode()))
 
 

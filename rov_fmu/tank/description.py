@@ -25,7 +25,18 @@ from rov_fmu.io.toml_file import (
     read_toml,
     validate,
 )
-from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Declaration, Layout, VehicleAxis, coefficient_name
+from rov_fmu.model.layout import (
+    AXES,
+    AXIS,
+    CURVE,
+    PITCH,
+    REVERSE,
+    ROLL,
+    Declaration,
+    Layout,
+    VehicleAxis,
+    coefficient_name,
+)
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.quantity import Finite, Quantity
@@ -156,6 +167,15 @@ class Description:
     """The value of `base` as it stands in the file; empty without one."""
     against: Path | None
     """The vehicle file to compare with."""
+
+    @property
+    def logged(self) -> Layout:
+        """The layout with the axes of which a log of several axes may have recordings.
+
+        Any autopilot logs roll and pitch, so they must be declared. Else they are only the context of other recordings.
+        """
+        forms = (form for form in self.layout.axes if form.axis not in (ROLL, PITCH) or form.axis.name in self.axes)
+        return replace(self.layout, axes=tuple(forms))
 
 
 def read_description(path: Path) -> tuple[Description | None, list[str]]:

@@ -84,6 +84,7 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
     check_inputs([folder / ROV_FILE, *paths, *(folder / part for part in parts), *filter(None, named_vehicles)])
     reader = _Reader(folder, description.layout if description else None)
     if description:
+        reader.logged = description.logged
         reader.names, mistakes = names_of(description.layout, description.columns, description.topics)
         description_mistakes += lines_on(description.path, mistakes)
     for path in paths:
@@ -137,6 +138,8 @@ class _Reader:
     findings: list[Finding] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
     """The hash of each file by its name."""
+    logged: Layout | None = None
+    """The layout with the axes that a log of several axes may have recordings of."""
     names: Names = field(default_factory=Names)
     known: set[str] = field(default_factory=set)
     """The keys that the tables [columns] and [topics] may have."""
@@ -167,8 +170,8 @@ class _Reader:
                     reason = "there is no such file in this folder"
                     raise DataFileError(*self._in_rov_file(f"{key}.files", reason, part))
                 self.inputs[part] = _hash(path)
-            if self.layout:
-                self._add(read_dive(paths, dive.other_clock, self.layout, self.names))
+            if self.logged:
+                self._add(read_dive(paths, dive.other_clock, self.logged, self.names))
         except FileError as error:
             self.mistakes += str(error).splitlines()
 
@@ -184,9 +187,8 @@ class _Reader:
                     yield key_line(f"{table}.{name}", f"{what}{did_you_mean(name, self.known)}", value)
 
     def _read_log(self, path: Path, axis: Axis | None) -> None:
-        if not self.layout:
-            return
-        self._add(read_log(path, self.layout, axis, self.names))
+        if layout := self.layout if axis else self.logged:
+            self._add(read_log(path, layout, axis, self.names))
 
     def _add(self, log: Log) -> None:
         self.known |= log.known
