@@ -12,8 +12,8 @@ from rov_fmu.io.csv_table import PULSES, Column, read_columns, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.content import PULSE_RANGE, Content, Wanted
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
 from rov_fmu.tank.logs import READERS, Names, is_column, read_part
 from rov_fmu.tank.recording import CONTEXT
 from rov_fmu.tank.signals import gaps

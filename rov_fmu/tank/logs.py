@@ -1,4 +1,4 @@
-"""Read logs of one test or of a whole dive: CSV files here, other formats in a module each.
+"""Read logs of one test or of a whole dive: CSV files here, other formats in formats/.
 
 A CSV log has a column `time`, columns of commands and columns of measured motion. The commands are one column
 `command` in a log of one axis, or a column for each input of the vehicle (`u_<name>`), or a column for each thruster.
@@ -29,7 +29,6 @@ from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.bags import read_bag
 from rov_fmu.tank.columns import (
     LOGGED_COMMAND,
     TIME,
@@ -38,12 +37,13 @@ from rov_fmu.tank.columns import (
     refuse_slips,
     velocity_column,
 )
-from rov_fmu.tank.content import Content, Entry, Wanted
 from rov_fmu.tank.findings import SENTENCES, Finding, refusals
-from rov_fmu.tank.mavlink import read_mavlink
+from rov_fmu.tank.formats.bags import read_bag
+from rov_fmu.tank.formats.content import Content, Entry, Wanted
+from rov_fmu.tank.formats.mavlink import read_mavlink
+from rov_fmu.tank.formats.ulog import read_ulog
 from rov_fmu.tank.recording import CLOCK_ERROR, Recording
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, context_at, gaps_of, main_signals, recordings_of
-from rov_fmu.tank.ulog import read_ulog
 
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order; with more, the file holds two logs."""

@@ -9,9 +9,9 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
-from tests.tank import motion, test_mavlink, test_ulog
-from tests.tank.motion import TIME
-from tests.tank.test_bags import Ros, dive
+from tests.tank.formats import motion, test_mavlink, test_ulog
+from tests.tank.formats.motion import TIME
+from tests.tank.formats.test_bags import Ros, dive
 from tests.tank.test_several_files import table
 
 DEPTH: Array = motion.DEPTH

@@ -10,8 +10,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
-from tests.tank import motion
-from tests.tank.motion import TIME
+from tests.tank.formats import motion
+from tests.tank.formats.motion import TIME
 
 ROV = """base = "bluerov2"
 [vehicle]

@@ -12,11 +12,11 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.tank.bags import _RC_OUT
 from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.formats.bags import _RC_OUT
 from rov_fmu.tank.logs import Log, names_of, read_log
-from tests.tank import motion
-from tests.tank.motion import BLUEROV2, TIME
+from tests.tank.formats import motion
+from tests.tank.formats.motion import BLUEROV2, TIME
 
 START = 1_700_000_000.0  # s since 1970
 LATE = 0.03  # s, from the header to the arrival

@@ -22,9 +22,9 @@ import numpy as np
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import brief
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.content import Content, Topic, Wanted, ascending, content_of, fraction, together
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.motion import attitude_signals, position_signals, rotations, to_body, velocity_signals
+from rov_fmu.tank.formats.content import Content, Topic, Wanted, ascending, content_of, fraction, together
+from rov_fmu.tank.formats.motion import attitude_signals, position_signals, rotations, to_body, velocity_signals
 from rov_fmu.tank.signals import Commands, Signal
 
 _OUTPUTS = {"actuator_motors": "control", "actuator_outputs": "output"}

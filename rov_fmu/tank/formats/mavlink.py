@@ -31,8 +31,8 @@ from rov_fmu.io.file_kinds import DATAFLASH_SUFFIX
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.tank.arrays import Array, Flags
-from rov_fmu.tank.content import Content, Wanted
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.formats.content import Content, Wanted
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, unwrapped
 
 _DATAFLASH = b"\xa3\x95\x80"

@@ -25,9 +25,9 @@ from rov_fmu.io.csv_table import NO_OUTPUT, DataFileError
 from rov_fmu.io.messages import brief
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.content import Content, Topic, Wanted, ascending, content_of, fraction, together
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.motion import attitude_signals, position_signals, rotations, velocity_signals
+from rov_fmu.tank.formats.content import Content, Topic, Wanted, ascending, content_of, fraction, together
+from rov_fmu.tank.formats.motion import attitude_signals, position_signals, rotations, velocity_signals
 from rov_fmu.tank.signals import Commands, Signal
 
 _ENU: Array = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

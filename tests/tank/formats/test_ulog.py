@@ -9,8 +9,8 @@ import pytest
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.logs import read_log
-from tests.tank import motion
-from tests.tank.motion import BLUEROV2, TIME
+from tests.tank.formats import motion
+from tests.tank.formats.motion import BLUEROV2, TIME
 
 BOOT = 100.0  # s, at the beginning of the log
 FORMATS = {
