@@ -89,13 +89,14 @@ def names_of(layout: Layout, columns: Mapping[str, str], topics: Mapping[str, st
     entries, mistakes = {}, []
     for table, titles, targets in (("columns", of_csv, columns), ("topics", known, topics)):
         for source, title in targets.items():
+            opposite = table == "topics" and title.startswith("-")
             try:
-                found = find_column(title.removeprefix("-"), titles, others=False)
+                found = find_column(title[opposite:], titles, others=False)
                 assert found
             except ValueError as error:
                 mistakes.append(key_line(f"{table}.{source}", str(error), title))
                 continue
-            sensor, sign = sensors.get(found.name), -1.0 if title.startswith("-") else 1.0
+            sensor, sign = sensors.get(found.name), -1.0 if opposite else 1.0
             name = found.name if layout.mix and found.name in layout.commands else thrusters.get(found.name, found.name)
             convert = partial(_converted, found.convert, sign)
             entries[source] = Entry(name, sensor.axis if sensor else None, sensor.quantity if sensor else "", convert)

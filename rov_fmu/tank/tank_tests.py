@@ -23,7 +23,6 @@ from pathlib import Path
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import FileError, did_you_mean, lines_on
-from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import AXES, Axis, Layout
 from rov_fmu.tank.description import ROV_FILE, Description, Dive, read_description
@@ -281,4 +280,11 @@ def _either(names: Iterable[str], last_word: str = "or") -> str:
 
 
 def _hash(path: Path) -> str:
-    return hashlib.sha256(read_bytes(path, DataFileError)).hexdigest()
+    found = hashlib.sha256()
+    try:
+        with path.open("rb") as file:  # in pieces, because a bag may be larger than the memory
+            while piece := file.read(2**20):
+                found.update(piece)
+    except OSError as error:
+        raise DataFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    return found.hexdigest()

@@ -128,6 +128,7 @@ def test_unknown_columns_are_named(folder: Path) -> None:
         ('[columns]\nDepthh = "depth [m]"', "rov.toml: columns.Depthh = 'depth [m]': no log has such a column"),
         ('[columns]\nx = "dpeth [m]"', "rov.toml: columns.x = 'dpeth [m]': there is no such column, but"),
         ('[topics]\n"/d.data" = "depth [m]"', "rov.toml: topics./d.data = 'depth [m]': no log has such a topic"),
+        ('[columns]\nx = "-depth [m]"', "rov.toml: columns.x = '-depth [m]': there is no such column, but"),
         ('[topics]\n"/d.data" = "depth"', "rov.toml: topics./d.data = 'depth': must be 'depth [m]' or"),
     ],
 )
