@@ -40,6 +40,8 @@ _LONGEST = 32
 """Longer arrays in messages are covariances, images or clouds, and are not read."""
 _OTHER_CLOCK = 1.0
 """The difference between header and arrival from which they are of different clocks, s."""
+_REPAIR = {".bag": "rosbag reindex", ".db3": "sqlite3 .recover", ".mcap": "mcap recover"}
+"""The commands that repair bags."""
 _THRUSTER = re.compile(r"(?:thruster|motor|propeller|thrust)s?\D*(\d+)", re.IGNORECASE)
 _ACTUATORS = re.compile("thrust|motor|actuator|propeller|pwm|command|cmd", re.IGNORECASE)
 _READ = re.compile(
@@ -64,7 +66,8 @@ def read_bag(path: Path, wanted: Wanted) -> Content:
         topics, unread, findings = _topics(path, {name.partition(".")[0] for name in named})
     except Exception as error:  # a parser may raise anything on bytes that are not a bag
         reason = brief(str(error)) or type(error).__name__
-        raise DataFileError(f"{path}: cannot be read as a bag: {reason}") from error
+        hint = f"; after a recording that was cut short, `{_REPAIR[path.suffix.lower()]}` may repair it"
+        raise DataFileError(f"{path}: cannot be read as a bag: {reason}{hint}") from error
     signals = [signal for topic in sorted(topics, key=_rank) for signal in _signals(topic)]
     commands, source = (None, []) if _has_commands(wanted) else _commands(path, topics, wanted)
     content = content_of(path.name, topics, wanted, commands, signals)

@@ -238,5 +238,5 @@ def test_a_bag_that_is_cut_short_is_one_line(version: int, suffix: str, kept: in
     path.write_bytes(path.read_bytes()[:kept])
     with pytest.raises(DataFileError) as error:
         read_log(path, BLUEROV2)
-    assert str(error.value).startswith(f"{path}: ")
+    assert str(error.value).startswith(f"{path}: {'cannot be read as a bag' if kept else 'the file is empty'}")
     assert len(str(error.value).splitlines()) == 1
