@@ -14,7 +14,7 @@ from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxi
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
-from rov_fmu.tank.logs import READERS, Names, is_column, read_part
+from rov_fmu.tank.logs import READERS, Names, is_column, read_csv
 from rov_fmu.tank.recording import CONTEXT
 from rov_fmu.tank.signals import gaps
 
@@ -80,7 +80,7 @@ def inspect(path: Path, layouts: Iterable[Layout]) -> Inspection:
         layout = replace(layout, axes=tuple(VehicleAxis(axis) for axis in AXES.values()))
         axis = next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
         columns = dict(_renamed(titles, numbers, commanding, layout, axis))
-        content, command = read_part(path, layout, axis, Names(columns))
+        content, command = read_csv(path, layout, axis, Names(columns), is_part=True)
         unread = [title for title in titles if not is_column(columns.get(title, title), layout, axis)]
         content.unread = dict.fromkeys(unread, "")
     rows = [_row("command", "1", *command)] if command else [*_commands(content)]

@@ -126,7 +126,7 @@ def read_content(path: Path, layout: Layout, names: Names) -> Content:
     """
     read = READERS.get(path.suffix.lower())
     if not read:
-        content, _ = _read_csv(path, layout, None, names, is_part=True)
+        content, _ = read_csv(path, layout, None, names, is_part=True)
         return content
     content = read(path, Wanted([t.name for t in layout.thrusters], names.topics))
     if content.commands:
@@ -147,7 +147,7 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names 
     if path.suffix.lower() in READERS:
         content = read_content(path, layout, names)
     else:
-        content, command = _read_csv(path, layout, axis, names)
+        content, command = read_csv(path, layout, axis, names)
         if axis and command is not None:
             recording = _recording_of_axis(path, axis, content.signals, command[1])
             return Log((recording,), (*content.findings, *gaps_of(recording)), frozenset(content.known))
@@ -161,11 +161,6 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names 
         reasons = refusals(useless, path.parent, SENTENCES) or [f"{path}: nothing measured of any axis"]
         raise DataFileError(*reasons)
     return Log(recordings, (*content.findings, *useless), frozenset(content.known))
-
-
-def read_part(path: Path, layout: Layout, axis: Axis | None, names: Names) -> tuple[Content, _Command | None]:
-    """Read a CSV file that may have only commands or only motion, and the command of an axis. Raises DataFileError."""
-    return _read_csv(path, layout, axis, names, is_part=True)
 
 
 def read_dive(paths: Sequence[Path], other_clock: Iterable[str], layout: Layout, names: Names) -> Log:
@@ -208,7 +203,7 @@ def read_dive(paths: Sequence[Path], other_clock: Iterable[str], layout: Layout,
     return Log(tuple(recordings), tuple(findings), frozenset().union(*(content.known for content in contents)))
 
 
-def _read_csv(
+def read_csv(
     path: Path, layout: Layout, axis: Axis | None, names: Names, *, is_part: bool = False
 ) -> tuple[Content, _Command | None]:
     """Read a CSV file, and the times and the command of the axis if it has one.

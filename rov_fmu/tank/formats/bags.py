@@ -69,7 +69,7 @@ def read_bag(path: Path, wanted: Wanted) -> Content:
         hint = f"; after a recording that was cut short, `{_REPAIR[path.suffix.lower()]}` may repair it"
         raise DataFileError(f"{path}: cannot be read as a bag: {reason}{hint}") from error
     signals = [signal for topic in sorted(topics, key=_rank) for signal in _signals(topic)]
-    commands, source = (None, []) if _has_commands(wanted) else _commands(path, topics, wanted)
+    commands, source = (None, []) if wanted.names_commands else _commands(path, topics, wanted)
     content = content_of(path.name, topics, wanted, commands, signals)
     content.findings, content.unread = findings, unread
     for topic in topics:
@@ -81,10 +81,6 @@ def read_bag(path: Path, wanted: Wanted) -> Content:
     if any(_rank(topic) == _PRESSURE for topic in topics) and not any(_is_depth(topic) for topic in topics):
         content.findings.append(Finding("depth by pressure", file=path.name))
     return content
-
-
-def _has_commands(wanted: Wanted) -> bool:
-    return any(not entry.quantity for entry in wanted.entries.values())
 
 
 # ---- Messages --------------------------------------------------------------------------------------------------------

@@ -56,6 +56,11 @@ class Wanted:
     entries: Mapping[str, Entry] = field(default_factory=dict)
     """The table [topics], by topic and field: `/bar30/depth.data`."""
 
+    @property
+    def names_commands(self) -> bool:
+        """True when the table [topics] names commands, which stand instead of those that are recognised."""
+        return any(not entry.quantity for entry in self.entries.values())
+
     def named(self, outputs: Iterable[Array]) -> dict[str, Array]:
         """Return the outputs of the thrusters by name."""
         found = list(outputs)

@@ -55,8 +55,7 @@ def read_ulog(path: Path, wanted: Wanted) -> Content:
         raise DataFileError(f"{path}: cannot be read as a ULog: {brief(str(error)) or type(error).__name__}") from error
     topics = [_topic(data) for data in log.data_list]
     signals = list(_signals(topics))
-    has_commands = any(not entry.quantity for entry in wanted.entries.values())
-    commands = None if has_commands else _commands(path, topics, wanted)
+    commands = None if wanted.names_commands else _commands(path, topics, wanted)
     content = content_of(path.name, topics, wanted, commands, signals)
     content.unread = {
         topic.name: f"{len(topic.time)} messages: {brief(', '.join(topic.fields))}"
