@@ -395,8 +395,21 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     help="Report to write. A build from the vehicle file puts it into the FMU.",
 )
 @click.option("--force", is_flag=True, help="Replace files that identify did not write, or that have changed since.")
-def _identify(folder: Path, output: Path | None, report: Path | None, force: bool) -> None:
+@click.option(
+    "--inspect",
+    "inspects",
+    is_flag=True,
+    help="Only list what the log FOLDER, or each log in it, contains, and write a draft of rov.toml beside it.",
+)
+def _identify(folder: Path, output: Path | None, report: Path | None, force: bool, inspects: bool) -> None:
     """Identify a vehicle from FOLDER, which holds its tank tests: rov.toml and thrust_, steady_, ... .csv."""
+    if inspects:
+        if output or report or force:
+            raise click.UsageError(
+                "identify: --inspect writes only a draft of rov.toml: leave -o, --report, --force out"
+            )
+        _inspect(folder)
+        return
     from rov_fmu.interface.identify_command import identify_folder
     from rov_fmu.report.console_results import print_identification
     from rov_fmu.report.progress import bar
@@ -406,6 +419,18 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
     for line in replaced:
         click.echo(line)
     print_identification(identification)
+
+
+def _inspect(path: Path) -> None:
+    """List what logs contain, and write a draft of rov.toml."""
+    from rov_fmu.interface.inspect_command import inspect_logs, write_draft
+    from rov_fmu.report.console_log import print_inspection
+
+    found, draft, text = inspect_logs(path)
+    for inspection in found:
+        print_inspection(inspection)
+    write_draft(draft, text)
+    click.echo(f"{draft}: a draft, to be edited")
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

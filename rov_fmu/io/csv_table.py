@@ -3,7 +3,7 @@
 import csv
 import re
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from math import isfinite, isnan, nan
@@ -53,8 +53,10 @@ class Columns:
     """The numbers of a file, in the first unit of each column."""
 
     path: Path
+    header: Sequence[str]
+    """All cells of the header, as the file has them."""
     headers: Mapping[str, str]
-    """The headers as the file has them, by column."""
+    """The headers of the columns that are read, as the file has them or as they are renamed."""
     units: Mapping[str, str]
     """The units of the file by column, without numbers that may follow a unit."""
     values: Mapping[str, "array[float]"]
@@ -81,7 +83,7 @@ class Columns:
 
 
 @dataclass(frozen=True)
-class _FileColumn:
+class FileColumn:
     """A column of the file that is read."""
 
     name: str
@@ -99,12 +101,14 @@ def read_columns(
     *,
     others: bool = False,
     loose: bool = False,
+    renamed: Mapping[str, str] = {},
     check_header: Callable[[Mapping[str, str], Iterable[str]], Iterable[str]] = lambda _, __: (),
 ) -> Columns:
     """Read the columns, in any order, with headers such as `command [%]`. Raises DataFileError with all mistakes.
 
     With `others`, the file may have other columns, which are not read. `loose` is for logs: a cell that is missing or
-    not a number becomes NaN, and a row with too many cells is left out. `check_header` is called before the rows are
+    not a number becomes NaN, and a row with too many cells is left out. `renamed` has other headers for some of those
+    of the file. `check_header` is called before the rows are
     read, with the headers that are read, by column, and with all other headers; it returns the mistakes in them.
     """
     open_stream = read_lines(path, DataFileError, most=LARGEST)
@@ -113,6 +117,7 @@ def read_columns(
     line, header = next(lines, (1, []))
     if not header:
         raise DataFileError(f"{path}: the file is empty")
+    titles, header = header, [renamed.get(title, title) for title in header]
     found = _find_columns(path, line, header, columns, others)
     names = [column.name for column in found.values()]
     headers = {column.name: header[place] for place, column in found.items()}
@@ -156,7 +161,14 @@ def read_columns(
     if not row_lines:
         raise DataFileError(f"{path}, line {line}: no rows below the header")
     units = {column.name: column.unit for column in found.values()}
-    return Columns(path, headers, units, values, row_lines, unread, torn.count, rows)
+    return Columns(path, titles, headers, units, values, row_lines, unread, torn.count, rows)
+
+
+def read_header(path: Path) -> list[str]:
+    """Return the cells of the first line that is not blank. Raises DataFileError."""
+    open_stream = read_lines(path, DataFileError, most=LARGEST)
+    _, header = next(_csv_lines(path, open_stream(), _separator(open_stream())), (1, []))
+    return header
 
 
 class _Mistakes:
@@ -224,7 +236,7 @@ def _number(text: str) -> float | None:
     return number if isfinite(number) else None
 
 
-def _value(text: str, exists: bool, file_column: _FileColumn, loose: bool) -> float:
+def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> float:
     """Return the number of a cell in the first unit. Raises ValueError with only the reason.
 
     `exists` is False for a cell that its row does not have.
@@ -260,17 +272,17 @@ def _value(text: str, exists: bool, file_column: _FileColumn, loose: bool) -> fl
 
 def _find_columns(
     path: Path, line: int, header: list[str], columns: Mapping[str, Column], others: bool
-) -> dict[int, _FileColumn]:
+) -> dict[int, FileColumn]:
     """Return the columns that are read, by their index in the header. Raises DataFileError."""
     if not any(_may_be_header(title, columns) for title in header):
         needed = ", ".join(_title(name, column) for name, column in columns.items() if not column.optional)
         reason = f"the first line must be a header that names the columns, such as {needed}"
         raise DataFileError(f"{path}, line {line} = {shown(', '.join(header))}: {reason}")
-    found: dict[int, _FileColumn] = {}
+    found: dict[int, FileColumn] = {}
     wrong = []
     for place, title in enumerate(header):
         try:
-            if column := _find_column(title, columns, others):
+            if column := find_column(title, columns, others):
                 if any(column.name == before.name for before in found.values()):
                     raise ValueError("there is such a column before")
                 found[place] = column
@@ -290,13 +302,13 @@ def _find_columns(
     return found
 
 
-def _find_column(title: str, columns: Mapping[str, Column], others: bool) -> _FileColumn | None:
+def find_column(title: str, columns: Mapping[str, Column], others: bool) -> FileColumn | None:
     """Return the column with this header, or None if it is not read. Raises ValueError with only the reason."""
     name, unit_and_numbers = _name_and_unit(title)
     word, *numbers = unit_and_numbers.split() or [""]
     for key, column in columns.items():
         if name in map(_folded, (key, *column.also)) and (unit := _find_unit(word, column)):
-            return _FileColumn(key, column, unit, *_conversion(unit, numbers, column))
+            return FileColumn(key, column, unit, *_conversion(unit, numbers, column))
     for key, column in columns.items():
         if _folded(key) == name:
             raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(column))}")

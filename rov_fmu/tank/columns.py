@@ -25,6 +25,8 @@ LOGGED_COMMAND = replace(COMMAND, conversions=dict.fromkeys(PULSES, pulses))
 FORCE = Column({"N": 1.0}, minimum=-1e6, maximum=1e6)
 TIME = Column(TIMES, minimum=-1e10, maximum=1e10)  # some loggers count from 1970
 
+VOLTAGE = Column({"V": 1.0, "mV": 1000.0}, True, True, 0.0, 1e4, also=("battery", "battery voltage"))
+
 
 def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCITIES[0]) -> Column:
     """Return a column of velocities along the axis; an optional column may have blanks."""

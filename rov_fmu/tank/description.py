@@ -25,7 +25,18 @@ from rov_fmu.io.toml_file import (
     read_toml,
     validate,
 )
-from rov_fmu.model.layout import AXES, AXIS, CURVE, REVERSE, Declaration, Layout, VehicleAxis, coefficient_name
+from rov_fmu.model.layout import (
+    AXES,
+    AXIS,
+    CURVE,
+    PITCH,
+    REVERSE,
+    ROLL,
+    Declaration,
+    Layout,
+    VehicleAxis,
+    coefficient_name,
+)
 from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, readable_parts
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.quantity import Finite, Quantity
@@ -77,6 +88,21 @@ class _Fit(Strict):
     """The curves whose thrusters' lag is fitted; true for all curves."""
 
 
+def _check_several(files: tuple[str, ...]) -> tuple[str, ...]:
+    if len({*files}) < 2:
+        raise ValueError("must be two or more files: a log of one file needs no table")
+    return files
+
+
+class Dive(Strict):
+    """A table [dives.x]: a dive whose commands and measurements are in several files, each with its own times."""
+
+    files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_several)]
+    """The files, one of which has the commands."""
+    other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = ()
+    """Those of the files whose times are of another clock than the commands'."""
+
+
 class _ReadableFile(OpenHardware):
     """The parts of rov.toml that could be read."""
 
@@ -87,6 +113,9 @@ class _ReadableFile(OpenHardware):
     windows: dict[str, _Window] = Field(default={})
     validity: Validity | None = None
     fit: _Fit = _Fit()
+    columns: dict[str, str] = Field(default={})
+    topics: dict[str, str] = Field(default={})
+    dives: dict[str, Dive] = Field(default={})
 
 
 class _RovFile(_ReadableFile):
@@ -124,6 +153,12 @@ class Description:
     lag: tuple[str, ...]
     """The curves whose thrusters' lag is fitted."""
     command_range: tuple[float, float] | None
+    columns: Mapping[str, str]
+    """What the headers of CSV logs stand for: other headers."""
+    topics: Mapping[str, str]
+    """What the topics and fields of bags and ULogs stand for, as headers."""
+    dives: Mapping[str, Dive] | None
+    """The dives of several files, by name; None where the table has a mistake."""
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
     base: Path | None
@@ -132,6 +167,15 @@ class Description:
     """The value of `base` as it stands in the file; empty without one."""
     against: Path | None
     """The vehicle file to compare with."""
+
+    @property
+    def logged(self) -> Layout:
+        """The layout with the axes of which a log of several axes may have recordings.
+
+        Any autopilot logs roll and pitch, so they must be declared. Else they are only the context of other recordings.
+        """
+        forms = (form for form in self.layout.axes if form.axis not in (ROLL, PITCH) or form.axis.name in self.axes)
+        return replace(self.layout, axes=tuple(forms))
 
 
 def read_description(path: Path) -> tuple[Description | None, list[str]]:
@@ -148,7 +192,7 @@ def read_description(path: Path) -> tuple[Description | None, list[str]]:
     if base_mistakes or hardware_mistakes or lost & {"base", "axes", *_HARDWARE_TABLES}:
         lines = lines_on(path, (*problem_lines(problems, data, _RovFile), *hardware_mistakes))
         return None, lines + base_mistakes
-    description = _describe(path, file, data, base)
+    description = _describe(path, file, lost, data, base)
     possible = _possible_coefficients(description.layout)
     # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
     unknown = {("known", name) for name in description.named if name not in possible}
@@ -183,7 +227,7 @@ def _hardware_mistakes(file: _ReadableFile, lost: set[str], data: Toml) -> Itera
         yield from check_names_and_keys(file, lost, data)
 
 
-def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None) -> Description:
+def _describe(path: Path, file: _ReadableFile, lost: set[str], data: Toml, base: Vehicle | None) -> Description:
     """Put together the description from the parts of the file and the base."""
     own_layout, folder = file.layout, path.parent
     if base:
@@ -207,6 +251,9 @@ def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None)
         windows=file.windows,
         lag=tuple(curve.name for curve in layout.curves) if file.fit.lag is True else file.fit.lag,
         command_range=file.validity.command_range if file.validity else None,
+        columns=file.columns,
+        topics=file.topics,
+        dives=None if "dives" in lost else file.dives,
         limits=file.validity.limits if file.validity else limits,
         base=_vehicle_file(file.base, folder / file.base) if file.base else None,
         base_name=file.base or "",

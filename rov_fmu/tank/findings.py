@@ -105,7 +105,20 @@ SENTENCES: dict[str, SentenceForm] = {
     ),
     "constant motion": "{files}: no recording of {axes}: the {quantity} never changes",
     "constant push": "{files}: no recording of {axes}: what the thrusters do along it never changes",
-    # MAVLink logs
+    "gaps": "{files}: {count:#gap} in {axes}, by which the recording is divided: {gaps}",
+    # Logs of autopilots and bags
+    "source of commands": "{files}: the commands of the thrusters are those of {source}",
+    "time of arrival": (
+        "{files}: {count:#message} of {topics} have no time in a header: that of their arrival stands for it"
+    ),
+    "other clock": (
+        "{files}: its clock is not that of the commands: how far it is off is to be fitted, within {most:g} s"
+    ),
+    "aligned clock": (
+        "{files}: its clock is not that of the commands, and they share no time: its first sample is taken as that of "
+        "the first command, and how far it is off is to be fitted, within {most:g} s"
+    ),
+    "dropouts": "{files}: the autopilot lost data {count:#time}, up to {longest:.3g} s",
     "damaged log": "{files}: damaged in places: what could be read is used",
     "damaged pieces": "{files}: {count:#damaged piece} left out",
     "messages without time": "{files}: {count:#message} without a time left out",

@@ -1,4 +1,4 @@
-"""Read logs of one test or of a whole dive: CSV files here, MAVLink logs in mavlink.py.
+"""Read logs of one test or of a whole dive: CSV files here, other formats in formats/.
 
 A CSV log has a column `time`, columns of commands and columns of measured motion. The commands are one column
 `command` in a log of one axis, or a column for each input of the vehicle (`u_<name>`), or a column for each thruster.
@@ -6,37 +6,57 @@ Rows and cells that cannot be used are left out and counted.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from rov_fmu.io.csv_table import NO_OUTPUT, PULSES, Column, Columns, DataFileError, read_columns
-from rov_fmu.io.file_kinds import LOG_SUFFIXES
+from rov_fmu.io.csv_table import (
+    NO_OUTPUT,
+    PULSES,
+    Column,
+    Columns,
+    Conversion,
+    DataFileError,
+    find_column,
+    read_columns,
+)
+from rov_fmu.io.file_kinds import BAG_SUFFIXES, LOG_SUFFIXES, ULOG_SUFFIX
 from rov_fmu.io.messages import did_you_mean, shown, similar
-from rov_fmu.model.layout import HEAVE, YAW, Axis, Layout
+from rov_fmu.io.toml_file import join_names, key_line
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import (
     LOGGED_COMMAND,
     TIME,
+    VOLTAGE,
     position_column,
     refuse_slips,
     velocity_column,
 )
 from rov_fmu.tank.findings import SENTENCES, Finding, refusals
-from rov_fmu.tank.mavlink import read_mavlink
-from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, recordings_of, unwrapped
+from rov_fmu.tank.formats.bags import read_bag
+from rov_fmu.tank.formats.content import Content, Entry, Wanted
+from rov_fmu.tank.formats.mavlink import read_mavlink
+from rov_fmu.tank.formats.ulog import read_ulog
+from rov_fmu.tank.recording import CLOCK_ERROR, Recording
+from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, context_at, gaps_of, main_signals, recordings_of
 
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order; with more, the file holds two logs."""
 _COMMAND = "command"
-_READERS = dict.fromkeys(LOG_SUFFIXES, read_mavlink)
+_Command = tuple[Array, Array]
+READERS: dict[str, Callable[[Path, Wanted], Content]] = {
+    **dict.fromkeys(LOG_SUFFIXES, read_mavlink),
+    ULOG_SUFFIX: read_ulog,
+    **dict.fromkeys(BAG_SUFFIXES, read_bag),
+}
 """The function that reads a log, by the suffix of the file. Other logs are CSV."""
-_POSITION_NAMES = {HEAVE: "z", YAW: "psi"}
-"""The names of the positions in the FMU."""
+_POSITION_NAMES = {HEAVE: ("z",), ROLL: ("phi", "roll"), PITCH: ("theta", "pitch"), YAW: ("psi",)}
+"""Other names of positions that need no axis: those in the FMU, and that of the axis."""
 
 
 @dataclass(frozen=True)
@@ -46,55 +66,182 @@ class Log:
     recordings: tuple[Recording, ...]
     findings: tuple[Finding, ...] = ()
     """What was left out, and why."""
+    known: frozenset[str] = frozenset()
+    """The keys that the tables [columns] and [topics] may have for this log."""
 
 
-def read_log(path: Path, layout: Layout, axis: Axis | None = None) -> Log:
-    """Read a recording of every axis that the log measures, or of `axis` alone. Raises DataFileError."""
-    if read := _READERS.get(path.suffix.lower()):
-        commands, signals, findings = read(path, layout)
-        return _log(path, layout, commands, signals, findings, axis)
-    sensors = _sensors([axis] if axis else [form.axis for form in layout.axes], of_one=axis is not None)
-    kinds = {"inputs": _inputs(layout), "thrusters": _thrusters(layout), "axis": {_COMMAND: _LOGGED} if axis else {}}
-    columns = {"time": TIME, **kinds["axis"], **kinds["inputs"], **kinds["thrusters"]}
+@dataclass(frozen=True)
+class Names:
+    """The tables [columns] and [topics] of rov.toml: what unknown names stand for."""
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    """Headers, by the headers of the CSV files."""
+    topics: Mapping[str, Entry] = field(default_factory=dict)
+
+
+def names_of(layout: Layout, columns: Mapping[str, str], topics: Mapping[str, str]) -> tuple[Names, list[str]]:
+    """Return the names of rov.toml, and a line for every value that is no column of a log."""
+    sensors = _sensors((form.axis for form in layout.axes), of_one=False) | _CONDITIONS
+    commands = _inputs(layout) | _thrusters(layout)
+    known = commands | {name: sensor.column for name, sensor in sensors.items()}
+    of_csv = {"time": TIME, _COMMAND: _LOGGED, **known}
+    thrusters = {f"{prefix}{t.name}": t.name for t in layout.thrusters for prefix in ("u_", "thruster ")}
+    entries, mistakes = {}, []
+    for table, titles, targets in (("columns", of_csv, columns), ("topics", known, topics)):
+        for source, title in targets.items():
+            opposite = table == "topics" and title.startswith("-")
+            try:
+                found = find_column(title[opposite:], titles, others=False)
+                assert found
+            except ValueError as error:
+                mistakes.append(key_line(f"{table}.{source}", str(error), title))
+                continue
+            sensor, sign = sensors.get(found.name), -1.0 if opposite else 1.0
+            name = found.name if layout.mix and found.name in layout.commands else thrusters.get(found.name, found.name)
+            convert = partial(_converted, found.convert, sign)
+            entries[source] = Entry(name, sensor.axis if sensor else None, sensor.quantity if sensor else "", convert)
+    return Names(columns, {source: entries[source] for source in topics if source in entries}), mistakes
+
+
+def is_column(title: str, layout: Layout, axis: Axis | None) -> bool:
+    """Return True if a log of the axis, or of several, may have a column with this header."""
+    axes = [axis] if axis else [form.axis for form in layout.axes]
+    sensors = _sensors(axes, of_one=axis is not None) | _CONDITIONS
+    columns = {"time": TIME, _COMMAND: _LOGGED, **_inputs(layout), **_thrusters(layout)}
     columns |= {name: sensor.column for name, sensor in sensors.items()}
-    check_header = partial(_wrong_columns, path=path, layout=layout, kinds=kinds, sensors=sensors)
-    table = read_columns(path, columns, others=True, loose=True, check_header=check_header)
-    ((kind, commanding),) = _commanding(table.values, kinds).items()
-    refuse_slips(table, commanding)
-    time, values, findings = _cleaned(table, commanding)
-    del table  # a long log is large
-    signals = _signals(sensors, time, values)
-    if kind == "axis":
-        return Log((_recording_of_axis(path, signals[0], values[_COMMAND]),), tuple(findings))
-    missing = (name for name in kinds[kind] if name not in values)
-    findings += [Finding("missing column", file=path.name, names={"column": name}) for name in missing]
-    thrusters = _mixed_inputs(layout, values) if kind == "inputs" else _thruster_commands(layout, values)
-    del values
-    return _log(path, layout, Commands(time, thrusters), signals, findings)
+    try:
+        return find_column(title, columns, others=True) is not None
+    except ValueError:
+        return False
 
 
-def _log(
-    path: Path,
-    layout: Layout,
-    commands: Commands,
-    signals: Iterable[Signal],
-    findings: Iterable[Finding],
-    axis: Axis | None = None,
-) -> Log:
-    """Return the recordings of a log. Raises DataFileError where there are none."""
-    recordings, useless = recordings_of(path.name, layout, commands, signals, axis)
+def _converted(convert: Conversion, sign: float, value: float) -> float:
+    return sign * convert(value)
+
+
+def read_content(path: Path, layout: Layout, names: Names) -> Content:
+    """Read the content of a log of several axes, or of a part of a dive; commands are those of the thrusters.
+
+    Raises DataFileError.
+    """
+    read = READERS.get(path.suffix.lower())
+    if not read:
+        content, _ = read_csv(path, layout, None, names, is_part=True)
+        return content
+    content = read(path, Wanted([t.name for t in layout.thrusters], names.topics))
+    if content.commands:
+        logged, named = content.commands, {"time": content.commands.time, **content.commands.thrusters}
+        if layout.mix and logged.thrusters.keys() <= {*layout.commands}:
+            thrusters = _mixed_inputs(layout, named)
+        else:
+            still = np.zeros_like(logged.time)
+            thrusters = {t.name: named.get(t.name, still) for t in layout.thrusters}
+            missing = (name for name in thrusters if name not in named)
+            content.findings += [Finding("missing column", file=path.name, names={"column": name}) for name in missing]
+        content.commands = Commands(logged.time, thrusters)
+    return content
+
+
+def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names = Names()) -> Log:
+    """Read a recording of every axis that the log measures, or of `axis` alone. Raises DataFileError."""
+    if path.suffix.lower() in READERS:
+        content = read_content(path, layout, names)
+    else:
+        content, command = read_csv(path, layout, axis, names)
+        if axis and command is not None:
+            recording = _recording_of_axis(path, axis, content.signals, command[1])
+            return Log((recording,), (*content.findings, *gaps_of(recording)), frozenset(content.known))
+    if not content.commands:
+        raise DataFileError(
+            f"{path}: no commands of thrusters are recognised: `rov-fmu identify --inspect` lists what "
+            "is in it, and the table [topics] of rov.toml names them"
+        )
+    recordings, useless = recordings_of(path.name, layout, content.commands, content.signals, axis)
     if not recordings:
         reasons = refusals(useless, path.parent, SENTENCES) or [f"{path}: nothing measured of any axis"]
         raise DataFileError(*reasons)
-    return Log(recordings, (*findings, *useless))
+    return Log(recordings, (*content.findings, *useless), frozenset(content.known))
 
 
-def _recording_of_axis(path: Path, signal: Signal, command: Array) -> Recording:
+def read_dive(paths: Sequence[Path], other_clock: Iterable[str], layout: Layout, names: Names) -> Log:
+    """Read a dive of several files, of which one has the commands. Raises DataFileError.
+
+    A file of another clock than that of the commands is told in its recordings. Where the times of both do not overlap,
+    its first sample is moved to the first command.
+    """
+    contents = [read_content(path, layout, names) for path in paths]
+    commanding = [content for content in contents if content.commands]
+    if len(commanding) != 1:
+        which = join_names(content.file for content in commanding) or "none"
+        raise DataFileError(f"{paths[0]}: one file of its dive must have the commands, and not {which}")
+    (commands,) = (content.commands for content in commanding if content.commands)
+    findings, signals = [], {}
+    for content in contents:
+        findings += content.findings
+        signals[content.file] = content.signals
+        times = [s.time[np.isfinite(s.values)] for s in content.signals if np.isfinite(s.values).any()]
+        if content in commanding or not times:
+            continue
+        start, end = min(time[0] for time in times), max(time[-1] for time in times)
+        overlap = start <= commands.time[-1] and commands.time[0] <= end
+        if content.file in other_clock or not overlap:
+            kind = "other clock" if overlap else "aligned clock"
+            findings.append(Finding(kind, file=content.file, numbers={"most": CLOCK_ERROR}))
+        if not overlap:
+            moved = commands.time[0] - start
+            signals[content.file] = [replace(signal, time=signal.time + moved) for signal in content.signals]
+    clocks = {finding.file for finding in findings if finding.kind in ("other clock", "aligned clock")}
+    recordings: list[Recording] = []
+    for file, own in signals.items():
+        others = [signal for other, found in signals.items() if other != file for signal in found]
+        found, useless = recordings_of(file, layout, commands, own, others=others)
+        recordings += [replace(recording, clock=file if file in clocks else "") for recording in found]
+        findings += useless
+    if not recordings:
+        reasons = [finding for finding in findings if finding.axis]
+        raise DataFileError(*refusals(reasons, paths[0].parent, SENTENCES) or [f"{paths[0]}: nothing measured"])
+    return Log(tuple(recordings), tuple(findings), frozenset().union(*(content.known for content in contents)))
+
+
+def read_csv(
+    path: Path, layout: Layout, axis: Axis | None, names: Names, *, is_part: bool = False
+) -> tuple[Content, _Command | None]:
+    """Read a CSV file, and the times and the command of the axis if it has one.
+
+    A part of a dive may have only commands or only motion. Raises DataFileError.
+    """
+    axes = [axis] if axis else [form.axis for form in layout.axes]
+    sensors = _sensors(axes, of_one=axis is not None)
+    conditions = {name: sensor for name, sensor in _CONDITIONS.items() if name not in sensors}
+    kinds = {"inputs": _inputs(layout), "thrusters": _thrusters(layout), "axis": {_COMMAND: _LOGGED} if axis else {}}
+    columns = {"time": TIME, **kinds["axis"], **kinds["inputs"], **kinds["thrusters"]}
+    columns |= {name: sensor.column for name, sensor in (sensors | conditions).items()}
+    check = _wrong_columns_of_part if is_part else _wrong_columns
+    check_header = partial(check, path=path, layout=layout, kinds=kinds, sensors=sensors)
+    table = read_columns(path, columns, others=True, loose=True, renamed=names.columns, check_header=check_header)
+    kind, commanding = next(iter(_commanding(table.values, kinds).items()), ("", []))
+    refuse_slips(table, commanding)
+    time, values, findings = _cleaned(table, commanding)
+    content = Content(path.name, findings=findings, known={*table.header})
+    del table  # a long log is large
+    content.signals = [*_signals(sensors, time, values), *_signals(conditions, time, values)]
+    if kind == "axis":
+        return content, (time, values[_COMMAND])
+    missing = (name for name in kinds.get(kind, ()) if name not in values)
+    content.findings += [Finding("missing column", file=path.name, names={"column": name}) for name in missing]
+    if kind:
+        thrusters = _mixed_inputs(layout, values) if kind == "inputs" else _thruster_commands(layout, values)
+        content.commands = Commands(time, thrusters)
+    return content, None
+
+
+def _recording_of_axis(path: Path, axis: Axis, signals: Sequence[Signal], command: Array) -> Recording:
     """Return the recording of an axis whose thrusters follow one command. Raises DataFileError."""
+    (signal,) = main_signals(signals, axis)
     if (count := int(np.isfinite(signal.values).sum())) < LEAST_SAMPLES:
         raise DataFileError(f"{path}: {count} samples of {signal.quantity}, at least {LEAST_SAMPLES} are needed")
-    values = unwrapped(signal.values) if signal.quantity == "heading" else signal.values
-    return Recording(path.name, signal.axis, signal.quantity, signal.time - signal.time[0], command, values)
+    time, context = signal.time - signal.time[0], context_at(signal.time, signals)
+    return Recording(path.name, axis, signal.quantity, time, command, signal.unwrapped(), context=context)
 
 
 # ---- Columns ---------------------------------------------------------------------------------------------------------
@@ -106,11 +253,18 @@ _IN_PULSES = tuple(f"{left}{unit}{right}" for unit in PULSES for left, right in 
 
 @dataclass(frozen=True)
 class _Sensor:
-    """A column of measured motion."""
+    """A column of measured motion, or of a condition."""
 
-    axis: Axis
+    axis: Axis | None
     quantity: str
     column: Column
+
+
+_CONDITIONS = {
+    axis.position: _Sensor(axis, axis.position, replace(position_column(axis), also=_POSITION_NAMES[axis]))
+    for axis in (HEAVE, ROLL, PITCH)
+} | {"voltage": _Sensor(None, "voltage", VOLTAGE)}
+"""The columns that any log may have, whether or not the vehicle has their axis."""
 
 
 def _sensors(axes: Iterable[Axis], *, of_one: bool) -> dict[str, _Sensor]:
@@ -123,9 +277,10 @@ def _sensors(axes: Iterable[Axis], *, of_one: bool) -> dict[str, _Sensor]:
         for quantity in (axis.position, "velocity"):
             velocity = quantity == "velocity"
             column = velocity_column(axis, optional=True, least=0.0) if velocity else position_column(axis)
-            long_name, state = f"{axis.name} {quantity}", axis.velocity if velocity else _POSITION_NAMES.get(axis)
+            long_name = f"{axis.name} {quantity}"
+            others = (axis.velocity,) if velocity else _POSITION_NAMES.get(axis, ())
             name = quantity if of_one or (axis in _POSITION_NAMES and not velocity) else long_name
-            column = replace(column, also=tuple(filter(None, (long_name, state))))
+            column = replace(column, also=(long_name, *others))
             found[name] = _Sensor(axis, quantity, column)
     return found
 
@@ -179,6 +334,15 @@ def _wrong_columns(
         yield f"column {titles} is missing"
 
 
+def _wrong_columns_of_part(
+    headers: Mapping[str, str], others: Iterable[str], kinds: Mapping[str, Mapping[str, Column]], **more: Any
+) -> Iterator[str]:
+    """Yield a line for every mistake in the columns of a part of a dive, as `_wrong_columns` does."""
+    for mistake in _wrong_columns(headers, others, kinds=kinds, **more):
+        if len(_commanding(headers, kinds)) > 1 or headers.keys() == {"time"}:
+            yield mistake
+
+
 def _no_axis_in_name(path: Path, layout: Layout) -> str:
     """Explain that the name of a file does not contain an axis of the vehicle."""
     axes, word = [*layout.kinds], path.stem.lower().partition("_")[2].partition("_")[0]
@@ -194,10 +358,10 @@ def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Ar
     """Return ascending time (s), the columns with commands within ±1, and what was changed. Raises DataFileError."""
     columns = {name: np.frombuffer(values) for name, values in table.values.items()}
     timed = np.isfinite(columns["time"])
-    commanded = np.all([np.isfinite(columns[name]) for name in commanding], axis=0)
+    commanded = np.all([timed, *(np.isfinite(columns[name]) for name in commanding)], axis=0)
     rows = np.flatnonzero(timed & commanded)
     if not rows.size:
-        raise DataFileError(f"{table.path}: no row has both a time and a command")
+        raise DataFileError(f"{table.path}: no row has {'both a time and a command' if commanding else 'a time'}")
     time = columns["time"][rows]
     unordered = np.flatnonzero(time < np.maximum.accumulate(time))
     if unordered.size > _MOST_UNORDERED * rows.size:
@@ -265,12 +429,6 @@ def _thruster_commands(layout: Layout, columns: Mapping[str, Array]) -> dict[str
 
 
 def _signals(sensors: Mapping[str, _Sensor], time: Array, columns: Mapping[str, Array]) -> list[Signal]:
-    """Return the signal of each axis: the position, unless only the velocity has enough samples."""
-    found: dict[str, Signal] = {}
-    for name, sensor in sensors.items():
-        if name in columns:
-            signal = Signal(sensor.axis, sensor.quantity, time, columns[name])
-            before = found.get(sensor.axis.name)
-            if not before or np.isfinite(before.values).sum() < LEAST_SAMPLES:
-                found[sensor.axis.name] = signal
-    return list(found.values())
+    """Return the signal of each sensor."""
+    found = ((sensor, columns[name]) for name, sensor in sensors.items() if name in columns)
+    return [Signal(sensor.axis, sensor.quantity, time, values) for sensor, values in found]

@@ -8,6 +8,13 @@ import numpy as np
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.arrays import Array
 
+CONTEXT = {"voltage": "V", "roll": "rad", "pitch": "rad", "depth": "m", "distance": "m"}
+"""The conditions that a recording may contain, with their units: the voltage of the battery, the angles of roll and
+pitch, the depth, and the distance over ground from where the log begins."""
+
+CLOCK_ERROR = 5.0
+"""The largest error of times that were aligned with those of another clock, s."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -28,6 +35,13 @@ class Recording:
     """n each, by thruster: the command of the thruster, if logged; otherwise all thrusters follow `command`."""
     beside: Mapping[str, Array] = field(default_factory=dict)
     """n each: the logged u, v, r and psi, smoothed and interpolated; u and v are over ground."""
+    context: Mapping[str, Array] = field(default_factory=dict)
+    """n each: what else the log tells about the conditions, interpolated between its samples. The names are those of
+    CONTEXT that the log has."""
+
+    clock: str = ""
+    """The file whose clock the measurements have, where it is another one than that of the commands: their times may
+    be up to CLOCK_ERROR early or late. Empty for one clock."""
 
     @property
     def is_position(self) -> bool:

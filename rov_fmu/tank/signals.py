@@ -1,14 +1,16 @@
 """Combine commands and measured motion, each with its own times, into a recording of every axis."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import pi
 
 import numpy as np
 
-from rov_fmu.model.layout import SURGE, SWAY, YAW, Axis, Layout
+from rov_fmu.io.messages import MOST
+from rov_fmu.model.layout import PITCH, ROLL, SURGE, SWAY, YAW, Axis, Layout
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.recording import CONTEXT, Recording
 from rov_fmu.tank.smoothing import velocity, without_spikes
 
 LEAST_SAMPLES = 20
@@ -17,6 +19,14 @@ _SAME_COMMAND = 0.005
 _LEAST_CHANGE = 0.02
 """The smallest change of thrust that counts, as a fraction of full thrust. Smaller changes hold a heading or a depth,
 or are the rounding of a pulse."""
+_LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
+"""A gap is longer than this time, s, and than this many usual intervals."""
+_ROUNDING = 0.01
+_TURN = 2.0 * pi + 2.0 * _ROUNDING
+"""What rounding may add to the bounds of a wrapped angle, and the width of these bounds, rad."""
+_WRAPPING = (YAW.position, ROLL.position)
+_CONTEXT = {ROLL.position: "roll", PITCH.position: "pitch"}
+"""The names of positions in the context, where they differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,31 +41,51 @@ class Commands:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """The measurements of a sensor along an axis, in SI units."""
+    """The measurements of a sensor, in SI units."""
 
-    axis: Axis
+    axis: Axis | None
+    """The axis of the motion; None for a condition that is no motion."""
     quantity: str
-    """`velocity`, or the position whose rate it is: distance, depth, heading."""
+    """`velocity`, or the position whose rate it is: distance, depth, heading, roll angle, pitch angle; without an axis,
+    a key of CONTEXT."""
     time: Array
     """n: s, ascending."""
     values: Array
-    """n: NaN where there is no measurement; a heading may wrap."""
+    """n: NaN where there is no measurement; a heading and a roll angle may wrap."""
+
+    def unwrapped(self) -> Array:
+        """Return the values without jumps of a full turn; NaN stays NaN."""
+        return unwrapped(self.time, self.values) if self.quantity in _WRAPPING else self.values
 
 
 def recordings_of(
-    file: str, layout: Layout, commands: Commands, signals: Iterable[Signal], only: Axis | None = None
+    file: str,
+    layout: Layout,
+    commands: Commands,
+    signals: Iterable[Signal],
+    only: Axis | None = None,
+    others: Sequence[Signal] = (),
 ) -> tuple[tuple[Recording, ...], tuple[Finding, ...]]:
-    """Return a recording of every useful signal, and a finding for each useless one; `only` selects one axis."""
+    """Return a recording of every useful signal, and a finding for each useless one; `only` selects one axis.
+
+    Signals of axes that the vehicle does not have, and those of other files, are only the context of the others.
+    """
     recordings, findings, signals = [], [], list(signals)
-    for signal in signals:
-        if only in (None, signal.axis):
-            recording = _recording(file, layout, commands, signal, signals)
-            finding = why_useless(recording, layout)
-            if finding:
-                findings.append(finding)
+    for axis in [only] if only else [form.axis for form in layout.axes]:
+        for signal in main_signals(signals, axis):
+            recording = _recording(file, layout, commands, axis, signal, (*signals, *others))
+            if useless := why_useless(recording, layout):
+                findings.append(useless)
             else:
                 recordings.append(recording)
+                findings += gaps_of(recording)
     return tuple(recordings), tuple(findings)
+
+
+def main_signals(signals: Iterable[Signal], axis: Axis) -> list[Signal]:
+    """Return the signal of an axis, if there is one: the position, unless only the velocity has enough samples."""
+    found = sorted((s for s in signals if s.axis == axis), key=lambda signal: signal.quantity == "velocity")
+    return [s for s in found if np.isfinite(s.values).sum() >= LEAST_SAMPLES][:1] or found[-1:]
 
 
 def why_useless(recording: Recording, layout: Layout) -> Finding | None:
@@ -71,8 +101,10 @@ def why_useless(recording: Recording, layout: Layout) -> Finding | None:
     return None
 
 
-def _recording(file: str, layout: Layout, commands: Commands, signal: Signal, others: Iterable[Signal]) -> Recording:
-    """Return a recording at the times of commands and signal.
+def _recording(
+    file: str, layout: Layout, commands: Commands, axis: Axis, signal: Signal, others: Sequence[Signal]
+) -> Recording:
+    """Return a recording of an axis at the times of commands and signal.
 
     The last command counts for as long as a command is usually held.
     """
@@ -85,25 +117,20 @@ def _recording(file: str, layout: Layout, commands: Commands, signal: Signal, ot
         thrusters = {name: values[held] for name, values in thrusters.items()}
     values = np.full(len(time), np.nan)
     known = np.isin(signal.time, time)
-    values[np.searchsorted(time, signal.time[known])] = signal.values[known]
-    if signal.quantity == "heading":
-        values = unwrapped(values)
+    values[np.searchsorted(time, signal.time[known])] = signal.unwrapped()[known]
     start = time[0] if len(time) else 0.0
-    command = command_of(layout, signal.axis, thrusters)
-    return Recording(
-        file, signal.axis, signal.quantity, time - start, command, values, thrusters, _beside(time, others)
-    )
+    command, beside, context = command_of(layout, axis, thrusters), _beside(time, others), context_at(time, others)
+    return Recording(file, axis, signal.quantity, time - start, command, values, thrusters, beside, context)
 
 
 def _beside(time: Array, signals: Iterable[Signal]) -> dict[str, Array]:
     """Interpolate the smoothed velocities in surge, sway and yaw, and the heading, at the times of a recording."""
     found = {}
-    for signal in (s for s in signals if s.axis in (SURGE, SWAY, YAW)):
+    for signal in signals:
         there = np.isfinite(signal.values)
-        if there.sum() < LEAST_SAMPLES or not len(time):
+        if not signal.axis or signal.axis not in (SURGE, SWAY, YAW) or there.sum() < LEAST_SAMPLES or not len(time):
             continue
-        at, values, is_position = signal.time[there], signal.values[there], signal.quantity != "velocity"
-        values = np.unwrap(values) if signal.quantity == "heading" else values
+        at, values, is_position = signal.time[there], signal.unwrapped()[there], signal.quantity != "velocity"
         even, rate = velocity(at, without_spikes(values), is_position=is_position)
         found[signal.axis.velocity] = np.interp(time, even, rate)
         if signal.quantity == "heading":
@@ -111,10 +138,53 @@ def _beside(time: Array, signals: Iterable[Signal]) -> dict[str, Array]:
     return found
 
 
-def unwrapped(heading: Array) -> Array:
-    """Return the heading (rad) without jumps of a full turn; NaN stays NaN."""
-    found, there = heading.copy(), np.isfinite(heading)
-    found[there] = np.unwrap(heading[there])
+def context_at(time: Array, signals: Iterable[Signal]) -> dict[str, Array]:
+    """Interpolate the conditions that the signals tell at the times of a recording."""
+    found = {}
+    for signal in signals:
+        name, there = _CONTEXT.get(signal.quantity, signal.quantity), np.isfinite(signal.values)
+        if name in CONTEXT and there.any() and not (name == "distance" and signal.axis not in (None, SURGE)):
+            values = signal.unwrapped()[there]
+            found[name] = np.interp(time, signal.time[there], values - values[0] if name == "distance" else values)
+    return found
+
+
+def gaps(time: Array, values: Array) -> list[tuple[float, float]]:
+    """Return the last time before each gap in the measurements and the first time after it, s.
+
+    A gap is longer than 1 s and than ten usual intervals between two measurements.
+    """
+    at = time[np.isfinite(values)]
+    intervals = np.diff(at)
+    if not len(intervals):
+        return []
+    (before,) = np.nonzero(intervals > max(_LEAST_GAP, _GAP_INTERVALS * float(np.median(intervals))))
+    return [(float(at[n]), float(at[n + 1])) for n in before]
+
+
+def gaps_of(recording: Recording) -> list[Finding]:
+    """Return a finding about the gaps in a recording, or none."""
+    found = gaps(recording.time, recording.values)
+    shown = [f"{end - start:.3g} s from {start:.4g} s on" for start, end in found[:MOST]]
+    if more := len(found) - len(shown):
+        shown.append(f"{more} more")
+    names, numbers = {"gaps": ", ".join(shown)}, {"count": len(found)}
+    return [Finding("gaps", recording.axis.name, file=recording.file, names=names, numbers=numbers)] if found else []
+
+
+def unwrapped(time: Array, angle: Array) -> Array:
+    """Return an angle (rad) without jumps of a full turn; NaN stays NaN.
+
+    An angle that leaves -180° ... 180° and 0° ... 360°, or that never jumps by half a turn between two samples without
+    a gap between them, is continuous already and stays as it is. Over a gap, the smaller turn is taken.
+    """
+    found, there = angle.copy(), np.isfinite(angle)
+    values = angle[there]
+    jumps = np.abs(np.diff(values)) > pi
+    jumps[np.isin(time[there][:-1], [start for start, _ in gaps(time, angle)])] = False
+    in_one_turn = any(((low <= values) & (values <= low + _TURN)).all() for low in (-pi - _ROUNDING, -_ROUNDING))
+    if jumps.any() and in_one_turn:
+        found[there] = np.unwrap(values)
     return found
 
 

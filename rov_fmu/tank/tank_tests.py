@@ -7,24 +7,27 @@ anything may follow another underscore:
     steady_<surge|sway|heave|yaw>*.csv         command, velocity               Tables 3-5
     time_constant_<surge|sway|heave|yaw>*.csv  command, time constant          (17), Tables 6-8
     log_<surge|sway|heave|yaw>*.csv            time, command, and distance, depth or heading, or velocity
-    log_*.csv, *.bin, *.tlog                   time, commands, and the motion of several axes
+    log_*.csv, *.bin, *.tlog, *.ulg,           time, commands, and the motion of several axes
+    *.bag, *.db3, *.mcap
+
+A bag of ROS 2 may be in a folder of its own. The files of the tables [dives] of rov.toml may have any names.
 
 A command is that of an axis, or, in a test of a thrust curve, that of all thrusters that were tested together.
 """
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
-from rov_fmu.io.messages import FileError, did_you_mean
-from rov_fmu.io.reading import read_bytes
+from rov_fmu.io.messages import FileError, did_you_mean, lines_on
+from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import AXES, Axis, Layout
-from rov_fmu.tank.description import ROV_FILE, Description, read_description
+from rov_fmu.tank.description import ROV_FILE, Description, Dive, read_description
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.logs import read_log
+from rov_fmu.tank.logs import Log, Names, names_of, read_dive, read_log
 from rov_fmu.tank.narrowing import Given, Narrowed, Tested, narrowed
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tables import Row, read_rows
@@ -63,15 +66,32 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
         what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
         raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
     description, description_mistakes = _read_description(folder / ROV_FILE)
-    paths = sorted(path for path in folder.iterdir() if path.name.lower().endswith((".csv", *LOG_SUFFIXES)))
-    if not paths:
+    if description and description.dives is None:
+        raise VehicleFileError(*description_mistakes)
+    dives = (description.dives if description else None) or {}
+    parts = {name for dive in dives.values() for name in dive.files}
+    in_folders = (path for bag in folder.glob("*/metadata.yaml") for path in bag.parent.iterdir())
+    paths = sorted(
+        path
+        for path in (*folder.iterdir(), *in_folders)
+        if path.name.lower().endswith((".csv", *LOG_SUFFIXES)) and path.name not in parts
+    )
+    if not paths and not dives:
         patterns = ", ".join(f"*{suffix}" for suffix in (".csv", *LOG_SUFFIXES))
         raise VehicleFileError(*description_mistakes, f"{folder}: there are no tests ({patterns}) in this folder")
     named_vehicles = (description.against, description.base) if description else ()
-    check_inputs([folder / ROV_FILE, *paths, *filter(None, named_vehicles)])
+    check_inputs([folder / ROV_FILE, *paths, *(folder / part for part in parts), *filter(None, named_vehicles)])
     reader = _Reader(folder, description.layout if description else None)
+    if description:
+        reader.logged = description.logged
+        reader.names, mistakes = names_of(description.layout, description.columns, description.topics)
+        description_mistakes += lines_on(description.path, mistakes)
     for path in paths:
         reader.read(path)
+    for name, dive in dives.items():
+        reader.read_dive(name, dive)
+    if description and not (description_mistakes or reader.mistakes):
+        description_mistakes += lines_on(description.path, reader.unknown_names(description))
     vehicle = Narrowed(None)
     tested = reader.tested(description)
     # Without any axis, a file that could not be read may be the one with the axes.
@@ -117,6 +137,11 @@ class _Reader:
     findings: list[Finding] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
     """The hash of each file by its name."""
+    logged: Layout | None = None
+    """The layout with the axes that a log of several axes may have recordings of."""
+    names: Names = field(default_factory=Names)
+    known: set[str] = field(default_factory=set)
+    """The keys that the tables [columns] and [topics] may have."""
 
     def read(self, path: Path) -> None:
         """Read one file."""
@@ -131,10 +156,41 @@ class _Reader:
         except FileError as error:
             self.mistakes += str(error).splitlines()
 
+    def read_dive(self, name: str, dive: Dive) -> None:
+        """Read the files of a dive together."""
+        try:
+            key, paths = f"dives.{name}", [self.folder / part for part in dive.files]
+            for other in dive.other_clock:
+                if other not in dive.files:
+                    reason = f"must be one of its files{did_you_mean(other, dive.files)}"
+                    raise DataFileError(*self._in_rov_file(f"{key}.other_clock", reason, other))
+            for part, path in zip(dive.files, paths, strict=True):
+                if path.name != part or not path.is_file():
+                    reason = "there is no such file in this folder"
+                    raise DataFileError(*self._in_rov_file(f"{key}.files", reason, part))
+                self.inputs[part] = _hash(path)
+            if self.logged:
+                self._add(read_dive(paths, dive.other_clock, self.logged, self.names))
+        except FileError as error:
+            self.mistakes += str(error).splitlines()
+
+    def _in_rov_file(self, key: str, reason: str, value: str) -> list[str]:
+        return lines_on(self.folder / ROV_FILE, [key_line(key, reason, value)])
+
+    def unknown_names(self, description: Description) -> Iterator[str]:
+        """Yield a line for each entry of [columns] and [topics] that no file has."""
+        for table, names in (("columns", description.columns), ("topics", description.topics)):
+            for name, value in names.items():
+                if name not in self.known:
+                    what = "no log has such a column" if table == "columns" else "no log has such a topic and field"
+                    yield key_line(f"{table}.{name}", f"{what}{did_you_mean(name, self.known)}", value)
+
     def _read_log(self, path: Path, axis: Axis | None) -> None:
-        if not self.layout:
-            return
-        log = read_log(path, self.layout, axis)
+        if layout := self.layout if axis else self.logged:
+            self._add(read_log(path, layout, axis, self.names))
+
+    def _add(self, log: Log) -> None:
+        self.known |= log.known
         self.findings += log.findings
         for recording in log.recordings:
             self.recordings.setdefault(recording.axis.name, []).append(recording)
@@ -224,4 +280,11 @@ def _either(names: Iterable[str], last_word: str = "or") -> str:
 
 
 def _hash(path: Path) -> str:
-    return hashlib.sha256(read_bytes(path, DataFileError)).hexdigest()
+    found = hashlib.sha256()
+    try:
+        with path.open("rb") as file:  # in pieces, because a bag may be larger than the memory
+            while piece := file.read(2**20):
+                found.update(piece)
+    except OSError as error:
+        raise DataFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    return found.hexdigest()

@@ -131,7 +131,7 @@ TYPED: dict[str, tuple[list[str], str]] = {
     ),
     "an autopilot's log for a ghost": (
         ["fly", "--against", "d.tlog"],
-        "and not an autopilot's log; `rov-fmu identify` reads it in a folder of tank tests, as log_*",
+        "and not the log of an autopilot or of ROS; `rov-fmu identify` reads it in a folder of tank tests, as log_*",
     ),
     "an FMU for a vehicle": (["build", "x.fmu"], "x.fmu: must be a vehicle file (TOML), and not an FMU"),
     "a plan for a vehicle": (

@@ -255,3 +255,14 @@ def test_a_heading_is_unwrapped_over_blanks(tmp_path: Path) -> None:
     ]
     (recording,) = read(tmp_path, "time [s],u_l [1],u_r [1],heading [deg]", rows).recordings
     assert recording.values[-1] == pytest.approx(radians(350 + 5 * (N + 9)))
+
+
+def test_a_log_of_one_axis_tells_of_the_conditions(tmp_path: Path) -> None:
+    rows = [f"{n / 10},{STEP[n]},{0.1 * n},{15000 - n},{n},-5,3" for n in range(N)]
+    header = "time [s],command [1],velocity [m/s],Battery [mV],roll [deg],theta [deg],depth [m]"
+    (recording,) = read(tmp_path, header, rows, SURGE).recordings
+    assert recording.axis is SURGE
+    assert recording.context.keys() == {"voltage", "roll", "pitch", "depth"}
+    assert recording.context["voltage"] == pytest.approx(15.0 - 0.001 * np.arange(N))
+    assert recording.context["roll"] == pytest.approx(np.radians(np.arange(N)))
+    assert recording.context["pitch"] == pytest.approx(radians(-5) * np.ones(N))

@@ -7,12 +7,15 @@ The sources of each signal; the first with enough samples that change is used:
     depth     CTUN.Alt, BARO, XKF1, NKF1  GLOBAL_POSITION_INT.relative_alt, VFR_HUD.alt, SCALED_PRESSURE2
     heading   ATT.Yaw, XKF1, NKF1         ATTITUDE.yaw
     velocity  XKF1, NKF1                  LOCAL_POSITION_NED, both where the filter knows it (XKF4, EKF_STATUS_REPORT)
+    roll      ATT.Roll, XKF1, NKF1        ATTITUDE.roll; pitch from the same message
+    voltage   BAT.Volt                    SYS_STATUS.voltage_battery
 
 Thruster n of the vehicle is motor n of the autopilot: the servo that SERVOx_FUNCTION assigns to it, or else servo n. A
 motor with MOT_n_DIRECTION = -1 turns in the opposite direction.
 """
 
 import io
+import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, redirect_stderr, redirect_stdout
@@ -26,10 +29,11 @@ import numpy as np
 from rov_fmu.io.csv_table import NO_OUTPUT, DataFileError, pulses
 from rov_fmu.io.file_kinds import DATAFLASH_SUFFIX
 from rov_fmu.io.reading import read_bytes
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Layout
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal
+from rov_fmu.tank.formats.content import Content, Wanted
+from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, unwrapped
 
 _DATAFLASH = b"\xa3\x95\x80"
 """The first bytes of a DataFlash log, which begin a message about the format of others."""
@@ -37,6 +41,8 @@ _WRAP = 2.0**32 * 1e-6
 """The time after which the clock of SERVO_OUTPUT_RAW starts again, s."""
 _PRESSURE_GRADIENT = 1000.0 * 9.80665
 """The pressure gradient in fresh water, Pa/m."""
+_NO_VOLTAGE = 65535
+"""The voltage in SYS_STATUS that stands for none, mV."""
 _VELOCITY_KNOWN, _CONSTANT_POSITION = 2, 128
 """Flags of the filter: it knows the horizontal velocity; it assumes that the vehicle does not move."""
 
@@ -44,7 +50,7 @@ _Samples = list[tuple[float, ...]]
 
 
 def _filtered(m: Any) -> tuple[float, ...]:
-    return m.PD, radians(m.Yaw), m.VN, m.VE
+    return m.PD, radians(m.Roll), radians(m.Pitch), radians(m.Yaw), m.VN, m.VE
 
 
 _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
@@ -55,15 +61,19 @@ _NUMBERS: dict[str, Callable[[Any], tuple[float, ...]]] = {
     "SCALED_PRESSURE2": lambda m: (m.press_abs * 100.0 / _PRESSURE_GRADIENT,),
     "CTUN": lambda m: (-m.Alt,),
     "BARO": lambda m: (-m.Alt,),
-    "ATTITUDE": lambda m: (m.yaw,),
-    "ATT": lambda m: (radians(m.Yaw),),
+    "ATTITUDE": lambda m: (m.roll, m.pitch, m.yaw),
+    "ATT": lambda m: (radians(m.Roll), radians(m.Pitch), radians(m.Yaw)),
     "LOCAL_POSITION_NED": lambda m: (m.vx, m.vy),
     "XKF1": _filtered,
     "NKF1": _filtered,
     "EKF_STATUS_REPORT": lambda m: (m.flags,),
+    "SYS_STATUS": lambda m: (m.voltage_battery / 1000.0 if m.voltage_battery != _NO_VOLTAGE else nan,),
+    "BAT": lambda m: (m.Volt,),
     "XKF4": lambda m: (m.SS,),
     "NKF4": lambda m: (m.SS,),
 }
+_INSTANCES = ("I", "Inst", "Instance", "C")
+"""The fields with the number of the sensor, of the battery or of the filter's core."""
 _PARAMETERS = {"PARAM_VALUE": ("param_id", "param_value"), "PARM": ("Name", "Value")}
 # Each source is a message and the index of the first number used.
 _SERVOS = (("SERVO_OUTPUT_RAW", 0), ("RCOU", 0))
@@ -76,20 +86,24 @@ _DEPTHS = (
     ("XKF1", 0),
     ("NKF1", 0),
 )
-_HEADINGS = (("ATTITUDE", 0), ("ATT", 0), ("XKF1", 1), ("NKF1", 1))
-_VELOCITIES = (("LOCAL_POSITION_NED", 0), ("XKF1", 2), ("NKF1", 2))
+_ATTITUDES = (("ATTITUDE", 0), ("ATT", 0), ("XKF1", 1), ("NKF1", 1))
+"""Roll, pitch and heading."""
+_VELOCITIES = (("LOCAL_POSITION_NED", 0), ("XKF1", 4), ("NKF1", 4))
+_VOLTAGES = (("SYS_STATUS", 0), ("BAT", 0))
 _STATUS = (("EKF_STATUS_REPORT", 0), ("XKF4", 0), ("NKF4", 0))
 
 
 @dataclass
-class _Content:
-    """The content of a log."""
+class _Messages:
+    """The messages of a log that are used."""
 
     file: str
     samples: defaultdict[tuple[str, int], _Samples] = field(default_factory=lambda: defaultdict(list))
     """Time (s) and numbers, by message and by instance of the sensor or system that sent it."""
     parameters: dict[str, float] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
+    others: Counter[str] = field(default_factory=Counter)
+    """The number of messages of each kind that is not used."""
 
     def add_finding(self, kind: str, names: dict[str, str] | None = None, **numbers: float) -> None:
         """Add a finding about this log."""
@@ -125,7 +139,7 @@ class _Content:
         return None
 
 
-def read_mavlink(path: Path, layout: Layout) -> tuple[Commands, list[Signal], list[Finding]]:
+def read_mavlink(path: Path, wanted: Wanted) -> Content:
     """Read the commands of the thrusters, the signals, and findings about the log. Raises DataFileError."""
     try:
         import pymavlink  # noqa: F401 (to give a clear message)
@@ -145,12 +159,12 @@ def read_mavlink(path: Path, layout: Layout) -> tuple[Commands, list[Signal], li
         raise DataFileError(f"{path}: cannot be read as a {path.suffix} log: {type(error).__name__}") from error
     if printed.getvalue():
         log.add_finding("damaged log")
-    commands = _commands(path, layout, log)
-    signals = list(_signals(layout, log))
-    return commands, signals, log.findings
+    commands = _commands(path, wanted, log)
+    unread = {kind: f"{count} messages" for kind, count in log.others.items()}
+    return Content(path.name, commands, list(_signals(log)), log.findings, unread)
 
 
-def _read_dataflash(path: Path, head: bytes) -> _Content:
+def _read_dataflash(path: Path, head: bytes) -> _Messages:
     from pymavlink import DFReader
 
     class Reader(DFReader.DFReader_binary):  # type: ignore[misc]
@@ -170,24 +184,27 @@ def _read_dataflash(path: Path, head: bytes) -> _Content:
 
     if head != _DATAFLASH:
         raise DataFileError(f"{path}: no DataFlash log: it must begin with the bytes A3 95 80")
-    log, untimed = _Content(path.name), 0
+    log, untimed = _Messages(path.name), 0
     with closing(Reader(str(path))) as reader:
         while message := reader.recv_match(type=[*_NUMBERS, *_PARAMETERS]):
             stamp = getattr(message, "TimeUS", nan)
-            instance = getattr(message, "I", getattr(message, "C", 0))
+            instance = next((getattr(message, key) for key in _INSTANCES if hasattr(message, key)), 0)
             untimed += message.get_type() in _NUMBERS and not isfinite(stamp)
             log.add(message, int(instance), stamp * 1e-6)
+        for kind, name in reader.id_to_name.items():
+            if name not in (*_NUMBERS, *_PARAMETERS) and reader.counts[kind]:
+                log.others[name] = reader.counts[kind]
     if untimed:
         log.add_finding("messages without time", count=untimed)
     return log
 
 
-def _read_telemetry(path: Path) -> _Content:
+def _read_telemetry(path: Path) -> _Messages:
     """Read a log of a ground station, with times of the vehicle.
 
     A message without a time gets the time of its arrival, less the usual delay of the other messages.
     """
-    log, received, damaged = _Content(path.name), [], 0
+    log, received, damaged = _Messages(path.name), [], 0
     delays: defaultdict[bool, list[float]] = defaultdict(list)  # True: the clock of SERVO_OUTPUT_RAW
     systems: Counter[int] = Counter()
     for message in _messages(path):
@@ -199,6 +216,8 @@ def _read_telemetry(path: Path) -> _Content:
             received.append((message, stamp, at))
             systems[message.get_srcSystem()] += is_servo
             delays[is_servo] += [at - stamp] if isfinite(stamp) else []
+        else:
+            log.others[kind] += kind != "BAD_DATA"
     delay = float(np.median(delays[False] or delays[True] or [0.0]))
     vehicle = max(systems, key=lambda system: systems[system], default=None)
     untimed = 0
@@ -229,23 +248,24 @@ def _messages(path: Path) -> Iterator[Any]:
         log.close()
 
 
-def _commands(path: Path, layout: Layout, log: _Content) -> Commands:
+def _commands(path: Path, wanted: Wanted, log: _Messages) -> Commands:
     """Return the commands of the thrusters. Raises DataFileError."""
     series = log.series(_SERVOS, width=16, varies=False)
     if not series:
         raise DataFileError(f"{path}: no outputs of servos (RCOU, SERVO_OUTPUT_RAW) in this log")
     _, time, outputs = series
     thrusters, reversed_motors, without_pulse = {}, [], 0
-    for n, thruster in enumerate(layout.thrusters, start=1):
+    names = wanted.thrusters or [str(n) for n in range(1, _motors(log, outputs) + 1)]
+    for n, name in enumerate(names, start=1):
         servo = next((s for s in range(1, 17) if log.parameters.get(f"SERVO{s}_FUNCTION") == 32 + n), n)
         if servo > outputs.shape[1]:
-            raise DataFileError(f"{path}: no output of thruster {thruster.name}: the log has {outputs.shape[1]} servos")
+            raise DataFileError(f"{path}: no output of thruster {name}: the log has {outputs.shape[1]} servos")
         direction = -1.0 if log.parameters.get(f"MOT_{n}_DIRECTION", 1.0) < 0.0 else 1.0
         if direction < 0.0:
-            reversed_motors.append(thruster.name)
+            reversed_motors.append(name)
         widths = outputs[:, servo - 1]
         without_pulse += int(np.isin(widths, NO_OUTPUT).sum())
-        thrusters[thruster.name] = np.clip(direction * np.array(list(map(pulses(), widths.tolist()))), -1.0, 1.0)
+        thrusters[name] = np.clip(direction * np.array(list(map(pulses(), widths.tolist()))), -1.0, 1.0)
     if without_pulse:
         log.add_finding("no servo pulse", count=without_pulse)
     if reversed_motors:
@@ -255,30 +275,40 @@ def _commands(path: Path, layout: Layout, log: _Content) -> Commands:
     return Commands(time, thrusters)
 
 
-def _signals(layout: Layout, log: _Content) -> Iterator[Signal]:
-    """Yield velocities, depth and heading for the axes of the vehicle."""
-    heading = log.series(_HEADINGS, varies=False)
-    if layout.has(SURGE, SWAY) and heading and (series := log.series(_VELOCITIES, width=2)):
+def _motors(log: _Messages, outputs: Array) -> int:
+    """Return the number of motors: by the functions of the servos, or else of the first servos with pulses."""
+    functions = [value for name, value in log.parameters.items() if re.fullmatch(r"SERVO\d+_FUNCTION", name)]
+    motors = [int(value) - 32 for value in functions if 33 <= value <= 40]
+    return max(motors, default=int(np.argmax(np.append(np.isin(outputs, NO_OUTPUT).all(axis=0), True))))
+
+
+def _signals(log: _Messages) -> Iterator[Signal]:
+    """Yield velocities, depth, the angles of the attitude, and the voltage of the battery."""
+    attitude = log.series(_ATTITUDES, width=3, varies=False)
+    if attitude and (series := log.series(_VELOCITIES, width=2)):
         _, time, numbers = series
         north, east = numbers.T
         known = _is_known(log, time)
         if not known.all():
             log.add_finding("unknown velocity", count=int((~known).sum()))
-        psi = np.interp(time, heading[1], np.unwrap(heading[2][:, 0]))
+        psi = np.interp(time, attitude[1], unwrapped(attitude[1], attitude[2][:, 2]))
         along = {SURGE: north * np.cos(psi) + east * np.sin(psi), SWAY: east * np.cos(psi) - north * np.sin(psi)}
         for axis, values in along.items():
-            if layout.has(axis):
-                yield Signal(axis, "velocity", time[known], values[known])
-    if layout.has(HEAVE) and (series := log.series(_DEPTHS)):
+            yield Signal(axis, "velocity", time[known], values[known])
+    if series := log.series(_DEPTHS):
         kind, time, numbers = series
         if kind == "SCALED_PRESSURE2":
             log.add_finding("depth by pressure")
         yield Signal(HEAVE, HEAVE.position, time, numbers[:, 0])
-    if layout.has(YAW) and heading:
-        yield Signal(YAW, YAW.position, heading[1], heading[2][:, 0])
+    if attitude:
+        for axis, values in zip((ROLL, PITCH, YAW), attitude[2].T, strict=True):
+            yield Signal(axis, axis.position, attitude[1], values)
+    if series := log.series(_VOLTAGES, varies=False):
+        _, time, numbers = series
+        yield Signal(None, "voltage", time, numbers[:, 0])
 
 
-def _is_known(log: _Content, time: Array) -> Flags:
+def _is_known(log: _Messages, time: Array) -> Flags:
     """Return True at each time when the filter knew the horizontal velocity; without a status, it always did."""
     series = log.series(_STATUS, varies=False)
     if not series:

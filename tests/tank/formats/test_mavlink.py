@@ -63,7 +63,11 @@ def altitude(time: float, metres: float) -> tuple[float, Any]:
 
 
 def attitude(time: float, yaw: float) -> tuple[float, Any]:
-    return time, mavlink.MAVLink_attitude_message(round(time * 1e3), 0.0, 0.0, yaw, 0.0, 0.0, 0.0)
+    return time, mavlink.MAVLink_attitude_message(round(time * 1e3), 0.1, -0.2, yaw, 0.0, 0.0, 0.0)
+
+
+def battery(time: float, millivolts: int) -> tuple[float, Any]:
+    return time, mavlink.MAVLink_sys_status_message(0, 0, 0, 0, millivolts, -1, -1, *[0] * 6)
 
 
 def parameter(name: str, value: float) -> tuple[float, Any]:
@@ -96,6 +100,16 @@ def test_a_telemetry_log_tells_of_a_dive(bluerov2: Layout, tmp_path: Path) -> No
         ("unknown direction", "", "Dive.TLOG"),
         ("constant motion", "yaw", "Dive.TLOG"),
     ]
+
+
+def test_the_conditions_of_a_telemetry_log(bluerov2: Layout, tmp_path: Path) -> None:
+    """Before its first measurement, the voltage is reported as 65535."""
+    voltages = [battery(100.0, 65535), battery(101.0, 16000), battery(105.0, 15600)]
+    (recording,) = read_log(tlog(tmp_path / "a.tlog", [*dive(), *voltages]), bluerov2).recordings
+    context = recording.context
+    assert context["voltage"] == pytest.approx(np.interp(recording.time, [1.0, 5.0], [16.0, 15.6]), abs=1e-3)
+    assert context["roll"] == pytest.approx(0.1 * np.ones(len(recording.time)))
+    assert context["pitch"] == pytest.approx(-0.2 * np.ones(len(recording.time)))
 
 
 def test_thrusters_by_the_parameters_of_the_autopilot(bluerov2: Layout, tmp_path: Path) -> None:
@@ -189,6 +203,7 @@ FORMATS = {
     "ATT": (152, "QccccCCCCB", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF"),
     "BARO": (153, "QBffcfIffB", "TimeUS,I,Alt,Press,Temp,CRt,SMS,Offset,GndTemp,Health"),
     "XKF1": (154, "QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
+    "BAT": (156, "QBf", "TimeUS,Inst,Volt"),
     "PARM": (155, "QNff", "TimeUS,Name,Value,Default"),
 }
 CODES = {"Q": "Q", "H": "H", "h": "h", "f": "f", "c": "h", "C": "H", "B": "B", "I": "I", "e": "i", "N": "16s"}
@@ -223,7 +238,7 @@ def ctun(time: float, alt: float) -> bytes:
 
 
 def att(time: float, yaw: float) -> bytes:
-    return packed("ATT", round(time * 1e6), 0.0, 0.0, 0.0, 0.0, 0.0, yaw, 0.0, 0.0, 3)
+    return packed("ATT", round(time * 1e6), 0.0, 4.0, 0.0, -6.0, 0.0, yaw, 0.0, 0.0, 3)
 
 
 def baro(time: float, instance: int, alt: float) -> bytes:
@@ -236,6 +251,7 @@ def turn() -> list[bytes]:
     for n in range(N):
         time, c = 50.0 + 0.1 * n, 0.25 * (n >= 10)
         messages += [rcou(time, pulse(c), pulse(-c), pulse(-c), pulse(c), 1500, 1500)]
+        messages += [packed("BAT", round(time * 1e6), battery, 16.0 - 8.0 * battery) for battery in (1, 0)]
         messages += [ctun(time, -2.0), att(time, (350.0 + 2.0 * max(n - 10, 0)) % 360.0)]
     return messages
 
@@ -249,6 +265,8 @@ def test_a_dataflash_log_tells_of_a_turn(bluerov2: Layout, tmp_path: Path) -> No
     assert {name: values[-1] for name, values in recording.thrusters.items()} == pytest.approx(
         {"1": 0.25, "2": -0.25, "3": -0.25, "4": 0.25, "5": 0.0, "6": 0.0}
     )
+    assert recording.context["roll"] == pytest.approx(radians(4.0) * np.ones(N))
+    assert recording.context["voltage"] == pytest.approx(16.0 * np.ones(N))
     assert log.findings == ()
 
 

@@ -1,0 +1,98 @@
+"""The command `rov-fmu identify --inspect`: from a log to a table of what it contains, and a draft of rov.toml."""
+
+import errno
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.file_kinds import LOG_SUFFIXES
+from rov_fmu.io.messages import brief
+from rov_fmu.io.output import Output, WriteError, write_whole
+from rov_fmu.model.layout import BODY
+from rov_fmu.tank.description import ROV_FILE
+from rov_fmu.tank.inspection import Inspection, fitting, inspect, logs_of
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+
+_BAG = "metadata.yaml"
+"""The file in the folder of a bag of ROS 2."""
+
+
+def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
+    """Return what a log, or each log in a folder, contains, with the place and the text of a draft of rov.toml.
+
+    Raises DataFileError.
+    """
+    if not path.exists():
+        raise DataFileError(f"{path}: there is no such file")
+    vehicles = {name: load_vehicle(file) for name, file in SHIPPED.items()}
+    layouts = [vehicle.layout for vehicle in vehicles.values()]
+    found = [inspect(log, layouts) for log in logs_of(path)]
+    if not found:
+        raise DataFileError(f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it")
+    folder = path if path.is_dir() else path.parent
+    folder = folder.parent if (folder / _BAG).is_file() else folder
+    count, changing = max((len(one.commands), _changing(one)) for one in found)
+    if not (fits := fitting(count, layouts)):
+        count, fits = changing, fitting(changing, layouts)
+    base = next((name for name, vehicle in vehicles.items() if vehicle.layout == fits), "")
+    return found, folder / ROV_FILE, "\n".join(_draft(found, count, base, vehicles.get(base))) + "\n"
+
+
+def _changing(inspection: Inspection) -> int:
+    """Return the number of commands up to the last one that changes; more of them may be lights or servos."""
+    return max((n for n, row in enumerate(inspection.commands, start=1) if row.low < row.high), default=0)
+
+
+def write_draft(path: Path, text: str) -> None:
+    """Write a draft of rov.toml. Raises WriteError where there is one."""
+    if path.exists():
+        raise WriteError(errno.EEXIST, "the file there is not replaced by a draft", str(path))
+    write_whole(Output(path, text.encode()))
+
+
+# ---- The draft -------------------------------------------------------------------------------------------------------
+
+
+def _draft(found: Sequence[Inspection], count: int, base: str, vehicle: Vehicle | None) -> Iterator[str]:
+    """Yield the lines of a draft, which is a complete rov.toml."""
+    first = found[0].path
+    names = brief(", ".join(one.path.name for one in found))
+    word = re.sub(r"[^a-z0-9]+", "_", first.stem.lower()).strip("_")
+    yield f"# A draft by `rov-fmu identify --inspect` of {names}: edit it, then run `rov-fmu identify` on its folder."
+    alone = count == 1
+    why = f"the first vehicle that ships with {count} thrusters" if base else "no vehicle that ships has such thrusters"
+    why = "a log of one axis: the vehicle that it is of" if alone else why
+    yield f"base = {_quoted(base or 'videoray')}  # {why}: or your vehicle file, or {', '.join(SHIPPED)}"
+    yield from ("", "[vehicle]", f"name = {_quoted(first.stem)}")
+    yield f"identifier = {_quoted(word if word[:1].isalpha() else f'rov_{word}')}"
+    yield from ('version = "1.0"', f'description = "A vehicle identified from {_quoted(names)[1:-1]}"')
+    yield f"source = {_quoted(names)}"
+    yield from ("", "[known]  # what no log tells: write the values of your vehicle instead of those of the base")
+    for key in BODY:
+        if vehicle and key in vehicle.layout.coefficients:
+            unit = vehicle.layout.coefficients[key].unit
+            yield f'# {key} = {{ value = {vehicle.rov[key]:g}, unit = "{unit}", source = "..." }}'
+    columns = {title: meant for one in found for title, meant in one.columns.items()}
+    is_csv = {one.path: one.path.suffix.lower() not in LOG_SUFFIXES for one in found}
+    others = {name for one in found if is_csv[one.path] for name in one.unread}
+    if columns or others:
+        yield from ("", "[columns]  # what headers of the CSV files stand for: check their units and signs")
+        yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
+        yield from (f'# {_quoted(title)} = "depth [m]"' for title in sorted(others))
+    topics = {name: what for one in found if not is_csv[one.path] for name, what in one.unread.items()}
+    mappable = [f"{name}.{what.rpartition(': ')[2].split(', ')[0]}" for name, what in topics.items() if ": " in what]
+    if mappable:
+        yield from ("", "[topics]  # what other fields of topics stand for, such as:")
+        yield from (f'# {_quoted(field)} = "depth [m]"' for field in mappable)
+    if len([one for one in found if one.commands]) == 1 and len(found) > 1:
+        files = ", ".join(_quoted(one.path.name) for one in found)
+        yield from ("", f"[dives.{word or 'dive'}]", f"files = [{files}]")
+        yield "# other_clock = [...]  # those of the files whose clock is not that of the commands"
+
+
+def _quoted(text: str) -> str:
+    """Return a text as a basic string of TOML."""
+    clean = "".join(c if c.isprintable() else " " for c in text)
+    return '"{}"'.format(clean.replace("\\", "\\\\").replace('"', '\\"'))

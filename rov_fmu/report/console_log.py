@@ -1,0 +1,45 @@
+"""The printout of what a log contains."""
+
+from collections.abc import Iterator
+
+from rich.table import Table
+
+from rov_fmu.report.console import console, table, text
+from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.inspection import Inspection, Row
+
+_MOST_GAPS = 3
+"""The largest number of gaps of a signal that are listed."""
+
+
+def print_inspection(inspection: Inspection) -> None:
+    """Print the commands and signals of a log, what is not recognised, and what was left out."""
+    out = console()
+    out.print(_rows(inspection))
+    if inspection.unread:
+        out.print("\nNot recognised:")
+    for name, what in inspection.unread.items():
+        out.print(f"- {name}{': ' if what else ''}{what}", soft_wrap=True)
+    for title, meant in inspection.columns.items():
+        out.print(f"- {title} is taken as {meant}", soft_wrap=True)
+    for line in sentences(inspection.findings, SENTENCES):
+        out.print(f"- {line}", soft_wrap=True)
+    out.print()
+
+
+def _rows(inspection: Inspection) -> Table:
+    """Return the table of the commands and signals."""
+    numbers = ("unit", "samples", "rate [Hz]", "least", "largest")
+    found = table(str(inspection.path), "", numbers, ("gaps",))
+    for row in (*inspection.commands, *inspection.signals):
+        digits = [text(number, ".4g") for number in (row.rate, row.low, row.high)]
+        found.add_row(row.name, row.unit, str(row.samples), *digits, ", ".join(_gaps(row)))
+    return found
+
+
+def _gaps(row: Row) -> Iterator[str]:
+    """Yield the first gaps of a signal, with times from its first sample."""
+    for start, end in row.gaps[:_MOST_GAPS]:
+        yield f"{end - start:.3g} s at {start - row.start:.4g} s"
+    if (more := len(row.gaps) - _MOST_GAPS) > 0:
+        yield f"{more} more"

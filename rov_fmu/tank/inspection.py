@@ -1,0 +1,186 @@
+"""List what logs contain before a vehicle is known, and what of it a vehicle file would have to explain."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf, pi
+from pathlib import Path
+
+import numpy as np
+
+from rov_fmu.io.csv_table import PULSES, Column, read_columns, read_header
+from rov_fmu.io.file_kinds import LOG_SUFFIXES
+from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
+from rov_fmu.tank.logs import READERS, Names, is_column, read_csv
+from rov_fmu.tank.recording import CONTEXT
+from rov_fmu.tank.signals import gaps
+
+_HEADER = re.compile(r"(?P<name>[^\[(]*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*")
+_COMMAND = re.compile(r"\b(?:thruster|motor|propeller|pwm|servo|esc|cmd|command|u)[ _]*(\d+)\b|^(?:u_|thruster )\S+$")
+_LIKELY = {
+    "depth": {"m": 100.0, "cm": 1e4, "mm": inf},
+    "heading": {"rad": 2.1 * pi, "deg": inf},
+    "roll": {"rad": pi, "deg": inf},
+    "pitch": {"rad": 0.5 * pi, "deg": inf},
+    "voltage": {"V": 1000.0, "mV": inf},
+}
+"""The columns that are recognised by a word, and their units, each with the largest number that it is likely for."""
+_WORDS = {name: name for name in _LIKELY} | {"yaw": "heading", "battery": "voltage"}
+_NOT_MEASURED = {"rate", "speed", "set", "target", "desired"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one signal of a log contains."""
+
+    name: str
+    unit: str
+    start: float
+    """The time of the first sample, s."""
+    samples: int
+    rate: float
+    """The usual rate, 1/s."""
+    low: float
+    high: float
+    gaps: Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a log contains."""
+
+    path: Path
+    commands: tuple[Row, ...]
+    """The commands of the thrusters, in order; or the command of an axis alone."""
+    signals: tuple[Row, ...]
+    unread: Mapping[str, str]
+    """What is not recognised: a description by name."""
+    findings: tuple[Finding, ...]
+    columns: Mapping[str, str] = field(default_factory=dict)
+    """Headers of columns of logs that seem to be meant, by the headers of the file."""
+
+
+def inspect(path: Path, layouts: Iterable[Layout]) -> Inspection:
+    """Return what a log contains; its thrusters have the names of the first layout with as many.
+
+    Raises DataFileError.
+    """
+    columns: dict[str, str] = {}
+    if read := READERS.get(path.suffix.lower()):
+        content = read(path, Wanted())
+        command = None
+    else:
+        titles = read_header(path)
+        numbers = _numbers(path, titles)
+        commanding = [title for title in titles if _is_command(title, numbers[title])]
+        layout = fitting(len(commanding), layouts) or _layout(len(commanding))
+        layout = replace(layout, axes=tuple(VehicleAxis(axis) for axis in AXES.values()))
+        axis = next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
+        columns = dict(_renamed(titles, numbers, commanding, layout, axis))
+        content, command = read_csv(path, layout, axis, Names(columns), is_part=True)
+        unread = [title for title in titles if not is_column(columns.get(title, title), layout, axis)]
+        content.unread = dict.fromkeys(unread, "")
+    rows = [_row("command", "1", *command)] if command else [*_commands(content)]
+    return Inspection(path, tuple(rows), tuple(_signals(content)), content.unread, tuple(content.findings), columns)
+
+
+def logs_of(path: Path) -> list[Path]:
+    """Return the logs in a folder, or in the folder of a bag, or the path itself."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.iterdir() if file.name.lower().endswith((".csv", *LOG_SUFFIXES)))
+
+
+def fitting(count: int, layouts: Iterable[Layout]) -> Layout | None:
+    """Return the first layout with this number of thrusters."""
+    return next((layout for layout in layouts if len(layout.thrusters) == count), None)
+
+
+def _layout(count: int) -> Layout:
+    """Return a layout of thrusters that are only numbered."""
+    return Layout((), (Curve("t"),), tuple(Thruster(str(n + 1), "t", (1.0, 0.0, 0.0), arm=1) for n in range(count)))
+
+
+def _row(name: str, unit: str, time: Array, values: Array) -> Row:
+    there = np.isfinite(values)
+    at, found = time[there], values[there]
+    rate = 1.0 / float(np.median(np.diff(at))) if len(at) > 1 else 0.0
+    low, high = (float(found.min()), float(found.max())) if len(found) else (np.nan, np.nan)
+    return Row(name, unit, float(at[0]) if len(at) else 0.0, len(found), rate, low, high, gaps(time, values))
+
+
+def _commands(content: Content) -> Iterator[Row]:
+    if content.commands:
+        for name, values in content.commands.thrusters.items():
+            yield _row(f"thruster {name}", "1", content.commands.time, values)
+
+
+def _signals(content: Content) -> Iterator[Row]:
+    for signal in content.signals:
+        name, axis = signal.quantity, signal.axis
+        if axis is None:
+            yield _row(name, CONTEXT[name], signal.time, signal.values)
+        else:
+            words = f"{axis.name} {name}" if name in ("velocity", "distance") else name
+            unit = axis.unit if name == "velocity" else axis.position_unit
+            yield _row(words, unit, signal.time, signal.unwrapped())
+
+
+# ---- Columns of unknown names ----------------------------------------------------------------------------------------
+
+
+def _parts(title: str) -> tuple[str, str]:
+    """Return the name and the unit in a header with brackets of any kind."""
+    match = _HEADER.fullmatch(title)
+    return (match["name"], match["unit"]) if match else (title, "")
+
+
+def _numbers(path: Path, titles: Sequence[str]) -> dict[str, Array]:
+    """Return the numbers of every column as they stand in the file."""
+    names = {title: f"{n} [1]" for n, title in enumerate(titles)}
+    columns = {str(n): Column({"1": 1.0}, True, True) for n in range(len(titles))}
+    table = read_columns(path, columns, others=True, loose=True, renamed=names)
+    found = {title: np.frombuffer(table.values[str(n)]) for n, title in enumerate(titles)}
+    return {title: values[np.isfinite(values)] for title, values in found.items()}
+
+
+def _is_command(title: str, numbers: Array) -> bool:
+    """Return True for the command of a thruster, by its name and size."""
+    name, _ = _parts(title)
+    return bool(_COMMAND.search(name.casefold())) and bool(len(numbers)) and np.abs(numbers).max() <= PULSE_RANGE[1]
+
+
+def _renamed(
+    titles: Sequence[str], numbers: Mapping[str, Array], commanding: Sequence[str], layout: Layout, axis: Axis | None
+) -> Iterator[tuple[str, str]]:
+    """Yield what unknown headers seem to mean."""
+    thrusters = [thruster.name for thruster in layout.thrusters]
+    if not all(is_column(title, layout, axis) for title in commanding):
+        for title, name in zip(commanding, thrusters, strict=False):
+            yield title, f"u_{name} [{_unit_of_command(title, numbers)}]"
+    taken: set[str] = set()
+    for title in titles:
+        (name, unit), most = _parts(title), float(np.abs(numbers[title]).max(initial=0.0))
+        words = re.findall("[a-z]+", name.casefold())
+        if title in commanding or is_column(title, layout, axis):
+            continue
+        meant = next((name for word, name in _WORDS.items() if word in words), "")
+        if {"time", "t", "timestamp"} & {*words} and "time" not in taken:
+            usual = float(np.median(np.diff(numbers[title]))) if len(numbers[title]) > 1 else 0.0
+            yield title, f"time [{unit if unit in ('s', 'ms') else 'ms' if usual > 5.0 else 's'}]"
+            taken.add("time")
+        elif meant and meant not in taken and not _NOT_MEASURED & {*words}:
+            likely = next(one for one, largest in _LIKELY[meant].items() if most <= largest)
+            yield title, f"{meant} [{unit if unit in _LIKELY[meant] else likely}]"
+            taken.add(meant)
+
+
+def _unit_of_command(title: str, numbers: Mapping[str, Array]) -> str:
+    """Return the unit of a command: that of its header, or by its size."""
+    _, unit = _parts(title)
+    most = float(np.abs(numbers[title]).max())
+    known = unit in ("%", "1", *PULSES) or unit.startswith(PULSES)
+    return unit if known else "1" if most <= 1.0 else "%" if most <= 100.0 else "us"

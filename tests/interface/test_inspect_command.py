@@ -1,0 +1,122 @@
+"""`rov-fmu identify --inspect`: what logs contain, and a draft of rov.toml with which they are read."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
+from tests.tank.formats import motion, test_mavlink, test_ulog
+from tests.tank.formats.motion import TIME
+from tests.tank.formats.test_bags import Ros, dive
+from tests.tank.test_several_files import table
+
+DEPTH: Array = motion.DEPTH
+
+
+def bag(version: int, suffix: str) -> Callable[[Path], Path]:
+    return lambda folder: Ros(version).write(folder, dive(Ros(version)), suffix)
+
+
+def ulog(folder: Path) -> Path:
+    return test_ulog.dive().write(folder / "dive.ulg")
+
+
+def three_files(folder: Path) -> Path:
+    """Write commands, a depth and a heading of a sensor whose clock begins at 0."""
+    names = [f"thruster{n} (us)" for n in range(1, 7)]
+    table(folder / "out.csv", ",".join(["time [s]", *names]), TIME + 99.0, *(1500 + 400 * c for c in THRUSTERS))
+    table(folder / "bar30.csv", "t,Depth (m),Voltage", TIME + 99.0, DEPTH, motion.VOLTAGE)
+    table(folder / "imu.csv", "Time(ms),yaw,temperature", 1000.0 * TIME, np.degrees(motion.HEADING), TIME)
+    return folder
+
+
+def one_file(folder: Path) -> Path:
+    titles = ["time [s]", *(f"u_{name} [%]" for name in motion.THRUSTERS), "depth [m]", "roll [deg]"]
+    table(folder / "log_a.csv", ",".join(titles), TIME, *(100 * c for c in THRUSTERS), DEPTH, np.degrees(motion.ROLL))
+    return folder / "log_a.csv"
+
+
+def telemetry(folder: Path) -> Path:
+    return test_mavlink.tlog(folder / "dive.tlog", test_mavlink.dive())
+
+
+THRUSTERS = [*motion.THRUSTERS.values()]
+LOGS: dict[str, tuple[Callable[[Path], Path], set[str]]] = {
+    "ROS 1": (bag(1, ".bag"), {"surge", "sway", "heave", "yaw"}),
+    "ROS 2": (bag(2, ".db3"), {"surge", "sway", "heave", "yaw"}),
+    "MCAP": (bag(2, ".mcap"), {"surge", "sway", "heave", "yaw"}),
+    "ULog": (ulog, {"surge", "sway", "heave", "yaw"}),
+    "three files": (three_files, {"heave", "yaw"}),
+    "one file": (one_file, {"heave"}),
+    "telemetry": (telemetry, {"heave"}),
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write, axes = LOGS[name]
+    path = write(tmp_path)
+    assert main(["identify", "--inspect", str(path)]) == 0
+    assert f"{tmp_path / 'rov.toml'}: a draft" in capsys.readouterr().out
+    assert 'base = "bluerov2"' in (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    tests: TankTests = load_tank_tests(tmp_path)
+    assert tests.recordings.keys() == axes
+    (heave,) = tests.recordings["heave"]
+    there = np.isfinite(heave.values)
+    if name != "telemetry":
+        assert heave.values[there] == pytest.approx(DEPTH, abs=1e-5)
+        assert heave.thrusters["6"][there] == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
+    if name == "three files":
+        assert tests.recordings["yaw"][0].clock == "imu.csv"
+        assert heave.context["voltage"][there] == pytest.approx(motion.VOLTAGE, abs=1e-6)
+
+
+def test_the_folder_of_a_bag_is_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = bag(2, ".mcap")(tmp_path).parent
+    assert main(["identify", "--inspect", str(folder)]) == 0
+    assert (tmp_path / "rov.toml").exists()
+    assert "heave velocity" in capsys.readouterr().out
+
+
+def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    there = (TIME < 3.95) | (TIME > 7.95)
+    columns = [TIME, np.where(TIME > 1.0, 30.0, 0.0), DEPTH, TIME, 16.0 + TIME]
+    table(tmp_path / "log_heave.csv", "time [s],command [%],depth [m],Lux,voltage [V]", *(c[there] for c in columns))
+    assert main(["identify", "--inspect", str(tmp_path / "log_heave.csv")]) == 0
+    rows = {line.split("  ")[0]: line.split() for line in capsys.readouterr().out.splitlines() if line}
+    assert rows["command"][1:] == ["1", "60", "10", "0", "0.3", "4.1", "s", "at", "3.9", "s"]
+    assert rows["depth"][1:6] == ["m", "60", "10", "1", "1.99"]
+    assert rows["voltage"][1:6] == ["V", "60", "10", "16", "25.9"]
+    assert "- Lux" in rows
+    assert '# "Lux" = "depth [m]"' in (tmp_path / "rov.toml").read_text(encoding="utf-8").splitlines()
+
+
+def test_a_rov_toml_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "rov.toml").write_text("mine", encoding="utf-8")
+    assert main(["identify", "--inspect", str(one_file(tmp_path))]) == 2
+    found = capsys.readouterr()
+    assert "depth" in found.out
+    assert (
+        found.err == f"rov-fmu: {tmp_path / 'rov.toml'}: cannot be written: the file there is not replaced by a draft\n"
+    )
+    assert (tmp_path / "rov.toml").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.bag", "a.db3", "a.mcap", "a.ulg", "a.tlog", "a.bin", "missing.csv"])
+@pytest.mark.parametrize("content", [b"", b"nonsense\n" * 50])
+def test_what_is_no_log_is_one_line(
+    name: str, content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if name != "missing.csv":
+        (tmp_path / name).write_bytes(content)
+    assert main(["identify", "--inspect", str(tmp_path / name)]) == 2
+    found = capsys.readouterr()
+    assert found.err.startswith(f"rov-fmu: {tmp_path / name}")
+    assert len(found.err.splitlines()) == 1
+    assert not (tmp_path / "rov.toml").exists()

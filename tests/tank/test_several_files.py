@@ -1,0 +1,139 @@
+"""A dive in several CSV files, each with its own times, and names of columns and topics that rov.toml explains."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.io.messages import FileError
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
+from tests.tank.formats import motion
+from tests.tank.formats.motion import TIME
+
+ROV = """base = "bluerov2"
+[vehicle]
+name = "ROV"
+identifier = "rov"
+version = "1.0"
+description = "An ROV"
+source = "Dive of May"
+"""
+FILES = 'files = ["commands.csv", "depth.csv", "heading.csv"]'
+
+
+def table(path: Path, titles: str, *columns: Array) -> None:
+    rows = (",".join(f"{value:.6f}" for value in row) for row in zip(*columns, strict=True))
+    path.write_text("\n".join([titles, *rows]) + "\n", encoding="utf-8")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder with a dive: commands at 10 Hz, a depth and a voltage at 5 Hz, a heading at 4 Hz."""
+    (tmp_path / "rov.toml").write_text(f"{ROV}[dives.may]\n{FILES}\n", encoding="utf-8")
+    titles = ",".join(["time [s]", *(f"u_{name} [1]" for name in motion.THRUSTERS)])
+    table(tmp_path / "commands.csv", titles, 1000.0 + TIME, *motion.THRUSTERS.values())
+    slow: Array = np.arange(0.01, 9.9, 0.2)
+    table(tmp_path / "depth.csv", "time [s],depth [cm],voltage [V]", 1000.0 + slow, 100.0 + 10.0 * slow, 16.0 - slow)
+    slower: Array = np.arange(0.02, 9.9, 0.25)
+    table(tmp_path / "heading.csv", "time [s],heading [deg]", 1000.0 + slower, np.degrees(2.0 + 0.3 * slower))
+    return tmp_path
+
+
+def read(folder: Path) -> tuple[TankTests, dict[str, Recording]]:
+    tests = load_tank_tests(folder)
+    return tests, {name: recording for name, (recording,) in tests.recordings.items()}
+
+
+def mistakes(folder: Path) -> list[str]:
+    with pytest.raises(FileError) as error:
+        load_tank_tests(folder)
+    return str(error.value).replace(f"{folder}/", "").splitlines()
+
+
+def test_files_of_one_clock_are_joined_by_their_times(folder: Path) -> None:
+    tests, recordings = read(folder)
+    assert {name: (one.file, one.clock) for name, one in recordings.items()} == {
+        "heave": ("depth.csv", ""),
+        "yaw": ("heading.csv", ""),
+    }
+    heave = recordings["heave"]
+    there = np.isfinite(heave.values)
+    assert there.sum() == 50
+    assert heave.values[there] == pytest.approx(1.0 + 0.1 * heave.time[there], abs=1e-6)
+    assert heave.thrusters["5"] == pytest.approx(np.where(heave.time > 0.999, 0.5, 0.0))
+    assert recordings["yaw"].context["voltage"][50] == pytest.approx(16.0 - recordings["yaw"].time[50], abs=1e-6)
+    assert tests.inputs.keys() == {"rov.toml", "bluerov2", "commands.csv", "depth.csv", "heading.csv"}
+
+
+@pytest.mark.parametrize("declared", [False, True])
+def test_a_file_of_another_clock_is_told_and_aligned(folder: Path, declared: bool) -> None:
+    """Its clock began at 0, or was set by hand and is 2 s late."""
+    slower: Array = np.arange(0.0, 9.9, 0.25)
+    start = 1002.0 if declared else 0.0
+    table(folder / "heading.csv", "time [s],heading [deg]", start + slower, np.degrees(2.0 + 0.3 * slower))
+    if declared:
+        other = f'{ROV}[dives.may]\n{FILES}\nother_clock = ["heading.csv"]\n'
+        (folder / "rov.toml").write_text(other, encoding="utf-8")
+    tests, recordings = read(folder)
+    yaw = recordings["yaw"]
+    assert (yaw.clock, recordings["heave"].clock) == ("heading.csv", "")
+    there = np.isfinite(yaw.values)
+    late = 2.0 if declared else 0.0
+    assert yaw.values[there] == pytest.approx(2.0 + 0.3 * (yaw.time[there] - late), abs=1e-5)
+    (line,) = (line for line in sentences(tests.findings, SENTENCES) if "clock" in line)
+    aligned = "" if declared else ", and they share no time: its first sample is taken as that of the first command,"
+    assert line == (
+        f"heading.csv: its clock is not that of the commands{aligned or ':'}"
+        f"{'' if declared else ' and'} how far it is off is to be fitted, within 5 s"
+    )
+
+
+@pytest.mark.parametrize(
+    ("dive", "line"),
+    [
+        ('files = ["commands.csv", "dept.csv"]', "rov.toml: dives.may.files = 'dept.csv': there is no such file"),
+        (
+            'files = ["heading.csv", "depth.csv"]',
+            "heading.csv: one file of its dive must have the commands, and not no",
+        ),
+        (f'{FILES}\nother_clock = ["depht.csv"]', "rov.toml: dives.may.other_clock = 'depht.csv': must be one of"),
+        ('files = ["commands.csv"]', "rov.toml: dives.may.files = ['commands.csv']: must be two or more files"),
+        (f"{FILES}\nclocks = 2", "rov.toml: dives.may.clocks: there is no such key"),
+    ],
+)
+def test_a_wrong_dive_is_one_line(folder: Path, dive: str, line: str) -> None:
+    (folder / "rov.toml").write_text(f"{ROV}[dives.may]\n{dive}\n", encoding="utf-8")
+    for name in ("heading.csv", "depth.csv", "commands.csv"):
+        if name not in dive:
+            (folder / name).unlink()
+    found = mistakes(folder)
+    assert len(found) == 1
+    assert found[0].startswith(line)
+
+
+def test_unknown_columns_are_named(folder: Path) -> None:
+    table(folder / "depth.csv", "t,Pressure depth", 1000.0 + TIME, 100.0 * motion.DEPTH)
+    names = '[columns]\n"Pressure depth" = "depth [cm]"\nt = "time [s]"\n'
+    (folder / "rov.toml").write_text(f"{ROV}{names}[dives.may]\n{FILES}\n", encoding="utf-8")
+    _, recordings = read(folder)
+    assert recordings["heave"].values[np.isfinite(recordings["heave"].values)] == pytest.approx(motion.DEPTH, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("names", "line"),
+    [
+        ('[columns]\nDepthh = "depth [m]"', "rov.toml: columns.Depthh = 'depth [m]': no log has such a column"),
+        ('[columns]\nx = "dpeth [m]"', "rov.toml: columns.x = 'dpeth [m]': there is no such column, but"),
+        ('[topics]\n"/d.data" = "depth [m]"', "rov.toml: topics./d.data = 'depth [m]': no log has such a topic"),
+        ('[columns]\nx = "-depth [m]"', "rov.toml: columns.x = '-depth [m]': there is no such column, but"),
+        ('[topics]\n"/d.data" = "depth"', "rov.toml: topics./d.data = 'depth': must be 'depth [m]' or"),
+    ],
+)
+def test_an_unknown_name_is_one_line(folder: Path, names: str, line: str) -> None:
+    (folder / "rov.toml").write_text(f"{ROV}{names}\n[dives.may]\n{FILES}\n", encoding="utf-8")
+    found = mistakes(folder)
+    assert len(found) == 1
+    assert found[0].startswith(line)

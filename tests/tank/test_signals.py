@@ -1,0 +1,76 @@
+"""Commands, motion and conditions, each with its own times, as recordings; gaps; headings that wrap."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.signals import Commands, Signal, gaps, recordings_of, unwrapped
+from rov_fmu.vehicle.shipped import PAPER
+
+STEPS: Array = np.linspace(0.0, 19.9, 200)
+
+
+def wrapped(heading: Array) -> Array:
+    return (heading + pi) % (2.0 * pi) - pi
+
+
+def test_conditions_are_interpolated_at_the_times_of_a_recording() -> None:
+    """The voltage comes each 5 s, roll and pitch are no axes of this vehicle, and the distance begins at 0."""
+    still: Array = np.zeros(len(STEPS))
+    commands = Commands(STEPS, {"l": still, "r": still, "t": np.where(STEPS > 2.0, 0.5, still)})
+    slow = np.array([0.0, 5.0, 10.0, 15.0])
+    signals = [
+        Signal(HEAVE, "depth", STEPS, 1.0 + 0.1 * STEPS),
+        Signal(ROLL, "roll angle", STEPS, wrapped(0.4 * STEPS)),
+        Signal(PITCH, "pitch angle", STEPS, np.where(STEPS < 1.0, np.nan, 0.2)),
+        Signal(SURGE, "distance", STEPS, 7.0 + STEPS),
+        Signal(None, "voltage", slow, 16.0 - 0.1 * slow),
+    ]
+    recordings, _ = recordings_of("a.csv", PAPER, commands, signals)
+    (heave,) = (recording for recording in recordings if recording.axis is HEAVE)
+    assert heave.context["voltage"] == pytest.approx(16.0 - 0.1 * np.minimum(STEPS, 15.0))
+    assert heave.context["roll"] == pytest.approx(0.4 * STEPS)
+    assert heave.context["pitch"] == pytest.approx(0.2 * np.ones(len(STEPS)))
+    assert heave.context["depth"] == pytest.approx(heave.values)
+    assert heave.context["distance"] == pytest.approx(STEPS)
+
+
+@pytest.mark.parametrize(
+    ("interval", "lost", "found"),
+    [(0.1, (5.0, 9.0), [(5.0, 9.0)]), (0.1, (5.0, 5.9), []), (1.0, (5.0, 14.0), []), (0.1, (19.95, 30.0), [])],
+    ids=["4 s", "below 1 s", "nine of its intervals", "at the end"],
+)
+def test_gaps(interval: float, lost: tuple[float, float], found: list[tuple[float, float]]) -> None:
+    time = interval * 10.0 * STEPS
+    values = np.where((time > lost[0] + 1e-9) & (time < lost[1] - 1e-9), np.nan, 1.0)
+    assert gaps(time, values) == [pytest.approx(gap) for gap in found]
+
+
+def test_gaps_are_told_with_their_time_and_length() -> None:
+    depth = np.where((STEPS > 4.95) & (STEPS < 9.05) | (STEPS > 12.95) & (STEPS < 15.05), np.nan, STEPS)
+    commands = Commands(STEPS, {name: np.where(STEPS > 2.0, 0.5, 0.0) for name in "lrt"})
+    _, findings = recordings_of("a.csv", PAPER, commands, [Signal(HEAVE, "depth", STEPS, depth)])
+    assert sentences(findings, SENTENCES) == (
+        "a.csv: 2 gaps in heave, by which the recording is divided: 4.2 s from 4.9 s on, 2.2 s from 12.9 s on",
+    )
+
+
+def test_a_wrapped_heading_is_unwrapped_and_keeps_its_blanks() -> None:
+    heading = 2.0 + 0.7 * STEPS
+    values = wrapped(heading)
+    values[50:55] = np.nan
+    assert np.isnan(unwrapped(STEPS, values)[50:55]).all()
+    assert np.delete(unwrapped(STEPS, values), range(50, 55)) == pytest.approx(np.delete(heading, range(50, 55)))
+    np.testing.assert_allclose(unwrapped(STEPS, values % (2.0 * pi)), unwrapped(STEPS, values))
+
+
+@pytest.mark.parametrize("turns", [0.05, 3.0], ids=["within a turn", "several turns"])
+def test_a_continuous_heading_stays_as_it_is_over_a_gap(turns: float) -> None:
+    """The vehicle turns by more than half a turn in the gap, which looks like a jump."""
+    heading = turns * pi * np.where(STEPS < 8.0, 0.0, 1.0) + np.where(STEPS < 8.0, 0.0, 3.2) + 0.001 * STEPS
+    there = (STEPS < 8.0) | (STEPS > 12.0)
+    assert (unwrapped(STEPS[there], heading[there]) == heading[there]).all()
