@@ -10,6 +10,7 @@ from rov_fmu.identify.recordings.recordings_fit import Effect
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.report.console import DEVIATION, console, table, text
 from rov_fmu.report.findings import Unseen, acting, effects, unseen
+from rov_fmu.report.templates import two_digits
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _LEAVE_ONE_OUT = "leave-\none-out"
@@ -38,7 +39,9 @@ def print_identification(identification: Identification) -> None:
         out.print()
         out.print(found)
     out.print(
-        "\ndev.: relative to the measured value. leave-one-out: by a fit without the points of the same thrust.\n"
+        "\nno change: by a model whose position or velocity stays. noise: the sensor's own. explained: of the change "
+        "beyond the noise.\n"
+        "dev.: relative to the measured value. leave-one-out: by a fit without the points of the same thrust.\n"
         "(weight 0): not fitted, and not counted in the RMS. interval: 95 % confidence."
     )
     if identification.warnings:
@@ -49,8 +52,11 @@ def print_identification(identification: Identification) -> None:
 
 def _first_tables(identification: Identification, comparisons: Sequence[Comparison]) -> Iterator[Table]:
     """Yield the tables of the predictions, of the coefficients and of the other effects."""
-    if predicted := list(unseen(identification, comparisons)):
-        yield _predicted(predicted)
+    predicted = list(unseen(identification, comparisons))
+    if of_recordings := [row for row in predicted if row.error is None]:
+        yield _predicted(of_recordings)
+    if of_points := [row for row in predicted if row.error is not None]:
+        yield _predicted_points(of_points)
     yield _coefficients(identification.vehicle)
     kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
     if kept:
@@ -79,12 +85,23 @@ def _detailed_tables(
 
 
 def _predicted(found: Iterable[Unseen]) -> Table:
-    """Return the table of how well the model predicts data that it was not fitted to."""
-    result = table("Prediction of what a fit has not seen", "axis", ("fit", "RMS error"), ("of",))
+    """Return the table of how far predictions of recordings are off that the model was not fitted to."""
+    numbers = ("off by", "no change", "noise", "explained")
+    result = table("Prediction of recordings by fits to the others, RMS", "", numbers, ("of",))
     for row in found:
-        fit = "" if row.fit is None else text(row.fit / 100.0, ".1%")
-        error = "" if row.error is None else text(row.error, ".1%")
-        result.add_row(row.axis.name, fit, error, f"{row.what}, {row.by}")
+        if not row.errors:
+            result.add_row(row.axis.name, *("-" for _ in numbers), f"{row.what}: {row.by}")
+        for e in row.errors:
+            values = (f"{two_digits(value)} {e.unit}" for value in (e.predicted, e.unchanged, e.noise))
+            result.add_row(f"{row.axis.name} {e.of}, {e.span}", *values, text(e.explained, ".1%"), row.what)
+    return result
+
+
+def _predicted_points(found: Iterable[Unseen]) -> Table:
+    """Return the table of how far predictions of points are off that the model was not fitted to."""
+    result = table("Prediction of points that were not fitted, relative RMS", "axis", ("off by",), ("of",))
+    for row in found:
+        result.add_row(row.axis.name, text(row.error, ".1%"), f"{row.what}, {row.by}")
     return result
 
 

@@ -11,7 +11,7 @@ from rov_fmu.identify.recordings.recordings_fit import count
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.io.output import Output
 from rov_fmu.io.seal import sealed
-from rov_fmu.report.findings import Known, acting, effects, known, unseen, verdict
+from rov_fmu.report.findings import Known, acting, effects, known, measured_and_fitted, unseen, verdict
 from rov_fmu.report.plots.fits import plot_drag, plot_known, plot_response, plot_steps, plot_thrust
 from rov_fmu.report.plots.recordings import CommandStep, clearest_step, plot_recording, plot_step
 from rov_fmu.report.plots.svg import Draw, inline_svg
@@ -43,7 +43,8 @@ def report_page(results: Identification) -> str:
         comparisons=comparisons,
         curves=results.vehicle.layout.curves,
         unseen=predicted,
-        unseen_fit=dict(part for row in predicted for part in row.parts),
+        unseen_parts={file: errors for row in predicted for file, errors in row.parts.items()},
+        both=tuple(measured_and_fitted(results)),
         known=found,
         closeups=closeups,
         plots={label: inline_svg(label, draw, size) for label, draw, size in plots},
