@@ -77,13 +77,17 @@ def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Id
             raise DataFileError(f"{tests.folder}: {backward[0]}")
     results.sort(key=lambda result: [*given.rov.layout.kinds].index(result.axis.name))
     on_progress("what to measure next", 0.95)
-    results = [replace(result, next_test=_next_test(result, found.rov)) for result in results]
     findings = [*tests.findings, *doubts]
     for name, fit in thrust.items():
         findings += diagnostics.on_thrust(name, fit)
     for result in results:
         findings += result.findings
     findings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
+    drifting = {finding.axis for finding in findings if finding.kind == "drift"}
+    results = [
+        replace(result, next_test=_next_test(tests, result, found.rov, repeat=result.axis.name in drifting))
+        for result in results
+    ]
     vehicle = found.vehicle(results, Together(thrust.values(), results), findings)
     return Identification(tests, vehicle, thrust, tuple(results), against, tuple(findings))
 
@@ -293,14 +297,15 @@ def _points(tests: TankTests, axis: Axis, found: Sequence[StepResponse]) -> tupl
     return tuple(points)
 
 
-def _next_test(result: AxisResult, rov: Rov) -> NextTest | None:
+def _next_test(tests: TankTests, result: AxisResult, rov: Rov, *, repeat: bool) -> NextTest | None:
     """Return the test that would help an axis most, with the sensor of its recordings or a typical one."""
     if result.estimate is None:
         return None
     fit = result.recordings
     quantity = fit.simulations[0].recording.quantity if fit else result.axis.position
     noise = max(s.noise * np.sqrt(s.correlation_time) for s in fit.simulations) if fit else NOISE[quantity]
-    return next_test(result.axis, rov, result.estimate, Sensor(quantity, max(float(noise), 1e-9)))
+    sensor, limits = Sensor(quantity, max(float(noise), 1e-9)), tests.given.description.tank_limits
+    return next_test(result.axis, rov, result.estimate, sensor, limits, repeat=repeat)
 
 
 def _weight(tests: TankTests, window: str, command: float) -> float:

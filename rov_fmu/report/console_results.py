@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from rich.table import Table
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
-from rov_fmu.identify.next_test import NextTest
+from rov_fmu.identify.next_test import REPEATED, NextTest
 from rov_fmu.identify.recordings.recordings_fit import Effect
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.report.console import DEVIATION, console, table, text
@@ -34,7 +34,8 @@ def print_identification(identification: Identification) -> None:
     if identification.next_tests:
         out.print("\nTo measure next:")
     for test in identification.next_tests:
-        out.print(_next_test(test), soft_wrap=True)
+        for line in _next_test(test):
+            out.print(f"- {test.axis.name}: {line}", soft_wrap=True)
     for found in _detailed_tables(identification, comparisons, other):
         out.print()
         out.print(found)
@@ -63,12 +64,18 @@ def _first_tables(identification: Identification, comparisons: Sequence[Comparis
         yield _effects(kept)
 
 
-def _next_test(test: NextTest) -> str:
-    """Return the line about a test to make next."""
-    if not test.interval:
-        return f"- {test.axis.name}: {test.words} ({test.coefficient}, not identifiable yet)"
-    now = f"now {test.interval[0]:.3g} ... {test.interval[1]:.3g}"
-    return f"- {test.axis.name}: {test.words} ({test.coefficient}, {now}; then {1.0 - test.narrowed:.0%} narrower)"
+def _next_test(test: NextTest) -> Iterator[str]:
+    """Yield the lines about a test to make next, or that none is needed."""
+    now = "now {:.3g} ... {:.3g}".format(*test.interval) if test.interval else "not identifiable yet"
+    if test.is_known:
+        yield f"enough is known; the widest interval is that of {test.coefficient}, {now}"
+    elif not test.is_useful:
+        yield f"no step within the limits would narrow the widest interval by a tenth ({test.coefficient}, {now})"
+    else:
+        then = f"; then {1.0 - test.narrowed:.0%} narrower" if test.interval else ""
+        yield f"{test.words} ({test.coefficient}, {now}{then})"
+    if test.repeat:
+        yield REPEATED
 
 
 def _detailed_tables(

@@ -7,6 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
+from rov_fmu.identify.next_test import REPEATED
 from rov_fmu.identify.recordings.recordings_fit import count
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.io.output import Output
@@ -46,6 +47,7 @@ def report_page(results: Identification) -> str:
         unseen_parts={file: errors for row in predicted for file, errors in row.parts.items()},
         both=tuple(measured_and_fitted(results)),
         known=found,
+        repeated=REPEATED,
         closeups=closeups,
         plots={label: inline_svg(label, draw, size) for label, draw, size in plots},
         of_points={name: [label for label, _, _ in some] for name, some in of_points.items()},

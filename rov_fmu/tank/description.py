@@ -5,8 +5,10 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 """
 
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -77,6 +79,40 @@ class _Fit(Strict):
     """The curves whose thrusters' lag is fitted; true for all curves."""
 
 
+def _as_fraction(value: object) -> object:
+    """Return a text in percent as a fraction."""
+    percent = re.fullmatch(r"\s*([0-9.]+)\s*%\s*", value) if isinstance(value, str) else None
+    return float(percent[1]) / 100.0 if percent else value
+
+
+def _check_command(value: float) -> float:
+    if not 0.0 < value <= 1.0:
+        raise ValueError('must be above 0 and at most 1, a fraction of full thrust: half is 0.5, or "50 %" in quotes')
+    return value
+
+
+def _above(least: float, what: str) -> AfterValidator:
+    """Check that a number is above the least one; `what` names it with its unit."""
+
+    def check(value: float) -> float:
+        if not value > least:
+            raise ValueError(f"must be {what}, above {least:g}")
+        return value
+
+    return AfterValidator(check)
+
+
+class TankLimits(Strict):
+    """The table [limits]: the most that a proposed test may take."""
+
+    tank_length: Annotated[Finite, _above(0.0, "the length of the tank in m")] = inf
+    """The longest distance along surge, sway or heave, m."""
+    command_max: Annotated[Finite, BeforeValidator(_as_fraction), AfterValidator(_check_command)] = 1.0
+    """The strongest command, a fraction of full thrust."""
+    duration: Annotated[Finite, _above(0.0, "the duration of a test in s")] = inf
+    """The longest recording, s."""
+
+
 class _ReadableFile(OpenHardware):
     """The parts of rov.toml that could be read."""
 
@@ -87,6 +123,7 @@ class _ReadableFile(OpenHardware):
     windows: dict[str, _Window] = Field(default={})
     validity: Validity | None = None
     fit: _Fit = _Fit()
+    limits: TankLimits = TankLimits()
 
 
 class _RovFile(_ReadableFile):
@@ -123,6 +160,8 @@ class Description:
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     lag: tuple[str, ...]
     """The curves whose thrusters' lag is fitted."""
+    tank_limits: TankLimits
+    """The most that a proposed test may take."""
     command_range: tuple[float, float] | None
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
@@ -206,6 +245,7 @@ def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None)
         thruster_sources=thruster_sources,
         windows=file.windows,
         lag=tuple(curve.name for curve in layout.curves) if file.fit.lag is True else file.fit.lag,
+        tank_limits=file.limits,
         command_range=file.validity.command_range if file.validity else None,
         limits=file.validity.limits if file.validity else limits,
         base=_vehicle_file(file.base, folder / file.base) if file.base else None,
