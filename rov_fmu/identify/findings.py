@@ -149,6 +149,21 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     "outliers": "{axes}: {share:.0%} of the samples of {files} are outliers and count less",
     "disagreement": _disagreement,
+    "impossible velocity": (
+        "{files}: no recording of {axes}: {quantity} tells of a velocity of {speed:.3g} {unit}, which is possible from "
+        "{low:g} to {high:g} only. Is its unit right, and that of time?"
+    ),
+    "no thrust": (
+        "{axes}: all its tests are left out, because the thrust curve of {curves} gives {force:.3g} {unit} at a "
+        "command of {command:.0%}, where {axes} needs a push that way. Check the thrust tests, their signs and windows"
+    ),
+    "no tests of drag": (
+        "{axes}: all its tests are left out: none that counts tells its drag, and rov.toml does not give {drag}"
+    ),
+    "no fit": "{files}: no recording of {axes}, because {reason}. {cause}",
+    "fitted apart": (
+        "{axes}: no vehicle fits the recordings of all these axes together, so each axis is fitted alone: {reason}"
+    ),
     "poor prediction": (
         "{axes}: a fit to {others} predicts the velocity of a recording to {predicted:.2g} {unit} (RMS), a model "
         "without any change to {unchanged:.2g} {unit}, and the sensor's noise is {noise:.1g} {unit}: do not trust this "
