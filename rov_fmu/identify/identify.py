@@ -30,6 +30,7 @@ from rov_fmu.identify.slips.search import beta_out_of_range
 from rov_fmu.identify.together import Together
 from rov_fmu.identify.usable import UnusableError, check_push, check_recording, check_slips, is_pushed
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import Progress, part, silent
 from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import Axis, Curve
 from rov_fmu.model.rov import Rov
@@ -40,16 +41,15 @@ from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
-Progress = Callable[[str, float], None]
-"""A function that is called with the name of the next step and the share of the work that is done."""
-
+_CHECKED, _FITTED = 0.1, 0.9
+"""The share of the work that is done when units and signs are checked, and when the recordings are fitted."""
 _SATURATED = 0.2
 """The share of the time at full command from which on saturation is the likely cause of a recording without a fit."""
 _ASSUMED_ALPHA = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
 _ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
 
 
-def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Identification:
+def identify(tests: TankTests, on_progress: Progress = silent) -> Identification:
     """Identify a vehicle from its tests.
 
     Tests that cannot be used are left out with a finding. Raises DataFileError where nothing can be learnt, or where
@@ -73,17 +73,20 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
         found.take_thrust(fit)
     results: list[AxisResult] = []
     doubts: list[Finding] = []
-    for _, axes in connected(given.rov.layout):
+    groups = [*connected(given.rov.layout)]
+    for n, (_, axes) in enumerate(groups):
+        on_progress(f"units and signs of {_named(axes)}", _CHECKED * n / len(groups))
         doubts += check_slips(tests, axes, found.rov)
         for recording in _recordings(tests, axes):
             check_push(tests.folder, recording.axis, found.rov, [1.0])
             check_recording(tests.folder, recording, found.rov)
-    for curves, axes in connected(given.rov.layout):
-        on_progress(
-            f"recordings of {join_names(axis.name for axis in axes)}", 0.9 * len(results) / len(given.rov.layout.axes)
-        )
+    samples = [sum(len(recording.time) for recording in _recordings(tests, axes)) for _, axes in groups]
+    shares = [_CHECKED + (_FITTED - _CHECKED) * sum(samples[:n]) / max(sum(samples), 1) for n in range(len(groups) + 1)]
+    for n, (curves, axes) in enumerate(groups):
+        of_group = part(on_progress, shares[n], shares[n + 1])
+        of_group(f"recordings of {_named(axes)}", 0.0)
         tested = {curve.name: thrust[curve.name] for curve in curves if curve.name in thrust}
-        recorded, apart = _fit_recordings(tests, _recordings(tests, axes), found.rov, tested, on_progress)
+        recorded, apart = _fit_recordings(tests, _recordings(tests, axes), found.rov, tested, of_group)
         doubts += apart
         for fit_of_axis in recorded.values():  # these replace the tested thrust curves
             found.take_recordings(fit_of_axis)
@@ -96,7 +99,6 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
         if backward := [*no_thrust(curve, found.rov.coefficients, place)]:
             raise DataFileError(f"{tests.folder}: {backward[0]}")
     results.sort(key=lambda result: [*given.rov.layout.kinds].index(result.axis.name))
-    on_progress("what to measure next", 0.95)
     findings = [*tests.findings, *doubts]
     for name, fit in thrust.items():
         findings += diagnostics.on_thrust(name, fit)
@@ -104,10 +106,10 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
         findings += result.findings
     findings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
     drifting = {finding.axis for finding in findings if finding.kind == "drift"}
-    results = [
-        replace(result, next_test=_next_test(tests, result, found.rov, repeat=result.axis.name in drifting))
-        for result in results
-    ]
+    for n, result in enumerate(results):
+        on_progress(f"what to measure next of {result.axis.name}", _FITTED + (1.0 - _FITTED) * n / len(results))
+        test = _next_test(tests, result, found.rov, repeat=result.axis.name in drifting)
+        results[n] = replace(result, next_test=test)
     vehicle = found.vehicle(results, Together(thrust.values(), results), findings)
     return Identification(tests, vehicle, thrust, tuple(results), against, tuple(findings))
 
@@ -201,6 +203,10 @@ class _Found:
         )
 
 
+def _named(axes: Iterable[Axis]) -> str:
+    return join_names(axis.name for axis in axes)
+
+
 def _capitalized(words: str) -> str:
     return words[0].upper() + words[1:]
 
@@ -249,7 +255,7 @@ def _fit_recordings(
     apart: dict[str, RecordingsFit] = {}
     for n, axis in enumerate(axes):
         own = [recording for recording in recordings if recording.axis is axis]
-        on_progress(f"recordings of {axis.name} alone", 0.9 * n / len(axes))
+        on_progress(f"recordings of {axis.name} alone", n / len(axes))
         try:
             if len(axes) == 1:
                 raise together

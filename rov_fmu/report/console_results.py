@@ -10,7 +10,6 @@ from rov_fmu.identify.recordings.recordings_fit import Effect
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.report.console import DEVIATION, console, table, text
 from rov_fmu.report.findings import Unseen, acting, effects, unseen
-from rov_fmu.report.templates import two_digits
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _LEAVE_ONE_OUT = "leave-\none-out"
@@ -99,7 +98,7 @@ def _predicted(found: Iterable[Unseen]) -> Table:
         if not row.errors:
             result.add_row(row.axis.name, *("-" for _ in numbers), f"{row.what}: {row.by}")
         for e in row.errors:
-            values = (f"{two_digits(value)} {e.unit}" for value in (e.predicted, e.unchanged, e.noise))
+            values = (f"{float(f'{value:.2g}'):g} {e.unit}" for value in (e.predicted, e.unchanged, e.noise))
             result.add_row(f"{row.axis.name} {e.of}, {e.span}", *values, text(e.explained, ".1%"), row.what)
     return result
 

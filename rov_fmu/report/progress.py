@@ -25,6 +25,9 @@ from rich.progress import (
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.report.console import console
 
+_PERIOD = 600.0
+"""The time over which the speed of the work is averaged to estimate the time left, s."""
+
 
 @contextmanager
 def compiling(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
@@ -39,8 +42,19 @@ def compiling(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def bar() -> Iterator[Callable[[str, float], None]]:
-    """Show one bar. Yields the function to call with the name of the next step and the share of work done (0 to 1)."""
-    columns = SpinnerColumn(), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
+    """Show one bar, with the time taken and left.
+
+    Yields the function to call with the name of the next step and the share of work done (0 to 1).
+    """
+    columns = (
+        SpinnerColumn(),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TextColumn("so far, left:"),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
     with _shown(*columns) as progress:
         if progress is None:
             yield lambda *_: None
@@ -120,7 +134,7 @@ def _shown(*columns: ProgressColumn) -> Iterator[Progress | None]:
     if not out.is_terminal:
         yield None
         return
-    progress = Progress(*columns, console=out, transient=True)
+    progress = Progress(*columns, console=out, transient=True, speed_estimate_period=_PERIOD)
     progress.start()
     with cleaned_up(progress.stop):
         yield progress
