@@ -16,17 +16,16 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     SpinnerColumn,
+    Task,
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.text import Text
 
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.report.console import console
-
-_PERIOD = 600.0
-"""The time over which the speed of the work is averaged to estimate the time left, s."""
 
 
 @contextmanager
@@ -51,8 +50,7 @@ def bar() -> Iterator[Callable[[str, float], None]]:
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
-        TextColumn("so far, left:"),
-        TimeRemainingColumn(),
+        TimeLeftColumn(),
         TextColumn("{task.description}"),
     )
     with _shown(*columns) as progress:
@@ -61,6 +59,28 @@ def bar() -> Iterator[Callable[[str, float], None]]:
         else:
             task = progress.add_task("reading", total=1.0)
             yield lambda step, share: progress.update(task, description=step, completed=share)
+
+
+class TimeLeftColumn(ProgressColumn):
+    """About the time left, for work whose share is known at a few moments only.
+
+    It follows from the time and the share of the work at the last of these moments, and counts down from there.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._share = 0.0
+        self._whole = 0.0
+        """The time that all of the work takes, s."""
+
+    def render(self, task: Task) -> Text:
+        """Return the time left in minutes and seconds; nothing before any work is done."""
+        if task.elapsed is None or task.completed <= 0.0:
+            return Text("")
+        if task.completed != self._share:
+            self._share, self._whole = task.completed, task.elapsed / task.completed
+        minutes, seconds = divmod(round(max(self._whole - task.elapsed, 0.0)), 60)
+        return Text(f"about {minutes}:{seconds:02} left")
 
 
 @contextmanager
@@ -134,7 +154,7 @@ def _shown(*columns: ProgressColumn) -> Iterator[Progress | None]:
     if not out.is_terminal:
         yield None
         return
-    progress = Progress(*columns, console=out, transient=True, speed_estimate_period=_PERIOD)
+    progress = Progress(*columns, console=out, transient=True)
     progress.start()
     with cleaned_up(progress.stop):
         yield progress
