@@ -7,15 +7,21 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rov_fmu.identify.diagnostics import on_axis
+from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.identification import AxisResult
+from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings import held_out
 from rov_fmu.identify.recordings.held_out import HeldOut, hold_out
 from rov_fmu.identify.recordings.prediction_errors import Errors, shown_in
+from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.identify.recordings.runs import prepare
 from rov_fmu.identify.recordings.simulator import Simulator
 from rov_fmu.identify.recordings.trajectory import MotionError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import sensor_noise
 from tests.recordings import NOISE, PLANS, clean
@@ -122,3 +128,22 @@ def test_the_noise_of_a_sensor_is_at_least_its_rounding() -> None:
     assert sensor_noise(rounded) == pytest.approx(0.01 / np.sqrt(12.0))
     noisy = 0.02 * time + 0.005 * np.random.default_rng(0).standard_normal(1000)
     assert sensor_noise(noisy) == pytest.approx(0.005, rel=0.1)
+
+
+def test_poor_and_failed_predictions_are_warned_of() -> None:
+    recordings, alpha = recorded(YAW), YAW.coefficient("alpha")
+    good, poor = (predicted(recordings, VIDEORAY.replaced({alpha: x * VIDEORAY[alpha]})) for x in (1.0, 0.1))
+    nothing = Estimate((), np.zeros(0), np.zeros((0, 0)), 1.0, 1.0)
+
+    def warned(found: HeldOut) -> list[Finding]:
+        fit = RecordingsFit(YAW, VIDEORAY, nothing, nothing, (), (), lambda: found)
+        return [*on_axis(AxisResult(YAW, (), (), None, None, fit, {}, ()), VIDEORAY, {})]
+
+    assert warned(good) == []
+    (finding,) = warned(poor)
+    assert finding.kind == "poor prediction"
+    assert finding.numbers["predicted"] == degrees(poor.errors["whole recording", "velocity"].rms[0])
+    assert "deg/s, and the sensor's noise is 3 deg/s: do not trust this axis" in sentences([finding])[0]
+    (failed,) = warned(replace(good, failed=("log_9.csv",)))
+    assert (failed.kind, failed.file) == ("failed prediction", "log_9.csv")
+    assert sentences([failed])[0].startswith("yaw: the motion of log_9.csv cannot be computed with a fit to the others")
