@@ -11,6 +11,7 @@ from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.identify.points.thrust_fit import ThrustFit
+from rov_fmu.identify.recordings.prediction_errors import Key, shown_in
 from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
 from rov_fmu.identify.usable import is_pushed
 from rov_fmu.io.toml_file import join_names
@@ -18,6 +19,10 @@ from rov_fmu.model.layout import REVERSE
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
+
+_WHOLE_VELOCITY: Key = ("whole recording", "velocity")
+_LEAST_EXPLAINED = 0.5
+"""The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""
 
 
 def on_thrust(curve: str, fit: ThrustFit) -> Iterator[Finding]:
@@ -123,10 +128,14 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
     if factors := fit.disagreement:
         numbers = {"low": min(factors.values()), "high": max(factors.values())}
         yield finding("disagreement", names={"coefficients": join_names(factors)}, numbers=numbers)
-    held_out = fit.held_out
-    if held_out.fit < 0.5 * held_out.possible:
+    held_out, key = fit.held_out, _WHOLE_VELOCITY
+    for file in held_out.failed:
+        yield finding("failed prediction", file=file)
+    if key in held_out.errors and (errors := held_out.errors[key]).explained < _LEAST_EXPLAINED:
+        factor, unit = shown_in(axis, "velocity")
         others = "the other half" if held_out.by_halves else "the others"
-        yield finding("poor prediction", names={"others": others}, numbers={"fit": held_out.fit})
+        numbers = dict(zip(("predicted", "unchanged", "noise"), (factor * rms for rms in errors.rms), strict=True))
+        yield finding("poor prediction", names={"others": others, "unit": unit}, numbers=numbers)
     for effect in fit.effects:
         if effect.kept:
             yield _on_effect(fit, effect)

@@ -134,7 +134,10 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{axes}: the leave-one-thrust-out error of {quantity} is {predicted:.1%} (RMS), the residual of the fit "
         "{fitted:.1%}: single thrusts carry much of it"
     ),
-    "tables against recordings": "{axes}: {quantity} of the tables is {error:.0%} (RMS) off what the recordings give",
+    "tables against recordings": (
+        "{axes}: {quantity} of the tables is {error:.0%} (RMS) off what the recordings give. The vehicle has the "
+        "coefficients of the recordings: a table has no delay, load or current apart from the drag"
+    ),
     # Recordings
     "coupling left out": (
         "{axes}: {files} does not tell how fast the vehicle moves along or about the other axes, so their coupling "
@@ -146,12 +149,33 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     "outliers": "{axes}: {share:.0%} of the samples of {files} are outliers and count less",
     "disagreement": _disagreement,
+    "impossible velocity": (
+        "{files}: no recording of {axes}: {quantity} tells of a velocity of {speed:.3g} {unit}, which is possible from "
+        "{low:g} to {high:g} only. Is its unit right, and that of time?"
+    ),
+    "no thrust": (
+        "{axes}: all its tests are left out, because the thrust curve of {curves} gives {force:.3g} {unit} at a "
+        "command of {command:.0%}, where {axes} needs a push that way. Check the thrust tests, their signs and windows"
+    ),
+    "no tests of drag": (
+        "{axes}: all its tests are left out: none that counts tells its drag, and rov.toml does not give {drag}"
+    ),
+    "no fit": "{files}: no recording of {axes}, because {reason}. {cause}",
+    "fitted apart": (
+        "{axes}: no vehicle fits the recordings of all these axes together, so each axis is fitted alone: {reason}"
+    ),
     "poor prediction": (
-        "{axes}: each recording is predicted by {others} with a fit of {fit:.0f} % only: do not trust this axis"
+        "{axes}: a fit to {others} predicts the velocity of a recording to {predicted:.2g} {unit} (RMS), a model "
+        "without any change to {unchanged:.2g} {unit}, and the sensor's noise is {noise:.1g} {unit}: do not trust this "
+        "axis"
+    ),
+    "failed prediction": (
+        "{axes}: the motion of {files} cannot be computed with a fit to the others, so its prediction is left out: "
+        "check its units and signs, and whether a thruster was saturated or a tether was taut"
     ),
     "recordings against thrust": (
         "{axes}: the recordings ask for {coefficient} = {value:.3g}, while the thrust tests gave {tested:.3g} +- "
-        "{error:.1g}: a thruster in motion is not one that is held"
+        "{error:.1g}: a thruster in motion is not one that is held. The vehicle has the value of the recordings"
     ),
     # Effects
     "load": _effect(

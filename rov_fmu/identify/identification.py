@@ -16,7 +16,6 @@ from rov_fmu.identify.points.step_responses import StepResponse
 from rov_fmu.identify.points.thrust_fit import ThrustFit
 from rov_fmu.identify.recordings.held_out import HeldOut
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
-from rov_fmu.identify.recordings.trajectory import MotionError
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
@@ -47,11 +46,8 @@ class AxisResult:
 
     @property
     def held_out(self) -> HeldOut | None:
-        """The prediction of each recording by a fit to the others; None where it cannot be computed."""
-        try:
-            return self.recordings.held_out if self.recordings else None
-        except MotionError:
-            return None
+        """The prediction of each recording by a fit to the others; None where none can be computed."""
+        return self.recordings.held_out if self.recordings and self.recordings.held_out.predictions else None
 
     @property
     def chosen(self) -> Literal["recordings", "points", "known"]:

@@ -5,7 +5,7 @@ curves. An axis without recordings takes its coefficients from the measured poin
 and recordings are fitted in either case, for comparison.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,8 +28,9 @@ from rov_fmu.identify.recordings.recordings_fit import RecordingsFit, count
 from rov_fmu.identify.recordings.trajectory import MotionError
 from rov_fmu.identify.slips.search import beta_out_of_range
 from rov_fmu.identify.together import Together
-from rov_fmu.identify.usable import check_push, check_recording, check_slips, is_pushed
+from rov_fmu.identify.usable import UnusableError, check_push, check_recording, check_slips, is_pushed
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import Progress, part, silent
 from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import Axis, Curve
 from rov_fmu.model.rov import Rov
@@ -40,15 +41,29 @@ from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
 
-Progress = Callable[[str, float], None]
-"""A function that is called with the name of the next step and the share of the work that is done."""
-
+_CHECKED, _FITTED = 0.1, 0.9
+"""The share of the work that is done when units and signs are checked, and when the recordings are fitted."""
+_SATURATED = 0.2
+"""The share of the time at full command from which on saturation is the likely cause of a recording without a fit."""
 _ASSUMED_ALPHA = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
 _ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
 
 
-def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Identification:
-    """Identify a vehicle from its tests. Raises DataFileError, VehicleFileError."""
+def identify(tests: TankTests, on_progress: Progress = silent) -> Identification:
+    """Identify a vehicle from its tests.
+
+    Tests that cannot be used are left out with a finding. Raises DataFileError where nothing can be learnt, or where
+    the unit or sign of a file is certainly wrong, and VehicleFileError.
+    """
+    while True:
+        try:
+            return _identify(tests, on_progress)
+        except UnusableError as unusable:
+            tests = unusable.left_out_of(tests)
+
+
+def _identify(tests: TankTests, on_progress: Progress) -> Identification:
+    """Identify a vehicle from all tests. Raises UnusableError, DataFileError, VehicleFileError."""
     given = tests.given
     against = load_vehicle(given.description.against) if given.description.against else None
     on_progress("thrust curves", 0.0)
@@ -58,13 +73,21 @@ def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Id
         found.take_thrust(fit)
     results: list[AxisResult] = []
     doubts: list[Finding] = []
-    for curves, axes in connected(given.rov.layout):
-        on_progress(
-            f"recordings of {join_names(axis.name for axis in axes)}", 0.9 * len(results) / len(given.rov.layout.axes)
-        )
-        tested = {curve.name: thrust[curve.name] for curve in curves if curve.name in thrust}
+    groups = [*connected(given.rov.layout)]
+    for n, (_, axes) in enumerate(groups):
+        on_progress(f"units and signs of {_named(axes)}", _CHECKED * n / len(groups))
         doubts += check_slips(tests, axes, found.rov)
-        recorded = _fit_recordings(tests, axes, found.rov, tested)
+        for recording in _recordings(tests, axes):
+            check_push(tests.folder, recording.axis, found.rov, [1.0])
+            check_recording(tests.folder, recording, found.rov)
+    samples = [sum(len(recording.time) for recording in _recordings(tests, axes)) for _, axes in groups]
+    shares = [_CHECKED + (_FITTED - _CHECKED) * sum(samples[:n]) / max(sum(samples), 1) for n in range(len(groups) + 1)]
+    for n, (curves, axes) in enumerate(groups):
+        of_group = part(on_progress, shares[n], shares[n + 1])
+        of_group(f"recordings of {_named(axes)}", 0.0)
+        tested = {curve.name: thrust[curve.name] for curve in curves if curve.name in thrust}
+        recorded, apart = _fit_recordings(tests, _recordings(tests, axes), found.rov, tested, of_group)
+        doubts += apart
         for fit_of_axis in recorded.values():  # these replace the tested thrust curves
             found.take_recordings(fit_of_axis)
         for axis in axes:
@@ -76,14 +99,17 @@ def identify(tests: TankTests, on_progress: Progress = lambda _, __: None) -> Id
         if backward := [*no_thrust(curve, found.rov.coefficients, place)]:
             raise DataFileError(f"{tests.folder}: {backward[0]}")
     results.sort(key=lambda result: [*given.rov.layout.kinds].index(result.axis.name))
-    on_progress("what to measure next", 0.95)
-    results = [replace(result, next_test=_next_test(result, found.rov)) for result in results]
     findings = [*tests.findings, *doubts]
     for name, fit in thrust.items():
         findings += diagnostics.on_thrust(name, fit)
     for result in results:
         findings += result.findings
     findings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
+    drifting = {finding.axis for finding in findings if finding.kind == "drift"}
+    for n, result in enumerate(results):
+        on_progress(f"what to measure next of {result.axis.name}", _FITTED + (1.0 - _FITTED) * n / len(results))
+        test = _next_test(tests, result, found.rov, repeat=result.axis.name in drifting)
+        results[n] = replace(result, next_test=test)
     vehicle = found.vehicle(results, Together(thrust.values(), results), findings)
     return Identification(tests, vehicle, thrust, tuple(results), against, tuple(findings))
 
@@ -177,6 +203,10 @@ class _Found:
         )
 
 
+def _named(axes: Iterable[Axis]) -> str:
+    return join_names(axis.name for axis in axes)
+
+
 def _capitalized(words: str) -> str:
     return words[0].upper() + words[1:]
 
@@ -196,27 +226,76 @@ def _thrust(tests: TankTests, curve: Curve) -> ThrustFit | None:
     return fit_thrust(curve, commands, forces, weights, {name: q.value for name, q in tests.given.known.items()})
 
 
+def _recordings(tests: TankTests, axes: Iterable[Axis]) -> list[Recording]:
+    """Return the recordings of axes that have something to be identified."""
+    wanted = (axis for axis in axes if drag_and_beta(axis, tests.given.known))
+    return [recording for axis in wanted for recording in tests.recordings.get(axis.name, ())]
+
+
 def _fit_recordings(
-    tests: TankTests, axes: Sequence[Axis], base: Rov, thrust: Mapping[str, ThrustFit]
-) -> dict[str, RecordingsFit]:
-    """Fit the recordings of axes that share thrust curves; return the fits by axis."""
-    recordings: list[Recording] = []
-    for axis in axes:
-        if drag_and_beta(axis, tests.given.known):
-            recordings += tests.recordings.get(axis.name, ())
-    for recording in recordings:
-        check_push(tests.folder, recording.axis, base, [1.0])
-        check_recording(tests.folder, recording, base)
+    tests: TankTests, recordings: Sequence[Recording], base: Rov, thrust: Mapping[str, ThrustFit], on_progress: Progress
+) -> tuple[dict[str, RecordingsFit], list[Finding]]:
+    """Fit recordings of axes that share thrust curves; return the fits by axis, and a finding about fits apart.
+
+    Where no vehicle fits all recordings, each axis is fitted alone. Raises UnusableError with the recordings that
+    cannot be fitted alone either.
+    """
     if not recordings:
-        return {}
+        return {}, []
+
+    def fit(some: Sequence[Recording]) -> dict[str, RecordingsFit]:
+        fits = fit_recordings(some, base, tests.given.known, measured(thrust.values()), lag=tests.given.lag)
+        return {found.axis.name: found.widened() for found in fits}
+
     try:
-        fits = fit_recordings(recordings, base, tests.given.known, measured(thrust.values()), lag=tests.given.lag)
-        return {fit.axis.name: fit.widened() for fit in fits}
-    except NoFitError as error:
-        raise DataFileError(f"{tests.folder}: {error}") from None
-    except MotionError as error:
-        files = join_names(dict.fromkeys(recording.file for recording in recordings))
-        raise DataFileError(f"{tests.folder}: {files}: {error}: check units and signs") from None
+        return fit(recordings), []
+    except (NoFitError, MotionError) as error:
+        together = error
+    axes = list(dict.fromkeys(recording.axis for recording in recordings))
+    apart: dict[str, RecordingsFit] = {}
+    for n, axis in enumerate(axes):
+        own = [recording for recording in recordings if recording.axis is axis]
+        on_progress(f"recordings of {axis.name} alone", n / len(axes))
+        try:
+            if len(axes) == 1:
+                raise together
+            apart |= fit(own)
+        except (NoFitError, MotionError) as error:
+            raise _unusable(tests, own, base, error, fit) from None
+    return apart, [Finding("fitted apart", axis.name, names={"reason": str(together)}) for axis in axes]
+
+
+def _unusable(
+    tests: TankTests,
+    recordings: Sequence[Recording],
+    base: Rov,
+    error: NoFitError | MotionError,
+    fit: Callable[[Sequence[Recording]], object],
+) -> UnusableError:
+    """Return the recordings of an axis that no vehicle fits alone, or else all of them, and the likely cause."""
+    wrong = list(recordings)
+    if len(recordings) > 1:
+        wrong = []
+        for recording in recordings:
+            try:
+                fit([recording])
+            except (NoFitError, MotionError) as its_error:
+                wrong, error = [*wrong, recording], its_error
+        wrong = wrong or list(recordings)
+    files = join_names(dict.fromkeys(recording.file for recording in wrong))
+    line = str(error) if isinstance(error, NoFitError) else f"{files}: {error}: check units and signs"
+    names = {"reason": str(error).removeprefix(f"{files}: ").partition(". ")[0], "cause": _likely_cause(wrong, base)}
+    return UnusableError(
+        f"{tests.folder}: {line}", Finding("no fit", wrong[0].axis.name, names=names), wrong[0].axis, wrong
+    )
+
+
+def _likely_cause(recordings: Sequence[Recording], base: Rov) -> str:
+    """Return what most likely prevents a fit, in words."""
+    full = max(float(np.mean(np.abs(r.reaching(base.layout)).max(axis=1) >= 0.999)) for r in recordings)
+    if full > _SATURATED:
+        return f"Thrusters are at full command for {full:.0%} of the time, where they may be limited by the current"
+    return "Check units and signs, the order of the thrusters, their dead band, and whether a tether was taut"
 
 
 # ---- One axis --------------------------------------------------------------------------------------------------------
@@ -235,9 +314,12 @@ def _axis(
     response = _response(axis, points, base, known, _thrust_of(fitted, driving))
     wanted = set(drag_and_beta(axis, known))
     if not fitted and not response and (missing := sorted(wanted - {axis.coefficient("beta")})):
-        raise DataFileError(
+        names = {"drag": ", ".join(missing)}
+        raise UnusableError(
             f"{tests.folder}: no steady_{axis.name}*.csv or log_{axis.name}*.csv that counts, and rov.toml does not "
-            f"give {', '.join(missing)}"
+            f"give {names['drag']}",
+            Finding("no tests of drag", axis.name, names=names),
+            axis,
         )
     drag = None
     if steady := [p for p in used if p.quantity == "V_ss"]:
@@ -293,14 +375,15 @@ def _points(tests: TankTests, axis: Axis, found: Sequence[StepResponse]) -> tupl
     return tuple(points)
 
 
-def _next_test(result: AxisResult, rov: Rov) -> NextTest | None:
+def _next_test(tests: TankTests, result: AxisResult, rov: Rov, *, repeat: bool) -> NextTest | None:
     """Return the test that would help an axis most, with the sensor of its recordings or a typical one."""
     if result.estimate is None:
         return None
     fit = result.recordings
     quantity = fit.simulations[0].recording.quantity if fit else result.axis.position
     noise = max(s.noise * np.sqrt(s.correlation_time) for s in fit.simulations) if fit else NOISE[quantity]
-    return next_test(result.axis, rov, result.estimate, Sensor(quantity, max(float(noise), 1e-9)))
+    sensor, limits = Sensor(quantity, max(float(noise), 1e-9)), tests.given.description.tank_limits
+    return next_test(result.axis, rov, result.estimate, sensor, limits, repeat=repeat)
 
 
 def _weight(tests: TankTests, window: str, command: float) -> float:

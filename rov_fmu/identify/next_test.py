@@ -1,4 +1,8 @@
-"""Suggest the next test: the recording that would narrow the widest interval most, by its Fisher information."""
+"""Suggest the next test: the recording that would narrow the widest interval most, by its Fisher information.
+
+The test stays within the limits that rov.toml gives. Enough is known where the widest interval is narrow, or where no
+test within the limits would narrow it by a useful amount.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,15 +17,25 @@ from rov_fmu.identify.recordings.trajectory import MotionError
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.description import TankLimits
 from rov_fmu.tank.recording import Recording
-from rov_fmu.vehicle.uncertainty import is_factor
+from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 _COMMANDS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
 _RATE = 10.0  # Hz
 _HOLDS = 5.0, 60.0
-"""The shortest and the longest hold, s."""
+"""The shortest and the longest hold, s, where no limit asks for a shorter one."""
+_SHORTER = (1.0, 0.5, 0.25, 0.125)
+"""The shares of a hold that are tried until the test is within the limits."""
+_KNOWN = 0.05
+"""Half the width of an interval, relative to the value, from which on enough is known."""
+_USEFUL = 0.9
+"""The width of an interval after a test, relative to the width before it, from which on the test is of use."""
 _VAGUE = 1e3
 """The assumed standard error of a coefficient that is not identifiable yet, relative to its value."""
+REPEATED = "fly the first step of the dive once more at its end, because something drifts over the dive"
+"""What to do where drift is suspected: the two steps show how much it is."""
+NO_LIMITS = TankLimits()
 NOISE = {"distance": 0.02, "depth": 0.01, "heading": 0.01, "velocity": 0.02}
 """The noise of a typical sensor (m, rad, m/s), where there is no recording."""
 
@@ -48,55 +62,109 @@ class NextTest:
     narrowed: float
     """The width of the interval after the test, relative to the present width."""
     words: str
+    """The test; empty where no test is within the limits."""
+    repeat: bool = False
+    """True when the test should be repeated at the end of the dive, because something drifts over it."""
+
+    @property
+    def is_known(self) -> bool:
+        """True when every interval of the axis is narrow enough."""
+        return self.interval is not None and self.width <= _KNOWN
+
+    @property
+    def is_useful(self) -> bool:
+        """True when the test narrows the interval by a useful amount."""
+        return bool(self.words) and self.narrowed <= _USEFUL
 
 
-def next_test(axis: Axis, rov: Rov, found: Estimate, sensor: Sensor) -> NextTest | None:
-    """Return the best of many tests; None where nothing is fitted or nothing moves."""
+def next_test(
+    axis: Axis, rov: Rov, found: Estimate, sensor: Sensor, limits: TankLimits = NO_LIMITS, *, repeat: bool = False
+) -> NextTest | None:
+    """Return the best of many tests within the limits; None where nothing is fitted or nothing moves.
+
+    `repeat` says that something drifts over a dive of the axis.
+    """
     if not found.names:
         return None
     error = np.sqrt(np.diag(found.covariance))
     size = np.maximum(np.abs(found.values), 1e-9)
-    relative = np.where(np.isfinite(error), error / size, inf)
+    relative = np.where(np.isfinite(error), quantile(max(found.degrees_of_freedom, 1.0)) * error / size, inf)
     widest = int(np.argmax(relative))
     error = np.maximum(np.where(np.isfinite(error), error, _VAGUE * size), 1e-12 * size)
     prior = np.where(np.isfinite(found.covariance), found.covariance, 0.0) / np.outer(error, error)
     prior[np.diag_indices(len(size))] = 1.0  # in present standard errors
     before = np.linalg.pinv(prior, hermitian=True)
     internal = error * [1.0 / v if is_factor(n) else 1.0 for n, v in zip(found.names, found.values, strict=True)]
-    best: tuple[float, str] = (inf, "")
-    for words, command in _tests(axis, rov):
+    best: tuple[float, str] = (1.0, "")
+    moves = False
+    for words, command in _tests(axis, rov, limits):
+        moves = True
+        if not words:
+            continue
         information = _information(axis, rov, found.names, sensor, command) * np.outer(internal, internal)
         if np.isfinite(information).all():
             after = np.linalg.pinv(before + information, hermitian=True)
             best = min(best, (float(np.sqrt(np.clip(after[widest, widest], 0.0, 1.0))), words))
-    if not best[1]:
+    if not moves:
         return None
-    return NextTest(axis, found.names[widest], found.interval(found.names[widest]), float(relative[widest]), *best)
+    name = found.names[widest]
+    return NextTest(axis, name, found.interval(name), float(relative[widest]), *best, repeat)
 
 
-def _tests(axis: Axis, rov: Rov) -> Iterator[tuple[str, Array]]:
-    """Yield tests of steps from rest in one or both directions: a phrase, and the command at each sample."""
-    for level in _COMMANDS:
+def _tests(axis: Axis, rov: Rov, limits: TankLimits) -> Iterator[tuple[str, Array]]:
+    """Yield tests of steps from rest in one or both directions: a phrase, and the command at each sample.
+
+    The phrase is empty where such steps are beyond the limits.
+    """
+    strongest = limits.command_max
+    for level in (*(c for c in _COMMANDS if c < strongest), strongest):
         if not rov.force(axis, level) or not rov.force(axis, -level):
             continue
         Taus = [rov.response(axis, c)[1] for c in (level, -level)]
-        hold = float(np.clip(round(4.0 * max(Taus)), *_HOLDS)) if np.isfinite(Taus).all() else _HOLDS[1]
+        longest = float(np.clip(round(4.0 * max(Taus)), *_HOLDS)) if np.isfinite(Taus).all() else _HOLDS[1]
         for ways in ((level,), (level, -level)):
-            levels = [0.0, *(c for way in ways for c in (way, 0.0))]
-            command = np.repeat(levels, round(hold * _RATE))
+            yield next(_within(axis, rov, limits, ways, longest), ("", np.zeros(0)))
+
+
+def _within(
+    axis: Axis, rov: Rov, limits: TankLimits, ways: tuple[float, ...], longest: float
+) -> Iterator[tuple[str, Array]]:
+    """Yield tests within the limits, those with the longest holds and rests first."""
+    shorter = [max(round(share * longest), 1.0) for share in _SHORTER]
+    for hold, rest in dict.fromkeys(pair for some in shorter for pair in ((some, longest), (some, some))):
+        levels = [(0.0, rest), *(part for c in ways for part in ((c, hold), (0.0, rest)))]
+        command = np.concatenate([np.full(round(seconds * _RATE), c) for c, seconds in levels])
+        if len(command) / _RATE <= limits.duration and _fits(axis, rov, limits, command):
             both = " and ".join(f"{c:.0%}" for c in ways)
             step = "steps" if len(ways) > 1 else "a step"
-            yield (
-                f"a recording of {step} from rest at {both}, {hold:g} s each, with {hold:g} s of rest after each",
-                command,
-            )
+            words = f"a recording of {step} from rest at {both}, {hold:g} s each, with {rest:g} s of rest after each"
+            yield words, command
+
+
+def _fits(axis: Axis, rov: Rov, limits: TankLimits, command: Array) -> bool:
+    """Return True when the tank is as long as the vehicle goes, until it has come to rest."""
+    if axis.is_rotation or limits.tank_length == inf:
+        return True
+    model = _simulator(axis, rov, "velocity", np.concatenate([command, np.zeros(round(_HOLDS[1] * _RATE))]))
+    try:
+        (output,) = model.run(np.zeros(1))
+    except MotionError:
+        return False
+    covered = np.cumsum(output.velocity) / _RATE
+    return float(np.ptp(np.append(covered, 0.0))) <= limits.tank_length
+
+
+def _simulator(
+    axis: Axis, rov: Rov, quantity: str, command: Array, names: tuple[str, ...] = (), noise: float = 1.0
+) -> Simulator:
+    """Return the model of a recording of the command."""
+    recording = Recording("", axis, quantity, np.arange(len(command)) / _RATE, command, np.zeros(len(command)))
+    return Simulator((prepare(recording, rov),), rov, names, (), np.array([noise]))
 
 
 def _information(axis: Axis, rov: Rov, names: tuple[str, ...], sensor: Sensor, command: Array) -> Array:
     """Return the information of a recording about the coefficients, with unknown initial values; or NaN."""
-    time, values = np.arange(len(command)) / _RATE, np.zeros(len(command))
-    recording = Recording("", axis, sensor.quantity, time, command, values)
-    model = Simulator((prepare(recording, rov),), rov, names, (), np.array([sensor.noise]))
+    model = _simulator(axis, rov, sensor.quantity, command, names, sensor.noise)
     x = model.start(dict(rov.coefficients), {})
     try:
         J = model.jacobian(x)

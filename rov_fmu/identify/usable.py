@@ -1,6 +1,8 @@
 """Check that the tests have enough content for a fit, and that their units and signs make sense."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,27 +30,61 @@ def is_pushed(axis: Axis, base: Rov, command: float) -> bool:
     return float(np.sign(command)) * base.force(axis, command) >= _LEAST_PUSH
 
 
+class UnusableError(Exception):
+    """Tests of an axis from which nothing can be learnt: some of its recordings, or all of them."""
+
+    def __init__(self, line: str, finding: Finding, axis: Axis, recordings: Sequence[Recording] = ()) -> None:
+        """Give the line that refuses them where nothing else is left, and otherwise the finding about each of them."""
+        super().__init__(line)
+        self.finding, self.axis, self.recordings = finding, axis, recordings
+
+    def left_out_of(self, tests: TankTests) -> TankTests:
+        """Return the tests without these. Raises DataFileError where nothing is left to learn from."""
+        axes = () if self.recordings else (self.axis.name,)
+        findings = [replace(self.finding, file=recording.file) for recording in self.recordings] or [self.finding]
+        remaining = tests.without(self.recordings, axes, findings)
+        if remaining is None:
+            raise DataFileError(str(self)) from None
+        return remaining
+
+
 def check_push(folder: Path, axis: Axis, base: Rov, commands: Sequence[float]) -> None:
-    """Check that the thrusters push in the direction of at least one command. Raises DataFileError."""
+    """Check that the thrusters push in the direction of at least one command. Raises UnusableError."""
     if commands and not any(is_pushed(axis, base, c) for c in commands):
-        names = join_names(c.name for c in curves_of(base.layout, axis))
-        raise DataFileError(
-            f"{folder}: the thrust curve of {names} gives {base.force(axis, commands[0]):.3g} {axis.load} at a command "
-            f"of {commands[0]:.0%}, where {axis.name} needs a push that way"
+        curves = join_names(c.name for c in curves_of(base.layout, axis))
+        numbers = {"force": base.force(axis, commands[0]), "command": commands[0]}
+        names = {"curves": curves, "unit": axis.load}
+        finding = Finding("no thrust", axis.name, names=names, numbers=numbers)
+        raise UnusableError(
+            f"{folder}: the thrust curve of {curves} gives {numbers['force']:.3g} {axis.load} at a command "
+            f"of {commands[0]:.0%}, where {axis.name} needs a push that way",
+            finding,
+            axis,
         )
 
 
 def check_recording(folder: Path, recording: Recording, base: Rov) -> None:
-    """Check that commands and motion change, and that the velocity is possible. Raises DataFileError."""
+    """Check that commands and motion change, and that the velocity is possible. Raises UnusableError."""
     path, values = folder / recording.file, recording.values[np.isfinite(recording.values)]
+    axis, quantity = recording.axis, recording.quantity
+    finding = partial(Finding, axis=axis.name)
     moves = np.ptp(recording.reaching(base.layout), axis=0).any() or recording.reaching(base.layout).any()
-    if still := "command" if not moves else recording.quantity if np.ptp(values) == 0.0 else None:
-        raise DataFileError(f"{path}: {still} never changes: nothing is identifiable")
-    speed = prepare(recording, base).speed
-    if not VELOCITIES[0] <= speed <= VELOCITIES[1]:
-        raise DataFileError(
-            f"{path}: {recording.quantity} tells of a velocity of {speed:.3g} "
-            f"{recording.axis.unit}: must be {VELOCITIES[0]:g} at least and {VELOCITIES[1]:g} at most"
+    if not moves:
+        raise UnusableError(
+            f"{path}: command never changes: nothing is identifiable", finding("constant push"), axis, [recording]
+        )
+    if np.ptp(values) == 0.0:
+        constant = finding("constant motion", names={"quantity": quantity})
+        raise UnusableError(f"{path}: {quantity} never changes: nothing is identifiable", constant, axis, [recording])
+    speed, (low, high) = prepare(recording, base).speed, VELOCITIES
+    if not low <= speed <= high:
+        names, numbers = {"quantity": quantity, "unit": axis.unit}, {"speed": speed, "low": low, "high": high}
+        raise UnusableError(
+            f"{path}: {quantity} tells of a velocity of {speed:.3g} {axis.unit}: must be {low:g} at least and {high:g} "
+            f"at most",
+            finding("impossible velocity", names=names, numbers=numbers),
+            axis,
+            [recording],
         )
 
 

@@ -1,20 +1,24 @@
 """The command `rov-fmu identify`: from a folder of tank tests to the vehicle file and the report."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rov_fmu.identify import identify
 from rov_fmu.identify.identification import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
+from rov_fmu.io.messages import Progress, part
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.seal import check_replaced
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.writer import check_report, vehicle_output
 
+_IDENTIFIED = 0.8
+"""The share of the work that is done before the report is drawn."""
+
 
 def identify_folder(
-    folder: Path, vehicle: Path | None, report: Path | None, *, force: bool, on_progress: Callable[[str, float], None]
+    folder: Path, vehicle: Path | None, report: Path | None, *, force: bool, on_progress: Progress
 ) -> tuple[Identification, list[str]]:
     """Identify a vehicle from a folder of tank tests, and write its vehicle file and its report if they are asked for.
 
@@ -37,24 +41,21 @@ def identify_folder(
         replaced.extend(check_replaced(targets, force=force))
 
     tests = load_tank_tests(folder, check_outputs)
-    identification = identify.identify(tests, on_progress)
-    on_progress("each recording predicted by the others", 0.97)
-    for result in identification.axes:
-        result.held_out  # noqa: B018 (it is computed once, and here rather than when it is printed)
+    identified = _IDENTIFIED if report else 1.0
+    identification = identify.identify(tests, part(on_progress, 0.0, identified))
     outputs = []
     if report:
-        on_progress("drawing the report", 1.0)
-        outputs.append(_report_output(identification, report))
+        outputs.append(_report_output(identification, report, part(on_progress, identified, 1.0)))
     if vehicle:
         outputs.append(_vehicle_output(identification, vehicle, report))
     write_whole(*outputs)
     return identification, replaced
 
 
-def _report_output(identification: Identification, path: Path) -> Output:
+def _report_output(identification: Identification, path: Path, on_progress: Progress) -> Output:
     from rov_fmu.report.report import report_output  # imports Matplotlib, which takes a second
 
-    return report_output(identification, path)
+    return report_output(identification, path, on_progress)
 
 
 def _vehicle_output(identification: Identification, path: Path, report: Path | None) -> Output:

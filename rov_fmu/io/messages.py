@@ -1,12 +1,25 @@
-"""Messages to the user: errors, hints, and values on one printable line."""
+"""Messages to the user: errors, hints, progress, and values on one printable line."""
 
 import reprlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 
 MOST = 10
 """The number of mistakes in a file that are printed; the others are counted."""
+
+
+Progress = Callable[[str, float], None]
+"""A function that is called with the name of the next step and the share of the work that is done, from 0 to 1."""
+
+
+def silent(_step: str, _share: float) -> None:
+    """Show no progress."""
+
+
+def part(on_progress: Progress, low: float, high: float) -> Progress:
+    """Return the progress of a part of the work, from the share `low` to the share `high` of all of it."""
+    return lambda step, share: on_progress(step, low + (high - low) * share)
 
 
 class FileError(ValueError):

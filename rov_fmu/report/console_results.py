@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from rich.table import Table
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
-from rov_fmu.identify.next_test import NextTest
+from rov_fmu.identify.next_test import REPEATED, NextTest
 from rov_fmu.identify.recordings.recordings_fit import Effect
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.report.console import DEVIATION, console, table, text
@@ -33,12 +33,15 @@ def print_identification(identification: Identification) -> None:
     if identification.next_tests:
         out.print("\nTo measure next:")
     for test in identification.next_tests:
-        out.print(_next_test(test), soft_wrap=True)
+        for line in _next_test(test):
+            out.print(f"- {test.axis.name}: {line}", soft_wrap=True)
     for found in _detailed_tables(identification, comparisons, other):
         out.print()
         out.print(found)
     out.print(
-        "\ndev.: relative to the measured value. leave-one-out: by a fit without the points of the same thrust.\n"
+        "\nno change: by a model whose position or velocity stays. noise: the sensor's own. explained: of the change "
+        "beyond the noise.\n"
+        "dev.: relative to the measured value. leave-one-out: by a fit without the points of the same thrust.\n"
         "(weight 0): not fitted, and not counted in the RMS. interval: 95 % confidence."
     )
     if identification.warnings:
@@ -49,20 +52,29 @@ def print_identification(identification: Identification) -> None:
 
 def _first_tables(identification: Identification, comparisons: Sequence[Comparison]) -> Iterator[Table]:
     """Yield the tables of the predictions, of the coefficients and of the other effects."""
-    if predicted := list(unseen(identification, comparisons)):
-        yield _predicted(predicted)
+    predicted = list(unseen(identification, comparisons))
+    if of_recordings := [row for row in predicted if row.error is None]:
+        yield _predicted(of_recordings)
+    if of_points := [row for row in predicted if row.error is not None]:
+        yield _predicted_points(of_points)
     yield _coefficients(identification.vehicle)
     kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
     if kept:
         yield _effects(kept)
 
 
-def _next_test(test: NextTest) -> str:
-    """Return the line about a test to make next."""
-    if not test.interval:
-        return f"- {test.axis.name}: {test.words} ({test.coefficient}, not identifiable yet)"
-    now = f"now {test.interval[0]:.3g} ... {test.interval[1]:.3g}"
-    return f"- {test.axis.name}: {test.words} ({test.coefficient}, {now}; then {1.0 - test.narrowed:.0%} narrower)"
+def _next_test(test: NextTest) -> Iterator[str]:
+    """Yield the lines about a test to make next, or that none is needed."""
+    now = "now {:.3g} ... {:.3g}".format(*test.interval) if test.interval else "not identifiable yet"
+    if test.is_known:
+        yield f"enough is known; the widest interval is that of {test.coefficient}, {now}"
+    elif not test.is_useful:
+        yield f"no step within the limits would narrow the widest interval by a tenth ({test.coefficient}, {now})"
+    else:
+        then = f"; then {1.0 - test.narrowed:.0%} narrower" if test.interval else ""
+        yield f"{test.words} ({test.coefficient}, {now}{then})"
+    if test.repeat:
+        yield REPEATED
 
 
 def _detailed_tables(
@@ -79,12 +91,23 @@ def _detailed_tables(
 
 
 def _predicted(found: Iterable[Unseen]) -> Table:
-    """Return the table of how well the model predicts data that it was not fitted to."""
-    result = table("Prediction of what a fit has not seen", "axis", ("fit", "RMS error"), ("of",))
+    """Return the table of how far predictions of recordings are off that the model was not fitted to."""
+    numbers = ("off by", "no change", "noise", "explained")
+    result = table("Prediction of recordings by fits to the others, RMS", "", numbers, ("of",))
     for row in found:
-        fit = "" if row.fit is None else text(row.fit / 100.0, ".1%")
-        error = "" if row.error is None else text(row.error, ".1%")
-        result.add_row(row.axis.name, fit, error, f"{row.what}, {row.by}")
+        if not row.errors:
+            result.add_row(row.axis.name, *("-" for _ in numbers), f"{row.what}: {row.by}")
+        for e in row.errors:
+            values = (f"{float(f'{value:.2g}'):g} {e.unit}" for value in (e.predicted, e.unchanged, e.noise))
+            result.add_row(f"{row.axis.name} {e.of}, {e.span}", *values, text(e.explained, ".1%"), row.what)
+    return result
+
+
+def _predicted_points(found: Iterable[Unseen]) -> Table:
+    """Return the table of how far predictions of points are off that the model was not fitted to."""
+    result = table("Prediction of points that were not fitted, relative RMS", "axis", ("off by",), ("of",))
+    for row in found:
+        result.add_row(row.axis.name, text(row.error, ".1%"), f"{row.what}, {row.by}")
     return result
 
 

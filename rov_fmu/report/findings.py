@@ -1,9 +1,11 @@
 """The main findings of an identification: prediction errors, known coefficients, and other effects on the motion."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification
+from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.recordings.prediction_errors import Errors, Key, Quantity, Span, shown_in
 from rov_fmu.identify.recordings.recordings_fit import Effect, count
 from rov_fmu.model.layout import Axis
 
@@ -24,7 +26,7 @@ _WORDS = {
 class Unseen:
     """A prediction of data of an axis that the model was not fitted to.
 
-    Recordings have a `fit`, and points an `error`. Both are None where no prediction was tried.
+    Recordings have `errors`, and points an `error`. There are neither where no prediction can be computed.
     """
 
     axis: Axis
@@ -32,14 +34,52 @@ class Unseen:
     """The predicted data, in words."""
     by: str
     """The fit that predicts them, in words."""
-    fit: float | None = None
-    """The fit of the velocity over time in percent: 100 is perfect, 0 is no better than the mean velocity."""
-    seen: float | None = None
-    """The fit in percent of the model that was fitted to all recordings, these included."""
     error: float | None = None
     """The RMS relative error."""
-    parts: tuple[tuple[str, float], ...] = ()
-    """Each recording (or half of one) and its fit in percent."""
+    errors: tuple["Accuracy", ...] = ()
+    """The errors of the predictions of recordings."""
+    parts: Mapping[str, tuple["Accuracy", ...]] = field(default_factory=dict)
+    """The errors of each recording, or of each half of a single one."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How far predictions are off (RMS), beside a model that predicts no change and the noise of the sensor."""
+
+    span: Span
+    of: str
+    """The predicted quantity: depth, velocity ..."""
+    unit: str
+    predicted: float
+    unchanged: float
+    noise: float
+    explained: float
+    """The share of the change beyond the noise that is predicted, see `Errors`."""
+
+
+@dataclass(frozen=True)
+class MeasuredAndFitted:
+    """A coefficient that tables give and recordings too. The vehicle has the value of the recordings."""
+
+    name: str
+    unit: str
+    measured: float
+    measured_interval: tuple[float, float] | None
+    by: str
+    """The tables that give the measured value."""
+    fitted: float
+    fitted_interval: tuple[float, float] | None
+    reason: str
+    """Why the two values may differ."""
+
+    @property
+    def differ(self) -> bool:
+        """True when the intervals have no value in common."""
+        if not self.measured_interval or not self.fitted_interval:
+            return False
+        return max(self.measured_interval[0], self.fitted_interval[0]) > min(
+            self.measured_interval[1], self.fitted_interval[1]
+        )
 
 
 @dataclass(frozen=True)
@@ -70,19 +110,67 @@ def unseen(results: Identification, comparisons: Sequence[Comparison]) -> Iterat
     """
     for result in results.axes:
         if held_out := result.held_out:
-            parts = [(p.recording.file, p.fit) for p in held_out.predictions]
-            what, by = count(len(parts), "recording"), "each by a fit to the others"
+            files = [p.recording.file for p in held_out.predictions]
+            what, by = count(len(files), "recording"), "each by a fit to the others"
             if held_out.by_halves:
-                what, by = f"halves of {parts[0][0]}", "each by a fit to the other"
-                parts = [(f"{half} half", fit) for half, (_, fit) in zip(("first", "second"), parts, strict=False)]
-            yield Unseen(result.axis, what, by, held_out.fit, held_out.possible, parts=tuple(parts))
+                what, by = f"halves of {files[0]}", "each by a fit to the other"
+                files = ["first half", "second half"][: len(files)]
+            parts = {
+                file: accuracies(result.axis, p.errors) for file, p in zip(files, held_out.predictions, strict=True)
+            }
+            yield Unseen(result.axis, what, by, errors=accuracies(result.axis, held_out.errors), parts=parts)
         elif result.recordings:
-            yield Unseen(result.axis, count(len(result.recordings.simulations), "recording"), "not tried")
+            yield Unseen(result.axis, count(len(result.recordings.simulations), "recording"), "cannot be computed")
         elif result.response:
             for c in (c for c in comparisons if c.result is result):
                 points = count(sum(p.weight > 0.0 for p in c.points), "point")
                 by = "each by a fit without its thrust"
                 yield Unseen(result.axis, f"{c.quantity} of {points}", by, error=c.rms(c.leave_one_out))
+
+
+def accuracies(axis: Axis, errors: Mapping[Key, Errors]) -> tuple[Accuracy, ...]:
+    """Return the errors in the units of a report, the short predictions first."""
+    spans: tuple[Span, ...] = ("10 s", "whole recording")
+    quantities: tuple[Quantity, ...] = ("position", "velocity")
+    found = []
+    for span, quantity in ((span, quantity) for span in spans for quantity in quantities):
+        if here := errors.get((span, quantity)):
+            factor, unit = shown_in(axis, quantity)
+            predicted, unchanged, noise = (factor * rms for rms in here.rms)
+            name = axis.position if quantity == "position" else "velocity"
+            found.append(Accuracy(span, name, unit, predicted, unchanged, noise, here.explained))
+    return tuple(found)
+
+
+def measured_and_fitted(results: Identification) -> Iterator[MeasuredAndFitted]:
+    """Yield the coefficients that recordings give, and thrust tests or tables of points too."""
+    given: dict[str, MeasuredAndFitted] = {}
+    units = {name: meta.unit for name, meta in results.vehicle.layout.coefficients.items()}
+
+    def compare(measured: Estimate, fitted: Estimate, by: str, reason: str) -> Iterator[MeasuredAndFitted]:
+        for name in measured.names:
+            if name in fitted.names and name not in given:
+                values = [(e[name], e.interval(name)) for e in (measured, fitted)]
+                given[name] = MeasuredAndFitted(name, units[name], *values[0], by, *values[1], reason)
+                yield given[name]
+
+    for result in (r for r in results.axes if r.recordings):
+        assert result.recordings
+        fitted = result.recordings.estimate
+        for curve, thrust in results.thrust.items():
+            yield from compare(thrust.estimate, fitted, f"thrust tests of {curve}", _OF_THRUST)
+        if result.response and any(p.error is None and p.weight for p in result.points):
+            yield from compare(result.response.estimate, fitted, f"points of {result.axis.name}", _OF_POINTS)
+
+
+_OF_THRUST = (
+    "The fit weighs the thrust tests and the recordings by their uncertainty. They may differ because a thruster "
+    "pushes less in motion than held at a scale, and because the scale and the battery have errors of their own"
+)
+_OF_POINTS = (
+    "The recordings show load, delay, lag and current apart from the drag, and every sample counts; a table of steady "
+    "velocities and time constants has them all in its numbers, from other days and by other readings"
+)
 
 
 def known(results: Identification) -> tuple[Known, ...]:

@@ -16,11 +16,13 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     SpinnerColumn,
+    Task,
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.text import Text
 
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.report.console import console
@@ -39,14 +41,46 @@ def compiling(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def bar() -> Iterator[Callable[[str, float], None]]:
-    """Show one bar. Yields the function to call with the name of the next step and the share of work done (0 to 1)."""
-    columns = SpinnerColumn(), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
+    """Show one bar, with the time taken and left.
+
+    Yields the function to call with the name of the next step and the share of work done (0 to 1).
+    """
+    columns = (
+        SpinnerColumn(),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TimeLeftColumn(),
+        TextColumn("{task.description}"),
+    )
     with _shown(*columns) as progress:
         if progress is None:
             yield lambda *_: None
         else:
             task = progress.add_task("reading", total=1.0)
             yield lambda step, share: progress.update(task, description=step, completed=share)
+
+
+class TimeLeftColumn(ProgressColumn):
+    """About the time left, for work whose share is known at a few moments only.
+
+    It follows from the time and the share of the work at the last of these moments, and counts down from there.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._share = 0.0
+        self._whole = 0.0
+        """The time that all of the work takes, s."""
+
+    def render(self, task: Task) -> Text:
+        """Return the time left in minutes and seconds; nothing before any work is done."""
+        if task.elapsed is None or task.completed <= 0.0:
+            return Text("")
+        if task.completed != self._share:
+            self._share, self._whole = task.completed, task.elapsed / task.completed
+        minutes, seconds = divmod(round(max(self._whole - task.elapsed, 0.0)), 60)
+        return Text(f"about {minutes}:{seconds:02} left")
 
 
 @contextmanager

@@ -7,11 +7,13 @@ from itertools import chain
 from pathlib import Path
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
+from rov_fmu.identify.next_test import REPEATED
 from rov_fmu.identify.recordings.recordings_fit import count
 from rov_fmu.identify.recordings.residual_analysis import Simulation
+from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.output import Output
 from rov_fmu.io.seal import sealed
-from rov_fmu.report.findings import Known, acting, effects, known, unseen, verdict
+from rov_fmu.report.findings import Known, acting, effects, known, measured_and_fitted, unseen, verdict
 from rov_fmu.report.plots.fits import plot_drag, plot_known, plot_response, plot_steps, plot_thrust
 from rov_fmu.report.plots.recordings import CommandStep, clearest_step, plot_recording, plot_step
 from rov_fmu.report.plots.svg import Draw, inline_svg
@@ -23,19 +25,24 @@ _PLOT, _WIDE = (3.7, 3.5), (4.7, 3.0)  # inches
 _WHITE = 1.5  # samples; residuals that are correlated over fewer count as white noise
 
 
-def report_output(results: Identification, path: Path) -> Output:
+def report_output(results: Identification, path: Path, on_progress: Progress = silent) -> Output:
     """Return the file of the report of an identification."""
-    return Output(path, sealed(report_page(results), "<!-- {} -->").encode())
+    return Output(path, sealed(report_page(results, on_progress), "<!-- {} -->").encode())
 
 
-def report_page(results: Identification) -> str:
+def report_page(results: Identification, on_progress: Progress = silent) -> str:
     """Return the report as HTML. The same identification always gives the same text."""
     comparisons, found = compare(results), known(results)
     predicted = tuple(unseen(results, comparisons))
     fits = [result.recordings for result in results.axes if result.recordings]
     closeups = {fit.axis.name: step for fit in fits if (step := clearest_step(fit))}
     of_points = {result.axis.name: [*_plots_of_points(results, result, comparisons)] for result in results.axes}
-    plots = chain(_plots(results, found, closeups), *of_points.values())
+    plots = [*_plots(results, found, closeups), *chain(*of_points.values())]
+
+    def drawn(n: int, label: str, draw: Draw, size: tuple[float, float]) -> str:
+        on_progress(f"drawing: {label}", n / len(plots))
+        return inline_svg(label, draw, size)
+
     return page(
         "report.html.j2",
         vehicle=results.vehicle,
@@ -43,10 +50,12 @@ def report_page(results: Identification) -> str:
         comparisons=comparisons,
         curves=results.vehicle.layout.curves,
         unseen=predicted,
-        unseen_fit=dict(part for row in predicted for part in row.parts),
+        unseen_parts={file: errors for row in predicted for file, errors in row.parts.items()},
+        both=tuple(measured_and_fitted(results)),
         known=found,
+        repeated=REPEATED,
         closeups=closeups,
-        plots={label: inline_svg(label, draw, size) for label, draw, size in plots},
+        plots={plot[0]: drawn(n, *plot) for n, plot in enumerate(plots)},
         of_points={name: [label for label, _, _ in some] for name, some in of_points.items()},
         holds=_holds(results.tests),
         effects=effects,

@@ -17,6 +17,7 @@ def page(template: str, **content: object) -> str:
         Path(__file__).parent / "templates",
         number=number,
         text=text,
+        two_digits=two_digits,
         unit=pretty_unit,
         palette=PALETTE,
         **content,
@@ -37,6 +38,11 @@ def number(value: float | None, digits: int | None = None) -> str:
         mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")
         text = f"{mantissa}10{str(int(exponent)).translate(RAISED)}"
     return text.replace("-", "−")
+
+
+def two_digits(value: float) -> str:
+    """Return a number for readers with two significant digits: 420, not 4.2·10²."""
+    return number(float(f"{value:.2g}"))
 
 
 def text(value: float | None, form: str) -> str:

@@ -5,8 +5,10 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 """
 
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -103,6 +105,40 @@ class Dive(Strict):
     """Those of the files whose times are of another clock than the commands'."""
 
 
+def _as_fraction(value: object) -> object:
+    """Return a text in percent as a fraction."""
+    percent = re.fullmatch(r"\s*([0-9.]+)\s*%\s*", value) if isinstance(value, str) else None
+    return float(percent[1]) / 100.0 if percent else value
+
+
+def _check_command(value: float) -> float:
+    if not 0.0 < value <= 1.0:
+        raise ValueError('must be above 0 and at most 1, a fraction of full thrust: half is 0.5, or "50 %" in quotes')
+    return value
+
+
+def _above(least: float, what: str) -> AfterValidator:
+    """Check that a number is above the least one; `what` names it with its unit."""
+
+    def check(value: float) -> float:
+        if not value > least:
+            raise ValueError(f"must be {what}, above {least:g}")
+        return value
+
+    return AfterValidator(check)
+
+
+class TankLimits(Strict):
+    """The table [limits]: the most that a proposed test may take."""
+
+    tank_length: Annotated[Finite, _above(0.0, "the length of the tank in m")] = inf
+    """The longest distance along surge, sway or heave, m."""
+    command_max: Annotated[Finite, BeforeValidator(_as_fraction), AfterValidator(_check_command)] = 1.0
+    """The strongest command, a fraction of full thrust."""
+    duration: Annotated[Finite, _above(0.0, "the duration of a test in s")] = inf
+    """The longest recording, s."""
+
+
 class _ReadableFile(OpenHardware):
     """The parts of rov.toml that could be read."""
 
@@ -116,6 +152,7 @@ class _ReadableFile(OpenHardware):
     columns: dict[str, str] = Field(default={})
     topics: dict[str, str] = Field(default={})
     dives: dict[str, Dive] = Field(default={})
+    limits: TankLimits = TankLimits()
 
 
 class _RovFile(_ReadableFile):
@@ -152,6 +189,8 @@ class Description:
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
     lag: tuple[str, ...]
     """The curves whose thrusters' lag is fitted."""
+    tank_limits: TankLimits
+    """The most that a proposed test may take."""
     command_range: tuple[float, float] | None
     columns: Mapping[str, str]
     """What the headers of CSV logs stand for: other headers."""
@@ -250,6 +289,7 @@ def _describe(path: Path, file: _ReadableFile, lost: set[str], data: Toml, base:
         thruster_sources=thruster_sources,
         windows=file.windows,
         lag=tuple(curve.name for curve in layout.curves) if file.fit.lag is True else file.fit.lag,
+        tank_limits=file.limits,
         command_range=file.validity.command_range if file.validity else None,
         columns=file.columns,
         topics=file.topics,

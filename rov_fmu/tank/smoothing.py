@@ -56,6 +56,13 @@ def white_noise(values: Array) -> float:
     return robust_deviation(np.diff(values, 2)) / sqrt(6.0)
 
 
+def sensor_noise(values: Array) -> float:
+    """Estimate the standard deviation of a sensor's noise, at least that of rounding to its resolution."""
+    changes = np.abs(np.diff(values))
+    resolution = float(changes[changes > 1e-9 * np.ptp(values)].min(initial=np.inf))
+    return max(white_noise(values), resolution / sqrt(12.0) if np.isfinite(resolution) else 0.0)
+
+
 def robust_deviation(values: Array) -> float:
     """Return a robust standard deviation, from the median absolute deviation."""
     return float(1.4826 * np.median(np.abs(values - np.median(values))))

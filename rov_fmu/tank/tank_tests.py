@@ -16,8 +16,8 @@ A command is that of an axis, or, in a test of a thrust curve, that of all thrus
 """
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError
@@ -53,8 +53,45 @@ class TankTests:
     """Recordings by axis."""
     inputs: Mapping[str, str]
     """The SHA-256 hash of every file read, by its name."""
+    tested: Tested
+    """What the files test, including those of curves that the vehicle does not need."""
     findings: tuple[Finding, ...] = ()
     """What was left out of the vehicle and of the files."""
+
+    def without(
+        self, recordings: Collection[Recording], axes: Collection[str], findings: Iterable[Finding]
+    ) -> "TankTests | None":
+        """Return the tests without some recordings, and without all tests of some axes; the findings say why.
+
+        Returns None where nothing is left from which a vehicle could be identified.
+        """
+        remaining = {
+            name: kept
+            for name, some in self.recordings.items()
+            if name not in axes and (kept := tuple(r for r in some if r not in recordings))
+        }
+        # Without its recordings, an axis may have too few other tests.
+        for gone in ({*axes}, {*axes, *(name for name in self.recordings if name not in remaining)}):
+            tested = replace(
+                self.tested,
+                steady={name: back for name, back in self.tested.steady.items() if name not in gone},
+                time_constants=[name for name in self.tested.time_constants if name not in gone],
+                logs=[*remaining],
+            )
+            vehicle = narrowed(self.given.description, tested, self.folder)
+            if vehicle.given and (tested.axes or tested.thrust):
+                curves = {curve.name for curve in vehicle.given.rov.layout.curves}
+                return replace(
+                    self,
+                    given=vehicle.given,
+                    thrust={name: rows for name, rows in self.thrust.items() if name in curves},
+                    steady={name: rows for name, rows in self.steady.items() if name not in gone},
+                    time_constants={name: rows for name, rows in self.time_constants.items() if name not in gone},
+                    recordings=remaining,
+                    tested=tested,
+                    findings=(*self.findings, *findings, *(f for f in vehicle.findings if f not in self.findings)),
+                )
+        return None
 
 
 def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> TankTests:
@@ -101,7 +138,7 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
     if mistakes := [*description_mistakes, *reader.mistakes, *vehicle.rov_file_mistakes, *vehicle.test_mistakes]:
         raise (DataFileError if in_tests else VehicleFileError)(*mistakes)
     assert vehicle.given
-    return reader.tests(vehicle.given, vehicle.findings)
+    return reader.tests(vehicle.given, tested, vehicle.findings)
 
 
 def _read_description(path: Path) -> tuple[Description | None, list[str]]:
@@ -239,7 +276,7 @@ class _Reader:
             [*filter(None, subjects("log")), *self.recordings],
         )
 
-    def tests(self, given: Given, findings: Iterable[Finding]) -> TankTests:
+    def tests(self, given: Given, tested: Tested, findings: Iterable[Finding]) -> TankTests:
         """Return all tests; `findings` are those about the vehicle."""
         curves = {curve.name for curve in given.rov.layout.curves}
         rows: dict[str, dict[str, tuple[Row, ...]]] = {kind: {} for kind in _KINDS}
@@ -257,6 +294,7 @@ class _Reader:
             time_constants=rows["time_constant"],
             recordings={name: tuple(found) for name, found in self.recordings.items()},
             inputs=inputs | self.inputs,
+            tested=tested,
             findings=(*findings, *self.findings),
         )
 

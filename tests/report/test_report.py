@@ -157,7 +157,7 @@ def test_a_vehicle_of_another_kind_is_compared(of_tables: Identification) -> Non
 
 
 def test_recordings_are_drawn_listed_and_predicted(of_recordings: Identification, pages: Mapping[int, str]) -> None:
-    """The prediction is in percent of the velocity over time."""
+    """The errors of predictions are in units, beside no change and the noise of the sensor."""
     page = pages[id(of_recordings)]
     labels = {svg.get("aria-label") for svg in html.fromstring(page).iter("svg")}
     assert {"Thrust: rear", "Thrust: top"} <= labels
@@ -167,14 +167,29 @@ def test_recordings_are_drawn_listed_and_predicted(of_recordings: Identification
         file = f"log_{result.axis.name}_a&b $1.csv"
         assert f"Recording: {file}" in labels
         assert sum(row[0] == file for row in table) >= len(result.steps) > 0
-        assert result.held_out
-        p = np.concatenate([[p.measured, p.predicted] for p in result.held_out.predictions], axis=1)
-        fit = 1.0 - np.sqrt(np.mean((p[0] - p[1]) ** 2)) / np.std(p[0])
-        assert 0.5 < fit < 1.0
-        words = f"halves of {file}, each by a fit to the other"
-        assert [row[2] for row in table if row[:2] == [result.axis.name.capitalize(), words]] == [
-            f"{100.0 * fit:.1f} %"
-        ]
+        first, *others = (row for row in table if row[-1] == f"halves of {file}, each by a fit to the other")
+        assert not others
+        assert first[:3] == [result.axis.name.capitalize(), "10 s", result.axis.position]
+        predicted, unchanged, noise = (float(number) for number in first[3:6])
+        assert noise < predicted < 0.1 * unchanged
+        assert first[6] == "m"
+        whole = [row for row in table if row[1:3] == ["whole recording", "velocity"] and row[-1] == ""]
+        assert len(whole) == 2
+        assert all(float(row[3]) < 0.3 * float(row[4]) and row[6] == "m/s" for row in whole)
+
+
+def test_measured_and_fitted_values_stand_side_by_side(of_recordings: Identification, pages: Mapping[int, str]) -> None:
+    listed = {
+        row[0]: row
+        for row in rows(pages[id(of_recordings)])
+        if row[4:5] in (["thrust tests of rear"], ["thrust tests of top"])
+    }
+    assert {*listed} == {"a_t_rear", "b_t_rear", "a_t_top", "b_t_top"}
+    for name, row in listed.items():
+        assert row[1] == number(of_recordings.thrust[name[4:]].values[name], 4)
+        assert row[5] == number(of_recordings.vehicle.rov[name], 4), "the vehicle has the fitted value"
+        assert row[-1] in ("agree", "they differ")
+    assert "a thruster pushes less in motion than held at a scale" in text_of(pages[id(of_recordings)])
 
 
 # ---- Without plots ---------------------------------------------------------------------------------------------------
@@ -251,8 +266,10 @@ def test_the_printout_is_short_and_says_the_same(
     print_identification(replace(of_recordings, axes=(surge, heave, *others)))
     out = capsys.readouterr().out
     words = [" ".join(line.split()) for line in out.splitlines()]
-    assert heave.held_out
-    assert f"heave {heave.held_out.fit:.1f}% halves of log_heave_a&b $1.csv, each by a fit to the other" in words
+    (first,) = (line for line in words if line.startswith("heave depth, 10 s"))
+    predicted, unchanged, noise = (float(n) for n in first.split()[4:10:2])
+    assert noise < predicted < 3.0 * noise < 0.1 * unchanged
+    assert first.endswith("% halves of log_heave_a&b $1.csv")
     assert "heave 0.21 0.2 0.22 s delay from the commands to the motion" in words
     assert "- heave: a dive (a_d_w, now 10 ... 20; then 75% narrower)" in words
     assert "and 10 more: --report lists them all" in words

@@ -224,9 +224,11 @@ def test_folders_that_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ([f"{n / 10},{30 * (n > 9)},{-0.02 * max(n - 9, 0):.2f}" for n in range(100)], "against the command"),
     ],
 )
-def test_recordings_that_teach_nothing(
+def test_a_recording_that_teaches_nothing_is_refused_where_there_is_no_other(
     rows: list[str], reason: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    for path in folder.glob("[st]*.csv"):
+        path.unlink()
     (folder / "log_heave.csv").write_text(LOG + "\n".join(rows) + "\n", encoding="utf-8")
     refused(folder, (str(folder / "log_heave.csv"), reason), capsys)
 

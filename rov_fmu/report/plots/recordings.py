@@ -42,7 +42,7 @@ def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -
         _write_at_top(above, 0.5 * (hold.start + hold.end), text(hold.command, ".0%"), "center")
     above.plot(*_thin(*measured(simulation)), color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label="measured")
     above.plot(*_thin(*modelled(simulation)), color=LIGHT["blue"], linewidth=1.2, label="model")
-    label: str | None = "predicted unseen"
+    label: str | None = "predicted"
     for p in result.held_out.predictions if result.held_out else ():
         if p.recording.file == recording.file:
             above.plot(*_thin(p.time, p.predicted), "--", color=LIGHT["violet"], linewidth=1.0, label=label)

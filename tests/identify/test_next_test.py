@@ -1,0 +1,157 @@
+"""The next test: within the limits of the tank, and none where enough is known."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.next_test import NextTest, Sensor, next_test
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.report.console_results import print_identification
+from rov_fmu.tank.description import TankLimits
+from rov_fmu.tank.findings import Finding
+from tests.folders import FORCE, HEAD, MASS, SPEED, read
+from tests.pool import run
+from tests.vehicles import VIDEORAY
+
+
+def estimate(axis: Axis, error: float) -> Estimate:
+    """Return an estimate of drag and β with this relative standard error."""
+    names = tuple(axis.coefficient(kind) for kind in ("a_d", "b_d", "beta"))
+    values = np.array([VIDEORAY[name] for name in names])
+    return Estimate(names, values, np.diag((error * values) ** 2), 1000.0, 1.0)
+
+
+def proposed(axis: Axis, error: float = 0.2, noise: float = 0.01, **limits: float) -> NextTest:
+    found = next_test(axis, VIDEORAY, estimate(axis, error), Sensor("velocity", noise), TankLimits(**limits))
+    assert found
+    return found
+
+
+def steps(test: NextTest) -> tuple[list[float], float, float]:
+    """Return the commands of a test, the duration of a hold and that of a rest, from its words."""
+    levels = [float(level) / 100.0 for level in re.findall(r"(-?\d+)%", test.words)]
+    hold, rest = re.findall(r"([0-9.]+) s (?:each|of rest)", test.words)
+    return levels, float(hold), float(rest)
+
+
+def plan(test: NextTest) -> list[tuple[float, float]]:
+    levels, hold, rest = steps(test)
+    return [(0.0, rest), *(part for c in levels for part in ((c, hold), (0.0, rest)))]
+
+
+@pytest.mark.parametrize("axis", [SURGE, HEAVE], ids=lambda axis: axis.name)
+def test_the_vehicle_stays_in_the_tank(axis: Axis) -> None:
+    """The integrator of the tests flies the proposed steps, and a minute of coasting after them."""
+    covered = {}
+    for length in (np.inf, 3.0, 1.0):
+        test = proposed(axis, **({"tank_length": length} if np.isfinite(length) else {}))
+        flown = run(VIDEORAY, axis, [*plan(test), (0.0, 60.0)], 10.0)
+        covered[length] = float(np.ptp(flown.position))
+        assert covered[length] <= length
+        assert test.is_useful
+    assert covered[np.inf] > 3.0, "without limits the step is longer than the tank"
+
+
+def test_yaw_needs_no_length() -> None:
+    assert proposed(YAW, tank_length=0.1).words == proposed(YAW).words
+
+
+@pytest.mark.parametrize("most", [0.15, 0.6])
+def test_no_command_is_above_the_strongest(most: float) -> None:
+    assert max(map(abs, steps(proposed(SURGE))[0])) > 0.6
+    assert max(map(abs, steps(proposed(SURGE, command_max=most))[0])) <= most
+
+
+@pytest.mark.parametrize("longest", [12.0, 30.0, 120.0])
+def test_a_recording_is_no_longer_than_allowed(longest: float) -> None:
+    assert sum(seconds for _, seconds in plan(proposed(HEAVE, duration=longest))) <= longest
+
+
+def test_enough_is_known_where_intervals_are_narrow() -> None:
+    assert proposed(HEAVE, error=0.02).is_known
+    assert not proposed(HEAVE, error=0.03).is_known
+    unknown = replace(estimate(HEAVE, 0.01), covariance=np.full((3, 3), np.inf))
+    found = next_test(HEAVE, VIDEORAY, unknown, Sensor("velocity", 0.01))
+    assert found
+    assert not found.is_known
+
+
+def test_no_test_is_of_use_where_none_fits_or_none_narrows() -> None:
+    none = proposed(HEAVE, duration=2.0)
+    assert (none.words, none.is_useful) == ("", False)
+    blind = proposed(HEAVE, error=0.1, noise=10.0)
+    assert blind.words
+    assert not blind.is_useful
+
+
+# ---- In a folder -----------------------------------------------------------------------------------------------------
+
+TESTS = {
+    "thrust_top.csv": f"{FORCE}\n0.1,0.07\n0.3,0.6\n0.5,1.65\n0.7,3.2\n",
+    "steady_heave.csv": f"{SPEED}\n0.3,0.163\n0.4,0.22\n0.5,0.28\n0.6,0.34\n0.7,0.4\n",
+}
+
+
+def lines(printed: str) -> Iterable[str]:
+    return printed.partition("To measure next:\n")[2].splitlines()[:2]
+
+
+def test_the_printout_says_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = identify(read(tmp_path, f"{HEAD}[known]\n{MASS}[limits]\ntank_length = 2\nduration = 60.0\n", TESTS))
+    (result,) = found.axes
+    test = result.next_test
+    assert test
+    assert sum(seconds for _, seconds in plan(test)) <= 60.0
+    known = replace(test, interval=(1.0, 1.02), width=0.02)
+    useless = replace(test, words="", narrowed=1.0, repeat=True)
+    for shown, expected in (
+        (known, "enough is known; the widest"),
+        (useless, "no step within the limits would narrow"),
+    ):
+        print_identification(replace(found, axes=(replace(result, next_test=shown),)))
+        first, second = lines(capsys.readouterr().out)
+        assert first.startswith(f"- heave: {expected}")
+        assert second.startswith("- heave: fly the first step of the dive once more at its end") == shown.repeat
+
+
+def test_a_step_is_repeated_where_something_drifts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for axis, repeat in (("surge", False), ("heave", True)):
+        drift = Finding("drift", axis=axis)
+        monkeypatch.setattr("rov_fmu.identify.identify.check_slips", lambda *_, drift=drift: [drift])
+        monkeypatch.setattr("rov_fmu.identify.identify.sentences", lambda *_: ())
+        (result,) = identify(read(tmp_path / axis, f"{HEAD}[known]\n{MASS}", TESTS)).axes
+        assert result.next_test
+        assert result.next_test.repeat == repeat
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("tank_length = 0", "limits.tank_length = 0: must be the length of the tank in m, above 0"),
+        ('tank_length = "4 m"', "limits.tank_length = '4 m': must be a number"),
+        (
+            "command_max = 50",
+            "limits.command_max = 50: must be above 0 and at most 1, a fraction of full thrust: half is",
+        ),
+        ('command_max = "120 %"', "limits.command_max = '120 %': must be above 0 and at most 1"),
+        ("duration = -1.0", "limits.duration = -1.0: must be the duration of a test in s, above 0"),
+        ("tank_lenght = 3.0", "limits.tank_lenght"),
+    ],
+)
+def test_a_wrong_limit_is_one_line(line: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(Exception, match="limits") as error:
+        read(tmp_path, f"{HEAD}[known]\n{MASS}[limits]\n{line}\n", TESTS)
+    text = str(error.value)
+    assert text.count("\n") == 0
+    assert message in text
+
+
+def test_percent_are_a_fraction(tmp_path: Path) -> None:
+    tests = read(tmp_path, f'{HEAD}[known]\n{MASS}[limits]\ncommand_max = "60 %"\n', TESTS)
+    assert tests.given.description.tank_limits == TankLimits(command_max=0.6)

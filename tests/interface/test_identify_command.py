@@ -1,0 +1,34 @@
+"""The command `identify` as a function: its progress."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.interface.identify_command import identify_folder
+from rov_fmu.io.messages import part
+from tests.folders import small_folder
+
+
+@pytest.mark.parametrize("with_report", [False, True])
+def test_the_progress_names_what_is_done_and_never_goes_back(with_report: bool, tmp_path: Path) -> None:
+    calls: list[tuple[str, float]] = []
+    report = tmp_path / "report.html" if with_report else None
+    folder = small_folder(tmp_path / "tests")
+    identify_folder(folder, None, report, force=False, on_progress=lambda *call: calls.append(call))
+    steps, shares = zip(*calls, strict=True)
+    assert all(before <= after for before, after in pairwise(shares))
+    assert shares[0] == 0.0
+    assert shares[-1] < 1.0
+    assert steps[:3] == ("thrust curves", "units and signs of heave", "recordings of heave")
+    assert "what to measure next of heave" in steps
+    assert any(step.startswith("drawing: ") for step in steps) == with_report
+
+
+def test_the_progress_of_a_part_is_a_share_of_the_whole() -> None:
+    calls: list[tuple[str, float]] = []
+    inner = part(part(lambda *call: calls.append(call), 0.5, 1.0), 0.2, 0.4)
+    for share in (0.0, 0.5, 1.0):
+        inner("fit", share)
+    assert [step for step, _ in calls] == ["fit"] * 3
+    assert [share for _, share in calls] == pytest.approx([0.6, 0.65, 0.7])
