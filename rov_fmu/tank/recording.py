@@ -28,6 +28,8 @@ class Recording:
     """n each, by thruster: the command of the thruster, if logged; otherwise all thrusters follow `command`."""
     beside: Mapping[str, Array] = field(default_factory=dict)
     """n each: the logged u, v, r and psi, smoothed and interpolated; u and v are over ground."""
+    context: Mapping[str, Array] = field(default_factory=dict)
+    """n each: what else was logged, by name: voltage (V), roll and pitch (rad), depth and distance (m)."""
 
     @property
     def is_position(self) -> bool:
