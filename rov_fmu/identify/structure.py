@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 from scipy.fft import idct
-from scipy.linalg import block_diag, solve_banded
+from scipy.linalg import block_diag, solve_banded, solve_triangular
 from scipy.special import fdtrc
+from threadpoolctl import threadpool_limits
 
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.recordings.noise_spectrum import cosines, noise_spectrum
@@ -28,8 +29,10 @@ _CHANCE = 1e-4
 """The probability of a false alarm by one cause; there are about ten causes."""
 _FREEDOM = 30.0
 """The degrees of freedom of the estimated spectrum of the noise; few, so that a wrong spectrum raises no alarm."""
-_FASTEST = 4.0
-"""The frequency up to which the residuals are tested, Hz; faster residuals contain no motion."""
+_COEFFICIENTS = 512
+"""The number of coefficients of the cosine transform that are tested; faster ones contain no motion."""
+_SWITCHES = 300
+"""The number of switches of a recording that count as uncertain, strongest first."""
 _LAG = 0.2
 """The time constant that stands for a lag of any length, s. The delay is projected out, so only the shape counts."""
 _SLOW = 12
@@ -44,13 +47,14 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
     """Yield a finding for each recording that the model does not explain: the most likely cause, and since when."""
     all_cases = (_Case(fit.rov, s, fit.delay_of(s.recording.file)) for s in fit.simulations)
     cases = [case for case in all_cases if case.spectrum is not None]
-    misfits = _misfits(cases) if cases else {}
+    with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
+        misfits = _misfits(cases) if cases else {}
     causes = [cause for cause in misfits if cause != "unknown"] or [*misfits]
     if not causes:
         return
     logged = {name for case in cases for name in case.simulation.recording.context}
     cause = max(causes, key=lambda name: misfits[name].score * (_LOGGED if name in logged else 1.0))
-    parts = np.split(misfits[cause].explained, np.cumsum([len(case.deviation) for case in cases[:-1]]))
+    parts = np.split(misfits[cause].explained, np.cumsum([len(case.spread) for case in cases[:-1]]))
     worst = max(range(len(cases)), key=lambda n: float(parts[n] @ parts[n]))
     for n, (case, part) in enumerate(zip(cases, parts, strict=True)):
         start = case.visible_from(part)
@@ -73,17 +77,24 @@ class _Case:
         return np.asarray(self.simulation.time - self.simulation.time[0])
 
     @cached_property
-    def thrust(self) -> Array:
-        """The force of each thruster along the axis, n x thrusters."""
+    def steady(self) -> Array:
+        """The force of each thruster along the axis without lag, n x thrusters."""
         layout, recording = self.rov.layout, self.simulation.recording
         held = np.searchsorted(recording.time, self.simulation.time - self.delay, side="right") - 1
-        command = recording.reaching(layout)[np.maximum(held, 0)]
         columns = []
-        for thruster, commands in zip(layout.thrusters, command.T, strict=True):
+        for thruster, commands in zip(layout.thrusters, recording.reaching(layout)[np.maximum(held, 0)].T, strict=True):
             curve, effect = layout.curve_of[thruster.name], self.rov.effect(thruster, recording.axis)
             levels, places = np.unique(commands, return_inverse=True)
             forces = [effect * self.rov.curve_force(curve, c) if effect else 0.0 for c in levels.tolist()]
-            force = self.rov[recording.axis.coefficient("alpha")] * np.array(forces)[places]
+            columns.append(self.rov[recording.axis.coefficient("alpha")] * np.array(forces)[places])
+        return np.column_stack(columns)
+
+    @cached_property
+    def thrust(self) -> Array:
+        """The force of each thruster along the axis, n x thrusters."""
+        columns = []
+        for thruster, force in zip(self.rov.layout.thrusters, self.steady.T, strict=True):
+            curve = self.rov.layout.curve_of[thruster.name]
             columns.append(self.lagging(force, self.rov[curve.coefficient("T")]) if curve.has_lag else force)
         return np.column_stack(columns)
 
@@ -178,20 +189,29 @@ class _Case:
         return noise_spectrum(self.residuals, np.hstack([self.shared, self.own, *self.causes.values()]))
 
     @cached_property
-    def deviation(self) -> Array:
-        """The standard deviation of the noise in the slow coefficients."""
+    def spread(self) -> Array:
+        """The Cholesky factor of the covariance of the slow coefficients.
+
+        A command that changes between two rows of a log changes at an unknown time between them, which adds to the
+        noise of the sensor. Where it changes on average is a delay.
+        """
         assert self.spectrum is not None
-        return np.sqrt(self.spectrum[: round(2.0 * _FASTEST * float(self.time[-1]))])
+        jumps = np.diff(self.steady.sum(axis=1))
+        last = np.argsort(-np.abs(jumps * np.diff(self.time)))[:_SWITCHES]
+        pulses = np.zeros((len(self.time), len(last)))
+        pulses[last, np.arange(len(last))] = jumps[last] / np.sqrt(12.0)
+        S = cosines(self.by_force(pulses))[:_COEFFICIENTS]
+        return np.asarray(np.linalg.cholesky(S @ S.T + np.diag(self.spectrum[:_COEFFICIENTS])))
 
     def white(self, values: Array) -> Array:
         """Return the slow coefficients of the transform of n or n x k values, in standard deviations of the noise."""
-        slow = cosines(values)[: len(self.deviation)]
-        return np.asarray((slow.T / self.deviation).T)
+        return np.asarray(solve_triangular(self.spread, cosines(values)[:_COEFFICIENTS], lower=True))
 
     def visible_from(self, misfit: Array) -> float | None:
-        """Return the time from which a whitened misfit exceeds the noise, s; None where it never does."""
-        values = idct(misfit * self.deviation, n=len(self.time), norm="ortho")
-        visible = np.flatnonzero(np.abs(values) > np.sqrt(np.mean(self.deviation**2)))
+        """Return the time from which a whitened misfit exceeds the sensor's noise, s; None where it never does."""
+        assert self.spectrum is not None
+        values = idct(self.spread @ misfit, n=len(self.time), norm="ortho")
+        visible = np.flatnonzero(np.abs(values) > np.sqrt(np.mean(self.spectrum)))
         return float(self.simulation.time[visible[0]]) if visible.size else None
 
 
