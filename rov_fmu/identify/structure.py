@@ -45,9 +45,9 @@ _LOGGED = 1.2
 
 def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
     """Yield a finding for each recording that the model does not explain: the most likely cause, and since when."""
-    all_cases = (_Case(fit.rov, s, fit.delay_of(s.recording.file)) for s in fit.simulations)
-    cases = [case for case in all_cases if case.spectrum is not None]
     with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
+        all_cases = (_Case(fit.rov, s, fit.delay_of(s.recording.file)) for s in fit.simulations)
+        cases = [case for case in all_cases if case.spectrum is not None]
         misfits = _misfits(cases) if cases else {}
     causes = [cause for cause in misfits if cause != "unknown"] or [*misfits]
     if not causes:
