@@ -118,6 +118,13 @@ _CAUSES = {
 }
 """What the residuals show, by cause (rov_fmu/identify/structure.py)."""
 
+
+def _unexplained(values: Mapping[str, Any]) -> str:
+    return "{axes}: the model does not explain {files} from {start:.0f} s on: {words}".format(
+        **values, words=_CAUSES[values["cause"]]
+    )
+
+
 _OWN_SENTENCES: dict[str, SentenceForm] = {
     # Thrust curves
     "thrust without freedom": (
@@ -199,10 +206,7 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "front of the commands."
     ),
     # Structure of the model
-    **{
-        f"unexplained {cause}": f"{{axes}}: the model does not explain {{files}} from {{start:.0f}} s on: {words}"
-        for cause, words in _CAUSES.items()
-    },
+    "unexplained": _unexplained,
     "lag suggested": (
         "{axes}: the motion in {files} follows the commands with a lag that the model does not have: put the curve of "
         "its thrusters into `lag` of [fit]"

@@ -6,7 +6,7 @@ residuals are whitened by the spectrum of the sensor's noise, so correlated nois
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,8 +59,10 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
     for n, (case, part) in enumerate(zip(cases, parts, strict=True)):
         start = case.visible_from(part)
         if start is not None or n == worst:
-            kind = "lag suggested" if cause == "lag" else f"unexplained {cause}"
-            yield Finding(kind, fit.axis.name, file=case.simulation.recording.file, numbers={"start": start or 0.0})
+            found = Finding("unexplained", fit.axis.name, file=case.simulation.recording.file, names={"cause": cause})
+            if cause == "lag":
+                found = replace(found, kind="lag suggested", names={})
+            yield replace(found, numbers={"start": start or 0.0})
 
 
 @dataclass(frozen=True, eq=False)
