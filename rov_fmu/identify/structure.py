@@ -49,11 +49,13 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
         all_cases = (_Case(fit.rov, s, fit.delay_of(s.recording.file)) for s in fit.simulations)
         cases = [case for case in all_cases if case.spectrum is not None]
         misfits = _misfits(cases) if cases else {}
-    causes = [cause for cause in misfits if cause != "unknown"] or [*misfits]
-    if not causes:
+    if not misfits:
         return
     logged = {name for case in cases for name in case.simulation.recording.context}
-    cause = max(causes, key=lambda name: misfits[name].score * (_LOGGED if name in logged else 1.0))
+    scores = {name: misfit.score * (_LOGGED if name in logged else 1.0) for name, misfit in misfits.items()}
+    cause = max(scores, key=lambda name: scores[name])
+    if cause != "lag":  # a lag explains part of many a misfit, and an unknown force most of it
+        cause = max(scores.keys() - {"lag", "unknown"} or {"unknown"}, key=lambda name: scores[name])
     parts = np.split(misfits[cause].explained, np.cumsum([len(case.spread) for case in cases[:-1]]))
     worst = max(range(len(cases)), key=lambda n: float(parts[n] @ parts[n]))
     for n, (case, part) in enumerate(zip(cases, parts, strict=True)):
