@@ -13,6 +13,7 @@ from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_
 from rov_fmu.identify.points.thrust_fit import ThrustFit
 from rov_fmu.identify.recordings.prediction_errors import Key, shown_in
 from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
+from rov_fmu.identify.structure import on_structure
 from rov_fmu.identify.usable import is_pushed
 from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import REVERSE
@@ -125,6 +126,7 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
         share = s.outliers / len(s.time)
         if share > 0.03:
             yield finding("outliers", file=file, numbers={"share": share})
+    yield from on_structure(fit)
     if factors := fit.disagreement:
         numbers = {"low": min(factors.values()), "high": max(factors.values())}
         yield finding("disagreement", names={"coefficients": join_names(factors)}, numbers=numbers)

@@ -100,6 +100,31 @@ def _wrong_scale(values: Mapping[str, Any]) -> str:
     )
 
 
+_CAUSES = {
+    "voltage": (
+        "the residuals grow as the voltage changes. A thrust that depends on the voltage (V_0 and n_V of its curve) "
+        "would explain it"
+    ),
+    "pitch": "the residuals follow the pitch. A vehicle with the axis pitch would explain it",
+    "roll": "the residuals follow the roll. A vehicle with the axis roll would explain it",
+    "depth": "the residuals follow the depth, as when the buoyancy changes with the pressure, or a tether pulls",
+    "distance": "the residuals follow the logged distance, as when a tether pulls",
+    "tether": "a force grows with the distance from the start, as when a tether pulls",
+    "saturation": "the thrust differs from its curve at the highest commands, as when thrusters saturate",
+    "drift": "the thrust or the load changes with time, as when the voltage falls",
+    "recording": "thrust or drag differ between the recordings",
+    "scale": "the sensors of position and velocity disagree, so one of them has a wrong scale",
+    "unknown": "a force that changes slowly remains, and none of the causes that are tested explains it",
+}
+"""What the residuals show, by cause (rov_fmu/identify/structure.py)."""
+
+
+def _unexplained(values: Mapping[str, Any]) -> str:
+    return "{axes}: the model does not explain {files} from {start:.0f} s on: {words}".format(
+        **values, words=_CAUSES[values["cause"]]
+    )
+
+
 _OWN_SENTENCES: dict[str, SentenceForm] = {
     # Thrust curves
     "thrust without freedom": (
@@ -203,6 +228,12 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     "delay not modelled": _effect(
         "The motion in {axes} followed the commands {value:.4g} s late{interval}: the model has no delay, put one in "
         "front of the commands."
+    ),
+    # Structure of the model
+    "unexplained": _unexplained,
+    "lag suggested": (
+        "{axes}: the motion in {files} follows the commands with a lag that the model does not have: put the curve of "
+        "its thrusters into `lag` of [fit]"
     ),
     # Units and signs
     "implausible beta": (
