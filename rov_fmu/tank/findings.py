@@ -105,7 +105,7 @@ SENTENCES: dict[str, SentenceForm] = {
     ),
     "constant motion": "{files}: no recording of {axes}: the {quantity} never changes",
     "constant push": "{files}: no recording of {axes}: what the thrusters do along it never changes",
-    "gaps": "{files}: {count:#gap} in {axes}, by which the recording is divided: {gaps}",
+    "gaps": "{files}: {count:#gap} in {axes}: {gaps}",
     # Logs of autopilots and bags
     "source of commands": "{files}: the commands of the thrusters are those of {source}",
     "time of arrival": (

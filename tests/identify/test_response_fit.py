@@ -6,8 +6,8 @@ from math import atanh, exp, inf, sqrt
 import numpy as np
 import pytest
 
-from rov_fmu.identify.choice import MARGIN
 from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.points.choice import MARGIN
 from rov_fmu.identify.points.drag_forms import LEFT_OUT, Point
 from rov_fmu.identify.points.response_fit import ResponseFit, fit_response, response_band
 from rov_fmu.model.layout import HEAVE, SWAY, Curve, Layout, Thruster, VehicleAxis

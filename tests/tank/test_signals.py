@@ -55,7 +55,7 @@ def test_gaps_are_told_with_their_time_and_length() -> None:
     commands = Commands(STEPS, {name: np.where(STEPS > 2.0, 0.5, 0.0) for name in "lrt"})
     _, findings = recordings_of("a.csv", PAPER, commands, [Signal(HEAVE, "depth", STEPS, depth)])
     assert sentences(findings, SENTENCES) == (
-        "a.csv: 2 gaps in heave, by which the recording is divided: 4.2 s from 4.9 s on, 2.2 s from 12.9 s on",
+        "a.csv: 2 gaps in heave: 4.2 s from 4.9 s on, 2.2 s from 12.9 s on",
     )
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from rov_fmu.identify.forms import widened
+from rov_fmu.identify.points.forms import widened
 from rov_fmu.model.layout import REVERSE, Axis
 from rov_fmu.model.rov import Rov
 

@@ -7,7 +7,6 @@ from math import isfinite
 
 import numpy as np
 
-from rov_fmu.identify.choice import MARGIN, Choice, aicc
 from rov_fmu.identify.least_squares import (
     Estimate,
     Solution,
@@ -18,6 +17,7 @@ from rov_fmu.identify.least_squares import (
     leave_one_out,
     rms,
 )
+from rov_fmu.identify.points.choice import MARGIN, Choice, aicc
 from rov_fmu.identify.points.drag_forms import LEFT_OUT, DragForm, Point, candidate_forms, level
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov

@@ -9,8 +9,6 @@ from math import inf
 import numpy as np
 from scipy.linalg import block_diag
 
-from rov_fmu.identify.choice import MARGIN, Choice, aicc
-from rov_fmu.identify.forms import with_keys
 from rov_fmu.identify.least_squares import (
     Estimate,
     Solution,
@@ -19,7 +17,9 @@ from rov_fmu.identify.least_squares import (
     leave_one_out,
     minimize,
 )
+from rov_fmu.identify.points.choice import MARGIN, Choice, aicc
 from rov_fmu.identify.points.curve_fit import CurveFit
+from rov_fmu.identify.points.forms import with_keys
 from rov_fmu.model.layout import REVERSE, Curve
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.checks import no_thrust

@@ -10,6 +10,7 @@ axes that share it are fitted at once. Each recording adds its initial velocity 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -146,12 +147,13 @@ class _Fit:
         kept = analysis.model.extras
         for extra in (e for e in kept if e.pairs() and analysis.significance(e) < _BEYOND_DOUBT):
             without = tuple(e for e in kept if e != extra)
-            errors = [
-                sum(p.error for axis in self.axes for p in self.held_out(axis, analysis, some).predictions)
-                for some in (kept, without)
-            ]
-            kept = kept if errors[0] < errors[1] else without
+            kept = kept if self._missed(analysis, kept) < self._missed(analysis, without) else without
         return kept
+
+    def _missed(self, analysis: ResidualAnalysis, extras: Collection[Extra]) -> float:
+        """Return the sum of the errors of the held-out predictions; infinite where one cannot be computed."""
+        found = [self.held_out(axis, analysis, extras) for axis in self.axes]
+        return inf if any(each.failed for each in found) else sum(p.error for each in found for p in each.predictions)
 
     def held_out(self, axis: Axis, analysis: ResidualAnalysis, extras: Collection[Extra]) -> HeldOut:
         """Predict each recording of an axis by the others, with the thrust curve of the fit to all."""

@@ -22,7 +22,7 @@ from verification.references.pool import Array, Commands, Conditions
 Random = np.random.Generator
 Motion = Mapping[str, Array]
 
-ALARMS = frozenset({"disagreement", "poor prediction"})
+ALARMS = frozenset({"unexplained", "poor prediction"})
 """The kinds of findings that say that the model does not explain the data."""
 EFFECTS = frozenset(
     {"load", "delay", "lag", "current", "current north", "current east", "dead band", "reverse thrust", "reverse drag"}

@@ -13,7 +13,7 @@ from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.structure import on_structure
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.tank.findings import Finding
-from tests.identify.disturbed import SECONDS, SENSORS, Disturbance, Dive, along, by_hand, dive
+from tests.identify.structure.disturbed import SECONDS, SENSORS, Disturbance, Dive, along, by_hand, dive
 from tests.pool import NOISE
 from tests.vehicles import VIDEORAY
 
@@ -79,7 +79,11 @@ TILTED = {
     "logged tilt": Case(None, ("z",), Disturbance(tilt=TILT), logged=True, cause="pitch"),
 }
 """A fit to these takes long."""
-SEEDS = [0, 1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 20))]
+SEEDS = [
+    0,
+    pytest.param(1, marks=pytest.mark.long),
+    *(pytest.param(seed, marks=pytest.mark.weekly) for seed in range(2, 20)),
+]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -139,7 +143,7 @@ def test_the_sentence_names_recordings_time_and_remedy() -> None:
     assert "n_V" in sentence
 
 
-@pytest.mark.parametrize("sensors", [("z",), ("w", "z")])
+@pytest.mark.parametrize("sensors", [("z",), pytest.param(("w", "z"), marks=pytest.mark.long)])
 def test_a_short_recording_beside_others_is_no_obstacle(sensors: Sequence[str]) -> None:
     """It has too few samples for a spectrum of its noise, and is left out of the tests."""
     case = replace(DISTURBED["sag"], sensors=tuple(sensors))
