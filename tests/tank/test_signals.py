@@ -54,9 +54,7 @@ def test_gaps_are_told_with_their_time_and_length() -> None:
     depth = np.where((STEPS > 4.95) & (STEPS < 9.05) | (STEPS > 12.95) & (STEPS < 15.05), np.nan, STEPS)
     commands = Commands(STEPS, {name: np.where(STEPS > 2.0, 0.5, 0.0) for name in "lrt"})
     _, findings = recordings_of("a.csv", PAPER, commands, [Signal(HEAVE, "depth", STEPS, depth)])
-    assert sentences(findings, SENTENCES) == (
-        "a.csv: 2 gaps in heave: 4.2 s from 4.9 s on, 2.2 s from 12.9 s on",
-    )
+    assert sentences(findings, SENTENCES) == ("a.csv: 2 gaps in heave: 4.2 s from 4.9 s on, 2.2 s from 12.9 s on",)
 
 
 def test_a_wrapped_heading_is_unwrapped_and_keeps_its_blanks() -> None:
