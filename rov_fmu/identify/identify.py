@@ -105,7 +105,7 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
     for result in results:
         findings += result.findings
     findings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
-    drifting = {finding.axis for finding in findings if finding.kind == "drift"}
+    drifting = {finding.axis for finding in findings if finding.names.get("cause") == "drift"}
     for n, result in enumerate(results):
         on_progress(f"what to measure next of {result.axis.name}", _FITTED + (1.0 - _FITTED) * n / len(results))
         test = _next_test(tests, result, found.rov, repeat=result.axis.name in drifting)
@@ -256,9 +256,9 @@ def _fit_recordings(
     for n, axis in enumerate(axes):
         own = [recording for recording in recordings if recording.axis is axis]
         on_progress(f"recordings of {axis.name} alone", n / len(axes))
+        if len(axes) == 1:
+            raise _unusable(tests, own, base, together, fit)
         try:
-            if len(axes) == 1:
-                raise together
             apart |= fit(own)
         except (NoFitError, MotionError) as error:
             raise _unusable(tests, own, base, error, fit) from None
