@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.fft import idct
-from scipy.linalg import block_diag, solve_banded, solve_triangular
+from scipy.linalg import block_diag, solve_triangular
 from scipy.special import fdtrc
 from threadpoolctl import threadpool_limits
 
@@ -19,6 +19,7 @@ from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.recordings.noise_spectrum import cosines, noise_spectrum
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
+from rov_fmu.identify.recordings.trajectory import recursion
 from rov_fmu.model.layout import REVERSE, SURGE, SWAY
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
@@ -105,7 +106,7 @@ class _Case:
     def lagging(self, force: Array, T: float) -> Array:
         """Return the force with a lag of first order, which is steady at the start."""
         fall = np.exp(-np.diff(self.time) / T)
-        return _recursion(fall, ((1.0 - fall) * force[:-1])[:, None], force[0])[:, 0]
+        return recursion(np.append(fall, 0.0), np.append(force[0], (1.0 - fall) * force[:-1]))
 
     def by_force(self, *forces: Array, first: float = 0.0) -> Array:
         """Return the change of the measured values due to forces and an initial velocity, n x k."""
@@ -117,7 +118,9 @@ class _Case:
         damping = np.where(v >= 0.0, 2.0 * a * v + b, b_reverse - 2.0 * a_reverse * v)
         fall = np.maximum(gain * damping, 1e-6) * h
         gained = -np.expm1(-fall) / fall * gain * h
-        return self.by_velocity(_recursion(np.exp(-fall), gained[:, None] * np.column_stack(forces)[:-1], first))
+        changes = gained[:, None] * np.column_stack(forces)[:-1]
+        terms = np.vstack([np.full(changes.shape[1], first), changes])
+        return self.by_velocity(recursion(np.append(np.exp(-fall), 0.0), terms))
 
     def by_velocity(self, velocities: Array) -> Array:
         """Return the change of the measured values due to changes of the velocity, n x k."""
@@ -264,12 +267,6 @@ def _misfits(cases: Sequence[_Case]) -> dict[str, _Misfit]:
         if misfit.count and misfit.chance < _CHANCE:
             found[name] = misfit
     return found
-
-
-def _recursion(fall: Array, gained: Array, first: float) -> Array:
-    """Return x with x[n + 1] = fall[n] x[n] + gained[n] in each of k columns, where x[0] is `first`."""
-    bands = np.vstack([np.ones(len(fall) + 1), np.append(-fall, 0.0)])
-    return np.asarray(solve_banded((1, 0), bands, np.vstack([np.full(gained.shape[1], first), gained])))
 
 
 def _scaled(columns: Array) -> Array:

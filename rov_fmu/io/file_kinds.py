@@ -10,12 +10,14 @@ TESTS_FILE = "the rov.toml of a folder of tank tests"
 _TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "the log of an autopilot or of ROS"
 DATAFLASH_SUFFIX = ".bin"
 """The suffix of a DataFlash log, which the autopilot writes."""
+MAVLINK_SUFFIXES = (DATAFLASH_SUFFIX, ".tlog")
+"""The suffixes of logs of ArduSub; a .tlog is the telemetry log of a ground station."""
 ULOG_SUFFIX = ".ulg"
 """The suffix of a log of PX4."""
 BAG_SUFFIXES = (".bag", ".db3", ".mcap")
 """The suffixes of a bag of ROS 1 and of the files in a bag of ROS 2."""
-LOG_SUFFIXES = (DATAFLASH_SUFFIX, ".tlog", ULOG_SUFFIX, *BAG_SUFFIXES)
-"""The suffixes of logs other than CSV; a .tlog is the telemetry log of a ground station."""
+LOG_SUFFIXES = (*MAVLINK_SUFFIXES, ULOG_SUFFIX, *BAG_SUFFIXES)
+"""The suffixes of logs other than CSV."""
 _BY_SUFFIX = {
     **{".toml": _TOML, ".fmu": FMU, ".html": PAGE},
     **dict.fromkeys((".csv", ".tsv"), _TABLE),

@@ -24,7 +24,7 @@ from rov_fmu.io.csv_table import (
     find_column,
     read_columns,
 )
-from rov_fmu.io.file_kinds import BAG_SUFFIXES, LOG_SUFFIXES, ULOG_SUFFIX
+from rov_fmu.io.file_kinds import BAG_SUFFIXES, MAVLINK_SUFFIXES, ULOG_SUFFIX
 from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
@@ -50,7 +50,7 @@ _MOST_UNORDERED = 0.2
 _COMMAND = "command"
 _Command = tuple[Array, Array]
 READERS: dict[str, Callable[[Path, Wanted], Content]] = {
-    **dict.fromkeys(LOG_SUFFIXES, read_mavlink),
+    **dict.fromkeys(MAVLINK_SUFFIXES, read_mavlink),
     ULOG_SUFFIX: read_ulog,
     **dict.fromkeys(BAG_SUFFIXES, read_bag),
 }

@@ -145,9 +145,12 @@ class _Fit:
     def voted(self, analysis: ResidualAnalysis) -> tuple[Extra, ...]:
         """Return the extras without ratios by direction that do not improve the held-out predictions."""
         kept = analysis.model.extras
-        for extra in (e for e in kept if e.pairs() and analysis.significance(e) < _BEYOND_DOUBT):
+        doubtful = [e for e in kept if e.pairs() and analysis.significance(e) < _BEYOND_DOUBT]
+        least = self._missed(analysis, kept) if doubtful else inf
+        for extra in doubtful:
             without = tuple(e for e in kept if e != extra)
-            kept = kept if self._missed(analysis, kept) < self._missed(analysis, without) else without
+            if (missed := self._missed(analysis, without)) <= least:
+                kept, least = without, missed
         return kept
 
     def _missed(self, analysis: ResidualAnalysis, extras: Collection[Extra]) -> float:

@@ -68,12 +68,13 @@ def read_bag(path: Path, wanted: Wanted) -> Content:
         reason = brief(str(error)) or type(error).__name__
         hint = f"; after a recording that was cut short, `{_REPAIR[path.suffix.lower()]}` may repair it"
         raise DataFileError(f"{path}: cannot be read as a bag: {reason}{hint}") from error
-    signals = [signal for topic in sorted(topics, key=_rank) for signal in _signals(topic)]
+    measured = {topic.name: [*_signals(topic)] for topic in sorted(topics, key=_rank)}
+    signals = [signal for found in measured.values() for signal in found]
     commands, source = (None, []) if wanted.names_commands else _commands(path, topics, wanted)
     content = content_of(path.name, topics, wanted, commands, signals)
     content.findings, content.unread = findings, unread
     for topic in topics:
-        if topic.name not in source and not [*_signals(topic)]:
+        if topic.name not in source and not measured[topic.name]:
             content.unread[topic.name] = f"{topic.kind}, {len(topic.time)} messages: {brief(', '.join(topic.fields))}"
     if source:
         names = {"source": ", ".join(source)}
