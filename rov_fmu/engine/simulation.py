@@ -19,10 +19,12 @@ _POLL = 0.5
 """The waiting thread looks for Ctrl-C after this number of seconds, because Ctrl-C does not end a wait on Windows."""
 _SHORT = 30
 """Up to this number of steps take less time than starting a thread, and are over before anyone presses Ctrl-C."""
+_BRIEF = 100_000
+"""Up to this number of steps are over in about 0.1 s, so one worker computes them without a thread of its own."""
 _SHARES = 8
 """The number of parts that each worker computes on average. Small parts keep workers from waiting for each other."""
 
-_TABLE = np.dtype([("at", np.uintp), ("per_vehicle", np.intp), ("per_time", np.intp)])
+TABLE = np.dtype([("at", np.uintp), ("per_vehicle", np.intp), ("per_time", np.intp)])
 """The struct `table` of engine.c: the address of an array indexed by vehicle and time, and its two
 strides, counted in doubles."""
 
@@ -68,7 +70,7 @@ def simulate(
     shape = vehicles, len(times)
     places = layout.places | {f"der({name})": layout.places[name] + len(layout.state) for name in layout.state}
     numbers = np.zeros(len(places))
-    tables = np.zeros(len(places), _TABLE)
+    tables = np.zeros(len(places), TABLE)
     tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(places))
     arrays = []  # keeps the arrays alive while C uses their addresses
     for name, value in {**rov.coefficients, **layout.usual_inputs, **values}.items():
@@ -93,7 +95,7 @@ def simulate(
     workers = min(workers or usable_cores(), vehicles)
     share = -(-vehicles // (_SHARES * workers))
     firsts = range(0, vehicles, share)
-    if vehicles * len(times) <= _SHORT:
+    if vehicles * len(times) <= (_BRIEF if workers == 1 else _SHORT):
         for first in firsts:
             part(first)
     else:

@@ -157,7 +157,11 @@ def test_ctrl_c_ends_it() -> None:
 
 @pytest.mark.long
 def test_threads_cost_no_processor_time() -> None:
-    """Two cores are therefore nearly twice as fast as one. Wall time would also depend on other programs."""
+    """Two cores are therefore nearly twice as fast as one. Wall time would also depend on other programs.
+
+    Threads that waited actively or repeated each other's work would need twice the time. Cores that share their caches
+    with other programs have needed 12 % more.
+    """
     times, vehicles = np.arange(1001.0) / 10.0, 200
     values = {"u_l": 0.5, "u_r": 0.3, "a_d_u": np.linspace(5.0, 20.0, vehicles)[:, np.newaxis]}
 
@@ -167,4 +171,4 @@ def test_threads_cost_no_processor_time() -> None:
         return time.process_time() - start
 
     one, two = (min(seconds(workers) for _ in range(20)) for workers in (1, 2))
-    assert two < 1.1 * one
+    assert two < 1.4 * one

@@ -1,0 +1,1 @@
+"""Connections to ArduPilot, Gazebo, CasADi, JAX and Gymnasium."""

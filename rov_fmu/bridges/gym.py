@@ -1,0 +1,127 @@
+"""Gymnasium environments of a vehicle: one, or many with coefficients drawn from their uncertainty.
+
+The task is to hold station: the vehicle starts at rest in a random place near the origin and should return there and
+stay, heading north. The action holds the commands from -1 to 1 (as fractions), the observation all states.
+"""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from rov_fmu.engine.simulation import simulate
+from rov_fmu.io.messages import InputError
+from rov_fmu.vehicle.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+STEP = 0.1
+"""The length of a step by default, s."""
+STEPS = 300
+"""The steps of an episode by default."""
+START = 2.0
+"""The vehicle starts within this distance of the origin along each axis, m, and within this heading, rad."""
+BOUND = 1000.0
+"""The largest size of a state in an episode, in SI units."""
+
+
+class RovVectorEnv(VectorEnv[Array, Array, Any]):
+    """Many vehicles at once. Each has coefficients of its own, drawn from their uncertainty (`Vehicle.uncertainty`).
+
+    The reward is minus the sum of the squares of the position (m) and the heading (rad, of a vehicle without roll and
+    pitch), and a tenth of that of the commands. An episode is truncated after `steps` steps of `step` seconds, and
+    begins anew in the step after that. It is terminated when a state exceeds BOUND or the motion cannot be computed.
+    With `draws=False`, all vehicles have the coefficients of the file.
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as Gymnasium declares it
+
+    def __init__(
+        self, vehicle: Vehicle, count: int = 1, *, step: float = STEP, steps: int = STEPS, draws: bool = True
+    ) -> None:
+        layout = vehicle.layout
+        self.vehicle, self.num_envs, self.length, self.steps = vehicle, count, step, steps
+        self.draws = draws and len(vehicle.uncertainty.names) > 0
+        self.states, self.commands = tuple(layout.state), tuple(layout.commands)
+        self.targets = [n for n, name in enumerate(self.states) if name in ("x", "y", "z", "psi")]
+        self.single_observation_space = Box(-BOUND, BOUND, (len(self.states),), np.float64)
+        self.single_action_space = Box(-1.0, 1.0, (len(self.commands),), np.float64)
+        self.observation_space = batch_space(self.single_observation_space, count)
+        self.action_space = batch_space(self.single_action_space, count)
+        self.coefficients: dict[str, Array] = {}
+        self.state = np.zeros((count, len(self.states)))
+        self.elapsed = np.zeros(count, int)
+        self.over = np.zeros(count, bool)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Draw all coefficients and starts anew. Return the states (vehicles x states)."""
+        super().reset(seed=seed[0] if isinstance(seed, list) else seed, options=options)
+        if self.draws:
+            known = self.vehicle.uncertainty
+            drawn = known.drawn(self.np_random.random((self.num_envs, len(known.names))))
+            self.coefficients = {name: column[:, np.newaxis] for name, column in zip(known.names, drawn.T, strict=True)}
+        self._begin(np.ones(self.num_envs, bool))
+        return self.state.copy(), {}
+
+    def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
+        """Hold the commands (vehicles x commands) for one step. Vehicles whose episode is over begin a new one.
+
+        Raises InputError if the actions have another shape or are not finite.
+        """
+        fractions = np.clip(np.asarray(actions, float), -1.0, 1.0)
+        shape = self.num_envs, len(self.commands)
+        if fractions.shape != shape or not np.isfinite(fractions).all():
+            raise InputError(
+                f"actions: must be finite numbers of the shape {shape}, and have the shape {fractions.shape}"
+            )
+        layout, begun = self.vehicle.layout, self.over.copy()
+        command_of = np.vectorize(layout.command_of, otypes=[float]) if layout.pulse else np.asarray
+        commands = {name: command_of(fractions[:, n])[:, None] for n, name in enumerate(self.commands)}
+        start = {name: self.state[:, n, None] for n, name in enumerate(self.states)}
+        values = {**self.coefficients, **commands, **start}
+        found = simulate(self.vehicle.rov, [0.0, self.length], values, self.states, vehicles=self.num_envs)
+        after = found.values[:, :, 1].T
+        failed = ~(np.abs(after) <= BOUND).all(axis=1) & ~begun
+        moved = ~(failed | begun)
+        self.state[moved] = after[moved]
+        self.elapsed[moved] += 1
+        reward = -np.sum(self.state[:, self.targets] ** 2, axis=1) - 0.1 * np.sum(fractions**2, axis=1)
+        truncated = (self.elapsed >= self.steps) & ~begun
+        self._begin(begun)
+        reward[begun] = 0.0
+        self.over = failed | truncated
+        return self.state.copy(), reward, failed, truncated, {}
+
+    def _begin(self, which: NDArray[np.bool_]) -> None:
+        """Start new episodes."""
+        places = self.np_random.uniform(-START, START, (int(which.sum()), len(self.targets)))
+        level = [self.vehicle.layout.at_rest[name] for name in self.states]
+        self.state[which] = level
+        self.state[np.flatnonzero(which)[:, np.newaxis], self.targets] = places
+        self.elapsed[which], self.over[which] = 0, False
+
+
+class RovEnv(gymnasium.Env[Array, Array]):
+    """One vehicle: a `RovVectorEnv` of one, with the same arguments, that ends its episodes itself."""
+
+    metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
+
+    def __init__(self, vehicle: Vehicle, *, step: float = STEP, steps: int = STEPS, draws: bool = True) -> None:
+        self.many = RovVectorEnv(vehicle, step=step, steps=steps, draws=draws)
+        self.observation_space, self.action_space = self.many.single_observation_space, self.many.single_action_space
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Draw the coefficients and the start anew. Return the states."""
+        super().reset(seed=seed)
+        state, info = self.many.reset(seed=seed, options=options)
+        return state[0], info
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Hold the commands for one step."""
+        state, reward, terminated, truncated, info = self.many.step(np.asarray(action)[np.newaxis])
+        return state[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info

@@ -1,0 +1,436 @@
+"""Write a vehicle as a model for Gazebo (SDFormat 1.10), with the plugins of gz-sim: Hydrodynamics, Buoyancy, Thruster.
+
+The vehicle file has axes forward, starboard, down and an earth frame north-east-down. Gazebo has forward, left, up and
+east-north-up. Both body frames differ by half a turn about the forward axis, so components along and about the second
+and third axis change their signs, and nothing else does.
+
+The plugins take loads in newtons and coefficients that do not depend on commands. What a vehicle file says beyond that
+becomes a note of the model. Sources: gz-sim, src/systems; the specification of SDFormat, sdf/1.10.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from math import pi
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from rov_fmu import __version__
+from rov_fmu.io.messages import InputError
+from rov_fmu.io.templates import render
+from rov_fmu.model.layout import AXES, BODY, FAINT, HEAVE, REVERSE, Thruster, VehicleAxis, cross_name
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+DENSITY = 1000.0
+"""The density of the water, kg/m3, the default of the Buoyancy plugin."""
+_GRAVITY = 9.8
+"""Gravity where a vehicle file has no weight, m/s2, the default of SDFormat."""
+_SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+"""The signs of the components along and about the axes in Gazebo's frame, by those in the vehicle's frame."""
+_VELOCITIES, _FORCES, _IN_LINK = "uvwpqr", "xyzkmn", "xyzpqr"
+"""The letters of the axes: of velocities, of forces in the Hydrodynamics plugin, and in <fluid_added_mass>."""
+_HELD_TIME = 0.02
+"""The time constant, s, with which an axis that the vehicle lacks comes to rest."""
+_HELD_INERTIA = 1000.0
+"""The moment of inertia about an axis that the vehicle lacks, relative to one that it has."""
+_PROPELLER = 1e-5, 0.05
+"""The mass of a propeller's link relative to the vehicle, and its radius of inertia in m."""
+_COMMANDS = tuple(n / 4.0 for n in range(-4, 5))
+"""The commands whose thrust the file lists."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model for Gazebo: the text of its file, and what the reader of the console should know."""
+
+    text: str
+    notes: tuple[str, ...]
+    """What the vehicle file says and Gazebo does otherwise, and how the tuning was folded in, without a full stop."""
+    warnings: tuple[str, ...]
+    """What makes the simulation diverge."""
+
+
+@dataclass(frozen=True)
+class _Propeller:
+    """A thruster in Gazebo's frame: where it must stand so that the plugin's force has its force and moments."""
+
+    name: str
+    description: str
+    direction: Array
+    position: Array
+    scale: float
+    """The newtons of the plugin per newton of the vehicle file's thrust curve: alpha."""
+    newtons: Mapping[float, float]
+    """The thrust for some commands."""
+    lost: float
+    """The moment per newton that no position can give, m."""
+
+    @property
+    def largest(self) -> float:
+        """The largest thrust, N."""
+        return max(self.newtons.values())
+
+    @property
+    def smallest(self) -> float:
+        """The smallest thrust, N: that in reverse."""
+        return min(self.newtons.values())
+
+
+@dataclass(frozen=True)
+class _Link:
+    """The rigid body of a link: mass, centre of mass and moments of inertia about it."""
+
+    mass: float
+    centre: Array
+    inertia: Array
+
+    @property
+    def moments(self) -> dict[str, float]:
+        """The entries of the matrix of inertia by their names in SDFormat."""
+        return {f"i{'xyz'[i]}{'xyz'[j]}": self.inertia[i, j] for i, j in combinations_with_replacement(range(3), 2)}
+
+    @property
+    def matrix(self) -> Array:
+        """The 6x6 mass matrix about the origin."""
+        first_moment = self.mass * _cross(self.centre)
+        about_origin = self.inertia + _of_point(self.mass, self.centre)
+        return np.block([[self.mass * np.eye(3), first_moment.T], [first_moment, about_origin]])
+
+
+def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = False) -> Model:
+    """Return the model of a vehicle, alone or in a world with water.
+
+    The added mass stands in the link, in <fluid_added_mass>, or if it is `explicit`, in the Hydrodynamics plugin.
+    Raises InputError about a vehicle that Gazebo cannot have at all.
+    """
+    rov = vehicle.rov
+    if mistake := next(_impossible(rov), None):
+        raise InputError(f"{vehicle.identifier}: {mistake}")
+    gravity, volume = _gravity(rov), _volume(rov)
+    link = _link(rov, volume)
+    added = _added_mass(rov, link.matrix)
+    propellers = [propeller for propeller in (_propeller(rov, t) for t in rov.layout.thrusters) if propeller]
+    notes = tuple(_notes(rov, added, propellers, explicit=explicit))
+    small, radius = _PROPELLER
+    text = render(
+        "model.sdf.j2",
+        Path(__file__).parent / "templates",
+        number=_number,
+        vector=_vector,
+        comment=_comment,
+        vehicle=vehicle,
+        version=__version__,
+        notes=notes,
+        in_world=in_world,
+        density=DENSITY,
+        gravity=gravity,
+        north=pi / 2.0,
+        body=_Link(link.mass * (1.0 - small * len(propellers)), link.centre, link.inertia),
+        propeller=_Link(link.mass * small, np.zeros(3), link.mass * small * radius**2 * np.eye(3)),
+        fluid_added_mass={} if explicit else dict(_in_link(added)),
+        disable_coriolis=explicit and not rov.layout.coupled,
+        buoyancy={"centre": _centre(rov, "B"), "size": [volume ** (1.0 / 3.0)] * 3},
+        hydrodynamics=_damping(rov, link) | (dict(_in_plugin(added)) if explicit else {}),
+        thrusters=propellers,
+    )
+    return Model(text, notes, tuple(_divergence(added, link.matrix)) if explicit else ())
+
+
+def _impossible(rov: Rov) -> Iterator[str]:
+    """Yield a line about each reason why Gazebo cannot have the vehicle."""
+    if "m_rov" not in rov.coefficients:
+        yield "has no surge, sway or heave, and so no mass m_rov, which a link in Gazebo must have"
+        return
+    for name in (form.axis.coefficient("beta") for form in rov.layout.axes):
+        if rov[name] == 0.0:
+            yield f"{name} = 0: must be more than 0 for Gazebo, because m/{name} is a mass"
+    if _volume(rov) <= 0.0:
+        weight = rov["m_rov"] * _gravity(rov)
+        least = "must be less than the weight for Gazebo, because the Buoyancy plugin only pushes upwards"
+        yield f"the net weight of {_net_weight(rov):g} N {least}: {weight:g} N"
+
+
+# ---- Mass ------------------------------------------------------------------------------------------------------------
+
+
+def _cross(vector: Array) -> Array:
+    """Return the matrix S with S v = vector x v."""
+    return np.cross(np.eye(3), vector)
+
+
+def _of_point(mass: float, position: Array) -> Array:
+    """Return the matrix of inertia of a point mass about the origin."""
+    return mass * _cross(position).T @ _cross(position)
+
+
+def _net_weight(rov: Rov) -> float:
+    """Return the load that acts downwards in the earth frame, N: weight less buoyancy, and F_0 of a level vehicle."""
+    if not rov.layout.has(HEAVE):
+        return 0.0
+    if rov.layout.has_attitude:
+        return rov["W"] - rov["B"] if rov.layout.restoring else 0.0
+    return rov.load(rov.layout.kinds[HEAVE.name])
+
+
+def _gravity(rov: Rov) -> float:
+    """Return the gravity of the world, m/s2: that of the vehicle file's weight."""
+    return rov.coefficients.get("W", 0.0) / rov["m_rov"] or _GRAVITY
+
+
+def _volume(rov: Rov) -> float:
+    """Return the volume of the displaced water, m3, which gives the net weight."""
+    return (rov["m_rov"] - _net_weight(rov) / _gravity(rov)) / DENSITY
+
+
+def _centre(rov: Rov, of: str) -> Array:
+    """Return the centre of mass (G) or of buoyancy (B) in Gazebo's frame; the origin if the vehicle stays level."""
+    if not rov.layout.has_attitude:
+        return np.zeros(3)
+    return _SIGNS[:3] * [rov.coefficients.get(f"{axis}_{of}", 0.0) for axis in "xyz"]
+
+
+def _link(rov: Rov, volume: float) -> _Link:
+    """Return the body of a vehicle, without added mass.
+
+    About an axis that the vehicle lacks, its moment of inertia is so large that it hardly turns.
+    """
+    mass, centre = rov["m_rov"], _centre(rov, "G")
+    own = [rov.coefficients.get(axis.inertia) for axis in AXES.values() if axis.is_rotation]
+    typical = max((moment for moment in own if moment), default=mass * volume ** (2.0 / 3.0) / 6.0)
+    about_origin = np.diag([_HELD_INERTIA * typical if moment is None else moment for moment in own])
+    inertia = about_origin - _of_point(mass, centre)
+    least, middle, most = np.linalg.eigvalsh(inertia)
+    if least <= 0.0 or least + middle < most:  # no body has these moments, and SDFormat refuses them
+        inertia = most * np.eye(3)
+    return _Link(mass, centre, inertia)
+
+
+def _added_mass(rov: Rov, rigid: Array) -> Array:
+    """Return the 6x6 matrix that the rigid body lacks to the vehicle's effective mass matrix, in Gazebo's frame."""
+    found = np.zeros((6, 6))
+    forms = rov.layout.by_velocity
+    for i, a in enumerate(_VELOCITIES):
+        for j, b in enumerate(_VELOCITIES):
+            if a in forms and b in forms:
+                mass = rov.effective_inertia(forms[a]) if a == b else _off_diagonal(rov, a, b)
+                found[i, j] = _SIGNS[i] * _SIGNS[j] * mass - rigid[i, j]
+    size = np.sqrt(np.diag(rigid))
+    return np.where(np.abs(found) < FAINT * np.outer(size, size), 0.0, found)
+
+
+def _off_diagonal(rov: Rov, a: str, b: str) -> float:
+    """Return an entry of the effective mass matrix."""
+    return rov.parameters.get(f"mass_{a}{b}", rov.parameters.get(f"mass_{b}{a}", 0.0))
+
+
+def _in_link(added: Array) -> Iterator[tuple[str, float]]:
+    """Yield the entries of <fluid_added_mass> that are not 0."""
+    for i, j in combinations_with_replacement(range(6), 2):
+        if added[i, j]:
+            yield f"{_IN_LINK[i]}{_IN_LINK[j]}", added[i, j]
+
+
+def _in_plugin(added: Array) -> Iterator[tuple[str, float]]:
+    """Yield the added mass for the Hydrodynamics plugin, which has Fossen's sign: xDotU is -m_a."""
+    for i, j in np.argwhere(added):
+        yield f"{_FORCES[i]}Dot{_VELOCITIES[j].upper()}", -added[i, j]
+
+
+def _divergence(added: Array, rigid: Array) -> Iterator[str]:
+    """Yield a line if the plugin's added mass makes the simulation diverge (gz-sim issue 1923).
+
+    The plugin computes its force from the acceleration of the step before, so what remains of an error after a step is
+    the added mass by the mass of the link. It grows when the added mass is not less.
+    """
+    if max(abs(np.linalg.eigvals(np.linalg.solve(rigid, added)))) < 1.0:
+        return
+    too_large = [
+        f"{name} ({added[n, n]:.4g} of {rigid[n, n]:.4g} {BODY[axis.inertia].unit})"
+        for n, (name, axis) in enumerate(AXES.items())
+        if abs(added[n, n]) >= rigid[n, n]
+    ]
+    yield (
+        "the simulation diverges, because the Hydrodynamics plugin computes the added mass explicitly, and it is not "
+        f"less than the link's own: {', '.join(too_large) or 'the axes together'} (gz-sim issue 1923); use "
+        "--added-mass link, with the physics engine DART"
+    )
+
+
+# ---- Damping ---------------------------------------------------------------------------------------------------------
+
+
+def _damping(rov: Rov, link: _Link) -> dict[str, float]:
+    """Return the terms of the Hydrodynamics plugin: xU of U, xUabsU of U|U|, xUU of U U, yUR of U R.
+
+    U|U| and U U together give quadratic drag that depends on the direction.
+    """
+    found: dict[str, float] = {}
+
+    def add(axis: str, value: float, first: str, second: str = "", *, magnitude: bool = False) -> None:
+        """Add a force along an axis: a value times a velocity, and times another or its magnitude."""
+        signs = [_SIGNS[_VELOCITIES.index(v)] for v in (axis, first, *([] if magnitude else second))]
+        name = f"{_FORCES[_VELOCITIES.index(axis)]}{first.upper()}{'abs' if magnitude else ''}{second.upper()}"
+        found[name] = found.get(name, 0.0) + value * np.prod(signs)
+
+    for n, v in enumerate(_VELOCITIES):
+        form = rov.layout.by_velocity.get(v)
+        if form is None:
+            add(v, -link.matrix[n, n] / _HELD_TIME, v)
+            continue
+        b, a = (_both_ways(rov, form, key) for key in ("b_d", "a_d"))
+        add(v, -sum(b) / 2.0, v)
+        add(v, -sum(a) / 2.0, v, v, magnitude=True)
+        if a[0] != a[1]:
+            add(v, (a[1] - a[0]) / 2.0, v, v)
+    for key, axis, *others in rov.layout.cross:
+        value = rov[cross_name(key, axis, *others)]
+        if key == "b_d":
+            add(axis, -value, others[0])
+        elif key == "a_d":
+            add(axis, -value, others[0], others[0], magnitude=True)
+        elif key == "lift":
+            add(axis, value, *others)
+    return found
+
+
+def _both_ways(rov: Rov, form: VehicleAxis, key: str) -> tuple[float, float]:
+    """Return a drag coefficient for positive and for negative velocities."""
+    return rov[form.coefficient(key)], rov[form.coefficient(key + REVERSE)]
+
+
+# ---- Thrusters -------------------------------------------------------------------------------------------------------
+
+
+def _propeller(rov: Rov, thruster: Thruster) -> _Propeller | None:
+    """Return a thruster with alpha folded in, or None if it has no force.
+
+    Its force along each axis is multiplied by alpha of the axis, so is its moment about each axis, and a moment about
+    an axis that the vehicle lacks is 0. The thruster stands at the place where the force has these moments.
+    """
+    effects = np.zeros(6)
+    for n, (v, axis) in enumerate(zip(_VELOCITIES, AXES.values(), strict=True)):
+        if v in rov.layout.by_velocity:
+            effects[n] = rov[axis.coefficient("alpha")] * rov.effect(thruster, axis)
+        elif not axis.is_rotation:
+            effects[n] = thruster.effect(axis)
+    effects *= _SIGNS
+    force, moment = effects[:3], effects[3:]
+    scale = float(np.linalg.norm(force))
+    if scale == 0.0:
+        return None
+    direction = force / scale
+    given = _SIGNS[:3] * (thruster.position or (0.0, 0.0, 0.0))
+    curve = rov.layout.curve_of[thruster.name]
+    return _Propeller(
+        name=thruster.name,
+        description=thruster.description or f"thruster {thruster.name}",
+        direction=direction,
+        position=np.cross(force, moment) / scale**2 + direction * (direction @ given),
+        scale=scale,
+        newtons={c: scale * rov.curve_force(curve, c) for c in _COMMANDS},
+        lost=abs(float(direction @ moment)) / scale,
+    )
+
+
+# ---- What Gazebo does otherwise --------------------------------------------------------------------------------------
+
+
+def _notes(rov: Rov, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+    """Yield what the vehicle file says and Gazebo does otherwise, and how alpha and beta were folded in."""
+    yield from _notes_of_tuning(rov, added, propellers, explicit=explicit)
+    yield from _notes_of_commands(rov)
+    yield from _notes_of_motion(rov, propellers, explicit=explicit)
+
+
+def _notes_of_tuning(rov: Rov, added: Array, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+    """Yield how alpha and beta were folded in."""
+    scaled = [
+        f"{propeller.scale:.4g} F_{propeller.name}" for propeller in propellers if abs(propeller.scale - 1.0) > FAINT
+    ]
+    if scaled:
+        yield f"alpha: the plugins take {', '.join(scaled)} newtons, and the thrusters' places scale the moments"
+    if idle := {thruster.name for thruster in rov.layout.thrusters} - {propeller.name for propeller in propellers}:
+        yield f"left out: thrusters whose force alpha makes 0: {', '.join(sorted(idle))}"
+    place = "the Hydrodynamics plugin" if explicit else "<fluid_added_mass>"
+    for form in rov.layout.axes:
+        axis, beta = form.axis, form.axis.coefficient("beta")
+        if rov[beta] != 1.0:
+            n, unit = _VELOCITIES.index(axis.velocity), BODY[axis.inertia].unit
+            yield (
+                f"{beta} = {rov[beta]:g}: the effective inertia in {axis.name} "
+                f"is {rov.effective_inertia(form):.4g} {unit}, of which {place} has {added[n, n]:.4g} {unit}"
+            )
+
+
+def _notes_of_commands(rov: Rov) -> Iterator[str]:
+    """Yield what stands between a command and the thrust, which the Thruster plugin takes in newtons."""
+    layout = rov.layout
+    keys = {key for curve in layout.curves for key in curve.keys}
+    parts = {
+        "the thrust curve": True,
+        "its dead band": "c_0" in keys,
+        "its curve in reverse": any(key.endswith(REVERSE) for key in keys),
+        "the voltage of the battery": layout.voltage is not None,
+        "the inputs that drive several thrusters": bool(layout.mix),
+        "the pulse widths": layout.pulse is not None,
+    }
+    has = [part for part, is_there in parts.items() if is_there]
+    yield f"the Thruster plugin takes newtons, so these are left to the sender: {', '.join(has)}"
+    effects = {
+        "the lag of the thrust (T)": "T" in keys,
+        "the dead time (T_d)": layout.has_dead_time,
+        "the loss of thrust by the speed of advance (d)": "d" in keys,
+        "the fins": bool(layout.fins),
+    }
+    for effect in (effect for effect, is_there in effects.items() if is_there):
+        yield f"left out: {effect}"
+
+
+def _notes_of_motion(rov: Rov, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:
+    """Yield what the plugins and Gazebo's rigid body do otherwise with the motion."""
+    layout = rov.layout
+    for form in layout.axes:
+        forward, back = _both_ways(rov, form, "b_d")
+        if forward != back:
+            names = f"{form.coefficient('b_d')} and {form.coefficient('b_d' + REVERSE)}"
+            yield f"{names}: linear drag has their mean in both directions"
+        if rov.coefficients.get(form.coefficient("F_0")):
+            if form.axis is HEAVE and not layout.has_attitude:
+                yield "the constant load F_0_w is in the buoyancy"
+            else:
+                yield f"left out: the constant load {form.coefficient('F_0')}"
+    if missing := [name for name in AXES if name not in layout.kinds]:
+        yield f"the vehicle file has no {', '.join(missing)}: damping holds it there, in rotation with a large inertia"
+    if not layout.has_attitude:
+        yield "thrusters stand where their force has no moment in roll and pitch"
+    if lost := [propeller.name for propeller in propellers if propeller.lost > FAINT]:
+        yield f"left out: the moment about its own direction of each of the thrusters {', '.join(lost)}"
+    if not layout.coupled and len(layout.axes) > 1:
+        yield "the vehicle file has no Coriolis and Munk terms, but Gazebo's bodies have them"
+    if layout.coupled and explicit:
+        yield "the plugin computes Coriolis and Munk terms of the added mass from its diagonal only"
+
+
+# ---- Text ------------------------------------------------------------------------------------------------------------
+
+
+def _number(value: float) -> str:
+    """Return a number with 12 digits, without a negative zero."""
+    return f"{value + 0.0:.12g}"
+
+
+def _vector(values: Array) -> str:
+    """Return the components of a vector."""
+    return " ".join(map(_number, values))
+
+
+def _comment(text: str) -> Markup:
+    """Return a text for an XML comment, which must not contain two hyphens in a row."""
+    return Markup(re.sub("-(?=-)", "- ", text.rstrip(".")))

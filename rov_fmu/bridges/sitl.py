@@ -1,0 +1,242 @@
+"""A vehicle as the physics of ArduPilot's simulator: each servo packet moves it on by one frame, and gets a reply."""
+
+from array import array
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from io import StringIO
+from math import cos, inf, pi, sin
+from pathlib import Path
+from socket import socket
+from time import thread_time
+from typing import Any
+
+from rov_fmu.bridges.sitl_frames import Servos
+from rov_fmu.bridges.sitl_protocol import Kind, Sequence, ServoPacket, reply, servo_packet
+from rov_fmu.engine.stepper import Stepper
+from rov_fmu.io.csv_table import NO_OUTPUT, pulses
+from rov_fmu.io.messages import InputError
+from rov_fmu.io.output import Output, write_whole
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.model.rov import Rov
+
+GRAVITY = 9.80665
+"""The acceleration of gravity in ArduPilot, m/s2."""
+_LEAST_RATE = 20
+"""The lowest frame rate, Hz. ArduPilot does not accept steps of 0.1 s or more."""
+_LONGEST_RANGE = 100.0
+"""The range of the sensor that measures the distance to the bottom, m."""
+_DATAGRAM = 65536
+_usual_fraction = pulses()
+_MOTION = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
+_RATES = ("u", "v", "w", "x", "y", "z")
+"""The variables whose derivatives the reply contains. Those of the position are the velocity over ground."""
+_LOGGED = {
+    "surge velocity [m/s]": SURGE,
+    "sway velocity [m/s]": SWAY,
+    "depth [m]": HEAVE,
+    "roll [rad]": ROLL,
+    "pitch [rad]": PITCH,
+    "heading [rad]": YAW,
+}
+"""The columns of a log, and the axis that the vehicle must have."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a flight begins with."""
+
+    rov: Rov
+    servos: Servos
+    start: Mapping[str, float] = field(default_factory=dict)
+    """Inputs that are held, states and Euler angles at the start, in SI units, by name."""
+    bottom: float = inf
+    """The depth of the bottom, m."""
+    log: Path | None = None
+    """The log to write (CSV). Later flights add a number to its name."""
+    log_interval: float = 0.1
+    """The time between two rows of the log, s."""
+
+
+class Log:
+    """A log of one flight in the form that `identify` reads: commands, velocities over ground, depth and angles.
+
+    A row holds the motion at its time, and the mean commands up to the next row.
+    """
+
+    def __init__(self, path: Path, setup: Setup) -> None:
+        layout = setup.rov.layout
+        self._path, self._interval = path, setup.log_interval
+        self._motion = [title for title, axis in _LOGGED.items() if layout.has(axis)]
+        self._titles = ["time [s]", *(f"{name} [1]" for name in layout.commands), *self._motion]
+        self._rows = array("d")
+        self._row: list[float] = []
+        self._sums = [0.0] * len(layout.commands)
+        self._since = 0.0
+
+    def add(self, h: float, fractions: list[float], time: float, motion: Mapping[str, float]) -> None:
+        """Add a step of h seconds under commands from -1 to 1, and the time and the motion at its end."""
+        self._sums = [total + h * value for total, value in zip(self._sums, fractions, strict=True)]
+        self._since += h
+        if self._row and self._since < self._interval - 0.5 * h:
+            return
+        if self._row:
+            self._rows.extend([self._row[0], *(total / self._since for total in self._sums), *self._row[1:]])
+        self._row = [time, *(motion[title] for title in self._motion)]
+        self._sums, self._since = [0.0] * len(fractions), 0.0
+
+    def write(self) -> None:
+        """Write all complete rows. Raises WriteError."""
+        text, width = StringIO(), len(self._titles)
+        print(*self._titles, sep=",", file=text)
+        for first in range(0, len(self._rows), width):
+            print(*(f"{value:.9g}" for value in self._rows[first : first + width]), sep=",", file=text)
+        write_whole(Output(self._path, text.getvalue().encode()))
+
+
+class Flight:
+    """One flight: a vehicle that follows the servo packets of an autopilot."""
+
+    def __init__(self, setup: Setup, number: int = 1) -> None:
+        """Begin at time 0 s. `number` counts the flights from 1. Raises BuildError when there is no engine."""
+        self._setup, layout = setup, setup.rov.layout
+        self._names = [name for name in _MOTION if name in layout.state or name in layout.angles]
+        self._names += [f"der({name})" for name in _RATES if name in layout.state]
+        self._stepper = Stepper(setup.rov, setup.start, self._names)
+        self._commands = {name: setup.servos.get(name) for name in layout.commands}
+        self._held = {**layout.usual_inputs, **setup.start}
+        path = setup.log
+        if path and number > 1:
+            path = path.with_stem(f"{path.stem}_{number}")
+        self.log = Log(path, setup) if path else None
+
+    @property
+    def time(self) -> float:
+        """The time since the start, s."""
+        return self._stepper.time
+
+    def step(self, packet: ServoPacket) -> bytes:
+        """Move on by one frame and return the reply. Raises InputError if the motion cannot be computed."""
+        h, layout = 1.0 / max(packet.frame_rate, _LEAST_RATE), self._setup.rov.layout
+        commands, fractions = [], []
+        for name, servo in self._commands.items():
+            if servo is None:
+                commands.append(self._held[name])
+                fractions.append(layout.fraction_of(self._held[name]))
+            else:
+                number, sign = servo
+                fractions.append(sign * self._fraction(packet.pulses[number - 1]))
+                commands.append(layout.command_of(fractions[-1]))
+        try:
+            at = dict(zip(self._names, self._stepper.step(commands, h), strict=True))
+        except OverflowError as error:
+            raise InputError(f"VEHICLE: {error}: it overflows, or changes too fast") from error
+        values, motion = self._measured(at)
+        if self.log:
+            self.log.add(h, fractions, self.time, motion)
+        return reply(values)
+
+    def _fraction(self, pulse: int) -> float:
+        """Return the command from -1 to 1 of a pulse (µs), by the vehicle's own pulses if it has them."""
+        layout = self._setup.rov.layout
+        if layout.pulse and pulse not in NO_OUTPUT:
+            return layout.fraction_of(pulse)
+        return max(-1.0, min(1.0, _usual_fraction(pulse)))
+
+    def _measured(self, at: Mapping[str, float]) -> tuple[dict[str, Any], dict[str, float]]:
+        """Return the values of the reply, and those of the log, from the variables of the vehicle."""
+        u, v, w, p, q, r, x, y, z, phi, theta, psi = (at.get(name, 0.0) for name in _MOTION)
+        du, dv, dw, V_N, V_E, V_D = (at.get(f"der({name})", 0.0) for name in _RATES)
+        c1, s1, c2, s2, c3, s3 = cos(phi), sin(phi), cos(theta), sin(theta), cos(psi), sin(psi)
+        upright = c1 * c2  # the part of the body's z axis that points down
+        # The current is steady, so the acceleration of the vehicle is that of its motion through the water.
+        accel = [
+            du + q * w - r * v + GRAVITY * s2,
+            dv + r * u - p * w - GRAVITY * s1 * c2,
+            dw + p * v - q * u - GRAVITY * upright,
+        ]
+        values: dict[str, Any] = {
+            "timestamp": self.time,
+            "imu": {"gyro": [p, q, r], "accel_body": accel},
+            "position": [x, y, z],
+            "attitude": [phi, theta, (psi + pi) % (2.0 * pi) - pi],
+            "velocity": [V_N, V_E, V_D],
+        }
+        if self._setup.bottom < inf:
+            height = max(self._setup.bottom - z, 0.0)
+            values["rng_1"] = height / upright if height < _LONGEST_RANGE * upright else _LONGEST_RANGE
+        if self._setup.rov.layout.voltage is not None:
+            values["battery"] = {"voltage": self._held["voltage"]}
+        ahead, starboard = c3 * V_N + s3 * V_E, c3 * V_E - s3 * V_N
+        below = s2 * ahead + c2 * V_D
+        over_ground = (c2 * ahead - s2 * V_D, c1 * starboard + s1 * below)
+        return values, dict(zip(_LOGGED, (*over_ground, z, phi, theta, psi), strict=True))
+
+
+@dataclass
+class Traffic:
+    """What a connection has seen."""
+
+    frames: int = 0
+    """The number of steps."""
+    repeated: int = 0
+    """The number of packets that got the last reply again."""
+    ignored: int = 0
+    """The number of datagrams that were no servo packets, or came late."""
+    restarts: int = 0
+    own_time: float = 0.0
+    """The processor time from the arrivals of servo packets to the ends of their replies, s."""
+
+
+class Connection:
+    """The flights of a vehicle with an autopilot, which may be started again."""
+
+    def __init__(self, setup: Setup) -> None:
+        """Begin the first flight. Raises BuildError when there is no engine."""
+        self._setup = setup
+        self._answer = b""
+        self.order = Sequence()
+        self.traffic = Traffic()
+        self.flight = Flight(setup)
+
+    def answer(self, data: bytes, sender: tuple[Any, ...]) -> bytes:
+        """Return the reply to a datagram; it is empty if there is none.
+
+        Raises InputError if the motion cannot be computed, and WriteError if the log cannot be written.
+        """
+        packet = servo_packet(data)
+        kind = self.order.kind(packet, sender) if packet else Kind.STRANGE
+        if packet is None or kind is Kind.STRANGE:
+            self.traffic.ignored += 1
+            return b""
+        if kind is Kind.REPEATED:
+            self.traffic.repeated += 1
+            return self._answer
+        if kind is Kind.RESTART:
+            self.write_log()
+            self.traffic.restarts += 1
+            self.flight = Flight(self._setup, self.traffic.restarts + 1)
+        self.traffic.frames += 1
+        self._answer = self.flight.step(packet)
+        return self._answer
+
+    def write_log(self) -> None:
+        """Write the log of the flight, if there is one to write. Raises WriteError."""
+        if self.flight.log:
+            self.flight.log.write()
+
+    def serve(self, server: socket, duration: float = inf) -> None:
+        """Answer the datagrams that arrive, for a duration of the flight in seconds.
+
+        A reply that cannot be sent is lost, and ArduPilot asks again. Raises what `answer` raises.
+        """
+        while self.flight.time < duration - 1e-6:  # the time is a sum of steps, with their rounding
+            try:
+                data, sender = server.recvfrom(_DATAGRAM)
+            except ConnectionError:  # Windows reports in this way that nobody received the last reply
+                continue
+            begin = thread_time()
+            if found := self.answer(data, sender):
+                with suppress(OSError):
+                    server.sendto(found, sender)
+            self.traffic.own_time += thread_time() - begin

@@ -1,0 +1,96 @@
+"""The packets of ArduPilot's JSON interface: servo packets, replies, and which of the packets are new.
+
+The layout is that of `libraries/SITL/SIM_JSON.h` and of `libraries/SITL/examples/JSON/readme.md` of ArduPilot.
+"""
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+PORT = 9002
+"""The UDP port to which ArduPilot sends its servo packets."""
+_HEAD = struct.Struct("<HHI")
+_CHANNELS = {18458: 16, 29569: 32}
+"""The number of channels in a packet, by its magic number."""
+_BODIES = {magic: struct.Struct(f"<{count}H") for magic, count in _CHANNELS.items()}
+_JSON = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
+_MOST_LOST = 1000
+"""A packet whose count has risen by more than this is probably not the next one."""
+_WRAP = 2**32
+Address = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class ServoPacket:
+    """The outputs of the autopilot for one frame."""
+
+    frame_rate: int
+    """The number of frames in a second that the autopilot asks for."""
+    frame_count: int
+    pulses: tuple[int, ...]
+    """The pulse widths of 16 or 32 channels, µs; 0 stands for no pulse."""
+
+
+def servo_packet(data: bytes) -> ServoPacket | None:
+    """Return the servo packet in a datagram, or None if it is none."""
+    if len(data) < _HEAD.size:
+        return None
+    magic, frame_rate, frame_count = _HEAD.unpack_from(data)
+    body = _BODIES.get(magic)
+    if body is None or len(data) != _HEAD.size + body.size:
+        return None
+    return ServoPacket(frame_rate, frame_count, body.unpack_from(data, _HEAD.size))
+
+
+def reply(values: Mapping[str, Any]) -> bytes:
+    """Return the datagram that answers a servo packet: JSON without blanks, between two line breaks.
+
+    ArduPilot does not parse JSON, but searches for the first occurrence of `"key":` and reads the number or the
+    bracket behind it. So there are no blanks, and no key contains one that stands behind it. Raises ValueError if a
+    number is not finite.
+    """
+    return f"\n{_JSON.encode(values)}\n".encode()
+
+
+class Kind(Enum):
+    """What to do with a servo packet."""
+
+    NEW = "a step"
+    REPEATED = "the last reply again"
+    RESTART = "a step from the start, for an autopilot that was started again"
+    STRANGE = "nothing"
+
+
+@dataclass
+class Sequence:
+    """The order of servo packets. ArduPilot counts a frame when it has the reply, and repeats the packet until then."""
+
+    last: int | None = None
+    """The count of the last packet that was answered with a step."""
+    lost: int = 0
+    """The number of counts that were left out."""
+    _sender: Address = ()
+    _strange: int | None = field(default=None, repr=False)
+
+    def kind(self, packet: ServoPacket, sender: Address) -> Kind:
+        """Return what to do with a packet.
+
+        A packet whose count is older, or much newer, came late or is damaged. It is believed if it comes a second time
+        with no other in between, since ArduPilot repeats a packet that is not answered. An autopilot that is started
+        again counts from 0, usually from another port.
+        """
+        count = packet.frame_count
+        ahead = 1 if self.last is None else (count - self.last) % _WRAP
+        if ahead == 0:
+            return Kind.REPEATED
+        restarted = count == 0 and self.last is not None
+        if ahead > _MOST_LOST and count != self._strange and not (restarted and sender != self._sender):
+            self._strange = count
+            return Kind.STRANGE
+        if ahead <= _MOST_LOST:
+            self.lost += ahead - 1
+        self.last, self._sender, self._strange = count, sender, None
+        return Kind.RESTART if restarted and ahead > _MOST_LOST else Kind.NEW

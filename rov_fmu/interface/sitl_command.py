@@ -1,0 +1,119 @@
+"""The command `rov-fmu sitl`: the meaning of its options, and what it prints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from socket import AF_INET, SOCK_DGRAM, socket
+
+import click
+
+from rov_fmu.bridges.sitl import Connection, Setup
+from rov_fmu.bridges.sitl_frames import FRAMES, Servos, servos_of
+from rov_fmu.interface.arguments import checked_start, checked_values
+from rov_fmu.interface.model import load
+from rov_fmu.interface.simulate_command import read_settings
+from rov_fmu.io.interrupts import cleaned_up
+from rov_fmu.io.messages import InputError, did_you_mean, shown
+from rov_fmu.io.output import check_targets
+from rov_fmu.model.layout import Layout
+
+_MOST_CHANNELS = 16
+"""ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of the command."""
+
+    frame: str | None
+    servos: Sequence[str]
+    """Texts such as `3=t`, or `3=-t` for a reversed thruster."""
+    settings: Sequence[str]
+    """Texts such as `V_N=0.3`."""
+    bottom: float
+    log: Path | None
+    log_rate: float
+    duration: float | None
+    host: str
+    port: int
+
+
+def serve(path: Path, options: Options) -> None:
+    """Answer an autopilot until the duration is over or the command is interrupted, and then write the log.
+
+    Raises FileError, InputError about an option, WriteError about the log, and BuildError.
+    """
+    setup = _setup(path, options)
+    with socket(AF_INET, SOCK_DGRAM) as server:
+        try:
+            server.bind((options.host, options.port))
+        except OSError as error:
+            raise InputError(
+                f"--host {options.host}, --port {options.port}: cannot listen there: {error.strerror}"
+            ) from error
+        connection = Connection(setup)
+        address, port = server.getsockname()
+        click.echo(f"{_listed(setup.servos)}\nlistening on {address}, UDP port {port}; Ctrl-C ends it")
+
+        def end() -> None:
+            connection.write_log()
+            click.echo(_summary(connection))
+
+        with cleaned_up(end):
+            connection.serve(server, options.duration or inf)
+
+
+def _setup(path: Path, options: Options) -> Setup:
+    """Return what a flight begins with. Raises FileError, InputError, WriteError."""
+    if options.log:
+        if options.log.suffix.lower() != ".csv":
+            raise InputError(f"--log {options.log}: the name must end with .csv")
+        check_targets([options.log], [path])
+    if options.frame is not None and options.frame not in FRAMES:
+        hint = did_you_mean(options.frame, FRAMES)
+        raise InputError(f"--frame {shown(options.frame)}: must be one of {', '.join(FRAMES)}{hint}")
+    vehicle = load(path)
+    given = read_settings(options.settings, vehicle.layout)
+    vehicle = vehicle.with_(**given.coefficients)
+    checked_values("inputs", given.inputs, vehicle.layout.inputs, many=False)
+    checked_start(given.start, vehicle.layout, many=False)
+    servos = servos_of(vehicle.layout, options.frame, _table(options.servos, vehicle.layout))
+    for name in given.inputs:
+        if name in servos:
+            raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
+    start = given.inputs | given.start
+    return Setup(vehicle.rov, servos, start, options.bottom, options.log, 1.0 / options.log_rate)
+
+
+def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:
+    """Return the names of inputs by servo. Raises InputError."""
+    found: dict[int, str] = {}
+    example = next(iter(layout.commands)).removeprefix("u_")
+    for text in texts:
+        number, equals, name = (part.strip() for part in text.partition("="))
+        if not (equals and number.isdecimal() and 1 <= int(number) <= _MOST_CHANNELS):
+            raise InputError(f"--servo {text}: must be N=NAME with N from 1 to {_MOST_CHANNELS}, such as 3={example}")
+        if int(number) in found:
+            raise InputError(f"--servo {text}: servo {number} is given before")
+        found[int(number)] = name
+    return found
+
+
+def _listed(servos: Servos) -> str:
+    """Return a line with the servos and what each drives."""
+    ordered = sorted(servos.items(), key=lambda item: item[1])
+    drives = (
+        f"{number} {name.removeprefix('u_')}{' reversed' if sign < 0 else ''}" for name, (number, sign) in ordered
+    )
+    return f"servo and what it drives: {', '.join(drives)}"
+
+
+def _summary(connection: Connection) -> str:
+    """Return a line about the traffic and the time that it took."""
+    traffic, order = connection.traffic, connection.order
+    own = 1e6 * traffic.own_time / max(traffic.frames + traffic.repeated, 1)
+    return (
+        f"{connection.flight.time:.3f} s of flight; {traffic.frames} frames, {own:.0f} µs each; "
+        f"{traffic.repeated} repeated, {order.lost} lost, {traffic.ignored} ignored, {traffic.restarts} restarts"
+    )

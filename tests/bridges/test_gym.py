@@ -1,0 +1,58 @@
+"""The Gymnasium environments: Gymnasium's own checker, and the vector environment against the single one."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import rov_fmu
+from rov_fmu.bridges.gym import RovEnv, RovVectorEnv
+from rov_fmu.io.messages import InputError
+
+
+def test_the_environment_checker_passes() -> None:
+    check_env(RovEnv(rov_fmu.load("videoray_refit")), skip_render_check=True)
+
+
+def test_the_vector_agrees_with_single_environments_and_with_simulate() -> None:
+    vehicle = rov_fmu.load("videoray_refit")
+    many, one = RovVectorEnv(vehicle, 3, steps=5), RovEnv(vehicle, steps=5)
+    start, _ = many.reset(seed=1)
+    one.reset(seed=2)
+    assert len({*many.coefficients["a_d_u"][:, 0].tolist()}) == 3, "each vehicle has coefficients of its own"
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 3, len(many.commands)))
+    one.many.coefficients = {name: column[1:2] for name, column in many.coefficients.items()}
+    one.many.state[:] = start[1]
+    drawn = vehicle.with_(**{name: float(column[1, 0]) for name, column in many.coefficients.items()})
+    state = start[1]
+    for n in range(5):
+        states, rewards, terminated, truncated, _ = many.step(actions[n])
+        single, reward, is_terminated, is_truncated, _ = one.step(actions[n, 1])
+        assert np.array_equal(states[1], single)
+        assert (rewards[1], terminated[1], truncated[1]) == (reward, is_terminated, is_truncated)
+        begin = dict(zip(many.states, state, strict=True))
+        commands = dict(zip(many.commands, actions[n, 1], strict=True))
+        run = drawn.simulate([0.0, 0.1], commands, start=begin, record=many.states)
+        state = np.array([run[name][-1] for name in many.states])
+        assert np.array_equal(state, single)
+        assert truncated.all() == (n == 4)
+    states, rewards, _, truncated, _ = many.step(actions[0])
+    assert not rewards.any()
+    assert not truncated.any()
+    assert not states[:, : many.states.index("x")].any(), "a new episode begins at rest"
+
+
+def test_the_same_seed_gives_the_same_vehicles() -> None:
+    env = RovVectorEnv(rov_fmu.load("videoray_refit"), 4)
+    first, _ = env.reset(seed=3)
+    again, _ = env.reset(seed=3)
+    assert np.array_equal(first, again)
+
+
+@pytest.mark.parametrize("actions", [np.zeros((2, 3)), np.zeros(3), np.full((4, 3), np.nan)])
+def test_wrong_actions_give_one_line(actions: Any) -> None:
+    env = RovVectorEnv(rov_fmu.load("videoray_refit"), 4)
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=r"^actions: must be finite numbers of the shape \(4, 3\)"):
+        env.step(actions)

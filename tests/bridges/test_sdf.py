@@ -1,0 +1,552 @@
+"""The model for Gazebo: valid SDFormat, and in the plugins' equations, written out here, it moves as the FMU does.
+
+The rules of the format are those of SDFormat 1.10 (sdf/1.10 of gazebosim/sdformat), of the elements that are written.
+The equations are those of gz-sim (src/systems: hydrodynamics, buoyancy, thruster) and, for a body with added mass,
+Kirchhoff's, which gz-physics solves with DART. All are in Gazebo's frames: forward-left-up and east-north-up.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import exp, inf
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+from lxml import etree
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from rov_fmu.bridges.sdf import gazebo_model
+from rov_fmu.cli import main
+from rov_fmu.io.messages import InputError
+from rov_fmu.model.layout import AXES
+from rov_fmu.model.riccati import RISE
+from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import BARE, ROOT
+from tests.vehicles import VEHICLES
+
+Array = NDArray[np.float64]
+REMUS = ROOT / "examples" / "remus100" / "remus100.toml"
+EVERYTHING = ROOT / "tests" / "vehicle" / "everything.toml"
+FILES = {**SHIPPED, "remus100": REMUS, "everything": EVERYTHING, "bare": BARE}
+LOADED = {name: load_vehicle(path) for name, path in FILES.items()}
+FORMS = [{"in_world": in_world, "explicit": explicit} for in_world in (False, True) for explicit in (False, True)]
+
+
+def root_of(text: str) -> Any:
+    return etree.fromstring(text.encode(), etree.XMLParser(resolve_entities=False))
+
+
+# ---- The specification -----------------------------------------------------------------------------------------------
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*(?:e[+-]?\d+)?|inf)"
+_TYPES = {
+    "double": re.compile(_NUMBER),
+    "vector3": re.compile(rf"{_NUMBER}(?: {_NUMBER}){{2}}"),
+    "pose": re.compile(rf"{_NUMBER}(?: {_NUMBER}){{5}}"),
+    "color": re.compile(rf"{_NUMBER}(?: {_NUMBER}){{3}}"),
+    "string": re.compile(r"\w+"),
+    "bool": re.compile("true|false"),
+}
+_DOUBLES = dict.fromkeys(
+    [
+        "mass",
+        "ixx",
+        "ixy",
+        "ixz",
+        "iyy",
+        "iyz",
+        "izz",
+        "lower",
+        "upper",
+        "max_step_size",
+        "real_time_factor",
+        "real_time_update_rate",
+    ]
+    + [f"{a}{b}" for n, a in enumerate("xyzpqr") for b in "xyzpqr"[n:]],
+    "double",
+)
+_LEAVES = _DOUBLES | {
+    "pose": "pose",
+    "parent": "string",
+    "child": "string",
+    "gravity": "vector3",
+    "magnetic_field": "vector3",
+    "ambient": "color",
+    "background": "color",
+    "shadows": "bool",
+    "direction": "vector3",
+    "size": "vector3",
+    "xyz": "vector3",
+}
+"""The types of the elements that hold a value."""
+_ADDED = {name: "?" for name in _DOUBLES if re.fullmatch(r"[xyzpqr]{2}", name)}
+_CHILDREN: dict[str, dict[str, str]] = {
+    "sdf": {"world": "*", "model": "?"},
+    "world": {
+        **{"physics": "+", "gravity": "1", "magnetic_field": "1", "atmosphere": "1", "scene": "1"},
+        **{"plugin": "*", "light": "*", "model": "*"},
+    },
+    "physics": {"max_step_size": "1", "real_time_factor": "1", "real_time_update_rate": "1"},
+    "atmosphere": {},
+    "scene": {"ambient": "1", "background": "1", "shadows": "1"},
+    "light": {"direction": "1"},
+    "model": {"pose": "?", "link": "*", "joint": "*", "plugin": "*"},
+    "link": {"pose": "?", "inertial": "?", "collision": "*", "visual": "*"},
+    "inertial": {"pose": "?", "mass": "?", "inertia": "?", "fluid_added_mass": "?"},
+    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "1"),
+    "fluid_added_mass": _ADDED,
+    "collision": {"pose": "?", "geometry": "1"},
+    "visual": {"pose": "?", "geometry": "1"},
+    "geometry": {"box": "?"},
+    "box": {"size": "1"},
+    "joint": {"parent": "1", "child": "1", "axis": "?"},
+    "axis": {"xyz": "1", "limit": "1"},
+    "limit": {"lower": "1", "upper": "1"},
+}
+"""The children of an element and how often each occurs, as in the attribute `required` of the specification."""
+_TIMES = {"1": (1, 1), "?": (0, 1), "*": (0, inf), "+": (1, inf)}
+_ATTRIBUTES = {
+    "sdf": {"version"},
+    "physics": {"name", "type"},
+    "atmosphere": {"type"},
+    "light": {"name", "type"},
+    "joint": {"name", "type"},
+    "plugin": {"name", "filename"},
+    **{tag: {"name"} for tag in ("world", "model", "link", "collision", "visual")},
+}
+_SNAME = r"[xyzkmn](?:Dot[UVWPQR]|[UVWPQR](?:(?:abs)?[UVWPQR])?)"
+_PARAMETERS = {
+    "Hydrodynamics": rf"link_name|disable_coriolis|{_SNAME}",
+    "Thruster": "namespace|joint_name|propeller_diameter|thrust_coefficient|fluid_density|velocity_control"
+    "|max_thrust_cmd|min_thrust_cmd",
+    "Buoyancy": "uniform_fluid_density",
+    "Physics": "",
+    "UserCommands": "",
+    "SceneBroadcaster": "",
+}
+"""What each plugin reads."""
+
+
+def check(element: Any) -> None:
+    """Check an element and what is in it against the specification."""
+    tag = element.tag
+    assert set(element.attrib) == _ATTRIBUTES.get(tag, set()), tag
+    children = list(element.iterchildren("*"))
+    if tag == "plugin":
+        known = _PARAMETERS[element.get("name").removeprefix("gz::sim::systems::")]
+        words = re.sub(r"(?<!^)(?=[A-Z])", "-", element.get("name").rpartition(":")[2]).lower()
+        assert element.get("filename") == f"gz-sim-{words}-system"
+        names = [child.tag for child in children]
+        assert len(names) == len(set(names))
+        assert not [name for name in names if not re.fullmatch(known, name)]
+        return
+    if tag in _LEAVES and not children:
+        assert _TYPES[_LEAVES[tag]].fullmatch(element.text), f"{tag}: {element.text}"
+        return
+    assert not (element.text or "").strip()
+    counts = {child: sum(1 for one in children if one.tag == child) for child in {one.tag for one in children}}
+    assert counts.keys() <= _CHILDREN[tag].keys(), f"{tag}: {counts.keys() - _CHILDREN[tag].keys()}"
+    for child, times in _CHILDREN[tag].items():
+        least, most = _TIMES[times]
+        assert least <= counts.get(child, 0) <= most, f"{tag}: {child}"
+    for child in children:
+        check(child)
+
+
+def check_model(root: Any) -> None:
+    """Check what libsdformat refuses although each element is allowed: names, inertia, axes."""
+    (model,) = root.iter("model")
+    names = [one.get("name") for one in model.iterchildren("link", "joint")]
+    assert len(names) == len(set(names))
+    assert not [name for name in names if "::" in name or re.fullmatch("__.*__|world", name)]
+    links = {link.get("name") for link in model.iterchildren("link")}
+    for joint in model.iterchildren("joint"):
+        assert {joint.findtext("parent"), joint.findtext("child")} <= links
+        assert np.linalg.norm(numbers(joint.findtext("axis/xyz"))) == pytest.approx(1.0)
+    for inertial in model.iter("inertial"):
+        assert float(inertial.findtext("mass")) > 0.0
+        least, middle, most = np.linalg.eigvalsh(inertia_of(inertial))
+        assert least > 0.0
+        assert least + middle >= most * (1.0 - 1e-9)
+
+
+def numbers(text: str) -> Array:
+    return np.array(text.split(), dtype=float)
+
+
+def inertia_of(inertial: Any) -> Array:
+    xx, xy, xz, yy, yz, zz = (float(inertial.findtext(f"inertia/i{ij}")) for ij in ("xx", "xy", "xz", "yy", "yz", "zz"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+@pytest.mark.parametrize("name", FILES)
+def test_the_file_is_valid(name: str, form: Mapping[str, Any]) -> None:
+    root = root_of(gazebo_model(LOADED[name], **form).text)
+    assert root.tag == "sdf"
+    assert root.get("version") == "1.10"
+    check(root)
+    check_model(root)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_every_kind_of_vehicle_gives_a_valid_file_or_one_line(name: str) -> None:
+    vehicle = replace(LOADED["bare"], rov=VEHICLES[name])
+    if "m_rov" not in vehicle.rov.coefficients:
+        with pytest.raises(InputError, match="no mass m_rov"):
+            gazebo_model(vehicle)
+        return
+    root = root_of(gazebo_model(vehicle).text)
+    check(root)
+    check_model(root)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "<sdf version='1.10'><model name='a'><links/></model></sdf>",
+        "<sdf version='1.10'><model name='a'><link name='b'><inertial><mass>1,5</mass></inertial></link></model></sdf>",
+        "<sdf version='1.10'><model><link name='b'/></model></sdf>",
+        "<sdf version='1.10'><model name='a'><plugin name='gz::sim::systems::Hydrodynamics' "
+        "filename='gz-sim-hydrodynamics-system'><xUabs>1</xUabs></plugin></model></sdf>",
+    ],
+)
+def test_the_check_refuses(wrong: str) -> None:
+    with pytest.raises(AssertionError):
+        check(root_of(wrong))
+
+
+# ---- The plugins' equations ------------------------------------------------------------------------------------------
+
+
+class Gazebo:
+    """A model as Gazebo moves it: a rigid body of all links under the plugins' forces, in its own frames."""
+
+    def __init__(self, text: str) -> None:
+        root = root_of(text)
+        (model,) = root.iter("model")
+        self.gravity = numbers(root.findtext("world/gravity"))
+        self.density = float(root.findtext(".//uniform_fluid_density"))
+        self.rigid, self.added, self.weights = np.zeros((6, 6)), np.zeros((6, 6)), []
+        for link in model.iterchildren("link"):
+            inertial, at = link.find("inertial"), numbers(link.findtext("pose") or "0 0 0 0 0 0")
+            mass = float(inertial.findtext("mass"))
+            centre = at[:3] + numbers(inertial.findtext("pose") or "0 0 0 0 0 0")[:3]
+            S = skew(centre)
+            about = inertia_of(inertial) - mass * S @ S
+            self.rigid += np.block([[mass * np.eye(3), -mass * S], [mass * S, about]])
+            self.weights.append((mass, centre))
+            for entry in inertial.iterfind("fluid_added_mass/*"):
+                i, j = map("xyzpqr".index, entry.tag)
+                self.added[i, j] = self.added[j, i] = float(entry.text)
+        box = model.find("link/collision")
+        self.volume = float(np.prod(numbers(box.findtext("geometry/box/size"))))
+        self.centre = numbers(box.findtext("pose"))[:3]
+        plugins = {p.get("name").rpartition(":")[2]: p for p in model.iterchildren("plugin")}
+        terms = {one.tag: float(one.text) for one in plugins["Hydrodynamics"] if re.fullmatch(_SNAME, one.tag)}
+        U = "UVWPQR"
+        self.linear = np.array([[terms.get(f"{a}{b}", 0.0) for b in U] for a in "xyzkmn"])
+        self.squares = np.array([[[terms.get(f"{a}{b}{c}", 0.0) for c in U] for b in U] for a in "xyzkmn"])
+        self.sizes = np.array([[[terms.get(f"{a}{b}abs{c}", 0.0) for c in U] for b in U] for a in "xyzkmn"])
+        self.explicit = np.array([[terms.get(f"{a}Dot{b}", 0.0) for b in U] for a in "xyzkmn"])
+        self.thrusters, self.largest = {}, {}
+        for plugin in (p for p in model.iterchildren("plugin") if p.get("name").endswith("Thruster")):
+            name = plugin.findtext("joint_name").removeprefix("thruster_").removesuffix("_joint")
+            joint = next(j for j in model.iterchildren("joint") if j.get("name") == plugin.findtext("joint_name"))
+            link = next(k for k in model.iterchildren("link") if k.get("name") == joint.findtext("child"))
+            direction = numbers(joint.findtext("axis/xyz"))
+            moment = np.cross(numbers(link.findtext("pose"))[:3], direction)
+            self.thrusters[name] = np.concatenate([direction, moment])
+            self.largest[name] = float(plugin.findtext("max_thrust_cmd"))
+
+    def thrust(self, newtons: Mapping[str, float]) -> Array:
+        """The force and moment of the thrusters."""
+        return sum((newtons[name] * effect for name, effect in self.thrusters.items()), np.zeros(6))
+
+    def wrench(self, turned: Array, velocity: Array) -> Array:
+        """Weight, buoyancy and damping in the body frame, which `turned` turns into the world's."""
+        total: Array = (self.linear + self.sizes @ np.abs(velocity) + self.squares @ velocity) @ velocity
+        down = turned.T @ self.gravity
+        for mass, centre in [*self.weights, (-self.density * self.volume, self.centre)]:
+            total += mass * np.concatenate([down, np.cross(centre, down)])
+        return total
+
+    def rates(self, state: Array, newtons: Mapping[str, float]) -> Array:
+        """The derivatives of position, rotation matrix and velocities: Kirchhoff's equations."""
+        turned, velocity = state[3:12].reshape(3, 3), state[12:]
+        matrix = self.rigid + self.added
+        momentum, v, omega = matrix @ velocity, velocity[:3], velocity[3:]
+        gyroscopic = np.concatenate(
+            [np.cross(momentum[:3], omega), np.cross(momentum[3:], omega) + np.cross(momentum[:3], v)]
+        )
+        change = np.linalg.solve(matrix, self.wrench(turned, velocity) + self.thrust(newtons) + gyroscopic)
+        return np.concatenate([turned @ v, (turned @ skew(omega)).ravel(), change])
+
+    def alone(self, axis: int, newtons: Mapping[str, float]) -> Callable[[float, Array], list[float]]:
+        """The acceleration along one axis of a level vehicle that the others do not move."""
+        push, inertia = self.thrust(newtons)[axis], (self.rigid + self.added)[axis, axis]
+        return lambda _, v: [(self.wrench(np.eye(3), v[0] * np.eye(6)[axis])[axis] + push) / inertia]
+
+
+def skew(a: Array) -> Array:
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+SIGNS = {"u": 1.0, "v": -1.0, "w": -1.0, "p": 1.0, "q": -1.0, "r": -1.0}
+"""The signs of components in Gazebo's frame by those in the vehicle's: left for starboard, up for down."""
+
+
+def newtons_of(gazebo: Gazebo, rov: Rov, thrust: Mapping[str, float]) -> dict[str, float]:
+    """The newtons to send for the thrust of the FMU's curves; alpha is seen in the largest thrust."""
+    full = {name: rov.curve_force(curve, 1.0) for name, curve in rov.layout.curve_of.items()}
+    return {name: force * gazebo.largest[name] / full[name] for name, force in thrust.items()}
+
+
+@pytest.mark.parametrize("command", [0.3, -0.6, 1.0])
+@pytest.mark.parametrize("name", SHIPPED)
+def test_an_axis_alone_has_the_steady_velocity_and_the_time_constant_of_the_fmu(name: str, command: float) -> None:
+    vehicle = LOADED[name]
+    rov = vehicle.rov
+    gazebo = Gazebo(gazebo_model(vehicle, in_world=True).text)
+    for form in rov.layout.axes:
+        if not rov.layout.drivers(form.axis):
+            continue
+        V_ss, Tau = rov.response(form.axis, command)
+        newtons = newtons_of(gazebo, rov, rov.commanded(rov.held_inputs(form.axis, command)))
+        velocity, sign = form.axis.velocity, SIGNS[form.axis.velocity]
+        reached = lambda _, v: v[0] - sign * RISE * V_ss  # noqa: B023, E731
+        found = solve_ivp(
+            gazebo.alone("uvwpqr".index(velocity), newtons),
+            (0.0, 50.0 * Tau),
+            [0.0],
+            "DOP853",
+            events=reached,
+            rtol=1e-9,
+            atol=1e-12,
+        )
+        assert sign * found.y[0, -1] == pytest.approx(V_ss, rel=2e-4), velocity
+        assert found.t_events[0][0] == pytest.approx(Tau, rel=2e-4), velocity
+
+
+EARTH = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+"""From north-east-down to east-north-up."""
+HALF_TURN = np.diag([1.0, -1.0, -1.0])
+"""From forward-starboard-down to forward-left-up."""
+
+
+def in_gazebo(rov: Rov, state: dict[str, float]) -> Array:
+    """Position, rotation matrix and velocities of a state of the FMU, in Gazebo's frames."""
+    angles = state | rov.thrust(rov.layout.usual_inputs, state)
+    turned = Rotation.from_euler("ZYX", [angles["psi"], angles.get("theta", 0.0), angles.get("phi", 0.0)]).as_matrix()
+    velocity = [sign * state.get(name, 0.0) for name, sign in SIGNS.items()]
+    return np.concatenate([EARTH @ [state[name] for name in "xyz"], (EARTH @ turned @ HALF_TURN).ravel(), velocity])
+
+
+def fly(vehicle: Vehicle, state: dict[str, float], pieces: int, seed: int) -> tuple[Array, Array]:
+    """The last states of the FMU and of Gazebo under random commands, held for 0.4 s each; Gazebo gets the lag, too."""
+    rov, random = vehicle.rov, Random(seed)
+    gazebo = Gazebo(gazebo_model(vehicle, in_world=True).text)
+    mine = in_gazebo(rov, state)
+    for _ in range(pieces):
+        inputs = rov.layout.usual_inputs | {name: random.uniform(-0.6, 0.6) for name in rov.layout.commands}
+        inputs |= {f"u_{fin.name}": 0.0 for fin in rov.layout.fins}
+        steady, before = rov.commanded(inputs), dict(state)
+
+        def rates(t: float, y: Array, steady: Any = steady, before: Any = before) -> Array:
+            thrust = {}
+            for name, force in steady.items():
+                curve = rov.layout.curve_of[name]
+                left = exp(-t / rov[curve.coefficient("T")]) if curve.has_lag else 0.0
+                thrust[name] = force + left * (before.get(f"F_{name}", force) - force)
+            return gazebo.rates(y, newtons_of(gazebo, rov, thrust))
+
+        mine = solve_ivp(rates, (0.0, 0.4), mine, "DOP853", rtol=1e-7, atol=1e-9).y[:, -1]
+        state = rov.step(inputs, state, 0.4)
+    return in_gazebo(rov, state), mine
+
+
+def tuned(name: str, **coefficients: float) -> Vehicle:
+    vehicle = LOADED[name]
+    return replace(vehicle, rov=vehicle.rov.extended(coefficients))
+
+
+MOVING: dict[str, tuple[Vehicle, dict[str, float]]] = {
+    "four axes": (tuned("bluerov2", alpha_u=1.1, alpha_v=0.9, alpha_w=1.05, alpha_r=1.2, beta_v=0.8), {}),
+    "six axes": (tuned("bluerov2_heavy", beta_u=0.7, beta_q=0.8, beta_r=1.3), {}),
+    "drag by direction": (tuned("bluerov2_heavy", a_d_u_reverse=60.0, a_d_v_reverse=400.0, a_d_p_reverse=3.0), {}),
+    "moments that no body has": (tuned("bluerov2_heavy", I_r=0.8), {}),
+    "cross terms": (LOADED["remus100"], {"u": 1.2, "v": 0.2, "w": -0.1, "p": 0.3, "q": 0.1, "r": -0.2}),
+}
+"""Vehicles, and the velocities with which they start."""
+
+
+@pytest.mark.parametrize("case", MOVING)
+def test_gazebo_moves_as_the_fmu(case: str) -> None:
+    vehicle, velocities = MOVING[case]
+    true, found = fly(vehicle, vehicle.layout.at_rest | velocities, 6, seed=5)
+    assert np.max(np.abs(true[:3])) > 0.2, "it went somewhere"
+    assert found == pytest.approx(true, abs=4e-4)
+
+
+# ---- The plugin's explicit added mass --------------------------------------------------------------------------------
+
+
+def grows(vehicle: Vehicle, *, explicit: bool) -> bool:
+    """True if velocities grow without bound in steps of 1 ms: the plugin's force follows the last acceleration."""
+    gazebo = Gazebo(gazebo_model(vehicle, in_world=True, explicit=explicit).text)
+    newtons = {name: 0.1 * n * force for n, (name, force) in enumerate(gazebo.largest.items())}
+    velocity: Array = np.zeros(6)
+    acceleration: Array = np.zeros(6)
+    for _ in range(1000):
+        load = gazebo.wrench(np.eye(3), velocity) + gazebo.thrust(newtons) + gazebo.explicit @ acceleration
+        acceleration = np.asarray(np.linalg.solve(gazebo.rigid + gazebo.added, load), dtype=float)
+        velocity = velocity + 1e-3 * acceleration
+        if np.max(np.abs(velocity)) > 1e3:
+            return True
+    return False
+
+
+EXPLICIT = {
+    "videoray": (LOADED["videoray"], "yaw"),
+    "videoray_refit": (LOADED["videoray_refit"], "yaw"),
+    "bluerov2": (LOADED["bluerov2"], "sway (12.7 of 11.5 kg), heave (14.57 of 11.5 kg)"),
+    "bluerov2_heavy": (LOADED["bluerov2_heavy"], "heave (18.68 of 13.5 kg)"),
+    "remus100": (LOADED["remus100"], "sway"),
+    "just less": (LOADED["bluerov2"].with_(m_a_v=11.2, m_a_w=11.2), None),
+    "just more": (LOADED["bluerov2"].with_(m_a_v=11.2, m_a_w=11.8), "heave"),
+    "a large beta": (LOADED["videoray"].with_(beta_r=0.55), None),
+}
+
+
+@pytest.mark.parametrize("case", EXPLICIT)
+def test_the_warning_is_there_where_the_plugin_diverges(case: str) -> None:
+    vehicle, where = EXPLICIT[case]
+    warnings = gazebo_model(vehicle, explicit=True).warnings
+    assert grows(vehicle, explicit=True) == bool(warnings) == bool(where)
+    assert gazebo_model(vehicle).warnings == (), "in the link it is implicit"
+    if where:
+        assert where in warnings[0]
+        assert "gz-sim issue 1923" in warnings[0]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_with_the_added_mass_in_the_link_nothing_diverges(name: str) -> None:
+    assert not grows(LOADED[name], explicit=False)
+
+
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "remus100"])
+def test_the_link_has_the_mass_and_the_moments_of_the_file(name: str) -> None:
+    vehicle = LOADED[name]
+    found = Gazebo(gazebo_model(vehicle, in_world=True).text)
+    wanted = [vehicle.rov[key] for key in ("m_rov", "m_rov", "m_rov", "I_p", "I_q", "I_r")]
+    assert np.diag(found.rigid) == pytest.approx(wanted, rel=1e-3), "about the origin"
+    weight, buoyancy = sum(mass for mass, _ in found.weights), found.density * found.volume
+    assert -found.gravity[2] * np.array([weight, buoyancy]) == pytest.approx([vehicle.rov["W"], vehicle.rov["B"]])
+
+
+def test_the_page_has_the_ratios_of_the_vehicles_that_ship() -> None:
+    page = (ROOT / "docs" / "gazebo.md").read_text(encoding="utf-8")
+    for name in SHIPPED:
+        found = Gazebo(gazebo_model(LOADED[name], in_world=True, explicit=True).text)
+        cells = []
+        for axis, ratio in zip(AXES, -np.diag(found.explicit) / np.diag(found.rigid), strict=True):
+            text = f"{ratio + 0.0:.2f}" if axis in LOADED[name].layout.kinds else "–"
+            cells.append(f"**{text}**" if ratio >= 1.0 else text)
+        assert f"| {name} | {' | '.join(cells)} |\n" in page
+
+
+def test_the_plugin_has_the_same_mass_as_the_link() -> None:
+    for name in SHIPPED:
+        implicit, explicit = (
+            Gazebo(gazebo_model(LOADED[name], in_world=True, explicit=where).text) for where in (False, True)
+        )
+        assert -explicit.explicit == pytest.approx(implicit.added, abs=1e-12)
+        assert not explicit.added.any()
+        assert not implicit.explicit.any()
+
+
+# ---- Notes and mistakes ----------------------------------------------------------------------------------------------
+
+NOTES = {
+    "alpha": ("videoray", "alpha: the plugins take 1.1 F_l, 1.1 F_r, 1.14 F_t newtons"),
+    "beta": (
+        "videoray",
+        "beta_r = 0.12: the effective inertia in yaw is 0.875 kg.m2, of which <fluid_added_mass> has 0.77",
+    ),
+    "no Coriolis": ("videoray", "the vehicle file has no Coriolis and Munk terms"),
+    "missing axes": ("videoray", "the vehicle file has no sway, roll, pitch"),
+    "curve": ("bluerov2_heavy", "the thrust curve, its dead band, its curve in reverse"),
+    "lag": ("bluerov2_heavy", "left out: the lag of the thrust (T)"),
+    "load": ("bluerov2", "the constant load F_0_w is in the buoyancy"),
+    "fins": ("remus100", "left out: the fins"),
+    "linear drag": ("everything", "b_d_w and b_d_w_reverse: linear drag has their mean"),
+    "thrusters": ("without surge thrust", "left out: thrusters whose force alpha makes 0: l, r"),
+    "mix": ("everything", "the inputs that drive several thrusters"),
+}
+
+
+@pytest.mark.parametrize("case", NOTES)
+def test_the_notes_say_what_is_otherwise_in_the_file_too(case: str) -> None:
+    name, note = NOTES[case]
+    vehicle = LOADED["videoray"].with_(alpha_u=0.0) if name == "without surge thrust" else LOADED[name]
+    model = gazebo_model(vehicle)
+    assert any(note in one for one in model.notes)
+    (comment, *_) = root_of(model.text).xpath("/comment()")
+    assert note in comment.text
+
+
+def test_a_vehicle_has_only_its_own_notes() -> None:
+    notes = " ".join(gazebo_model(LOADED["bluerov2_heavy"]).notes)
+    for word in ("alpha", "beta", "fins", "has no", "F_0", "voltage", "pulse", "dead time", "videoray"):
+        assert word not in notes
+
+
+def test_texts_cannot_leave_the_comment() -> None:
+    vehicle = replace(LOADED["bare"], name="A --> <model/> & --- B-")
+    root = root_of(gazebo_model(vehicle).text)
+    check(root)
+    (comment, *_) = root.xpath("/comment()")
+    assert "A - -> <model/> & - - - B-, " in comment.text
+
+
+def test_a_thruster_that_no_place_can_stand_for_is_told() -> None:
+    note = "left out: the moment about its own direction of each of the thrusters 1, 2, 3, 4"
+    assert note not in gazebo_model(tuned("bluerov2_heavy", alpha_r=2.0)).notes, "yaw is square to their forces"
+    assert note in gazebo_model(tuned("bluerov2_heavy", alpha_p=2.0)).notes
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "line"),
+    [
+        ("videoray", {"beta_u": 0.0}, "videoray: beta_u = 0: must be more than 0 for Gazebo"),
+        ("bluerov2", {"F_0_w": 150.0}, "bluerov2: the net weight of 150 N must be less than the weight for Gazebo"),
+    ],
+)
+def test_what_gazebo_cannot_have_is_one_line(name: str, changes: Mapping[str, float], line: str) -> None:
+    with pytest.raises(InputError) as error:
+        gazebo_model(LOADED[name].with_(**changes))
+    assert str(error.value).startswith(line)
+    assert "\n" not in str(error.value)
+
+
+def test_the_command_writes_the_file_and_lists_the_notes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "a folder"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    assert main(["sdf", "bluerov2"]) == 0
+    model = gazebo_model(LOADED["bluerov2"])
+    assert Path("bluerov2.sdf").read_bytes() == model.text.encode()
+    assert capsys.readouterr() == ("\n- ".join(["bluerov2.sdf", *model.notes]) + "\n", "")
+    assert main(["sdf", "bluerov2", "--world", "--added-mass", "plugin", "-o", "my rov.sdf"]) == 0
+    wanted = gazebo_model(LOADED["bluerov2"], in_world=True, explicit=True)
+    assert Path("my rov.sdf").read_bytes() == wanted.text.encode()
+    assert capsys.readouterr().err == f"rov-fmu: warning: {wanted.warnings[0]}\n"
