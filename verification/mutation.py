@@ -56,7 +56,7 @@ TESTS = {
     "rov_fmu/vehicle/*": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_writer.py vehicle",
     "rov_fmu/identify/points/*": "identify/test_response_fit.py identify/test_thrust_fit.py identify",
     "rov_fmu/identify/slips/*": "identify/test_slips.py identify",
-    "rov_fmu/identify/*": "identify/test_simulator.py identify/test_trajectory.py identify",
+    "rov_fmu/identify/*": "identify/test_simulator.py identify/test_dive.py identify",
     "rov_fmu/fmu/experiments.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",

@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from rov_fmu.identify.effects.coupling import is_coupled, is_logged
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.identify.points.thrust_fit import ThrustFit
-from rov_fmu.identify.recordings.prediction_errors import Key, shown_in
-from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
+from rov_fmu.identify.recordings.held_out import of_velocity
+from rov_fmu.identify.recordings.prediction_errors import shown_in
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit
 from rov_fmu.identify.structure import on_structure
 from rov_fmu.identify.usable import is_pushed
 from rov_fmu.io.toml_file import join_names
@@ -21,7 +21,6 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 
-_WHOLE_VELOCITY: Key = ("whole recording", "velocity")
 _LEAST_EXPLAINED = 0.5
 """The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""
 
@@ -119,21 +118,21 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
     finding = partial(Finding, axis=axis.name)
     for s in fit.simulations:
         file = s.recording.file
-        if is_coupled(fit.rov.layout, axis) and s.recording.command is None and not is_logged(s.recording):
-            yield finding("coupling left out", file=file)
         if s.correlation_time > 3.0 and s.noise > 1e-4 * float(np.ptp(s.measured)):
             yield finding("correlated residuals", file=file, numbers={"samples": s.correlation_time})
         share = s.outliers / len(s.time)
         if share > 0.03:
             yield finding("outliers", file=file, numbers={"share": share})
+    if fit.between_rows:
+        yield finding("switches between rows")
     yield from on_structure(fit)
     if factors := fit.disagreement:
         numbers = {"low": min(factors.values()), "high": max(factors.values())}
         yield finding("disagreement", names={"coefficients": join_names(factors)}, numbers=numbers)
-    held_out, key = fit.held_out, _WHOLE_VELOCITY
+    held_out = fit.held_out
     for file in held_out.failed:
         yield finding("failed prediction", file=file)
-    if key in held_out.errors and (errors := held_out.errors[key]).explained < _LEAST_EXPLAINED:
+    if held_out.predictions and (errors := of_velocity(held_out.errors)).explained < _LEAST_EXPLAINED:
         factor, unit = shown_in(axis, "velocity")
         others = "the other half" if held_out.by_halves else "the others"
         numbers = dict(zip(("predicted", "unchanged", "noise"), (factor * rms for rms in errors.rms), strict=True))
@@ -148,7 +147,7 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
             yield finding("tables against recordings", names={"quantity": quantity}, numbers={"error": error})
 
 
-def _on_effect(fit: RecordingsFit, effect: Effect) -> Finding:
+def _on_effect(fit: RecordingsFit, effect: FittedEffect) -> Finding:
     """Return the finding about an effect that is kept in the fit."""
     numbers = {"value": effect.value}
     if effect.interval:

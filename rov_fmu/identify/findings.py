@@ -5,6 +5,7 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
+from rov_fmu.identify.effects.catalogue import EFFECTS
 from rov_fmu.tank import findings
 from rov_fmu.tank.findings import Finding, SentenceForm
 
@@ -102,11 +103,13 @@ def _wrong_scale(values: Mapping[str, Any]) -> str:
 
 _CAUSES = {
     "voltage": (
-        "the residuals grow as the voltage changes. A thrust that depends on the voltage (V_0 and n_V of its curve) "
-        "would explain it"
+        "the residuals grow as the voltage changes. A thrust that depends on it would explain it: put "
+        "`voltage = true` into [fit]"
     ),
-    "pitch": "the residuals follow the pitch. A vehicle with the axis pitch would explain it",
-    "roll": "the residuals follow the roll. A vehicle with the axis roll would explain it",
+    "pitch": "the residuals follow the pitch. `attitude = true` in [fit] takes it into account, as far as pitch and "
+    "roll are logged; else a vehicle with the axis pitch would explain it",
+    "roll": "the residuals follow the roll. `attitude = true` in [fit] takes it into account, as far as roll and "
+    "pitch are logged; else a vehicle with the axis roll would explain it",
     "depth": "the residuals follow the depth, as when the buoyancy changes with the pressure, or a tether pulls",
     "distance": "the residuals follow the logged distance, as when a tether pulls",
     "tether": "a force grows with the distance from the start, as when a tether pulls",
@@ -164,10 +167,6 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "coefficients of the recordings: a table has no delay, load or current apart from the drag"
     ),
     # Recordings
-    "coupling left out": (
-        "{axes}: {files} does not tell how fast the vehicle moves along or about the other axes, so their coupling "
-        "with {axes} is left out of the fit"
-    ),
     "correlated residuals": (
         "{axes}: the residuals of {files} are correlated over {samples:.0f} samples, so more than the sensor's noise "
         "(turbulence, tether, or the model); the intervals are widened for it"
@@ -203,28 +202,11 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{error:.1g}: a thruster in motion is not one that is held. The vehicle has the value of the recordings"
     ),
     # Effects
-    "load": _effect(
-        "{axes}: a constant load of {value:.4g} {unit}{interval} acts in {of} (net weight, tether), and is in the model"
+    "switches between rows": (
+        "{axes}: the commands change between the rows of the logs. A change is taken to be midway between two rows, "
+        "and the intervals allow for its unknown time"
     ),
-    "delay": _effect(
-        "{axes}: the motion of {of} follows the commands {value:.4g} s late{interval}; the delay is not in the model "
-        "but told with it"
-    ),
-    "current": _effect("{axes}: the water moved at {value:.4g} {unit}{interval} in {of}, which is taken out"),
-    "current north": _effect(
-        "{axes}: the water moved north at {value:.4g} {unit}{interval} in {of}, which is taken out"
-    ),
-    "current east": _effect("{axes}: the water moved east at {value:.4g} {unit}{interval} in {of}, which is taken out"),
-    "dead band": _effect(
-        "{axes}: thrust of {of} begins at a command of {value:.4g}{interval}, and that is in the model"
-    ),
-    "lag": _effect("{axes}: the thrust of {of} lags by {value:.4g} s{interval}, and is in the model"),
-    "reverse thrust": _effect(
-        "{axes}: {of} thrust in reverse is {value:.4g} times that ahead{interval}, and is in the model"
-    ),
-    "reverse drag": _effect(
-        "{axes}: drag of {of} in reverse is {value:.4g} times that ahead{interval}, and is in the model"
-    ),
+    **{kind: _effect(f"{{axes}}: {effect.sentence}") for kind, effect in EFFECTS.items()},
     "delay not modelled": _effect(
         "The motion in {axes} followed the commands {value:.4g} s late{interval}: the model has no delay, put one in "
         "front of the commands."

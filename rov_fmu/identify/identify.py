@@ -22,10 +22,9 @@ from rov_fmu.identify.points.quadratic_fit import fit_quadratic
 from rov_fmu.identify.points.response_fit import ResponseFit, fit_response
 from rov_fmu.identify.points.step_responses import StepResponse, steps
 from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, measured
-from rov_fmu.identify.recordings.limits import NoFitError
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit, count
-from rov_fmu.identify.recordings.trajectory import MotionError
+from rov_fmu.identify.simulation.limits import MotionError, NoFitError
 from rov_fmu.identify.slips.search import beta_out_of_range
 from rov_fmu.identify.together import Together
 from rov_fmu.identify.usable import UnusableError, check_push, check_recording, check_slips, is_pushed
@@ -45,6 +44,7 @@ _CHECKED, _FITTED = 0.1, 0.9
 """The share of the work that is done when units and signs are checked, and when the recordings are fitted."""
 _SATURATED = 0.2
 """The share of the time at full command from which on saturation is the likely cause of a recording without a fit."""
+_MEAN_VOLTAGE = "Mean voltage of the recordings"
 _ASSUMED_ALPHA = "Not identifiable: the tests give the ratio of drag to thrust only; assumed 1"
 _ASSUMED_BETA = "Not identifiable from these tests; assumed 1"
 
@@ -73,7 +73,7 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
         found.take_thrust(fit)
     results: list[AxisResult] = []
     doubts: list[Finding] = []
-    groups = [*connected(given.rov.layout)]
+    groups = [*connected(given.rov.layout, tilts=given.requests.attitude)]
     for n, (_, axes) in enumerate(groups):
         on_progress(f"units and signs of {_named(axes)}", _CHECKED * n / len(groups))
         doubts += check_slips(tests, axes, found.rov)
@@ -144,6 +144,14 @@ class _Found:
     def take_recordings(self, fit: RecordingsFit) -> None:
         """Take the coefficients from recordings, which also correct tested thrust curves."""
         values = {name: fit.rov[name] for name in fit.estimate.names}
+        curves = [c for c in fit.rov.layout.curves if c.coefficient("n_V") in values]
+        if curves:  # the battery and V_0 belong to the exponent
+            self.rov = Rov(replace(self.rov.layout, voltage=fit.rov.layout.voltage), self.rov.coefficients)
+        for curve in curves:
+            V_0 = curve.coefficient("V_0")
+            values[V_0] = fit.rov[V_0]
+            is_given = curve.name in self.tests.given.requests.measured_at
+            self.sources[V_0] = "Given in rov.toml" if is_given else _MEAN_VOLTAGE
         self.rov = self.rov.extended(values)
         for name in fit.estimate.names:
             tested = self.tested.get(name)
@@ -199,6 +207,7 @@ class _Found:
             intervals={name: self.intervals[name] for name in names if name in self.intervals},
             estimates=self._estimates(together),
             provenance=made,
+            voltage_source="" if self.rov.layout.voltage is None else _MEAN_VOLTAGE,
             thruster_sources=given.thruster_sources,
         )
 
@@ -244,7 +253,8 @@ def _fit_recordings(
         return {}, []
 
     def fit(some: Sequence[Recording]) -> dict[str, RecordingsFit]:
-        fits = fit_recordings(some, base, tests.given.known, measured(thrust.values()), lag=tests.given.lag)
+        tested, requests = measured(thrust.values()), tests.given.requests
+        fits = fit_recordings(some, base, tests.given.known, tested, requests=requests, on_progress=on_progress)
         return {found.axis.name: found.widened() for found in fits}
 
     try:

@@ -138,18 +138,18 @@ def minimize(
     loss: Loss = "linear",
     threshold: float = 1.0,
     tolerance: float = 1e-10,
-    far: bool = False,
+    methods: Sequence[Literal["trf", "dogbox"]] = ("dogbox",),
 ) -> Solution:
     """Solve bounded least squares with SciPy.
 
-    With a robust loss, residuals beyond the threshold count less than their square. `far` is for starts far from the
-    solution: the trust region then stays away from the bounds until the end.
+    With a robust loss, residuals beyond the threshold count less than their square. The methods follow each other:
+    "trf" stays away from the bounds, for starts far from the solution, and "dogbox" ends at them.
     """
     low, high = limits
     start = np.clip(start, low, high)
     options: dict[str, Any] = {"jac": jacobian or "3-point", "bounds": limits}
-    ends = {"xtol": tolerance, "ftol": 0.01 * tolerance, "gtol": 0.01 * tolerance}
-    for method in ("trf", "dogbox") if far else ("dogbox",):
+    ends = {"xtol": 1e-4 * tolerance, "ftol": 0.01 * tolerance, "gtol": 0.01 * tolerance}
+    for method in methods:
         result = least_squares(
             residuals,
             start,

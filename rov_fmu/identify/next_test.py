@@ -11,9 +11,9 @@ from math import inf
 import numpy as np
 
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.recordings.runs import prepare
-from rov_fmu.identify.recordings.simulator import Simulator
-from rov_fmu.identify.recordings.trajectory import MotionError
+from rov_fmu.identify.simulation.limits import MotionError
+from rov_fmu.identify.simulation.prepared import prepare
+from rov_fmu.identify.simulation.simulator import Simulator
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array

@@ -16,12 +16,11 @@ from scipy.special import fdtrc
 from threadpoolctl import threadpool_limits
 
 from rov_fmu.identify.driving import curves_of
-from rov_fmu.identify.recordings.noise_spectrum import cosines, noise_spectrum
+from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
-from rov_fmu.identify.recordings.trajectory import recursion
-from rov_fmu.model.layout import REVERSE, SURGE, SWAY
-from rov_fmu.model.rov import Rov
+from rov_fmu.identify.simulation.linear_response import LinearResponse
+from rov_fmu.model.layout import SURGE, SWAY
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.smoothing import without_spikes
@@ -32,8 +31,6 @@ _FREEDOM = 30.0
 """The degrees of freedom of the estimated spectrum of the noise; few, so that a wrong spectrum raises no alarm."""
 _COEFFICIENTS = 512
 """The number of coefficients of the cosine transform that are tested; faster ones contain no motion."""
-_SWITCHES = 300
-"""The number of switches of a recording that count as uncertain, strongest first."""
 _LAG = 0.2
 """The time constant that stands for a lag of any length, s. The delay is projected out, so only the shape counts."""
 _SLOW = 12
@@ -47,7 +44,7 @@ _LOGGED = 1.2
 def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
     """Yield a finding for each recording that the model does not explain: the most likely cause, and since when."""
     with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
-        all_cases = (_Case(fit.rov, s, fit.delay_of(s.recording.file)) for s in fit.simulations)
+        all_cases = (_case(fit, s) for s in fit.simulations)
         cases = [case for case in all_cases if case.spectrum is not None]
         misfits = _misfits(cases) if cases else {}
     if not misfits:
@@ -68,111 +65,62 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
             yield replace(found, numbers={"start": start or 0.0})
 
 
+def _case(fit: RecordingsFit, s: Simulation) -> "_Case":
+    return _Case(s, LinearResponse(fit.rov, s.recording, s.time, s.velocity, fit.delay_of(s.recording.file)))
+
+
 @dataclass(frozen=True, eq=False)
 class _Case:
     """One recording, and the linear response of the fitted model at its n samples."""
 
-    rov: Rov
     simulation: Simulation
-    delay: float
-
-    @cached_property
-    def time(self) -> Array:
-        """The time from the first sample, s."""
-        return np.asarray(self.simulation.time - self.simulation.time[0])
-
-    @cached_property
-    def steady(self) -> Array:
-        """The force of each thruster along the axis without lag, n x thrusters."""
-        layout, recording = self.rov.layout, self.simulation.recording
-        held = np.searchsorted(recording.time, self.simulation.time - self.delay, side="right") - 1
-        columns = []
-        for thruster, commands in zip(layout.thrusters, recording.reaching(layout)[np.maximum(held, 0)].T, strict=True):
-            curve, effect = layout.curve_of[thruster.name], self.rov.effect(thruster, recording.axis)
-            levels, places = np.unique(commands, return_inverse=True)
-            forces = [effect * self.rov.curve_force(curve, c) if effect else 0.0 for c in levels.tolist()]
-            columns.append(self.rov[recording.axis.coefficient("alpha")] * np.array(forces)[places])
-        return np.column_stack(columns)
-
-    @cached_property
-    def thrust(self) -> Array:
-        """The force of each thruster along the axis, n x thrusters."""
-        columns = []
-        for thruster, force in zip(self.rov.layout.thrusters, self.steady.T, strict=True):
-            curve = self.rov.layout.curve_of[thruster.name]
-            columns.append(self.lagging(force, self.rov[curve.coefficient("T")]) if curve.has_lag else force)
-        return np.column_stack(columns)
-
-    def lagging(self, force: Array, T: float) -> Array:
-        """Return the force with a lag of first order, which is steady at the start."""
-        fall = np.exp(-np.diff(self.time) / T)
-        return recursion(np.append(fall, 0.0), np.append(force[0], (1.0 - fall) * force[:-1]))
-
-    def by_force(self, *forces: Array, first: float = 0.0) -> Array:
-        """Return the change of the measured values due to forces and an initial velocity, n x k."""
-        s, form = self.simulation, self.rov.layout.kinds[self.simulation.recording.axis.name]
-        a, b, a_reverse, b_reverse = (
-            self.rov[form.coefficient(key + end)] for end in ("", REVERSE) for key in ("a_d", "b_d")
-        )
-        v, h, gain = s.velocity[:-1], np.diff(self.time), self.rov.gain(form)
-        damping = np.where(v >= 0.0, 2.0 * a * v + b, b_reverse - 2.0 * a_reverse * v)
-        fall = np.maximum(gain * damping, 1e-6) * h
-        gained = -np.expm1(-fall) / fall * gain * h
-        changes = gained[:, None] * np.column_stack(forces)[:-1]
-        terms = np.vstack([np.full(changes.shape[1], first), changes])
-        return self.by_velocity(recursion(np.append(np.exp(-fall), 0.0), terms))
-
-    def by_velocity(self, velocities: Array) -> Array:
-        """Return the change of the measured values due to changes of the velocity, n x k."""
-        return self.integral(velocities) if self.simulation.recording.is_position else velocities
-
-    def integral(self, values: Array) -> Array:
-        """Return the integral from the start by the trapezoidal rule, n x k."""
-        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(self.time)[:, None]
-        return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(steps, axis=0)])
+    response: LinearResponse
 
     # ---- What the fit may have absorbed, and what it cannot contain ----
 
     @cached_property
     def shared(self) -> Array:
         """The response to errors of thrust, dead band and drag in both directions, n x 8."""
-        v, forces = self.simulation.velocity, []
-        for F in (self.thrust, np.sign(self.thrust)):
+        v, thrust, forces = self.simulation.velocity, self.response.thrust, []
+        for F in (thrust, np.sign(thrust)):
             forces += [np.maximum(F, 0.0).sum(axis=1), np.minimum(F, 0.0).sum(axis=1)]
         for speed in (np.maximum(v, 0.0), np.minimum(v, 0.0)):
             forces += [speed, speed * speed]
-        return self.by_force(*forces)
+        return self.response.by_force(*forces)
 
     @cached_property
     def own(self) -> Array:
         """The response to the start, load, delay and current of this recording, n x 5."""
-        s, one = self.simulation, np.ones(len(self.time))
-        starts = self.by_force(0.0 * one, first=1.0), one * s.recording.is_position
-        current = self.by_velocity(one[:, None] * (s.recording.axis in (SURGE, SWAY)))
-        return np.column_stack([*starts, self.by_force(one), np.gradient(s.modelled, s.time), current])
+        s, response = self.simulation, self.response
+        one = np.ones(len(response.time))
+        starts = response.by_force(0.0 * one, first=1.0), one * s.recording.is_position
+        current = response.by_velocity(one[:, None] * (s.recording.axis in (SURGE, SWAY)))
+        return np.column_stack([*starts, response.by_force(one), np.gradient(s.modelled, s.time), current])
 
     @cached_property
     def causes(self) -> dict[str, Array]:
         """The response to each cause, n x k each."""
-        s, F, v, t = self.simulation, self.thrust.sum(axis=1), self.simulation.velocity, self.time / self.time[-1]
+        s, response = self.simulation, self.response
+        F, v, t = response.thrust.sum(axis=1), s.velocity, response.time / response.time[-1]
         beyond = [np.sign(F) * np.maximum(np.abs(F) - share * np.abs(F).max(), 0.0) for share in (0.5, 0.75)]
         found = {
-            "drift": self.by_force(F * t, t),
-            "recording": self.by_force(F, v, v * np.abs(v)),
-            "tether": self.by_force(self.integral(v[:, None])),
-            "saturation": self.by_force(*beyond),
+            "drift": response.by_force(F * t, t),
+            "recording": response.by_force(F, v, v * np.abs(v)),
+            "tether": response.by_force(response.integral(v[:, None])),
+            "saturation": response.by_force(*beyond),
             "scale": (s.modelled - s.modelled[0])[:, None] * s.recording.is_position,
-            "unknown": self.by_force(*(np.cos(np.pi * k * t) for k in range(1, _SLOW + 1))),
+            "unknown": response.by_force(*(np.cos(np.pi * k * t) for k in range(1, _SLOW + 1))),
         }
-        if not any(curve.has_lag for curve in curves_of(self.rov.layout, s.recording.axis)):
-            found["lag"] = self.by_force(self.lagging(F, _LAG) - F)
+        if not any(curve.has_lag for curve in curves_of(response.rov.layout, s.recording.axis)):
+            found["lag"] = response.by_force(response.lagging(F, _LAG) - F)
         for name, values in s.recording.context.items():
             x = self._sampled(values)
-            found[name] = self.by_force(F * (x - x.mean()), x - x.mean())
+            found[name] = response.by_force(F * (x - x.mean()), x - x.mean())
             if name in ("roll", "pitch"):  # they turn the velocities of other axes into that of this one
                 still = np.zeros(len(s.recording.time))
                 across = np.column_stack([self._sampled(s.recording.beside.get(key, still)) for key in "uv"])
-                turned = self.by_velocity(across * x[:, None]), self.by_force(across * np.gradient(x, s.time)[:, None])
+                turning = across * np.gradient(x, s.time)[:, None]
+                turned = response.by_velocity(across * x[:, None]), response.by_force(turning)
                 found[name] = np.hstack([found[name], *turned])
         return found
 
@@ -180,7 +128,7 @@ class _Case:
         """Return values beside the recording at the n samples; 0 where there are none."""
         there = np.isfinite(values)
         if not there.any():
-            return np.zeros(len(self.time))
+            return np.zeros(len(self.simulation.time))
         return np.interp(self.simulation.time, self.simulation.recording.time[there], values[there])
 
     # ---- Noise ----
@@ -199,15 +147,10 @@ class _Case:
     def spread(self) -> Array:
         """The Cholesky factor of the covariance of the slow coefficients.
 
-        A command that changes between two rows of a log changes at an unknown time between them, which adds to the
-        noise of the sensor. Where it changes on average is a delay.
+        The unknown times of switches add to the noise of the sensor.
         """
         assert self.spectrum is not None
-        jumps = np.diff(self.steady.sum(axis=1))
-        last = np.argsort(-np.abs(jumps * np.diff(self.time)))[:_SWITCHES]
-        pulses = np.zeros((len(self.time), len(last)))
-        pulses[last, np.arange(len(last))] = jumps[last] / np.sqrt(12.0)
-        S = cosines(self.by_force(pulses))[:_COEFFICIENTS]
+        S = cosines(self.response.by_switches)[:_COEFFICIENTS]
         return np.asarray(np.linalg.cholesky(S @ S.T + np.diag(self.spectrum[:_COEFFICIENTS])))
 
     def white(self, values: Array) -> Array:
@@ -217,7 +160,7 @@ class _Case:
     def visible_from(self, misfit: Array) -> float | None:
         """Return the time from which a whitened misfit exceeds the sensor's noise, s; None where it never does."""
         assert self.spectrum is not None
-        values = idct(self.spread @ misfit, n=len(self.time), norm="ortho")
+        values = idct(self.spread @ misfit, n=len(self.simulation.time), norm="ortho")
         visible = np.flatnonzero(np.abs(values) > np.sqrt(np.mean(self.spectrum)))
         return float(self.simulation.time[visible[0]]) if visible.size else None
 
@@ -260,7 +203,7 @@ def _misfits(cases: Sequence[_Case]) -> dict[str, _Misfit]:
     found = {}
     for name in names:
         size = max(case.causes[name].shape[1] for case in cases if name in case.causes)
-        parts = [case.white(case.causes.get(name, np.zeros((len(case.time), size)))) for case in cases]
+        parts = [case.white(case.causes.get(name, np.zeros((len(case.response.time), size)))) for case in cases]
         columns = _scaled(block_diag(*parts) if name in _BY_RECORDING else np.concatenate(parts))
         basis = _basis(columns - free @ (free.T @ columns), 1e-3)
         misfit = _Misfit(basis @ (basis.T @ residuals), basis.shape[1])

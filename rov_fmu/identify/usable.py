@@ -9,7 +9,7 @@ import numpy as np
 
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.findings import refusals
-from rov_fmu.identify.recordings.runs import prepare
+from rov_fmu.identify.simulation.prepared import prepare
 from rov_fmu.identify.slips.search import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.toml_file import join_names

@@ -6,8 +6,8 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any
@@ -88,6 +88,41 @@ class _Fit(Strict):
 
     lag: Annotated[Any, AfterValidator(_check_curve_names)] = ()
     """The curves whose thrusters' lag is fitted; true for all curves."""
+    advance: Annotated[Any, AfterValidator(_check_curve_names)] = ()
+    """The curves whose loss of thrust by the speed of advance is fitted; true for all curves."""
+    voltage: bool = False
+    """True when thrust depends on the logged voltage: its exponent is fitted."""
+    attitude: bool = False
+    """True when the vehicle is simulated at the logged roll and pitch."""
+
+
+@dataclass(frozen=True)
+class Requests:
+    """What is fitted on request."""
+
+    lag: tuple[str, ...] = ()
+    """The curves whose thrusters' lag is fitted."""
+    advance: tuple[str, ...] = ()
+    """The curves whose loss of thrust by the speed of advance is fitted."""
+    voltage: bool = False
+    """True when thrust depends on the logged voltage."""
+    attitude: bool = False
+    """True when the vehicle is simulated at the logged roll and pitch."""
+    measured_at: Mapping[str, float] = field(default_factory=dict)
+    """The voltage at which the thrust of a curve was measured, V, where it is given."""
+
+    @property
+    def columns(self) -> dict[str, tuple[str, ...]]:
+        """The columns that every log must have, by the key of [fit] that needs them."""
+        return {"voltage": ("voltage",) * self.voltage, "attitude": ("roll", "pitch") * self.attitude}
+
+    def of(self, curves: Collection[str]) -> "Requests":
+        """Return what is requested of some curves."""
+        lag, advance = (tuple(name for name in names if name in curves) for names in (self.lag, self.advance))
+        return replace(self, lag=lag, advance=advance)
+
+
+NO_REQUESTS = Requests()
 
 
 def _check_several(files: tuple[str, ...]) -> tuple[str, ...]:
@@ -187,8 +222,8 @@ class Description:
     """The sources of each thruster's direction and position."""
     windows: Mapping[str, tuple[float, float]]
     """The range of commands that count, by axis or by thrust_<curve>; rows outside have weight 0 in (7)."""
-    lag: tuple[str, ...]
-    """The curves whose thrusters' lag is fitted."""
+    requests: Requests
+    """What is fitted on request."""
     tank_limits: TankLimits
     """The most that a proposed test may take."""
     command_range: tuple[float, float] | None
@@ -276,7 +311,12 @@ def _describe(path: Path, file: _ReadableFile, lost: set[str], data: Toml, base:
     else:
         start, thruster_sources, limits = PAPER, PAPER_SOURCES, ()
     known_names = [*data["known"]] if isinstance(data.get("known"), dict) else []
-    layout = _largest_layout(start, {form.axis.name: form.keys for form in own_layout.axes}, known_names)
+    # With `[fit] voltage`, V_0 belongs to the effect that is fitted.
+    names = {coefficient_name("V_0", curve.name): curve.name for curve in start.curves if file.fit.voltage}
+    measured_at = {names[name]: file.known[name].value for name in names.keys() & file.known.keys()}
+    axis_keys = {form.axis.name: form.keys for form in own_layout.axes}
+    layout = _largest_layout(start, axis_keys, {*known_names} - names.keys())
+    curves = tuple(curve.name for curve in layout.curves)
     given = {name: quantity for name, quantity in file.quantities(layout).items() if quantity} | dict(file.known)
     return Description(
         path=path,
@@ -288,7 +328,13 @@ def _describe(path: Path, file: _ReadableFile, lost: set[str], data: Toml, base:
         base_quantities=_quantities(base) if base else {},
         thruster_sources=thruster_sources,
         windows=file.windows,
-        lag=tuple(curve.name for curve in layout.curves) if file.fit.lag is True else file.fit.lag,
+        requests=Requests(
+            lag=curves if file.fit.lag is True else file.fit.lag,
+            advance=curves if file.fit.advance is True else file.fit.advance,
+            voltage=file.fit.voltage,
+            attitude=file.fit.attitude,
+            measured_at=measured_at,
+        ),
         tank_limits=file.limits,
         command_range=file.validity.command_range if file.validity else None,
         columns=file.columns,
@@ -339,13 +385,19 @@ def _mistakes(file: _ReadableFile, lost: set[str], description: Description) -> 
             hint = did_you_mean(name, windows)
             yield key_line(f"windows.{name}", f"there is no such key, only {join_names(windows)}{hint}")
     curves = [curve.name for curve in layout.curves]
-    for name in description.lag:
-        T = coefficient_name("T", name)
-        if name not in curves:
-            hint = did_you_mean(name, curves)
-            yield key_line("fit.lag", f"there is no such curve, only {join_names(curves)}{hint}", name)
-        elif T in description.named:
-            yield key_line("fit.lag", f"{T} is given, so it cannot be fitted too", name)
+    requests = description.requests
+    asked = {"lag": ("T", requests.lag), "advance": ("d", requests.advance)}
+    asked["voltage"] = "n_V", tuple(curves) if requests.voltage else ()
+    for key, (coefficient, names) in asked.items():
+        for name in names:
+            given = coefficient_name(coefficient, name)
+            if name not in curves:
+                hint = did_you_mean(name, curves)
+                yield key_line(f"fit.{key}", f"there is no such curve, only {join_names(curves)}{hint}", name)
+            elif given in description.named:
+                yield key_line(f"fit.{key}", f"{given} is given, so it cannot be fitted too", name)
+    if requests.attitude and (own := [name for name in ("roll", "pitch") if name in description.axes]):
+        yield key_line("fit.attitude", f"the vehicle has the axis {join_names(own)}, which is simulated: leave it out")
 
 
 def _unknown_effects(layout: Layout) -> Iterator[str]:

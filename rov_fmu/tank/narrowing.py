@@ -20,7 +20,7 @@ from rov_fmu.model.layout import (
     coefficient_name,
 )
 from rov_fmu.model.rov import Rov
-from rov_fmu.tank.description import Description
+from rov_fmu.tank.description import Description, Requests
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.geometry import check_layout, check_thruster_places
@@ -46,8 +46,8 @@ class Given:
     """The coefficients that are given, not identified."""
     thruster_sources: Mapping[str, Mapping[str, str]]
     """The sources of each thruster's direction and position."""
-    lag: tuple[str, ...]
-    """The curves whose thrusters' lag is fitted."""
+    requests: Requests
+    """What is fitted on request, of the curves that are left."""
 
 
 @dataclass(frozen=True)
@@ -109,13 +109,15 @@ def _given(description: Description, head: Head, layout: Layout, known: Mapping[
         rov=Rov(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
         known={name: known[name] for name in names if name in known},
         thruster_sources={t.name: description.thruster_sources[t.name] for t in layout.thrusters},
-        lag=tuple(curve.name for curve in layout.curves if curve.name in description.lag),
+        requests=description.requests.of({curve.name for curve in layout.curves}),
     )
 
 
 def _kept_from_base(description: Description, tested: Tested) -> dict[str, Quantity]:
     """Return the coefficients of the base that no test identifies anew."""
-    replaced = {coefficient_name("T", name) for name in description.lag}
+    requests = description.requests
+    replaced = {coefficient_name("T", name) for name in requests.lag}
+    replaced |= {coefficient_name(key, name) for name in requests.advance for key in ("d", "d_reverse")}
     for curve in description.layout.curves:
         if curve.name in tested.thrust:
             _, backward = tested.thrust[curve.name]

@@ -22,14 +22,14 @@ from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
-from rov_fmu.io.messages import FileError, did_you_mean, lines_on
-from rov_fmu.io.toml_file import key_line
+from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on
+from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import AXES, Axis, Layout
-from rov_fmu.tank.description import ROV_FILE, Description, Dive, read_description
+from rov_fmu.tank.description import ROV_FILE, Description, Dive, Requests, read_description
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.logs import Log, Names, names_of, read_dive, read_log
 from rov_fmu.tank.narrowing import Given, Narrowed, Tested, narrowed
-from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.recording import CONTEXT, Recording
 from rov_fmu.tank.tables import Row, read_rows
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
@@ -129,6 +129,7 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
         reader.read_dive(name, dive)
     if description and not (description_mistakes or reader.mistakes):
         description_mistakes += lines_on(description.path, reader.unknown_names(description))
+        description_mistakes += lines_on(description.path, reader.missing_columns(description.requests))
     vehicle = Narrowed(None)
     tested = reader.tested(description)
     # Without any axis, a file that could not be read may be the one with the axes.
@@ -221,6 +222,17 @@ class _Reader:
                 if name not in self.known:
                     what = "no log has such a column" if table == "columns" else "no log has such a topic and field"
                     yield key_line(f"{table}.{name}", f"{what}{did_you_mean(name, self.known)}", value)
+
+    def missing_columns(self, requests: Requests) -> Iterator[str]:
+        """Yield a line for each key of [fit] that needs a column which a log does not have."""
+        recordings = [recording for some in self.recordings.values() for recording in some]
+        for key, columns in requests.columns.items():
+            for name in columns:
+                lacking = sorted({r.file for r in recordings if name not in r.context})
+                if lacking or not recordings:
+                    column = f"the column {name} [{CONTEXT[name].replace('rad', 'deg')}]"
+                    none = f"there is none in {brief(join_names(lacking))}" if lacking else "there is no log"
+                    yield key_line(f"fit.{key}", f"every log must have {column}, but {none}")
 
     def _read_log(self, path: Path, axis: Axis | None) -> None:
         if layout := self.layout if axis else self.logged:

@@ -10,9 +10,8 @@ import pytest
 from rov_fmu.identify import identify as module
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.recordings.limits import NoFitError
 from rov_fmu.identify.recordings.output_error import fit_recordings
-from rov_fmu.identify.recordings.trajectory import MotionError
+from rov_fmu.identify.simulation.limits import MotionError, NoFitError
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW
 from rov_fmu.tank.recording import Recording

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
 from rov_fmu.identify.points.step_responses import correlation_time
-from rov_fmu.identify.recordings.noise_spectrum import cosines, noise_spectrum
 
 N = 1200
 SLOW = np.asarray(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, N), 8), dtype=np.float64)

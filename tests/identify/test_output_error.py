@@ -266,3 +266,15 @@ def test_band_encloses_the_truth(k: Rov) -> None:
     assert ((low < truth[:, 0]) & (truth[:, 0] < high)).all()
     assert ((early < truth[:, 1]) & (truth[:, 1] < late)).all()
     assert ((high - low) < 0.01 * truth[:, 0]).all()
+
+
+def test_each_step_of_a_search_is_reported(k: Rov) -> None:
+    shown: list[tuple[str, float]] = []
+    fit = only(recorded(k, SURGE, 0), unknowing(k, SURGE), on_progress=lambda step, share: shown.append((step, share)))
+    chosen = len(shown)
+    assert fit.held_out.predictions
+    assert len(shown) > chosen > 5, "the predictions are a search too"
+    assert shown[0][0] == "recordings of surge, step 1"
+    shares = [share for _, share in shown]
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] <= shares[-1] < 1.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify.recordings.output_error import fit_recordings
-from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -24,7 +24,7 @@ def _fit(k: Rov, size: float) -> RecordingsFit:
     return fit
 
 
-def _loads(fit: RecordingsFit) -> list[Effect]:
+def _loads(fit: RecordingsFit) -> list[FittedEffect]:
     return [effect for effect in fit.effects if effect.kind == "load"]
 
 

@@ -220,12 +220,12 @@ def test_lag_to_be_found(lag: str, curves: tuple[str, ...], tmp_path: Path) -> N
     tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
     with (tests / ROV_FILE).open("a", encoding="utf-8") as file:
         file.write(f"\n[fit]\nlag = {lag}\n")
-    assert load_tank_tests(tests).given.lag == curves
+    assert load_tank_tests(tests).given.requests.lag == curves
 
 
 def test_the_lag_of_a_base_is_found_anew_where_asked(tmp_path: Path) -> None:
     given = read(tmp_path, f"{BLUEROV2}[fit]\nlag = true\n", {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
-    assert given.lag == ("t200",)
+    assert given.requests.lag == ("t200",)
     assert "T_t200" not in given.rov.layout.coefficients
 
 

@@ -158,6 +158,16 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         HEAVE_ALONE,
         "/rov.toml: fit.lag = 't200': T_t200 is given, so it cannot be fitted too",
     ),
+    (
+        f'{BLUEROV2}[fit]\nadvance = ["rear"]\n',
+        HEAVE_ALONE,
+        "/rov.toml: fit.advance = 'rear': there is no such curve, only t200",
+    ),
+    (
+        f"{BLUEROV2}[fit]\nvoltage = true\n",
+        HEAVE_ALONE,
+        "/rov.toml: fit.voltage: every log must have the column voltage [V], but there is no log",
+    ),
 ]
 """rov.toml, the tables, and the beginnings of the lines after the name of the folder."""
 

@@ -7,43 +7,49 @@ many commands also determines the shape of the thrust curve, so a tested curve t
 axes that share it are fitted at once. Each recording adds its initial velocity and position.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache
+from itertools import count
 from math import inf
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rov_fmu.identify.driving import curves_of
-from rov_fmu.identify.effects.coupling import EAST, NORTH, is_in_flow
-from rov_fmu.identify.effects.extras import Extra
-from rov_fmu.identify.least_squares import Estimate, Loss, external
+from rov_fmu.identify.effects.attitude import Attitude
+from rov_fmu.identify.effects.current import Current, CurrentNorth, is_in_flow
+from rov_fmu.identify.effects.delay import Delay
+from rov_fmu.identify.effects.effect import Effect, Setting
+from rov_fmu.identify.effects.lag import Lag
+from rov_fmu.identify.effects.load import Load
+from rov_fmu.identify.least_squares import Estimate, Loss
 from rov_fmu.identify.recordings.held_out import HeldOut, hold_out
-from rov_fmu.identify.recordings.limits import check_limits
-from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit, effects_of, estimate_of, part_of
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit, effects_of, estimate_of, part_of
 from rov_fmu.identify.recordings.residual_analysis import ResidualAnalysis
-from rov_fmu.identify.recordings.runs import PreparedRecording, axes_of, prepare
 from rov_fmu.identify.recordings.selection import candidates, earn_their_place, likely
-from rov_fmu.identify.recordings.simulator import Simulator, solve
-from rov_fmu.identify.recordings.trajectory import MotionError
-from rov_fmu.model.layout import YAW, Axis
+from rov_fmu.identify.recordings.switches import allow_for_switches
+from rov_fmu.identify.simulation.first_guess import DELAYS, first_guess
+from rov_fmu.identify.simulation.limits import check_limits
+from rov_fmu.identify.simulation.prepared import PreparedRecording, axes_of, divided, prepare, some_pieces
+from rov_fmu.identify.simulation.simulator import Simulator
+from rov_fmu.identify.simulation.solver import settled, solve
+from rov_fmu.io.messages import Progress, silent
+from rov_fmu.io.toml_file import join_names
+from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.description import NO_REQUESTS, Requests
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation, white_noise
 
-_BETAS = (0.03, 0.1, 0.3, 1.0, 3.0)  # starts
-_DELAYS = (0.0, 0.3)
-_STARTS = 3
 _BEYOND_DOUBT = 100.0
 """The value of Wald's statistic from which no held-out prediction is needed."""
-_GOOD = 1.5
-"""The cost per sample of a fit that cannot become much better; white noise has 1.36."""
-_FEW = 200
-"""The number of samples of a recording in the search for a start."""
-_LONG = 100.0
-"""The length of a recording in the search for a start, s."""
+_STEPS = 30
+"""The number of steps of a search after which half of the work seems to be done."""
+_PIECE = 5.0
+"""The length of a piece of a recording, s, where the axes act on each other. The coupling makes a vehicle that moves
+ahead unstable in yaw, so small errors grow quickly, and the simulation of a long piece tells little."""
 
 
 def fit_recordings(
@@ -52,17 +58,21 @@ def fit_recordings(
     known: Collection[str] = (),
     thrust: Estimate | None = None,
     loss: Loss = "huber",
-    lag: Collection[str] = (),
+    requests: Requests = NO_REQUESTS,
+    on_progress: Progress = silent,
 ) -> tuple[RecordingsFit, ...]:
     """Fit the unknown drag and β of every recorded axis, and optional effects; `base` has the other coefficients.
 
-    `thrust` is the estimate of tested curves; `lag` has the curves whose lag is fitted. The intervals account for the
-    correlation of the residuals. Raises MotionError or NoFitError.
+    `thrust` is the estimate of tested curves; `requests` are those of [fit]. The intervals account for the
+    correlation of the residuals. `on_progress` is called at each step of a search. Raises MotionError or NoFitError.
     """
     order = list(base.layout.kinds)
-    data = tuple(prepare(r, base) for r in sorted(recordings, key=lambda r: order.index(r.axis.name)))
+    recordings = sorted(recordings, key=lambda r: order.index(r.axis.name))
+    setting = Setting(recordings, base, known, requests)
+    data = tuple(replace(prepare(r, base), attitude=Attitude.of(r) if requests.attitude else None) for r in recordings)
+    data = divided(data, _PIECE if base.layout.is_linked else inf)
     with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
-        return _Fit(data, base, known, thrust, loss).choose(tuple(candidates(data, base, known, lag)))
+        return _Fit(data, base, known, thrust, loss, _counting(data, on_progress)).choose(tuple(candidates(setting)))
 
 
 def drag_and_beta(base: Rov, axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:
@@ -81,6 +91,8 @@ class _Fit:
     known: Collection[str]
     thrust: Estimate | None
     loss: Loss
+    on_step: Callable[[], None]
+    """A function that is called at each step of a search."""
 
     @property
     def axes(self) -> list[Axis]:
@@ -93,22 +105,33 @@ class _Fit:
         drag = (name for axis in self.axes for name in drag_and_beta(self.base, axis, self.known))
         return (*(self.thrust.names if self.thrust else ()), *drag)
 
-    def choose(self, extras: tuple[Extra, ...]) -> tuple[RecordingsFit, ...]:
-        """Find a start, fit all extras, and leave out those that the data do not justify."""
-        coefficients, values = dict(self.thrust.named if self.thrust else {}), {e: _begin(e) for e in extras}
+    def choose(self, extras: tuple[Effect, ...]) -> tuple[RecordingsFit, ...]:
+        """Find a start and the times of switches, fit all extras, and leave out those that the data do not justify."""
         noise = np.array([_at_least(white_noise(d.values), d) for d in self.data])
-        for axis in self.axes:
-            alone = replace(self, data=tuple(_glimpse(d) for d in self.data if d.axis is axis), thrust=None)
-            near, found = alone.near(axis, extras, noise[[d.axis is axis for d in self.data]])
-            coefficients |= near
-            values |= found
-        model = replace(self, data=tuple(d.thinned() for d in self.data)).model(extras, noise, with_prior=True)
-        x = solve(model, model.start(coefficients, values), "linear", 1e-4).x
+        some = some_pieces(self.data)
+        sample = replace(self, data=tuple(self.data[n].thinned() for n in some))
+        model = sample.model(extras, noise[some], with_prior=True)
+        start = min((settled(model, start) for start in self.starts(model)), key=lambda x: _cost(model, x))
+        x = solve(model, start, "linear", 1e-4, self.on_step).x
         check_limits(self.base, model.data, model.names, extras, x)
+        common = tuple(e for e in extras if e.is_current or not e.is_of_file)  # the others would explain some switches
+        plain = sample.model(common, noise[some], with_prior=True)
+        found = solve(plain, x[model.places_of(common)], "linear", 1e-4, self.on_step).x
+        allowing = replace(self, data=allow_for_switches(*self.of_all_pieces(plain, found, noise)))
+        return allowing.chosen(extras, self.of_all_pieces(model, x, noise)[1])
+
+    def of_all_pieces(self, model: Simulator, x: Array, noise: Array) -> tuple[Simulator, Array]:
+        """Return the model with all samples of all pieces, and its parameters by those of a model with some of them."""
+        whole = self.model(model.extras, noise, with_prior=True)
+        start = whole.start(model.rov(x).coefficients, model.extra_values(x), model.starts(x))
+        without_spikes = replace(whole, data=tuple(d.thinned() for d in self.data))
+        return whole, settled(without_spikes, start)
+
+    def chosen(self, extras: tuple[Effect, ...], x: Array) -> tuple[RecordingsFit, ...]:
+        """Fit all extras from x on, and leave out those that the data do not justify."""
         noise = self.noise(extras, x)
-        whole = self.analysed(
-            self.model(extras, noise, with_prior=True), x, 1e-5
-        )  # unidentifiable extras settle slowly
+        everything = self.model(extras, noise, with_prior=True)
+        whole = self.analysed(everything, x, 1e-4)  # effects that are not identifiable settle slowly
         kept, x = earn_their_place(whole)
         chosen = self.analysed(self.model(kept, noise), x)
         while (fewer := earn_their_place(chosen))[0] != kept:  # extras were dropped to first order only
@@ -121,7 +144,24 @@ class _Fit:
             kept, chosen = better, self.analysed(self.model(better, noise), x)
         check_limits(self.base, self.data, chosen.model.names, kept, chosen.x)
         effects = effects_of(whole, kept) | effects_of(chosen, kept)
-        return tuple(self._result(axis, chosen, effects) for axis in self.axes)
+        held_out = cache(lambda: self.held_out(chosen, kept))
+        return tuple(self._result(axis, chosen, effects, held_out) for axis in self.axes)
+
+    def starts(self, model: Simulator) -> Iterator[Array]:
+        """Yield the starts of the search: the first guess, and that without delays where the guess has some."""
+        for delays in (DELAYS, (0.0,)):
+            coefficients, values = dict(self.thrust.named if self.thrust else {}), {e: e.begin for e in model.extras}
+            late = False
+            for axis in self.axes:
+                guess, delay = first_guess(axis, self.data, self.base, delays)
+                coefficients |= {name: guess[_key(name)] for name in drag_and_beta(self.base, axis, self.known)}
+                slow = any(isinstance(e, Lag) and e.of in self._own(axis) for e in model.extras)
+                begin = {Load(axis.name): guess["F_0"], Delay(axis.name): delay - Lag.begin * slow}
+                values |= {e: value for e, value in begin.items() if e in values}
+                late |= delay != 0.0
+            yield model.start(coefficients, values)
+            if not late:
+                return
 
     def simplest(self, analysis: ResidualAnalysis, noise: Array) -> ResidualAnalysis:
         """Drop groups of extras that are not justified together, by the Bayesian criterion.
@@ -130,8 +170,8 @@ class _Fit:
         them explain nothing: motion in one direction is the same with more current, more load and less linear drag.
         """
         kept = analysis.model.extras
-        currents = {e for e in kept if e.kind == "current"}
-        others = {e for e in kept if e.kind == "load" or e.pairs()} if currents else set()
+        currents: set[Effect] = {e for e in kept if type(e) is Current}
+        others = {e for e in kept if isinstance(e, Load) or e.pairs()} if currents else set()
         each = np.log(max(analysis.degrees_of_freedom, 8.0))
         for dropped in dict.fromkeys(map(frozenset, (currents | others, others, currents))):
             if len(dropped) > 1:  # the effect of such extras is not linear, so Wald's statistic does not hold
@@ -142,7 +182,7 @@ class _Fit:
                     return self.analysed(other.model, other.x)
         return analysis
 
-    def voted(self, analysis: ResidualAnalysis) -> tuple[Extra, ...]:
+    def voted(self, analysis: ResidualAnalysis) -> tuple[Effect, ...]:
         """Return the extras without ratios by direction that do not improve the held-out predictions."""
         kept = analysis.model.extras
         doubtful = [e for e in kept if e.pairs() and analysis.significance(e) < _BEYOND_DOUBT]
@@ -153,99 +193,77 @@ class _Fit:
                 kept, least = without, missed
         return kept
 
-    def _missed(self, analysis: ResidualAnalysis, extras: Collection[Extra]) -> float:
+    def _missed(self, analysis: ResidualAnalysis, extras: Collection[Effect]) -> float:
         """Return the sum of the errors of the held-out predictions; infinite where one cannot be computed."""
-        found = [self.held_out(axis, analysis, extras) for axis in self.axes]
+        found = self.held_out(analysis, extras).values()
         return inf if any(each.failed for each in found) else sum(p.error for each in found for p in each.predictions)
 
-    def held_out(self, axis: Axis, analysis: ResidualAnalysis, extras: Collection[Extra]) -> HeldOut:
-        """Predict each recording of an axis by the others, with the thrust curve of the fit to all."""
+    def _own(self, axis: Axis) -> set[str]:
+        """Return the names of an axis and of its thrust curves."""
+        return {axis.name, *(curve.name for curve in curves_of(self.base.layout, axis))}
+
+    def held_out(self, analysis: ResidualAnalysis, extras: Collection[Effect]) -> dict[str, HeldOut]:
+        """Predict the recordings of each file by the others, with the thrust curves of the fit to all; by axis."""
         rov, values = analysis.model.rov(analysis.x), analysis.model.extra_values(analysis.x)
-        data = tuple(_in_flow(d, values) for d in self.data if d.axis is axis)
-        alone = replace(self, data=data, base=self.base.replaced(_common(rov, self.base)), thrust=None)
-        curves = {curve.name for curve in curves_of(self.base.layout, axis)}
-        own = tuple(
-            e
-            for e in extras
-            if e.kind not in (NORTH, EAST)
-            and (e.of in (axis.name, *curves) or any(e.concerns(d.recording) for d in data))
-        )
-        noise = analysis.model.sigma[[d.axis is axis for d in self.data]]
-        model = alone.model(own, noise)
-        x = model.start(dict(rov.coefficients), values)
-        initial = [analysis.x[place] for d, _, place, _ in analysis.model.places if d.axis is axis]
-        return hold_out(model, np.concatenate([x[: model.shared], *initial]))
+        base = self.base.replaced(_common(rov, self.base))
+        found: dict[str, HeldOut] = {}
+        for axes in self.blocks:
+            data = tuple(d for d in self.data if d.axis in axes)
+            alone = replace(self, data=data, base=base, thrust=None)
+            of = {name for axis in axes for name in self._own(axis)}
+            own = tuple(e for e in extras if e.of in of or any(e.concerns(d.recording) for d in data))
+            model = alone.model(own, analysis.model.sigma[[d.axis in axes for d in self.data]])
+            start = model.start(rov.coefficients, values, analysis.model.starts(analysis.x))
+            found |= hold_out(model, start, self.on_step)
+        return found
 
-    def near(self, axis: Axis, extras: Sequence[Extra], noise: Array) -> tuple[dict[str, float], dict[Extra, float]]:
-        """Find coefficients of one axis and the extras that act on it from many starts, with fixed thrust."""
-        own = {axis.name, *(curve.name for curve in curves_of(self.base.layout, axis))}
-        concerned = tuple(
-            e
-            for e in extras
-            if e.of in own
-            # a current acts horizontally
-            or (e.is_current and axis is not YAW and any(e.concerns(d.recording) for d in self.data))
-        )
-        model = self.model(concerned, noise, with_prior=True)
-        delay = Extra("delay", axis.name)
-        begin = {e: _begin(e) for e in concerned}
-        starts = [model.start(self.guess(axis, beta), {**begin, delay: s}) for beta in _BETAS for s in _DELAYS]
-        costs = sorted(((_cost(model, x), n) for n, x in enumerate(starts)))
-        near = [starts[n] for cost, n in costs[:_STARTS] if np.isfinite(cost)]
-        if not near:
-            raise MotionError(f"the motion in {axis.name} cannot be computed with any coefficients")
-        x = near[0]
-        for start in near:
-            try:
-                x = min(x, solve(model, start, "linear", 1e-4).x, key=lambda x: _cost(model, x))
-            except MotionError:  # this start is too far off
-                continue
-            if _cost(model, x) < _GOOD * len(model.residuals(x)):
-                break
-        return external(model.names, x), model.extra_values(x)
-
-    def guess(self, axis: Axis, beta: float) -> dict[str, float]:
-        """Return a start with half linear, half quadratic drag, so that the strongest force gives the highest speed."""
-        data = [d for d in self.data if d.axis is axis]
-        fastest = max(data, key=lambda d: d.speed)
-        force = self.base.strongest(axis)
-        if fastest.recording.command is not None:
-            force = max(abs(self.base.force(axis, c)) for c in _ends(fastest.recording.command)) or force
-        drag = self.base[axis.coefficient("alpha")] * force / fastest.speed
-        kinds = {"a_d": 0.5 * drag / fastest.speed, "b_d": 0.5 * drag, "beta": beta}
-        return {
-            name: kinds[next(key for key in kinds if name.startswith(key))]
-            for name in drag_and_beta(self.base, axis, self.known)
-        }
+    @property
+    def blocks(self) -> list[list[Axis]]:
+        """The recorded axes in groups that move independently of each other."""
+        return [self.axes] if self.base.layout.is_linked or self.data[0].attitude else [[axis] for axis in self.axes]
 
     def first_in(self, recording: Recording) -> Axis | None:
         """Return the first axis in a file along which the current is seen."""
         file = recording.file
         return next((d.axis for d in self.data if d.recording.file == file and is_in_flow(d.recording)), None)
 
-    def model(self, extras: tuple[Extra, ...], noise: Array, *, with_prior: bool = False) -> Simulator:
+    def model(self, extras: tuple[Effect, ...], noise: Array, *, with_prior: bool = False) -> Simulator:
         """Return the model with these extras; the prior pulls them to their neutral values."""
-        deviations = likely(extras, self.data, self.base) if with_prior else None
+        deviations = likely(extras, Setting([d.recording for d in self.data], self.base), all_of_them=with_prior)
         return Simulator(self.data, self.base, self.names, extras, noise, self.thrust, deviations)
 
     def analysed(self, model: Simulator, start: Array, tolerance: float = 1e-8) -> ResidualAnalysis:
         """Fit the model and analyse the residuals."""
-        return ResidualAnalysis(model, solve(model, start, self.loss, tolerance), robust=self.loss == "huber")
+        solution = solve(model, start, self.loss, tolerance, self.on_step)
+        return ResidualAnalysis(model, solution, robust=self.loss == "huber")
 
-    def noise(self, extras: tuple[Extra, ...], x: Array) -> Array:
+    def noise(self, extras: tuple[Effect, ...], x: Array) -> Array:
         """Return the robust standard deviation of each recording's residuals."""
-        plain = self.model(extras, np.ones(len(self.data)))
+        plain = replace(self, data=tuple(replace(d, shifts=None) for d in self.data)).model(
+            extras, np.ones(len(self.data))
+        )
         residuals = plain.residuals(x)
-        return np.array([_at_least(robust_deviation(residuals[rows]), d) for d, rows, *_ in plain.places])
+        found = np.empty(len(self.data))
+        for pieces in plain.recordings:
+            parts = [_without_shifts(residuals[plain.rows[n]], self.data[n]) for n in pieces]
+            found[pieces] = _at_least(robust_deviation(np.concatenate(parts)), self.data[pieces[0]])
+        return found
 
-    def _result(self, axis: Axis, analysis: ResidualAnalysis, effects: dict[Extra, Effect]) -> RecordingsFit:
+    def _result(
+        self,
+        axis: Axis,
+        analysis: ResidualAnalysis,
+        effects: dict[Effect, FittedEffect],
+        held_out: Callable[[], dict[str, HeldOut]],
+    ) -> RecordingsFit:
         curves = {curve.name for curve in curves_of(self.base.layout, axis)}
         own = [d.recording for d in self.data if d.axis is axis]
-        flows = {e.of for e in effects if e.kind in (NORTH, EAST)} - {r.file for r in own if self.first_in(r) is axis}
+        flows = {e.of for e in effects if isinstance(e, CurrentNorth)}
+        flows -= {r.file for r in own if self.first_in(r) is axis}
         of_axis = {
             e: effect
             for e, effect in effects.items()
-            if e.of in curves or (any(map(e.concerns, own)) and not (e.kind in (NORTH, EAST) and e.of in flows))
+            if e.of in curves or (any(map(e.concerns, own)) and not (isinstance(e, CurrentNorth) and e.of in flows))
         }
         rov, together = analysis.model.rov(analysis.x), estimate_of(analysis)
         return RecordingsFit(
@@ -255,38 +273,42 @@ class _Fit:
             part_of(together, axis, rov),
             tuple(s for s in analysis.simulations if s.recording.axis is axis),
             tuple(of_axis.values()),
-            partial(self.held_out, axis, analysis, analysis.model.extras),
+            lambda: held_out()[axis.name],
+            between_rows=any(d.shifts is not None for d in self.data if d.axis is axis),
         )
 
 
-def _cost(model: Simulator, x: Array) -> float:
-    """Return the cost of a robust fit; infinite where the motion cannot be computed."""
-    cost = float(np.sum(np.sqrt(1.0 + model.residuals(x) ** 2)))
-    return cost if np.isfinite(cost) else float("inf")
+def _counting(data: Sequence[PreparedRecording], on_progress: Progress) -> Callable[[], None]:
+    """Return a function that reports another step of the search; how many there will be is not known."""
+    axes, steps = join_names(axis.name for axis in axes_of(data)), count(1)
+
+    def on_step() -> None:
+        n = next(steps)
+        on_progress(f"recordings of {axes}, step {n}", n / (n + _STEPS))
+
+    return on_step
 
 
-def _ends(command: Array) -> tuple[float, float]:
-    return float(command.min()), float(command.max())
-
-
-def _in_flow(data: PreparedRecording, values: Mapping[Extra, float]) -> PreparedRecording:
-    """Set the current of the recording's file to the fitted one, which is independent of the vehicle."""
-    of: dict[str, float] = {e.kind: value for e, value in values.items() if e.concerns(data.recording)}
-    return replace(data, current=(of.get(NORTH, 0.0), of.get(EAST, 0.0)))
-
-
-def _glimpse(data: PreparedRecording) -> PreparedRecording:
-    """Return a short part of a recording, to search for a start."""
-    return data.liveliest(_LONG).thinned(_FEW)
-
-
-def _begin(extra: Extra) -> float:
-    """Return the start of the search for an extra."""
-    return {"lag": 0.1, "dead band": 0.02}.get(extra.kind, extra.neutral)
+def _key(name: str) -> str:
+    """Return the key of a coefficient of drag, or of β."""
+    return next(key for key in ("a_d", "b_d", "beta") if name.startswith(key))
 
 
 def _at_least(noise: float, data: PreparedRecording) -> float:
     return max(noise, 1e-6 * float(np.ptp(data.values)), 1e-12)
+
+
+def _without_shifts(residuals: Array, data: PreparedRecording) -> Array:
+    """Return residuals without what uncertain times of switches may explain."""
+    if data.shifts is None:
+        return residuals
+    return np.asarray(residuals - data.shifts @ np.linalg.lstsq(data.shifts, residuals, rcond=None)[0])
+
+
+def _cost(model: Simulator, x: Array) -> float:
+    """Return the sum of the squares of the residuals."""
+    r = model.residuals(x)
+    return float(r @ r)
 
 
 def _common(rov: Rov, base: Rov) -> dict[str, float]:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from rov_fmu.identify.recordings.runs import PreparedRecording
+from rov_fmu.identify.simulation.prepared import PreparedRecording
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.smoothing import WINDOW, kernel, sensor_noise, velocity, without_spikes

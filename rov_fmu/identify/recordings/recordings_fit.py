@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from rov_fmu.identify.driving import curves_of
-from rov_fmu.identify.effects.extras import EffectKind, Extra
+from rov_fmu.identify.effects.effect import Effect, axis_of
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.response_fit import response_band
 from rov_fmu.identify.recordings.held_out import HeldOut
@@ -18,15 +18,15 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 _DISAGREEMENT = 3.0
-"""The ratio to the standard error that counts as disagreement. If the model holds, three recordings differ by more once
+"""The ratio of `spread` that counts as disagreement. If the model holds, three recordings differ by more once
 in 10,000 cases."""
 
 
 @dataclass(frozen=True)
-class Effect:
+class FittedEffect:
     """An effect in addition to thrust, drag and β that was fitted to the recordings, whether or not it is kept."""
 
-    kind: EffectKind
+    kind: str
     of: str
     """An axis, one recording by its file, or a curve."""
     unit: str
@@ -49,8 +49,10 @@ class RecordingsFit:
     estimate: Estimate
     """The estimate of the coefficients of this axis."""
     simulations: tuple[Simulation, ...]
-    effects: tuple[Effect, ...]
+    effects: tuple[FittedEffect, ...]
     hold_out: Callable[[], HeldOut] = field(repr=False)
+    between_rows: bool = False
+    """True when the commands were found to switch between the rows of the logs, at unknown times."""
     disagreement: Mapping[str, float] = field(default_factory=dict)
     """The factors by which standard errors were widened because the recordings disagree, see `spread`."""
 
@@ -60,20 +62,24 @@ class RecordingsFit:
         return self.hold_out()
 
     def spread(self) -> dict[str, float]:
-        """Return the ratio of the jackknife standard error to that of the fit, by coefficient.
+        """Return the ratio of the differences between fits to their standard deviation by chance, by coefficient.
 
-        Only ratios that chance does not explain are returned, and none for less than three recordings. Raises
-        MotionError.
+        Each fit to the other recordings is compared with the fit to all. The variance of this difference is that of the
+        former estimate less that of the latter, because the latter is efficient (Hausman 1978). Only ratios that chance
+        does not explain are returned, and none for less than three recordings. Raises MotionError.
         """
         found, n = {}, len(self.held_out.predictions)
         if n < 3 or self.held_out.by_halves:
             return {}
         for name, error in self.estimate.errors.items():
-            each = np.array([p.coefficients[name] for p in self.held_out.predictions if name in p.coefficients])
-            if len(each) == n and error > 0.0:
-                ratio = float(np.sqrt((n - 1.0) / n * np.sum((each - each.mean()) ** 2))) / error
-                if ratio > _DISAGREEMENT:
-                    found[name] = ratio
+            squares = [
+                (p.coefficients[name] - self.rov[name]) ** 2
+                / max(p.errors_of_fit.get(name, 0.0) ** 2 - error**2, error**2 / (n - 1.0))
+                for p in self.held_out.predictions
+                if name in p.coefficients and error > 0.0
+            ]
+            if len(squares) == n and (ratio := float(np.sqrt(np.mean(squares)))) > _DISAGREEMENT:
+                found[name] = ratio
         return found
 
     def delay_of(self, file: str) -> float:
@@ -108,7 +114,7 @@ def estimate_of(analysis: ResidualAnalysis) -> Estimate:
         slopes[name] = np.zeros(len(analysis.x))
         slopes[name][n] = rov[name] if is_factor(name) else 1.0
     for n, (extra, value) in enumerate(model.extra_values(analysis.x).items(), p):
-        for name in extra.coefficients(rov, value):
+        for name in extra.coefficients(rov.coefficients, value):
             slopes[name] = np.zeros(len(analysis.x))
             forward = dict(extra.pairs()).get(name)
             slopes[name][n] = rov[forward] if forward else 1.0
@@ -131,15 +137,15 @@ def part_of(together: Estimate, axis: Axis, rov: Rov) -> Estimate:
     return together.part([name for name in together.names if name in concerned])
 
 
-def effects_of(analysis: ResidualAnalysis, kept: Collection[Extra]) -> dict[Extra, Effect]:
+def effects_of(analysis: ResidualAnalysis, kept: Collection[Effect]) -> dict[Effect, FittedEffect]:
     """Return the effect of each extra of a fit, with its 95 % interval."""
     model, found, reach = analysis.model, analysis.covariance(), quantile(max(analysis.degrees_of_freedom, 1.0))
-    effects = {}
+    effects, recordings = {}, [d.recording for d in model.data]
     for n, (extra, value) in enumerate(model.extra_values(analysis.x).items(), len(model.names)):
         half = reach * float(np.sqrt(found[n, n]))
-        axis = next((d.axis for d in model.data if extra.concerns(d.recording)), model.data[0].axis)
+        axis = axis_of(extra, recordings)
         interval = (value - half, value + half) if np.isfinite(half) else None
-        effects[extra] = Effect(extra.kind, extra.of, extra.unit(axis), value, interval, extra in kept)
+        effects[extra] = FittedEffect(extra.kind, extra.of, extra.unit(axis), value, interval, extra in kept)
     return effects
 
 

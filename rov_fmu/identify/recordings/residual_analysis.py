@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rov_fmu.identify.effects.extras import Extra
+from rov_fmu.identify.effects.effect import Effect
 from rov_fmu.identify.least_squares import Solution, covariance
+from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
 from rov_fmu.identify.points.step_responses import correlation_time
-from rov_fmu.identify.recordings.noise_spectrum import cosines, noise_spectrum
-from rov_fmu.identify.recordings.simulator import HUBER, Simulator
+from rov_fmu.identify.simulation.simulator import Simulator
+from rov_fmu.identify.simulation.solver import HUBER
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation
@@ -51,25 +52,34 @@ class ResidualAnalysis:
         self.simulations: list[Simulation] = []
         self.degrees_of_freedom = float(len(model.thrust.names) if model.thrust else 0) - len(self.x)
         excess = len(r) / (len(r) - len(self.x))
-        rest = slice(sum(len(d.time) for d in model.data), None)  # the priors of the thrust curve and of the extras
+        rest = slice(model.rows[-1].stop, None)  # the priors
         self.gram, self.meat = (J * inside[:, None]).T @ J, J[rest].T @ J[rest]
         size = np.abs(r)
         losses = np.where(inside, r * r, (2.0 * size - HUBER) * HUBER)
         cost: list[float] = []
-        for output, (d, rows, _, sigma) in zip(model.run(self.x), model.places, strict=True):
+        outputs = model.run(self.x)
+        for pieces in model.recordings:
+            d, sigma = model.data[pieces[0]], float(model.sigma[pieces[0]])
+            rows = slice(model.rows[pieces[0]].start, model.rows[pieces[-1]].stop)
+            time, measured = (
+                np.concatenate([getattr(model.data[n], key) for n in pieces]) for key in ("time", "values")
+            )
+            modelled, velocity = (
+                np.concatenate([getattr(outputs[n], key) for n in pieces]) for key in ("values", "velocity")
+            )
             variance = excess * float(np.mean(psi[rows] ** 2))
             correlation = correlation_time(psi[rows])
-            part, weights = J[rows], np.full(len(d.time), correlation * variance)
+            part, weights = J[rows], np.full(len(time), correlation * variance)
             if correlation > _COLOURED:
                 spectrum = noise_spectrum(psi[rows], part * inside[rows, None])
                 if spectrum is not None:
                     part, weights, correlation = cosines(part), spectrum, max(float(spectrum[0]) / variance, 1.0)
             self.meat += part.T @ (part * weights[:, None])
             cost.append(float(losses[rows].sum()))
-            self.degrees_of_freedom += len(d.time) / correlation
+            self.degrees_of_freedom += len(time) / correlation
             outliers, noise = int((np.abs(r[rows]) > HUBER).sum()), sigma * robust_deviation(r[rows])
             self.simulations.append(
-                Simulation(d.recording, d.time, d.values, output.values, output.velocity, noise, correlation, outliers)
+                Simulation(d.recording, time, measured, modelled, velocity, noise, correlation, outliers)
             )
         self.cost = np.array(cost)
         """The contribution of each recording to the cost."""
@@ -82,7 +92,7 @@ class ResidualAnalysis:
         correlation = np.array([s.correlation_time for s in self.simulations])
         return float(np.sum((other.cost - self.cost) / correlation))
 
-    def significance(self, extra: Extra) -> float:
+    def significance(self, extra: Effect) -> float:
         """Return Wald's statistic, about the increase of the cost without the extra."""
         n = len(self.model.names) + self.model.extras.index(extra)
         return float((self.x[n] - extra.neutral) ** 2 / self.covariance()[n, n])

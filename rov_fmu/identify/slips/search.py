@@ -10,7 +10,7 @@ from math import inf, isfinite, nan
 import numpy as np
 from scipy.optimize import nnls
 
-from rov_fmu.identify.recordings.runs import prepare
+from rov_fmu.identify.simulation.prepared import prepare
 from rov_fmu.identify.slips.explanation import CERTAIN, FASTEST, LIKELY, Evidence, Explanation, Files, contradict
 from rov_fmu.identify.slips.single_recording import Alone, alone
 from rov_fmu.model.layout import Axis

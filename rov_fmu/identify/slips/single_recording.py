@@ -12,8 +12,9 @@ from math import inf, sqrt
 
 import numpy as np
 
+from rov_fmu.identify.driving import thrust_along
 from rov_fmu.identify.points.step_responses import correlation_time
-from rov_fmu.identify.recordings.runs import PreparedRecording, push
+from rov_fmu.identify.simulation.prepared import PreparedRecording
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 
@@ -64,8 +65,7 @@ def alone(data: PreparedRecording, base: Rov) -> Alone | None:
     count, speed = min(len(data.time), _MOST), data.speed
     time = np.linspace(data.time[0], data.time[-1], count)
     v = np.interp(time, data.time, data.velocity)
-    pushes = [push(base, data.axis, curve, data.commands).force for curve in base.layout.curves]
-    force = base[data.axis.coefficient("alpha")] * np.sum(pushes, axis=0)
+    force = base[data.axis.coefficient("alpha")] * thrust_along(base, data.axis, data.commands)
     strongest = float(np.abs(force).max(initial=0.0))
     if strongest == 0.0 or speed == 0.0 or count < 20 or np.ptp(data.values) == 0.0:
         return None

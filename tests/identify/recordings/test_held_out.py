@@ -1,8 +1,8 @@
 """Predictions of data that was not fitted: their errors are in units, beside the noise and a model without change."""
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import degrees
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +15,9 @@ from rov_fmu.identify.recordings import held_out
 from rov_fmu.identify.recordings.held_out import HeldOut, hold_out
 from rov_fmu.identify.recordings.prediction_errors import Errors, shown_in
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
-from rov_fmu.identify.recordings.runs import prepare
-from rov_fmu.identify.recordings.simulator import Simulator
-from rov_fmu.identify.recordings.trajectory import MotionError
+from rov_fmu.identify.simulation.limits import MotionError
+from rov_fmu.identify.simulation.prepared import PreparedRecording, prepare
+from rov_fmu.identify.simulation.simulator import Simulator
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
@@ -42,7 +42,7 @@ def predicted(recordings: list[Recording], vehicle: Rov = VIDEORAY) -> HeldOut:
     """Return the predictions by a vehicle, of which nothing is fitted."""
     data = tuple(prepare(recording, vehicle) for recording in recordings)
     model = Simulator(data, vehicle, (), (), np.full(len(data), NOISE[data[0].axis.name]))
-    return hold_out(model, model.start({}, {}))
+    return hold_out(model, model.start({}, {}))[data[0].axis.name]
 
 
 @pytest.mark.parametrize("axis", [SURGE, HEAVE, YAW], ids=lambda axis: axis.name)
@@ -70,7 +70,7 @@ def test_a_model_without_change_stays_where_it_is_and_as_fast() -> None:
     whole = clean(VIDEORAY, HEAVE, ((0.3, 60.0),), RATE)
     late = whole.time >= 20.0
     recording = Recording("log.csv", HEAVE, "depth", whole.time[late] - 20.0, whole.command[late], whole.position[late])
-    errors = predicted([recording, recording]).errors
+    errors = predicted([recording, replace(recording, file="other.csv")]).errors
     V_ss = VIDEORAY.response(HEAVE, 0.3)[0]
     assert errors["10 s", "position"].rms[1] == pytest.approx(V_ss * 10.0 / np.sqrt(3.0), rel=0.02)
     assert errors["10 s", "velocity"].rms[1] == pytest.approx(0.0, abs=1e-4)
@@ -84,25 +84,30 @@ def test_predictions_of_10_s_leave_out_gaps_and_short_recordings() -> None:
     gap = replace(
         recording, time=recording.time[there], command=recording.command[there], values=recording.values[there]
     )
-    counts = [len(predicted([r, r]).predictions[0].errors["10 s", "position"].noise) for r in (recording, gap)]
+    counts = [
+        len(predicted([r, replace(r, file="other.csv")]).predictions[0].errors["10 s", "position"].noise)
+        for r in (recording, gap)
+    ]
     assert counts[0] == 5 * (round(10.0 * RATE) - 1)
     assert 0 < counts[1] < counts[0]
     short = replace(
         recording, time=recording.time[:200], command=recording.command[:200], values=recording.values[:200]
     )
-    errors = predicted([short, short]).errors
+    errors = predicted([short, replace(short, file="other.csv")]).errors
     assert {span for span, _ in errors} == {"whole recording"}
 
 
 def test_a_prediction_that_cannot_be_computed_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    predict = held_out._prediction
+    predict = held_out._predictions
 
-    def failing(model: Simulator, x: Array, parts: Any, sigma: Array, out: int) -> held_out.Prediction:
-        if out == 1:
+    def failing(
+        model: Simulator, x: Array, *data: Sequence[PreparedRecording], on_step: Callable[[], None] | None
+    ) -> Iterator[held_out.Prediction]:
+        if data[0][0].recording.file == "log_1.csv":
             raise MotionError
-        return predict(model, x, parts, sigma, out)
+        yield from predict(model, x, *data, on_step=on_step)
 
-    monkeypatch.setattr(held_out, "_prediction", failing)
+    monkeypatch.setattr(held_out, "_predictions", failing)
     found = predicted(recorded(HEAVE))
     assert [p.recording.file for p in found.predictions] == ["log_0.csv"]
     assert found.failed == ("log_1.csv",)
@@ -142,7 +147,7 @@ def test_poor_and_failed_predictions_are_warned_of() -> None:
     assert warned(good) == []
     (finding,) = warned(poor)
     assert finding.kind == "poor prediction"
-    assert finding.numbers["predicted"] == degrees(poor.errors["whole recording", "velocity"].rms[0])
+    assert finding.numbers["predicted"] == degrees(poor.errors["10 s", "velocity"].rms[0])
     assert "deg/s, and the sensor's noise is 3 deg/s: do not trust this axis" in sentences([finding])[0]
     (failed,) = warned(replace(good, failed=("log_9.csv",)))
     assert (failed.kind, failed.file) == ("failed prediction", "log_9.csv")

@@ -139,6 +139,9 @@ _BETWEEN = Logs(between_rows=True)
 _PILOT = Logs(plan="pilot")
 _LAG = {"T_rear": 0.3, "T_top": 0.3}
 _FIT_LAG = "[fit]\nlag = true\n"
+_MEASURED = f'{{ value = {_VOLTAGE}, unit = "V", source = "measured" }}'
+_FIT_VOLTAGE = f"[fit]\nvoltage = true\n[known]\nV_0_rear = {_MEASURED}\nV_0_top = {_MEASURED}\n"
+"""The lines of rov.toml about a battery at whose full voltage the thrust was measured."""
 _LOAD = {"F_0_w": 0.1}
 _REVERSE = {
     f"{key}_{curve}_reverse": 0.6 * TRUTHS["videoray"][f"{key}_{curve}"]
@@ -207,7 +210,8 @@ COMPLETE: dict[str, Scenario] = {
         _TWO,
         logs=replace(_TWO.logs, columns=("voltage",)),
         conditions=Conditions(thrust=sagging),
-        rov_file="[fit]\nvoltage = true\n",
+        rov_file=_FIT_VOLTAGE,
+        effects=("voltage",),
     ),
     "tilt with roll and pitch": replace(
         _TWO,

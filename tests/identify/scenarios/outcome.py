@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lfilter
 
+from rov_fmu.identify.effects import catalogue as effects
 from rov_fmu.identify.identify import identify
 from rov_fmu.io.messages import FileError
 from rov_fmu.model.rov import Rov
@@ -24,9 +25,7 @@ Motion = Mapping[str, Array]
 
 ALARMS = frozenset({"unexplained", "poor prediction"})
 """The kinds of findings that say that the model does not explain the data."""
-EFFECTS = frozenset(
-    {"load", "delay", "lag", "current", "current north", "current east", "dead band", "reverse thrust", "reverse drag"}
-)
+EFFECTS = frozenset(effects.EFFECTS)
 """The kinds of findings that report an effect in the model or taken out of the data."""
 
 _PATTERNS: Mapping[str, Mapping[str, Mapping[str, float]]] = {

@@ -16,21 +16,16 @@ from verification.references.pool import Array, Commands, Conditions
 
 BY_DEFAULT = ("load of 0.1 N in heave", "pilot")
 """The quick scenarios of the default tests."""
-OFTEN = ("clean", "delay and lag", "gaps while turning")
+OFTEN = ("clean", "delay and lag", "gaps while turning", "switches between rows at 5 Hz")
 """The scenarios that the long tests run with 20 seeds. All of them are run with 200 seeds once a week."""
+FEW = 10
+"""The number of seeds of the Heavy once a week, because one of them takes minutes."""
 FAMILY = sum(len(scenario.coefficients) for scenario in COMPLETE.values())
 """The number of coverages that are judged at most."""
 
-_SWITCHES = "the time of a switch between two rows is not modelled"
 _ABSORBED = "other effects explain most of the disturbance, so it raises an alarm in a few seeds only"
 NOT_YET: dict[str, str] = {
-    "switches between rows at 10 Hz": _SWITCHES,
-    "switches between rows at 5 Hz": _SWITCHES,
-    "irregular stamps": _SWITCHES,
-    "jitter": _SWITCHES,
-    "sag with voltage": "the voltage cannot be requested",
-    "tilt with roll and pitch": "measured roll and pitch cannot be requested",
-    **dict.fromkeys(("heavy", "heavy in a current"), "roll and pitch are not identified"),
+    "irregular stamps": "errors of the time stamps are not modelled",
     **dict.fromkeys(("tether", "scale", "saturation"), _ABSORBED),
 }
 """The scenarios that identification does not handle yet, with the reason."""
@@ -42,7 +37,8 @@ def judged() -> Iterator[object]:
     """Yield each scenario with each number of seeds, and how it is marked."""
     for name in SCENARIOS:
         fails = [pytest.mark.xfail(strict=True, reason=NOT_YET[name])] if name in NOT_YET else []
-        yield pytest.param(name, 200, marks=[pytest.mark.weekly, *fails], id=f"{name}-200")
+        seeds = FEW if SCENARIOS[name].vehicle == "bluerov2_heavy" else 200
+        yield pytest.param(name, seeds, marks=[pytest.mark.weekly, *fails], id=f"{name}-{seeds}")
         if name in OFTEN:
             yield pytest.param(name, 20, marks=pytest.mark.long, id=f"{name}-20")
         if name in BY_DEFAULT:
@@ -91,6 +87,16 @@ def test_the_current_of_each_recording_is_found(tmp_path: Path) -> None:
     currents = {f.file: f.numbers["value"] for f in found.findings if f.kind == "current"}
     expected = {f"log_surge_{n}.csv": north for n, (north, _) in enumerate(scenario.currents)}
     assert currents == pytest.approx(expected, abs=0.002)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "rate", "most"), [("pilot", 20.0, 10.0), ("clean", 100.0, 30.0)])
+def test_identification_is_quick(name: str, rate: float, most: float, tmp_path: Path) -> None:
+    """Three recordings of all axes at 20 Hz, and nine of one axis at 100 Hz, each of 60 s; in seconds of one core."""
+    scenario = SCENARIOS[name]
+    found = outcome(replace(scenario, logs=replace(scenario.logs, rate=rate)), 0, tmp_path)
+    assert found.rov
+    assert found.seconds < most
 
 
 # ---- The scenarios ---------------------------------------------------------------------------------------------------

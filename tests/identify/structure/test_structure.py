@@ -12,6 +12,7 @@ from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.structure import on_structure
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.tank.description import Requests
 from rov_fmu.tank.findings import Finding
 from tests.identify.structure.disturbed import SECONDS, SENSORS, Disturbance, Dive, along, by_hand, dive
 from tests.pool import NOISE
@@ -49,7 +50,8 @@ class Case:
         for file, flown in zip(FILES, self.dives(seed), strict=True):
             options = {"colour": self.colour, "every": self.every, "logged": self.logged}
             found += flown.recorded(random, file, self.sensors, **options)  # type: ignore[arg-type]
-        return [finding for fit in fit_recordings(found, UNKNOWN, lag=self.lag) for finding in on_structure(fit)]
+        fits = fit_recordings(found, UNKNOWN, requests=Requests(self.lag))
+        return [finding for fit in fits for finding in on_structure(fit)]
 
 
 @cache
@@ -140,7 +142,7 @@ def test_the_sentence_names_recordings_time_and_remedy() -> None:
     ]
     (sentence,) = sentences(found)
     assert sentence.startswith("heave: the model does not explain log_1.csv and log_2.csv from 3 ... 41 s on: ")
-    assert "n_V" in sentence
+    assert "`voltage = true`" in sentence
 
 
 @pytest.mark.parametrize("sensors", [("z",), pytest.param(("w", "z"), marks=pytest.mark.long)])

@@ -5,30 +5,23 @@ from math import exp, log
 
 import numpy as np
 
-from rov_fmu.identify.effects.extras import EffectKind, Extra
+from rov_fmu.identify.effects.dead_band import DeadBand
+from rov_fmu.identify.effects.effect import Effect, Setting
+from rov_fmu.identify.effects.load import Load
 from rov_fmu.identify.least_squares import bounds
-from rov_fmu.identify.recordings.runs import PreparedRecording, axes_of
+from rov_fmu.identify.simulation.prepared import PreparedRecording, axes_of
 from rov_fmu.model.layout import REVERSE, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 
 _LEAST_BETA = 1e-3
-_LOAD = 1.5
-"""The largest load, relative to the strongest thrust."""
 _DRAG = 20.0
 """The largest drag, relative to the one that balances the strongest thrust at the highest velocity."""
 
-_EXTRAS: dict[EffectKind, tuple[float, float]] = {
-    "delay": (-2.0, 5.0),
-    "current": (-3.0, 3.0),
-    "current north": (-3.0, 3.0),
-    "current east": (-3.0, 3.0),
-    "lag": (0.05, 10.0),
-    "dead band": (-0.2, 0.3),  # a value below 0 means no dead band; a search that ends at a bound is slow
-    "reverse thrust": (0.05, 20.0),
-    "reverse drag": (0.05, 20.0),
-}
+
+class MotionError(ArithmeticError):
+    """The motion cannot be computed with these coefficients."""
 
 
 class NoFitError(ValueError):
@@ -36,12 +29,13 @@ class NoFitError(ValueError):
 
 
 def limits(
-    base: Rov, data: Sequence[PreparedRecording], names: Sequence[str], extras: Sequence[Extra], size: int
+    base: Rov, data: Sequence[PreparedRecording], names: Sequence[str], extras: Sequence[Effect], size: int
 ) -> tuple[Array, Array]:
     """Return lower and upper limits of x: coefficients (internal), extras, and unlimited initial values."""
     low, high = bounds(names, size - len(names))
+    setting = Setting([d.recording for d in data], base)
     for axis in axes_of(data):
-        strongest, fastest = _strongest(base, axis), max(d.speed for d in data if d.axis is axis)
+        strongest, fastest = setting.strongest(axis), max(d.speed for d in data if d.axis is axis)
         for power, key in enumerate(("b_d", "a_d"), 1):
             for name in (axis.coefficient(key + end) for end in ("", REVERSE)):
                 if name in names and fastest > 0.0:
@@ -49,20 +43,16 @@ def limits(
         if (beta := axis.coefficient("beta")) in names:
             low[names.index(beta)] = log(_LEAST_BETA)
     for curve in base.layout.curves:  # with a dead band, b_t must not be negative
-        if curve.coefficient("c_0") in names or Extra("dead band", curve.name) in extras:
+        if curve.coefficient("c_0") in names or DeadBand(curve.name) in extras:
             for name in {curve.coefficient("b_t"), curve.coefficient("b_t" + REVERSE)} & {*names}:
                 low[names.index(name)] = 0.0
     for n, extra in enumerate(extras, len(names)):
-        if extra.kind == "load":
-            load = _LOAD * max(_strongest(base, d.axis) for d in data if extra.concerns(d.recording))
-            low[n], high[n] = -load, load
-        else:
-            low[n], high[n] = _EXTRAS[extra.kind]
+        low[n], high[n] = extra.bounds(setting)
     return low, high
 
 
 def check_limits(
-    base: Rov, data: Sequence[PreparedRecording], names: Sequence[str], extras: Sequence[Extra], x: Array
+    base: Rov, data: Sequence[PreparedRecording], names: Sequence[str], extras: Sequence[Effect], x: Array
 ) -> None:
     """Check that no drag, β or load is at its limit. Raises NoFitError."""
     low, high = limits(base, data, names, extras, len(x))
@@ -80,7 +70,7 @@ def _at_limit(
     axis: Axis,
     own: Sequence[Recording],
     names: Sequence[str],
-    extras: Sequence[Extra],
+    extras: Sequence[Effect],
     x: Array,
     low: Array,
     high: Array,
@@ -94,11 +84,5 @@ def _at_limit(
         if (name in drag and at_high[n]) or (name == beta and (at_low[n] or at_high[n])):
             yield f"{name} = {exp(x[n]) if name == beta else x[n]:.3g}"
     for n, extra in enumerate(extras, len(names)):
-        if extra.kind == "load" and any(map(extra.concerns, own)) and (at_low[n] or at_high[n]):
+        if isinstance(extra, Load) and any(map(extra.concerns, own)) and (at_low[n] or at_high[n]):
             yield f"a load of {x[n]:.3g} {axis.load}"
-
-
-def _strongest(base: Rov, axis: Axis) -> float:
-    """Return the strongest thrust along an axis, N or N.m."""
-    force = base[axis.coefficient("alpha")] * base.strongest(axis)
-    return force if force > 0.0 else 1e6

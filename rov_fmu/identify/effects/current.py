@@ -1,0 +1,90 @@
+"""A steady current: along an axis, or north and east where the heading is logged."""
+
+from collections.abc import Iterator
+
+from rov_fmu.identify.effects.effect import Effect, Setting
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, Axis
+from rov_fmu.tank.recording import Recording
+
+
+class Current(Effect):
+    """The velocity of the water along an axis in one recording."""
+
+    kind = "current"
+    words = "current along the axis"
+    sentence = "the water moved at {value:.4g} {unit}{interval} in {of}, which is taken out"
+    limits = -3.0, 3.0
+    deviation = 0.3
+    order = 4
+    is_current = True
+
+    @classmethod
+    def candidates(cls, setting: Setting) -> Iterator[Effect]:
+        """Yield the current of each recording of surge or sway without a heading."""
+        for axis in setting.axes:
+            if axis in (SURGE, SWAY):
+                yield from (cls(r.file, axis.name) for r in setting.of_axis(axis) if not is_in_flow(r))
+
+    @property
+    def is_one_of_many(self) -> bool:
+        """False: each recording may well have a current."""
+        return False
+
+    @property
+    def rank(self) -> int:
+        """The order of elimination."""
+        return self.order
+
+    def unit(self, axis: Axis) -> str:
+        """Return the unit of the velocity."""
+        return axis.unit
+
+    @property
+    def input(self) -> str:
+        """The current along the axis at a heading of north."""
+        return "V_E" if self.axis == SWAY.name else "V_N"
+
+
+class CurrentNorth(Current):
+    """The velocity of the water to the north in one log."""
+
+    kind = "current north"
+    words = "current to the north"
+    sentence = "the water moved north at {value:.4g} {unit}{interval} in {of}, which is taken out"
+
+    @classmethod
+    def candidates(cls, setting: Setting) -> Iterator[Effect]:
+        """Yield the current of each log with a heading and a velocity over ground."""
+        return (cls(file) for file in dict.fromkeys(r.file for r in setting.recordings if is_in_flow(r)))
+
+    @property
+    def is_of_file(self) -> bool:
+        """True: it belongs to all recordings of a file."""
+        return True
+
+    def concerns(self, recording: Recording) -> bool:
+        """Return True for the axes of its file that a horizontal current may act on."""
+        return self.of == recording.file and recording.axis is not HEAVE
+
+    @property
+    def input(self) -> str:
+        """The current to the north."""
+        return "V_N"
+
+
+class CurrentEast(CurrentNorth):
+    """The velocity of the water to the east in one log."""
+
+    kind = "current east"
+    words = "current to the east"
+    sentence = "the water moved east at {value:.4g} {unit}{interval} in {of}, which is taken out"
+
+    @property
+    def input(self) -> str:
+        """The current to the east."""
+        return "V_E"
+
+
+def is_in_flow(recording: Recording) -> bool:
+    """Return True when a current north and east can be seen along the axis, because the heading is logged."""
+    return recording.axis in (SURGE, SWAY) and "psi" in recording.beside

@@ -1,0 +1,165 @@
+"""What every effect declares: an optional parameter of a fit to recordings, in addition to drag and β."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+from rov_fmu.identify.driving import curves_of
+from rov_fmu.model.layout import Axis, Curve
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.description import NO_REQUESTS, Requests
+from rov_fmu.tank.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """The recordings of a fit, and the vehicle that they are of."""
+
+    recordings: Sequence[Recording]
+    base: Rov
+    known: Collection[str] = ()
+    """The coefficients that are given, so they are not fitted."""
+    requests: Requests = NO_REQUESTS
+
+    @cached_property
+    def axes(self) -> list[Axis]:
+        """The recorded axes."""
+        return list({r.axis.name: r.axis for r in self.recordings}.values())
+
+    @cached_property
+    def curves(self) -> dict[str, Curve]:
+        """The thrust curves that drive the recorded axes, by name."""
+        return {curve.name: curve for axis in self.axes for curve in curves_of(self.base.layout, axis)}
+
+    def of_axis(self, axis: Axis) -> list[Recording]:
+        """Return the recordings of an axis."""
+        return [r for r in self.recordings if r.axis is axis]
+
+    def strongest(self, axis: Axis) -> float:
+        """Return the strongest thrust along an axis, N or N.m."""
+        force = self.base[axis.coefficient("alpha")] * self.base.strongest(axis)
+        return force if force > 0.0 else 1e6
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """An optional parameter of a fit: of an axis, a thrust curve, or one recording.
+
+    It enters the simulation in one of three ways: it sets coefficients of the vehicle, it adds to an input, or it
+    delays the commands.
+    """
+
+    of: str
+    """The name of an axis, a curve, or the file of one recording."""
+    axis: str = ""
+    """The axis of the recording, since one file may have several."""
+
+    kind: ClassVar[str]
+    """The name of the effect."""
+    words: ClassVar[str]
+    """The effect in a table of the report."""
+    sentence: ClassVar[str]
+    """What a finding says about the effect, with {value}, {unit}, {interval} and {of}."""
+    neutral: ClassVar[float] = 0.0
+    """The value without any effect."""
+    begin: ClassVar[float] = 0.0
+    """The value with which the search begins."""
+    likely: ClassVar[float] = 0.0
+    """The value that is expected before the data are seen."""
+    limits: ClassVar[tuple[float, float]]
+    """The least and the greatest value that the search may reach."""
+    deviation: ClassVar[float] = 0.5
+    """The standard deviation of the value before the data are seen."""
+    keeps_prior: ClassVar[bool] = False
+    """True when the last fit has the prior too, and not only the selection."""
+    order: ClassVar[int]
+    """The order of elimination, least first: the least likely effect is dropped first."""
+    is_delay: ClassVar[bool] = False
+    """True when it delays the commands."""
+    is_current: ClassVar[bool] = False
+    """True when it is a velocity of the water."""
+
+    @classmethod
+    @abstractmethod
+    def candidates(cls, setting: Setting) -> Iterator["Effect"]:
+        """Yield the effects of this kind that might act in the recordings."""
+
+    @property
+    def is_of_file(self) -> bool:
+        """True when it belongs to one recording and not to the vehicle."""
+        return bool(self.axis)
+
+    @property
+    def is_one_of_many(self) -> bool:
+        """True when there are many such effects, so that chance finds one of them more easily."""
+        return self.is_of_file
+
+    @property
+    def rank(self) -> int:
+        """The order of elimination of this effect."""
+        return 0 if self.is_of_file else self.order
+
+    def unit(self, axis: Axis) -> str:  # noqa: ARG002
+        """Return the unit of its value."""
+        return "1"
+
+    def concerns(self, recording: Recording) -> bool:
+        """Return True when it acts in a recording as a load, a delay or a current."""
+        return self.of == recording.axis.name or (self.of, self.axis) == (recording.file, recording.axis.name)
+
+    def bounds(self, setting: Setting) -> tuple[float, float]:  # noqa: ARG002
+        """Return the limits of the search."""
+        return self.limits
+
+    def prior(self, setting: Setting) -> float:  # noqa: ARG002
+        """Return the prior standard deviation; it keeps unidentifiable effects near their neutral values."""
+        return self.deviation
+
+    def is_none(self, value: float) -> bool:  # noqa: ARG002
+        """Return True for a value that stands for no effect, besides the neutral one."""
+        return False
+
+    # ---- How it enters the simulation ----
+
+    @property
+    def input(self) -> str:
+        """The input of the vehicle that it adds to; empty where it is none."""
+        return ""
+
+    def coefficients(self, rov: Mapping[str, Any], value: Any) -> dict[str, Any]:  # noqa: ARG002
+        """Return the coefficients of the vehicle that it sets."""
+        return {}
+
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Return pairs of coefficient names for a ratio: the one in reverse and the one ahead."""
+        return ()
+
+    def added(self, rov: Rov, value: float) -> Rov:
+        """Return the vehicle with the effect."""
+        added = self.coefficients(rov.coefficients, value)
+        return rov.extended(added) if added else rov
+
+
+def with_effects(rov: Rov, effects: Mapping[Effect, float]) -> Rov:
+    """Return the vehicle with the effects."""
+    for effect, value in effects.items():
+        rov = effect.added(rov, value)
+    return rov
+
+
+def delay_of(effects: Mapping[Effect, float], recording: Recording) -> float:
+    """Return the delay from the commands to the motion in a recording, s."""
+    return sum(value for effect, value in effects.items() if effect.is_delay and effect.concerns(recording))
+
+
+def axis_of(effect: Effect, recordings: Sequence[Recording]) -> Axis:
+    """Return the first axis that an effect concerns, or that of the first recording."""
+    return next((r.axis for r in recordings if effect.concerns(r)), recordings[0].axis)
+
+
+def of_axis_and_files(kind: type[Effect], setting: Setting, axis: Axis) -> Iterator[Effect]:
+    """Yield an effect of an axis, and what each recording but the first adds to it."""
+    yield kind(axis.name)
+    yield from (kind(r.file, axis.name) for r in setting.of_axis(axis)[1:])
