@@ -1,5 +1,6 @@
 """The site: `sphinx-build -W docs site`. {{ README.md }} stands for that file, {{ t200 }} for a table."""
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -20,7 +21,15 @@ from rov_fmu.vehicle.vehicle import load_vehicle  # noqa: E402
 
 project = "rov-fmu"
 release = __version__
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_nb", "sphinx.ext.autodoc"]
+
+# Notebooks are pages too, and an error in one is a warning of the build. Their commands are those of this Python, and
+# print without colours.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+os.environ["TTY_COMPATIBLE"] = "0"
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_timeout = 300
 
 myst_heading_anchors = 3
 smartquotes = False  # a prime is a derivative
@@ -47,9 +56,13 @@ html_theme_options = {
 TABLES = compared.tables()
 
 FLOWN = [load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2_heavy")]
-_LINKS = " or ".join(f'<a href="fly/{one.identifier}.html" target="fly">{one.name}</a>' for one in FLOWN)
-COCKPIT = f"""<p>Fly it here: the {_LINKS}.</p>
-<iframe class="fly" name="fly" src="fly/{FLOWN[0].identifier}.html" title="A vehicle in flight"></iframe>
+_LINKS = " or ".join(
+    f'<a href="fly/compact/{one.identifier}.html" target="fly">{one.name}</a> '
+    f'(<a href="fly/{one.identifier}.html">with all controls</a>)'
+    for one in FLOWN
+)
+COCKPIT = f"""<p>Fly it here: the {_LINKS}. Drag a stick in the picture, or click the picture and use the keys.</p>
+<iframe class="fly" name="fly" src="fly/compact/{FLOWN[0].identifier}.html" title="A vehicle in flight"></iframe>
 
 """
 """On the first page, before the first heading of the README."""
@@ -70,13 +83,14 @@ def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
 
 
 def _fly(app: Sphinx, error: Exception | None) -> None:
-    """The pages that fly, beside the site's own."""
+    """Write the pages that fly, each also in the compact form that the first page embeds."""
     folder = Path(app.outdir, "fly")
     if error is None:
-        folder.mkdir(exist_ok=True)
+        (folder / "compact").mkdir(parents=True, exist_ok=True)
         for one in FLOWN:
-            page = fly_page([Flown(one, module(one.rov))])
-            write_whole(Output(folder / f"{one.identifier}.html", page.encode()))
+            flown, name = [Flown(one, module(one.rov))], f"{one.identifier}.html"
+            write_whole(Output(folder / name, fly_page(flown).encode()))
+            write_whole(Output(folder / "compact" / name, fly_page(flown, compact=True).encode()))
 
 
 def _plain(*arguments: list[str]) -> None:

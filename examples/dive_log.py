@@ -68,7 +68,7 @@ def bluerov2() -> Rov:
     return k.replaced({"T_t200": LAG})
 
 
-def dive(seconds: float = 240.0, seed: int = 0) -> Dive:
+def dive(seconds: float = 90.0, seed: int = 0) -> Dive:
     """A dive by hand: each stick stays for a few seconds and then moves elsewhere, often back to the middle."""
     random = np.random.default_rng(seed)
     time = np.arange(round(seconds * _RATE)) / _RATE

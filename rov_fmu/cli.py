@@ -1,4 +1,4 @@
-"""The command rov-fmu: build, simulate, fly, prove, study, identify, tune, schema, tables, figures.
+"""The command rov-fmu: build, simulate, fly, sitl, sdf, prove, study, identify, tune, schema, tables, figures.
 
 Each command is a short function, which imports what it needs when it is called: so `--help` and completion are quick.
 """
@@ -314,6 +314,90 @@ def _open(path: Path) -> None:
             "another machine; -o PAGE.html writes it where you want it",
             err=True,
         )
+
+
+# ---- sitl ------------------------------------------------------------------------------------------------------------
+
+
+@_commands.command("sitl")
+@_vehicle()
+@click.option("--frame", metavar="FRAME", help="Frame of ArduSub, such as vectored_6dof. The default is one that fits.")
+@click.option(
+    "--servo",
+    "servos",
+    multiple=True,
+    metavar="N=NAME",
+    help="Servo N drives this thruster, fin or input; N=-NAME reverses it. It may be repeated.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Set an input that is held (a current: V_N, V_E), a coefficient, or a state at the start, in SI units.",
+)
+@click.option(
+    "--bottom",
+    type=_number("a number from -1e6 to 1e6 (m)", -1e6, 1e6),
+    default="20",
+    show_default=True,
+    help="Depth of the bottom, m, to which a range is measured.",
+)
+@click.option("--log", type=_FILE, metavar="LOG.csv", help="Log to write, which identify reads.")
+@click.option(
+    "--log-rate",
+    type=_number("a number from 1 to 100 (Hz)", 1.0, 100.0),
+    default="10",
+    show_default=True,
+    help="Rows of the log in a second.",
+)
+@click.option(
+    "--duration",
+    type=_number("a number from 0.001 (s)", 1e-3),
+    help="End after this time of the simulation, s. Without it, end with Ctrl-C.",
+)
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all of them.")
+@click.option(
+    "--port",
+    type=_number("a whole number from 0 to 65535", 0, 65535, int),
+    default=str(9002),
+    show_default=True,
+    help="UDP port to listen on; 0 takes a free one.",
+)
+def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **options: Any) -> None:
+    """Be the physics of a vehicle for ArduPilot's simulator, ArduSub with --model JSON.
+
+    ArduSub is started in another terminal. With --duration, or at Ctrl-C, the log is written.
+    """
+    from rov_fmu.interface.sitl_command import Options, serve
+
+    serve(vehicle, Options(servos=servos, settings=settings, **options))
+
+
+# ---- sdf -------------------------------------------------------------------------------------------------------------
+
+
+@_commands.command("sdf")
+@_vehicle(default=str(VIDEORAY))
+@click.option("-o", "--output", type=_FILE, metavar="FILE.sdf", help="File to write. The default is <identifier>.sdf.")
+@click.option("--world", "in_world", is_flag=True, help="Put the model into a world with water, which Gazebo can run.")
+@click.option(
+    "--added-mass",
+    type=_Choice(["link", "plugin"]),
+    default="link",
+    show_default=True,
+    help="Added mass in the link (physics engine DART), or in the Hydrodynamics plugin (any engine; may diverge).",
+)
+def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) -> None:
+    """Write a model for Gazebo (gz-sim) of a vehicle. The default is the VideoRay Pro 4."""
+    from rov_fmu.interface.sdf_command import write_model
+
+    path, model = write_model(vehicle, output, in_world=in_world, explicit=added_mass == "plugin")
+    click.echo(path)
+    for note in model.notes:
+        click.echo(f"- {note}")
+    for warning in model.warnings:
+        _warn(warning)
 
 
 # ---- prove -----------------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ PARTS = (
     "cli",
     "study",
     "interface",
+    "bridges",
     "build",
     "report",
     "fmu",
@@ -41,7 +42,13 @@ MAY_IMPORT = {
 """Which folders of this repository each folder may import. The innermost folder counts."""
 
 LARGEST_FOLDER = 12
-LARGER_FOLDERS = {"tests": 13, "tests/fmu": 15, "tests/fmu/calls": 16, "tests/identify": 18, "tests/model": 16}
+LARGER_FOLDERS = {
+    "tests": 13,
+    "tests/fmu": 15,
+    "tests/fmu/calls": 16,
+    "tests/identify": 17,
+    "tests/model": 16,
+}
 """The folders that have more than a dozen modules, without their __init__.py."""
 
 

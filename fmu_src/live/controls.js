@@ -1,4 +1,4 @@
-// The page's controls (sliders, keys, a gamepad, step tests, recordings), and the loop that steps and draws.
+// The page's controls (sliders, sticks, keys, a gamepad, step tests, recordings, links), and the loop that steps and draws.
 
 const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
 const SPAN = 20; // s, of the charts
@@ -13,7 +13,8 @@ const ARROWS = {
   ArrowLeft: ["yaw", -1],
 };
 
-/** The sticks of a standard gamepad, assigned as on ROVs: axis, stick, direction. @type {[string, number, number][]} */
+/** The sticks of a standard gamepad and of the page, assigned as on ROVs: axis, place among the sticks' coordinates (the left one's x and
+ * y, the right one's x and y), direction. @type {[string, number, number][]} */
 const STICKS = [
   ["yaw", 0, 1],
   ["heave", 1, 1],
@@ -30,6 +31,42 @@ function part(id) {
 function rounded(value, most) {
   const step = 10 ** (Math.floor(Math.log10(most)) - 2);
   return Number((Math.round(value / step) * step).toPrecision(12));
+}
+
+/** A stick on the page, for a finger or a mouse. It returns to its middle when it is let go. */
+class Stick {
+  /** @param {Element} svg */
+  constructor(svg) {
+    drawn(svg, "circle", { class: "rim", r: 44 });
+    this.knob = drawn(svg, "circle", { class: "knob", r: 18 });
+    /** To the right and down, from -1 to 1. */
+    this.at = [0, 0];
+    svg.addEventListener("pointerdown", (event) => {
+      svg.setPointerCapture(/** @type {PointerEvent} */ (event).pointerId);
+      this.move(svg, /** @type {PointerEvent} */ (event));
+    });
+    svg.addEventListener("pointermove", (event) => {
+      const pointer = /** @type {PointerEvent} */ (event);
+      if (svg.hasPointerCapture(pointer.pointerId)) this.move(svg, pointer);
+    });
+    svg.addEventListener("lostpointercapture", () => this.put(0, 0));
+  }
+
+  /** @param {Element} svg @param {PointerEvent} event */
+  move(svg, event) {
+    const { left, top, width, height } = svg.getBoundingClientRect();
+    const [x, y] = [(event.clientX - left) / width - 0.5, (event.clientY - top) / height - 0.5].map(
+      (part) => part / 0.3,
+    );
+    const far = Math.max(1, Math.hypot(x, y));
+    this.put(x / far, y / far);
+  }
+
+  /** @param {number} x @param {number} y */
+  put(x, y) {
+    this.at = [x, y];
+    place(this.knob, { cx: 26 * x, cy: 26 * y });
+  }
 }
 
 class Live {
@@ -49,11 +86,20 @@ class Live {
     }
     /** The keys that are down, with their axes and directions. @type {Map<string, [string, number]>} */
     this.keys = new Map();
-    /** @type {Map<string, number>} */
-    this.sticks = new Map();
+    /** The sticks on the page, left and right; a vehicle may lack one. @type {(Stick | null)[]} */
+    this.sticks = ["left", "right"].map((side) => {
+      const svg = document.getElementById(`live-${side}`);
+      return svg && new Stick(svg);
+    });
     /** @type {HTMLInputElement[]} */
     this.sliders = [...part("controls").querySelectorAll("input")].filter((input) => input.type === "range");
-    this.track = pilot.has("x") ? new TrackView(part("track"), this.flight) : null;
+    /** The commands that the sliders are set to. Keys, sticks and a gamepad add to them. @type {Record<string, number>} */
+    this.held = {};
+    for (const { name, value, dataset } of this.sliders)
+      if (dataset.kind === "command") this.held[name] = Number(value);
+    /** The place of the pointer in the charts, from 0 to 1 of their width. @type {number | null} */
+    this.pointed = null;
+    this.picture = pilot.has("x") ? new Picture(part("picture"), this.flight) : null;
     this.compass = pilot.has("psi") ? new Compass(part("compass")) : null;
     this.horizon = pilot.has("phi") ? new Horizon(part("horizon")) : null;
     this.depth = pilot.has("z") ? new DepthTape(part("depth")) : null;
@@ -62,6 +108,10 @@ class Live {
     this.changed = true;
     this.last = 0;
     this.connect();
+    this.say(
+      `Time starts with the first command: a slider, a stick, or a key such as ${this.vehicle.axes[0].keys[0]}.`,
+    );
+    this.follow(location.hash);
     this.show();
     requestAnimationFrame((now) => this.frame(now));
   }
@@ -84,6 +134,9 @@ class Live {
       ["still", () => this.still()],
       ["nearer", () => this.zoom(1.5)],
       ["farther", () => this.zoom(1 / 1.5)],
+      ["above", () => this.look()],
+      ["export", () => this.export()],
+      ["share", () => this.share()],
       ["file", () => this.tuneAll((slider) => Number(slider.dataset.start))],
       ["ones", () => this.tuneAll(() => 1)],
       ["run", () => this.run()],
@@ -99,26 +152,47 @@ class Live {
     stage.addEventListener("keyup", (event) => this.keys.delete(event.code));
     stage.addEventListener("blur", () => this.keys.clear());
     stage.addEventListener("pointerdown", () => stage.focus());
+    const picture = document.getElementById("live-picture");
+    picture?.addEventListener("pointerdown", (event) => picture.setPointerCapture(event.pointerId));
+    picture?.addEventListener("pointermove", (event) => {
+      if (!picture.hasPointerCapture(event.pointerId)) return;
+      this.picture?.orbit(event.movementX, event.movementY);
+      this.show();
+    });
+    for (const { svg } of this.charts) {
+      svg.addEventListener("pointermove", (event) => this.point(svg, /** @type {PointerEvent} */ (event)));
+      svg.addEventListener("pointerleave", () => this.point(svg, null));
+    }
     const file = /** @type {HTMLInputElement} */ (part("recording"));
     file.addEventListener("change", () => {
       if (file.files?.[0]) this.open(file.files[0]);
       file.value = "";
     });
     const section = part("section");
-    section.addEventListener("dragover", (event) => event.preventDefault());
+    section.addEventListener("dragover", (event) => {
+      event.preventDefault();
+      section.classList.add("dropping");
+    });
+    section.addEventListener("dragleave", (event) => {
+      if (!section.contains(/** @type {Node | null} */ (event.relatedTarget))) section.classList.remove("dropping");
+    });
     section.addEventListener("drop", (event) => {
       event.preventDefault();
+      section.classList.remove("dropping");
       const dropped = event.dataTransfer?.files[0];
       if (dropped) this.open(dropped);
-      else this.say("What was dropped is no file.");
+      else this.say("What was dropped is not a file.");
     });
+    addEventListener("hashchange", () => this.follow(location.hash));
     new IntersectionObserver(([entry]) => {
       this.isSeen = entry.isIntersecting;
     }).observe(section);
-    new ResizeObserver(() => {
-      this.track?.fit();
+    const resized = new ResizeObserver(() => {
+      this.picture?.fit();
+      for (const chart of this.charts) chart.fit();
       this.draw(); // before the new size is painted
-    }).observe(stage);
+    });
+    for (const name of ["stage", "charts"]) resized.observe(part(name));
   }
 
   /** @param {HTMLInputElement} slider */
@@ -132,8 +206,10 @@ class Live {
     } else if (slider.dataset.kind === "start") {
       this.takeOver();
       this.flight.beginAt(name, (Number(slider.value) * Math.PI) / 180);
-    } else {
+    } else if (slider.dataset.kind === "command") {
       this.takeOver();
+      this.held[name] = Number(slider.value);
+      this.command();
     }
     this.show();
   }
@@ -153,20 +229,23 @@ class Live {
     this.say("You have control; the recording has ended.");
   }
 
-  /** Shows the value of each slider, and the state of the buttons. */
+  /** Shows the value of each slider, that of a command as it acts, and the state of the buttons. */
   show() {
     for (const slider of this.sliders) {
-      const output = /** @type {HTMLElement} */ (slider.parentElement?.querySelector("output"));
-      const value = Number(slider.value);
-      const { kind, unit } = slider.dataset;
+      const { kind, unit, start } = slider.dataset;
       const isShare = kind === "command" || kind === "strength";
-      const acts = kind === "command" ? this.flight.pilot.model.get(slider.name) : value;
-      output.textContent = isShare ? `${shown(acts * 100, 0)} %` : `${shown(acts, 2)} ${unit ?? ""}`;
-      slider.setAttribute(
-        "aria-valuetext",
-        isShare ? `${shown(value * 100, 0)} %` : `${shown(value, 2)} ${unit ?? ""}`,
-      );
+      if (kind === "command") slider.value = String(this.flight.pilot.model.get(slider.name));
+      const value = Number(slider.value);
+      const words = isShare ? `${shown(value * 100, 0)} %` : `${shown(value, 2)} ${unit ?? ""}`;
+      const output = /** @type {HTMLElement} */ (slider.parentElement?.querySelector("output"));
+      output.textContent = words;
+      slider.setAttribute("aria-valuetext", words);
+      const [low, high] = [Number(slider.min), Number(slider.max)];
+      const ends = [Number(start ?? low), value].map((x) => (x - low) / (high - low));
+      slider.style.setProperty("--from", String(Math.min(...ends)));
+      slider.style.setProperty("--to", String(Math.max(...ends)));
     }
+    document.getElementById("live-above")?.setAttribute("aria-pressed", String(this.picture?.isFromAbove));
     part("pause").textContent = this.paused ? "Fly on" : "Pause";
     part("speed").textContent = `${this.speed}×`;
     /** @type {HTMLInputElement} */ (part("ghost")).checked = this.flight.ghostShown;
@@ -181,6 +260,7 @@ class Live {
   /** @param {boolean} paused */
   pause(paused) {
     this.paused = paused;
+    if (!paused && this.flight.test && this.hasEnded()) this.leaveTest();
     if (!paused && this.flight.playback?.next() === null) this.takeOver();
     this.show();
   }
@@ -194,16 +274,52 @@ class Live {
 
   /** @param {number} factor */
   zoom(factor) {
-    this.track?.zoom(factor);
+    this.picture?.zoom(factor);
     this.changed = true;
   }
 
+  /** Changes between the views from above and from an angle. */
+  look() {
+    this.picture?.turn();
+    this.show();
+  }
+
+  /** Shows the values at the place of the pointer. @param {Element} svg @param {PointerEvent | null} event */
+  point(svg, event) {
+    const { left, width } = svg.getBoundingClientRect();
+    const { plot } = this.charts[0];
+    this.pointed =
+      event &&
+      Math.max(
+        0,
+        Math.min(1, (((event.clientX - left) / width) * (plot.right + 4) - plot.left) / (plot.right - plot.left)),
+      );
+    this.changed = true;
+  }
+
+  /** Restores the commands, the camera, the speed and the time. */
   reset() {
-    this.takeOver();
+    this.still();
     this.flight.reset();
+    this.flight.begun = false;
+    this.picture?.reset();
+    this.paused = false;
+    this.speed = 1;
     this.span = SPAN;
     this.say("");
     this.show();
+  }
+
+  /** Returns true when the step test has reached the end of the charts. */
+  hasEnded() {
+    return this.flight.time >= this.span;
+  }
+
+  /** Ends a step test; from then on the charts move again. */
+  leaveTest() {
+    if (this.hasEnded()) this.paused = false;
+    this.flight.test = null;
+    this.span = SPAN;
   }
 
   /** Returns all commands to their start values. */
@@ -214,9 +330,10 @@ class Live {
 
   /** @param {Record<string, number>} commands */
   slideCommands(commands) {
-    for (const slider of this.sliders) {
-      if (slider.dataset.kind === "command") slider.value = String(commands[slider.name] ?? slider.dataset.start);
+    for (const { name, dataset } of this.sliders) {
+      if (dataset.kind === "command") this.held[name] = commands[name] ?? Number(dataset.start);
     }
+    this.command();
     this.show();
   }
 
@@ -265,6 +382,59 @@ class Live {
     }
   }
 
+  /** Saves the flight as a CSV file. */
+  export() {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([tableOf(this.flight)], { type: "text/csv" }));
+    link.download = `${this.vehicle.identifier}.csv`;
+    link.click();
+    URL.revokeObjectURL(link.href);
+    this.say(
+      `${link.download}: the flight of the last ${shown(this.flight.time - this.flight.times[0], 1)} s, which this page and rov-fmu identify read.`,
+    );
+  }
+
+  /** Puts the vehicle and everything that is set into the page's address, and copies it. */
+  share() {
+    const given = new URLSearchParams({ vehicle: this.vehicle.identifier });
+    for (const { name, value, dataset } of this.sliders) {
+      const set = dataset.kind === "command" ? this.held[name] : Number(value);
+      if (dataset.start !== undefined && set !== Number(dataset.start)) given.set(name, String(set));
+    }
+    history.replaceState(null, "", `#${given}`);
+    this.say("The address of this page now contains the vehicle, the commands and the tuning.");
+    navigator.clipboard?.writeText(location.href).then(
+      () => this.say("A link with the vehicle, the commands and the tuning has been copied."),
+      () => {},
+    );
+  }
+
+  /** Sets everything that a link contains. @param {string} hash */
+  follow(hash) {
+    const given = new URLSearchParams(hash.slice(1));
+    const vehicle = given.get("vehicle");
+    if (vehicle === null) return;
+    given.delete("vehicle");
+    if (vehicle !== this.vehicle.identifier) {
+      this.say(
+        `The link is for the vehicle “${vehicle.slice(0, 40)}”, and this page flies “${this.vehicle.identifier}”.`,
+      );
+      return;
+    }
+    this.reset();
+    for (const slider of this.sliders) {
+      if (slider.dataset.start === undefined) continue;
+      const value = Number(given.get(slider.name) ?? slider.dataset.start);
+      if (!Number.isFinite(value)) continue;
+      given.delete(slider.name);
+      if (value === Number(slider.value)) continue;
+      slider.value = String(value);
+      this.slid(slider);
+    }
+    const unused = [...given.keys()].join(", ").slice(0, 80);
+    if (unused) this.say(`The link has values that this page cannot use: ${unused}.`);
+  }
+
   /** @param {KeyboardEvent} event */
   pressed(event) {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
@@ -280,7 +450,7 @@ class Live {
 
   // ---- The loop ----
 
-  /** Returns the demands of keys and gamepad along each axis. */
+  /** Returns the demands of keys, sticks and gamepad along each axis. */
   demands() {
     const strength = Number(/** @type {HTMLInputElement} */ (part("strength")).value);
     /** @type {Map<string, number>} */
@@ -288,14 +458,14 @@ class Live {
     for (const [axis, direction] of this.keys.values())
       demands.set(axis, Math.max(-1, Math.min(1, (demands.get(axis) ?? 0) + direction)) * strength);
     const pad = navigator.getGamepads?.().find((one) => one !== null && one.mapping === "standard");
-    for (const [axis, stick, direction] of pad ? STICKS : []) {
-      const value = pad?.axes[stick] ?? 0;
+    for (const [axis, n, direction] of STICKS) {
+      const value = (this.sticks[n >> 1]?.at[n % 2] ?? 0) || (pad?.axes[n] ?? 0);
       if (Math.abs(value) > DEAD_ZONE) demands.set(axis, value * direction);
     }
     return demands;
   }
 
-  /** Sets the commands from sliders, keys and gamepad. */
+  /** Sets the commands from sliders, keys, sticks and gamepad. */
   command() {
     const demands = this.demands();
     if (this.flight.playback) {
@@ -303,12 +473,11 @@ class Live {
       this.takeOver();
     }
     const commands = commandsOf(this.vehicle, demands);
-    for (const { name, value, dataset } of this.sliders) {
-      if (dataset.kind === "command") commands[name] = saturated(commands[name] + Number(value));
-    }
+    for (const [name, value] of Object.entries(this.held)) commands[name] = saturated(commands[name] + value);
     const { model } = this.flight.pilot;
     if (this.vehicle.commands.every((name) => model.get(name) === commands[name])) return;
-    if (this.flight.test) this.span = SPAN;
+    if (this.flight.test) this.leaveTest();
+    if (!this.flight.begun) this.say("");
     this.flight.set(commands);
     this.show();
   }
@@ -320,19 +489,24 @@ class Live {
     this.last = now;
     if (!this.isSeen) return;
     this.command();
-    if (this.flight.begun && !this.paused) this.fly(passed * this.speed);
+    if (!this.paused && !this.flight.isAtRest()) this.fly(passed * this.speed);
     if (this.changed) this.draw();
   }
 
   /** @param {number} h */
   fly(h) {
     const { flight } = this;
-    if (!flight.advance(h)) this.say("It moved too fast to be computed, and is back at the start.");
+    if (!flight.advance(flight.test ? Math.min(h, this.span - flight.time) : h))
+      this.say("It moved too fast to be computed, and is back at the start.");
     if (flight.playback && flight.playback.next() === null) {
       this.say(flight.playback.verdict(this.vehicle));
       this.pause(true);
     }
     if (flight.playback) this.show();
+    if (flight.test && this.hasEnded()) {
+      this.say(`${part("message").textContent} The test has ended.`);
+      this.pause(true);
+    }
     this.changed = true;
   }
 
@@ -341,11 +515,11 @@ class Live {
     const { flight } = this;
     const { model } = flight.pilot;
     const ghost = flight.ghostShown;
-    this.track?.draw(flight);
+    this.picture?.draw(flight);
     this.compass?.draw(flight, ghost);
     this.horizon?.draw(flight, ghost);
     this.depth?.draw(flight, ghost);
-    for (const chart of this.charts) chart.draw(flight, this.span, ghost);
+    for (const chart of this.charts) chart.draw(flight, this.span, ghost, this.pointed);
     const [roll, pitch, heading] = attitudeOf(model);
     const readings = [`${shown(flight.time, 1)} s`];
     if (model.has("x")) readings.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);

@@ -1,14 +1,15 @@
 // A flight: the pilot's vehicle and a ghost under the same commands, with their tracks.
 
 const LONGEST_STEP = 0.05; // s, so that curves and the track are smooth at any speed
-const MOST_KEPT = 4000;
+const MOST_KEPT = 20000;
+const REST = 1e-3; // m/s, rad/s, m/s2, rad/s2; a vehicle that moves less is at rest
 
 /** A vehicle with its track and the history of its velocities and positions. */
 class Craft {
   /** @param {Model} model */
   constructor(model) {
     this.model = model;
-    /** The points of the track: north and east in turn. @type {number[]} */
+    /** The points of the track: north, east and depth in turn. @type {number[]} */
     this.track = [];
     /** The velocities by axis, at the times of the flight. @type {number[][]} */
     this.velocities = model.vehicle.axes.map(() => []);
@@ -46,11 +47,10 @@ class Craft {
       this.velocities[a].push(model.get(velocity));
       this.positions[a].push(this.position(a));
     });
-    const x = model.get("x");
-    const y = model.get("y");
-    const n = track.length;
-    if (n < 2 || Math.hypot(x - track[n - 2], y - track[n - 1]) > model.vehicle.size / 8) track.push(x, y);
-    if (n > 2 * MOST_KEPT) track.splice(0, MOST_KEPT);
+    const here = positionOf(model);
+    const moved = plus(here, [-1, /** @type {Vector} */ (track.slice(-3))]);
+    if (track.length === 0 || Math.hypot(...moved) > model.vehicle.size / 8) track.push(...here);
+    if (track.length > 3 * MOST_KEPT) track.splice(0, 3 * (MOST_KEPT / 2));
   }
 
   /** Returns the number of an axis, or -1 if the vehicle does not have it. @param {string} name */
@@ -80,6 +80,8 @@ class Flight {
     this.time = 0;
     /** @type {number[]} */
     this.times = [];
+    /** The commands that hold from each of the times on. @type {number[][]} */
+    this.commands = [];
     /** By axis: the time of the last change of an input, and the velocity at that time. */
     this.since = pilot.vehicle.axes.map(() => ({ time: 0, velocity: 0 }));
     /** @type {StepTest | null} */
@@ -95,11 +97,31 @@ class Flight {
   reset() {
     this.time = 0;
     this.times = [0];
+    this.commands = [this.given()];
     this.test = null;
     this.playback = null;
     this.pilot.reset();
     this.ghost.reset();
     for (const since of this.since) Object.assign(since, { time: 0, velocity: 0 });
+  }
+
+  /** Returns the commands that act. */
+  given() {
+    const { model } = this.pilot;
+    return model.vehicle.commands.map((name) => model.get(name));
+  }
+
+  /** Returns true while nothing is asked of the vehicle and it does not move, so that time can stand still. */
+  isAtRest() {
+    const { model } = this.pilot;
+    const { variables, inputs, axes } = model.vehicle;
+    return (
+      !this.begun ||
+      (this.test === null &&
+        this.playback === null &&
+        variables.slice(0, inputs).every(([name, start]) => model.get(name) === start) &&
+        axes.every(({ velocity }) => [velocity, `der(${velocity})`].every((name) => Math.abs(model.get(name)) < REST)))
+    );
   }
 
   /** Begins anew with another Euler angle at the start. @param {string} name @param {number} angle */
@@ -118,6 +140,7 @@ class Flight {
     const handed = handedOver(vehicle, this.ghost.model.vehicle, (name) => model.get(name));
     for (const [name, value] of Object.entries(handed)) this.ghost.model.set(name, value);
     this.followed();
+    this.commands[this.commands.length - 1] = this.given();
     vehicle.axes.forEach(({ velocity, signs, external }, a) => {
       if (changed.some(([name]) => name in signs || name === external)) {
         this.since[a] = { time: this.time, velocity: model.get(velocity) };
@@ -168,11 +191,13 @@ class Flight {
 
   keep() {
     this.times.push(this.time);
+    this.commands.push(this.given());
     this.pilot.keep();
     this.ghost.keep();
     if (this.times.length > MOST_KEPT) {
       const n = MOST_KEPT / 2;
       this.times.splice(0, n);
+      this.commands.splice(0, n);
       this.pilot.forget(n);
       this.ghost.forget(n);
     }

@@ -8,8 +8,8 @@
  *   signs: Record<string, number>, shares: Record<string, number>, keys: string}} Axis
  */
 /**
- * A thruster: the variable of its force, its place (x, y) and direction (x, y, z) in the body frame, its strongest force in N.
- * @typedef {{force: string, at: [number, number], along: [number, number, number], most: number}} Thruster
+ * A thruster: the variable of its force, its label, its place and direction in the body frame, its strongest force in N.
+ * @typedef {{force: string, label: string, at: Vector, along: Vector, most: number}} Thruster
  */
 /**
  * A published step test: a command along an axis from rest, with the measured V_ss and Tau.
@@ -18,8 +18,9 @@
 /**
  * The data of a vehicle in a page. Variables are listed by their places, with their start values. The module is deflated, in Base64.
  * Commands are fractions in the page; `pulse` has the pulse widths of full reverse, neutral and full thrust if the model takes these.
- * @typedef {{name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[], mixed: boolean,
- *   pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], tunable: string[], tests: StepTest[], size: number}} Vehicle
+ * @typedef {{identifier: string, name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[], mixed: boolean,
+ *   pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
+ *   tunable: string[], tests: StepTest[], size: number}} Vehicle
  */
 /**
  * The exports of fmu_src/live/module.c.

@@ -190,6 +190,22 @@ function unwrapped(angles) {
   });
 }
 
+/** Returns the flight as a table: what flew it and how it moved. As a recording it can be flown again. @param {Flight} flight */
+function tableOf({ times, commands, pilot }) {
+  const { axes, commands: names } = pilot.model.vehicle;
+  const columns = axes.flatMap(({ velocity, unit, position, positionUnit }, a) => [
+    { title: `${velocity} [${unit}]`, values: pilot.velocities[a] },
+    ...(position ? [{ title: `${position} [${positionUnit}]`, values: pilot.positions[a] }] : []),
+  ]);
+  const head = ["time [s]", ...names.map((name) => `${name} [%]`), ...columns.map(({ title }) => title)];
+  const rows = times.map((time, n) => [
+    time,
+    ...commands[n].map((x) => 100 * x),
+    ...columns.map(({ values }) => values[n]),
+  ]);
+  return [head, ...rows].map((row) => `${row.join(",")}\n`).join("");
+}
+
 /** A recording that is being flown. The pilot's vehicle gets its commands, and the ghost shows the measured motion. */
 class Playback {
   /** @param {Recording} recording @param {Flight} flight */

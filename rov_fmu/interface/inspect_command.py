@@ -74,6 +74,13 @@ def _draft(found: Sequence[Inspection], count: int, base: str, vehicle: Vehicle 
         if vehicle and key in vehicle.layout.coefficients:
             unit = vehicle.layout.coefficients[key].unit
             yield f'# {key} = {{ value = {vehicle.rov[key]:g}, unit = "{unit}", source = "..." }}'
+    signals = {row.name for one in found for row in one.signals}
+    effects = {"voltage": {"voltage"}}
+    if not (vehicle and vehicle.layout.has_attitude):
+        effects["attitude"] = {"roll", "pitch"}
+    if fitted := [key for key, names in effects.items() if names <= signals]:
+        yield from ("", "[fit]  # what every log has the columns for: remove # to fit it")
+        yield from (f"# {key} = true" for key in fitted)
     columns = {title: meant for one in found for title, meant in one.columns.items()}
     is_csv = {one.path: one.path.suffix.lower() not in LOG_SUFFIXES for one in found}
     others = {name for one in found if is_csv[one.path] for name in one.unread}

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rov_fmu.bridges import arrays
+from rov_fmu.bridges.rates import force_names
 from rov_fmu.engine.simulation import Array, simulate, usable_cores
 from rov_fmu.fmu.variables import variables
 from rov_fmu.interface.arguments import (
@@ -117,6 +119,37 @@ class VehicleModel(Vehicle):
         """
         workers = checked_workers(workers) or usable_cores()
         return self._simulated(time, inputs, start, coefficients, record, workers=workers, many=True)
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """The names of the components of `forces`, in their order."""
+        return force_names(self.layout)
+
+    def rates(self, x: Any, forces: Any, p: Mapping[str, Any] = _NONE) -> Any:
+        """Return the time derivatives of the states: the equation of motion itself, for any library.
+
+        `x` is a vector of the states in the order of `layout.state`, and `forces` one in the order of `force_names`,
+        which `forces` computes from commands. They may be NumPy arrays, CasADi vectors (SX, MX, DM) or JAX arrays in
+        double precision. An array of NumPy or JAX may have more dimensions after the first one, for many vehicles.
+        `p` maps names of coefficients to numbers, symbols or arrays; the other coefficients are those of the vehicle.
+        The result has the shape of `x`. All values are in SI units, angles in rad.
+
+        Where a velocity is 0, the drag has the coefficients of the positive direction.
+
+        Raises InputError if a vector has another length, a coefficient is unknown, or JAX computes in single precision.
+        """
+        return arrays.rates(self.rov, x, forces, p)
+
+    def forces(self, inputs: Mapping[str, Any], p: Mapping[str, Any] = _NONE) -> Any:
+        """Return the vector of forces that `rates` takes, for commands, loads and current.
+
+        `inputs` maps names of inputs to numbers, arrays or symbols of the libraries that `rates` accepts. The other
+        inputs are 0, and the voltage is the usual one. `p` is that of `rates`. The thrust is the steady one: a lag is
+        part of the rates. A dead time is left out, so the commands act at once.
+
+        Raises InputError if an input or a coefficient is unknown.
+        """
+        return arrays.forces(self.rov, inputs, p)
 
     def build(
         self,

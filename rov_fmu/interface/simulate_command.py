@@ -1,6 +1,7 @@
 """The command `rov-fmu simulate`: the meaning of its options, the files that it writes, and what it prints."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from io import BytesIO, StringIO
 from math import isfinite, nan
 from pathlib import Path
@@ -15,7 +16,8 @@ from rov_fmu.io.messages import FileError, InputError, did_you_mean, shown
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.time_series import Series, series
-from rov_fmu.report.console import console, table
+from rov_fmu.model.layout import Layout
+from rov_fmu.report.console import print_table, table
 
 _STOP, _STEP = 10.0, 0.01
 """The default end of a simulation and the default time between two results, s, as in the FMU's default experiment."""
@@ -50,21 +52,12 @@ def run(
             raise FileError(
                 f"{commands}: the last time is {stop:g} s, and must be at least {_SHORTEST:g}, without --stop"
             )
-    coefficients: dict[str, float] = {}
-    start: dict[str, float] = {}
-    layout = vehicle.layout
-    at_start = [*layout.state, *layout.initial]
-    for name, value in _read_settings(settings, [*layout.inputs, *at_start, *layout.coefficients]).items():
+    given = read_settings(settings, vehicle.layout)
+    for name in given.inputs:
         if name in inputs:
             raise InputError(f"--set {name}: {commands} has this input, too")
-        if name in layout.inputs:
-            inputs[name] = value
-        elif name in at_start:
-            start[name] = value
-        else:
-            coefficients[name] = value
     time = _result_times(_STOP if stop is None else stop, _STEP if step is None else step)
-    return vehicle.with_(**coefficients).simulate(time, inputs, start=start)
+    return vehicle.with_(**given.coefficients).simulate(time, inputs | given.inputs, start=given.start)
 
 
 def _result_times(stop: float, step: float) -> Array:
@@ -75,7 +68,28 @@ def _result_times(stop: float, step: float) -> Array:
     return np.append(time[time < stop - 1e-9], stop)
 
 
-def _read_settings(settings: Sequence[str], names: Sequence[str]) -> dict[str, float]:
+@dataclass(frozen=True)
+class Settings:
+    """The values of the options --set, by name."""
+
+    inputs: dict[str, float]
+    start: dict[str, float]
+    coefficients: dict[str, float]
+
+
+def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
+    """Return the values of the options --set: inputs, what the vehicle begins with, coefficients. Raises InputError."""
+    at_start = {*layout.state, *layout.initial}
+    names = [*layout.inputs, *layout.state, *layout.initial, *layout.coefficients]
+    found = _read_values(settings, names)
+    return Settings(
+        {name: value for name, value in found.items() if name in layout.inputs},
+        {name: value for name, value in found.items() if name in at_start},
+        {name: value for name, value in found.items() if name in layout.coefficients},
+    )
+
+
+def _read_values(settings: Sequence[str], names: Sequence[str]) -> dict[str, float]:
     """Return the values of the options --set by name. Raises InputError."""
     found: dict[str, float] = {}
     for text in settings:
@@ -155,4 +169,4 @@ def print_final(vehicle: VehicleModel, result: Result) -> None:
     found = table(f"{vehicle.name} after {result.time[-1] - result.time[0]:g} s", "variable", ["value"], ["unit"])
     for name, values in result.items():
         found.add_row(name, f"{values[-1]:.6g}", "" if result.units[name] == "1" else result.units[name])
-    console().print(found)
+    print_table(found)

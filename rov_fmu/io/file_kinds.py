@@ -6,6 +6,7 @@ from pathlib import Path
 from rov_fmu.io.messages import FileError
 
 VEHICLE_FILE, PLAN, FMU, PAGE = "a vehicle file (TOML)", "the plan of a study (TOML)", "an FMU", "a page (HTML)"
+GAZEBO_MODEL = "a model for Gazebo (SDF)"
 TESTS_FILE = "the rov.toml of a folder of tank tests"
 _TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "the log of an autopilot or of ROS"
 DATAFLASH_SUFFIX = ".bin"
@@ -19,7 +20,7 @@ BAG_SUFFIXES = (".bag", ".db3", ".mcap")
 LOG_SUFFIXES = (*MAVLINK_SUFFIXES, ULOG_SUFFIX, *BAG_SUFFIXES)
 """The suffixes of logs other than CSV."""
 _BY_SUFFIX = {
-    **{".toml": _TOML, ".fmu": FMU, ".html": PAGE},
+    **{".toml": _TOML, ".fmu": FMU, ".html": PAGE, ".sdf": GAZEBO_MODEL},
     **dict.fromkeys((".csv", ".tsv"), _TABLE),
     **dict.fromkeys(LOG_SUFFIXES, _LOG),
 }

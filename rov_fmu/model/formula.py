@@ -8,7 +8,7 @@ thrust table. Its value is a float.
 import ast
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache
+from functools import cache, reduce
 from types import MappingProxyType
 
 FUNCTIONS = {"sin": "sin", "cos": "cos", "abs": "fabs", "sqrt": "sqrt", "pow": "pow", "log": "log", "atan2": "atan2"}
@@ -108,6 +108,27 @@ def compiled(
         return found
 
     return evaluate
+
+
+class _Branchless(ast.NodeTransformer):
+    """Replace choices, `and` and `or` by calls of functions."""
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        self.generic_visit(node)
+        return ast.Call(ast.Name("where", ast.Load()), [node.test, node.body, node.orelse], [])
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
+        self.generic_visit(node)
+        name = "both" if isinstance(node.op, ast.And) else "either"
+        return reduce(lambda a, b: ast.Call(ast.Name(name, ast.Load()), [a, b], []), node.values)
+
+
+def branchless(formula: str) -> str:
+    """Write a formula without choices, for arrays and symbols, which have no single truth value.
+
+    `a if test else b` becomes where(test, a, b), and `and` and `or` become both(…, …) and either(…, …).
+    """
+    return ast.unparse(_Branchless().visit(ast.parse(formula, mode="eval")))
 
 
 # ---- C ---------------------------------------------------------------------------------------------------------------

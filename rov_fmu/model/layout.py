@@ -470,6 +470,11 @@ class Layout:
         return self.has(ROLL, PITCH)
 
     @cached_property
+    def is_linked(self) -> bool:
+        """True when the motion along one axis acts on others."""
+        return self.coupled or self.has_attitude
+
+    @cached_property
     def memory(self) -> tuple[str, ...]:
         """The variables besides the states that a step continues: the heading, which counts turns."""
         return ("psi",) if self.has_attitude else ()
@@ -567,6 +572,13 @@ class Layout:
             return fraction
         low, neutral, high = self.pulse
         return neutral + fraction * (high - neutral if fraction > 0.0 else neutral - low)
+
+    def fraction_of(self, command: float) -> float:
+        """Return the fraction from -1 to 1 that a command stands for."""
+        if self.pulse is not None:
+            low, neutral, high = self.pulse
+            command = (command - neutral) / (high - neutral if command > neutral else neutral - low)
+        return max(-1.0, min(1.0, command))
 
     @cached_property
     def delayed(self) -> dict[str, Declaration]:

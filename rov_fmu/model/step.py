@@ -54,6 +54,7 @@ class Table:
                 self.velocities.append(place[directed[0].velocity] if directed else None)
                 formulas[f"coefficient_{len(formulas)}"] = term.coefficient
         self.coefficients = list(formulas)
+        self.coefficient_formulas = formulas
         self.hold = compiled({**equation.program, **equation.forces, **formulas}, equation.measured)
         self.arrive = compiled({force: after for force, (_, after) in equation.lagging.items()})
         self.products = sorted({factors for row in self.rows for _, factors in row if len(factors) == 2})
@@ -75,33 +76,11 @@ def step(table: Table, values: Mapping[str, float], h: float) -> dict[str, float
     `values` are the coefficients, inputs and states by their names. The result is not finite when the motion overflows
     or would take more than MOST_PIECES pieces.
     """
-    motion = _Motion(table, values)
-    done, lost, unit = 0.0, 0.0, h  # elapsed seconds, their rounding error, and the unit of time of the series
-    for _ in range(MOST_PIECES):
-        motion.settle()
-        if motion.has_settled():
-            motion.coast(h - done)
-            return motion.end()
-        unit = min(unit, h - done)
-        series = motion.series(unit)
-        motion.unit = unit
-        reach = motion.reach(series)
-        if reach == 0.0:
-            unit *= 1e-3
-            if unit == 0.0:
-                break
-            continue
-        length = motion.move(series, reach)
-        if length * unit >= h - done:
-            return motion.end()
-        before, elapsed = done, length * unit + lost
-        done += elapsed
-        lost = elapsed - (done - before)
-        unit *= 2.0 * reach
-    return dict.fromkeys(motion.end(), nan)
+    motion = Motion(table, values)
+    return motion.end() if motion.advance(h) else dict.fromkeys(motion.end(), nan)
 
 
-class _Motion:
+class Motion:
     """The states of a table during a step, and the coefficients of the current piece."""
 
     def __init__(self, table: Table, values: Mapping[str, float]) -> None:
@@ -121,6 +100,32 @@ class _Motion:
             angle = self.angle(self.y)
             self.heading = unwrapped(angle, values.get("psi", angle))
         self.hold()
+
+    def advance(self, h: float) -> bool:
+        """Move for h seconds. Return False when the motion overflows or would take more than MOST_PIECES pieces."""
+        done, lost, unit = 0.0, 0.0, h  # elapsed seconds, their rounding error, and the unit of time of the series
+        for _ in range(MOST_PIECES):
+            self.settle()
+            if self.has_settled():
+                self.coast(h - done)
+                return True
+            unit = min(unit, h - done)
+            series = self.series(unit)
+            self.unit = unit
+            reach = self.reach(series)
+            if reach == 0.0:
+                unit *= 1e-3
+                if unit == 0.0:
+                    break
+                continue
+            length = self.move(series, reach)
+            if length * unit >= h - done:
+                return True
+            before, elapsed = done, length * unit + lost
+            done += elapsed
+            lost = elapsed - (done - before)
+            unit *= 2.0 * reach
+        return False
 
     def hold(self) -> None:
         """Compute the coefficients for both directions of the velocities.
@@ -268,15 +273,20 @@ class _Motion:
         """Return the time up to which the series may be used, at most 1; 0 when they overflow."""
         if not all(isfinite(x) for c in series for x in c[-3:]):
             return 0.0
-        return min(1.0, *(_reach(series[i]) for i in self.table.used))
+        return min(1.0, *(usable_time(series[i]) for i in self.table.used))
 
-    def move(self, series: Series, length: float) -> float:
-        """Move to the end of a piece, which is at `length` or at the first reversal, and return that time."""
+    def end_of_piece(self, series: Series, length: float) -> tuple[float, int | None]:
+        """Return the end of a piece, and the place of the velocity that reverses there, or None."""
         reversed_velocity = None
         for v in self.table.monitored:
             end, is_reversal = _sign_kept(series[v], length)
             if is_reversal or end < length:
                 length, reversed_velocity = end, v if is_reversal else None
+        return length, reversed_velocity
+
+    def move(self, series: Series, length: float) -> float:
+        """Move to the end of a piece, which is at `length` or at the first reversal, and return that time."""
+        length, reversed_velocity = self.end_of_piece(series, length)
         if self.table.equation.ends:
             self.follow_series(series, length)
         changes = [_change(c, length) + lost for c, lost in zip(series, self.lost, strict=True)]
@@ -285,11 +295,15 @@ class _Motion:
         if reversed_velocity is not None:
             self.put(reversed_velocity, 0.0)  # so that the next piece has the other direction
         if self.steady:
-            progress = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
-            found = self.table.arrive({**self.values, **self.steady, **progress})
-            self.values.update({force: found[force] for force in self.table.equation.lagging})
-            self.hold()
+            self.arrive()
         return length
+
+    def arrive(self) -> None:
+        """Update the forces that lag, and the coefficients that follow from them, at the end of a piece."""
+        progress = {name: self.y[self.table.place[name]] for name in self.table.equation.lags}
+        found = self.table.arrive({**self.values, **self.steady, **progress})
+        self.values.update({force: found[force] for force in self.table.equation.lagging})
+        self.hold()
 
     def follow_series(self, series: Series, length: float) -> None:
         """Follow the heading through a piece."""
@@ -337,7 +351,7 @@ def _change(c: Sequence[float], t: float) -> float:
     return change
 
 
-def _reach(c: Sequence[float]) -> float:
+def usable_time(c: Sequence[float]) -> float:
     """Return the time at which the terms decrease like the powers of _RATIO from the first three to the last three.
 
     Of three neighbours, the largest counts, because every second or third coefficient of a series may be 0.

@@ -1,6 +1,6 @@
 """The console that the commands print on, its tables, and the printout of the paper's tables and of a proof."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from math import isnan
 from typing import TYPE_CHECKING
@@ -17,23 +17,40 @@ if TYPE_CHECKING:
 
 DEVIATION = "+.1%"
 """The format of a relative deviation."""
-_MIN_WIDTH = 110  # Rich assumes 80 columns in a pipe, and would cut digits off to fit a table into them
+_WIDE = 110
+"""The width of tables in a pipe or a file, and of those that a terminal is too narrow for."""
 
 
 def console() -> Console:
-    """Return a console that prints text without markup and is wide enough for the tables."""
+    """Return a console that prints text without markup, as wide as the terminal."""
     found = Console(markup=False, highlight=False, emoji=False)
-    found.width = max(found.width, _MIN_WIDTH)
+    if not found.is_terminal:
+        found.width = max(found.width, _WIDE)  # Rich assumes 80 columns
     return found
+
+
+def paragraph(out: Console, words: str) -> None:
+    """Print a paragraph. A terminal gets lines that end between words; a pipe or a file gets one line."""
+    out.print(words, soft_wrap=not out.is_terminal)
+
+
+def print_table(found: Table) -> None:
+    """Print a table. It is wider than the terminal where digits would be cut off otherwise."""
+    out = console()
+    with out.capture() as drawn:
+        out.print(found)
+    if "…" in drawn.get():
+        out.width = max(out.width, _WIDE)
+    out.print(found)
 
 
 def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
     """Print Tables 6-8 of the paper beside the values computed for the vehicle."""
     out = console()
-    out.print(f"{vehicle.name}. {vehicle.source}", soft_wrap=True)
+    paragraph(out, f"{vehicle.name}. {vehicle.source}")
     for t in tables:
         out.print()
-        out.print(_side_by_side(vehicle, t))
+        print_table(_side_by_side(vehicle, t))
     out.print(
         "\nnon-linear: every alpha and beta is 1; scaled: those of the vehicle file; computed in closed form.\n"
         "dev.: the computed value against the printed one; under test, the scaled model against the test.\n"
@@ -41,7 +58,7 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
     )
 
 
-def print_proof(findings: "Iterable[Finding]") -> None:
+def print_proof(findings: "Sequence[Finding]") -> None:
     """Print how far each variable of each experiment deviates from its expected values."""
     found = table("", "experiment", (), ("variable",))
     for header in ("deviation", "tolerance"):
@@ -55,8 +72,9 @@ def print_proof(findings: "Iterable[Finding]") -> None:
             text(f.tolerance, ".1e"),
             "pass" if f.passed else f"FAIL {f.error}",
         )
-    console().print(found)
-    console().print("\nDeviation: relative to the largest expected value of the variable.")
+    print_table(found)
+    passed = sum(f.passed for f in findings)
+    console().print(f"\n{passed} of {len(findings)} pass. Deviations are relative to the largest expected value.")
 
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
@@ -92,6 +110,7 @@ def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] =
     result = Table(
         title=title,
         title_justify="left",
+        caption_justify="left",
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
         show_edge=False,

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
-from rov_fmu.report.console import console, table, text
+from rov_fmu.report.console import console, print_table, table, text
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection import Inspection, Row
 
@@ -15,7 +15,7 @@ _MOST_GAPS = 3
 def print_inspection(inspection: Inspection) -> None:
     """Print the commands and signals of a log, what is not recognised, and what was left out."""
     out = console()
-    out.print(_rows(inspection))
+    print_table(_rows(inspection))
     if inspection.unread:
         out.print("\nNot recognised:")
     for name, what in inspection.unread.items():

@@ -1,25 +1,81 @@
 """The main findings of an identification: prediction errors, known coefficients, and other effects on the motion."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rov_fmu.identify.effects.catalogue import EFFECTS
+from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings.prediction_errors import Errors, Key, Quantity, Span, shown_in
-from rov_fmu.identify.recordings.recordings_fit import Effect, count
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect, count
 from rov_fmu.model.layout import Axis
+from rov_fmu.tank.findings import Finding
 
-_WORDS = {
-    "load": "constant load",
-    "delay": "delay from the commands to the motion",
-    "current": "current along the axis",
-    "current north": "current to the north",
-    "current east": "current to the east",
-    "lag": "lag of the thrusters",
-    "reverse thrust": "thrust in reverse, by that forward",
-    "reverse drag": "drag in reverse, by that forward",
-    "dead band": "dead band of the command",
+FACTS = frozenset(EFFECTS) | {
+    "rows sorted",
+    "time stamps merged",
+    "rows without time",
+    "rows without command",
+    "torn rows",
+    "unread cells",
+    "no pulse",
+    "no servo pulse",
+    "pulse beyond full thrust",
+    "constant motion",
+    "constant push",
+    "gaps",
+    "source of commands",
+    "dropouts",
+    "damaged pieces",
+    "messages without time",
+    "several vehicles",
+    "reversed motors",
+    "axis left out",
+    "not coupled",
+    "unused curve",
+    "outliers",
+    "switches between rows",
+    "delay not modelled",
 }
+"""The kinds of findings that say what was found or done, and ask for nothing."""
+DOUBTS = frozenset(
+    {
+        "missing column",
+        "too few samples",
+        "time of arrival",
+        "arrival time",
+        "other clock",
+        "aligned clock",
+        "unknown direction",
+        "unknown velocity",
+        "depth by pressure",
+        "thrust without freedom",
+        "drag without freedom",
+        "assumed beta",
+        "untested thrust",
+        "inseparable drag",
+        "drag at zero",
+        "leave-one-out error",
+        "correlated residuals",
+    }
+)
+"""The kinds of findings that say what the data leave open. All other kinds contradict the model or the data."""
+EXPLAINED = {
+    "Warnings": "Something contradicts the model or other data. Check each of these before you use the model.",
+    "Doubts": "The data leave these questions open. More or other tests would answer them.",
+    "Facts": "What was found, and what was done with the data. No action is needed.",
+}
+"""What each group of findings says, by its heading."""
+
+
+def by_heading(found: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
+    """Return the sentences of findings by the headings of EXPLAINED."""
+    groups: dict[str, list[Finding]] = {heading: [] for heading in EXPLAINED}
+    for finding in found:
+        is_fact, is_doubt = finding.kind in FACTS, finding.kind in DOUBTS
+        groups["Facts" if is_fact else "Doubts" if is_doubt else "Warnings"].append(finding)
+    return {heading: sentences(some) for heading, some in groups.items()}
 
 
 @dataclass(frozen=True)
@@ -189,17 +245,17 @@ def known(results: Identification) -> tuple[Known, ...]:
     )
 
 
-def effects(result: AxisResult) -> tuple[Effect, ...]:
+def effects(result: AxisResult) -> tuple[FittedEffect, ...]:
     """Return the effects that were looked for along an axis, the kept ones first."""
     found = result.recordings.effects if result.recordings else ()
     return tuple(sorted(found, key=lambda effect: not effect.kept))
 
 
-def acting(effect: Effect) -> str:
+def acting(effect: FittedEffect) -> str:
     """Return an effect in words."""
-    return _WORDS[effect.kind]
+    return EFFECTS[effect.kind].words
 
 
-def verdict(effect: Effect) -> str:
+def verdict(effect: FittedEffect) -> str:
     """Return whether an effect was kept, in words."""
-    return "kept" if effect.kept else f"left at {int(effect.kind.startswith('reverse'))}"
+    return "kept" if effect.kept else f"left at {EFFECTS[effect.kind].neutral:g}"

@@ -135,7 +135,7 @@ class RunsBar:
             if now.dashboard:
                 self._progress.console.print(f"what the workers do: {now.dashboard}", soft_wrap=True)
         rate = (now.done - self._done_before) / max(perf_counter() - self._start, 1e-3)
-        words = f"{rate:.3g} runs/s{f', {now.failed} failed' if now.failed else ''}"
+        words = f"{rate:,.0f} runs/s{f', {now.failed} failed' if now.failed else ''}"
         self._progress.update(self._task, total=now.total, completed=now.done, description=words)
 
     def warn(self, message: str) -> None:
@@ -151,7 +151,7 @@ class RunsBar:
 def _shown(*columns: ProgressColumn) -> Iterator[Progress | None]:
     """Show progress until the block ends. Yields None if there is no terminal."""
     out = console()
-    if not out.is_terminal:
+    if not (out.is_terminal and out.file.isatty()):  # Rich calls a pipe a terminal if FORCE_COLOR is set, as in Jupyter
         yield None
         return
     progress = Progress(*columns, console=out, transient=True)

@@ -1,7 +1,9 @@
 """The identification report: one HTML file with the data, the fits, their residuals, and the warnings."""
 
+import os
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import date, datetime, timezone
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -13,15 +15,36 @@ from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.output import Output
 from rov_fmu.io.seal import sealed
-from rov_fmu.report.findings import Known, acting, effects, known, measured_and_fitted, unseen, verdict
+from rov_fmu.report.findings import (
+    EXPLAINED,
+    Known,
+    acting,
+    by_heading,
+    effects,
+    known,
+    measured_and_fitted,
+    unseen,
+    verdict,
+)
+from rov_fmu.report.overview import (
+    ShownPrediction,
+    amount_of_data,
+    kind_of_data,
+    main_coefficients,
+    main_errors,
+    shown_prediction,
+)
 from rov_fmu.report.plots.fits import plot_drag, plot_known, plot_response, plot_steps, plot_thrust
+from rov_fmu.report.plots.overview import plot_correlation, plot_error, plot_predicted
 from rov_fmu.report.plots.recordings import CommandStep, clearest_step, plot_recording, plot_step
-from rov_fmu.report.plots.svg import Draw, inline_svg
+from rov_fmu.report.plots.svg import Draw, inline_svg, with_even_text
 from rov_fmu.report.templates import number, page
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.tank_tests import TankTests
 
-_PLOT, _WIDE = (3.7, 3.5), (4.7, 3.0)  # inches
+_WIDTH = 3.7
+"""The width of every plot, inches. All plots of a page are as wide, so that their text has the same size."""
+_LOW, _HIGH = (_WIDTH, 2.7), (_WIDTH, 3.5)
 _WHITE = 1.5  # samples; residuals that are correlated over fewer count as white noise
 
 
@@ -30,23 +53,40 @@ def report_output(results: Identification, path: Path, on_progress: Progress = s
     return Output(path, sealed(report_page(results, on_progress), "<!-- {} -->").encode())
 
 
-def report_page(results: Identification, on_progress: Progress = silent) -> str:
-    """Return the report as HTML. The same identification always gives the same text."""
-    comparisons, found = compare(results), known(results)
+def _today() -> date:
+    """Return the date of today (UTC), or that of SOURCE_DATE_EPOCH, by which builds become reproducible."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    now = datetime.fromtimestamp(int(epoch), timezone.utc) if epoch.isdecimal() else datetime.now(timezone.utc)
+    return now.date()
+
+
+def report_page(results: Identification, on_progress: Progress = silent, *, made: date | None = None) -> str:
+    """Return the report as HTML. The same identification and date (today by default) always give the same text."""
+    comparisons, found, shown = compare(results), known(results), shown_prediction(results)
     predicted = tuple(unseen(results, comparisons))
     fits = [result.recordings for result in results.axes if result.recordings]
     closeups = {fit.axis.name: step for fit in fits if (step := clearest_step(fit))}
     of_points = {result.axis.name: [*_plots_of_points(results, result, comparisons)] for result in results.axes}
-    plots = [*_plots(results, found, closeups), *chain(*of_points.values())]
+    overview = [*_plots_of_overview(shown, of_points.values())]
+    plots = [*overview, *_plots(results, found, closeups), *chain(*of_points.values())]
 
     def drawn(n: int, label: str, draw: Draw, size: tuple[float, float]) -> str:
         on_progress(f"drawing: {label}", n / len(plots))
-        return inline_svg(label, draw, size)
+        return inline_svg(label, with_even_text(draw), size)
 
     return page(
         "report.html.j2",
         vehicle=results.vehicle,
         results=results,
+        made=made or _today(),
+        kind=kind_of_data(results.tests),
+        data=amount_of_data(results.tests),
+        shown=shown,
+        overview=[label for label, _, _ in overview],
+        main_errors=[*main_errors(predicted)],
+        main_known=main_coefficients(results, found),
+        findings=by_heading(results.findings),
+        explained=EXPLAINED,
         comparisons=comparisons,
         curves=results.vehicle.layout.curves,
         unseen=predicted,
@@ -69,6 +109,16 @@ Plot = tuple[str, Draw, tuple[float, float]]
 """The label of a plot, the function that draws it, and its size in inches."""
 
 
+def _plots_of_overview(shown: ShownPrediction | None, of_points: Iterable[list[Plot]]) -> Iterator[Plot]:
+    """Yield the plots of the opening screen: a prediction, or without recordings the points of an axis."""
+    if shown:
+        yield "Prediction of an unseen recording", partial(plot_predicted, shown=shown), _LOW
+        yield "Error of this prediction", partial(plot_error, shown=shown), _LOW
+    else:
+        first: list[Plot] = next((some for some in of_points if some), [])
+        yield from ((f"Overview: {label}", draw, size) for label, draw, size in first[:2])
+
+
 def _plots_of_points(
     results: Identification, result: AxisResult, comparisons: tuple[Comparison, ...]
 ) -> Iterator[Plot]:
@@ -78,24 +128,30 @@ def _plots_of_points(
         compared = {c.quantity: c for c in comparisons if c.result is result}
         for quantity in ("V_ss", "Tau"):
             response = partial(plot_response, quantity=quantity, comparison=compared.get(quantity))
-            yield f"{quantity} over the command: {name}", partial(response, results=results, result=result), _PLOT
+            yield f"{quantity} over the command: {name}", partial(response, results=results, result=result), _HIGH
         if result.drag:
-            yield f"Drag: {name}", partial(plot_drag, results=results, result=result), _PLOT
+            yield f"Drag: {name}", partial(plot_drag, results=results, result=result), _HIGH
     if result.points:
-        yield f"Step responses: {name}", partial(plot_steps, results=results, result=result), _PLOT
+        yield f"Step responses: {name}", partial(plot_steps, results=results, result=result), _HIGH
 
 
 def _plots(results: Identification, found: tuple[Known, ...], closeups: Mapping[str, CommandStep]) -> Iterator[Plot]:
     """Yield the plots of the report besides those of `_plots_of_points`."""
     if found:
-        yield "What is known", partial(plot_known, found=found), (4.6, 0.7 + 0.23 * len(found))
+        yield "What is known", partial(plot_known, found=found), (_WIDTH, 0.7 + 0.23 * len(found))
+    estimates = [(name, fit.estimate) for name, fit in results.thrust.items()]
+    estimates += [(result.axis.name, result.estimate) for result in results.axes if result.estimate]
+    for name, estimate in estimates:
+        if (p := len(estimate.names)) > 1:
+            matrix = partial(plot_correlation, names=estimate.names, correlation=estimate.correlation)
+            yield f"Correlation: {name}", matrix, (_WIDTH, 1.0 + 0.23 * p)
     for name, fit in results.thrust.items():
-        yield f"Thrust: {name}", partial(plot_thrust, results=results, fit=fit), _PLOT
+        yield f"Thrust: {name}", partial(plot_thrust, results=results, fit=fit), _HIGH
     for result in results.axes:
         for s in result.recordings.simulations if result.recordings else ():
-            yield f"Recording: {s.recording.file}", partial(plot_recording, result=result, simulation=s), _WIDE
+            yield f"Recording: {s.recording.file}", partial(plot_recording, result=result, simulation=s), _LOW
         if step := closeups.get(result.axis.name):
-            yield f"Step in {step.simulation.recording.file}", partial(plot_step, result=result, step=step), _WIDE
+            yield f"Step in {step.simulation.recording.file}", partial(plot_step, result=result, step=step), _LOW
 
 
 def _holds(tests: TankTests) -> dict[str, str]:

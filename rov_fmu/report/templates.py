@@ -1,10 +1,12 @@
 """Render pages from templates, with filters that format numbers and units for readers."""
 
+import re
 from math import isfinite, isnan
 from pathlib import Path
 
 from rov_fmu.io.templates import render
 from rov_fmu.report.plots.svg import PALETTE
+from rov_fmu.vehicle import uncertainty
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """The translation of digits to superscripts."""
@@ -19,6 +21,9 @@ def page(template: str, **content: object) -> str:
         text=text,
         two_digits=two_digits,
         unit=pretty_unit,
+        with_interval=with_interval,
+        sentence=sentence,
+        readable=readable,
         palette=PALETTE,
         **content,
     )
@@ -32,7 +37,16 @@ def number(value: float | None, digits: int | None = None) -> str:
     if value is None or not isfinite(value):
         return "–"
     is_short = digits is None and len(repr(value)) <= 9 and abs(value) < 1e5
-    text = repr(value).removesuffix(".0") if is_short else f"{value:.{digits or 6}g}"
+    return _with_signs(repr(value).removesuffix(".0") if is_short else f"{value:.{digits or 6}g}")
+
+
+def with_interval(value: float, interval: tuple[float, float] | None) -> list[str]:
+    """Return a value and the ends of its interval for readers, with digits that suit the interval."""
+    return [_with_signs(text) for text in uncertainty.with_interval(value, interval)]
+
+
+def _with_signs(text: str) -> str:
+    """Return a number with a minus sign and, for an exponent, a power of ten."""
     mantissa, _, exponent = text.partition("e")
     if exponent:
         mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")
@@ -52,6 +66,19 @@ def text(value: float | None, form: str) -> str:
     return format(value, form).replace("%", " %").replace("-", "−").replace("inf", "∞")
 
 
+def sentence(text: str) -> str:
+    """Return a text with a capital first letter, except where it begins with the name of a file."""
+    text = readable(text)
+    return text if "." in text.partition(":")[0] else text[:1].upper() + text[1:]
+
+
+def readable(text: str) -> str:
+    """Return a sentence with minus signs, with spaces before percent signs, and with µs for us."""
+    text = re.sub(r"(?<=[\s(])-(?=\d)", "−", text)
+    text = re.sub(r"(?<=\d)%(?=[\s,.;)]|$)", " %", text)
+    return re.sub(r"(?<=\d )us\b", "µs", text)
+
+
 def pretty_unit(unit: str) -> str:
     """Return a unit for readers: N.m.s2/rad2 becomes N·m·s²/rad²."""
-    return {"1": "1", "us": "µs"}.get(unit) or unit.translate(RAISED).replace(".", "·")
+    return {"1": "1", "us": "µs", "deg": "°", "deg/s": "°/s"}.get(unit) or unit.translate(RAISED).replace(".", "·")

@@ -6,7 +6,8 @@ has the normal distribution.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, log
+from decimal import Decimal
+from math import floor, inf, isfinite, log, log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,6 +172,46 @@ def quantile(degrees_of_freedom: float) -> float:
 
 
 _NORMAL = quantile(inf)
+_WIDTH_IN_UNITS = 3.0
+"""The least width of a written interval in units of the last digit, which tells the width to a third."""
+
+
+def with_interval(value: float, interval: tuple[float, float] | None, digits: int = 4) -> tuple[str, str, str]:
+    """Return a value and the ends of its interval as text, with digits that suit the width of the interval.
+
+    36.98 from 36.974 to 37.004 becomes 36.98, 36.97, 37.00: all three have the same decimals, and the interval is at
+    least three units of the last one wide. Where this would leave less than two digits of the value, each number has
+    two significant digits of its own. Rounding keeps the order of numbers, so an interval that contains its value is
+    never written as one that does not. Without an interval the value has the given number of significant digits, and
+    the ends are empty.
+    """
+    if interval is None:
+        return _significant(value, digits), "", ""
+    numbers = value, *interval
+    width = interval[1] - interval[0]
+    if width > 0.0 and all(map(isfinite, numbers)):
+        place = floor(log10(width / _WIDTH_IN_UNITS))
+        if abs(value) >= 10.0 ** (place + 1):
+            value_text, low, high = (_rounded(number, place) for number in numbers)
+            return value_text, low, high
+        digits = 2
+    value_text, low, high = (_significant(number, digits) for number in numbers)
+    return value_text, low, high
+
+
+def _rounded(number: float, place: int) -> str:
+    """Return a number rounded to a multiple of a power of ten: 36.98 for 36.982 and -2."""
+    return _plain(+Decimal(number).quantize(Decimal(1).scaleb(place)))  # the sign makes 0 of -0
+
+
+def _significant(number: float, digits: int) -> str:
+    """Return a number with a number of significant digits: 0.30, 420."""
+    return _plain(Decimal(f"{number:.{digits - 1}e}")) if number and isfinite(number) else f"{number:g}"
+
+
+def _plain(number: Decimal) -> str:
+    """Return a decimal number with its digits, and with an exponent only where it is very small or very large."""
+    return f"{number:f}" if not number or -5 <= number.adjusted() < 6 else f"{number:e}"
 
 
 def _half_width(name: str, value: float, interval: tuple[float, float], declaration: Declaration) -> float:

@@ -8,12 +8,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partialmethod
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fmpy import read_model_description
+from rich.progress import Progress
 
 from rov_fmu.build import build
 from rov_fmu.cli import main
@@ -105,7 +107,8 @@ for arguments in {!r}:
 
 
 @pytest.mark.parametrize(
-    "commands", [_NEEDED, pytest.param([(["identify", str(TESTS)], _NEEDED[-1][1])], marks=pytest.mark.long)]
+    "commands",
+    [_NEEDED, pytest.param([(["identify", str(TESTS)], {*_NEEDED[-1][1], "jinja2"})], marks=pytest.mark.long)],
 )
 def test_a_command_imports_what_it_uses(commands: list[tuple[list[str], set[str]]]) -> None:
     script = _IMPORTED.format([arguments for arguments, _ in commands])
@@ -140,7 +143,8 @@ def complete(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 
 
 def test_the_shell_completes_commands_vehicles_platforms_and_axes(complete: Complete) -> None:
-    commands = ["build", "figures", "fly", "identify", "prove", "schema", "simulate", "study", "tables", "tune"]
+    commands = ["build", "figures", "fly", "identify", "prove", "schema", "sdf", "simulate", "sitl"]
+    commands += ["study", "tables", "tune"]
     assert complete("") == [f"plain,{name}" for name in commands]
     assert complete("build", "video") == ["file,video", "plain,videoray", "plain,videoray_refit"]
     assert complete("tables", "videoray_") == ["file,videoray_", "plain,videoray_refit"]
@@ -193,12 +197,23 @@ def test_a_build_shows_its_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatc
     assert "\x1b[2K" in shown, "the lines of the progress are cleared"
 
 
+def test_a_pipe_gets_no_progress_even_if_colour_is_forced(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Jupyter and many CI systems set FORCE_COLOR."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    assert main(["build", str(BARE), "--platform=host", "-o", str(tmp_path / "x.fmu")]) == 0
+    assert "compiling" not in "".join(capsys.readouterr())
+
+
 @pytest.mark.long
 def test_an_identification_shows_its_progress_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = _terminal(monkeypatch)
+    every_step_is_drawn = partialmethod(Progress.update, refresh=True)  # Rich draws ten times a second
+    monkeypatch.setattr(Progress, "update", every_step_is_drawn)
     assert main(["identify", str(TESTS)]) == 0
     shown = terminal.getvalue()
-    before = shown[: shown.index("Coefficients")]
+    before = shown[: shown.index("VideoRay Pro 4, refitted. ")]  # the first words of the results
     assert "%" in before
     assert "heave" in before
     assert "\x1b[2K" in shown, "the bar is cleared"

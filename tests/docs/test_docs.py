@@ -27,6 +27,7 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
+from tests.docs.test_notebooks import NOTEBOOKS
 from tests.vehicles import VEHICLES
 
 State = dict[str, float]
@@ -49,8 +50,10 @@ def name(page: Path) -> str:
 
 
 def blocks(page: Path, language: str) -> list[str]:
+    """The blocks of a language, and the cells of a notebook that hold commands."""
     text = page.read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    cells = r"|\{code-cell\} ipython3\n%%sh" if language == "sh" else ""
+    return re.findall(rf"^```(?:{language}{cells})\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
 def lines(block: str) -> list[str]:
@@ -177,7 +180,7 @@ def run(workplace: Path, *command: str) -> str:
     return done.stdout
 
 
-SHELL_PAGES = [page for page in PAGES if runnable(page)]
+SHELL_PAGES = [page for page in PAGES if runnable(page) and page not in NOTEBOOKS]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the pages' commands are written for a POSIX shell")
@@ -190,8 +193,7 @@ def test_commands_run(page: Path, workplace: Path) -> None:
 
 def test_the_pages_with_commands_are_found() -> None:
     pages = ("identify", "importers", "model", "platforms", "studies")
-    tutorials = (f"tutorial-{name}" for name in ("dive-log", "tank-tests", "stopping-distance"))
-    wanted = {"README.md", *(f"docs/{page}.md" for page in (*pages, *tutorials))}
+    wanted = {"README.md", "docs/tutorial-stopping-distance.md", *(f"docs/{page}.md" for page in pages)}
     assert wanted <= {name(page) for page in SHELL_PAGES}
 
 
@@ -203,11 +205,12 @@ def test_programs_print_what_is_said(page: Path, workplace: Path) -> None:
             continue  # its package fetches its binaries as it is installed; the next test looks at what it prints
         printed = run(workplace, sys.executable, "-c", program).splitlines()
         said = re.findall(r"^ *print\(.*?  # (.*)$", program, re.MULTILINE)
-        assert len(printed) == len(said) == 1
-        if printed != said:
-            value = re.search(r"\d+\.(\d+) ", said[0])
-            assert value, "a sentence that ends with a number and its unit"
-            assert f"{float(printed[0]):.{len(value[1])}f}" == value[0].strip()
+        assert len(printed) == len(said) > 0
+        for line, expected in zip(printed, said, strict=True):
+            if line != expected:
+                value = re.search(r"\d+\.(\d+) ", expected)
+                assert value, "a sentence that ends with a number and its unit"
+                assert f"{float(line):.{len(value[1])}f}" == value[0].strip()
 
 
 def test_the_program_for_omsimulator_is_python_and_ends_where_it_says(vehicle: Vehicle) -> None:
@@ -339,15 +342,20 @@ def test_every_set_of_tests_is_run_and_told() -> None:
 @pytest.mark.long
 @pytest.mark.skipif(find_spec("furo") is None, reason='the site needs Sphinx: pip install -e ".[docs]"')
 def test_site_builds_strictly_and_fetches_nothing(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "docs", str(tmp_path)]
+    folder = tmp_path / "site"
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "docs", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    pages = {page.name: page.read_text(encoding="utf-8") for page in tmp_path.glob("*.html")}
+    pages = {page.name: page.read_text(encoding="utf-8") for page in folder.glob("*.html")}
     assert {f"{page.stem}.html" for page in (ROOT / "docs").glob("*.md")} <= set(pages)
     assert "ends at u = 0.4729 m/s" in pages["index.html"], "the README is the first page"
     flown = re.findall(r'(?:href|src)="(fly/[^"]+)"', pages["index.html"])
-    assert {"fly/videoray.html", "fly/bluerov2_heavy.html"} == {*flown}
-    assert all("live-vehicles" in (tmp_path / page).read_text(encoding="utf-8") for page in flown)
+    vehicles = ["videoray.html", "bluerov2_heavy.html"]
+    assert {place + name for place in ("fly/", "fly/compact/") for name in vehicles} == {*flown}
+    assert all("live-vehicles" in (folder / page).read_text(encoding="utf-8") for page in flown)
+    notebooks = {page.name: page.read_text(encoding="utf-8") for page in folder.glob("_downloads/*/*.ipynb")}
+    assert {f"{page.stem}.ipynb" for page in NOTEBOOKS} == set(notebooks)
+    assert all('"image/png"' in notebook for notebook in notebooks.values()), "executed, with their figures"
     for key in (*BODY, *ARM, *CURVE, *AXIS, *TUNING):
         assert f">{key}</span>" in pages["vehicle-file.html"]
     for title, page in pages.items():

@@ -93,6 +93,9 @@ def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
     assert rows["command"][1:] == ["1", "60", "10", "0", "0.3", "4.1", "s", "at", "3.9", "s"]
     assert rows["depth"][1:6] == ["m", "60", "10", "1", "1.99"]
     assert rows["voltage"][1:6] == ["V", "60", "10", "16", "25.9"]
+    draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    assert "\n# voltage = true\n" in draft
+    assert "attitude" not in draft, "there is no roll or pitch"
     assert "- Lux" in rows
     assert '# "Lux" = "depth [m]"' in (tmp_path / "rov.toml").read_text(encoding="utf-8").splitlines()
 

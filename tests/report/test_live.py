@@ -2,9 +2,10 @@
 
 import random
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import exp, log
+from math import ceil, exp, log
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
     def page(kind: str) -> str:
         path = folder / f"{kind}.html"
         if not path.exists():
-            vehicle = four_axes(load_vehicle(FILES[kind]))
+            vehicle = a_vehicle(SIX) if kind == "six" else four_axes(load_vehicle(FILES[kind]))
             path.write_text(fly_page([Flown(vehicle, module(vehicle.rov))]), encoding="utf-8")
         return path.as_uri()
 
@@ -49,6 +50,9 @@ def flying(visit: Visitor, address: str, **options: Any) -> Visit:
     seen.page.goto(address)
     seen.page.wait_for_selector("#live-section:not([hidden])")
     return seen
+
+
+BOX = "element => element.getBoundingClientRect().toJSON()"
 
 
 def until(page: Any, condition: str) -> None:
@@ -364,7 +368,7 @@ def test_a_step_test_stands_beside_what_was_measured(page: Any, vehicle: Vehicle
         page.click("#live-run")
         V, Tau = vehicle.rov.response(HEAVE, float(row.command) / 100.0)
         until(page, "live.flight.time > 0.1")
-        title = page.text_content("#live-chart-heave .title") or ""
+        title = page.text_content("#live-chart-heave .marks") or ""
         assert title.endswith(f"V_ss {V:.3f} · Tau {Tau:.2f} s")
         line = page.inner_text("#live-message")
         assert f"measured: V_ss {row.scaled.V_ss.measured} m/s, Tau {row.scaled.Tau.measured} s" in line
@@ -395,8 +399,9 @@ def test_a_vehicle_of_one_axis_flies_too(pages: Callable[[str], str], quiet: Vis
     page.click("#live-run")
     until(page, "live.flight.time > 0.3")
     assert page.evaluate("live.flight.pilot.model.get('z')") > 0.0
-    assert page.locator("#live-track").count() == page.locator("#live-compass").count() == 0
-    assert page.evaluate("document.getElementById('live-chart-heave').clientWidth") <= 420, "text grows with it"
+    assert page.locator("#live-picture").count() == page.locator("#live-compass").count() == 0
+    chart = page.locator("#live-chart-heave")
+    assert chart.evaluate("svg => svg.viewBox.baseVal.width === svg.clientWidth"), "text has the page's size"
 
 
 def test_words_fit_their_places(tmp_path: Path, quiet: Visitor) -> None:
@@ -407,9 +412,15 @@ def test_words_fit_their_places(tmp_path: Path, quiet: Visitor) -> None:
     page = flying(quiet, target.as_uri()).page
     wide, room = page.evaluate("(span => [span.scrollWidth, span.clientWidth])(document.querySelector('label span'))")
     assert wide <= room
-    title = "surge: u \N{MINUS SIGN}1.165 m/s · V_ss \N{MINUS SIGN}1.211 · Tau 10.65 s"
-    page.evaluate("words => { live.charts[0].title.textContent = words; }", title)
-    assert page.evaluate("live.charts[0].title.getComputedTextLength()") < 298
+    title, marks = "surge: u \N{MINUS SIGN}1.165 m/s", "V_ss \N{MINUS SIGN}1.211 · Tau 10.65 s"
+    lengths = page.evaluate(
+        """words => [live.charts[0].title, live.charts[0].marks].map((text, n) => {
+            text.textContent = words[n];
+            return text.getComputedTextLength();
+        })""",
+        [title, marks],
+    )
+    assert sum(lengths) < 298, "the width from which both stand on one line"
 
 
 def test_a_heading_is_below_360_and_a_track_far_away_is_drawn(page: Any) -> None:
@@ -419,7 +430,7 @@ def test_a_heading_is_below_360_and_a_track_far_away_is_drawn(page: Any) -> None
         live.flight.pilot.model.set("x", 1e17);
         live.zoom(1000);
         live.draw();
-        return live.track.grid.getAttribute("d").split("M").length;
+        return live.picture.grid.getAttribute("d").split("M").length;
     }""")
     assert lines < 40
     assert "north 1.00e17 m" in page.inner_text("#live-readings")
@@ -459,6 +470,254 @@ def test_another_vehicle_flies_the_same_commands_as_a_ghost(tmp_path: Path, quie
     names = [v.name for v in variables(other.rov)]
     assert {name: ghost[names.index(name)] for name in expected} == pytest.approx(expected, rel=1e-11, abs=1e-12)
     assert page.is_checked("#live-ghost")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+@pytest.mark.parametrize("kind", ["videoray", "heavy", "six"])
+def test_the_picture_and_an_even_grid_of_charts_fit_one_screen(
+    kind: str, pages: Callable[[str], str], quiet: Visitor, tmp_path: Path, width: int, height: int, scheme: str
+) -> None:
+    page = flying(quiet, pages(kind), width=width, height=height, scheme=scheme).page
+    page.select_option("#live-test", index=0)
+    page.click("#live-run")
+    until(page, "live.flight.time > 0.1")
+    page.evaluate("scrollTo({ top: 0, behavior: 'instant' })")
+    page.screenshot(path=tmp_path / f"{kind}-{width}-{scheme}.png")
+    picture = page.locator("#live-picture").evaluate(BOX)
+    boxes = [chart.evaluate(BOX) for chart in page.locator(".charts svg").all()]
+    assert len(boxes) == page.evaluate("live.vehicle.axes.length")
+    assert picture["width"] > 0.6 * width
+    assert picture["height"] > 0.25 * height
+    for box in (picture, *boxes):
+        assert box["x"] >= 0
+        assert box["y"] >= 0
+        assert box["x"] + box["width"] <= width
+        assert box["y"] + box["height"] <= height
+    assert {(round(box["width"]), round(box["height"])) for box in boxes} == {
+        (round(boxes[0]["width"]), round(boxes[0]["height"]))
+    }
+    assert min(boxes[0]["width"], 2 * boxes[0]["height"]) > 150
+    in_rows = Counter(round(box["y"]) for box in boxes)
+    assert len({*in_rows.values()}) == 1, "each row has as many charts"
+
+
+def test_each_thruster_has_its_label_and_throws_its_jet_against_its_force(
+    pages: Callable[[str], str], quiet: Visitor, heavy: Vehicle
+) -> None:
+    page = flying(quiet, pages("heavy"), width=1440).page
+    labels = page.locator("#live-picture .craft:not(.ghostly) text").all_text_contents()
+    # The file describes the thrusters by their corners too, in the words of the sea.
+    for label, thruster in zip(labels, heavy.layout.thrusters, strict=True):
+        words = label.replace("left", "port").replace("right", "starboard").split()
+        assert all(word in thruster.description for word in words), (label, thruster.description)
+        assert ("vertical" in words) == ("vertical" in thruster.description)
+    tubes, jets, forces = page.evaluate("""() => {
+        live.pause(true);
+        live.look();
+        live.flight.set({ u_1: -0.4, u_3: 0.4 });
+        live.flight.advance(0.5);
+        live.flight.pilot.model.set("psi", 0);
+        live.draw();
+        const middles = kind => [...document.querySelectorAll(`#live-picture .craft:not(.ghostly) ${kind}`)]
+            .filter(path => path.getAttribute("d"))
+            .map(path => path.getBBox()).map(({ x, y, width, height }) => [x + width / 2, y + height / 2])
+            .sort((one, other) => one[1] - other[1]);
+        const forces = ["F_1", "F_3"].map(name => live.flight.pilot.model.get(name));
+        return [middles(".tube"), middles(".jet:not(.core)"), forces];
+    }""")
+    assert forces[0] < 0.0 < forces[1]
+    assert (len(tubes), len(jets)) == (8, 2)
+    middle = sum(x for x, _ in tubes) / 8
+    # Those of the horizontal thrusters on the starboard side, seen from above with the bow up.
+    inner = sorted((at for at in tubes if at[0] > middle), key=lambda at: at[0])[:2]
+    front, rear = sorted(inner, key=lambda at: at[1])
+    (front_jet, rear_jet) = jets
+    assert heavy.layout.thrusters[0].direction[0] < 0.0 < heavy.layout.thrusters[2].direction[0]
+    for jet, tube, n, force in ((front_jet, front, 0, forces[0]), (rear_jet, rear, 2, forces[1])):
+        ahead, aside, _ = heavy.layout.thrusters[n].direction
+        assert (tube[1] - jet[1]) * force * ahead < 0.0
+        assert (jet[0] - tube[0]) * force * aside < 0.0
+
+
+def test_reset_restores_commands_camera_speed_and_time(page: Any) -> None:
+    before = page.evaluate("[{ ...live.picture.camera }, live.picture.magnified]")
+    page.locator("input[name=u_t]").fill("0.5")
+    for button in ("above", "nearer", "faster", "faster"):
+        page.click(f"#live-{button}")
+    until(page, "live.flight.time > 0.2")
+    page.click("#live-pause")
+    assert page.evaluate("[{ ...live.picture.camera }, live.picture.magnified]") != before
+    assert page.inner_text("#live-speed") == "5×"
+    page.click("#live-reset")
+    page.wait_for_timeout(200)
+    assert page.evaluate("[{ ...live.picture.camera }, live.picture.magnified]") == before
+    assert page.evaluate("[live.flight.time, live.flight.pilot.model.get('z'), live.paused]") == [0, 0, False]
+    assert page.inner_text("#live-speed") == "1×"
+    assert page.input_value("input[name=u_t]") == "0"
+    assert page.inner_text("#live-readings").startswith("0.0 s")
+
+
+def test_time_stands_still_while_nothing_is_commanded(page: Any) -> None:
+    page.wait_for_timeout(200)
+    assert page.evaluate("live.flight.time") == 0
+    page.evaluate("live.speed = 50")
+    page.locator("input[name=u_t]").fill("0.5")
+    until(page, "live.flight.time > 1")
+    page.click("#live-still")
+    until(page, "live.flight.isAtRest()")
+    time = page.evaluate("live.flight.time")
+    page.wait_for_timeout(200)
+    assert page.evaluate("live.flight.time") == time
+    page.locator("input[name=u_t]").fill("0.1")
+    until(page, f"live.flight.time > {time}")
+
+
+def test_a_step_test_stops_at_its_end_and_keeps_its_curve(page: Any, vehicle: Vehicle) -> None:
+    page.evaluate("live.speed = 10")
+    page.select_option("#live-test", label="heave 50 %")
+    page.click("#live-run")
+    until(page, "live.paused")
+    V, Tau = vehicle.rov.response(HEAVE, 0.5)
+    assert page.evaluate("[live.flight.time, live.flight.times[0]]") == pytest.approx([ceil(6.0 * Tau), 0.0])
+    assert "The test has ended." in page.inner_text("#live-message")
+    marks = page.text_content("#live-chart-heave .marks")
+    assert marks == f"V_ss {V:.3f} · Tau {Tau:.2f} s"
+    curve = page.locator("#live-chart-heave path.line:not(.ghostly)").evaluate(BOX)
+    chart = page.locator("#live-chart-heave").evaluate(BOX)
+    assert curve["width"] > 0.8 * chart["width"]
+    page.locator("input[name=u_t]").fill("0.2")
+    until(page, f"live.flight.time > {ceil(6.0 * Tau)}")
+
+
+def test_sliders_show_the_command_that_acts_and_fill_from_the_middle(page: Any) -> None:
+    slider = page.locator("input[name=u_l]")
+    filled = "slider => ['--from', '--to'].map(name => Number(slider.style.getPropertyValue(name)))"
+    assert slider.evaluate(filled) == [0.5, 0.5]
+    slider.fill("0.25")
+    assert slider.evaluate(filled) == [0.5, 0.625]
+    page.focus("#live-stage")
+    page.keyboard.down("KeyS")
+    until(page, "live.flight.pilot.model.get('u_l') === -0.25")
+    assert slider.input_value() == "-0.25"
+    assert slider.get_attribute("aria-valuetext") == "−25 %"
+    assert slider.evaluate(filled) == [0.375, 0.5]
+    page.keyboard.up("KeyS")
+    until(page, "document.querySelector('input[name=u_l]').value === '0.25'")
+    page.evaluate("() => { navigator.getGamepads = () => [{ mapping: 'standard', axes: [0, 0, 0, -0.5] }]; }")
+    until(page, "document.querySelector('input[name=u_l]').value === '0.75'")
+
+
+def test_a_finger_on_a_stick_steers_until_it_is_lifted(browser: Any, pages: Callable[[str], str]) -> None:
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    page = context.new_page()
+    page.goto(pages("videoray"))
+    page.wait_for_selector("#live-section:not([hidden])")
+    box = page.locator("#live-right").evaluate(BOX)
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    finger = context.new_cdp_session(page)
+    touch = "Input.dispatchTouchEvent"
+    finger.send(touch, {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+    finger.send(touch, {"type": "touchMove", "touchPoints": [{"x": x, "y": y - 60}]})
+    until(page, "live.flight.pilot.model.get('u_l') === 1 && live.flight.pilot.model.get('x') > 0.01")
+    assert page.evaluate("scrollY") == 0
+    finger.send(touch, {"type": "touchEnd", "touchPoints": []})
+    until(page, "live.flight.pilot.model.get('u_l') === 0")
+    context.close()
+
+
+def test_the_charts_tell_the_values_under_the_pointer(page: Any, vehicle: Vehicle) -> None:
+    page.locator("input[name=u_t]").fill("0.5")
+    page.evaluate("() => { live.pause(true); live.flight.reset(); live.flight.advance(10); live.draw(); }")
+    page.locator("#live-chart-surge").hover(position={"x": 150, "y": 60})
+    until(page, "live.pointed !== null && !live.changed")
+    words = page.text_content("#live-chart-heave .marks")
+    (time,) = re.findall(r"^at (\S+) s$", words)
+    rest = dict.fromkeys([*vehicle.layout.inputs, *vehicle.layout.state], 0.0)
+    w = vehicle.rov.step(rest | {"u_t": 0.5}, rest, float(time))["w"]
+    title = page.text_content("#live-chart-heave .title")
+    assert float(re.findall(r"w (\S+) m/s", title)[0]) == pytest.approx(w, abs=2e-3)
+    box = page.locator("#live-chart-heave .scale").evaluate(BOX)
+    chart = page.locator("#live-chart-surge").evaluate(BOX)
+    heave = page.locator("#live-chart-heave").evaluate(BOX)
+    assert box["x"] - heave["x"] == pytest.approx(150, abs=2), chart
+    page.mouse.move(5, 5)
+    until(page, "live.pointed === null && !live.changed")
+    assert "V_ss" in page.text_content("#live-chart-heave .marks")
+
+
+def test_an_exported_flight_can_be_flown_and_inspected(page: Any, tmp_path: Path) -> None:
+    page.evaluate("""() => {
+        live.pause(true);
+        for (const commands of [{ u_l: 0.5, u_r: 0.4 }, { u_t: -0.3 }, { u_r: -0.2 }]) {
+            live.flight.set(commands);
+            live.flight.advance(2);
+        }
+        Object.assign(live.held, { u_l: 0.5, u_r: -0.2, u_t: -0.3 });
+    }""")
+    with page.expect_download() as download:
+        page.click("#live-export")
+    assert download.value.suggested_filename == "videoray.csv"
+    log = tmp_path / "videoray.csv"
+    download.value.save_as(log)
+    drop(page, log.name, log.read_bytes())
+    until(page, "live.flight.playback !== null")
+    page.evaluate("live.speed = 50")
+    until(page, "live.paused && live.flight.playback?.next() === null")
+    line = page.inner_text("#live-message")
+    deviations = [float(number) for number in re.findall(r"(?:surge|heave|yaw) (\S+) ", line)]
+    assert len(deviations) == 3
+    assert max(deviations) < 1e-12, line
+    assert main(["identify", "--inspect", str(log)]) == 0
+
+
+def test_a_link_contains_vehicle_commands_and_tuning(page: Any, pages: Callable[[str], str], visit: Visitor) -> None:
+    page.locator("summary", has_text="Tuning").click()
+    page.locator("input[name=u_t]").fill("-0.4")
+    page.locator("input[name=alpha_w]").fill("1.5")
+    page.evaluate("() => { navigator.clipboard.writeText = async () => { throw new Error('not allowed'); }; }")
+    page.click("#live-share")
+    link = page.url
+    assert link == f"{pages('videoray')}#vehicle=videoray&u_t=-0.4&alpha_w=1.5"
+    assert "address of this page" in page.inner_text("#live-message")
+    there = flying(visit, link).page
+    until(there, "live.flight.time > 0.2")
+    assert there.evaluate("['u_t', 'alpha_w', 'u_l'].map(name => live.flight.pilot.model.get(name))") == [-0.4, 1.5, 0]
+    for hash, message in (
+        ("vehicle=heavy&u_1=1", "The link is for the vehicle “heavy”, and this page flies “videoray”."),
+        ("vehicle=videoray&u_t=fast&u_x=1", "The link has values that this page cannot use: u_t, u_x."),
+    ):
+        there.evaluate("hash => { location.hash = hash; }", hash)
+        until(there, "!document.getElementById('live-message').textContent.startsWith('Time')")
+        there.wait_for_timeout(100)
+        assert there.inner_text("#live-message") == message
+    there.evaluate("() => { location.hash = 'vehicle=videoray&u_t=7'; }")
+    until(there, "live.flight.pilot.model.get('u_t') === 1")
+
+
+def test_the_ghost_is_lightly_filled_and_each_line_has_its_own_dash(page: Any) -> None:
+    style = "(path, name) => getComputedStyle(path)[name]"
+    page.evaluate("() => { live.flight.ghostShown = true; live.draw(); }")
+    assert 0.0 < float(page.locator(".ghostly .float.end").evaluate(style, "fillOpacity")) < 0.3
+    assert page.locator(".ghostly .float.end").evaluate(style, "fill") != "none"
+    chart = "#live-chart-heave "
+    dashes = [
+        page.locator(chart + name).evaluate(style, "strokeDasharray") for name in (".steady", ".measured", ".ghostly")
+    ]
+    assert len({*dashes}) == 3
+    assert dashes[2] == "none"
+
+
+def test_a_compact_page_shows_the_picture_and_the_charts_in_a_small_frame(tmp_path: Path, quiet: Visitor) -> None:
+    target, vehicle = tmp_path / "compact.html", load_vehicle(SHIPPED["videoray"])
+    target.write_text(fly_page([Flown(vehicle, module(vehicle.rov))], compact=True), encoding="utf-8")
+    page = flying(quiet, target.as_uri(), width=720, height=620).page
+    for shown in ("#live-picture", "#live-chart-surge", "#live-reset", "#live-right"):
+        box = page.locator(shown).evaluate(BOX)
+        assert box["height"] > 15
+        assert box["y"] + box["height"] <= 620
+    assert not page.locator("#live-controls").is_visible()
+    assert page.evaluate("document.documentElement.scrollHeight") <= 620
 
 
 # ---- Recordings ------------------------------------------------------------------------------------------------------
@@ -575,16 +834,20 @@ def test_the_page_says_why_a_file_is_no_recording_and_the_model_flies_on(page: A
 
 
 def test_a_file_is_taken_where_it_is_dropped(page: Any, vehicle: Vehicle) -> None:
+    page.evaluate("document.getElementById('live-picture').dispatchEvent(new DragEvent('dragover', { bubbles: true }))")
+    outline = "() => getComputedStyle(document.querySelector('.deck')).outlineStyle"
+    assert page.evaluate(outline) == "dashed", "the page shows that it takes the file"
     page.evaluate(
         """text => {
             const dataTransfer = new DataTransfer();
             dataTransfer.items.add(new File([text], "pool.csv"));
-            document.getElementById("live-track").dispatchEvent(
+            document.getElementById("live-picture").dispatchEvent(
                 new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
         }""",
         a_recording(vehicle),
     )
     until(page, "live.flight.playback !== null")
+    assert page.evaluate(outline) == "none"
     page.locator("input[name=u_t]").fill("0.5")
     until(page, "live.flight.pilot.model.get('u_t') === 0.5")
     assert page.evaluate("live.flight.playback") is None, "the pilot has control again"

@@ -2,8 +2,10 @@
 
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from datetime import date
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +14,20 @@ from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content, python_content
+from rov_fmu.identify.findings import _SENTENCES
 from rov_fmu.identify.identification import Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.next_test import NextTest
-from rov_fmu.identify.recordings.recordings_fit import Effect
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect
 from rov_fmu.model.layout import HEAVE, SURGE, YAW
 from rov_fmu.model.rov import Rov
+from rov_fmu.report import report
 from rov_fmu.report.console_results import print_identification
+from rov_fmu.report.findings import DOUBTS, FACTS, by_heading
+from rov_fmu.report.overview import kind_of_data, shown_prediction
 from rov_fmu.report.page.fmu_page import documentation_page
-from rov_fmu.report.report import report_page
-from rov_fmu.report.templates import number
+from rov_fmu.report.templates import number, sentence, with_interval
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -29,8 +35,10 @@ from tests.commands import ROOT, TESTS
 from tests.folders import DOWN, SPEED, folder_of, pulled, read
 from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
 from tests.recordings import PLANS, clean, write_log
+from tests.report.conftest import Visit
 from tests.report.pages import check_is_whole, check_refers_to_itself_alone, rows, text_of
 
+report_page = partial(report.report_page, made=date(2026, 11, 23))
 PAGES = ["of_tables", "of_recordings"]
 ONE_AXIS = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n0.3,0.4\n0.5,0.62\n0.8,1.0\n"}
 """The tank tests of a vehicle with one axis."""
@@ -90,7 +98,7 @@ def test_the_page_is_whole_loads_nothing_and_answers_three_questions_first(page:
     check_is_whole(page)
     check_refers_to_itself_alone(page)
     assert not list(html.fromstring(page).iter("script"))
-    assert sections(page)[:4] == ["predicts", "known", "next", "warnings"]
+    assert sections(page)[:5] == ["overview", "predicts", "known", "next", "warnings"]
     assert "nan" not in re.findall(r"[a-z]+", text_of(page)), "a dash stands where there is no number"
 
 
@@ -108,8 +116,8 @@ def test_inputs_coefficients_and_intervals_have_their_rows(results: Identificati
     coefficients = {row[0]: row for row in reversed(table) if len(row) == 7}  # the first of each name
     for name in results.vehicle.layout.coefficients:
         row, interval = coefficients[name], results.vehicle.intervals.get(name)
-        assert row[2] == f"{results.vehicle.rov[name]:.5g}"
-        assert row[3:5] == ([f"{end:.4g}" for end in interval] if interval else ["", ""])
+        value = results.vehicle.rov[name]
+        assert row[2:5] == (with_interval(value, interval) if interval else [number(value, 5), "", ""])
         assert row[6] == results.vehicle.sources[name]
 
 
@@ -117,8 +125,7 @@ def test_fitted_coefficients_are_in_a_plot_and_a_table(results: Identification, 
     table = {row[0]: row for row in reversed(rows(page)) if len(row) in (4, 5)}
     fitted = {name for result in results.axes if result.estimate for name in result.estimate.names}
     for name in fitted:
-        low, high = results.vehicle.intervals[name]
-        assert table[name][1:4] == [number(results.vehicle.rov[name], 4), number(low, 3), number(high, 3)]
+        assert table[name][1:4] == with_interval(results.vehicle.rov[name], results.vehicle.intervals[name])
     (plot,) = [svg for svg in html.fromstring(page).iter("svg") if svg.get("aria-label") == "What is known"]
     labels = {text.text_content() for text in plot.iter("text")}
     assert {"a_d_u", "b_d_w"} <= fitted <= labels
@@ -129,7 +136,7 @@ def test_warnings_points_and_predictions_of_tables(of_tables: Identification, pa
     page = pages[id(of_tables)]
     items = [item.text_content().strip() for item in html.fromstring(page).iter("li")]
     assert of_tables.warnings
-    assert {f"{warning}." for warning in of_tables.warnings} <= set(items)
+    assert {sentence(f"{warning}.") for warning in of_tables.warnings} <= set(items)
     table = rows(page)
     for comparison in compare(of_tables):
         for n, p in enumerate(comparison.points):
@@ -186,10 +193,47 @@ def test_measured_and_fitted_values_stand_side_by_side(of_recordings: Identifica
     }
     assert {*listed} == {"a_t_rear", "b_t_rear", "a_t_top", "b_t_top"}
     for name, row in listed.items():
-        assert row[1] == number(of_recordings.thrust[name[4:]].values[name], 4)
-        assert row[5] == number(of_recordings.vehicle.rov[name], 4), "the vehicle has the fitted value"
+        measured = of_recordings.thrust[name[4:]].estimate
+        assert row[1:4] == with_interval(measured[name], measured.interval(name))
+        assert row[5] == with_interval(of_recordings.vehicle.rov[name], of_recordings.vehicle.intervals[name])[0]
         assert row[-1] in ("agree", "they differ")
     assert "a thruster pushes less in motion than held at a scale" in text_of(pages[id(of_recordings)])
+
+
+def test_the_opening_screen_shows_an_unseen_recording_with_its_band(
+    of_recordings: Identification, pages: Mapping[int, str]
+) -> None:
+    """Most of the predicted samples are inside; the band of a prediction by half a recording is an approximation."""
+    shown = shown_prediction(of_recordings)
+    assert shown
+    assert shown.half_band is not None
+    assert 0.7 <= (shown.share_inside or 0.0) <= 1.0
+    later = shown.later
+    assert np.all(shown.half_band[later] < 0.1 * np.ptp(shown.measured))
+    page = pages[id(of_recordings)]
+    assert shown.file in text_of(page)
+    labels = [svg.get("aria-label") for svg in html.fromstring(page).iter("svg")]
+    assert labels[:2] == ["Prediction of an unseen recording", "Error of this prediction"]
+    assert "Correlation: surge" in labels
+    assert "Identification from tank tests · 2026-11-23" in text_of(page)
+
+
+def test_every_kind_of_finding_is_a_fact_a_doubt_or_a_warning() -> None:
+    assert {*_SENTENCES} >= FACTS | DOUBTS
+    assert not FACTS & DOUBTS
+    groups = by_heading([Finding("constant motion", "surge", file="A b.csv", names={"quantity": "depth"})])
+    assert groups["Facts"] == ("A b.csv: no recording of surge: the depth never changes",)
+    assert sentence("a b.csv: 3 pulses of 0 or 65535 us, -55%") == "a b.csv: 3 pulses of 0 or 65535 µs, −55 %"
+
+
+def test_a_log_of_several_axes_is_a_dive_log(of_recordings: Identification) -> None:
+    tests = of_recordings.tests
+    assert kind_of_data(tests) == "tank tests"
+    dives = {
+        axis: tuple(replace(r, file="dive.bin") for r in recordings) for axis, recordings in tests.recordings.items()
+    }
+    assert kind_of_data(replace(tests, recordings=dives)) == "tank tests and a dive log"
+    assert kind_of_data(replace(tests, recordings=dives, thrust={})) == "a dive log"
 
 
 # ---- Without plots ---------------------------------------------------------------------------------------------------
@@ -207,8 +251,8 @@ def test_the_next_tests_begin_with_the_worst_axis(of_tables: Identification) -> 
     (listed,) = html.fromstring(report_page(replace(of_tables, axes=axes))).iter("ol")
     items = [" ".join(item.text_content().split()) for item in listed.iter("li")]
     assert [item.split(":")[0] for item in items] == ["Heave", "Yaw", "Surge"]
-    assert items[0] == "Heave: do 1 < 3. It makes a_d_w identifiable, which the data do not tell yet."
-    assert items[1].endswith("would have an interval of 40 % of that width.")
+    assert items[0] == "Heave: do 1 < 3. It makes a_d_w identifiable, which it is not yet."
+    assert items[1].endswith("would shrink to 40 % of its width.")
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -217,14 +261,14 @@ def test_other_effects_are_listed_kept_or_not(of_recordings: Identification) -> 
     assert heave.recordings
     file = heave.recordings.simulations[0].recording.file
     acts = (
-        Effect("load", "heave", "N", -0.25, (-0.3, -0.2), kept=True),
-        Effect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),
-        Effect("delay", file, "s", 0.001, None, kept=False),
+        FittedEffect("load", "heave", "N", -0.25, (-0.3, -0.2), kept=True),
+        FittedEffect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),
+        FittedEffect("delay", file, "s", 0.001, None, kept=False),
     )
     axes = (of_recordings.axes[0], replace(heave, recordings=replace(heave.recordings, effects=acts)))
     page = report_page(replace(of_recordings, axes=axes))
-    assert ["Constant load", "heave", "−0.25", "−0.3", "−0.2", "N", "kept"] in rows(page)
-    assert ["Delay from the commands to the motion", file, "0.001", "–", "–", "s", "left at 0"] in rows(page)
+    assert ["Constant load", "heave", "−0.25", "−0.30", "−0.20", "N", "kept"] in rows(page)
+    assert ["Delay from the commands to the motion", file, "0.001000", "", "", "s", "left at 0"] in rows(page)
     assert "The fitted delay of 0.21 s is shaded." in text_of(page)
     folded = [fold.text_content() for fold in html.fromstring(page).iter("details")]
     assert any("Sought in single recordings too, and left at zero: 1" in fold and file in fold for fold in folded)
@@ -256,12 +300,11 @@ def test_the_printout_is_short_and_says_the_same(
 ) -> None:
     surge, heave, *others = of_recordings.axes
     assert heave.recordings
-    acts = (Effect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),)
+    acts = (FittedEffect("delay", "heave", "s", 0.21, (0.2, 0.22), kept=True),)
     heave = replace(
         heave,
         recordings=replace(heave.recordings, effects=acts),
         next_test=NextTest(HEAVE, "a_d_w", (10.0, 20.0), 0.5, 0.25, "a dive"),
-        steps=heave.steps[:1] * 30,
     )
     print_identification(replace(of_recordings, axes=(surge, heave, *others)))
     out = capsys.readouterr().out
@@ -270,11 +313,11 @@ def test_the_printout_is_short_and_says_the_same(
     predicted, unchanged, noise = (float(n) for n in first.split()[4:10:2])
     assert noise < predicted < 3.0 * noise < 0.1 * unchanged
     assert first.endswith("% halves of log_heave_a&b $1.csv")
-    assert "heave 0.21 0.2 0.22 s delay from the commands to the motion" in words
+    assert "heave 0.210 0.200 0.220 s delay from the commands to the motion" in words
     assert "- heave: a dive (a_d_w, now 10 ... 20; then 75% narrower)" in words
-    assert "and 10 more: --report lists them all" in words
-    order = [out.index(part) for part in ("Prediction of", "Coefficients", "What else acts", "To measure next", "held")]
+    order = [out.index(part) for part in ("Prediction of", "Identified coefficients", "What else acts", "To measure")]
     assert order == sorted(order)
+    assert len(words) < 60
 
 
 # ---- Any data -------------------------------------------------------------------------------------------------------
@@ -390,3 +433,23 @@ def test_figures_of_the_paper_are_those_that_ship(tmp_path: Path) -> None:
     assert shown == expected
     for figure in ("5", "6", "7", "8", "9", "11a", "11b"):
         assert any(words.startswith(f"Figure {figure}: ") for words in shown), figure
+
+
+# ---- In a browser ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", [390, 1440])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_is_accessible_and_as_wide_as_the_screen(
+    page: str, visit: Callable[..., Visit], tmp_path: Path, width: int, scheme: str
+) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    (tmp_path / "report.html").write_text(page, encoding="utf-8")
+    shown = visit(width=width, scheme=scheme)
+    shown.page.goto((tmp_path / "report.html").as_uri())
+    assert shown.page.evaluate("document.documentElement.scrollWidth") <= width
+    found = axe.Axe().run(shown.page)
+    assert not [(one["id"], one["nodes"][0]["html"]) for one in found.response["violations"]]
+    widths = shown.page.evaluate("[...document.querySelectorAll('svg')].map((svg) => svg.clientWidth)")
+    assert max(widths) - min(widths) <= 2, "so the text of all plots has one size"
+    assert not shown.problems()

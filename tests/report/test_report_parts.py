@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings.held_out import HeldOut
-from rov_fmu.identify.recordings.recordings_fit import Effect, RecordingsFit
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
@@ -22,9 +22,9 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 DELAY_TIME = 0.4  # s, between commands and motion
-LOAD = Effect("load", "heave", "N", 0.0, (-0.1, 0.1), kept=False)
-DELAY = Effect("delay", "heave", "s", DELAY_TIME, (0.39, 0.41), kept=True)
-OF_FILE = Effect("delay", "b.csv", "s", 0.1, None, kept=True)
+LOAD = FittedEffect("load", "heave", "N", 0.0, (-0.1, 0.1), kept=False)
+DELAY = FittedEffect("delay", "heave", "s", DELAY_TIME, (0.39, 0.41), kept=True)
+OF_FILE = FittedEffect("delay", "b.csv", "s", 0.1, None, kept=True)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def recorded(
     return Simulation(recording, time, depth + noise, depth, velocity, 1e-5, white, 3)
 
 
-def result_of(k: Rov, *simulations: Simulation, acts: tuple[Effect, ...] = ()) -> AxisResult:
+def result_of(k: Rov, *simulations: Simulation, acts: tuple[FittedEffect, ...] = ()) -> AxisResult:
     estimate = Estimate((), np.zeros(0), np.zeros((0, 0)), 1.0, 1.0)
 
     fit = RecordingsFit(HEAVE, k, estimate, estimate, simulations, acts, lambda: HeldOut((), by_halves=False))
@@ -147,7 +147,7 @@ def test_the_model_is_drawn_as_the_sensor_would_measure_it(k: Rov) -> None:
 
 
 def test_effects_kept_come_first_and_the_others_are_left_at_nothing(k: Rov) -> None:
-    ratio = Effect("reverse thrust", "top", "1", 0.98, (0.9, 1.1), kept=False)
+    ratio = FittedEffect("reverse thrust", "top", "1", 0.98, (0.9, 1.1), kept=False)
     result = result_of(k, recorded("b.csv", {4.0: 0.7}), acts=(LOAD, ratio, DELAY))
     assert effects(result) == (DELAY, LOAD, ratio)
     assert [verdict(effect) for effect in effects(result)] == ["kept", "left at 0", "left at 1"]

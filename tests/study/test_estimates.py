@@ -13,6 +13,7 @@ from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
+from rov_fmu.report.templates import sentence
 from rov_fmu.study import Results
 from rov_fmu.study.plan.estimates import Estimates
 from rov_fmu.study.plan.model import Variable
@@ -195,7 +196,7 @@ def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(
     warnings = done.results.warnings
     assert warnings[0].startswith("the FMU has other values than made.toml of b_d_w (0.6324, not 0.372294), a_d_r (0.")
     assert warnings[1:] == ("what is correlated has one Sobol index together: a_d_u and b_d_u",)
-    assert items == [f"{warning}." for warning in warnings]
+    assert items == [f"{sentence(warning)}." for warning in warnings]
     assert done.lines == [f"rov-fmu: warning: {warning}" for warning in warnings]
     varied = {row[0].text_content(): row[1].text_content() for row in page.xpath("//h2[@id='varied']/following::tr")}
     assert varied["b_d_u"] == "estimate: value 5, error 0.3; correlated with a_d_u"

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 from scipy.stats import kstest, norm, qmc, spearmanr
 
 from rov_fmu.cli import main
 from rov_fmu.vehicle.schema import Estimated
-from rov_fmu.vehicle.uncertainty import Uncertainty
+from rov_fmu.vehicle.uncertainty import Uncertainty, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, REFIT
@@ -259,3 +261,41 @@ def test_the_table_is_readable(refit: Vehicle) -> None:
     assert names == list(refit.estimates)
     for n, name in enumerate(names):
         assert {*refit.estimates[name].correlation} <= {*names[:n]}
+
+
+# ---- Intervals as text -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value", "interval", "texts"),
+    [
+        (36.98, (36.974, 37.004), ("36.98", "36.97", "37.00")),
+        (0.1195, (0.1187, 0.1202), ("0.1195", "0.1187", "0.1202")),
+        (12345.0, (12201.0, 12500.0), ("12340", "12200", "12500")),
+        (-0.004, (-1.2, 1.2), ("-0.0040", "-1.2", "1.2")),
+        (0.0012, (0.0, 40.0), ("0.0012", "0", "40")),
+        (1e-7, (0.9e-7, 1.1e-7), ("1.00e-7", "9.0e-8", "1.10e-7")),
+        (2.5, None, ("2.500", "", "")),
+        (2.5, (2.5, 2.5), ("2.500", "2.500", "2.500")),
+    ],
+)
+def test_a_value_has_the_digits_of_its_interval(
+    value: float, interval: tuple[float, float] | None, texts: tuple[str, str, str]
+) -> None:
+    assert with_interval(value, interval) == texts
+
+
+SIZES = st.floats(-1e12, 1e12).filter(lambda x: x == 0.0 or abs(x) > 1e-12)
+"""Numbers of every size that a coefficient may have."""
+PARTS = st.floats(1e-9, 1e9)
+"""Half the width of an interval, as a part of its value."""
+
+
+@given(SIZES, PARTS, PARTS)
+def test_no_written_interval_excludes_its_value_or_hides_its_width(value: float, below: float, above: float) -> None:
+    size = abs(value) or 1.0
+    low, high = value - below * size, value + above * size
+    middle, *ends = (float(text) for text in with_interval(value, (low, high)))
+    assert ends[0] <= middle <= ends[1]
+    assert 0.5 * (high - low) <= ends[1] - ends[0] <= 1.5 * (high - low)
+    assert value == 0.0 or abs(middle / value - 1.0) < 0.051, "the value keeps two digits"

@@ -14,7 +14,7 @@ from rov_fmu.tank.recording import Recording
     "seed", [pytest.param(n, marks=pytest.mark.weekly if n else pytest.mark.long) for n in range(3)]
 )
 def test_nothing_is_said_of_a_dive_by_hand_with_all_axes_at_once(seed: int) -> None:
-    swum, k = dive(seed=seed), bluerov2()
+    swum, k = dive(240.0, seed), bluerov2()
     outputs = {name: (output - 1500.0) / 400.0 for name, output in swum.outputs.items()}
     random = np.random.default_rng(seed)
     for axis in (form.axis for form in k.layout.axes):

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.fmu.archive import REPORT
@@ -32,7 +31,7 @@ from rov_fmu.report.plots.steps import (
     measured_step,
     tables_by_axis,
 )
-from rov_fmu.report.plots.svg import LIGHT, image, inline_svg, svg_file
+from rov_fmu.report.plots.svg import LIGHT, image, inline_svg
 from rov_fmu.report.templates import page
 from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -263,17 +262,6 @@ def plot_steps(ax: Axes, rov: Rov, axis: Axis, commands: Sequence[Decimal], tabl
         steps += [Step(-step.command) for step in steps]
     draw_steps(ax, axis, steps, [(rov, "-")])
     ax.set_title(f"{axis.name.capitalize()}: ${axis.velocity}$ ({axis.unit})", loc="left")
-
-
-def steady_picture(vehicle: Vehicle) -> str:
-    """Return plots of V_ss of all axes, side by side, as an SVG file."""
-    tables, axes = tables_by_axis(vehicle), [form.axis for form in vehicle.layout.axes]
-
-    def draw(figure: Figure) -> None:
-        for ax, axis in zip(figure.subplots(1, len(axes), squeeze=False)[0], axes, strict=True):
-            plot_steady(ax, vehicle, axis, tables.get(axis.name))
-
-    return svg_file(draw, (len(axes) * _PANEL[0], _PANEL[1]), salt="steady") + "\n"
 
 
 def _plot(label: str, draw: Callable[[Axes], None], size: tuple[float, float] = _PANEL) -> Markup:

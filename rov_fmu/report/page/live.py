@@ -25,7 +25,9 @@ from rov_fmu.vehicle.vehicle import Vehicle
 _KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
 """The letters of the keys for the positive and the negative direction of an axis."""
 _SPARE_KEYS = ("LJ", "IK")
-_SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "controls.js")
+_VERTICAL = 0.9
+"""The least vertical part of a thruster's direction for which its label says that it is vertical."""
+_SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "picture.js", "controls.js")
 # The comments and types are for readers of the source. They are a quarter of it, and are left out of the page.
 _COMMENT = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ ")
 
@@ -52,6 +54,8 @@ class Live:
     """The labels of the step tests that a button starts."""
     keys: Sequence[tuple[Axis, str]]
     """The axes, each with the letters of its keys: that of its positive direction, and that of its negative one."""
+    places: Mapping[str, str]
+    """Where the thruster is that a command drives alone."""
     start: Mapping[str, float]
     """The start value of each variable."""
     loads: Sequence[tuple[str, float, str]]
@@ -76,6 +80,7 @@ def live(flown: Sequence[Flown]) -> Live:
         policy=f"; script-src 'sha256-{digest}' 'wasm-unsafe-eval'",
         tests=[f"{pilot.layout.axes[t['axis']].axis.name} {number(100.0 * t['command'], 3)} %" for t in tests],
         keys=[(form.axis, keys) for form, keys in zip(pilot.layout.axes, _keys(pilot.layout), strict=True)],
+        places=_places(pilot.rov),
         start=start,
         loads=list(_loads(pilot.rov, start)),
         tunable=list(_tunable(pilot.rov)),
@@ -83,19 +88,21 @@ def live(flown: Sequence[Flown]) -> Live:
     )
 
 
-def fly_page(flown: Sequence[Flown]) -> str:
+def fly_page(flown: Sequence[Flown], *, compact: bool = False) -> str:
     """Return a page that has only the live section: the first vehicle and the second one as a ghost.
 
+    The compact form, for a frame in another page, shows the picture, the charts and the buttons only.
     Raises DataFileError.
     """
     vehicle = flown[0].vehicle
-    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=live(flown))
+    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=live(flown), compact=compact)
 
 
 def _data(flown: Flown) -> dict[str, Any]:
     """Return the data of a vehicle for the scripts."""
     vehicle, rov, layout = flown.vehicle, flown.vehicle.rov, flown.vehicle.layout
     return {
+        "identifier": vehicle.identifier,
         "name": vehicle.name,
         "module": base64.b64encode(zlib.compress(flown.module, 9)).decode(),
         "variables": [(v.name, 0.0 if v.name in layout.commands else v.start or 0.0) for v in variables(rov)],
@@ -105,7 +112,10 @@ def _data(flown: Flown) -> dict[str, Any]:
         "commands": list(layout.commands),
         "mixed": bool(layout.mix),
         "axes": [_axis(rov, form.axis, keys) for form, keys in zip(layout.axes, _keys(layout), strict=True)],
-        "thrusters": [_thruster(rov, thruster) for thruster in layout.thrusters],
+        "thrusters": [
+            _thruster(rov, thruster, label) for thruster, label in zip(layout.thrusters, _labels(rov), strict=True)
+        ],
+        "fins": [{"at": fin.position, "along": fin.direction} for fin in layout.fins],
         "tunable": [name for name, meta in layout.coefficients.items() if meta.tunable],
         "tests": list(_tests(vehicle)),
         "size": size_of(rov),
@@ -155,15 +165,43 @@ def _shares(rov: Rov, axis: Axis) -> dict[str, float]:
     return {name: share for name, share in found.items() if share}
 
 
-def _thruster(rov: Rov, thruster: Thruster) -> dict[str, Any]:
+def _thruster(rov: Rov, thruster: Thruster, label: str) -> dict[str, Any]:
     curve = rov.layout.curve_of[thruster.name]
     most = max(abs(rov.curve_force(curve, command)) for command in (1.0, -1.0))
     return {
         "force": f"F_{thruster.name}",
-        "at": place(rov, thruster)[:2],
+        "label": label,
+        "at": place(rov, thruster),
         "along": thruster.direction,
         "most": most or 1.0,
     }
+
+
+def _places(rov: Rov) -> dict[str, str]:
+    """Return the label of the thruster that a command drives alone, by the command."""
+    if rov.layout.mix:
+        return {}
+    return {f"u_{one.name}": label for one, label in zip(rov.layout.thrusters, _labels(rov), strict=True)}
+
+
+def _labels(rov: Rov) -> list[str]:
+    """Return where each thruster is ("left rear"). Thrusters at the same place also have their names."""
+    found = [_label(rov, thruster) for thruster in rov.layout.thrusters]
+    return [
+        label if found.count(label) == 1 else f"{thruster.name} {label}".rstrip()
+        for label, thruster in zip(found, rov.layout.thrusters, strict=True)
+    ]
+
+
+def _label(rov: Rov, thruster: Thruster) -> str:
+    x, y, _ = place(rov, thruster)
+    least = 0.2 * size_of(rov)
+    words = [
+        "left" if y < -least else "right" if y > least else "",
+        "rear" if x < -least else "front" if x > least else "",
+        "vertical" if abs(thruster.direction[2]) > _VERTICAL else "",
+    ]
+    return " ".join(word for word in words if word)
 
 
 def _tests(vehicle: Vehicle) -> Iterator[dict[str, Any]]:

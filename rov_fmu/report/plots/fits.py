@@ -146,15 +146,9 @@ def plot_known(figure: Figure, found: Sequence[Known]) -> None:
 
 
 def _ticks(sizes: Sequence[float], reach: float) -> Iterator[float]:
-    """Yield the outermost tick within reach, and one nearer to the middle."""
-    places = {size: place for size in sizes if (place := abs(log(1.0 + size))) <= reach}
-    if not places:
-        return
-    outermost = list(places)[-1]
-    yield outermost
-    nearer = [size for size, place in places.items() if 0.25 * reach < place <= 0.55 * places[outermost]]
-    if nearer:
-        yield nearer[-1]
+    """Yield the outermost tick within reach. More of them would not fit beside each other."""
+    within = [size for size in sizes if abs(log(1.0 + size)) <= reach]
+    yield from within[-1:]
 
 
 def _band(ax: Axes, x: Array, low: Array, high: Array, color: str) -> None:

@@ -17,15 +17,15 @@ from rov_fmu.identify.points.quadratic_fit import fit_quadratic, quadratic
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.model.layout import SURGE
 from rov_fmu.model.rov import Rov
-from rov_fmu.report.page.fmu_page import steady_picture
 from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
 from rov_fmu.report.plots.svg import LIGHT, svg_file
 from rov_fmu.vehicle.published import ResponseTable, untuned
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 NAME = "paper_figures.svg"
 _SIZE = (11.1, 9.6)  # inches
+_STEADY_SIZE = (11.1, 2.9)  # inches
 _STEPS = (30, 50, 70)  # %
 _STEP_TITLES = {
     "heave": "Figure 11a: heave",
@@ -42,15 +42,33 @@ _NOT_PRINTED = (
 
 
 def write_figures(folder: Path) -> list[Path]:
-    """Write an SVG file with the figures and one with V_ss of the three axes; return their paths. Raises WriteError."""
-    vehicle = load_vehicle(VIDEORAY)
+    """Write an SVG file with the figures, and one with V_ss of the paper's model and of the refit; return their paths.
+
+    Raises WriteError.
+    """
+    vehicle, refit = load_vehicle(VIDEORAY), load_vehicle(SHIPPED["videoray_refit"])
+    steady = partial(_draw_steady, vehicle=vehicle, refit=refit.rov)
     pictures = {
         NAME: svg_file(partial(_draw, vehicle=vehicle), _SIZE, salt=NAME) + "\n",
-        f"{vehicle.identifier}.svg": steady_picture(vehicle),
+        f"{vehicle.identifier}.svg": svg_file(steady, _STEADY_SIZE, salt="steady") + "\n",
     }
     outputs = [Output(folder / name, text.encode()) for name, text in pictures.items()]
     write_whole(*outputs)
     return [output.path for output in outputs]
+
+
+def _draw_steady(figure: Figure, vehicle: Vehicle, refit: Rov) -> None:
+    """Draw V_ss over the command for every axis: the paper's model, the refit, and the paper's measurements."""
+    tables, commands = tables_by_axis(vehicle), range(0, 101, 2)
+    models = [("paper's model", vehicle.rov, "grey", "--"), ("refit", refit, "blue", "-")]
+    for ax, axis in zip(figure.subplots(1, len(tables)), (form.axis for form in vehicle.layout.axes), strict=True):
+        for label, rov, color, dashes in models:
+            V_ss = [rov.response(axis, command / 100.0)[0] for command in commands]
+            ax.plot(commands, V_ss, dashes, label=label, color=LIGHT[color], linewidth=1.8)
+        points = [(float(command), float(V)) for command, V in tables[axis.name].steady.items()]
+        ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
+        finish(ax, f"{axis.name.capitalize()}: $V_{{ss}}$ ({axis.unit})", "command (%)")
+        ax.set_xlim(0, 100)
 
 
 def _draw(figure: Figure, vehicle: Vehicle) -> None:

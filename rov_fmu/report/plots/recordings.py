@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.identify.driving import thrust_along
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
-from rov_fmu.identify.recordings.runs import prepare, push
+from rov_fmu.identify.simulation.prepared import prepare
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.residuals import finish_residuals, with_residuals
 from rov_fmu.report.plots.svg import LIGHT
@@ -51,7 +52,7 @@ def plot_recording(figure: Figure, result: AxisResult, simulation: Simulation) -
     parts = np.array_split(np.arange(len(simulation.time)), min(_BINS, len(simulation.time)))
     low, high = ([pick(simulation.residuals[part]) for part in parts] for pick in (np.min, np.max))
     below.fill_between([simulation.time[part[0]] for part in parts], low, high, color=LIGHT["orange"], linewidth=0.6)
-    above.set_title(f"${axis.velocity}$ ({axis.unit})", loc="left")
+    above.set_ylabel(f"${axis.velocity}$ ({axis.unit})")
     above.set_xlim(float(simulation.time[0]), float(simulation.time[-1]))
     above.locator_params(nbins=6)
     below.set_xlabel("time (s)")
@@ -116,8 +117,7 @@ def _strongest(simulation: Simulation, rov: Rov) -> CommandStep | None:
     """Return the strongest step in a recording, or None if there is no step far enough from its ends."""
     recording, axis = simulation.recording, simulation.recording.axis
     data = prepare(recording, rov)
-    curves = [curve for curve in rov.layout.curves if any(t.curve == curve.name for t in rov.layout.drivers(axis))]
-    force = np.sum([push(rov, axis, curve, data.commands).force for curve in curves], axis=0)
+    force = thrust_along(rov, axis, data.commands)
     at = data.switches[1:]
     after = force[np.searchsorted(data.switches, at + _SETTLED, side="right") - 1]
     strength = np.abs(after - force[:-1]) * np.where(force[:-1] == 0.0, _FROM_REST, 1.0)
@@ -157,7 +157,7 @@ def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
         ax.plot(*_thin(time[near] - step.at, v[near]), color=LIGHT[color], linewidth=width, alpha=alpha, label=label)
     ax.margins(y=0.14)
     ax.set(xlim=(low, high), xlabel="time after the change of the command (s)")
-    ax.set_title(f"${axis.velocity}$ ({axis.unit})", loc="left")
+    ax.set_ylabel(f"${axis.velocity}$ ({axis.unit})")
     ax.locator_params(nbins=6)
     _legend(ax)
 

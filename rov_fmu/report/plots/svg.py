@@ -13,6 +13,7 @@ from markupsafe import Markup
 from matplotlib import style
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from rov_fmu.io.picture import read_svg
 
@@ -78,6 +79,17 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
     for role, color in LIGHT.items():
         svg = svg.replace(color, f"var(--{role})")
     return Markup(svg)
+
+
+def with_even_text(draw: Draw) -> Draw:
+    """Return a function that draws the same figure with all text in one size."""
+
+    def drawn(figure: Figure) -> None:
+        draw(figure)
+        for text in figure.findobj(Text):
+            text.set_fontsize(_STYLE["font.size"])
+
+    return drawn
 
 
 def image(label: str, path: Path) -> Markup:

@@ -3,7 +3,7 @@
 import numpy as np
 from rich.text import Text
 
-from rov_fmu.report.console import console, table, text
+from rov_fmu.report.console import console, print_table, table, text
 from rov_fmu.study.results.page import axis_label
 from rov_fmu.study.results.results import Results
 from rov_fmu.study.run.cluster import Spent
@@ -31,7 +31,7 @@ def print_summary(results: Results, spent: Spent) -> None:
             numbers = [*np.quantile(there, _SHOWN), there.mean()] if there.size else [np.nan] * (len(_SHOWN) + 1)
             label = axis_label(name, results.figure_units[name])
             shown.add_row(label, *(text(number, ".5g") for number in numbers), str(there.size))
-        out.print(shown)
+        print_table(shown)
     reasons = runs[REASON].value_counts()
     for reason, count in reasons.head(_FAILURES).items():
         out.print(f"  {count} runs: {reason}", soft_wrap=True)
