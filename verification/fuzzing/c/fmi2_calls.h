@@ -80,9 +80,11 @@ static void call_fmi2NewDiscreteStates(slot *s)
 {
     const bool given = take_byte() < 240;
     LENT fmi2EventInfo *const info = exactly(1, sizeof *info);
-    if (CALL(s, given, false, NewDiscreteStates, s->f, given ? info : NULL)) {
+    if (CALL(s, given, has_own_events(s), NewDiscreteStates, s->f, given ? info : NULL)) {
         PROPERTY(info->newDiscreteStatesNeeded == fmi2False && info->terminateSimulation == fmi2False
-                     && info->nextEventTimeDefined == fmi2False, "an event of the model's own");
+                     && info->nominalsOfContinuousStatesChanged == fmi2False
+                     && info->valuesOfContinuousStatesChanged == fmi2False, "an event of the model's own");
+        check_next_event(s, info->nextEventTimeDefined, info->nextEventTime);
     }
 }
 

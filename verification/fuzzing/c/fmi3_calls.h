@@ -202,10 +202,13 @@ static void call_fmi3UpdateDiscreteStates(slot *s)
     for (unsigned i = 0; i < 5; i++) {
         asked[i] = any == 240 + i ? NULL : &flags[i];
     }
-    const bool accepted = CALL(s, any < 240 || any > 245, false, UpdateDiscreteStates, s->f, asked[0], asked[1], asked[2],
+    const bool accepted = CALL(s, any < 240 || any > 245, has_own_events(s), UpdateDiscreteStates, s->f, asked[0], asked[1], asked[2],
                                asked[3], asked[4], any == 245 ? NULL : &next);
-    for (unsigned i = 0; i < 5; i++) {
+    for (unsigned i = 0; i < 4; i++) {
         PROPERTY(flags[i] == !accepted, "an event of the model's own");
+    }
+    if (accepted) {
+        check_next_event(s, flags[4], next);
     }
 }
 

@@ -265,6 +265,18 @@ static bool after_call(const slot *s, call which, verdict wanted, int status, bo
     (before_call(), after_call(s, WHICH(name), wanted, (int)FMI(name)(__VA_ARGS__), changes))
 #define CALL(s, good, changes, name, ...) CALL_AS(s, legal(s, WHICH(name), good), changes, name, __VA_ARGS__)
 
+/* True when new discrete states may change an instance: in Model Exchange, commands begin and end their dead time there. */
+static bool has_own_events(const slot *s)
+{
+    return HAS_DEAD_TIME && s->f != NULL && s->at.type == TYPE_MODEL_EXCHANGE;
+}
+
+/* Check the time at which the next command will act, as the FMU tells it. */
+static void check_next_event(const slot *s, bool defined, double next)
+{
+    PROPERTY(!defined || (has_own_events(s) && next > s->at.time), "a command acts at %g, after t = %g", next, s->at.time);
+}
+
 /* Return true when no result can overflow. */
 static bool is_moderate(const fmu *f)
 {
