@@ -88,7 +88,9 @@ def tests_of(file: str) -> list[str]:
     """Return the files and folders of tests for a file: those that import it, then those of the table."""
     *packages, name = Path(file).with_suffix("").parts
     is_imported = re.compile(rf"{re.escape('.'.join(packages))}(\.{name} import| import (.*, )?{name}\b)")
-    tests = sorted((ROOT / "tests" / packages[1]).glob("test_*.py"), key=lambda path: path.stem != f"test_{name}")
+    tests = sorted(
+        (ROOT / "tests" / packages[1]).rglob("test_*.py"), key=lambda path: (path.stem != f"test_{name}", path)
+    )
     importing = [path.relative_to(ROOT).as_posix() for path in tests if is_imported.search(path.read_text("utf-8"))]
     names = next(names for pattern, names in TESTS.items() if fnmatch.fnmatch(file, pattern))
     return list(dict.fromkeys([*importing, *(f"tests/{name}" for name in names.split())]))
