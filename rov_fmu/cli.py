@@ -596,8 +596,26 @@ def _tables(vehicle: Path) -> None:
 
 @_commands.command("figures")
 @click.argument("folder", type=_FILE)
-def _figures(folder: Path) -> None:
-    """Redraw the figures of the paper whose data it prints, into an existing FOLDER."""
+@click.option(
+    "--format",
+    "form",
+    type=_Choice(["svg", "pdf", "png"]),
+    default="svg",
+    show_default=True,
+    help="Format of the figures. Fonts are embedded; PNG has 300 dots per inch.",
+)
+@click.option(
+    "--column",
+    type=_Choice(["single", "double"]),
+    default="single",
+    show_default=True,
+    help="Width: one column of a journal (89 mm) or two (182 mm).",
+)
+def _figures(folder: Path, form: str, column: str) -> None:
+    """Draw the figures of the paper whose data it prints, each with its caption, into FOLDER.
+
+    FOLDER is created if it does not exist.
+    """
     from rov_fmu.report.plots.paper_figures import write_figures
 
-    print(*write_figures(folder), sep="\n")
+    print(*write_figures(folder, form, column), sep="\n")

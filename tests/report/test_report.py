@@ -31,7 +31,7 @@ from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import ROOT, TESTS
+from tests.commands import TESTS
 from tests.folders import DOWN, SPEED, folder_of, pulled, read
 from tests.identify.test_identification import COMMANDS, FORCES, STEADY, TOP, Tables, folder_with, write_csv, write_rov
 from tests.recordings import PLANS, clean, write_log
@@ -415,24 +415,6 @@ def test_a_report_outside_the_folder_of_the_vehicle_file_is_refused_before_the_f
     report = tmp_path / "report.html"
     assert main(["identify", "no/tests", "-o", str(tmp_path / "other" / "v.toml"), "--report", str(report)]) == 2
     assert capsys.readouterr().err.startswith(f"rov-fmu: {report}: must be inside the folder of ")
-
-
-# ---- The paper's figures ---------------------------------------------------------------------------------------------
-
-
-def test_figures_of_the_paper_are_those_that_ship(tmp_path: Path) -> None:
-    assert main(["figures", str(tmp_path)]) == 0
-    written = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
-    assert sorted(written) == ["paper_figures.svg", "videoray.svg"]
-    assert written["videoray.svg"].startswith("<svg ")
-    assert written["videoray.svg"].count("measured</text>") == 3
-    shipped = (ROOT / "docs" / "paper_figures.svg").read_text(encoding="utf-8")
-    shown, expected = (
-        re.findall(r"<text[^>]*>([^<]*)</text>", text) for text in (written["paper_figures.svg"], shipped)
-    )
-    assert shown == expected
-    for figure in ("5", "6", "7", "8", "9", "11a", "11b"):
-        assert any(words.startswith(f"Figure {figure}: ") for words in shown), figure
 
 
 # ---- In a browser ----------------------------------------------------------------------------------------------------

@@ -1,96 +1,165 @@
-"""Redraw Figures 5-9 and 11 of the paper as far as it prints their data: `rov-fmu figures docs`.
+"""The figures of the paper as far as it prints their data, for a publication: `rov-fmu figures FOLDER`.
 
 The curves are those of the printed equations. The only printed points are V_ss and Tau (Tables 3-7); the force at a
 measured velocity is that of the thrust curve, (11)-(13). The forces behind the thrust curves (Figures 4-6) and all
 recordings (Figures 3, 10, 11) are not printed, so they are not drawn.
 """
 
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from decimal import Decimal
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.identify.points.quadratic_fit import fit_quadratic, quadratic
-from rov_fmu.io.output import Output, write_whole
+from rov_fmu.io.output import Output, folder_made, write_whole
 from rov_fmu.model.layout import SURGE
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
-from rov_fmu.report.plots.svg import LIGHT, svg_file
+from rov_fmu.report.plots.svg import LIGHT, saved, with_even_text
 from rov_fmu.vehicle.published import ResponseTable, untuned
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 
-NAME = "paper_figures.svg"
-_SIZE = (11.1, 9.6)  # inches
-_STEADY_SIZE = (11.1, 2.9)  # inches
-_STEPS = (30, 50, 70)  # %
-_STEP_TITLES = {
-    "heave": "Figure 11a: heave",
-    "yaw": "Figure 11b: yaw",
-    "surge": "Surge, likewise: not in the paper",
+COLUMNS = {"single": 3.5, "double": 7.16}
+"""The widths of the columns of a journal, in inches: those of the IEEE (89 and 182 mm)."""
+FORMATS: dict[str, dict[str, Any]] = {
+    "svg": {"metadata": {"Date": None}},
+    "pdf": {"metadata": {"CreationDate": None}},
+    "png": {"metadata": {"Software": None}, "dpi": 300},
 }
-_NOT_PRINTED = (
-    "Not printed in the paper, so not drawn:",
-    "• Figure 4 (reverse thrust)",
-    "• the forces behind Figures 5 and 6",
-    "• the recordings of Figure 11",
-    "• Tau of surge (Table 8)",
-)
+"""The options of Matplotlib for each format. Without dates and versions, the same figures have the same bytes."""
+_EMBEDDED = {"svg.fonttype": "path", "pdf.fonttype": 42}
+_TEXT_SIZE = 8.0  # points, in print
+_RATIO, _WIDE_RATIO = 0.78, 0.5
+"""The height of a plot by its width, in a single column and where one plot fills both."""
+_STEPS = (30, 50, 70)  # %
+_PAPER = "Enevoldsen et al. (2018)"
+_STEP_FIGURES = {
+    "heave": ("figure_11a", ", Figure 11a"),
+    "yaw": ("figure_11b", ", Figure 11b"),
+    "surge": ("surge_steps", ", which shows no such figure"),
+}
+"""The name of the figure and where the paper has it, by axis."""
 
 
-def write_figures(folder: Path) -> list[Path]:
-    """Write an SVG file with the figures, and one with V_ss of the paper's model and of the refit; return their paths.
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure: the name of its file, its caption, and the function that draws each of its plots."""
 
-    Raises WriteError.
+    name: str
+    caption: str
+    plots: tuple[Callable[[Axes], None], ...]
+
+    def content(self, form: str, column: str) -> bytes:
+        """Return the figure in a format of FORMATS, as wide as a column of COLUMNS, with its fonts embedded."""
+        columns = len(self.plots) if column == "double" else 1
+        rows, width = len(self.plots) // columns, COLUMNS[column]
+        height = rows * width / columns * (_WIDE_RATIO if column == "double" and columns == 1 else _RATIO)
+        draw = with_even_text(partial(self._draw, rows=rows, columns=columns), _TEXT_SIZE)
+        return saved(
+            draw,
+            (width, height),
+            background="white",
+            margin=0.04,
+            salt=self.name,
+            style=_EMBEDDED,
+            format=form,
+            **FORMATS[form],
+        )
+
+    def _draw(self, figure: Figure, rows: int, columns: int) -> None:
+        for ax, plot in zip(np.ravel(figure.subplots(rows, columns)), self.plots, strict=True):
+            plot(ax)
+
+
+def write_figures(folder: Path, form: str = "svg", column: str = "single") -> list[Path]:
+    """Write every figure into a folder, with its caption beside it as text, and return the paths.
+
+    The folder is created if it does not exist. Raises WriteError.
     """
-    vehicle, refit = load_vehicle(VIDEORAY), load_vehicle(SHIPPED["videoray_refit"])
-    steady = partial(_draw_steady, vehicle=vehicle, refit=refit.rov)
-    pictures = {
-        NAME: svg_file(partial(_draw, vehicle=vehicle), _SIZE, salt=NAME) + "\n",
-        f"{vehicle.identifier}.svg": svg_file(steady, _STEADY_SIZE, salt="steady") + "\n",
-    }
-    outputs = [Output(folder / name, text.encode()) for name, text in pictures.items()]
-    write_whole(*outputs)
+    outputs = []
+    with folder_made(folder):
+        for figure in paper_figures():
+            outputs.append(Output(folder / f"{figure.name}.{form}", figure.content(form, column)))
+            outputs.append(Output(folder / f"{figure.name}.txt", f"{figure.caption}\n".encode()))
+        write_whole(*outputs)
     return [output.path for output in outputs]
 
 
-def _draw_steady(figure: Figure, vehicle: Vehicle, refit: Rov) -> None:
-    """Draw V_ss over the command for every axis: the paper's model, the refit, and the paper's measurements."""
-    tables, commands = tables_by_axis(vehicle), range(0, 101, 2)
-    models = [("paper's model", vehicle.rov, "grey", "--"), ("refit", refit, "blue", "-")]
-    for ax, axis in zip(figure.subplots(1, len(tables)), (form.axis for form in vehicle.layout.axes), strict=True):
-        for label, rov, color, dashes in models:
-            V_ss = [rov.response(axis, command / 100.0)[0] for command in commands]
-            ax.plot(commands, V_ss, dashes, label=label, color=LIGHT[color], linewidth=1.8)
-        points = [(float(command), float(V)) for command, V in tables[axis.name].steady.items()]
-        ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=5.0, zorder=5)
-        finish(ax, f"{axis.name.capitalize()}: $V_{{ss}}$ ({axis.unit})", "command (%)")
-        ax.set_xlim(0, 100)
-
-
-def _draw(figure: Figure, vehicle: Vehicle) -> None:
-    k, other, tables = vehicle.rov, vehicle.alternatives["unweighted_rear_thrust"], tables_by_axis(vehicle)
-    (rear, top, notes), drag, steps = figure.subplots(3, 3)
-    unweighted = other.values["a_t_rear"], other.values["b_t_rear"]
-    _curve(rear, 100.0, 1.0, unweighted, "--", "grey", "all points (8)")
-    _curve(rear, 100.0, 1.0, (k["a_t_rear"], k["b_t_rear"]), "-", "blue", "weighted (9)")
-    finish(rear, "Figure 5: forward thrust", "command (%)", "$F_l + F_r$ (N)")
-    _curve(top, 100.0, 1.0, (k["a_t_top"], k["b_t_top"]), "-", "blue", "(10)")
-    finish(top, "Figure 6: downward thrust", "command (%)", "$F_t$ (N)")
-    notes.set_axis_off()
-    notes.text(
-        0.0, 0.92, "\n".join(_NOT_PRINTED), transform=notes.transAxes, va="top", linespacing=1.7, color=LIGHT["muted"]
+def paper_figures() -> Iterator[PaperFigure]:
+    """Yield Figures 5 to 9 and 11 of the paper, the steps of surge, and V_ss of the paper's model and of the refit."""
+    vehicle, refit = load_vehicle(VIDEORAY), load_vehicle(SHIPPED["videoray_refit"]).rov
+    k, tables = vehicle.rov, tables_by_axis(vehicle)
+    unweighted = vehicle.alternatives["unweighted_rear_thrust"].values
+    yield PaperFigure(
+        "figure_5",
+        "Forward thrust of both rear thrusters over the command: the weighted curve (9) and the curve of all points "
+        f"(8) of {_PAPER}, Figure 5. The paper does not print the measured forces.",
+        (partial(_rear_thrust, k=k, unweighted=(unweighted["a_t_rear"], unweighted["b_t_rear"])),),
     )
-    for number, ax, axis in zip((7, 8, 9), drag, vehicle.layout.kinds, strict=True):
-        _drag(ax, k, tables[axis], f"Figure {number}: {axis} drag")
-    for ax, (axis, title) in zip(steps, _STEP_TITLES.items(), strict=True):
-        _steps(ax, k, tables[axis], title)
+    yield PaperFigure(
+        "figure_6",
+        f"Downward thrust of the top thruster over the command: curve (10) of {_PAPER}, Figure 6. The paper does not "
+        "print the measured forces.",
+        (partial(_top_thrust, k=k),),
+    )
+    for number, axis in zip((7, 8, 9), vehicle.layout.kinds, strict=True):
+        table = tables[axis]
+        kind = "torque" if table.axis.is_rotation else "force"
+        yield PaperFigure(
+            f"figure_{number}",
+            f"Drag {kind} in {axis} over the steady velocity: curve {table.axis.equations[0]} of {_PAPER}, Figure "
+            f"{number}, and the curve of least squares through the points. A point is a measured velocity of Table "
+            f"{table.steady_number} and the {kind} that the thrust curve gives.",
+            (partial(_drag, k=k, table=table),),
+        )
+    for axis, (name, source) in _STEP_FIGURES.items():
+        yield PaperFigure(
+            name,
+            f"Velocity in {axis} after steps of the command to {', '.join(map(str, _STEPS))} %: the non-linear model "
+            f"(dashed) and the scaled model (solid) of {_PAPER}{source}. Dotted: measured V_ss. Points: measured Tau, "
+            "at 63 % of the measured V_ss. The paper does not print the recordings.",
+            (partial(_steps, k=k, table=tables[axis]),),
+        )
+    axes = [form.axis.name for form in vehicle.layout.axes]
+    yield PaperFigure(
+        "steady_velocity",
+        f"Steady velocity over the command in {', '.join(axes)}: the model of {_PAPER} (dashed), the model refitted to "
+        "all measured V_ss and Tau (solid), and the measured V_ss (points).",
+        tuple(partial(_steady, k=k, refit=refit, table=tables[axis]) for axis in axes),
+    )
 
 
-def _drag(ax: Axes, k: Rov, table: ResponseTable, title: str) -> None:
+def _steady(ax: Axes, k: Rov, refit: Rov, table: ResponseTable) -> None:
+    """Draw V_ss over the command along an axis: the paper's model, the refit, and the paper's measurements."""
+    axis, commands = table.axis, range(0, 101, 2)
+    for label, rov, color, dashes in (("paper", k, "grey", "--"), ("refit", refit, "blue", "-")):
+        V_ss = [rov.response(axis, command / 100.0)[0] for command in commands]
+        ax.plot(commands, V_ss, dashes, label=label, color=LIGHT[color], linewidth=1.8)
+    points = [(float(command), float(V)) for command, V in table.steady.items()]
+    ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=4.0, zorder=5)
+    finish(ax, axis.name.capitalize(), "command (%)", f"$V_{{ss}}$ ({axis.unit})")
+    ax.set_xlim(0, 100)
+
+
+def _rear_thrust(ax: Axes, k: Rov, unweighted: tuple[float, float]) -> None:
+    _curve(ax, 100.0, 1.0, unweighted, "--", "grey", "all points (8)")
+    _curve(ax, 100.0, 1.0, (k["a_t_rear"], k["b_t_rear"]), "-", "blue", "weighted (9)")
+    finish(ax, "", "command (%)", "$F_l + F_r$ (N)")
+
+
+def _top_thrust(ax: Axes, k: Rov) -> None:
+    _curve(ax, 100.0, 1.0, (k["a_t_top"], k["b_t_top"]), "-", "blue", "(10)")
+    finish(ax, "", "command (%)", "$F_t$ (N)")
+
+
+def _drag(ax: Axes, k: Rov, table: ResponseTable) -> None:
     axis = table.axis
     names = (axis.coefficient("a_d"), axis.coefficient("b_d"))
     v = np.array([float(V) for V in table.steady.values()])
@@ -99,16 +168,16 @@ def _drag(ax: Axes, k: Rov, table: ResponseTable, title: str) -> None:
     _curve(ax, 1.0, end, fit_quadratic(names, v, force).unbounded, "--", "grey", "least squares of the points")
     _curve(ax, 1.0, end, (k[names[0]], k[names[1]]), "-", "blue", axis.equations[0])
     ax.plot(v, force, "o", color=LIGHT["orange"], markersize=4.5, zorder=5, label=f"Table {table.steady_number}")
-    finish(ax, title, f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
+    finish(ax, "", f"${axis.velocity}$ ({axis.unit})", "torque (N·m)" if axis.load == "N.m" else "force (N)")
 
 
-def _steps(ax: Axes, k: Rov, table: ResponseTable, title: str) -> None:
+def _steps(ax: Axes, k: Rov, table: ResponseTable) -> None:
     axis = table.axis
     draw_steps(ax, axis, [measured_step(table, Decimal(command)) for command in _STEPS], [(untuned(k), "--"), (k, "-")])
     if axis is not SURGE:  # in the plot of surge the legend would hide the curves
         for look, label in (("--", "non-linear"), ("-", "scaled"), (":", "measured $V_{ss}$"), ("o", "measured $Tau$")):
             ax.plot([], [], look, color=LIGHT["muted"], markersize=5.0, label=label)
-    finish(ax, title, "time (s)", f"${axis.velocity}$ ({axis.unit})", where="lower right")
+    finish(ax, "", "time (s)", f"${axis.velocity}$ ({axis.unit})", where="lower right")
 
 
 def _curve(ax: Axes, scale: float, end: float, curve: tuple[float, float], dashes: str, color: str, label: str) -> None:

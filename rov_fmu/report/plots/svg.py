@@ -2,17 +2,18 @@
 
 import base64
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from html import escape
 from io import BytesIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from lxml import etree
 from markupsafe import Markup
-from matplotlib import style
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.style import context
 from matplotlib.text import Text
 
 from rov_fmu.io.picture import read_svg
@@ -81,13 +82,13 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
     return Markup(svg)
 
 
-def with_even_text(draw: Draw) -> Draw:
-    """Return a function that draws the same figure with all text in one size."""
+def with_even_text(draw: Draw, size: float = _STYLE["font.size"]) -> Draw:
+    """Return a function that draws the same figure with all text in one size, in points."""
 
     def drawn(figure: Figure) -> None:
         draw(figure)
         for text in figure.findobj(Text):
-            text.set_fontsize(_STYLE["font.size"])
+            text.set_fontsize(size)
 
     return drawn
 
@@ -110,12 +111,22 @@ def svg_file(
 
 
 def saved(
-    draw: Draw, size: tuple[float, float], *, background: str, margin: float, salt: str = "", **how: Any
+    draw: Draw,
+    size: tuple[float, float],
+    *,
+    background: str,
+    margin: float,
+    salt: str = "",
+    style: Mapping[str, Any] = MappingProxyType({}),
+    **how: Any,
 ) -> bytes:
-    """Return a figure (size in inches) as Matplotlib saves it, in the common style; `how` says in which format."""
+    """Return a figure (size in inches) as Matplotlib saves it, in the common style; `how` says in which format.
+
+    `style` has settings of Matplotlib that differ from the common style.
+    """
     file = BytesIO()
     margins = {f"figure.constrained_layout.{side}_pad": margin for side in "wh"}
-    with style.context(["default", _STYLE, {"svg.hashsalt": salt, **margins}]):
+    with context(["default", _STYLE, {"svg.hashsalt": salt, **margins, **style}]):
         figure = Figure(figsize=size, layout="constrained", facecolor=background)
         draw(figure)
         _arrange(figure, how["format"])
@@ -125,9 +136,10 @@ def saved(
 
 def _arrange(figure: Figure, form: str) -> None:
     """Lay the figure out for a format. Otherwise Matplotlib would do it while saving, and draw everything twice."""
+    if form in ("svg", "pdf"):
+        figure.dpi = 72.0  # as these formats are drawn
     if form == "svg":
         FigureCanvasSVG(figure)
-        figure.dpi = 72.0  # as SVG is drawn
     engine = figure.get_layout_engine()
     assert engine
     engine.execute(figure)

@@ -1,0 +1,103 @@
+"""The figures of the paper: files for a publication, with captions and with the numbers that the paper prints."""
+
+import re
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+from lxml import etree
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
+
+from rov_fmu.cli import main
+from rov_fmu.report.plots.paper_figures import COLUMNS, FORMATS, PaperFigure, paper_figures
+from tests.commands import ROOT
+
+FIGURES = {figure.name: figure for figure in paper_figures()}
+SHIPPED = ROOT / "docs" / "figures"
+
+
+def size_of(picture: bytes, form: str) -> tuple[float, float]:
+    """Return the width and the height of a picture in inches."""
+    if form == "png":
+        image = Image.open(BytesIO(picture))
+        return image.width / image.info["dpi"][0], image.height / image.info["dpi"][1]
+    if form == "svg":
+        box = etree.fromstring(picture).get("viewBox")
+    else:
+        found = re.search(rb"/MediaBox \[([^]]*)]", picture)
+        assert found
+        box = found[1].decode()
+    _, _, width, height = map(float, box.split())
+    return width / 72.0, height / 72.0
+
+
+def drawn(figure: PaperFigure, plot: int = 0) -> Axes:
+    ax = Figure().subplots()
+    figure.plots[plot](ax)
+    return ax
+
+
+@pytest.mark.parametrize("name", ["figure_5", "steady_velocity"])
+@pytest.mark.parametrize("column", COLUMNS)
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_figure_is_as_wide_as_the_column_and_has_the_same_bytes_again(name: str, form: str, column: str) -> None:
+    picture = FIGURES[name].content(form, column)
+    width, height = size_of(picture, form)
+    assert width == pytest.approx(COLUMNS[column], abs=0.01)
+    assert 0.25 * width < height < 2.5 * width
+    assert FIGURES[name].content(form, column) == picture
+
+
+def test_fonts_are_embedded() -> None:
+    assert FIGURES["figure_5"].content("pdf", "single").count(b"/FontFile2") >= 2, "upright and italic, as TrueType"
+    picture = etree.fromstring(FIGURES["figure_5"].content("svg", "single"))
+    assert not picture.findall(".//{*}text"), "text is drawn as paths"
+
+
+def test_every_figure_has_its_caption_beside_it_and_the_folder_is_created(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "for the" / "paper"
+    assert main(["figures", str(folder), "--format", "pdf"]) == 0
+    assert "steady_velocity.pdf" in capsys.readouterr().out
+    wanted = {f"{name}.{suffix}" for name in FIGURES for suffix in ("pdf", "txt")}
+    assert {path.name for path in folder.iterdir()} == wanted
+    for name, figure in FIGURES.items():
+        assert (folder / f"{name}.txt").read_text(encoding="utf-8") == f"{figure.caption}\n"
+
+
+@pytest.mark.parametrize(("path", "reason"), [("file", "is a file, not a folder"), ("file/folder", "Not a directory")])
+def test_a_folder_that_cannot_be_made_is_one_line_and_leaves_nothing(
+    path: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("kept", encoding="utf-8")
+    assert main(["figures", str(tmp_path / path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("rov-fmu: ")
+    assert line.endswith(reason)
+    assert [(found.name, found.read_text("utf-8")) for found in tmp_path.iterdir()] == [("file", "kept")]
+
+
+def test_the_documentation_shows_every_figure_that_is_drawn_with_its_caption() -> None:
+    page = " ".join((ROOT / "docs" / "model.md").read_text(encoding="utf-8").split())
+    assert {path.name for path in SHIPPED.iterdir()} == {
+        f"{name}.{suffix}" for name in FIGURES for suffix in ("svg", "txt")
+    }
+    for name, figure in FIGURES.items():
+        assert f"(figures/{name}.svg) {figure.caption}" in page
+        assert (SHIPPED / f"{name}.txt").read_text(encoding="utf-8") == f"{figure.caption}\n"
+        assert size_of((SHIPPED / f"{name}.svg").read_bytes(), "svg")[0] == pytest.approx(COLUMNS["double"], abs=0.01)
+
+
+def test_curves_and_points_are_those_that_the_paper_prints() -> None:
+    unweighted, weighted = (line.get_xydata() for line in drawn(FIGURES["figure_5"]).lines)
+    assert unweighted[-1] == pytest.approx((100.0, 100.3 - 27.09), rel=1e-9), "(8)"
+    assert weighted[-1] == pytest.approx((100.0, 42.9 + 2.711), rel=1e-3), "(9)"
+    points = drawn(FIGURES["figure_7"]).lines[-1].get_xydata()
+    assert points[1] == pytest.approx((0.47, 42.9 * 0.3**2 + 2.711 * 0.3), rel=1e-3), "Table 4 at 30 %"
+    surge = {line.get_label(): line.get_xydata() for line in drawn(FIGURES["steady_velocity"]).lines}
+    assert surge["measured"][1] == pytest.approx((30.0, 0.47))
+    assert surge["paper"][15] == pytest.approx((30.0, 0.4729), abs=1e-4)
+    assert drawn(FIGURES["figure_11a"]).texts[0].get_text() == "30 %"
