@@ -233,6 +233,8 @@ def _expression(text: str) -> str:
 class Plan(Strict):
     """A study: many runs of one FMU."""
 
+    title: Annotated[str, Field(max_length=200), AfterValidator(not_blank)] | None = None
+    """The title of the page with the results. The default is the name of the FMU."""
     fmu: Annotated[str, AfterValidator(_file)] | None = None
     """An FMU for Co-Simulation in the folder of the plan, or in a folder inside it. A plan has this or `vehicle`."""
     vehicle: _Beside | None = None
@@ -297,7 +299,7 @@ class Plan(Strict):
         """
         mark: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True, exclude_none=True))
         runs = [] if self.sampler == "latin-hypercube" else ["runs"]
-        for key in ("fmu", "vehicle", "vary_from", "time_limit", *runs):
+        for key in ("title", "fmu", "vehicle", "vary_from", "time_limit", *runs):
             mark.pop(key, None)
         return mark
 

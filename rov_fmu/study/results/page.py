@@ -22,7 +22,10 @@ from rov_fmu.study.run.worker import REASON, STATUS
 PAGE = "study.html"
 _KIND = b'<p class="kind">Study</p>'
 """A line that every page about a study contains."""
-_PLOT = (3.7, 2.6)  # inches
+_THIRD, _HALF = (3.7, 2.6), (5.0, 2.8)
+"""The sizes of plots that fill a third and a half of a row, in inches. In both, text has about the same size."""
+_BARS = 12
+"""The number of variables whose Sobol indices are drawn; the table has all of them."""
 _BINS = 40
 _POINTS = 400
 """The number of points of a band that are drawn; more would not be visible."""
@@ -63,9 +66,13 @@ def study_page(results: Results) -> str:
     grid = _grid(results)
     indices = _sensitivities(results) if plan["sampler"] == "saltelli" else {}
     rows = [row for found in indices.values() if not isinstance(found, str) for row in found]
+    figures = [_figure(name, results, grid) for name in results.figures]
+    bands = [_band(results, name) for name in results.outputs] if len(results.failed) < len(runs) else []
+    _draw_in_rows(figures)
+    _draw_in_rows(bands)
     return page(
         "study.html.j2",
-        title=results.model.removesuffix(".fmu"),
+        title=results.title,
         fmu=results.fmu,
         made_by=results.made_by,
         done=len(runs),
@@ -75,15 +82,17 @@ def study_page(results: Results) -> str:
         sampler=plan["sampler"],
         seed=plan["seed"],
         quantiles=QUANTILES,
-        figures=[_figure(name, results, grid) for name in results.figures],
+        figures=figures,
         grid=grid,
         rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
         more_rows=len(runs[_ROWS:]),
         sensitivities=indices,
+        charts={name: _chart(name, found) for name, found in indices.items() if not isinstance(found, str)},
+        most_bars=_BARS,
         is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
         blocks=results.planned // (len(results.groups) + 2),
         few=_FEW,
-        bands={name: _band(results, name) for name in results.outputs} if len(results.failed) < len(runs) else {},
+        bands=bands,
         descriptions=results.descriptions,
         warnings=results.warnings,
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
@@ -99,25 +108,42 @@ def _grid(results: Results) -> Sequence[str]:
     return sorted(results.parameters, key=lambda name: -results.runs[name].nunique())
 
 
+def _draw_in_rows(shown: Sequence[dict[str, Any]]) -> None:
+    """Add the plots, in sizes that fill every row of the page: three to a row, and two in the last rows."""
+    drawn = [found for found in shown if found["draw"]]
+    halves = {0: 0, 1: 4, 2: 2}[len(drawn) % 3]
+    for n, found in enumerate(drawn):
+        is_half = n >= len(drawn) - halves
+        found["width"] = "half" if is_half else "third"
+        found["plot"] = inline_svg(found["label"], found["draw"], _HALF if is_half else _THIRD)
+
+
 def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
-    """Return the row about a figure with its plot."""
+    """Return the row about a figure, and how its plot is drawn."""
     values = results.runs[name].to_numpy(float)
     there, unit = values[np.isfinite(values)], results.figure_units[name]
     found = {"name": name, "expression": results.plan["figures"][name], "unit": unit, "runs": there.size}
     if not there.size:
-        return {**found, "quantiles": [None] * len(QUANTILES), "mean": None, "sd": None, "plot": "", "is_still": False}
+        return {
+            **found,
+            "quantiles": [None] * len(QUANTILES),
+            "mean": None,
+            "sd": None,
+            "draw": None,
+            "is_still": False,
+        }
     quantiles = np.quantile(there, QUANTILES).tolist()
     sd = float(there.std(ddof=1)) if there.size > 1 else None
     found |= {"quantiles": quantiles, "mean": float(there.mean()), "sd": sd}
     if _is_constant(there):
-        return {**found, "plot": "", "is_still": True}
+        return {**found, "draw": None, "is_still": True}
     if grid:
         draw: Draw = partial(_draw_lines, name=name, results=results, grid=grid)
-        title = f"{name} over {' and '.join(grid)}"
+        label = f"{name} over {' and '.join(grid)}"
     else:
         draw = partial(_draw_distribution, values=there, quantiles=quantiles, label=axis_label("", unit))
-        title = f"Distribution of {name}"
-    return {**found, "plot": inline_svg(title, draw, _PLOT), "is_still": False}
+        label = f"Distribution of {name}"
+    return {**found, "label": label, "draw": draw, "is_still": False}
 
 
 def _is_constant(values: Any) -> bool:
@@ -169,10 +195,12 @@ def _set_ticks(ax: Axes, along: int = 6) -> None:
     ax.locator_params("y", nbins=6)
 
 
-def _band(results: Results, output: str) -> Markup:
+def _band(results: Results, output: str) -> dict[str, Any]:
+    """Return an output, and how its trajectories are drawn."""
     bands = results.bands(output)
     shown = bands.iloc[:: max(1, len(bands) // _POINTS)]
-    return inline_svg(f"Trajectories of {output}", partial(_draw_band, bands=shown, unit=results.units[output]), _PLOT)
+    draw = partial(_draw_band, bands=shown, unit=results.units[output])
+    return {"name": output, "label": f"Trajectories of {output}", "draw": draw}
 
 
 def _draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
@@ -202,6 +230,28 @@ def _sensitivities(results: Results) -> dict[str, Any]:
             rows["S1_tells"], rows["ST_tells"] = (_tells(rows[key], rows[f"{key}_95"]) for key in ("S1", "ST"))
             found[figure] = (rows.round(3) + 0.0).reset_index(names="name").to_dict("records")  # without -0
     return found
+
+
+def _chart(name: str, rows: Sequence[dict[str, Any]]) -> Markup:
+    """Return the Sobol indices of a figure as a bar chart."""
+    shown = rows[:_BARS]
+    size = _HALF[0], 0.9 + 0.36 * len(shown)  # inches
+    return inline_svg(f"Sobol indices of {name}", partial(_draw_indices, rows=shown), size)
+
+
+def _draw_indices(figure: Figure, rows: Sequence[dict[str, Any]]) -> None:
+    """Draw a bar for S_1 and one for S_T of each variable, with their 95 % intervals."""
+    ax = figure.subplots()
+    places = np.arange(len(rows), dtype=float)
+    for key, shift, color, label in (("S1", -0.19, "blue", "$S_1$: alone"), ("ST", 0.19, "grey", "$S_T$: with others")):
+        values, errors = ([row[f"{key}{end}"] for row in rows] for end in ("", "_95"))
+        ax.barh(places + shift, values, 0.36, color=LIGHT[color], label=label)
+        ax.errorbar(values, places + shift, xerr=errors, fmt="none", ecolor=LIGHT["ink"], elinewidth=1.0, capsize=2.5)
+    ax.set_yticks(places, [row["name"] for row in rows])
+    ax.set_ylim(len(rows) - 0.5, -0.5)
+    ax.grid(visible=False, axis="y")
+    ax.set_xlim(min(0.0, ax.get_xlim()[0]), max(1.0, ax.get_xlim()[1]))
+    figure.legend(loc="outside lower left", ncols=2)
 
 
 def _tells(index: "pd.Series[float]", half_width: "pd.Series[float]") -> "pd.Series[bool]":

@@ -49,6 +49,8 @@ class Results:
         """The FMU's descriptions of parameters and outputs."""
         self.model: str = study["model"]
         """The name of the FMU's file."""
+        self.title: str = study.get("title") or self.model.removesuffix(".fmu")
+        """The title of the plan, or the name of the model."""
         self.fmu: str = study["fmu"]
         """SHA-256 of the FMU."""
         self.groups: tuple[tuple[str, ...], ...] = tuple(map(tuple, study["groups"]))

@@ -67,6 +67,7 @@ def run_study(
             columns={"parameters": design.names, "figures": [*job.figures], "outputs": job.kept},
             points=len(job.kept_points),
             model=model.name,
+            title=plan.title,
             units={variable.name: variable.unit for variable in named},
             descriptions={variable.name: variable.description for variable in named},
             groups=design.groups,
