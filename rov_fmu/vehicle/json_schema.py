@@ -29,7 +29,11 @@ def _simplified(node: Any) -> Any:
         return [*map(_simplified, node)]
     if not isinstance(node, dict):
         return node
-    simple = {key: _simplified(value) for key, value in node.items() if key != "title" and (key != "default" or value)}
+    simple = {
+        key: _simplified(value)
+        for key, value in node.items()
+        if not (key == "title" and isinstance(value, str)) and (key != "default" or value)  # a key may be named title
+    }
     choices = [choice for key in ("allOf", "anyOf") for choice in simple.pop(key, []) if choice != _NULL]
     if len(choices) > 1:
         simple["anyOf"] = choices

@@ -4,10 +4,12 @@ import re
 from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from lxml import etree
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from PIL import Image
 
 from rov_fmu.cli import main
@@ -33,10 +35,15 @@ def size_of(picture: bytes, form: str) -> tuple[float, float]:
     return width / 72.0, height / 72.0
 
 
-def drawn(figure: PaperFigure, plot: int = 0) -> Axes:
-    ax = Figure().subplots()
-    figure.plots[plot](ax)
+def drawn(figure: PaperFigure) -> Axes:
+    ax: Axes = Figure().subplots()
+    figure.plots[0](ax)
     return ax
+
+
+def lines(figure: PaperFigure) -> dict[str, NDArray[np.float64]]:
+    """Return the points of each line of the first plot, n x 2, by its label."""
+    return {str(line.get_label()): np.array(line.get_xydata()) for line in drawn(figure).lines}
 
 
 @pytest.mark.parametrize("name", ["figure_5", "steady_velocity"])
@@ -92,12 +99,11 @@ def test_the_documentation_shows_every_figure_that_is_drawn_with_its_caption() -
 
 
 def test_curves_and_points_are_those_that_the_paper_prints() -> None:
-    unweighted, weighted = (line.get_xydata() for line in drawn(FIGURES["figure_5"]).lines)
-    assert unweighted[-1] == pytest.approx((100.0, 100.3 - 27.09), rel=1e-9), "(8)"
-    assert weighted[-1] == pytest.approx((100.0, 42.9 + 2.711), rel=1e-3), "(9)"
-    points = drawn(FIGURES["figure_7"]).lines[-1].get_xydata()
-    assert points[1] == pytest.approx((0.47, 42.9 * 0.3**2 + 2.711 * 0.3), rel=1e-3), "Table 4 at 30 %"
-    surge = {line.get_label(): line.get_xydata() for line in drawn(FIGURES["steady_velocity"]).lines}
+    thrust = lines(FIGURES["figure_5"])
+    assert thrust["all points (8)"][-1] == pytest.approx((100.0, 100.3 - 27.09))
+    assert thrust["weighted (9)"][-1] == pytest.approx((100.0, 42.9 + 2.711), rel=1e-3)
+    assert lines(FIGURES["figure_7"])["Table 4"][1] == pytest.approx((0.47, 42.9 * 0.3**2 + 2.711 * 0.3), rel=1e-3)
+    surge = lines(FIGURES["steady_velocity"])
     assert surge["measured"][1] == pytest.approx((30.0, 0.47))
     assert surge["paper"][15] == pytest.approx((30.0, 0.4729), abs=1e-4)
     assert drawn(FIGURES["figure_11a"]).texts[0].get_text() == "30 %"

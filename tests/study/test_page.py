@@ -3,13 +3,15 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lxml import html
+from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
 from rov_fmu.study import Results
-from rov_fmu.study.results.page import study_page
+from rov_fmu.study.results.page import _draw_in_rows, _draw_indices, study_page
 from tests.folders import beside
 
 
@@ -17,7 +19,8 @@ from tests.folders import beside
 def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path], scheduler: str) -> Path:
     """The results of a study with its page, made by the command. Some runs fail; the others lack the figure `odd`."""
     folder = tmp_path_factory.mktemp("page")
-    (folder / "plan.toml").write_text(f"""fmu = "{beside(foreign(), folder)}"
+    (folder / "plan.toml").write_text(f"""title = "Pumps & <valves>"
+fmu = "{beside(foreign(), folder)}"
 stop_time = 2.0
 step = 0.1
 runs = 600
@@ -54,7 +57,8 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     failed = next(row for row in page.iter("tr") if "the pump is blocked" in row.text_content())
     assert failed[0].text_content() == str(len(results.failed))
     labels = re.findall(r'aria-label="([^"]*)"', text)
-    assert labels == ["Distribution of end", "Trajectories of y"]
+    assert labels == ["Distribution of end", "Sobol indices of end", "Trajectories of y"]
+    assert page.xpath("string(//h1)") == page.xpath("string(//title)").removesuffix(" – study") == "Pumps & <valves>"
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
     assert "<script" not in text
     assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
@@ -132,6 +136,35 @@ down = "a - u / 1000"
     assert -0.0005 < min(small) < -1e-5
     rows = pages[800].xpath("//h2[@id='sensitivity']/following::tr[td/code='u']/td[2]")
     assert [row.text_content() for row in rows[1:3]] == ["0.000", "0.000"]
+
+
+def test_bars_have_the_lengths_of_sobol_indices_and_lines_those_of_their_intervals() -> None:
+    rows = [
+        {"name": "a", "S1": 0.6, "S1_95": 0.1, "ST": 0.7, "ST_95": 0.2},
+        {"name": "b", "S1": -0.01, "S1_95": 0.02, "ST": 0.3, "ST_95": 0.05},
+    ]
+    figure = Figure()
+    _draw_indices(figure, rows)
+    (ax,) = figure.axes
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["a", "b"]
+    assert [bar.get_width() for group in ax.containers[::2] for bar in group] == [0.6, -0.01, 0.7, 0.3]
+    lines = [segment[:, 0].tolist() for line in ax.collections for segment in line.get_segments()]  # type: ignore[attr-defined]
+    assert lines == [pytest.approx(ends) for ends in ([0.5, 0.7], [-0.03, 0.01], [0.5, 0.9], [0.25, 0.35])]
+    low, high = ax.get_xlim()
+    assert low <= -0.03
+    assert high >= 1.0
+
+
+@pytest.mark.parametrize(
+    ("count", "widths"),
+    [(0, ""), (1, "h"), (2, "hh"), (3, "ttt"), (4, "hhhh"), (5, "ttthh"), (7, "ttthhhh"), (9, 9 * "t")],
+)
+def test_plots_fill_their_rows(count: int, widths: str) -> None:
+    """A third takes two of six columns, and a half three."""
+    shown: list[dict[str, Any]] = [{"label": f"{n}", "draw": Figure.subplots} for n in range(count)]
+    _draw_in_rows([{"draw": None}, *shown])
+    assert "".join(found["width"][0] for found in shown) == widths
+    assert count == 1 or sum({"t": 2, "h": 3}[width] for width in widths) % 6 == 0
 
 
 def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_done(
