@@ -14,7 +14,9 @@ from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxi
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
-from rov_fmu.tank.logs import READERS, Names, is_column, read_csv
+from rov_fmu.tank.formats.csv_columns import Names, is_column
+from rov_fmu.tank.formats.csv_log import read_csv
+from rov_fmu.tank.logs import READERS
 from rov_fmu.tank.recording import CONTEXT
 from rov_fmu.tank.signals import gaps
 

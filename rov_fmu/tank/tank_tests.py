@@ -27,7 +27,8 @@ from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import AXES, Axis, Layout
 from rov_fmu.tank.description import ROV_FILE, Description, Dive, Requests, read_description
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.logs import Log, Names, names_of, read_dive, read_log
+from rov_fmu.tank.formats.csv_columns import Names, names_of
+from rov_fmu.tank.logs import Log, read_dive, read_log
 from rov_fmu.tank.narrowing import Given, Narrowed, Tested, narrowed
 from rov_fmu.tank.recording import CONTEXT, Recording
 from rov_fmu.tank.tables import Row, read_rows

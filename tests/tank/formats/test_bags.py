@@ -14,7 +14,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.formats.bags import _RC_OUT
-from rov_fmu.tank.logs import Log, names_of, read_log
+from rov_fmu.tank.formats.csv_columns import names_of
+from rov_fmu.tank.logs import Log, read_log
 from tests.tank.formats import motion
 from tests.tank.formats.motion import BLUEROV2, TIME
 
