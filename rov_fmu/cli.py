@@ -20,7 +20,7 @@ from click.shell_completion import CompletionItem
 from rov_fmu import __version__
 from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.io.file_kinds import PAGE, check_written
-from rov_fmu.io.messages import FileError, InputError, ProofError, StudyError, did_you_mean, shown
+from rov_fmu.io.messages import FileError, InputError, ProofError, StudyError, did_you_mean, on_terminal, shown
 from rov_fmu.io.output import check_targets, write_whole
 from rov_fmu.model.layout import AXES
 from rov_fmu.process import exit_code
@@ -266,7 +266,7 @@ def _warnings_printed() -> Iterator[None]:
 
 
 def _warn(message: str) -> None:
-    click.echo(f"rov-fmu: warning: {message}", err=True)
+    click.echo(on_terminal(f"rov-fmu: warning: {message}"), err=True)
 
 
 # ---- fly -------------------------------------------------------------------------------------------------------------
@@ -419,10 +419,10 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     """Run the experiments that an FMU carries (FMI-LS-REF). It can be the FMU of any exporter."""
     from rov_fmu.fmu.proof import prove
     from rov_fmu.report.console import print_proof
-    from rov_fmu.report.progress import bar
+    from rov_fmu.report.progress import parts
 
-    with bar() as progress:
-        findings = prove(fmu, interface, tolerance, progress)
+    with parts() as shown:
+        findings = prove(fmu, interface, tolerance, shown.begin("running the experiments"))
     print_proof(findings)
     if wrong := sum(not finding.passed for finding in findings):
         raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
@@ -455,11 +455,18 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
         from rov_fmu.study.run.run_study import run_study
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
-    from rov_fmu.report.progress import runs_bar
+    from rov_fmu.report.progress import StudyParts, parts
 
     check_place(output)
-    with runs_bar() as bar:
-        spent, results = run_study(plan, output, workers, scheduler, bar.update, bar.warn)
+    with parts() as shown:
+        spent, results = run_study(
+            plan,
+            output,
+            workers,
+            scheduler,
+            StudyParts(shown).update,
+            lambda message: shown.print(f"warning: {message}"),
+        )
     write_whole(page_output(results))
     print_summary(results, spent)
     if len(results.failed) + len(results.incomplete) == len(results.runs):
@@ -496,10 +503,10 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
         return
     from rov_fmu.interface.identify_command import identify_folder
     from rov_fmu.report.console_results import print_identification
-    from rov_fmu.report.progress import bar
+    from rov_fmu.report.progress import parts
 
-    with bar() as progress:
-        identification, replaced = identify_folder(folder, output, report, force=force, on_progress=progress)
+    with parts() as shown:
+        identification, replaced = identify_folder(folder, output, report, force=force, begin=shown.begin)
     for line in replaced:
         click.echo(line)
     print_identification(identification)

@@ -21,9 +21,9 @@ _WIDE = 110
 """The width of tables in a pipe or a file, and of those that a terminal is too narrow for."""
 
 
-def console() -> Console:
+def console(*, stderr: bool = False) -> Console:
     """Return a console that prints text without markup, as wide as the terminal."""
-    found = Console(markup=False, highlight=False, emoji=False)
+    found = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
     if not found.is_terminal:
         found.width = max(found.width, _WIDE)  # Rich assumes 80 columns
     return found
