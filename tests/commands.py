@@ -54,8 +54,8 @@ COMMANDS = {
 
 
 def without_progress(err: str) -> str:
-    """Return what a command printed on stderr, without the lines about parts that are done."""
-    return re.sub(r"^rov-fmu: .*: done in [\d.]+ s\n", "", err, flags=re.M)
+    """Return what a command printed on stderr, without the lines about parts and runs that are done."""
+    return re.sub(r"^rov-fmu: (?:.*: done in [\d.]+ s|[\d,]+/[\d,]+ runs, .*)\n", "", err, flags=re.M)
 
 
 _DRIVER = """
