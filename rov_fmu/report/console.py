@@ -97,7 +97,7 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
     out.print()
     for line in (
         "non-linear: every alpha and beta is 1. scaled: those of the vehicle file. model: in closed form.",
-        "dev.: the deviation of the model from the printed value, and at the end that of the scaled model from the test.",
+        "dev.: the deviation of the model from the printed value, at the end that of the scaled model from the test.",
         "*: the printed value is not that of the model rounded to its digits. -: not printed, or not measured.",
     ):
         paragraph(out, line)

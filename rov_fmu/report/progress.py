@@ -79,7 +79,14 @@ def parts() -> Iterator[Parts]:
     if not (out.is_terminal and out.file.isatty()):  # Rich calls a pipe a terminal if FORCE_COLOR is set, as in Jupyter
         yield Parts(None)
         return
-    columns = SpinnerColumn(finished_text="✓"), _Words(), _Share(), TimeElapsedColumn(), TimeLeftColumn()
+    fixed = Column(no_wrap=True, min_width=1)  # Rich cuts the others where a column is empty
+    columns = (
+        SpinnerColumn(finished_text="✓"),
+        _Words(Column(ratio=1, no_wrap=True, overflow="ellipsis")),
+        _Share(fixed),
+        TimeElapsedColumn(fixed),
+        TimeLeftColumn(fixed),
+    )
     display = Progress(*columns, console=out, transient=True, expand=True)
     display.start()
     with cleaned_up(display.stop):
@@ -136,15 +143,18 @@ class StudyParts:
         if self._began is None:
             self._parts.begin("runs")
             self._began, self._done_before = perf_counter(), now.done
+            self._tenth = 10 * now.done // max(now.total, 1)
             if now.dashboard and self._parts.is_shown:
                 self._parts.print(f"what the workers do: {now.dashboard}")
+        if now.done == self._done_before:
+            return
         rate = (now.done - self._done_before) / max(perf_counter() - self._began, 1e-3)
-        words = f"{per_second(rate)}{f', {now.failed} failed' if now.failed else ''}"
+        words = f"{per_second(rate)}{f', {now.failed:,} failed' if now.failed else ''}"
         count = f"{now.done:,}/{now.total:,}"
-        share = (now.done - self._done_before) / max(now.total - self._done_before, 1)
-        self._parts.show("runs", f"runs, {words}", share, count)
-        before, self._tenth = self._tenth, 10 * now.done // max(now.total, 1)
-        if before < self._tenth < 10 and now.done > self._done_before and not self._parts.is_shown:
+        share = (now.done - self._done_before) / (now.total - self._done_before)
+        self._parts.show("runs", words, share, count)
+        before, self._tenth = self._tenth, 10 * now.done // now.total
+        if before < self._tenth < 10 and not self._parts.is_shown:
             self._parts.print(f"{count} runs, {words}")
 
 
@@ -158,10 +168,6 @@ def per_second(rate: float) -> str:
 
 class _Words(ProgressColumn):
     """The name of a part, or the step that it is at, in the room that the other columns leave."""
-
-    def get_table_column(self) -> Column:
-        """Return the column, which takes all room and is cut where it is too long."""
-        return Column(ratio=1, no_wrap=True, overflow="ellipsis")
 
     def render(self, task: Task) -> Text:
         """Return the words."""
@@ -186,8 +192,8 @@ class TimeLeftColumn(ProgressColumn):
     It follows from the time and the share of the work at the last of these moments, and counts down from there.
     """
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, table_column: Column | None = None) -> None:
+        super().__init__(table_column)
         self._whole: dict[TaskID, tuple[float, float]] = {}
         """The last known share of each part, and the time that all of it takes, s."""
 

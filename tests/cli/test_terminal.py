@@ -24,7 +24,7 @@ import termios
 
 import pyte
 
-_WIDE, _TALL = 400, 1000
+_WIDE, _TALL = 300, 300
 """The size of the screen that output is drawn on. It is larger than the terminal, so that long lines stay long."""
 _VARIES = re.compile(r"\d+(?:[.:]\d+)*")
 """Times differ from run to run."""
@@ -66,9 +66,16 @@ def on_a_terminal(
     while piece := _read(ours):
         stream.feed(piece)
         raw += piece
-        moments.append(tuple(line.rstrip() for line in screen.display[: screen.cursor.y + 1]))
+        moments.append(_lines(screen))
     os.close(ours)
     return Shown(process.wait(), raw.decode(), tuple(moments) or ((),))
+
+
+def _lines(screen: pyte.Screen) -> tuple[str, ...]:
+    """Return the lines of a screen up to the last one with a letter."""
+    rows = (screen.buffer[y] for y in range(max(screen.buffer, default=-1) + 1))
+    text = "\n".join("".join(row[x].data for x in range(max(row, default=-1) + 1)).rstrip() for row in rows)
+    return tuple(text.rstrip("\n").split("\n"))
 
 
 def _environment() -> dict[str, str]:
@@ -106,7 +113,7 @@ def folder(tmp_path: Path, videoray_fmu: Path) -> Path:
     small_folder(tmp_path / "tests")
     (tmp_path / "bare.toml").write_bytes(BARE.read_bytes())
     (tmp_path / "videoray.fmu").symlink_to(videoray_fmu)
-    (tmp_path / "mistake.toml").write_text(BARE.read_text(encoding="utf-8").replace("[known", "[knwon"), "utf-8")
+    (tmp_path / "mistake.toml").write_text(f"nmae = 1\n{BARE.read_text(encoding='utf-8')}", encoding="utf-8")
     return tmp_path
 
 
@@ -155,7 +162,7 @@ def test_no_line_is_too_long_no_word_is_broken_and_no_progress_is_left(
     assert max(len(line) for moment in shown.moments for line in moment) <= columns
     at_the_end = "\n".join(shown.lines)
     assert not re.search(r"✓|\d:\d\d:\d\d|[━╸╺⠀-⣿]|about \d+:\d\d left", at_the_end)
-    assert "\x1b[?25l" not in shown.raw or shown.raw.endswith(("\x1b[?25h", at_the_end[-1:])), "the cursor is back"
+    assert shown.raw.rfind("\x1b[?25l") <= shown.raw.rfind("\x1b[?25h"), "the cursor is back"
     if "--help" not in arguments:  # Click fills the lines of a help up to 80 columns
         words = {_VARIES.sub("0", word) for word in at_the_end.split()}
         assert words - words_in_a_pipe(arguments, folder) <= {"the", "widest", "of", *at_the_end.split("…")[1:]}
@@ -166,10 +173,10 @@ def test_parts_that_are_done_have_a_tick_and_disappear(columns: int, folder: Pat
     shown = on_a_terminal(["identify", "tests", "--report", "found.html"], columns, folder)
     assert shown.code == 0
     progress = [moment for moment in shown.moments if any("✓" in line for line in moment)]
-    done = [next(line for line in moment if "✓" in line) for moment in progress]
-    assert all(re.fullmatch(r"✓ reading the folder +0:00:\d\d", line) for line in done)
+    for name in ("reading the folder", "identifying the vehicle"):
+        assert any(re.fullmatch(rf"✓ {name} +0:0\d:\d\d", line) for moment in progress for line in moment)
     running = [moment[-1] for moment in progress]
-    assert any(re.search(r"\d %|\d% 0:0\d:\d\d about \d+:\d\d left$", line) for line in running), running[-1]
+    assert any(re.search(r" \d+% 0:0\d:\d\d about \d+:\d\d left$", line) for line in running), running
     assert len(shown.lines) <= 24
 
 
@@ -180,7 +187,7 @@ def test_colours_are_left_out_where_they_are_not_wanted(folder: Path) -> None:
     assert colour.search(on_a_terminal(arguments, 80, folder).raw)
     without = on_a_terminal(arguments, 80, folder, {"NO_COLOR": "1"})
     assert not colour.search(without.raw)
-    assert without.lines[-2] == "Wrote bare.fmu. Next: rov-fmu prove bare.fmu"
+    assert without.lines[-1] == "Wrote bare.fmu. Next: rov-fmu prove bare.fmu"
 
 
 def test_a_pipe_gets_a_plain_line_for_each_part_but_the_last(folder: Path) -> None:
