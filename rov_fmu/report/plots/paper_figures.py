@@ -5,7 +5,7 @@ measured velocity is that of the thrust curve, (11)-(13). The forces behind the 
 recordings (Figures 3, 10, 11) are not printed, so they are not drawn.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import partial
@@ -125,7 +125,7 @@ def paper_figures() -> Iterator[PaperFigure]:
     for axis, (name, source) in _STEP_FIGURES.items():
         yield PaperFigure(
             name,
-            f"Velocity in {axis} after steps of the command to {', '.join(map(str, _STEPS))} %: the non-linear model "
+            f"Velocity in {axis} after steps of the command to {_listed(_STEPS)} %: the non-linear model "
             f"(dashed) and the scaled model (solid) of {_PAPER}{source}. Dotted: measured V_ss. Points: measured Tau, "
             "at 63 % of the measured V_ss. The paper does not print the recordings.",
             (partial(_steps, k=k, table=tables[axis]),),
@@ -133,10 +133,16 @@ def paper_figures() -> Iterator[PaperFigure]:
     axes = [form.axis.name for form in vehicle.layout.axes]
     yield PaperFigure(
         "steady_velocity",
-        f"Steady velocity over the command in {', '.join(axes)}: the model of {_PAPER} (dashed), the model refitted to "
+        f"Steady velocity over the command in {_listed(axes)}: the model of {_PAPER} (dashed), the model refitted to "
         "all measured V_ss and Tau (solid), and the measured V_ss (points).",
         tuple(partial(_steady, k=k, refit=refit, table=tables[axis], has_legend=axis == axes[0]) for axis in axes),
     )
+
+
+def _listed(words: Sequence[object]) -> str:
+    """Return words in running text: 30, 50 and 70."""
+    *first, last = map(str, words)
+    return f"{', '.join(first)} and {last}"
 
 
 def _steady(ax: Axes, k: Rov, refit: Rov, table: ResponseTable, *, has_legend: bool) -> None:

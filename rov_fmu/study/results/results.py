@@ -35,6 +35,8 @@ class Results:
         """The figures, columns of `runs`."""
         self.outputs: tuple[str, ...] = tuple(study["columns"]["outputs"])
         """The kept outputs, columns of `trajectories`."""
+        self.title: str | None = study.get("title")
+        """The title that the plan gives."""
         self.planned: int = study["runs"]
         """The number of runs of the whole study."""
         self.plan: dict[str, Any] = study["plan"]

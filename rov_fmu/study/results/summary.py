@@ -4,7 +4,7 @@ import numpy as np
 from rich.text import Text
 
 from rov_fmu.report.console import console, print_table, table, text
-from rov_fmu.study.results.page import axis_label
+from rov_fmu.study.results.plots import axis_label
 from rov_fmu.study.results.results import Results
 from rov_fmu.study.run.cluster import Spent
 from rov_fmu.study.run.worker import REASON

@@ -64,6 +64,7 @@ def run_study(
             sha256(model.content).hexdigest(),
             plan.vehicle,
             design.runs,
+            title=plan.title,
             columns={"parameters": design.names, "figures": [*job.figures], "outputs": job.kept},
             points=len(job.kept_points),
             model=model.name,
