@@ -421,7 +421,7 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
         paragraph(console(), f"- {note}")
     for warning in model.warnings:
         _warn(warning)
-    following = shell_words("gz", "sim", path) if in_world else "include it in a world, or give --world"
+    following = shell_words("gz", "sim", "-r", path) if in_world else "include it in a world, or give --world"
     print_end([path], following)
 
 
