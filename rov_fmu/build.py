@@ -35,6 +35,8 @@ class Built:
     """The time until each platform was compiled."""
     note: str
     """The result of validating and running the FMU."""
+    was_run: bool
+    """True when the FMU was run, and so has a binary for this machine."""
     beside: Sequence[Path]
     """The other files that were written."""
 
@@ -100,12 +102,13 @@ def build(
         for name, library in binaries.items()
     }
     packed = archive({**content.files, **libraries})
-    notes: list[str] = []
-    draft = Output(output, packed, lambda path: notes.append(_check(path, vehicle, chosen if native else None, fmi)))
+    checked: list[tuple[str, bool]] = []
+    draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen if native else None, fmi)))
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
     written = [other.path for other in beside]
-    return Built(output, len(packed), content.guid, sizes, seconds, notes[0], written)
+    note, was_run = checked[0]
+    return Built(output, len(packed), content.guid, sizes, seconds, note, was_run, written)
 
 
 def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[str]:
@@ -128,8 +131,8 @@ def _folder(name: str, fmi: int) -> str:
     return name if fmi == 2 else PLATFORMS[name].folder
 
 
-def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: int) -> str:
-    """Validate and run an FMU, and return a summary of the result. Raises BuildError."""
+def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: int) -> tuple[str, bool]:
+    """Validate and run an FMU. Return a summary of the result, and whether it was run. Raises BuildError."""
     import fmpy
     from fmpy.validation import validate_fmu
 
@@ -139,7 +142,7 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
     # FMPy refuses to run an FMU without a binary in a folder that it knows, although it may load another folder
     known = fmpy.platform in fmpy.supported_platforms(str(path))
     if platforms is not None and not (known and loaded in [_folder(name, fmi) for name in platforms]):
-        return "valid; not run, for it has no binary that FMPy loads on this machine"
+        return "The FMU is valid. It was not run, because it has no binary that FMPy loads on this machine.", False
     with temporary_folder("fmu-") as folder:
         fmpy.extract(str(path), unzipdir=folder)
         axis = vehicle.layout.axes[0].axis
@@ -148,4 +151,4 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
     by_value = {value: " = ".join(name for name in start if start[name] == value) for value in start.values()}
     commands = ", ".join(f"{names} = {value:g}" for value, names in by_value.items())
     end = f"{axis.velocity} = {result[axis.velocity][-1]:.4f} {axis.unit} after {result['time'][-1]:g} s"
-    return f"valid; runs: {commands} gives {end}"
+    return f"The FMU is valid. In a run, {commands} gives {end}.", True

@@ -20,7 +20,7 @@ from click.shell_completion import CompletionItem
 from rov_fmu import __version__
 from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.io.file_kinds import PAGE, check_written
-from rov_fmu.io.messages import FileError, InputError, ProofError, StudyError, did_you_mean, shown
+from rov_fmu.io.messages import FileError, InputError, ProofError, StudyError, did_you_mean, on_terminal, shown
 from rov_fmu.io.output import check_targets, write_whole
 from rov_fmu.model.layout import AXES
 from rov_fmu.process import exit_code
@@ -105,13 +105,31 @@ def _number(allowed: str, low: float = -inf, high: float = inf, kind: type[float
 _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is checked by the code that reads it
 
 
-@click.group(no_args_is_help=False, context_settings={"help_option_names": ["-h", "--help"]})
+class _Commands(click.Group):
+    """The commands. Without one, the help is printed; it has the whole summary of each."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """Write the commands with their summaries, which Click would cut to a line."""
+        summaries = [(name, command.get_short_help_str(limit=1000)) for name, command in self.commands.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(summaries)
+
+
+@click.group(
+    cls=_Commands,
+    no_args_is_help=False,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__, prog_name="rov-fmu")
-def _commands() -> None:
+@click.pass_context
+def _commands(context: click.Context) -> None:
     """Make an FMU of an identified underwater vehicle (ROV).
 
     VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships.
     """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 # ---- build -----------------------------------------------------------------------------------------------------------
@@ -172,19 +190,17 @@ def _build(vehicle: Path, output: Path | None, backend: str, fmi: int, platforms
 
 
 def _print_built(built: "Built", seconds: float) -> None:
-    """Print the files with their sizes and times, and what the FMU showed when it was run."""
-    from rich.text import Text
-
-    from rov_fmu.report.console import console
+    """Print the size of the FMU and of its binaries, the times, what it did when it was run, and what to do next."""
+    from rov_fmu.report.console import console, paragraph, print_end, shell_words
 
     out = console()
-    out.print(Text.assemble((str(built.path), "bold"), f"  {built.size / 1000:.0f} kB  {built.guid}"), soft_wrap=True)
-    for name, size in built.binaries.items():
-        out.print(f"  {name:<14}{size / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
-    out.print(f"  {built.note}")
-    for path in built.beside:
-        out.print(Text(str(path), "bold"), soft_wrap=True)
-    out.print(f"  built in {seconds:.1f} s")
+    size = f"{built.size / 1000:.0f} kB, built in {seconds:.1f} s, GUID {built.guid}"
+    paragraph(out, f"{shell_words(built.path)}: {size}")
+    for name, size_of_binary in built.binaries.items():
+        out.print(f"  {name:<14}{size_of_binary / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
+    paragraph(out, built.note)
+    following = shell_words("rov-fmu", "prove", built.path) if built.was_run else ""
+    print_end([built.path, *built.beside], following)
 
 
 # ---- simulate --------------------------------------------------------------------------------------------------------
@@ -240,6 +256,7 @@ def _simulate(
     """
     from rov_fmu.interface.model import load
     from rov_fmu.interface.simulate_command import check_outputs, print_final, run, write_results
+    from rov_fmu.report.console import print_end
 
     opens = plot == Path()
     check_outputs(output, None if opens else plot, [path for path in (vehicle, commands) if path])
@@ -249,6 +266,7 @@ def _simulate(
     write_results(result, output, picture)
     if opens and picture:
         _open(picture)
+    print_end([path for path in (output, plot) if path and path != Path()])
     if not (output or picture):
         print_final(loaded, result)
 
@@ -266,7 +284,7 @@ def _warnings_printed() -> Iterator[None]:
 
 
 def _warn(message: str) -> None:
-    click.echo(f"rov-fmu: warning: {message}", err=True)
+    click.echo(on_terminal(f"rov-fmu: warning: {message}"), err=True)
 
 
 # ---- fly -------------------------------------------------------------------------------------------------------------
@@ -288,6 +306,7 @@ def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
     from rov_fmu.fmu.module import module
     from rov_fmu.io.output import Output
+    from rov_fmu.report.console import print_end
     from rov_fmu.report.page.live import Flown, fly_page
     from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -300,7 +319,7 @@ def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
     write_whole(Output(path, page))
     if output:
-        click.echo(path)
+        print_end([path], "open it in a browser")
     else:
         _open(path)
 
@@ -310,8 +329,10 @@ def _open(path: Path) -> None:
     click.echo(path)
     if not webbrowser.open(path.as_uri()):
         click.echo(
-            "rov-fmu: no browser could be opened: open this file, which needs no other, in a browser here or on "
-            "another machine; -o PAGE.html writes it where you want it",
+            on_terminal(
+                "rov-fmu: no browser could be opened: open this file, which needs no other, in a browser here or on "
+                "another machine; -o PAGE.html writes it where you want it"
+            ),
             err=True,
         )
 
@@ -391,13 +412,17 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
 def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) -> None:
     """Write a model for Gazebo (gz-sim) of a vehicle. The default is the VideoRay Pro 4."""
     from rov_fmu.interface.sdf_command import write_model
+    from rov_fmu.report.console import console, paragraph, print_end, shell_words
 
     path, model = write_model(vehicle, output, in_world=in_world, explicit=added_mass == "plugin")
-    click.echo(path)
+    if model.notes:
+        paragraph(console(), "What is different in Gazebo:")
     for note in model.notes:
-        click.echo(f"- {note}")
+        paragraph(console(), f"- {note}")
     for warning in model.warnings:
         _warn(warning)
+    following = shell_words("gz", "sim", "-r", path) if in_world else "include it in a world, or give --world"
+    print_end([path], following)
 
 
 # ---- prove -----------------------------------------------------------------------------------------------------------
@@ -419,10 +444,10 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     """Run the experiments that an FMU carries (FMI-LS-REF). It can be the FMU of any exporter."""
     from rov_fmu.fmu.proof import prove
     from rov_fmu.report.console import print_proof
-    from rov_fmu.report.progress import bar
+    from rov_fmu.report.progress import parts
 
-    with bar() as progress:
-        findings = prove(fmu, interface, tolerance, progress)
+    with parts() as shown:
+        findings = prove(fmu, interface, tolerance, shown.begin("running the experiments"))
     print_proof(findings)
     if wrong := sum(not finding.passed for finding in findings):
         raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
@@ -455,13 +480,23 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
         from rov_fmu.study.run.run_study import run_study
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
-    from rov_fmu.report.progress import runs_bar
+    from rov_fmu.report.console import print_end
+    from rov_fmu.report.progress import StudyParts, parts
 
     check_place(output)
-    with runs_bar() as bar:
-        spent, results = run_study(plan, output, workers, scheduler, bar.update, bar.warn)
-    write_whole(page_output(results))
+    with parts() as shown:
+        spent, results = run_study(
+            plan,
+            output,
+            workers,
+            scheduler,
+            StudyParts(shown).update,
+            lambda message: shown.print(f"warning: {message}"),
+        )
+    page = page_output(results)
+    write_whole(page)
     print_summary(results, spent)
+    print_end([page.path], "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
         raise StudyError(f"{output}: no run is done, with all its figures")
 
@@ -486,7 +521,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     help="Only list what the log FOLDER, or each log in it, contains, and write a draft of rov.toml beside it.",
 )
 def _identify(folder: Path, output: Path | None, report: Path | None, force: bool, inspects: bool) -> None:
-    """Identify a vehicle from FOLDER, which holds its tank tests: rov.toml and thrust_, steady_, ... .csv."""
+    """Identify a vehicle from FOLDER, which holds its tank tests or dive logs, and rov.toml."""
     if inspects:
         if output or report or force:
             raise click.UsageError(
@@ -495,26 +530,33 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
         _inspect(folder)
         return
     from rov_fmu.interface.identify_command import identify_folder
+    from rov_fmu.report.console import console, paragraph, print_end, shell_words
     from rov_fmu.report.console_results import print_identification
-    from rov_fmu.report.progress import bar
+    from rov_fmu.report.progress import parts
 
-    with bar() as progress:
-        identification, replaced = identify_folder(folder, output, report, force=force, on_progress=progress)
+    with parts() as shown:
+        identification, replaced = identify_folder(folder, output, report, force=force, begin=shown.begin)
     for line in replaced:
-        click.echo(line)
+        paragraph(console(), line)
     print_identification(identification)
+    name = identification.vehicle.identifier
+    whole = "identify", folder, "-o", f"{name}.toml", "--report", report or f"{name}.html"
+    following = shell_words("rov-fmu", *(("build", output) if output else whole))
+    print_end([path for path in (output, report) if path], following)
 
 
 def _inspect(path: Path) -> None:
     """List what logs contain, and write a draft of rov.toml."""
     from rov_fmu.interface.inspect_command import inspect_logs, write_draft
+    from rov_fmu.report.console import print_end, shell_words
     from rov_fmu.report.console_log import print_inspection
 
     found, draft, text = inspect_logs(path)
     for inspection in found:
         print_inspection(inspection)
     write_draft(draft, text)
-    click.echo(f"{draft}: a draft, to be edited")
+    following = shell_words("rov-fmu", "identify", draft.parent)
+    print_end([draft], f"edit this draft, then {following}")
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------
@@ -563,12 +605,17 @@ def _tune(
     from rov_fmu.identify.findings import sentences
     from rov_fmu.identify.tuning import implausible
     from rov_fmu.interface.tune_command import tune_vehicle
+    from rov_fmu.report.console import print_end, shell_words
     from rov_fmu.report.console_results import print_tuning
 
     tuning = tune_vehicle(vehicle, AXES[axis], command, v_ss, tau, points, output)
     print_tuning(tuning)
     for message in sentences(implausible(tuning)):
         _warn(message)
+    if output:
+        print_end([output], shell_words("rov-fmu", "build", output))
+    else:
+        print_end([], "add -o TUNED.toml to write the tuned vehicle")
 
 
 # ---- schema, tables, figures -----------------------------------------------------------------------------------------
@@ -616,6 +663,9 @@ def _figures(folder: Path, form: str, column: str) -> None:
 
     FOLDER is created if it does not exist.
     """
+    from rov_fmu.report.console import console, paragraph, shell_words
     from rov_fmu.report.plots.paper_figures import write_figures
 
-    print(*write_figures(folder, form, column), sep="\n")
+    figures = len(write_figures(folder, form, column)) // 2
+    words = f"Wrote {figures} figures to {shell_words(folder)}, each with its caption in a text file beside it."
+    paragraph(console(), words)

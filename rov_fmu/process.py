@@ -124,10 +124,11 @@ def _kill_children() -> None:
 def _print_error(program: str, message: str, code: int) -> int:
     """Print the lines of a message to stderr, and return the exit code."""
     from rov_fmu.io.interrupts import UNINTERRUPTED
+    from rov_fmu.io.messages import on_terminal
 
     with UNINTERRUPTED:
         for line in message.splitlines():
-            print(f"{program}: {line}", file=sys.stderr)
+            print(on_terminal(f"{program}: {line}"), file=sys.stderr)
     return code
 
 

@@ -52,6 +52,12 @@ COMMANDS = {
     "the figures": Command("figure_5.svg", lambda path: ["figures", str(path.parent)]),
 }
 
+
+def without_progress(err: str) -> str:
+    """Return what a command printed on stderr, without the lines about parts and runs that are done."""
+    return re.sub(r"^rov-fmu: (?:.*: done in [\d.]+ s|[\d,]+/[\d,]+ runs, .*)\n", "", err, flags=re.M)
+
+
 _DRIVER = """
 import contextlib, io, json, sys
 from rov_fmu.cli import main

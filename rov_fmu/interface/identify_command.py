@@ -1,30 +1,28 @@
 """The command `rov-fmu identify`: from a folder of tank tests to the vehicle file and the report."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rov_fmu.identify import identify
 from rov_fmu.identify.identification import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written
-from rov_fmu.io.messages import Progress, part
+from rov_fmu.io.messages import Progress
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.seal import check_replaced
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.writer import check_report, vehicle_output
 
-_IDENTIFIED = 0.8
-"""The share of the work that is done before the report is drawn."""
-
 
 def identify_folder(
-    folder: Path, vehicle: Path | None, report: Path | None, *, force: bool, on_progress: Progress
+    folder: Path, vehicle: Path | None, report: Path | None, *, force: bool, begin: Callable[[str], Progress]
 ) -> tuple[Identification, list[str]]:
     """Identify a vehicle from a folder of tank tests, and write its vehicle file and its report if they are asked for.
 
-    `force` allows to replace files that were not written by `identify`, or were changed since. `on_progress` is called
-    with the name of the next step and the share of work done. Returns the identification, and a line for each file
-    that was replaced. Raises FileError, and WriteError before the work begins if a file cannot be written.
+    `force` allows to replace files that were not written by `identify`, or were changed since. `begin` is called with
+    the name of each part of the work, and returns the function that takes the progress of this part. Returns the
+    identification, and a line for each file that was replaced. Raises FileError, and WriteError before the work begins
+    if a file cannot be written.
     """
     replaced: list[str] = []
     if vehicle and report:
@@ -40,12 +38,12 @@ def identify_folder(
             check_written(report, PAGE)
         replaced.extend(check_replaced(targets, force=force))
 
+    begin("reading the folder")
     tests = load_tank_tests(folder, check_outputs)
-    identified = _IDENTIFIED if report else 1.0
-    identification = identify.identify(tests, part(on_progress, 0.0, identified))
+    identification = identify.identify(tests, begin("identifying the vehicle"))
     outputs = []
     if report:
-        outputs.append(_report_output(identification, report, part(on_progress, identified, 1.0)))
+        outputs.append(_report_output(identification, report, begin("drawing the report")))
     if vehicle:
         outputs.append(_vehicle_output(identification, vehicle, report))
     write_whole(*outputs)

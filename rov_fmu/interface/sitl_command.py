@@ -1,12 +1,11 @@
 """The command `rov-fmu sitl`: the meaning of its options, and what it prints."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from socket import AF_INET, SOCK_DGRAM, socket
-
-import click
 
 from rov_fmu.bridges.sitl import Connection, Setup
 from rov_fmu.bridges.sitl_frames import FRAMES, Servos, servos_of
@@ -17,6 +16,7 @@ from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, shown
 from rov_fmu.io.output import check_targets
 from rov_fmu.model.layout import Layout
+from rov_fmu.report.console import console, paragraph, print_end, shell_words
 
 _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
@@ -54,11 +54,15 @@ def serve(path: Path, options: Options) -> None:
             ) from error
         connection = Connection(setup)
         address, port = server.getsockname()
-        click.echo(f"{_listed(setup.servos)}\nlistening on {address}, UDP port {port}; Ctrl-C ends it")
+        paragraph(console(), _listed(setup.servos))
+        paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
+        sys.stdout.flush()  # a pipe would get it at the end
 
         def end() -> None:
             connection.write_log()
-            click.echo(_summary(connection))
+            paragraph(console(), _summary(connection))
+            if options.log:
+                print_end([options.log], shell_words("rov-fmu", "identify", "--inspect", options.log))
 
         with cleaned_up(end):
             connection.serve(server, options.duration or inf)

@@ -1,9 +1,13 @@
 """Messages to the user: errors, hints, progress, and values on one printable line."""
 
+import os
 import reprlib
+import shutil
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
+from textwrap import wrap
 
 MOST = 10
 """The number of mistakes in a file that are printed; the others are counted."""
@@ -66,6 +70,22 @@ def lines_on(path: Path, mistakes: Iterable[str]) -> list[str]:
 def one_line(text: str) -> str:
     """Return the text with line breaks, control characters and undecodable bytes escaped, as Python writes them."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def on_terminal(text: str) -> str:
+    """Return the text as stderr gets it: on a terminal in lines that end between words, in a pipe as it is."""
+    if not (sys.stderr and sys.stderr.isatty()):
+        return text
+    try:
+        columns = os.get_terminal_size(sys.stderr.fileno()).columns
+    except (OSError, ValueError):
+        columns = 0
+    return wrapped(text, columns or shutil.get_terminal_size().columns, "  ")
+
+
+def wrapped(text: str, width: int, indent: str = "") -> str:
+    """Return the text in lines of a width that end between words; those after the first are indented."""
+    return "\n".join(wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False))
 
 
 def brief(text: str, most: int = 80) -> str:

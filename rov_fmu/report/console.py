@@ -1,14 +1,21 @@
 """The console that the commands print on, its tables, and the printout of the paper's tables and of a proof."""
 
+import os
+import shlex
+import subprocess
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from math import isnan
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich import box
+from rich.cells import cell_len
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
+from rov_fmu.io.messages import one_line, wrapped
 from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -18,12 +25,12 @@ if TYPE_CHECKING:
 DEVIATION = "+.1%"
 """The format of a relative deviation."""
 _WIDE = 110
-"""The width of tables in a pipe or a file, and of those that a terminal is too narrow for."""
+"""The width of tables in a pipe or a file, in columns."""
 
 
-def console() -> Console:
+def console(*, stderr: bool = False) -> Console:
     """Return a console that prints text without markup, as wide as the terminal."""
-    found = Console(markup=False, highlight=False, emoji=False)
+    found = Console(stderr=stderr, markup=False, highlight=False, emoji=False)
     if not found.is_terminal:
         found.width = max(found.width, _WIDE)  # Rich assumes 80 columns
     return found
@@ -31,17 +38,56 @@ def console() -> Console:
 
 def paragraph(out: Console, words: str) -> None:
     """Print a paragraph. A terminal gets lines that end between words; a pipe or a file gets one line."""
-    out.print(words, soft_wrap=not out.is_terminal)
+    if out.is_terminal:
+        out.print(wrapped(words, out.width, "  " if words.startswith(("- ", "  ")) else ""))
+    else:
+        out.print(words, soft_wrap=True)
 
 
-def print_table(found: Table) -> None:
-    """Print a table. It is wider than the terminal where digits would be cut off otherwise."""
+def shell_words(*words: str | Path) -> str:
+    """Return the words of a command line for people, quoted for a shell."""
+    clean = [one_line(str(word)) for word in words]
+    return subprocess.list2cmdline(clean) if os.name == "nt" else shlex.join(clean)
+
+
+def print_end(written: Sequence[Path], following: str = "") -> None:
+    """Print which files a command wrote, and what to do next: a command line, or words."""
     out = console()
-    with out.capture() as drawn:
+    *some, last = [shell_words(path) for path in written] or [""]
+    sentences = [f"Wrote {', '.join(some)}{' and ' if some else ''}{last}."] if written else []
+    sentences += [f"Next: {following}"] if following else []
+    if out.is_terminal and len(" ".join(sentences)) > out.width:
+        for sentence in sentences:
+            paragraph(out, sentence)
+    elif sentences:
+        paragraph(out, " ".join(sentences))
+
+
+def print_table(found: Table, out: Console | None = None) -> None:
+    """Print a table between its title and its caption, which are paragraphs.
+
+    No number is cut: where a terminal is narrower than the numbers of a row, each row is a paragraph.
+    """
+    out = out or console()
+    if found.title:
+        paragraph(out, str(found.title))
+    caption, found.title, found.caption = found.caption, None, None
+    for column in found.columns:
+        if column.no_wrap:
+            lines = [line for cell in (column.header, *column.cells) for line in str(cell).splitlines()]
+            column.min_width = max(map(cell_len, lines), default=0)
+    least = Measurement.get(out, out.options.update(max_width=10_000), found).minimum
+    if not out.is_terminal:
+        out.width = max(out.width, least)
+    if least <= out.width:
         out.print(found)
-    if "…" in drawn.get():
-        out.width = max(out.width, _WIDE)
-    out.print(found)
+    else:
+        headers = [" ".join(str(column.header).split()) for column in found.columns[1:]]
+        for first, *cells in zip(*(map(str, column.cells) for column in found.columns), strict=True):
+            values = ", ".join(f"{header} {cell}".strip() for header, cell in zip(headers, cells, strict=True) if cell)
+            paragraph(out, f"{first}: {values}".removesuffix(": "))
+    if caption:
+        paragraph(out, str(caption))
 
 
 def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
@@ -50,12 +96,14 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
     paragraph(out, f"{vehicle.name}. {vehicle.source}")
     for t in tables:
         out.print()
-        print_table(_side_by_side(vehicle, t))
-    out.print(
-        "\nnon-linear: every alpha and beta is 1; scaled: those of the vehicle file; computed in closed form.\n"
-        "dev.: the computed value against the printed one; under test, the scaled model against the test.\n"
-        "*: the printed value is not the computed one rounded to its digits. -: not printed, not measured."
-    )
+        print_table(_side_by_side(vehicle, t), out)
+    out.print()
+    for line in (
+        "non-linear: every alpha and beta is 1. scaled: those of the vehicle file. model: in closed form.",
+        "dev.: the deviation of the model from the printed value, at the end that of the scaled model from the test.",
+        "*: the printed value is not that of the model rounded to its digits. -: not printed, or not measured.",
+    ):
+        paragraph(out, line)
 
 
 def print_proof(findings: "Sequence[Finding]") -> None:
@@ -72,20 +120,23 @@ def print_proof(findings: "Sequence[Finding]") -> None:
             text(f.tolerance, ".1e"),
             "pass" if f.passed else f"FAIL {f.error}",
         )
-    print_table(found)
-    passed = sum(f.passed for f in findings)
-    console().print(f"\n{passed} of {len(findings)} pass. Deviations are relative to the largest expected value.")
+    out = console()
+    print_table(found, out)
+    out.print()
+    passed = f"{sum(f.passed for f in findings)} of {len(findings)} pass"
+    paragraph(out, f"{passed}. A deviation is the largest one, relative to the largest expected value.")
 
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
     """Return a published table with the printed, computed and measured values side by side."""
     values = ", ".join(f"{name} = {vehicle.rov[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
-    compared = [f"{model}\nprinted|\ncomputed|\ndev." for model in ("non-linear", "scaled")]
-    headers = "|".join([*compared, "test\nmeasured|\ndev."]).split("|")
-    result = table(f"Table {t.number}. {t.axis.name.capitalize()}, {values}", "\ncommand", headers)
-    for quantity, unit in (("V_ss", t.axis.unit), ("Tau", "s")):
+    compared = [f"{model}\nprinted|\nmodel|\ndev." for model in ("non-linear", "scaled")]
+    headers = "|".join([*compared, "\ntest|\ndev."]).split("|")
+    title = f"Table {t.number}. {t.axis.name.capitalize()}, {values}; V_ss in {t.axis.unit}, Tau in s"
+    result = table(title, "\ncommand", headers)
+    for quantity in ("V_ss", "Tau"):
         result.add_section()
-        result.add_row(f"{quantity} [{unit}]")
+        result.add_row(quantity)
         for row in t.rows:
             scaled: Cell = getattr(row.scaled, quantity)
             result.add_row(
@@ -109,8 +160,6 @@ def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] =
     """Return an empty table with a first column, then columns of numbers, then columns of texts."""
     result = Table(
         title=title,
-        title_justify="left",
-        caption_justify="left",
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
         show_edge=False,

@@ -1,120 +1,156 @@
 """The printout of an identification and of a tuning."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from math import inf
 
+from rich.console import Console
 from rich.table import Table
 
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.next_test import REPEATED, NextTest
-from rov_fmu.identify.recordings.recordings_fit import FittedEffect
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect, count
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.report.console import DEVIATION, console, paragraph, print_table, table, text
-from rov_fmu.report.findings import Unseen, acting, effects, unseen
+from rov_fmu.report.findings import Unseen, acting, by_heading, effects, unseen
+from rov_fmu.report.overview import main_errors
 from rov_fmu.vehicle.uncertainty import with_interval
 from rov_fmu.vehicle.vehicle import Vehicle
 
+_SCREEN = 24
+"""The number of lines of the printout on a terminal of 80 columns, with the line about what is next."""
+_FEWEST_COEFFICIENTS, _MOST_WARNINGS = 4, 3
+_ARE_THERE = "are in the report"
+_GAP = (0, 2, 0, 0)
+"""The padding of the tables, in columns to the right of each cell."""
+
 
 def print_identification(identification: Identification) -> None:
-    """Print the results of an identification, the most important first; the report has all of them.
+    """Print the main results of an identification on one screen; the report has all of them.
 
-    These are the prediction errors, the identified coefficients, the other effects, the next tests, and the findings.
+    These are the prediction errors, the coefficients with the widest intervals, the other effects, the next test, and
+    the warnings.
     """
     out, vehicle = console(), identification.vehicle
-    paragraph(out, f"{vehicle.name}. {vehicle.source}")
-    for found in _tables(identification, compare(identification)):
-        out.print()
-        print_table(found)
-    given = [name for name in vehicle.layout.coefficients if name not in vehicle.intervals]
-    if given:
-        paragraph(out, f"\nGiven or assumed: {', '.join(given)}.")
-    if identification.next_tests:
-        out.print("\nTo measure next:")
-    for test in identification.next_tests:
-        for line in _next_test(test, vehicle.rov[test.coefficient]):
-            paragraph(out, f"- {test.axis.name}: {line}")
-    if identification.warnings:
-        out.print("\nNot identifiable, or against the model:")
-    for warning in identification.warnings:
-        paragraph(out, f"- {warning}")
+    with out.capture() as before:
+        paragraph(out, f"{vehicle.name}. {vehicle.source}")
+        for found in _predictions(identification):
+            out.print()
+            print_table(found, out)
+    with out.capture() as after:
+        for line in _conclusions(identification):
+            paragraph(out, line)
+    remaining = _SCREEN - (before.get() + after.get()).count("\n") - 5  # 2 blank lines, a heading, what is next
+    out.out(before.get(), end="\n")
+    _print_coefficients(out, vehicle, remaining)
+    out.out("", after.get(), sep="\n", end="")
 
 
-def _tables(identification: Identification, comparisons: Sequence[Comparison]) -> Iterator[Table]:
-    """Yield the tables of the predictions, of the coefficients, of the other effects, and of the points."""
-    predicted = list(unseen(identification, comparisons))
-    if of_recordings := [row for row in predicted if row.error is None]:
-        yield _predicted(of_recordings)
-    if of_points := [row for row in predicted if row.error is not None]:
-        yield _predicted_points(of_points)
-    yield _coefficients(identification.vehicle)
+def _predictions(identification: Identification) -> Iterator[Table]:
+    """Yield the tables of the predictions: of recordings, and of points where an axis has only these."""
+    comparisons = compare(identification)
+    predicted = [row for row in unseen(identification, comparisons) if row.error is None]
+    if predicted:
+        yield _of_recordings(predicted)
+    if of_points := [c for c in comparisons if not c.result.recordings]:
+        yield _of_points(of_points, [identification.against.name] if identification.against else [])
+
+
+def _print_coefficients(out: Console, vehicle: Vehicle, lines: int) -> None:
+    """Print the coefficients with the widest intervals, in columns, on about as many lines."""
+    widths = {name: (high - low) / (abs(vehicle.rov[name]) or inf) for name, (low, high) in vehicle.intervals.items()}
+    texts = []
+    for name in sorted(widths, key=lambda name: -widths[name]):
+        unit = vehicle.layout.coefficients[name].unit
+        value, low, high = with_interval(vehicle.rov[name], vehicle.intervals[name])
+        texts.append(f"{name} {value} ({low} to {high}) {'' if unit == '1' else unit}".rstrip())
+    fitting = (n for n in range(len(texts), _FEWEST_COEFFICIENTS, -1) if n <= lines * _columns(texts[:n], out.width))
+    shown = texts[: next(fitting, _FEWEST_COEFFICIENTS)]
+    columns = _columns(shown, out.width)
+    of = f", the {len(shown)} widest of {len(texts)}" if len(shown) < len(texts) else ""
+    paragraph(out, f"Identified coefficients with 95 % intervals{of}:")
+    grid = Table.grid(padding=_GAP)
+    for first in range(0, len(shown), columns):
+        grid.add_row(*shown[first : first + columns])
+    out.print(grid)
+
+
+def _columns(texts: Sequence[str], width: int) -> int:
+    """Return the largest number of columns in which texts fit side by side, with gaps between them."""
+    counts = range(len(texts), 1, -1)
+    return next((n for n in counts if sum(2 + max(map(len, texts[k::n])) for k in range(n)) - 2 <= width), 1)
+
+
+def _conclusions(identification: Identification) -> Iterator[str]:
+    """Yield the paragraphs about other effects, the next test, warnings, and what else the report has."""
     kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
     if kept:
-        yield _effects(kept)
-    if comparisons:
-        yield _summary(comparisons, [identification.against.name] if identification.against else [])
+        yield f"What else acts: {_acting(kept)}."
+    if line := " ".join(_next_tests(identification.next_tests)):
+        yield line
+    groups = by_heading(identification.findings)
+    warnings = groups["Warnings"]
+    rest = {"warning": warnings[_MOST_WARNINGS:], "doubt": groups["Doubts"], "fact": groups["Facts"]}
+    more = _listed([count(len(some), what) for what, some in rest.items() if some])
+    if warnings:
+        yield f"Warnings ({more} more {_ARE_THERE}):" if more else "Warnings:"
+    elif more:
+        yield f"{more[0].upper()}{more[1:]} {_ARE_THERE}."
+    for warning in warnings[:_MOST_WARNINGS]:
+        yield f"- {warning}"
 
 
-def _next_test(test: NextTest, value: float) -> Iterator[str]:
-    """Yield the lines about a test to make next, or that none is needed; `value` is that of its coefficient."""
-    _, low, high = with_interval(value, test.interval)
-    now = f"now {low} ... {high}" if test.interval else "not identifiable yet"
-    if test.is_known:
-        yield f"enough is known; the widest interval is that of {test.coefficient}, {now}"
-    elif not test.is_useful:
-        yield f"no step within the limits would narrow the widest interval by a tenth ({test.coefficient}, {now})"
-    else:
-        then = f"; then {1.0 - test.narrowed:.0%} narrower" if test.interval else ""
-        yield f"{test.words} ({test.coefficient}, {now}{then})"
-    if test.repeat:
-        yield REPEATED
+def _next_tests(tests: Sequence[NextTest]) -> Iterator[str]:
+    """Yield sentences about the most useful test, and the axes of which enough is known."""
+    if unknown := [test for test in tests if not test.is_known]:
+        widest = unknown[0]
+        if useful := next((test for test in unknown if test.is_useful), None):
+            narrows = f"narrows {useful.coefficient} by {min(1.0 - useful.narrowed, 0.99):.0%}"
+            why = narrows if useful.interval else f"tells {useful.coefficient}"
+            yield f"To measure next: {useful.axis.name}: {useful.words} ({why})."
+        else:
+            yield "To measure next: no step within the limits would narrow an interval by a tenth; the widest"
+            yield f"is that of {widest.coefficient}."
+    if known := [test.axis.name for test in tests if test.is_known]:
+        yield f"Enough is known of {_listed(known)}."
+    if drifting := [test.axis.name for test in tests if test.repeat]:
+        yield f"In {_listed(drifting)}: {REPEATED}."
 
 
-def _predicted(found: Iterable[Unseen]) -> Table:
+def _listed(words: Sequence[str]) -> str:
+    """Return words as in a sentence: a, b and c."""
+    *some, last = words or [""]
+    return f"{', '.join(some)} and {last}" if some else last
+
+
+def _acting(kept: Iterable[FittedEffect]) -> str:
+    """Return the other effects that were kept, in words, with the value along each axis."""
+    values: dict[str, list[str]] = {}
+    for effect in kept:
+        value, *_ = with_interval(effect.value, effect.interval)
+        unit = "" if effect.unit == "1" else f" {effect.unit}"
+        values.setdefault(acting(effect), []).append(f"{effect.of} {value}{unit}")
+    return "; ".join(f"{words} ({', '.join(some)})" for words, some in values.items())
+
+
+def _of_recordings(found: Sequence[Unseen]) -> Table:
     """Return the table of how far predictions of recordings are off that the model was not fitted to."""
-    numbers = ("off by", "no change", "noise", "explained")
-    result = table("Prediction of recordings by fits to the others, RMS", "", numbers, ("of",))
-    result.caption = (
-        "no change: by a model whose position or velocity stays. noise: the sensor's own. explained: of the change "
-        "beyond the noise."
-    )
+    numbers = ("off by", "no change", "noise")
+    title = "Prediction of unseen data, RMS, beside no change at all and the sensor's noise"
+    result = table(title, "", numbers, ("of",))
+    result.box, result.padding = None, _GAP
     for row in found:
         if not row.errors:
             result.add_row(row.axis.name, *("-" for _ in numbers), f"{row.what}: {row.by}")
-        for e in row.errors:
-            values = (f"{float(f'{value:.2g}'):g} {e.unit}" for value in (e.predicted, e.unchanged, e.noise))
-            span = e.span.removesuffix(" recording")
-            result.add_row(f"{row.axis.name} {e.of}, {span}", *values, text(e.explained, ".1%"), row.what)
+    for row, e in main_errors(found):
+        values = (f"{float(f'{value:.2g}'):g} {e.unit}" for value in (e.predicted, e.unchanged, e.noise))
+        result.add_row(f"{row.axis.name} {e.of}, {e.span.removesuffix(' recording')}", *values, row.what)
     return result
 
 
-def _predicted_points(found: Iterable[Unseen]) -> Table:
-    """Return the table of how far predictions of points are off that the model was not fitted to."""
-    result = table("Prediction of points that were not fitted, relative RMS", "axis", ("off by",), ("of",))
-    for row in found:
-        result.add_row(row.axis.name, text(row.error, ".1%"), f"{row.what}, {row.by}")
-    return result
-
-
-def _effects(kept: Iterable[FittedEffect]) -> Table:
-    """Return the table of the other effects that were kept."""
-    found = table("What else acts", "of", ("value", "95 % from", "to", "unit"), ("",))
-    for effect in kept:
-        unit = "" if effect.unit == "1" else effect.unit
-        found.add_row(effect.of, *with_interval(effect.value, effect.interval), unit, acting(effect))
-    return found
-
-
-def _coefficients(vehicle: Vehicle) -> Table:
-    """Return the table of the identified coefficients with their intervals."""
-    result = table("Identified coefficients", "name", ("value", "95 % from", "to", "unit"))
-    for name, interval in vehicle.intervals.items():
-        unit = vehicle.layout.coefficients[name].unit
-        result.add_row(name, *with_interval(vehicle.rov[name], interval), "" if unit == "1" else unit)
-    return result
-
-
-def _summary(comparisons: Iterable[Comparison], other: Sequence[str]) -> Table:
-    """Return the table of the RMS errors of all points, by each model."""
-    found = table("Points, RMS of the relative errors", "", ("model", "leave-\none-out", *other))
+def _of_points(comparisons: Iterable[Comparison], other: Sequence[str]) -> Table:
+    """Return the table of the RMS errors of points, by each model."""
+    found = table("Prediction of points, RMS of the relative errors", "", ("model", "leave-one-out", *other))
+    found.box, found.padding = None, _GAP
     found.caption = "leave-one-out: by a fit without the points of the same thrust."
     for c in comparisons:
         found.add_row(f"{c.result.axis.name} {c.quantity}", *(text(c.rms(column), ".4f") for column in c.columns))

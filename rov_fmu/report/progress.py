@@ -1,100 +1,112 @@
-"""Progress on a terminal: a line for each platform that is compiled, a bar of the work done, a bar of a study's runs.
+"""Progress on stderr: the parts of a command's work, one after another, or several at once.
 
-The display disappears when the work ends or is interrupted. Where there is no terminal, nothing is shown.
+A terminal shows a line for each part: ✓ and the time that it took, or how far it is and about the time left. The lines
+disappear when the work ends or is interrupted. A pipe or a file gets one line as each part ends, except for the last
+part, whose end the result shows.
 """
 
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from time import perf_counter
 from typing import Protocol
 
 import click
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    SpinnerColumn,
-    Task,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.console import RenderableType
+from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TaskID, TimeElapsedColumn
+from rich.progress_bar import ProgressBar
+from rich.table import Column, Table
 from rich.text import Text
 
 from rov_fmu.io.interrupts import cleaned_up
+from rov_fmu.io.messages import Progress as OnProgress
+from rov_fmu.io.messages import on_terminal
 from rov_fmu.report.console import console
+
+_BAR = 12
+"""The width of a bar, which leaves room for the words on a terminal of 80 columns."""
+
+
+class Parts:
+    """The parts of a command's work, on a terminal or in a pipe."""
+
+    def __init__(self, display: Progress | None) -> None:
+        self._display = display
+        self._running: dict[str, tuple[float, TaskID | None]] = {}
+        """When each running part began, s, and its line."""
+
+    def begin(self, *names: str) -> OnProgress:
+        """End the running parts and begin others at once. Returns the progress of the last of these."""
+        while self._running:
+            self.end(next(iter(self._running)))
+        for name in names:
+            task = self._display.add_task(name, total=1.0, count="") if self._display else None
+            self._running[name] = perf_counter(), task
+        return partial(self.show, names[-1])
+
+    def end(self, name: str) -> None:
+        """Say that a part is done."""
+        began, task = self._running.pop(name)
+        if self._display and task is not None:
+            self._display.update(task, completed=1.0, description=name, count="")
+        else:
+            self.print(f"{name}: done in {perf_counter() - began:.1f} s")
+
+    def show(self, name: str, step: str, share: float, count: str = "") -> None:
+        """Show the step that a running part is at, the share of the part that is done, and a count instead of it."""
+        _, task = self._running[name]
+        if self._display and task is not None:
+            self._display.update(task, completed=min(share, 0.999), description=step, count=count or f"{share:.0%}")
+
+    @property
+    def is_shown(self) -> bool:
+        """True on a terminal, which shows each step."""
+        return self._display is not None
+
+    def print(self, message: str) -> None:
+        """Print a line, on a terminal above the parts."""
+        line = on_terminal(f"rov-fmu: {message}")
+        if self._display:
+            self._display.console.print(line, soft_wrap=True)
+        else:
+            click.echo(line, err=True)
+
+
+@contextmanager
+def parts() -> Iterator[Parts]:
+    """Show the parts of the work of the block."""
+    out = console(stderr=True)
+    if not (out.is_terminal and out.file.isatty()):  # Rich calls a pipe a terminal if FORCE_COLOR is set, as in Jupyter
+        yield Parts(None)
+        return
+    fixed = Column(no_wrap=True, min_width=1)  # Rich cuts the others where a column is empty
+    columns = (
+        SpinnerColumn(finished_text="✓"),
+        _Words(Column(ratio=1, no_wrap=True, overflow="ellipsis")),
+        _Share(fixed),
+        TimeElapsedColumn(fixed),
+        TimeLeftColumn(fixed),
+    )
+    display = Progress(*columns, console=out, transient=True, expand=True)
+    display.start()
+    with cleaned_up(display.stop):
+        yield Parts(display)
 
 
 @contextmanager
 def compiling(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
-    """Show a line for each platform while it is compiled. Yields the function to call with a platform that is done."""
-    with _shown(SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()) as progress:
-        if progress is None:
-            yield lambda _: None
-        else:
-            tasks = {name: progress.add_task(f"compiling {name}", total=1) for name in platforms}
-            yield lambda name: progress.update(tasks[name], completed=1)
+    """Show a part for each platform that is compiled. Yields the function to call with a platform that is done."""
+    with parts() as shown:
+        remaining = [f"compiling {name}" for name in platforms]
+        if remaining:
+            shown.begin(*remaining)
 
+        def done(name: str) -> None:
+            remaining.remove(f"compiling {name}")
+            if remaining or shown.is_shown:
+                shown.end(f"compiling {name}")
 
-@contextmanager
-def bar() -> Iterator[Callable[[str, float], None]]:
-    """Show one bar, with the time taken and left.
-
-    Yields the function to call with the name of the next step and the share of work done (0 to 1).
-    """
-    columns = (
-        SpinnerColumn(),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TimeLeftColumn(),
-        TextColumn("{task.description}"),
-    )
-    with _shown(*columns) as progress:
-        if progress is None:
-            yield lambda *_: None
-        else:
-            task = progress.add_task("reading", total=1.0)
-            yield lambda step, share: progress.update(task, description=step, completed=share)
-
-
-class TimeLeftColumn(ProgressColumn):
-    """About the time left, for work whose share is known at a few moments only.
-
-    It follows from the time and the share of the work at the last of these moments, and counts down from there.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._share = 0.0
-        self._whole = 0.0
-        """The time that all of the work takes, s."""
-
-    def render(self, task: Task) -> Text:
-        """Return the time left in minutes and seconds; nothing before any work is done."""
-        if task.elapsed is None or task.completed <= 0.0:
-            return Text("")
-        if task.completed != self._share:
-            self._share, self._whole = task.completed, task.elapsed / task.completed
-        minutes, seconds = divmod(round(max(self._whole - task.elapsed, 0.0)), 60)
-        return Text(f"about {minutes}:{seconds:02} left")
-
-
-@contextmanager
-def runs_bar() -> Iterator["RunsBar"]:
-    """Show a bar of the runs of a study, with their rate and the time left."""
-    columns = (
-        SpinnerColumn(),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.description}"),
-    )
-    with _shown(*columns) as progress:
-        yield RunsBar(progress)
+        yield done
 
 
 class StudyProgress(Protocol):
@@ -117,44 +129,79 @@ class StudyProgress(Protocol):
         """The address of Dask's page about its workers, or nothing."""
 
 
-class RunsBar:
-    """The bar of a study's runs, and the warnings above it."""
+class StudyParts:
+    """The parts of a study: the start of the workers, and the runs. A pipe gets a line for each tenth of the runs."""
 
-    def __init__(self, progress: Progress | None) -> None:
-        self._progress = progress
-        self._task = progress.add_task("starting the workers", total=None) if progress else None
-        self._start: float | None = None
-        self._done_before = 0
+    def __init__(self, shown: Parts) -> None:
+        self._parts = shown
+        shown.begin("starting the workers")
+        self._began: float | None = None
+        self._done_before = self._tenth = 0
 
     def update(self, now: StudyProgress) -> None:
         """Show how many runs are done and failed. The first call prints the address of Dask's dashboard, too."""
-        if self._progress is None or self._task is None:
+        if self._began is None:
+            self._parts.begin("runs")
+            self._began, self._done_before = perf_counter(), now.done
+            self._tenth = 10 * now.done // max(now.total, 1)
+            if now.dashboard and self._parts.is_shown:
+                self._parts.print(f"what the workers do: {now.dashboard}")
+        if now.done == self._done_before:
             return
-        if self._start is None:
-            self._start, self._done_before = perf_counter(), now.done
-            if now.dashboard:
-                self._progress.console.print(f"what the workers do: {now.dashboard}", soft_wrap=True)
-        rate = (now.done - self._done_before) / max(perf_counter() - self._start, 1e-3)
-        words = f"{rate:,.0f} runs/s{f', {now.failed} failed' if now.failed else ''}"
-        self._progress.update(self._task, total=now.total, completed=now.done, description=words)
-
-    def warn(self, message: str) -> None:
-        """Print a warning, above the bar if stderr is a terminal too."""
-        line = f"rov-fmu: warning: {message}"
-        if self._progress is not None and sys.stderr and sys.stderr.isatty():
-            self._progress.console.print(line, soft_wrap=True)
-        else:
-            click.echo(line, err=True)
+        rate = (now.done - self._done_before) / max(perf_counter() - self._began, 1e-3)
+        words = f"{per_second(rate)}{f', {now.failed:,} failed' if now.failed else ''}"
+        count = f"{now.done:,}/{now.total:,}"
+        share = (now.done - self._done_before) / (now.total - self._done_before)
+        self._parts.show("runs", words, share, count)
+        before, self._tenth = self._tenth, 10 * now.done // now.total
+        if before < self._tenth < 10 and not self._parts.is_shown:
+            self._parts.print(f"{count} runs, {words}")
 
 
-@contextmanager
-def _shown(*columns: ProgressColumn) -> Iterator[Progress | None]:
-    """Show progress until the block ends. Yields None if there is no terminal."""
-    out = console()
-    if not (out.is_terminal and out.file.isatty()):  # Rich calls a pipe a terminal if FORCE_COLOR is set, as in Jupyter
-        yield None
-        return
-    progress = Progress(*columns, console=out, transient=True)
-    progress.start()
-    with cleaned_up(progress.stop):
-        yield progress
+def per_second(rate: float) -> str:
+    """Return a rate of runs in words: 1,120 runs/s."""
+    return f"{rate:,.0f} runs/s" if rate >= 10.0 else f"{rate:.2g} runs/s"
+
+
+# ---- The columns on a terminal ---------------------------------------------------------------------------------------
+
+
+class _Words(ProgressColumn):
+    """The name of a part, or the step that it is at, in the room that the other columns leave."""
+
+    def render(self, task: Task) -> Text:
+        """Return the words."""
+        return Text(task.description)
+
+
+class _Share(ProgressColumn):
+    """A bar and a count, while a part runs whose share is known."""
+
+    def render(self, task: Task) -> RenderableType:
+        """Return the bar with the count behind it."""
+        if task.finished or task.completed <= 0.0:
+            return Text("")
+        row = Table.grid(padding=(0, 1))
+        row.add_row(ProgressBar(1.0, task.completed, width=_BAR), Text(task.fields["count"]))
+        return row
+
+
+class TimeLeftColumn(ProgressColumn):
+    """About the time left, for work whose share is known at a few moments only.
+
+    It follows from the time and the share of the work at the last of these moments, and counts down from there.
+    """
+
+    def __init__(self, table_column: Column | None = None) -> None:
+        super().__init__(table_column)
+        self._whole: dict[TaskID, tuple[float, float]] = {}
+        """The last known share of each part, and the time that all of it takes, s."""
+
+    def render(self, task: Task) -> Text:
+        """Return the time left in minutes and seconds; nothing before any work is done, and at the end."""
+        if task.elapsed is None or task.completed <= 0.0 or task.finished:
+            return Text("")
+        if task.completed != self._whole.get(task.id, (0.0, 0.0))[0]:
+            self._whole[task.id] = task.completed, task.elapsed / task.completed
+        minutes, seconds = divmod(round(max(self._whole[task.id][1] - task.elapsed, 0.0)), 60)
+        return Text(f"about {minutes}:{seconds:02} left")

@@ -172,6 +172,8 @@ def quantile(degrees_of_freedom: float) -> float:
 
 
 _NORMAL = quantile(inf)
+_EXACT = 1e-9
+"""The width of an interval relative to its value up to which the value is exact, and the width is rounding."""
 _WIDTH_IN_UNITS = 3.0
 """The least width of a written interval in units of the last digit, which tells the width to a third."""
 
@@ -182,14 +184,14 @@ def with_interval(value: float, interval: tuple[float, float] | None, digits: in
     36.98 from 36.974 to 37.004 becomes 36.98, 36.97, 37.00: all three have the same decimals, and the interval is at
     least three units of the last one wide. Where this would leave less than two digits of the value, each number has
     two significant digits of its own. Rounding keeps the order of numbers, so an interval that contains its value is
-    never written as one that does not. Without an interval the value has the given number of significant digits, and
-    the ends are empty.
+    never written as one that does not. Where there is no interval, or one that is as narrow as rounding, the value has
+    the given number of significant digits. The ends are empty where there is no interval.
     """
     if interval is None:
         return _significant(value, digits), "", ""
     numbers = value, *interval
     width = interval[1] - interval[0]
-    if width > 0.0 and all(map(isfinite, numbers)):
+    if width > _EXACT * abs(value) and all(map(isfinite, numbers)):
         place = floor(log10(width / _WIDTH_IN_UNITS))
         if abs(value) >= 10.0 ** (place + 1):
             value_text, low, high = (_rounded(number, place) for number in numbers)

@@ -545,8 +545,12 @@ def test_the_command_writes_the_file_and_lists_the_notes(
     assert main(["sdf", "bluerov2"]) == 0
     model = gazebo_model(LOADED["bluerov2"])
     assert Path("bluerov2.sdf").read_bytes() == model.text.encode()
-    assert capsys.readouterr() == ("\n- ".join(["bluerov2.sdf", *model.notes]) + "\n", "")
+    end = "Wrote bluerov2.sdf. Next: include it in a world, or give --world"
+    notes = (f"- {note}" for note in model.notes)
+    assert capsys.readouterr() == ("\n".join(["What is different in Gazebo:", *notes, end]) + "\n", "")
     assert main(["sdf", "bluerov2", "--world", "--added-mass", "plugin", "-o", "my rov.sdf"]) == 0
     wanted = gazebo_model(LOADED["bluerov2"], in_world=True, explicit=True)
     assert Path("my rov.sdf").read_bytes() == wanted.text.encode()
-    assert capsys.readouterr().err == f"rov-fmu: warning: {wanted.warnings[0]}\n"
+    out, err = capsys.readouterr()
+    assert err == f"rov-fmu: warning: {wanted.warnings[0]}\n"
+    assert out.endswith("\nWrote 'my rov.sdf'. Next: gz sim -r 'my rov.sdf'\n")

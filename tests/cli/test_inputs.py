@@ -12,7 +12,7 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.cli.test_targets import bound_by_permissions
-from tests.commands import TESTS, Command, run_elsewhere
+from tests.commands import TESTS, Command, run_elsewhere, without_progress
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="permissions are POSIX")
 
@@ -69,6 +69,7 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def _check(err: str, named: str) -> None:
+    err = without_progress(err)
     assert err.startswith("rov-fmu: ")
     assert err.count("\n") == 1
     assert named in err

@@ -20,7 +20,7 @@ import pytest
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, ROOT, TESTS, endless_compiler
+from tests.commands import BARE, ROOT, TESTS, endless_compiler, without_progress
 from tests.recordings import PLANS, clean, write_log
 
 fcntl = pytest.importorskip("fcntl", reason="terminals and signals are POSIX")
@@ -103,7 +103,7 @@ class Command:
         assert not alive
         assert self.process.returncode == 130, err
         assert not [*self.temporary.iterdir()]
-        return str(err)
+        return without_progress(str(err))
 
 
 @contextmanager

@@ -71,7 +71,7 @@ def test_results_have_round_times_and_the_end_is_one_of_them(here: Path) -> None
 @pytest.mark.parametrize(("name", "begins"), [("plot.png", b"\x89PNG"), ("plot.svg", b"<?xml"), ("plot.pdf", b"%PDF")])
 def test_a_plot_is_written(name: str, begins: bytes, here: Path, capsys: Capsys) -> None:
     assert main(["simulate", str(BARE), "--plot", name]) == 0
-    assert capsys.readouterr() == ("", "")
+    assert capsys.readouterr() == (f"Wrote {name}.\n", "")
     assert (here / name).read_bytes().startswith(begins)
 
 

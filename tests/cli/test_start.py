@@ -39,7 +39,7 @@ def test_a_vehicle_that_ships_is_built_by_its_name(
     monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
     monkeypatch.setattr("rov_fmu.build.reference_results", lambda _: {})
     assert main(["build", name, "--backend", "pythonfmu"]) == 0
-    assert capsys.readouterr().out.startswith(f"{name}-python.fmu  ")
+    assert capsys.readouterr().out.startswith(f"{name}-python.fmu: ")
     assert [path.name for path in tmp_path.iterdir()] == [f"{name}-python.fmu"]
 
 
@@ -50,8 +50,8 @@ def test_an_fmu_of_fmi_3_has_it_in_its_name_and_shows_no_progress_without_a_term
     assert main(["build", str(BARE), "--fmi", "3", "--platform", "host"]) == 0
     out, err = capsys.readouterr()
     assert err == ""
-    assert out.startswith("bare.fmi3.fmu  ")
-    assert len(out.splitlines()) == 4  # the file, the platform, what the run gave, the time
+    assert out.startswith("bare.fmi3.fmu: ")
+    assert len(out.splitlines()) == 4  # the file, the platform, what the run gave, what is next
     assert not any(shown in out for shown in ("compiling", "\x1b", "\r"))
     (path,) = tmp_path.iterdir()
     assert path.name == "bare.fmi3.fmu"

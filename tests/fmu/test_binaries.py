@@ -100,7 +100,7 @@ def test_every_vehicle_that_ships_is_built_for_all_platforms(
     (archive,) = tmp_path.iterdir()
     assert archive.name == f"{vehicle}{'.fmi3' if fmi == 3 else ''}.fmu"
     assert archive.stat().st_size <= LARGEST
-    assert capsys.readouterr().out.startswith(f"{archive.name}  ")
+    assert capsys.readouterr().out.startswith(f"{archive.name}: ")
 
 
 # The names that FMPy gives to platforms and machines, except Linux on ARM, which has no name in FMI 2.0.

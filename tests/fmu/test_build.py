@@ -122,7 +122,7 @@ def test_a_second_build_gives_the_same_bytes_and_says_what_it_built(
     assert list(again.parent.iterdir()) == [again]
     output = capsys.readouterr().out
     assert str(fmu_compile.host_platform(fmi)) in output
-    assert "valid; runs: u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s" in output
+    assert "The FMU is valid. In a run, u_l = u_r = 0.3 gives u = 0.4729 m/s after 10 s." in output
     assert "built in" in output
 
 

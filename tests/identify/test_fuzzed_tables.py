@@ -17,7 +17,7 @@ from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
-from tests.commands import TESTS
+from tests.commands import TESTS, without_progress
 from tests.damage import (
     CELLS,
     NUMBERS,
@@ -113,7 +113,8 @@ def test_any_folder_is_identified_or_one_clear_line(
         shutil.copytree(tests, folder)
         (folder / only).write_bytes(data.draw(st.sampled_from(changes))(original, data))
         code = main(["identify", str(folder), "-o", str(out / "rov.toml")])
-        printed, said = capsys.readouterr()
+        printed, err = capsys.readouterr()
+        said = without_progress(err)
         if code == 0:
             vehicle = load_vehicle(out / "rov.toml")
             assert all(isfinite(value) for value in vehicle.rov.coefficients.values())
@@ -152,7 +153,8 @@ def test_a_strange_recording_is_identified_or_one_clear_line(
 ) -> None:
     np.savetxt(tests / LOG, np.column_stack(STRANGE[case]), "%r", ",", header=HEADER, comments="")
     code = main(["identify", str(tests), "--report", str(tmp_path / "report.html")])
-    printed, said = capsys.readouterr()
+    printed, err = capsys.readouterr()
+    said = without_progress(err)
     assert code in (0, 2)
     assert (tmp_path / "report.html").exists() == (code == 0)
     if code:
@@ -265,7 +267,8 @@ def test_a_thrust_curve_that_hardly_pushes_is_one_clear_line_or_a_vehicle(
     if not recorded:
         (tests / LOG).unlink()
     code = main(["identify", str(tests), "-o", str(tmp_path / "rov.toml")])
-    printed, said = capsys.readouterr()
+    printed, err = capsys.readouterr()
+    said = without_progress(err)
     assert "nan" not in printed
     if code:
         assert code == 2
@@ -280,7 +283,7 @@ def test_names_that_are_no_text_are_one_clear_line(tests: Path, capsys: Capsys) 
         except OSError:  # a file system that takes Unicode alone
             continue
         assert main(["identify", str(tests)]) == 2
-        said = capsys.readouterr().err.removesuffix("\n")
+        said = without_progress(capsys.readouterr().err).removesuffix("\n")
         check_line(said, tests)
         assert "no name of a test" in said
         path.unlink()

@@ -61,7 +61,8 @@ def test_a_log_is_read_with_its_draft_as_it_is(name: str, tmp_path: Path, capsys
     write, axes = LOGS[name]
     path = write(tmp_path)
     assert main(["identify", "--inspect", str(path)]) == 0
-    assert f"{tmp_path / 'rov.toml'}: a draft" in capsys.readouterr().out
+    end = f"Wrote {tmp_path / 'rov.toml'}. Next: edit this draft, then rov-fmu identify {tmp_path}\n"
+    assert capsys.readouterr().out.endswith(end)
     assert 'base = "bluerov2"' in (tmp_path / "rov.toml").read_text(encoding="utf-8")
     tests: TankTests = load_tank_tests(tmp_path)
     assert tests.recordings.keys() == axes

@@ -82,7 +82,7 @@ def test_a_coefficient_that_is_set_by_hand_is_no_estimate() -> None:
 def test_the_vehicle_builds_itself(tmp_path: Path) -> None:
     built = rov_fmu.load(BARE).with_(m_rov=12).build(tmp_path / "x.fmu", platforms="host")
     assert built.path == tmp_path / "x.fmu"
-    assert built.note.startswith("valid; runs")
+    assert built.note.startswith("The FMU is valid. In a run, ")
 
 
 # ---- Simulate --------------------------------------------------------------------------------------------------------

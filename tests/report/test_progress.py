@@ -1,8 +1,12 @@
-"""The time left of a long work, from the share of it that is done."""
+"""The progress of long work: the time left, and the lines that a pipe gets."""
 
+import re
+from dataclasses import dataclass
+
+import pytest
 from rich.progress import Task, TaskID
 
-from rov_fmu.report.progress import TimeLeftColumn
+from rov_fmu.report.progress import StudyParts, TimeLeftColumn, compiling, parts, per_second
 
 
 def test_the_time_left_counts_down_from_the_last_known_share() -> None:
@@ -14,3 +18,43 @@ def test_the_time_left_counts_down_from_the_last_known_share() -> None:
         clock[0], task.completed = now, share
         shown.append(column.render(task).plain)
     assert shown == ["", *(f"about {left} left" for left in ("1:30", "1:00", "0:00", "0:40", "0:10"))]
+
+
+def test_a_pipe_gets_a_line_for_each_platform_but_the_last(capsys: pytest.CaptureFixture[str]) -> None:
+    with compiling(["linux64", "win64", "darwin64"]) as done:
+        for name in ("win64", "linux64", "darwin64"):
+            done(name)
+    lines = capsys.readouterr().err.splitlines()
+    assert [re.sub(r"\d\.\d", "0", line) for line in lines] == [
+        f"rov-fmu: compiling {name}: done in 0 s" for name in ("win64", "linux64")
+    ]
+
+
+@dataclass
+class Runs:
+    """The progress of a study."""
+
+    done: int
+    total: int = 12_000
+    failed: int = 0
+    dashboard: str = "http://localhost"
+
+
+def test_a_pipe_gets_a_line_for_each_tenth_of_the_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    """Also of a study that is continued."""
+    with parts() as shown:
+        study = StudyParts(shown)
+        for done in range(6_000, 12_001, 300):
+            study.update(Runs(done, failed=done // 4_000))
+    preparing, *lines = capsys.readouterr().err.splitlines()
+    assert preparing.startswith("rov-fmu: starting the workers: done in ")
+    counts = [re.fullmatch(r"rov-fmu: ([\d,]+)/12,000 runs, [\d,]+ runs/s, (\d) failed", line) for line in lines]
+    assert [found.groups() for found in counts if found] == [
+        ("7,200", "1"),
+        *[("8,400", "2"), ("9,600", "2"), ("10,800", "2")],
+    ]
+
+
+@pytest.mark.parametrize(("rate", "words"), [(1120.4, "1,120 runs/s"), (10.0, "10 runs/s"), (0.25, "0.25 runs/s")])
+def test_a_rate_is_never_written_with_an_exponent(rate: float, words: str) -> None:
+    assert per_second(rate) == words

@@ -17,7 +17,7 @@ from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import TESTS
+from tests.commands import TESTS, without_progress
 
 
 @pytest.fixture
@@ -241,6 +241,7 @@ def refused(folder: Path, named: tuple[str, ...], capsys: pytest.CaptureFixture[
     assert main(["identify", str(folder), "--force", "-o", str(output)]) == 2
     out, err = capsys.readouterr()
     assert out == ""
+    err = without_progress(err)
     assert len(err.splitlines()) == 1
     for word in named:
         assert word in err

@@ -1,9 +1,9 @@
 """The summary that the command line prints after a study."""
 
 import numpy as np
-from rich.text import Text
 
-from rov_fmu.report.console import console, print_table, table, text
+from rov_fmu.report.console import console, paragraph, print_table, shell_words, table, text
+from rov_fmu.report.progress import per_second
 from rov_fmu.study.results.plots import axis_label
 from rov_fmu.study.results.results import Results
 from rov_fmu.study.run.cluster import Spent
@@ -18,11 +18,10 @@ def print_summary(results: Results, spent: Spent) -> None:
     """Print the number of runs, the speed, the quantiles of the figures, and why runs failed or figures are missing."""
     out, runs = console(), results.runs
     counts = f"{len(runs)} runs, {len(results.failed)} failed, {len(results.incomplete)} incomplete"
-    out.print(Text.assemble((str(results.folder), "bold"), f"  {counts}"))
+    paragraph(out, f"{shell_words(results.folder)}: {counts}")
     if spent.runs:
-        rate = spent.runs / max(spent.elapsed, 1e-3)
-        often = f"{rate:.0f}" if rate >= 10.0 else f"{rate:.2g}"
-        out.print(f"  {spent.runs} of them now, in {spent.elapsed:.1f} s; {often} a second")
+        rate = per_second(spent.runs / max(spent.elapsed, 1e-3))
+        paragraph(out, f"  {spent.runs:,} of them now, in {spent.elapsed:.1f} s; {rate}")
     if results.figures:
         shown = table("", "figure", [*(f"{q:.0%}" for q in _SHOWN), "mean", "runs"])
         for name in results.figures:
@@ -34,6 +33,6 @@ def print_summary(results: Results, spent: Spent) -> None:
         print_table(shown)
     reasons = runs[REASON].value_counts()
     for reason, count in reasons.head(_FAILURES).items():
-        out.print(f"  {count} runs: {reason}", soft_wrap=True)
+        paragraph(out, f"  {count} runs: {reason}")
     if len(others := reasons[_FAILURES:]):
-        out.print(f"  {others.sum()} runs: other reasons ({len(others)}), which are on the page", soft_wrap=True)
+        paragraph(out, f"  {others.sum()} runs: other reasons ({len(others)}), which are on the page")

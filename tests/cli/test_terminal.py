@@ -1,0 +1,205 @@
+"""What commands show on a terminal of 80 and of 120 columns, without colour, and in a pipe."""
+
+import os
+import re
+import struct
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from rov_fmu.cli import _commands
+from tests.commands import BARE, ROOT, start
+from tests.folders import small_folder
+
+if sys.platform == "win32":
+    pytest.skip("a pseudo-terminal is POSIX", allow_module_level=True)
+
+import fcntl
+import pty
+import termios
+
+import pyte
+
+_WIDE, _TALL = 300, 300
+"""The size of the screen that output is drawn on. It is larger than the terminal, so that long lines stay long."""
+_VARIES = re.compile(r"\d+(?:[.:]\d+)*")
+"""Times differ from run to run."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a command showed on a terminal."""
+
+    code: int
+    raw: str
+    """All characters, with the control sequences."""
+    moments: tuple[tuple[str, ...], ...]
+    """The lines of the screen after each piece of output."""
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The lines of the screen at the end."""
+        return self.moments[-1]
+
+
+def on_a_terminal(
+    arguments: Sequence[str], columns: int, folder: Path, environment: Mapping[str, str] | None = None
+) -> Shown:
+    """Run a command in a folder, on a pseudo-terminal of some columns."""
+    ours, its = pty.openpty()
+    fcntl.ioctl(its, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rov_fmu", *arguments],
+        cwd=folder,
+        env=_environment() | dict(environment or {}),
+        stdin=its,
+        stdout=its,
+        stderr=its,
+    )
+    os.close(its)
+    screen = pyte.Screen(_WIDE, _TALL)
+    stream, raw, moments = pyte.ByteStream(screen), b"", list[tuple[str, ...]]()
+    while piece := _read(ours):
+        stream.feed(piece)
+        raw += piece
+        moments.append(_lines(screen))
+    os.close(ours)
+    return Shown(process.wait(), raw.decode(), tuple(moments) or ((),))
+
+
+def _lines(screen: pyte.Screen) -> tuple[str, ...]:
+    """Return the lines of a screen up to the last one with a letter."""
+    rows = (screen.buffer[y] for y in range(max(screen.buffer, default=-1) + 1))
+    text = "\n".join("".join(row[x].data for x in range(max(row, default=-1) + 1)).rstrip() for row in rows)
+    return tuple(text.rstrip("\n").split("\n"))
+
+
+def _environment() -> dict[str, str]:
+    """Return the environment of a user's terminal."""
+    unset = {"COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE"}
+    inherited = {name: value for name, value in os.environ.items() if name not in unset}
+    return inherited | {"PYTHONPATH": str(ROOT), "TERM": "xterm-256color"}
+
+
+def _read(terminal: int) -> bytes:
+    """Return the next output, and nothing at the end."""
+    try:
+        return os.read(terminal, 65536)
+    except OSError:  # Linux raises it when the process has closed its side
+        return b""
+
+
+def words_in_a_pipe(arguments: Sequence[str], folder: Path) -> set[str]:
+    """Return the words that a command prints in a pipe, with its numbers replaced."""
+    ran = subprocess.run(
+        [sys.executable, "-m", "rov_fmu", *arguments],
+        cwd=folder,
+        env=_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "\x1b" not in ran.stdout + ran.stderr
+    return {_VARIES.sub("0", word) for word in (ran.stdout + ran.stderr).split()}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, videoray_fmu: Path) -> Path:
+    """Return a folder with what the commands read, under short names."""
+    small_folder(tmp_path / "tests")
+    (tmp_path / "bare.toml").write_bytes(BARE.read_bytes())
+    (tmp_path / "videoray.fmu").symlink_to(videoray_fmu)
+    (tmp_path / "mistake.toml").write_text(f"nmae = 1\n{BARE.read_text(encoding='utf-8')}", encoding="utf-8")
+    return tmp_path
+
+
+def _long(*arguments: str) -> object:
+    return pytest.param(arguments, marks=pytest.mark.long)
+
+
+_TUNE = ("tune", "videoray", "--axis", "heave", "--command", "0.3", "--v-ss", "0.2")
+COMMANDS = [
+    (),
+    ("tables",),
+    (*_TUNE, "-o", "tuned.toml"),
+    ("build", "bare.toml", "--platform", "host", "--osp"),
+    ("build", "videorey"),
+    ("build", "mistake.toml"),
+    ("simulate", "bare.toml", "--set", "u_t=1.5"),
+    ("identify", "tests", "-o", "found.toml", "--force"),
+    _long("build", "--platform", "amiga"),
+    _long("simulate", "videoray", "-o", "result.csv", "--plot", "result.png"),
+    _long("simulate", "bare.toml", "--set", "u_x=1"),
+    _long("fly", "bare.toml", "-o", "page.html"),
+    _long("sdf", "bluerov2_heavy", "--world"),
+    _long("sdf", "videoray"),
+    _long("sitl", "bluerov2", "--duration", "0.01", "--port", "70000"),
+    _long("prove", "videoray.fmu"),
+    _long("prove", "videoray.fmu", "--tolerance", "1e-300"),
+    _long("prove", "bare.toml"),
+    _long("identify", "tests"),
+    _long("identify", "nowhere"),
+    _long("identify", "tests", "--report", "found.html", "--force"),
+    _long(*_TUNE),
+    _long("tune", "videoray", "--axis", "surge", "--command", "0.3", "--v-ss", "0.5", "--tau", "0.6"),
+    _long("tune", "videoray", "--axis", "heave"),
+    _long("figures", "."),
+    _long("study", "bare.toml", "-o", "results"),
+    *(_long(name, "--help") for name in _commands.commands),
+]
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+@pytest.mark.parametrize("arguments", COMMANDS, ids=" ".join)
+def test_no_line_is_too_long_no_word_is_broken_and_no_progress_is_left(
+    arguments: tuple[str, ...], columns: int, folder: Path
+) -> None:
+    shown = on_a_terminal(arguments, columns, folder)
+    assert max(len(line) for moment in shown.moments for line in moment) <= columns
+    at_the_end = "\n".join(shown.lines)
+    assert not re.search(r"✓|\d:\d\d:\d\d|[━╸╺⠀-⣿]|about \d+:\d\d left", at_the_end)
+    assert shown.raw.rfind("\x1b[?25l") <= shown.raw.rfind("\x1b[?25h"), "the cursor is back"
+    if "--help" not in arguments:  # Click fills the lines of a help up to 80 columns
+        words = {_VARIES.sub("0", word) for word in at_the_end.split()}
+        assert words - words_in_a_pipe(arguments, folder) <= {"the", "widest", "of", *at_the_end.split("…")[1:]}
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_parts_that_are_done_have_a_tick_and_disappear(columns: int, folder: Path) -> None:
+    shown = on_a_terminal(["identify", "tests", "--report", "found.html"], columns, folder)
+    assert shown.code == 0
+    progress = [moment for moment in shown.moments if any("✓" in line for line in moment)]
+    for name in ("reading the folder", "identifying the vehicle"):
+        assert any(re.fullmatch(rf"✓ {name} +0:0\d:\d\d", line) for moment in progress for line in moment)
+    running = [moment[-1] for moment in progress]
+    assert any(re.search(r" \d+% 0:0\d:\d\d about \d+:\d\d left$", line) for line in running), running
+    assert len(shown.lines) <= 24
+
+
+def test_colours_are_left_out_where_they_are_not_wanted(folder: Path) -> None:
+    """The words are the same with and without them."""
+    arguments = ["build", "bare.toml", "--platform", "host"]
+    colour = re.compile(r"\x1b\[(?:[\d;]*;)?(?:3[0-8]|4[0-8]|9[0-7])[\d;]*m")
+    assert colour.search(on_a_terminal(arguments, 80, folder).raw)
+    without = on_a_terminal(arguments, 80, folder, {"NO_COLOR": "1"})
+    assert not colour.search(without.raw)
+    assert without.lines[-1] == "Wrote bare.fmu. Next: rov-fmu prove bare.fmu"
+
+
+def test_a_pipe_gets_a_plain_line_for_each_part_but_the_last(folder: Path) -> None:
+    with start(["identify", str(folder / "tests"), "--report", str(folder / "found.html")], stdout=-1) as process:
+        out, err = process.communicate(timeout=300)
+    assert process.returncode == 0
+    names = "reading the folder", "identifying the vehicle"
+    assert re.fullmatch("".join(rf"rov-fmu: {name}: done in \d+\.\d s\n" for name in names), err)
+    assert out.splitlines()[-1].startswith(f"Wrote {folder / 'found.html'}. Next: rov-fmu identify ")
+
+
+def test_a_narrow_terminal_gets_the_rows_of_a_table_as_paragraphs(folder: Path) -> None:
+    shown = on_a_terminal(["tables"], 40, folder)
+    assert max(map(len, shown.lines)) <= 40
+    assert "20 %: non-linear printed 0.10, model 0.1044, dev. +4.4%, scaled printed 0.11," in " ".join(shown.lines)
