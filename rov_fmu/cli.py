@@ -421,7 +421,7 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
         paragraph(console(), f"- {note}")
     for warning in model.warnings:
         _warn(warning)
-    following = shell_words("gz", "sim", path) if in_world else "include it in a world, or give --world"
+    following = shell_words("gz", "sim", "-r", path) if in_world else "include it in a world, or give --world"
     print_end([path], following)
 
 
@@ -666,5 +666,6 @@ def _figures(folder: Path, form: str, column: str) -> None:
     from rov_fmu.report.console import console, paragraph, shell_words
     from rov_fmu.report.plots.paper_figures import write_figures
 
-    written = write_figures(folder, form, column)
-    paragraph(console(), f"Wrote {len(written) // 2} figures and their captions to {shell_words(folder)}.")
+    figures = len(write_figures(folder, form, column)) // 2
+    words = f"Wrote {figures} figures to {shell_words(folder)}, each with its caption in a text file beside it."
+    paragraph(console(), words)

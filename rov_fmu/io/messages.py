@@ -80,8 +80,12 @@ def on_terminal(text: str) -> str:
         columns = os.get_terminal_size(sys.stderr.fileno()).columns
     except (OSError, ValueError):
         columns = 0
-    width = columns or shutil.get_terminal_size().columns
-    return "\n".join(wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False))
+    return wrapped(text, columns or shutil.get_terminal_size().columns, "  ")
+
+
+def wrapped(text: str, width: int, indent: str = "") -> str:
+    """Return the text in lines of a width that end between words; those after the first are indented."""
+    return "\n".join(wrap(text, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False))
 
 
 def brief(text: str, most: int = 80) -> str:

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-from rov_fmu.io.messages import one_line
+from rov_fmu.io.messages import one_line, wrapped
 from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -38,7 +38,10 @@ def console(*, stderr: bool = False) -> Console:
 
 def paragraph(out: Console, words: str) -> None:
     """Print a paragraph. A terminal gets lines that end between words; a pipe or a file gets one line."""
-    out.print(words, soft_wrap=not out.is_terminal)
+    if out.is_terminal:
+        out.print(wrapped(words, out.width, "  " if words.startswith(("- ", "  ")) else ""))
+    else:
+        out.print(words, soft_wrap=True)
 
 
 def shell_words(*words: str | Path) -> str:
@@ -117,11 +120,11 @@ def print_proof(findings: "Sequence[Finding]") -> None:
             text(f.tolerance, ".1e"),
             "pass" if f.passed else f"FAIL {f.error}",
         )
-    found.caption = (
-        f"\n{sum(f.passed for f in findings)} of {len(findings)} pass. A deviation is the largest one, relative to the "
-        "largest expected value."
-    )
-    print_table(found)
+    out = console()
+    print_table(found, out)
+    out.print()
+    passed = f"{sum(f.passed for f in findings)} of {len(findings)} pass"
+    paragraph(out, f"{passed}. A deviation is the largest one, relative to the largest expected value.")
 
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:

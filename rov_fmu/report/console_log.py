@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
-from rov_fmu.report.console import console, print_table, table, text
+from rov_fmu.report.console import console, paragraph, print_table, table, text
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection import Inspection, Row
 
@@ -16,14 +16,17 @@ def print_inspection(inspection: Inspection) -> None:
     """Print the commands and signals of a log, what is not recognised, and what was left out."""
     out = console()
     print_table(_rows(inspection))
-    if inspection.unread:
-        out.print("\nNot recognised:")
-    for name, what in inspection.unread.items():
-        out.print(f"- {name}{': ' if what else ''}{what}", soft_wrap=True)
-    for title, meant in inspection.columns.items():
-        out.print(f"- {title} is taken as {meant}", soft_wrap=True)
-    for line in sentences(inspection.findings, SENTENCES):
-        out.print(f"- {line}", soft_wrap=True)
+    for heading, lines in {
+        "Not recognised": [f"{name}{': ' if what else ''}{what}" for name, what in inspection.unread.items()],
+        "Notes": [
+            *(f"{title} is taken as {meant}" for title, meant in inspection.columns.items()),
+            *sentences(inspection.findings, SENTENCES),
+        ],
+    }.items():
+        if lines:
+            out.print(f"\n{heading}:")
+        for line in lines:
+            paragraph(out, f"- {line}")
     out.print()
 
 

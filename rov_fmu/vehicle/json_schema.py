@@ -20,6 +20,11 @@ def json_schema_text() -> str:
     return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
+def _is_left_out(key: str, value: Any) -> bool:
+    """Return True for an empty default and for the title of a part of a schema, but not for a key called title."""
+    return (key == "title" and isinstance(value, str)) or (key == "default" and not value)
+
+
 def _simplified(node: Any) -> Any:
     """Return a part of a schema in a form that does not depend on the version of pydantic.
 
@@ -29,11 +34,7 @@ def _simplified(node: Any) -> Any:
         return [*map(_simplified, node)]
     if not isinstance(node, dict):
         return node
-    simple = {
-        key: _simplified(value)
-        for key, value in node.items()
-        if not (key == "title" and isinstance(value, str)) and (key != "default" or value)  # a key may be named title
-    }
+    simple = {key: _simplified(value) for key, value in node.items() if not _is_left_out(key, value)}
     choices = [choice for key in ("allOf", "anyOf") for choice in simple.pop(key, []) if choice != _NULL]
     if len(choices) > 1:
         simple["anyOf"] = choices

@@ -553,4 +553,4 @@ def test_the_command_writes_the_file_and_lists_the_notes(
     assert Path("my rov.sdf").read_bytes() == wanted.text.encode()
     out, err = capsys.readouterr()
     assert err == f"rov-fmu: warning: {wanted.warnings[0]}\n"
-    assert out.endswith("\nWrote 'my rov.sdf'. Next: gz sim 'my rov.sdf'\n")
+    assert out.endswith("\nWrote 'my rov.sdf'. Next: gz sim -r 'my rov.sdf'\n")

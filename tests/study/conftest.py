@@ -9,8 +9,10 @@ import pytest
 from distributed import LocalCluster
 
 from tests.conftest import Made
+from tests.report.conftest import browser, engine, visit
 from verification.references.c_programs import compile_c
 
+__all__ = ["browser", "engine", "visit"]
 HERE = Path(__file__).parent
 
 

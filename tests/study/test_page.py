@@ -3,23 +3,29 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pytest
 from lxml import html
+from matplotlib.colors import to_hex
+from matplotlib.container import BarContainer, ErrorbarContainer
 from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
+from rov_fmu.report.plots.svg import LIGHT
 from rov_fmu.study import Results
-from rov_fmu.study.results.page import _draw_in_rows, _draw_indices, study_page
+from rov_fmu.study.results.page import study_page
+from rov_fmu.study.results.plots import Plot, draw_indices, in_rows
 from tests.folders import beside
+from tests.report.conftest import Visit
+from tests.report.pages import check_is_whole
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory, foreign: Callable[..., Path], scheduler: str) -> Path:
     """The results of a study with its page, made by the command. Some runs fail; the others lack the figure `odd`."""
     folder = tmp_path_factory.mktemp("page")
-    (folder / "plan.toml").write_text(f"""title = "Pumps & <valves>"
+    (folder / "plan.toml").write_text(f"""title = "A <foreign> study"
 fmu = "{beside(foreign(), folder)}"
 stop_time = 2.0
 step = 0.1
@@ -33,6 +39,7 @@ mode.values = [0, 0, 0, 0, 0, 0, 0, 1]
 outputs = ["y"]
 [figures]
 end = "y[-1]"
+twice = "2 * y[-1]"
 odd = "y[99]"
 offset = "2.0 + 0*b"
 """)
@@ -46,23 +53,106 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     page = html.fromstring(text)
     rows = {row[0].text_content(): [cell.text_content() for cell in row] for row in page.iter("tr")}
     ended = results.runs[results.runs.status != "failed"]
-    assert f"600 of 600 runs, {len(results.failed)} failed, {len(ended)} incomplete." in page.text_content()
+    assert [element.text_content() for element in page.iter("h1")] == ["A <foreign> study"]
+    assert (
+        f"Model foreign: 600 of 600 runs, {len(results.failed)} failed, {len(ended)} incomplete." in page.text_content()
+    )
     assert float(rows["end"][3].replace("−", "-")) == pytest.approx(ended.end.median(), rel=1e-3)
     assert rows["end"][-1] == str(len(ended))
     assert rows["odd"][-1] == "0"
     index = results.sensitivity("end").loc["b"]
     indices = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='b']/td")
     assert float(indices[1].text_content().replace("−", "-")) == pytest.approx(index.S1, abs=1e-3)
-    assert "Too few runs have odd" in page.text_content()
+    assert "odd has no indices: too few runs have odd." in page.text_content()
     failed = next(row for row in page.iter("tr") if "the pump is blocked" in row.text_content())
     assert failed[0].text_content() == str(len(results.failed))
     labels = re.findall(r'aria-label="([^"]*)"', text)
-    assert labels == ["Distribution of end", "Sobol indices of end", "Trajectories of y"]
-    assert page.xpath("string(//h1)") == page.xpath("string(//title)").removesuffix(" – study") == "Pumps & <valves>"
+    shown = [f"{what} {of}" for what in ("Distribution of", "Sobol indices of") for of in ("end", "twice")]
+    assert labels == [label for label in (*shown, "Trajectories of y") for _ in ("broad", "narrow")]
+    check_is_whole(text)
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
     assert "<script" not in text
     assert page.xpath("//footer//*[@class='hash']/text()") == [results.fmu], "64 digits break on a phone"
     assert study_page(results) == text, "the page is the same for the same results"
+
+
+def test_another_title_changes_the_page_and_not_the_results(
+    foreign: Callable[..., Path], tmp_path: Path, scheduler: str
+) -> None:
+    pages, times = [], []
+    for title in ("", 'title = "Before"', 'title = "After"'):
+        (tmp_path / "plan.toml").write_text(f"""{title}
+fmu = "{beside(foreign(), tmp_path)}"
+stop_time = 1.0
+step = 0.5
+runs = 4
+vary.a.uniform = [0.0, 1.0]
+figures.end = "y[-1]"
+""")
+        assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "r"), "--scheduler", scheduler]) == 0
+        pages.append(html.parse(tmp_path / "r" / "study.html"))
+        times.append([path.stat().st_mtime_ns for path in (tmp_path / "r" / "runs").iterdir()])
+    assert [page.findtext(".//h1") for page in pages] == ["foreign", "Before", "After"]
+    assert times == [times[0]] * 3, "the runs are kept"
+
+
+@pytest.mark.parametrize("plots", [1, 2, 3, 4, 5, 7])
+def test_rows_of_plots_are_full(plots: int) -> None:
+    def draw(figure: Figure) -> None:
+        figure.subplots()
+
+    rows = [plot["row"] for plot in in_rows([Plot(f"{n}", draw, "", "") for n in range(plots)])]
+    assert all(rows.count(row) % row == 0 for row in {*rows})
+    assert rows == sorted(rows, reverse=True)
+    assert min(rows) == 1 if plots == 1 else min(rows) >= 2
+
+
+_PLACES = """[...document.querySelectorAll(".plots.rows")].map((grid) => [grid, ...grid.children].map((e) => {
+  const { left, right, bottom } = e.getBoundingClientRect(); return [left, right, bottom]; }))"""
+_TEXT_SIZES = """[...document.querySelectorAll("svg text:not(:has(tspan))")].filter((e) => e.getClientRects().length)
+  .map((e) => Math.hypot(e.getScreenCTM().c, e.getScreenCTM().d) * parseFloat(getComputedStyle(e).fontSize))"""
+
+
+@pytest.mark.parametrize("width", [390, 1440])
+def test_the_plots_fill_the_page_with_text_of_one_size(done: Path, visit: Callable[..., Visit], width: int) -> None:
+    shown = visit(width=width)
+    shown.page.goto((done / "study.html").as_uri())
+    assert shown.page.evaluate("document.documentElement.scrollWidth") == width
+    for (left, right, _), *plots in shown.page.evaluate(_PLACES):
+        bottoms = sorted({round(bottom) for _, _, bottom in plots})
+        assert len(bottoms) == (len(plots) if width == 390 else 1), "so many rows"
+        for row in bottoms:
+            ends = [(start, end) for start, end, bottom in plots if round(bottom) == row]
+            assert (ends[0][0], ends[-1][1]) == pytest.approx((left, right), abs=1.0)
+    sizes = shown.page.evaluate(_TEXT_SIZES)
+    assert len(sizes) > 30
+    assert 11.0 < min(sizes) < max(sizes) < 1.03 * min(sizes), "pixels"
+    assert not shown.problems()
+
+
+def test_a_bar_is_an_index_with_its_interval() -> None:
+    rows = [
+        {"name": "a, b", "S1": 0.6, "S1_95": 0.1, "S1_tells": True, "ST": 0.7, "ST_95": 0.05, "ST_tells": True},
+        {"name": "c", "S1": 0.2, "S1_95": 3.0, "S1_tells": False, "ST": 0.3, "ST_95": 0.02, "ST_tells": True},
+        *(
+            {"name": f"d{n}", "S1": 0, "S1_95": 0, "S1_tells": True, "ST": 0, "ST_95": 0, "ST_tells": True}
+            for n in range(20)
+        ),
+    ]
+    figure = Figure()
+    draw_indices(figure, rows)
+    (ax,) = figure.axes
+    alone, together = (container for container in ax.containers if isinstance(container, BarContainer))
+    assert [bar.get_width() for bar in alone][:2] == [0.6, 0.2]
+    assert [bar.get_width() for bar in together][:2] == [0.7, 0.3]
+    assert [to_hex(bar.get_facecolor()) for bar in alone][:2] == [LIGHT["blue"], LIGHT["grey"]]
+    lines = [line for container in ax.containers if isinstance(container, ErrorbarContainer) for line in container[2]]
+    ends = [segment[:, 0].tolist() for line in lines for segment in line.get_segments()[:2]]
+    assert np.array(ends) == pytest.approx(np.array([[0.5, 0.7], [-2.8, 3.2], [0.65, 0.75], [0.28, 0.32]]))
+    assert len(alone) == 12, "the others have smaller ones"
+    assert ax.get_xlim() == pytest.approx((-0.3, 1.3), abs=0.05), (
+        "an interval that tells nothing does not hide the others"
+    )
 
 
 def test_a_grid_shows_figures_over_what_varies_with_their_units(
@@ -89,7 +179,7 @@ T = "Tau(u)"
     text = (tmp_path / "results" / "study.html").read_text(encoding="utf-8")
     page, runs = html.fromstring(text), Results(tmp_path / "results").runs
     labels = re.findall(r'aria-label="([^"]*)"', text)
-    assert labels == [*(f"{name} over m_rov and u_l" for name in ("V", "way", "T")), "Trajectories of u"]
+    assert labels == [*(f"{name} over m_rov and u_l" for name in ("V", "way", "T")), *["Trajectories of u"] * 2]
     head, *rows = [
         [cell.text_content() for cell in row] for row in page.xpath("//h2[@id='figures']/following::table[1]//tr")
     ]
@@ -136,35 +226,6 @@ down = "a - u / 1000"
     assert -0.0005 < min(small) < -1e-5
     rows = pages[800].xpath("//h2[@id='sensitivity']/following::tr[td/code='u']/td[2]")
     assert [row.text_content() for row in rows[1:3]] == ["0.000", "0.000"]
-
-
-def test_bars_have_the_lengths_of_sobol_indices_and_lines_those_of_their_intervals() -> None:
-    rows = [
-        {"name": "a", "S1": 0.6, "S1_95": 0.1, "ST": 0.7, "ST_95": 0.2},
-        {"name": "b", "S1": -0.01, "S1_95": 0.02, "ST": 0.3, "ST_95": 0.05},
-    ]
-    figure = Figure()
-    _draw_indices(figure, rows)
-    (ax,) = figure.axes
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["a", "b"]
-    assert [bar.get_width() for group in ax.containers[::2] for bar in group] == [0.6, -0.01, 0.7, 0.3]
-    lines = [segment[:, 0].tolist() for line in ax.collections for segment in line.get_segments()]  # type: ignore[attr-defined]
-    assert lines == [pytest.approx(ends) for ends in ([0.5, 0.7], [-0.03, 0.01], [0.5, 0.9], [0.25, 0.35])]
-    low, high = ax.get_xlim()
-    assert low <= -0.03
-    assert high >= 1.0
-
-
-@pytest.mark.parametrize(
-    ("count", "widths"),
-    [(0, ""), (1, "h"), (2, "hh"), (3, "ttt"), (4, "hhhh"), (5, "ttthh"), (7, "ttthhhh"), (9, 9 * "t")],
-)
-def test_plots_fill_their_rows(count: int, widths: str) -> None:
-    """A third takes two of six columns, and a half three."""
-    shown: list[dict[str, Any]] = [{"label": f"{n}", "draw": Figure.subplots} for n in range(count)]
-    _draw_in_rows([{"draw": None}, *shown])
-    assert "".join(found["width"][0] for found in shown) == widths
-    assert count == 1 or sum({"t": 2, "h": 3}[width] for width in widths) % 6 == 0
 
 
 def test_the_command_tells_of_what_is_missing_and_ends_with_1_where_no_run_is_done(

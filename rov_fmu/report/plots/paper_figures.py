@@ -5,7 +5,7 @@ measured velocity is that of the thrust curve, (11)-(13). The forces behind the 
 recordings (Figures 3, 10, 11) are not printed, so they are not drawn.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import partial
@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.identify.points.quadratic_fit import fit_quadratic, quadratic
-from rov_fmu.io.output import Output, folder_made, write_whole
+from rov_fmu.io.output import Output, check_targets, folder_made, write_whole
 from rov_fmu.model.layout import SURGE
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.steps import draw_steps, finish, measured_step, tables_by_axis
@@ -29,8 +29,8 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 COLUMNS = {"single": 3.5, "double": 7.16}
 """The widths of the columns of a journal, in inches: those of the IEEE (89 and 182 mm)."""
 FORMATS: dict[str, dict[str, Any]] = {
-    "svg": {"metadata": {"Date": None}},
-    "pdf": {"metadata": {"CreationDate": None}},
+    "svg": {"metadata": {"Date": None, "Creator": None}},
+    "pdf": {"metadata": {"CreationDate": None, "Creator": None, "Producer": None}},
     "png": {"metadata": {"Software": None}, "dpi": 300},
 }
 """The options of Matplotlib for each format. Without dates and versions, the same figures have the same bytes."""
@@ -83,13 +83,16 @@ def write_figures(folder: Path, form: str = "svg", column: str = "single") -> li
 
     The folder is created if it does not exist. Raises WriteError.
     """
-    outputs = []
+    places = [(folder / f"{one.name}.{form}", folder / f"{one.name}.txt", one) for one in paper_figures()]
+    paths = [path for *both, _ in places for path in both]
     with folder_made(folder):
-        for figure in paper_figures():
-            outputs.append(Output(folder / f"{figure.name}.{form}", figure.content(form, column)))
-            outputs.append(Output(folder / f"{figure.name}.txt", f"{figure.caption}\n".encode()))
+        check_targets(paths)
+        outputs = []
+        for picture, caption, figure in places:
+            outputs.append(Output(picture, figure.content(form, column)))
+            outputs.append(Output(caption, f"{figure.caption}\n".encode()))
         write_whole(*outputs)
-    return [output.path for output in outputs]
+    return paths
 
 
 def paper_figures() -> Iterator[PaperFigure]:
@@ -122,7 +125,7 @@ def paper_figures() -> Iterator[PaperFigure]:
     for axis, (name, source) in _STEP_FIGURES.items():
         yield PaperFigure(
             name,
-            f"Velocity in {axis} after steps of the command to {', '.join(map(str, _STEPS))} %: the non-linear model "
+            f"Velocity in {axis} after steps of the command to {_listed(_STEPS)} %: the non-linear model "
             f"(dashed) and the scaled model (solid) of {_PAPER}{source}. Dotted: measured V_ss. Points: measured Tau, "
             "at 63 % of the measured V_ss. The paper does not print the recordings.",
             (partial(_steps, k=k, table=tables[axis]),),
@@ -130,20 +133,31 @@ def paper_figures() -> Iterator[PaperFigure]:
     axes = [form.axis.name for form in vehicle.layout.axes]
     yield PaperFigure(
         "steady_velocity",
-        f"Steady velocity over the command in {', '.join(axes)}: the model of {_PAPER} (dashed), the model refitted to "
+        f"Steady velocity over the command in {_listed(axes)}: the model of {_PAPER} (dashed), the model refitted to "
         "all measured V_ss and Tau (solid), and the measured V_ss (points).",
-        tuple(partial(_steady, k=k, refit=refit, table=tables[axis]) for axis in axes),
+        tuple(partial(_steady, k=k, refit=refit, table=tables[axis], has_legend=axis == axes[0]) for axis in axes),
     )
 
 
-def _steady(ax: Axes, k: Rov, refit: Rov, table: ResponseTable) -> None:
+def _listed(words: Sequence[object]) -> str:
+    """Return words in running text: 30, 50 and 70."""
+    *first, last = map(str, words)
+    return f"{', '.join(first)} and {last}"
+
+
+def _steady(ax: Axes, k: Rov, refit: Rov, table: ResponseTable, *, has_legend: bool) -> None:
     """Draw V_ss over the command along an axis: the paper's model, the refit, and the paper's measurements."""
     axis, commands = table.axis, range(0, 101, 2)
-    for label, rov, color, dashes in (("paper", k, "grey", "--"), ("refit", refit, "blue", "-")):
-        V_ss = [rov.response(axis, command / 100.0)[0] for command in commands]
-        ax.plot(commands, V_ss, dashes, label=label, color=LIGHT[color], linewidth=1.8)
+    of_paper, of_refit = ([rov.response(axis, command / 100.0)[0] for command in commands] for rov in (k, refit))
     points = [(float(command), float(V)) for command, V in table.steady.items()]
-    ax.plot(*zip(*points, strict=True), "o", label="measured", color=LIGHT["orange"], markersize=4.0, zorder=5)
+    lines = [
+        *ax.plot(commands, of_paper, "--", color=LIGHT["grey"], linewidth=1.8),
+        *ax.plot(commands, of_refit, "-", color=LIGHT["blue"], linewidth=1.8),
+        *ax.plot(*zip(*points, strict=True), "o", color=LIGHT["orange"], markersize=4.0, zorder=5),
+    ]
+    if has_legend:
+        for line, label in zip(lines, ("paper", "refit", "measured"), strict=True):
+            line.set_label(label)
     finish(ax, axis.name.capitalize(), "command (%)", f"$V_{{ss}}$ ({axis.unit})")
     ax.set_xlim(0, 100)
 

@@ -68,12 +68,12 @@ _SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}hr
 Draw = Callable[[Figure], None]
 
 
-def inline_svg(label: str, draw: Draw, size: tuple[float, float]) -> Markup:
-    """Return a plot as part of a page, with a label for screen readers. The labels of a page must differ.
+def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str = "") -> Markup:
+    """Return a plot as part of a page, with a label for screen readers. The colours of the palette become the page's.
 
-    The colours of the palette become those of the page.
+    Two plots of a page must differ in their label or in their salt, because their ids follow from these.
     """
-    svg = svg_file(draw, size, salt=label, background="none", margin=0.02)
+    svg = svg_file(draw, size, salt=label + salt, background="none", margin=0.02)
     head = f'role="img" aria-label="{escape(label)}">'
     svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', lambda found: f"<svg {found[1]} {head}", svg, count=1)
     svg = svg.replace(f"font-family:{_FONTS};", "")

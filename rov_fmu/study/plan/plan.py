@@ -16,7 +16,7 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import Strict, as_tuple, folder_of, key_line, read_checked
 from rov_fmu.study.plan.figures import read_expression
-from rov_fmu.vehicle.quantity import Finite, not_blank
+from rov_fmu.vehicle.quantity import Finite, Name, not_blank
 
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
@@ -233,8 +233,8 @@ def _expression(text: str) -> str:
 class Plan(Strict):
     """A study: many runs of one FMU."""
 
-    title: Annotated[str, Field(max_length=200), AfterValidator(not_blank)] | None = None
-    """The title of the page with the results. The default is the name of the FMU."""
+    title: Name | None = None
+    """The heading of the page. Without it, that is the name of the model."""
     fmu: Annotated[str, AfterValidator(_file)] | None = None
     """An FMU for Co-Simulation in the folder of the plan, or in a folder inside it. A plan has this or `vehicle`."""
     vehicle: _Beside | None = None

@@ -7,26 +7,26 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from markupsafe import Markup
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output
-from rov_fmu.report.plots.steps import LINES, evenly
-from rov_fmu.report.plots.svg import LIGHT, Draw, inline_svg
-from rov_fmu.report.templates import number, page, pretty_unit
+from rov_fmu.report.templates import number, page
+from rov_fmu.study.results.plots import (
+    Plot,
+    axis_label,
+    draw_band,
+    draw_distribution,
+    draw_indices,
+    draw_lines,
+    in_rows,
+    indices_height,
+)
 from rov_fmu.study.results.results import QUANTILES, Results
 from rov_fmu.study.run.worker import REASON, STATUS
 
 PAGE = "study.html"
 _KIND = b'<p class="kind">Study</p>'
 """A line that every page about a study contains."""
-_THIRD, _HALF = (3.7, 2.6), (5.0, 2.8)
-"""The sizes of plots that fill a third and a half of a row, in inches. In both, text has about the same size."""
-_BARS = 12
-"""The number of variables whose Sobol indices are drawn; the table has all of them."""
-_BINS = 40
 _POINTS = 400
 """The number of points of a band that are drawn; more would not be visible."""
 _NUMBERS = 6
@@ -35,16 +35,12 @@ _REASONS = 50
 """The number of reasons of failures that are shown."""
 _ROWS = 60
 """The number of rows of a grid that are shown."""
-_MARKED = 40
-"""A line with at most so many points has markers."""
 _FEW = 16
 """Below so many blocks, even the intervals of Sobol indices are unreliable: with 2, that of 0.5 was 0.6 to 1.1."""
 _SURE = 0.1
 """An interval with a smaller half width is narrow enough to show that an index is small."""
 _CONSTANT = 1e-6
 """Values that vary by less than this share of the largest one count as constant."""
-_NARROW = 1e-3
-"""Below this relative variation, the numbers at an axis are long, so there are fewer of them."""
 
 
 def page_output(results: Results) -> Output:
@@ -64,15 +60,16 @@ def study_page(results: Results) -> str:
     runs, plan = results.runs, results.plan
     reasons = [*_failures(runs)]
     grid = _grid(results)
-    indices = _sensitivities(results) if plan["sampler"] == "saltelli" else {}
-    rows = [row for found in indices.values() if not isinstance(found, str) for row in found]
     figures = [_figure(name, results, grid) for name in results.figures]
-    bands = [_band(results, name) for name in results.outputs] if len(results.failed) < len(runs) else []
-    _draw_in_rows(figures)
-    _draw_in_rows(bands)
+    indices = _sensitivities(results) if plan["sampler"] == "saltelli" else {}
+    tables = {name: found for name, found in indices.items() if not isinstance(found, str)}
+    rows = [row for found in tables.values() for row in found]
+    outputs = results.outputs if len(results.failed) < len(runs) else ()
+    model = results.model.removesuffix(".fmu")
     return page(
         "study.html.j2",
-        title=results.title,
+        title=results.title or model,
+        model=model,
         fmu=results.fmu,
         made_by=results.made_by,
         done=len(runs),
@@ -83,17 +80,17 @@ def study_page(results: Results) -> str:
         seed=plan["seed"],
         quantiles=QUANTILES,
         figures=figures,
+        plots=in_rows([figure["plot"] for figure in figures if figure["plot"]]),
         grid=grid,
         rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
         more_rows=len(runs[_ROWS:]),
-        sensitivities=indices,
-        charts={name: _chart(name, found) for name, found in indices.items() if not isinstance(found, str)},
-        most_bars=_BARS,
+        no_indices={name: found for name, found in indices.items() if isinstance(found, str)},
+        indices=tables,
+        index_plots=in_rows([_index_plot(name, found) for name, found in tables.items()]),
         is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
         blocks=results.planned // (len(results.groups) + 2),
         few=_FEW,
-        bands=bands,
-        descriptions=results.descriptions,
+        bands=in_rows([_band(results, name) for name in outputs]),
         warnings=results.warnings,
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
         failures=reasons[:_REASONS],
@@ -108,18 +105,8 @@ def _grid(results: Results) -> Sequence[str]:
     return sorted(results.parameters, key=lambda name: -results.runs[name].nunique())
 
 
-def _draw_in_rows(shown: Sequence[dict[str, Any]]) -> None:
-    """Add the plots, in sizes that fill every row of the page: three to a row, and two in the last rows."""
-    drawn = [found for found in shown if found["draw"]]
-    halves = {0: 0, 1: 4, 2: 2}[len(drawn) % 3]
-    for n, found in enumerate(drawn):
-        is_half = n >= len(drawn) - halves
-        found["width"] = "half" if is_half else "third"
-        found["plot"] = inline_svg(found["label"], found["draw"], _HALF if is_half else _THIRD)
-
-
 def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
-    """Return the row about a figure, and how its plot is drawn."""
+    """Return the row about a figure, with its plot unless all runs have the same value."""
     values = results.runs[name].to_numpy(float)
     there, unit = values[np.isfinite(values)], results.figure_units[name]
     found = {"name": name, "expression": results.plan["figures"][name], "unit": unit, "runs": there.size}
@@ -129,21 +116,21 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
             "quantiles": [None] * len(QUANTILES),
             "mean": None,
             "sd": None,
-            "draw": None,
+            "plot": None,
             "is_still": False,
         }
     quantiles = np.quantile(there, QUANTILES).tolist()
     sd = float(there.std(ddof=1)) if there.size > 1 else None
     found |= {"quantiles": quantiles, "mean": float(there.mean()), "sd": sd}
     if _is_constant(there):
-        return {**found, "draw": None, "is_still": True}
+        return {**found, "plot": None, "is_still": True}
     if grid:
-        draw: Draw = partial(_draw_lines, name=name, results=results, grid=grid)
+        draw = partial(draw_lines, name=name, results=results, grid=grid)
         label = f"{name} over {' and '.join(grid)}"
     else:
-        draw = partial(_draw_distribution, values=there, quantiles=quantiles, label=axis_label("", unit))
+        draw = partial(draw_distribution, values=there, quantiles=quantiles, label=axis_label("", unit))
         label = f"Distribution of {name}"
-    return {**found, "label": label, "draw": draw, "is_still": False}
+    return {**found, "plot": Plot(label, draw, name, found["expression"]), "is_still": False}
 
 
 def _is_constant(values: Any) -> bool:
@@ -151,67 +138,15 @@ def _is_constant(values: Any) -> bool:
     return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
 
 
-def axis_label(name: str, unit: str) -> str:
-    """Return a name with its unit; either of them may be missing."""
-    if unit in ("", "1"):
-        return name
-    return f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
-
-
-def _draw_distribution(figure: Figure, values: Any, quantiles: list[float], label: str) -> None:
-    ax = figure.subplots()
-    low, median, high = quantiles[0], quantiles[len(quantiles) // 2], quantiles[-1]
-    ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
-    shares = np.full(len(values), 100.0 / len(values))
-    ax.hist(values, bins=min(_BINS, max(5, round(len(values) ** 0.5))), weights=shares, color=LIGHT["blue"], alpha=0.75)
-    ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
-    ax.set(xlabel=label, ylabel="runs (%)")
-    _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
-
-
-def _draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str]) -> None:
-    """Draw a figure over the variable with more values, with a line for some values of the other one."""
-    ax = figure.subplots()
-    along, *others = grid
-    runs = results.runs.sort_values(along, kind="stable")
-    lines = [("", runs)]
-    for other in others:
-        some = evenly(np.unique(runs[other]).tolist())
-        lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
-    for (label, line), color in zip(lines, LINES, strict=False):
-        marker = "o" if len(line) <= _MARKED else ""
-        ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
-    for other in others:
-        title = axis_label(other, results.units[other])
-        figure.legend(title=title, title_fontsize=8.5, handlelength=1.0, loc="outside right upper")
-    ax.set(xlabel=axis_label(along, results.units[along]), ylabel=axis_label("", results.figure_units[name]))
-    _set_ticks(ax)
-
-
-def _set_ticks(ax: Axes, along: int = 6) -> None:
-    """Print the full numbers at the axes, without an offset."""
-    ax.ticklabel_format(useOffset=False)
-    ax.locator_params("x", nbins=along)
-    ax.locator_params("y", nbins=6)
-
-
-def _band(results: Results, output: str) -> dict[str, Any]:
-    """Return an output, and how its trajectories are drawn."""
+def _band(results: Results, output: str) -> Plot:
     bands = results.bands(output)
     shown = bands.iloc[:: max(1, len(bands) // _POINTS)]
-    draw = partial(_draw_band, bands=shown, unit=results.units[output])
-    return {"name": output, "label": f"Trajectories of {output}", "draw": draw}
+    draw = partial(draw_band, bands=shown, unit=results.units[output])
+    return Plot(f"Trajectories of {output}", draw, output, results.descriptions[output])
 
 
-def _draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
-    ax = figure.subplots()
-    t = bands.index.to_numpy()
-    low, below, median, above, high = (bands[q].to_numpy(float) for q in QUANTILES)
-    ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
-    ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
-    ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6)
-    ax.set(xlabel="time (s)", ylabel=axis_label("", unit))
-    _set_ticks(ax)
+def _index_plot(figure: str, rows: Sequence[dict[str, Any]]) -> Plot:
+    return Plot(f"Sobol indices of {figure}", partial(draw_indices, rows=rows), figure, "", indices_height(len(rows)))
 
 
 def _sensitivities(results: Results) -> dict[str, Any]:
@@ -230,28 +165,6 @@ def _sensitivities(results: Results) -> dict[str, Any]:
             rows["S1_tells"], rows["ST_tells"] = (_tells(rows[key], rows[f"{key}_95"]) for key in ("S1", "ST"))
             found[figure] = (rows.round(3) + 0.0).reset_index(names="name").to_dict("records")  # without -0
     return found
-
-
-def _chart(name: str, rows: Sequence[dict[str, Any]]) -> Markup:
-    """Return the Sobol indices of a figure as a bar chart."""
-    shown = rows[:_BARS]
-    size = _HALF[0], 0.9 + 0.36 * len(shown)  # inches
-    return inline_svg(f"Sobol indices of {name}", partial(_draw_indices, rows=shown), size)
-
-
-def _draw_indices(figure: Figure, rows: Sequence[dict[str, Any]]) -> None:
-    """Draw a bar for S_1 and one for S_T of each variable, with their 95 % intervals."""
-    ax = figure.subplots()
-    places = np.arange(len(rows), dtype=float)
-    for key, shift, color, label in (("S1", -0.19, "blue", "$S_1$: alone"), ("ST", 0.19, "grey", "$S_T$: with others")):
-        values, errors = ([row[f"{key}{end}"] for row in rows] for end in ("", "_95"))
-        ax.barh(places + shift, values, 0.36, color=LIGHT[color], label=label)
-        ax.errorbar(values, places + shift, xerr=errors, fmt="none", ecolor=LIGHT["ink"], elinewidth=1.0, capsize=2.5)
-    ax.set_yticks(places, [row["name"] for row in rows])
-    ax.set_ylim(len(rows) - 0.5, -0.5)
-    ax.grid(visible=False, axis="y")
-    ax.set_xlim(min(0.0, ax.get_xlim()[0]), max(1.0, ax.get_xlim()[1]))
-    figure.legend(loc="outside lower left", ncols=2)
 
 
 def _tells(index: "pd.Series[float]", half_width: "pd.Series[float]") -> "pd.Series[bool]":

@@ -35,6 +35,8 @@ class Results:
         """The figures, columns of `runs`."""
         self.outputs: tuple[str, ...] = tuple(study["columns"]["outputs"])
         """The kept outputs, columns of `trajectories`."""
+        self.title: str | None = study.get("title")
+        """The title that the plan gives."""
         self.planned: int = study["runs"]
         """The number of runs of the whole study."""
         self.plan: dict[str, Any] = study["plan"]
@@ -49,8 +51,6 @@ class Results:
         """The FMU's descriptions of parameters and outputs."""
         self.model: str = study["model"]
         """The name of the FMU's file."""
-        self.title: str = study.get("title") or self.model.removesuffix(".fmu")
-        """The title of the plan, or the name of the model."""
         self.fmu: str = study["fmu"]
         """SHA-256 of the FMU."""
         self.groups: tuple[tuple[str, ...], ...] = tuple(map(tuple, study["groups"]))

@@ -4,7 +4,7 @@ import numpy as np
 
 from rov_fmu.report.console import console, paragraph, print_table, shell_words, table, text
 from rov_fmu.report.progress import per_second
-from rov_fmu.study.results.page import axis_label
+from rov_fmu.study.results.plots import axis_label
 from rov_fmu.study.results.results import Results
 from rov_fmu.study.run.cluster import Spent
 from rov_fmu.study.run.worker import REASON

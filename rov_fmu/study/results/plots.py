@@ -1,0 +1,163 @@
+"""The plots of a study's page, and their arrangement in rows that fill the page."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import shorten, wrap
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from rov_fmu.report.plots.steps import LINES, evenly
+from rov_fmu.report.plots.svg import LIGHT, Draw, inline_svg, with_even_text
+from rov_fmu.report.templates import number, pretty_unit
+from rov_fmu.study.results.results import QUANTILES, Results
+
+_WIDTHS = {3: 3.7, 2: 5.68, 1: 11.6}
+"""The width of a plot in inches by the number of plots in its row. On a wide page, text then has one size in all."""
+_HEIGHT = 2.6  # inches
+_BINS = 40
+_MARKED = 40
+"""A line with at most so many points has markers."""
+_NARROW = 1e-3
+"""Below this relative variation, the numbers at an axis are long, so there are fewer of them."""
+_SHOWN_INDICES = 12
+"""The number of variables in a plot of Sobol indices; the others have smaller ones."""
+_NAME_WIDTH = 22
+"""The number of characters in a line of a variable's name; correlated variables are named together."""
+_KINDS = {"blue": "$S_1$: alone", "teal": "$S_T$: with others"}
+"""The kinds of Sobol indices by their colour."""
+_BAR = 0.34
+"""The height of a bar, as a share of the distance between two variables."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot: its label for screen readers, its function, its height in inches, and what stands above it."""
+
+    label: str
+    draw: Draw
+    name: str
+    text: str
+    height: float = _HEIGHT
+
+
+def in_rows(plots: Sequence[Plot]) -> list[dict[str, Any]]:
+    """Return the plots for a grid whose rows are full: `name`, `text`, `row` (how many stand in its row) and `svg`.
+
+    A plot in a row of fewer than three is drawn twice: broad for a wide page, and as narrow as the others for a phone.
+    """
+    found = []
+    for plot, count in zip(plots, _counts(len(plots)), strict=True):
+        draw = with_even_text(plot.draw)
+        narrow = inline_svg(plot.label, draw, (_WIDTHS[3], plot.height))
+        if count < 3:
+            broad = inline_svg(plot.label, draw, (_WIDTHS[count], plot.height), salt="broad")
+            narrow = Markup('<div class="broad">{}</div><div class="narrow">{}</div>').format(broad, narrow)
+        found.append({"name": plot.name, "text": plot.text, "row": count, "svg": narrow})
+    return found
+
+
+def _counts(plots: int) -> list[int]:
+    """Return how many plots stand in the row of each plot: three, but two in the last rows where three leave a gap."""
+    if plots == 1:
+        return [1]
+    pairs = -plots % 3
+    return [3] * (plots - 2 * pairs) + [2] * (2 * pairs)
+
+
+def axis_label(name: str, unit: str) -> str:
+    """Return a name with its unit; either of them may be missing."""
+    if unit in ("", "1"):
+        return name
+    return f"{name} ({pretty_unit(unit)})" if name else pretty_unit(unit)
+
+
+def draw_distribution(figure: Figure, values: Any, quantiles: list[float], label: str) -> None:
+    """Draw a histogram of values with their median, and with the range from their first to their last quantile."""
+    ax = figure.subplots()
+    low, median, high = quantiles[0], quantiles[len(quantiles) // 2], quantiles[-1]
+    ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+    shares = np.full(len(values), 100.0 / len(values))
+    ax.hist(values, bins=min(_BINS, max(5, round(len(values) ** 0.5))), weights=shares, color=LIGHT["blue"], alpha=0.75)
+    ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
+    ax.set(xlabel=label, ylabel="runs (%)")
+    _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
+
+
+def draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str]) -> None:
+    """Draw a figure over the variable with more values, with a line for some values of the other one."""
+    ax = figure.subplots()
+    along, *others = grid
+    runs = results.runs.sort_values(along, kind="stable")
+    lines = [("", runs)]
+    for other in others:
+        some = evenly(np.unique(runs[other]).tolist())
+        lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
+    for (label, line), color in zip(lines, LINES, strict=False):
+        marker = "o" if len(line) <= _MARKED else ""
+        ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
+    for other in others:
+        title = axis_label(other, results.units[other])
+        figure.legend(title=title, handlelength=1.0, loc="outside right upper")
+    ax.set(xlabel=axis_label(along, results.units[along]), ylabel=axis_label("", results.figure_units[name]))
+    _set_ticks(ax)
+
+
+def draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
+    """Draw the median of an output over time, and the bands between its quantiles."""
+    ax = figure.subplots()
+    t = bands.index.to_numpy()
+    low, below, median, above, high = (bands[q].to_numpy(float) for q in QUANTILES)
+    ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
+    ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
+    ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6)
+    ax.set(xlabel="time (s)", ylabel=axis_label("", unit))
+    _set_ticks(ax)
+
+
+def indices_height(variables: int) -> float:
+    """Return the height in inches of a plot of Sobol indices."""
+    return 1.0 + 0.45 * min(variables, _SHOWN_INDICES)
+
+
+def draw_indices(figure: Figure, rows: Sequence[dict[str, Any]]) -> None:
+    """Draw the Sobol indices of a figure as bars with their 95 % intervals; what tells nothing is grey.
+
+    A row has `name`, `S1`, `S1_95`, `S1_tells` and the same for ST, and the largest ST comes first.
+    """
+    ax = figure.subplots()
+    shown = rows[:_SHOWN_INDICES]
+    ends = [0.0, 1.0]
+    for key, color, offset in (("S1", "blue", -0.5), ("ST", "teal", 0.5)):
+        at = np.arange(len(shown)) + offset * _BAR
+        values, half_widths = (np.array([row[name] for row in shown], float) for name in (key, f"{key}_95"))
+        colors = [LIGHT[color if row[f"{key}_tells"] else "grey"] for row in shown]
+        ax.barh(at, values, _BAR, color=colors, alpha=0.75)
+        ax.errorbar(values, at, xerr=half_widths, fmt="none", ecolor=LIGHT["ink"], elinewidth=1.0, capsize=2.0)
+        ends += [*(values - half_widths), *(values + half_widths)]
+    ax.set(xlim=(max(min(ends), -0.3) - 0.02, min(max(ends), 1.3) + 0.02), ylim=(len(shown) - 0.4, -0.6))
+    ax.set_yticks(range(len(shown)), ["\n".join(_name_lines(row["name"])) for row in shown])
+    ax.tick_params("y", labelcolor=LIGHT["ink"])
+    ax.grid(visible=False, axis="y")
+    ax.axvline(0.0, color=LIGHT["muted"], linewidth=0.8)
+    ax.set_xlabel("share of the variance")
+    looks = [Patch(color=LIGHT[color], alpha=0.75, label=label) for color, label in _KINDS.items()]
+    figure.legend(handles=looks, loc="outside upper right", ncols=2, handlelength=1.0, columnspacing=1.2)
+
+
+def _name_lines(name: str) -> list[str]:
+    """Return the name of a variable, or of several that are correlated, in at most two lines."""
+    lines = wrap(name, _NAME_WIDTH)
+    return lines if len(lines) <= 2 else [lines[0], shorten(" ".join(lines[1:]), _NAME_WIDTH, placeholder=" …")]
+
+
+def _set_ticks(ax: Axes, along: int = 6) -> None:
+    """Print the full numbers at the axes, without an offset."""
+    ax.ticklabel_format(useOffset=False)
+    ax.locator_params("x", nbins=along)
+    ax.locator_params("y", nbins=6)
