@@ -33,7 +33,7 @@ PATIENCE = 300.0
 
 
 class Command:
-    """A command in its own terminal; its stderr is read separately."""
+    """A command in its own terminal; its stderr is read separately, or is the terminal too."""
 
     def __init__(
         self,
@@ -41,6 +41,7 @@ class Command:
         folder: Path,
         is_controlled: bool = True,
         environment: Mapping[str, str] | None = None,
+        stderr: int | None = subprocess.PIPE,
     ) -> None:
         """`is_controlled` makes the terminal control the command, so that all its processes end with the first one."""
         self.temporary = folder / "temporary files"
@@ -59,14 +60,15 @@ class Command:
             cwd=ROOT,
             stdin=inside,
             stdout=inside,
-            stderr=subprocess.PIPE,
+            stderr=inside if stderr is None else stderr,
             text=True,
             env=os.environ | {"TERM": "xterm", "TMPDIR": str(self.temporary)} | dict(environment or {}),
             start_new_session=True,
             preexec_fn=own_terminal,  # noqa: PLW1509
         )
         os.close(inside)
-        Thread(target=self._read, daemon=True).start()
+        self._reader = Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def _read(self) -> None:
         with suppress(OSError):  # on Linux the end of a terminal is an error
@@ -99,18 +101,23 @@ class Command:
         children = psutil.Process(self.process.pid).children(recursive=True)
         action()
         _, err = self.process.communicate(timeout=PATIENCE)
+        self._reader.join(PATIENCE)
         _, alive = psutil.wait_procs(children, PATIENCE)
         assert not alive
         assert self.process.returncode == 130, err
         assert not [*self.temporary.iterdir()]
-        return without_progress(str(err))
+        return without_progress(err or "")
 
 
 @contextmanager
 def command(
-    arguments: list[str], folder: Path, is_controlled: bool = True, environment: Mapping[str, str] | None = None
+    arguments: list[str],
+    folder: Path,
+    is_controlled: bool = True,
+    environment: Mapping[str, str] | None = None,
+    stderr: int | None = subprocess.PIPE,
 ) -> Iterator[Command]:
-    begun = Command(arguments, folder, is_controlled, environment)
+    begun = Command(arguments, folder, is_controlled, environment, stderr)
     try:
         yield begun
     finally:
@@ -230,12 +237,14 @@ def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_pat
     output.write_bytes(b"the old one")
     report = str(output.with_name("report.html"))
     arguments = ["-m", "rov_fmu", "identify", str(folder), "--force", "-o", str(output), "--report", report]
-    with command(arguments, tmp_path, environment={"NO_COLOR": "1"}) as identification:
+    with command(arguments, tmp_path, environment={"NO_COLOR": "1"}, stderr=None) as identification:
         identification.wait_until(lambda: moment in identification.shown)
-        assert identification.press_ctrl_c() == LINE
-        shown = identification.shown
-    assert shown.rstrip().endswith(b"\x1b[2K"), "the bar is gone"
-    assert b"\x1b[?25h" in shown, "the cursor is back"
+        identification.press_ctrl_c()
+        shown = identification.shown.decode().replace("\r\n", "\n")
+    assert shown.endswith(LINE)
+    shown = shown.removesuffix(LINE)
+    assert shown.rstrip().endswith("\x1b[2K"), "the lines of the progress are gone"
+    assert "\x1b[?25h" in shown, "the cursor is back"
     assert [*output.parent.iterdir()] == [output]
     assert output.read_bytes() == b"the old one"
 

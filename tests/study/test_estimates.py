@@ -22,7 +22,7 @@ from rov_fmu.study.plan.sampling import Design
 from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import REFIT
+from tests.commands import REFIT, without_progress
 from tests.folders import beside
 
 REFITTED = load_vehicle(REFIT)
@@ -164,7 +164,7 @@ same = "0*a_d_u"
 """)
     with redirect_stderr(StringIO()) as printed:
         assert main(["study", str(plan), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
-    return Done(plan, Results(folder / "results"), printed.getvalue().splitlines())
+    return Done(plan, Results(folder / "results"), without_progress(printed.getvalue()).splitlines())
 
 
 def test_sobol_indices_are_those_of_groups_in_closed_form(done: Done) -> None:

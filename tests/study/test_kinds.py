@@ -17,6 +17,7 @@ from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.results.store import Store
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import without_progress
 from tests.folders import beside
 
 RUNS = 24
@@ -133,7 +134,7 @@ def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
         patched.setattr("rov_fmu.study.run.cluster._TASK", 1e-4)
         patched.setattr(os, "fsync", full)
         assert main(["study", str(plan), "-o", str(folder), "--scheduler", scheduler]) == 2
-    line = capsys.readouterr().err
+    line = without_progress(capsys.readouterr().err)
     assert line.startswith(f"rov-fmu: {folder}")
     assert line.endswith("cannot be written: No space left on device\n")
     assert line.count("\n") == 1
@@ -174,6 +175,6 @@ def test_an_fmu_that_cannot_be_loaded_is_a_line(
         part.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
     plan = _plan(tmp_path, fmu)
     assert main(["study", str(plan), "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 2
-    line = capsys.readouterr().err
+    line = without_progress(capsys.readouterr().err)
     assert line.startswith("rov-fmu: videoray.fmu: cannot be run: Cannot find shared library binaries")
     assert line.count("\n") == 1
