@@ -1,4 +1,7 @@
-"""The site: `sphinx-build -W docs site`. {{ README.md }} stands for that file, {{ t200 }} for a table."""
+"""The site: `sphinx-build -W docs site`. {{ README.md }} stands for that file, {{ t200 }} for a table.
+
+With `-D nb_execution_mode=off` the notebooks are not run, and the build takes a quarter of a minute.
+"""
 
 import os
 import re
@@ -16,12 +19,13 @@ from docs import compared, reference  # noqa: E402 (they stand beside this file)
 from rov_fmu.fmu.module import module  # noqa: E402
 from rov_fmu.io.output import Output, write_whole  # noqa: E402
 from rov_fmu.report.page.live import Flown, fly_page  # noqa: E402
+from rov_fmu.report.page.pictures import diagram  # noqa: E402
 from rov_fmu.vehicle.shipped import SHIPPED  # noqa: E402
 from rov_fmu.vehicle.vehicle import load_vehicle  # noqa: E402
 
 project = "rov-fmu"
 release = __version__
-extensions = ["myst_nb", "sphinx.ext.autodoc"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_click", "sphinx_copybutton"]
 
 # Notebooks are pages too, and an error in one is a warning of the build. Their commands are those of this Python, and
 # print without colours.
@@ -65,17 +69,29 @@ COCKPIT = f"""<p>Fly it here: the {_LINKS}. Drag a stick in the picture, or clic
 <iframe class="fly" name="fly" src="fly/compact/{FLOWN[0].identifier}.html" title="A vehicle in flight"></iframe>
 
 """
-"""On the first page, before the first heading of the README."""
+"""On the first page, in place of the README's moving picture."""
+MOVING_PICTURE = re.compile(r"^\[!\[[^\]]*\]\(fly\.webp\)\].*\n", re.MULTILINE)
+
+DRAWN = {name: load_vehicle(path) for name, path in SHIPPED.items() if name != "videoray_refit"}
+"""The vehicles of the gallery. The refit has the thrusters of the VideoRay."""
+GALLERY = "".join(
+    f'<figure class="drawing"><img src="drawings/{name}.svg" alt="Thrusters and axes of the {one.name}">'
+    f"<figcaption>{one.name}</figcaption></figure>\n\n"
+    for name, one in DRAWN.items()
+)
+"""On the page of the vehicles."""
 
 
 def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
     """Put in what stands elsewhere; its links are seen from docs/, and to what is not on the site there is none."""
 
     def text(match: re.Match[str]) -> str:
+        if match[1] == "gallery":
+            return GALLERY
         if match[1] in TABLES:
             return reference.markdown(TABLES[match[1]])
         whole = (ROOT / match[1]).read_text(encoding="utf-8").replace("](docs/", "](")
-        whole = whole.replace("\n## ", f"\n{COCKPIT}## ", 1) if match[1] == "README.md" else whole
+        whole = MOVING_PICTURE.sub(lambda _: COCKPIT, whole)
         whole = re.sub(r"\]\((CHANGELOG|CONTRIBUTING)\.md\)", lambda name: f"]({name[1].lower()}.md)", whole)
         return re.sub(r"\[([^\]]+)\]\(CITATION\.cff\)", r"\1 (`CITATION.cff`)", whole)
 
@@ -93,14 +109,25 @@ def _fly(app: Sphinx, error: Exception | None) -> None:
             write_whole(Output(folder / "compact" / name, fly_page(flown, compact=True).encode()))
 
 
+def _draw(app: Sphinx, error: Exception | None) -> None:
+    """Write the drawings of the vehicles, those of the FMU's diagram."""
+    folder = Path(app.outdir, "drawings")
+    if error is None:
+        folder.mkdir(exist_ok=True)
+        for name, one in DRAWN.items():
+            write_whole(Output(folder / f"{name}.svg", diagram(one.rov).encode()))
+
+
 def _plain(*arguments: list[str]) -> None:
-    """Docstrings are plain text: |v| in one is a magnitude, not a substitution."""
+    """Docstrings are plain text: |v| in one is a magnitude, not a substitution, and thrust_ is not a link."""
     lines = arguments[-1]
-    lines[:] = [line.replace("|", r"\|") for line in lines]
+    lines[:] = [re.sub(r"\||\*|_(?!\w)", r"\\\g<0>", line) for line in lines]
 
 
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
     app.connect("source-read", _fill)
     app.connect("build-finished", _fly)
+    app.connect("build-finished", _draw)
     app.connect("autodoc-process-docstring", _plain)
+    app.connect("sphinx-click-process-description", _plain)

@@ -21,7 +21,7 @@ import tomlkit
 
 from docs import reference
 from rov_fmu import __version__
-from rov_fmu.cli import main
+from rov_fmu.cli import _commands, main
 from rov_fmu.model.layout import ARM, AXIS, BODY, CURVE, TUNING
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -113,7 +113,7 @@ def module_of(words: Sequence[str]) -> tuple[tuple[str, ...], Sequence[str]]:
 
 
 def test_readme_is_read_in_one_sitting() -> None:
-    assert len(README.read_text(encoding="utf-8").splitlines()) <= 110
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 90
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
@@ -234,13 +234,13 @@ def course(
     return rows[round(0.1 / h) - 1 :: round(0.1 / h)]
 
 
-def test_the_steps_of_the_readme_end_where_it_says(vehicle: Vehicle) -> None:
-    text = README.read_text(encoding="utf-8")
+def test_the_first_simulations_end_where_the_pages_say(vehicle: Vehicle) -> None:
+    readme, importers = (page.read_text(encoding="utf-8") for page in (README, ROOT / "docs" / "importers.md"))
     (*_, ahead) = course(vehicle.rov, lambda _: {"u_l": 0.3, "u_r": 0.3}, 10.0, 0.1, 0.0)
-    assert f"ends at u = {ahead['u']:.4f} m/s" in text
+    assert f"ends at u = {ahead['u']:.4f} m/s" in readme
     untuned = vehicle.rov.replaced({"alpha_w": 1.0, "beta_w": 1.0})
     (*_, down) = course(untuned, lambda _: {"u_t": 0.3}, 20.0, 0.1, 0.0)
-    assert f"positive down: {down['w']:.4f} m/s" in text
+    assert f"positive down: {down['w']:.4f} m/s" in importers
 
 
 def test_held_commands_err_as_told(vehicle: Vehicle) -> None:
@@ -262,7 +262,7 @@ def test_held_commands_err_as_told(vehicle: Vehicle) -> None:
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_tab_completion(shell: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert f"{shell}_source" in README.read_text(encoding="utf-8")
+    assert f"{shell}_source" in (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
     monkeypatch.setenv("COMP_WORDS", "rov-fmu build video")
     monkeypatch.setenv("COMP_CWORD", "video" if shell == "fish" else "2")
     said = []
@@ -353,6 +353,10 @@ def test_site_builds_strictly_and_fetches_nothing(tmp_path: Path) -> None:
     vehicles = ["videoray.html", "bluerov2_heavy.html"]
     assert {place + name for place in ("fly/", "fly/compact/") for name in vehicles} == {*flown}
     assert all("live-vehicles" in (folder / page).read_text(encoding="utf-8") for page in flown)
+    drawn = re.findall(r'src="(drawings/[^"]+)"', pages["vehicles.html"])
+    assert {f"drawings/{name}.svg" for name in SHIPPED if name != "videoray_refit"} == {*drawn}
+    assert all((folder / drawing).read_text(encoding="utf-8").count("<path") > 10 for drawing in drawn)
+    assert {f"rov-fmu-{name}" for name in _commands.commands} <= {*re.findall(r'id="(rov-fmu-\w+)"', pages["cli.html"])}
     notebooks = {page.name: page.read_text(encoding="utf-8") for page in folder.glob("_downloads/*/*.ipynb")}
     assert {f"{page.stem}.ipynb" for page in NOTEBOOKS} == set(notebooks)
     assert all('"image/png"' in notebook for notebook in notebooks.values()), "executed, with their figures"

@@ -9,22 +9,33 @@ from rov_fmu.fmu.terminals import FOLDER, ICON, SIGNAL
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.plots.drawing import Scene, draw_icon, draw_thrusters, scenes
 from rov_fmu.report.plots.png import png_file
-from rov_fmu.report.plots.svg import LIGHT, svg_file
+from rov_fmu.report.plots.svg import LIGHT, Draw, svg_file
 
 _ICON, _SIGNAL = (2.0, 2.0), (0.2, 0.2)  # inches
 
 
 def pictures(rov: Rov) -> dict[str, bytes]:
     """Return all pictures by their path in the FMU."""
-    icon, views = partial(_icon, rov=rov), list(scenes(rov).values())
-    widths, heights = zip(*(scene.inches for scene in views), strict=True)
-    diagram = partial(_diagram, rov=rov, views=views)
+    icon, (draw, size) = partial(_icon, rov=rov), _views(rov)
     return {
-        "documentation/diagram.png": png_file(diagram, (sum(widths), max(heights)), background="white", margin=0.05),
+        "documentation/diagram.png": png_file(draw, size, background="white", margin=0.05),
         ICON: png_file(icon, _ICON, background="none"),
         f"{FOLDER}/icon.svg": svg_file(icon, _ICON, salt="icon", background="none", margin=0.0).encode(),
         f"{FOLDER}/{SIGNAL}.png": png_file(_signal, _SIGNAL, background="none"),
     }
+
+
+def diagram(rov: Rov) -> str:
+    """Return the thrusters and axes of a vehicle as SVG, from above and from the side."""
+    draw, size = _views(rov)
+    return svg_file(draw, size, salt="diagram", background="white", margin=0.05)
+
+
+def _views(rov: Rov) -> tuple[Draw, tuple[float, float]]:
+    """Return the function that draws all views of a vehicle, and the size of its figure in inches."""
+    views = list(scenes(rov).values())
+    widths, heights = zip(*(scene.inches for scene in views), strict=True)
+    return partial(_diagram, rov=rov, views=views), (sum(widths), max(heights))
 
 
 def _diagram(figure: Figure, rov: Rov, views: Sequence[Scene]) -> None:
