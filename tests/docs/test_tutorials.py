@@ -216,8 +216,8 @@ def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Result
     expected.append(f"{a:.1f} ± {errors[0]:.1f} N·s²/m² and linear drag {b:.1f} ± {errors[1]:.1f} N·s/m")
     assert [error / value for error, value in zip(errors, (a, b), strict=True)] == pytest.approx([0.25, 0.25], abs=0.04)
     measured = tables_by_axis(load_vehicle(VIDEORAY))["surge"].steady
-    ends = [*measured.values()][0], [*measured.values()][-1]
-    expected.append(f"{ends[0]} m/s to {ends[1]} m/s at {[*measured][0]} % to {[*measured][-1]} %")
+    (low, slowest), *_, (high, fastest) = measured.items()
+    expected.append(f"{slowest} m/s to {fastest} m/s at {low} % to {high} %")
     off = [float(V) / rov.response(SURGE, float(command) / 100.0)[0] - 1.0 for command, V in measured.items()]
     expected.append(f"scatter by {100.0 * float(np.std(off)):.0f} % about it")
     at_half = rov.response(SURGE, 0.5)[0]
