@@ -1,6 +1,5 @@
 """The command `rov-fmu sitl`: the meaning of its options, and what it prints."""
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
@@ -56,7 +55,6 @@ def serve(path: Path, options: Options) -> None:
         address, port = server.getsockname()
         paragraph(console(), _listed(setup.servos))
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
-        sys.stdout.flush()  # a pipe would get it at the end
 
         def end() -> None:
             connection.write_log()

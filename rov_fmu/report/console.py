@@ -50,11 +50,16 @@ def shell_words(*words: str | Path) -> str:
     return subprocess.list2cmdline(clean) if os.name == "nt" else shlex.join(clean)
 
 
+def listed(words: Sequence[str]) -> str:
+    """Return words as in a sentence: a, b and c."""
+    *some, last = words or [""]
+    return f"{', '.join(some)} and {last}" if some else last
+
+
 def print_end(written: Sequence[Path], following: str = "") -> None:
     """Print which files a command wrote, and what to do next: a command line, or words."""
     out = console()
-    *some, last = [shell_words(path) for path in written] or [""]
-    sentences = [f"Wrote {', '.join(some)}{' and ' if some else ''}{last}."] if written else []
+    sentences = [f"Wrote {listed([shell_words(path) for path in written])}."] if written else []
     sentences += [f"Next: {following}"] if following else []
     if out.is_terminal and len(" ".join(sentences)) > out.width:
         for sentence in sentences:

@@ -10,7 +10,7 @@ from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.next_test import REPEATED, NextTest
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, count
 from rov_fmu.identify.tuning import Tuning
-from rov_fmu.report.console import DEVIATION, console, paragraph, print_table, table, text
+from rov_fmu.report.console import DEVIATION, console, listed, paragraph, print_table, table, text
 from rov_fmu.report.findings import Unseen, acting, by_heading, effects, unseen
 from rov_fmu.report.overview import main_errors
 from rov_fmu.vehicle.uncertainty import with_interval
@@ -18,8 +18,10 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 _SCREEN = 24
 """The number of lines of the printout on a terminal of 80 columns, with the line about what is next."""
-_FEWEST_COEFFICIENTS, _MOST_WARNINGS = 4, 3
-_ARE_THERE = "are in the report"
+_FEWEST_COEFFICIENTS, _FEWEST_LINES = 4, 2
+"""The number of coefficients that are printed at least, and the lines that these need."""
+_MOST_WARNINGS = (3, 2, 1)
+"""The numbers of warnings that are tried until the printout fits a screen."""
 _GAP = (0, 2, 0, 0)
 """The padding of the tables, in columns to the right of each cell."""
 
@@ -36,10 +38,13 @@ def print_identification(identification: Identification) -> None:
         for found in _predictions(identification):
             out.print()
             print_table(found, out)
-    with out.capture() as after:
-        for line in _conclusions(identification):
-            paragraph(out, line)
-    remaining = _SCREEN - (before.get() + after.get()).count("\n") - 5  # 2 blank lines, a heading, what is next
+    for most in _MOST_WARNINGS:
+        with out.capture() as after:
+            for line in _conclusions(identification, most):
+                paragraph(out, line)
+        remaining = _SCREEN - (before.get() + after.get()).count("\n") - 5  # 2 blank lines, a heading, what is next
+        if remaining >= _FEWEST_LINES:
+            break
     out.out(before.get(), end="\n")
     _print_coefficients(out, vehicle, remaining)
     out.out("", after.get(), sep="\n", end="")
@@ -57,9 +62,13 @@ def _predictions(identification: Identification) -> Iterator[Table]:
 
 def _print_coefficients(out: Console, vehicle: Vehicle, lines: int) -> None:
     """Print the coefficients with the widest intervals, in columns, on about as many lines."""
-    widths = {name: (high - low) / (abs(vehicle.rov[name]) or inf) for name, (low, high) in vehicle.intervals.items()}
+
+    def width(name: str) -> float:
+        (low, high), value = vehicle.intervals[name], abs(vehicle.rov[name])
+        return (high - low) / value if value else inf
+
     texts = []
-    for name in sorted(widths, key=lambda name: -widths[name]):
+    for name in sorted(vehicle.intervals, key=width, reverse=True):
         unit = vehicle.layout.coefficients[name].unit
         value, low, high = with_interval(vehicle.rov[name], vehicle.intervals[name])
         texts.append(f"{name} {value} ({low} to {high}) {'' if unit == '1' else unit}".rstrip())
@@ -67,7 +76,7 @@ def _print_coefficients(out: Console, vehicle: Vehicle, lines: int) -> None:
     shown = texts[: next(fitting, _FEWEST_COEFFICIENTS)]
     columns = _columns(shown, out.width)
     of = f", the {len(shown)} widest of {len(texts)}" if len(shown) < len(texts) else ""
-    paragraph(out, f"Identified coefficients with 95 % intervals{of}:")
+    paragraph(out, f"Identified coefficients with 95 % intervals{of}:" if texts else "No coefficient was identified.")
     grid = Table.grid(padding=_GAP)
     for first in range(0, len(shown), columns):
         grid.add_row(*shown[first : first + columns])
@@ -80,8 +89,8 @@ def _columns(texts: Sequence[str], width: int) -> int:
     return next((n for n in counts if sum(2 + max(map(len, texts[k::n])) for k in range(n)) - 2 <= width), 1)
 
 
-def _conclusions(identification: Identification) -> Iterator[str]:
-    """Yield the paragraphs about other effects, the next test, warnings, and what else the report has."""
+def _conclusions(identification: Identification, most: int) -> Iterator[str]:
+    """Yield the paragraphs about other effects, the next test, the first warnings, and what else the report has."""
     kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
     if kept:
         yield f"What else acts: {_acting(kept)}."
@@ -89,13 +98,14 @@ def _conclusions(identification: Identification) -> Iterator[str]:
         yield line
     groups = by_heading(identification.findings)
     warnings = groups["Warnings"]
-    rest = {"warning": warnings[_MOST_WARNINGS:], "doubt": groups["Doubts"], "fact": groups["Facts"]}
-    more = _listed([count(len(some), what) for what, some in rest.items() if some])
+    rest = {"warning": warnings[most:], "doubt": groups["Doubts"], "fact": groups["Facts"]}
+    more = listed([count(len(some), what) for what, some in rest.items() if some])
+    where = f"{'is' if sum(map(len, rest.values())) == 1 else 'are'} in the report"
     if warnings:
-        yield f"Warnings ({more} more {_ARE_THERE}):" if more else "Warnings:"
+        yield f"Warnings ({more} more {where}):" if more else "Warnings:"
     elif more:
-        yield f"{more[0].upper()}{more[1:]} {_ARE_THERE}."
-    for warning in warnings[:_MOST_WARNINGS]:
+        yield f"{more} {where}."
+    for warning in warnings[:most]:
         yield f"- {warning}"
 
 
@@ -111,15 +121,9 @@ def _next_tests(tests: Sequence[NextTest]) -> Iterator[str]:
             yield "To measure next: no step within the limits would narrow an interval by a tenth; the widest"
             yield f"is that of {widest.coefficient}."
     if known := [test.axis.name for test in tests if test.is_known]:
-        yield f"Enough is known of {_listed(known)}."
+        yield f"Enough is known of {listed(known)}."
     if drifting := [test.axis.name for test in tests if test.repeat]:
-        yield f"In {_listed(drifting)}: {REPEATED}."
-
-
-def _listed(words: Sequence[str]) -> str:
-    """Return words as in a sentence: a, b and c."""
-    *some, last = words or [""]
-    return f"{', '.join(some)} and {last}" if some else last
+        yield f"In {listed(drifting)}: {REPEATED}."
 
 
 def _acting(kept: Iterable[FittedEffect]) -> str:
