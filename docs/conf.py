@@ -72,11 +72,11 @@ COCKPIT = f"""<p>Fly it here: the {_LINKS}. Drag a stick in the picture, or clic
 """On the first page, in place of the README's moving picture."""
 MOVING_PICTURE = re.compile(r"^\[!\[[^\]]*\]\(fly\.webp\)\].*\n", re.MULTILINE)
 
-DRAWN = {name: load_vehicle(path) for name, path in SHIPPED.items() if name != "videoray_refit"}
-"""The vehicles of the gallery. The refit has the thrusters of the VideoRay."""
+DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
+"""The vehicles of the gallery. The refit of the VideoRay has the same thrusters."""
 GALLERY = "".join(
-    f'<figure class="drawing"><img src="drawings/{name}.svg" alt="Thrusters and axes of the {one.name}">'
-    f"<figcaption>{one.name}</figcaption></figure>\n\n"
+    f'<figure class="drawing"><figcaption>{one.name}</figcaption>'
+    f'<img src="drawings/{name}.svg" alt="Thrusters and axes of the {one.name}"></figure>\n\n'
     for name, one in DRAWN.items()
 )
 """On the page of the vehicles."""
