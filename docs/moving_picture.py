@@ -39,7 +39,7 @@ _PREPARE = """() => {
     live.frame = () => {};  // the script below steps the flight, not the clock
     live.zoom(1.5);
     live.say("");
-    for (const below of document.querySelectorAll(".legend, .keys, footer")) below.style.display = "none";
+    for (const below of document.querySelectorAll(".legend, .keys, .live > p, footer")) below.style.display = "none";
 }"""
 _FLY = """([commands, seconds]) => {
     for (const name of Object.keys(live.held)) live.held[name] = commands[name] ?? 0;
