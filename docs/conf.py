@@ -34,6 +34,7 @@ os.environ["TTY_COMPATIBLE"] = "0"
 nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_timeout = 300
+nb_output_stderr = "remove"  # the progress of commands, with times that differ
 
 myst_heading_anchors = 3
 smartquotes = False  # a prime is a derivative
