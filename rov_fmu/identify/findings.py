@@ -8,6 +8,7 @@ from typing import Any
 from rov_fmu.identify.effects.catalogue import EFFECTS
 from rov_fmu.tank import findings
 from rov_fmu.tank.findings import Finding, SentenceForm
+from rov_fmu.vehicle.uncertainty import with_interval
 
 
 def sentences(found: Iterable[Finding]) -> tuple[str, ...]:
@@ -62,11 +63,20 @@ def _disagreement(values: Mapping[str, Any]) -> str:
 
 
 def _effect(form: str) -> Callable[[Mapping[str, Any]], str]:
-    """Return a form that also has {interval}, which may be empty, and {of}: an axis, a curve or the files."""
+    """Return a form that has {value}, {interval}, which may be empty, and {of}: an axis, a curve or the files.
+
+    The digits suit the interval. Several findings share the range of their values and one interval around all.
+    """
 
     def sentence(values: Mapping[str, Any]) -> str:
-        interval = " ({low:.4g} to {high:.4g})".format(**values) if "low" in values else ""
-        return form.format(**{"of": values["files"], **values}, interval=interval)
+        value = values["value"]
+        interval = (values["low"].low, values["high"].high) if "low" in values else None
+        (least, low, high), (most, *_) = (with_interval(number, interval) for number in (value.low, value.high))
+        written = {
+            "value": least if least == most else f"{least} ... {most}",
+            "interval": f" ({low} to {high})" if interval else "",
+        }
+        return form.format(**{"of": values["files"], **values, **written})
 
     return sentence
 
@@ -208,7 +218,7 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     **{kind: _effect(f"{{axes}}: {effect.sentence}") for kind, effect in EFFECTS.items()},
     "delay not modelled": _effect(
-        "The motion in {axes} followed the commands {value:.4g} s late{interval}: the model has no delay, put one in "
+        "The motion in {axes} followed the commands {value} s late{interval}: the model has no delay, put one in "
         "front of the commands."
     ),
     # Structure of the model

@@ -62,7 +62,7 @@ def test_counts_have_a_singular_and_a_plural() -> None:
 def test_effects_name_their_interval_and_what_they_act_on() -> None:
     load = Finding("load", "heave", names={"unit": "N", "of": "heave"}, numbers={"value": 2.0, "low": 1.0, "high": 3.0})
     assert sentences([load]) == (
-        "heave: a constant load of 2 N (1 to 3) acts in heave (net weight, tether), and is in the model",
+        "heave: a constant load of 2.0 N (1.0 to 3.0) acts in heave (net weight, tether), and is in the model",
     )
     current = Finding("current", "surge", file=C, names={"unit": "m/s"}, numbers={"value": 0.1})
     assert sentences([current]) == (f"surge: the water moved at 0.1 m/s in {C}, which is taken out",)

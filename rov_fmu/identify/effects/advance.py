@@ -16,7 +16,7 @@ class Advance(Effect):
     kind = "advance"
     words = "loss of thrust by the speed of advance"
     sentence = (
-        "the thrust of {of} decreases by {value:.4g} {unit}{interval} with the speed of advance at full command, and "
+        "the thrust of {of} decreases by {value} {unit}{interval} with the speed of advance at full command, and "
         "that is in the model"
     )
     order = 5

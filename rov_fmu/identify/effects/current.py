@@ -12,7 +12,7 @@ class Current(Effect):
 
     kind = "current"
     words = "current along the axis"
-    sentence = "the water moved at {value:.4g} {unit}{interval} in {of}, which is taken out"
+    sentence = "the water moved at {value} {unit}{interval} in {of}, which is taken out"
     limits = -3.0, 3.0
     deviation = 0.3
     order = 4
@@ -50,7 +50,7 @@ class CurrentNorth(Current):
 
     kind = "current north"
     words = "current to the north"
-    sentence = "the water moved north at {value:.4g} {unit}{interval} in {of}, which is taken out"
+    sentence = "the water moved north at {value} {unit}{interval} in {of}, which is taken out"
 
     @classmethod
     def candidates(cls, setting: Setting) -> Iterator[Effect]:
@@ -77,7 +77,7 @@ class CurrentEast(CurrentNorth):
 
     kind = "current east"
     words = "current to the east"
-    sentence = "the water moved east at {value:.4g} {unit}{interval} in {of}, which is taken out"
+    sentence = "the water moved east at {value} {unit}{interval} in {of}, which is taken out"
 
     @property
     def input(self) -> str:

@@ -12,7 +12,7 @@ class Delay(Effect):
     kind = "delay"
     words = "delay from the commands to the motion"
     sentence = (
-        "the motion of {of} follows the commands {value:.4g} s late{interval}; the delay is not in the model but told "
+        "the motion of {of} follows the commands {value} s late{interval}; the delay is not in the model but told "
         "with it"
     )
     limits = -2.0, 5.0

@@ -12,7 +12,7 @@ class Lag(Effect):
 
     kind = "lag"
     words = "lag of the thrusters"
-    sentence = "the thrust of {of} lags by {value:.4g} s{interval}, and is in the model"
+    sentence = "the thrust of {of} lags by {value} s{interval}, and is in the model"
     begin = 0.1
     limits = 0.05, 10.0
     order = 7

@@ -17,7 +17,7 @@ class Load(Effect):
 
     kind = "load"
     words = "constant load"
-    sentence = "a constant load of {value:.4g} {unit}{interval} acts in {of} (net weight, tether), and is in the model"
+    sentence = "a constant load of {value} {unit}{interval} acts in {of} (net weight, tether), and is in the model"
     order = 6
 
     @classmethod

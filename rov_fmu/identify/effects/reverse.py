@@ -28,7 +28,7 @@ class ReverseThrust(_Ratio):
 
     kind = "reverse thrust"
     words = "thrust in reverse, by that forward"
-    sentence = "{of} thrust in reverse is {value:.4g} times that ahead{interval}, and is in the model"
+    sentence = "{of} thrust in reverse is {value} times that ahead{interval}, and is in the model"
     order = 3
 
     @classmethod
@@ -48,7 +48,7 @@ class ReverseDrag(_Ratio):
 
     kind = "reverse drag"
     words = "drag in reverse, by that forward"
-    sentence = "drag of {of} in reverse is {value:.4g} times that ahead{interval}, and is in the model"
+    sentence = "drag of {of} in reverse is {value} times that ahead{interval}, and is in the model"
     order = 1
 
     @classmethod

@@ -20,7 +20,7 @@ class Voltage(Effect):
     kind = "voltage"
     words = "exponent of the voltage in the thrust"
     sentence = (
-        "the thrust of {of} is proportional to the voltage to the power of {value:.4g}{interval}, and that is in the "
+        "the thrust of {of} is proportional to the voltage to the power of {value}{interval}, and that is in the "
         "model"
     )
     begin = likely = 1.5
