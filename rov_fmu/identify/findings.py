@@ -69,13 +69,13 @@ def _effect(form: str) -> Callable[[Mapping[str, Any]], str]:
     """
 
     def sentence(values: Mapping[str, Any]) -> str:
-        value = values["value"]
-        interval = (values["low"].low, values["high"].high) if "low" in values else None
-        (least, low, high), (most, *_) = (with_interval(number, interval) for number in (value.low, value.high))
-        written = {
-            "value": least if least == most else f"{least} ... {most}",
-            "interval": f" ({low} to {high})" if interval else "",
-        }
+        value, interval = values["value"], ""
+        ends = [f"{value.low:.4g}", f"{value.high:.4g}"]
+        if "low" in values:
+            around = values["low"].low, values["high"].high
+            (least, low, high), (most, *_) = (with_interval(number, around) for number in (value.low, value.high))
+            ends, interval = [least, most], f" ({low} to {high})"
+        written = {"value": " ... ".join(dict.fromkeys(ends)), "interval": interval}
         return form.format(**{"of": values["files"], **values, **written})
 
     return sentence
