@@ -386,7 +386,7 @@ def _open(path: Path) -> None:
     help="UDP port to listen on; 0 takes a free one.",
 )
 def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **options: Any) -> None:
-    """Be the physics of a vehicle for ArduPilot's simulator, ArduSub with --model JSON.
+    """Simulate a vehicle for ArduPilot's simulator, which runs ArduSub with --model JSON.
 
     ArduSub is started in another terminal. With --duration, or at Ctrl-C, the log is written.
     """
@@ -410,7 +410,7 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
     help="Added mass in the link (physics engine DART), or in the Hydrodynamics plugin (any engine; may diverge).",
 )
 def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) -> None:
-    """Write a model for Gazebo (gz-sim) of a vehicle. The default is the VideoRay Pro 4."""
+    """Write a vehicle as a model for Gazebo (gz-sim). The default is the VideoRay Pro 4."""
     from rov_fmu.interface.sdf_command import write_model
     from rov_fmu.report.console import console, paragraph, print_end, shell_words
 
@@ -441,7 +441,7 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
     help="Tolerance to use instead of that of each experiment.",
 )
 def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
-    """Run the experiments that an FMU carries (FMI-LS-REF). It can be the FMU of any exporter."""
+    """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do."""
     from rov_fmu.fmu.proof import prove
     from rov_fmu.report.console import print_proof
     from rov_fmu.report.progress import parts
@@ -467,7 +467,7 @@ def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to use instead of this machine: tcp://host:8786.")
 def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None) -> None:
-    """Do the runs of PLAN (TOML), a sweep or a sampling of what is uncertain, with any FMU for Co-Simulation.
+    """Run any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of uncertain parameters.
 
     RESULTS gets the tables runs and trajectories (Parquet) and the page study.html. Runs that are done are kept: the
     same command continues a study that was interrupted.
@@ -521,7 +521,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None)
     help="Only list what the log FOLDER, or each log in it, contains, and write a draft of rov.toml beside it.",
 )
 def _identify(folder: Path, output: Path | None, report: Path | None, force: bool, inspects: bool) -> None:
-    """Identify a vehicle from FOLDER, which holds its tank tests or dive logs, and rov.toml."""
+    """Identify a vehicle from a FOLDER with its tank tests or dive logs and its rov.toml."""
     if inspects:
         if output or report or force:
             raise click.UsageError(
@@ -601,7 +601,7 @@ def _tune(
     points: Path | None,
     output: Path | None,
 ) -> None:
-    """Find alpha and beta of an axis for a wanted response."""
+    """Find alpha and beta of an axis that give a wanted response."""
     from rov_fmu.identify.findings import sentences
     from rov_fmu.identify.tuning import implausible
     from rov_fmu.interface.tune_command import tune_vehicle
@@ -659,7 +659,7 @@ def _tables(vehicle: Path) -> None:
     help="Width: one column of a journal (89 mm) or two (182 mm).",
 )
 def _figures(folder: Path, form: str, column: str) -> None:
-    """Draw the figures of the paper whose data it prints, each with its caption, into FOLDER.
+    """Draw those figures of the paper whose data it prints into FOLDER, each with its caption.
 
     FOLDER is created if it does not exist.
     """
