@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 from math import inf
-from typing import Self
 
 import numpy as np
+from typing_extensions import Self
 
 from rov_fmu.identify.points.drag_forms import Point
 from rov_fmu.identify.points.response_fit import ResponseFit, predict
