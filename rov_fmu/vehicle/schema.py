@@ -190,7 +190,9 @@ class TableAtVoltage(Strict):
 
 
 class ElectricCurrent(Strict):
-    """The electric current of one thruster over its command, measured at a voltage."""
+    """The electric current of one thruster over its command: `voltage` in V, at which it was measured, and `table`, the
+    name of a CSV file with the columns `command [1]`, `[%]` or `[us]`, and `current [A]`. All curves have it, or none.
+    The motion does not depend on it; `rov-fmu sitl` tells ArduSub the sum over all thrusters."""
 
     voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
     """The voltage, V."""
@@ -224,8 +226,6 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
     """Tables at several voltages, which replace `table`. Between two voltages, the thrust is interpolated linearly."""
 
     electric_current: ElectricCurrent | None = None
-    """The current of one thruster at a voltage, from a CSV file with the columns `command [1]`, `[%]` or `[us]`, and
-    `current [A]`. The motion does not depend on it; ArduSub's simulator is told the sum."""
 
     @property
     def measured_current(self) -> CurrentTable | None:

@@ -242,6 +242,19 @@ def test_holds_depth_and_heading_in_a_current() -> None:
     assert connection.traffic.frames == len(autopilot.history) == 12 * 400
 
 
+@pytest.mark.long
+def test_holds_its_place_in_a_current() -> None:
+    """ArduSub's position hold leans against the current, so its thrusters work outside of their dead band."""
+    with served(setup_of(V_N=0.2, V_E=0.1, z=0.9, psi_0=0.17)) as (_, port):
+        autopilot = ArduSub(port, depth=1.0, heading=0.0, place=(0.0, 0.0))
+        autopilot.fly(25.0)
+        autopilot.close()
+    held = [at for at in autopilot.history if at["timestamp"][0] > 20.0]
+    assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05
+    assert np.degrees(max(abs(at["attitude"][2]) for at in held)) < 2.0
+    assert max(abs(part) for at in held for part in at["position"][:2]) < 0.5
+
+
 def test_lost_and_repeated_packets_do_not_move_the_time() -> None:
     chance = random.Random(3)
     with served(setup_of(z=1.0)) as (connection, port):
