@@ -19,6 +19,7 @@ from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.model.rov import Rov
+from rov_fmu.vehicle.thrust_table import CurrentTable
 
 GRAVITY = 9.80665
 """The acceleration of gravity in ArduPilot, m/s2."""
@@ -50,6 +51,8 @@ class Setup:
     servos: Servos
     start: Mapping[str, float] = field(default_factory=dict)
     """Inputs that are held, states and Euler angles at the start, in SI units, by name."""
+    electric_currents: Mapping[str, CurrentTable] = field(default_factory=dict)
+    """The electric current of one thruster, by curve."""
     bottom: float = inf
     """The depth of the bottom, m."""
     log: Path | None = None
@@ -105,6 +108,12 @@ class Flight:
         self._stepper = Stepper(setup.rov, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
         self._held = {**layout.usual_inputs, **setup.start}
+        curves = {thruster: curve.name for thruster, curve in layout.curve_of.items()}
+        self._draws = [
+            (setup.electric_currents[curve], layout.gains[thruster])
+            for thruster, curve in curves.items()
+            if curve in setup.electric_currents
+        ]
         path = setup.log
         if path and number > 1:
             path = path.with_stem(f"{path.stem}_{number}")
@@ -132,6 +141,8 @@ class Flight:
         except OverflowError as error:
             raise InputError(f"VEHICLE: {error}: it overflows, or changes too fast") from error
         values, motion = self._measured(at)
+        if battery := self._battery(dict(zip(self._commands, fractions, strict=True))):
+            values["battery"] = battery
         if self.log:
             self.log.add(h, fractions, self.time, motion)
         return reply(values)
@@ -142,6 +153,22 @@ class Flight:
         if layout.pulse and pulse not in NO_OUTPUT:
             return layout.fraction_of(pulse)
         return max(-1.0, min(1.0, _usual_fraction(pulse)))
+
+    def _battery(self, fractions: Mapping[str, float]) -> dict[str, float]:
+        """Return the voltage and the electric current of the battery, as far as the vehicle has them.
+
+        `fractions` has all commands from -1 to 1.
+        """
+        found = {}
+        if self._draws:
+            found["voltage"] = self._draws[0][0].voltage
+            found["current"] = sum(
+                table.current(sum(gain * fractions[name] for name, gain in gains.items()))
+                for table, gains in self._draws
+            )
+        if "voltage" in self._held:
+            found["voltage"] = self._held["voltage"]
+        return found
 
     def _measured(self, at: Mapping[str, float]) -> tuple[dict[str, Any], dict[str, float]]:
         """Return the values of the reply, and those of the log, from the variables of the vehicle."""
@@ -165,8 +192,6 @@ class Flight:
         if self._setup.bottom < inf:
             height = max(self._setup.bottom - z, 0.0)
             values["rng_1"] = height / upright if height < _LONGEST_RANGE * upright else _LONGEST_RANGE
-        if self._setup.rov.layout.voltage is not None:
-            values["battery"] = {"voltage": self._held["voltage"]}
         ahead, starboard = c3 * V_N + s3 * V_E, c3 * V_E - s3 * V_N
         below = s2 * ahead + c2 * V_D
         over_ground = (c2 * ahead - s2 * V_D, c1 * starboard + s1 * below)

@@ -1,8 +1,8 @@
 """Identify a vehicle from a folder of tank tests: thrust curves, then drag and β of every axis.
 
-An axis with recordings takes its coefficients from them (output error), and the recordings also correct the thrust
-curves. An axis without recordings takes its coefficients from the measured points V_ss and Tau. The points of tables
-and recordings are fitted in either case, for comparison.
+An axis with recordings takes its coefficients from them (output error) and from the points of its tables. The
+recordings also correct the thrust curves. An axis without recordings takes its coefficients from the measured points
+V_ss and Tau. The points of tables and recordings are fitted in either case, for comparison.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -21,6 +21,7 @@ from rov_fmu.identify.points.drag_forms import Point, drag_and_beta, free_coeffi
 from rov_fmu.identify.points.quadratic_fit import fit_quadratic
 from rov_fmu.identify.points.response_fit import ResponseFit, fit_response
 from rov_fmu.identify.points.step_responses import StepResponse, steps
+from rov_fmu.identify.points.table_points import TablePoints
 from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, measured
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit, count
@@ -253,8 +254,9 @@ def _fit_recordings(
         return {}, []
 
     def fit(some: Sequence[Recording]) -> dict[str, RecordingsFit]:
-        tested, requests = measured(thrust.values()), tests.given.requests
-        fits = fit_recordings(some, base, tests.given.known, tested, requests=requests, on_progress=on_progress)
+        tested, requests, known = measured(thrust.values()), tests.given.requests, tests.given.known
+        points = _table_points(tests, dict.fromkeys(recording.axis for recording in some), base)
+        fits = fit_recordings(some, base, known, tested, requests=requests, points=points, on_progress=on_progress)
         return {found.axis.name: found.widened() for found in fits}
 
     try:
@@ -273,6 +275,22 @@ def _fit_recordings(
         except (NoFitError, MotionError) as error:
             raise _unusable(tests, own, base, error, fit) from None
     return apart, [Finding("fitted apart", axis.name, names={"reason": str(together)}) for axis in axes]
+
+
+def _table_points(tests: TankTests, axes: Iterable[Axis], base: Rov) -> list[TablePoints]:
+    """Return the points of tables that take part in the fit to the recordings of these axes.
+
+    Tau has no closed form where the thrusters lag, so it takes no part there.
+    """
+    found, lag = [], tests.given.requests.lag
+    for axis in axes:
+        lags = any(curve.has_lag or curve.name in lag for curve in curves_of(base.layout, axis))
+        tables = (p for p in _points(tests, axis, ()) if not lags or p.quantity == "V_ss")
+        points = [p for p in tables if is_pushed(axis, base, p.command)]
+        response = _response(axis, points, base, tests.given.known, None)
+        if response and (of_tables := TablePoints.of(response)):
+            found.append(of_tables)
+    return found
 
 
 def _unusable(

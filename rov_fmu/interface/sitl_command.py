@@ -85,7 +85,8 @@ def _setup(path: Path, options: Options) -> Setup:
         if name in servos:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
     start = given.inputs | given.start
-    return Setup(vehicle.rov, servos, start, options.bottom, options.log, 1.0 / options.log_rate)
+    currents = vehicle.electric_currents
+    return Setup(vehicle.rov, servos, start, currents, options.bottom, options.log, 1.0 / options.log_rate)
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:

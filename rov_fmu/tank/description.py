@@ -289,6 +289,10 @@ def _load_base(file: _ReadableFile, folder: Path) -> tuple[Vehicle | None, list[
 def _hardware_mistakes(file: _ReadableFile, lost: set[str], data: Toml) -> Iterator[str]:
     """Yield a line for every mistake in the hardware tables."""
     present = [name for name in _HARDWARE_TABLES if name in data]
+    for name, curve in file.curves.items():
+        if curve.electric_current:
+            reason = "identification leaves it out: give it in the vehicle file that you get"
+            yield key_line(f"curves.{name}.electric_current", reason)
     if "base" in data:
         for name in present:
             yield key_line(name, "must not stand beside base, which has its own; coefficients may be given in [known]")

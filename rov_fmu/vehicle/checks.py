@@ -68,6 +68,8 @@ def check_parts(parts: Parts, lost: set[str], data: Toml) -> Iterator[str]:
     yield from _check_keys(parts)
     if "curves" not in lost and "battery" not in lost:
         yield from _check_tables_of_thrust(parts)
+    if "curves" not in lost:
+        yield from _check_electric_currents(parts)
     if "axes" not in lost:
         yield from _check_cross(parts)
     yield from _check_needed_tables(parts, lost)
@@ -215,6 +217,22 @@ def _check_tables_of_thrust(parts: Parts) -> Iterator[str]:
         yield key_line(
             "battery", "no thrust depends on the voltage: give a curve V_0 and n_V, or tables; or leave it out"
         )
+
+
+def _check_electric_currents(parts: Parts) -> Iterator[str]:
+    """Check that all curves have the electric current at one voltage, or none has it."""
+    given = parts.electric_currents
+    if not given:
+        return
+    first, known = next(iter(given.items()))
+    for name in parts.curves:
+        place = f"curves.{name}.electric_current"
+        if name not in given:
+            reason = f"this key is missing, and curves.{first} has it: the vehicle draws the sum over its thrusters"
+            yield key_line(place, reason)
+        elif given[name].voltage != known.voltage:
+            reason = f"must be {known.voltage:g} V, as for curves.{first}: all thrusters have one battery"
+            yield key_line(f"{place}.voltage", reason, given[name].voltage)
 
 
 def _check_fins(parts: Parts, layout: Layout) -> Iterator[str]:

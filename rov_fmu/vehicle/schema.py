@@ -1,12 +1,13 @@
 """The pydantic models of the vehicle file, with every table and key; `model.layout` declares the coefficients."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo, WithJsonSchema
 
@@ -44,7 +45,7 @@ from rov_fmu.vehicle.quantity import (
     not_blank,
     quantity,
 )
-from rov_fmu.vehicle.thrust_table import ThrustFile, read_thrust
+from rov_fmu.vehicle.thrust_table import CurrentTable, ThrustFile, read_current, read_thrust
 
 FORMAT = 2
 UNTUNED = 1.0
@@ -154,20 +155,29 @@ class Arm(_coefficients("Arm", {key: kind.meta() for key, kind in ARM.items()}, 
 _CURVE = {key: kind.meta(curve="curve", equation="(2)") for key, kind in CURVE.items()}
 
 
-def _thrust_file(name: object, info: ValidationInfo) -> ThrustFile:
-    """Read a table of thrust beside the vehicle file. Raises ValueError."""
-    if not isinstance(name, str):
-        raise ValueError("must be text in quotes")
-    path = inside_or_shipped(folder_of(info), name)
-    if not os.path.isfile(path):  # noqa: PTH113 (Path.is_file raises an exception if the name is too long)
-        raise ValueError("there is no such file beside the vehicle file")
-    try:
-        return read_thrust(path)
-    except DataFileError as error:
-        raise ValueError(str(error).splitlines()[0]) from error
+_Read = TypeVar("_Read", ThrustFile, CurrentTable)
 
 
-_Thrust = Annotated[InstanceOf[ThrustFile], BeforeValidator(_thrust_file), WithJsonSchema({"type": "string"})]
+def _file_read_by(read: Callable[[Path], _Read]) -> BeforeValidator:
+    """Return the validator of the name of a CSV file beside the vehicle file, which it reads."""
+
+    def read_file(name: object, info: ValidationInfo) -> _Read:
+        if not isinstance(name, str):
+            raise ValueError("must be text in quotes")
+        path = inside_or_shipped(folder_of(info), name)
+        if not os.path.isfile(path):  # noqa: PTH113 (Path.is_file raises an exception if the name is too long)
+            raise ValueError("there is no such file beside the vehicle file")
+        try:
+            return read(path)
+        except DataFileError as error:
+            raise ValueError(str(error).splitlines()[0]) from error
+
+    return BeforeValidator(read_file)
+
+
+_TEXT = WithJsonSchema({"type": "string"})
+_Thrust = Annotated[InstanceOf[ThrustFile], _file_read_by(read_thrust), _TEXT]
+_Current = Annotated[InstanceOf[CurrentTable], _file_read_by(read_current), _TEXT]
 
 
 class TableAtVoltage(Strict):
@@ -176,6 +186,17 @@ class TableAtVoltage(Strict):
     voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
     """The voltage, V."""
     table: _Thrust
+    """The name of the CSV file."""
+
+
+class ElectricCurrent(Strict):
+    """The electric current of one thruster over its command: `voltage` in V, at which it was measured, and `table`, the
+    name of a CSV file with the columns `command [1]`, `[%]` or `[us]`, and `current [A]`. All curves have it, or none.
+    The motion does not depend on it; `rov-fmu sitl` tells ArduSub the sum over all thrusters."""
+
+    voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
+    """The voltage, V."""
+    table: _Current
     """The name of the CSV file."""
 
 
@@ -203,6 +224,14 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
     `command [1]`, `[%]` or `[us]`, and `thrust [N]`, `[kgf]` or `[lbf]`. It replaces a_t, b_t and c_0."""
     tables: Annotated[list[TableAtVoltage], AfterValidator(_rising), Field(max_length=MOST)] | None = None
     """Tables at several voltages, which replace `table`. Between two voltages, the thrust is interpolated linearly."""
+
+    electric_current: ElectricCurrent | None = None
+
+    @property
+    def measured_current(self) -> CurrentTable | None:
+        """The current of one thruster, with its voltage."""
+        given = self.electric_current
+        return replace(given.table, voltage=given.voltage) if given else None
 
     @property
     def thrust_files(self) -> tuple[Path, ...]:
@@ -463,6 +492,11 @@ class Hardware(Strict):
                 table = table.get(key) if isinstance(table, dict) else getattr(table, key, None)
             found[name] = table
         return found
+
+    @property
+    def electric_currents(self) -> dict[str, CurrentTable]:
+        """The current of one thruster, by curve."""
+        return {name: current for name, curve in self.curves.items() if (current := curve.measured_current)}
 
     @property
     def thruster_sources(self) -> dict[str, dict[str, str]]:

@@ -1,6 +1,7 @@
-"""Reading tables of measured thrust, such as those that makers publish of their thrusters."""
+"""Reading tables of measured thrust and electric current, such as those that makers publish of their thrusters."""
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
@@ -8,21 +9,16 @@ from statistics import fmean
 from rov_fmu.io.csv_table import PULSES, Column, DataFileError, pulses, read_columns
 from rov_fmu.model.layout import ThrustTable
 
-_COLUMNS = {
-    "command": Column(
-        {"1": 1.0, "%": 100.0},
-        minimum=-1.0,
-        maximum=1.0,
-        also=("pulse", "pwm"),
-        conversions=dict.fromkeys(PULSES, pulses),
-    ),
-    "thrust": Column(
-        {"N": 1.0, "kgf": 1.0 / 9.80665, "lbf": 1.0 / 4.4482216152605}, also=("force",), minimum=-1e6, maximum=1e6
-    ),
-}
+_COMMAND = Column(
+    {"1": 1.0, "%": 100.0}, minimum=-1.0, maximum=1.0, also=("pulse", "pwm"), conversions=dict.fromkeys(PULSES, pulses)
+)
+_THRUST = Column(
+    {"N": 1.0, "kgf": 1.0 / 9.80665, "lbf": 1.0 / 4.4482216152605}, also=("force",), minimum=-1e6, maximum=1e6
+)
+_CURRENT = Column({"A": 1.0}, minimum=0.0, maximum=1e4)
 _MOST_POINTS = 2000
 _WIDEST = 0.05
-"""The largest part of the commands, on each side, that a table may leave out. Its last slope continues there."""
+"""The largest part of the commands, on each side, that a table may leave out. Thrust continues with its last slope."""
 
 
 @dataclass(frozen=True)
@@ -50,33 +46,87 @@ class ThrustFile:
         return ThrustTable(name, commands, forces, steepness, voltage)
 
 
+@dataclass(frozen=True)
+class CurrentTable:
+    """The electric current of one thruster over its command, measured at one voltage."""
+
+    path: Path
+    commands: tuple[float, ...]
+    """The commands, from -1 to 1 in rising order."""
+    currents: tuple[float, ...]
+    """The current at each command, A."""
+    voltage: float = 0.0
+    """The voltage at which the currents were measured, V."""
+
+    def current(self, command: float) -> float:
+        """Return the current (A) at a command: linear between the points, and that of the last point beyond them."""
+        n = bisect_right(self.commands, command)
+        if n in (0, len(self.commands)):
+            return self.currents[min(n, len(self.commands) - 1)]
+        low, high = self.commands[n - 1 : n + 1]
+        return self.currents[n - 1] + (command - low) / (high - low) * (self.currents[n] - self.currents[n - 1])
+
+
 def read_thrust(path: Path) -> ThrustFile:
     """Read a CSV file with the columns command [1], [%] or [us], and thrust [N], [kgf] or [lbf]. Raises DataFileError.
 
     Rows with equal commands become one point with their mean thrust.
     """
-    columns = read_columns(path, _COLUMNS)
+
+    def check(command: float, force: float) -> str | None:
+        return "must have the sign of its command" if command * force < 0.0 else None
+
+    commands, forces = _points(path, "thrust", _THRUST, check)
+    if reason := _no_coverage(commands) or _no_thrust(commands, forces):
+        raise DataFileError(f"{path}: {reason}")
+    return ThrustFile(path, commands, forces)
+
+
+def read_current(path: Path) -> CurrentTable:
+    """Read a CSV file with the columns command [1], [%] or [us], and current [A]. Raises DataFileError.
+
+    Rows with equal commands become one point with their mean current.
+    """
+    commands, currents = _points(path, "current", _CURRENT)
+    if reason := _no_coverage(commands):
+        raise DataFileError(f"{path}: {reason}")
+    return CurrentTable(path, commands, currents)
+
+
+_Points = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+def _points(
+    path: Path, name: str, column: Column, check: Callable[[float, float], str | None] = lambda _, __: None
+) -> _Points:
+    """Return the commands of a file in rising order and the mean of the values at each. Raises DataFileError.
+
+    `check` returns what is wrong with a command and its value.
+    """
+    columns = read_columns(path, {"command": _COMMAND, name: column})
     points: dict[float, list[float]] = {}
-    for row, (command, force) in enumerate(zip(*(columns.values[name] for name in _COLUMNS), strict=True)):
+    for row, (command, value) in enumerate(zip(columns.values["command"], columns.values[name], strict=True)):
         if abs(command) > 1.0:
             raise columns.error(row, "command", "must be within full thrust in both directions")
-        if command * force < 0.0:
-            raise columns.error(row, "thrust", "must have the sign of its command")
-        points.setdefault(command, []).append(force)
-    commands = sorted(points)
-    forces = [fmean(points[command]) for command in commands]
-    if reason := _mistake(commands, forces):
-        raise DataFileError(f"{path}: {reason}")
-    return ThrustFile(path, tuple(commands), tuple(forces))
+        if reason := check(command, value):
+            raise columns.error(row, name, reason)
+        points.setdefault(command, []).append(value)
+    commands = tuple(sorted(points))
+    return commands, tuple(fmean(points[command]) for command in commands)
 
 
-def _mistake(commands: list[float], forces: list[float]) -> str | None:
-    """Return why the points are no thrust curve from full thrust in reverse to full thrust ahead, or None."""
+def _no_coverage(commands: Sequence[float]) -> str | None:
+    """Return why the commands do not reach from full thrust in reverse to full thrust ahead, or None."""
     if not 3 <= len(commands) <= _MOST_POINTS:
         return f"must have 3 to {_MOST_POINTS} different commands, not {len(commands)}"
     if commands[0] > _WIDEST - 1.0 or commands[-1] < 1.0 - _WIDEST:
         covered = f"{commands[0]:g} ... {commands[-1]:g}"
         return f"must cover the commands from -1 to 1 but for {_WIDEST:g} on each side, not only {covered}"
+    return None
+
+
+def _no_thrust(commands: Sequence[float], forces: Sequence[float]) -> str | None:
+    """Return why the forces are no thrust curve, or None."""
     if not forces[0] < 0.0 < forces[-1]:
         return "must give a force in reverse below 0 N, and one ahead above 0 N"
     if forces[bisect_right(commands, 0.0) - 1] != 0.0 or forces[bisect_left(commands, 0.0)] != 0.0:

@@ -20,6 +20,7 @@ from rov_fmu.vehicle.description import PICTURES, TABLES
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Estimated, File, Parts
+from rov_fmu.vehicle.thrust_table import CurrentTable
 
 if TYPE_CHECKING:
     from rov_fmu.vehicle.uncertainty import Uncertainty
@@ -90,6 +91,8 @@ class Vehicle:
     """The source of the battery's voltage."""
     thrust_files: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
     """The files of the thrust tables, by curve, in the order of the curve's tables."""
+    electric_currents: Mapping[str, CurrentTable] = field(default_factory=dict)
+    """The current of one thruster, by curve, for all curves or none."""
     thruster_sources: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """The sources of `direction` and `position`, by the name of the thruster."""
 
@@ -249,5 +252,6 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         provenance=provenance,
         voltage_source=file.battery.voltage.source if file.battery else "",
         thrust_files={name: curve.thrust_files for name, curve in file.curves.items() if curve.thrust_files},
+        electric_currents=file.electric_currents,
         thruster_sources=file.thruster_sources,
     )

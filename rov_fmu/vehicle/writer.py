@@ -17,6 +17,7 @@ from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import Curve, Declaration, Fin, Thruster
 from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated, where
+from rov_fmu.vehicle.thrust_table import CurrentTable
 from rov_fmu.vehicle.vehicle import Alternative, Vehicle, VehicleFileError, load_vehicle
 
 _DECIMALS = 6
@@ -65,7 +66,9 @@ def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) ->
             "voltage": _inline_table({"value": layout.voltage, "unit": "V", "source": vehicle.voltage_source})
         }
     tables["curves"] = {
-        curve.name: _curve(curve) | _thrust_tables(curve, vehicle.thrust_files.get(curve.name, ()), folder)
+        curve.name: _curve(curve)
+        | _thrust_tables(curve, vehicle.thrust_files.get(curve.name, ()), folder)
+        | _electric_current(vehicle.electric_currents.get(curve.name), folder)
         for curve in layout.curves
     }
     tables["thruster"] = tomlkit.aot()
@@ -97,6 +100,13 @@ def _thrust_tables(curve: Curve, files: Sequence[Path], folder: Path) -> dict[st
         return {"table": names[0]}
     rows = zip(curve.tables, names, strict=True)
     return {"tables": [_inline_table({"voltage": table.voltage, "table": name}) for table, name in rows]}
+
+
+def _electric_current(table: CurrentTable | None, folder: Path) -> dict[str, Any]:
+    """Return the key with the electric current of a curve. Raises ValueError."""
+    if table is None:
+        return {}
+    return {"electric_current": _inline_table({"voltage": table.voltage, "table": name_of(table.path, folder)})}
 
 
 def _fin(fin: Fin, sources: Mapping[str, str]) -> dict[str, Any]:
@@ -207,6 +217,7 @@ def _names_of_files(document: Any) -> Iterator[tuple[str, Any, str]]:
     for name, curve in document["curves"].items():
         tables.append((f"curves.{name}", curve))
         tables += [(f"curves.{name}.tables", row) for row in curve.get("tables", ())]
+        tables.append((f"curves.{name}.electric_current", curve.get("electric_current", {})))
     for name, table in tables:
         for key in ("data", "pictures", "report", "table"):
             if key in table:

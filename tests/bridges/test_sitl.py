@@ -31,7 +31,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.bridges.ardusub import VECTORED_6DOF, ArduSub, packet, parsed
 from tests.commands import ROOT
-from tests.vehicles import pulsed
+from tests.vehicles import THRUST_EFFECTS, pulsed
 
 HEAVY: Rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -139,6 +139,28 @@ def test_late_packets_do_not_move_the_vehicle_and_a_restart_begins_again() -> No
     assert connection.traffic.restarts == 2
 
 
+@pytest.mark.parametrize("name", ["bluerov2", "bluerov2_heavy"])
+def test_the_battery_gives_the_currents_that_the_maker_measured(name: str) -> None:
+    """The sheet has 24.30 A at 1104 µs, 0.30 A at 1572 µs and 19.13 A at 1860 µs."""
+    vehicle = load_vehicle(SHIPPED[name])
+    setup = Setup(vehicle.rov, servos_of(vehicle.rov.layout, None, {}), {}, vehicle.electric_currents)
+    connection = Connection(setup)
+    answer = connection.answer(packet(400, 0, [1104, 1572, 1860, *NEUTRAL[3:]]), HERE)
+    assert json.loads(answer)["battery"] == {"voltage": 16.0, "current": pytest.approx(24.30 + 0.30 + 19.13)}
+    assert {key: parsed(answer)[key] for key in ("voltage", "current")} == {
+        "voltage": [16.0],
+        "current": [pytest.approx(43.73)],
+    }
+    assert json.loads(connection.answer(packet(400, 1, NEUTRAL), HERE))["battery"] == {"voltage": 16.0, "current": 0.0}
+
+
+def test_a_vehicle_with_a_battery_tells_its_voltage() -> None:
+    rov = load_vehicle(THRUST_EFFECTS).rov
+    table = dict(enumerate(rov.layout.gains, 1))
+    connection = Connection(Setup(rov, servos_of(rov.layout, None, table), {"voltage": 13.0}))
+    assert json.loads(connection.answer(packet(400, 0, NEUTRAL), HERE))["battery"] == {"voltage": 13.0}
+
+
 def test_random_and_damaged_packets() -> None:
     """None of 10,000 of them raises anything, and the autopilot is served as before."""
     chance = random.Random(1)
@@ -218,6 +240,19 @@ def test_holds_depth_and_heading_in_a_current() -> None:
     assert np.degrees(np.max(np.abs(turned))) < 2.0
     assert max(abs(at["attitude"][0]) + abs(at["attitude"][1]) for at in held) < 0.1
     assert connection.traffic.frames == len(autopilot.history) == 12 * 400
+
+
+@pytest.mark.long
+def test_holds_its_place_in_a_current() -> None:
+    """ArduSub's position hold leans against the current, so its thrusters work outside of their dead band."""
+    with served(setup_of(V_N=0.2, V_E=0.1, z=0.9, psi_0=0.17)) as (_, port):
+        autopilot = ArduSub(port, depth=1.0, heading=0.0, place=(0.0, 0.0))
+        autopilot.fly(25.0)
+        autopilot.close()
+    held = [at for at in autopilot.history if at["timestamp"][0] > 20.0]
+    assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05
+    assert np.degrees(max(abs(at["attitude"][2]) for at in held)) < 2.0
+    assert max(abs(part) for at in held for part in at["position"][:2]) < 0.5
 
 
 def test_lost_and_repeated_packets_do_not_move_the_time() -> None:

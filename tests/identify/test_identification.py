@@ -435,6 +435,37 @@ def test_tables_are_checked_against_recordings(full_folder: Path, tmp_path: Path
     assert ("tables against recordings", "surge") in [(finding.kind, finding.axis) for finding in found.findings]
 
 
+def test_tables_join_the_fit_to_recordings(full_folder: Path, tmp_path: Path) -> None:
+    """With a lag of the thrusters Tau takes no part; the row at a command outside the window does not count."""
+    k = load_vehicle(VIDEORAY).rov.replaced({"alpha_w": 1.0})
+    random, commands = np.random.default_rng(5), (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+    rows = {
+        f"{name}_heave": [(c, k.response(HEAVE, c)[n] * (1.0 + 0.02 * random.standard_normal())) for c in commands]
+        for n, name in enumerate(("steady", "time_constant"))
+    }
+    methods = []
+    for lag in (False, True):
+        folder = tmp_path / str(lag)
+        folder.mkdir()
+        for name in ("log_heave_1.csv", "thrust_top.csv"):
+            shutil.copy(full_folder / name, folder)
+        for name, values in rows.items():
+            unit = "time constant [s]" if "time" in name else "velocity [m/s]"
+            write_csv(folder / f"{name}.csv", f"command [1],{unit}", values)
+        write_rov(folder, heave=(0.15, 1.0))
+        if lag:
+            path = folder / "rov.toml"
+            path.write_text(path.read_text(encoding="utf-8") + "\n[fit]\nlag = true\n", encoding="utf-8")
+        (heave,) = identify(load_tank_tests(folder)).axes
+        methods.append(heave.method)
+        for command in commands[1:]:
+            assert heave.recordings
+            assert heave.recordings.rov.response(HEAVE, command)[0] == pytest.approx(
+                k.response(HEAVE, command)[0], rel=0.02
+            )
+    assert methods == [f"output error over 1 recording and {n} points" for n in (12, 6)]
+
+
 def test_known_coefficients_are_kept(tmp_path: Path) -> None:
     """All tests are at one command, and the vehicle holds a twentieth of full thrust around it."""
     known = 'beta_u = { value = 0.8, unit = "1", source = "a guess", interval = [0.7, 0.9] }\n'

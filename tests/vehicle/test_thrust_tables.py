@@ -9,7 +9,7 @@ import pytest
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import COMMANDS, CURVE, FIN
-from rov_fmu.vehicle.thrust_table import read_thrust
+from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.vehicle.test_checks import GONE, changed, quantity
@@ -51,6 +51,54 @@ def test_the_makers_table_is_continued_to_full_thrust() -> None:
     assert (first, second, before, last) == (-1.0, -0.99, 0.99, 1.0)
     assert found.force(1.0) == found.forces[-2] + 0.01 * found.slopes[-2]
     assert found.force(1.0) > found.force(0.99)
+
+
+def test_the_electric_current_is_linear_between_the_points_and_constant_beyond_them(tmp_path: Path) -> None:
+    found = read_current(table(tmp_path, "pulse [us],current [A]\n1104,24.3\n1500,0\n1896,23\n1896,25\n"))
+    commands = (-1.0, -0.99, -0.5, 0.0, 0.25, 0.99, 1.0)
+    assert [found.current(c) for c in commands] == pytest.approx(
+        [24.3, 24.3, 24.3 * 0.5 / 0.99, 0.0, 24.0 * 0.25 / 0.99, 24.0, 24.0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    {
+        "a negative current": ("command [%],current [A]\n-100,-1\n0,0\n100,1\n", "must be at least 0"),
+        "half of the commands": ("command [%],current [A]\n0,0\n50,1\n100,2\n", "must cover the commands from -1 to 1"),
+        "no current": ("command [%],thrust [N]\n-100,-1\n0,0\n100,1\n", "current"),
+    }.values(),
+)
+def test_a_table_of_current_that_is_wrong_is_refused(text: str, wanted: str, tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match=re.escape(wanted)):
+        read_current(table(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        (None, "curves.bow.electric_current: this key is missing, and curves.main has it"),
+        ({"voltage": 14.0, "table": "a.csv"}, "curves.bow.electric_current.voltage = 14.0: must be 16 V"),
+        ({"voltage": 16.0, "table": "b.csv"}, "curves.bow.electric_current.table = 'b.csv': there is no such file"),
+        ({"voltage": 0.0, "table": "a.csv"}, "curves.bow.electric_current.voltage = 0.0: must be within 0.1 ... 1000"),
+    ],
+)
+def test_all_thrusters_have_their_current_from_one_battery(given: Any, wanted: str, folder: Path) -> None:
+    (folder / "a.csv").write_text("command [%],current [A]\n-100,10\n0,0\n100,12\n", encoding="utf-8")
+    right = {"voltage": 16.0, "table": "a.csv"}
+    curves = {f"curves.{name}.electric_current": right for name in ("main", "bow", "lift")}
+    path = folder / "rov.toml"
+    path.write_text(changed(curves, TEXT), encoding="utf-8")
+    vehicle = load_vehicle(path)
+    assert {table.current(1.0) for table in vehicle.electric_currents.values()} == {12.0}
+    write_vehicle(vehicle, folder / "again.toml")
+    assert load_vehicle(folder / "again.toml").electric_currents == vehicle.electric_currents
+    if given:
+        curves["curves.bow.electric_current"] = given
+    else:
+        del curves["curves.bow.electric_current"]
+    path.write_text(changed(curves, TEXT), encoding="utf-8")
+    assert wanted in refusal(path)
 
 
 @pytest.mark.parametrize(

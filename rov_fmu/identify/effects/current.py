@@ -20,10 +20,11 @@ class Current(Effect):
 
     @classmethod
     def candidates(cls, setting: Setting) -> Iterator[Effect]:
-        """Yield the current of each recording of surge or sway without a heading."""
+        """Yield the current of each file with surge or sway and without a heading."""
         for axis in setting.axes:
             if axis in (SURGE, SWAY):
-                yield from (cls(r.file, axis.name) for r in setting.of_axis(axis) if not is_in_flow(r))
+                files = dict.fromkeys(r.file for r in setting.of_axis(axis) if not is_in_flow(r))
+                yield from (cls(file, axis.name) for file in files)
 
     @property
     def is_one_of_many(self) -> bool:

@@ -160,6 +160,6 @@ def axis_of(effect: Effect, recordings: Sequence[Recording]) -> Axis:
 
 
 def of_axis_and_files(kind: type[Effect], setting: Setting, axis: Axis) -> Iterator[Effect]:
-    """Yield an effect of an axis, and what each recording but the first adds to it."""
+    """Yield an effect of an axis, and what each file but the first adds to it."""
     yield kind(axis.name)
-    yield from (kind(r.file, axis.name) for r in setting.of_axis(axis)[1:])
+    yield from (kind(file, axis.name) for file in [*dict.fromkeys(r.file for r in setting.of_axis(axis))][1:])

@@ -24,6 +24,7 @@ from rov_fmu.identify.effects.effect import Effect, Setting
 from rov_fmu.identify.effects.lag import Lag
 from rov_fmu.identify.effects.load import Load
 from rov_fmu.identify.least_squares import Estimate, Loss
+from rov_fmu.identify.points.table_points import TablePoints
 from rov_fmu.identify.recordings.held_out import HeldOut, hold_out
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit, effects_of, estimate_of, part_of
 from rov_fmu.identify.recordings.residual_analysis import ResidualAnalysis
@@ -59,12 +60,14 @@ def fit_recordings(
     thrust: Estimate | None = None,
     loss: Loss = "huber",
     requests: Requests = NO_REQUESTS,
+    points: Sequence[TablePoints] = (),
     on_progress: Progress = silent,
 ) -> tuple[RecordingsFit, ...]:
     """Fit the unknown drag and β of every recorded axis, and optional effects; `base` has the other coefficients.
 
-    `thrust` is the estimate of tested curves; `requests` are those of [fit]. The intervals account for the
-    correlation of the residuals. `on_progress` is called at each step of a search. Raises MotionError or NoFitError.
+    `thrust` is the estimate of tested curves; `requests` are those of [fit]. `points` of tables are residuals of the
+    same fit. The intervals account for the correlation of the residuals. `on_progress` is called at each step of a
+    search. Raises MotionError or NoFitError.
     """
     order = list(base.layout.kinds)
     recordings = sorted(recordings, key=lambda r: order.index(r.axis.name))
@@ -72,7 +75,8 @@ def fit_recordings(
     data = tuple(replace(prepare(r, base), attitude=Attitude.of(r) if requests.attitude else None) for r in recordings)
     data = divided(data, _PIECE if base.layout.is_linked else inf)
     with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
-        return _Fit(data, base, known, thrust, loss, _counting(data, on_progress)).choose(tuple(candidates(setting)))
+        on_step = _counting(data, on_progress)
+        return _Fit(data, base, known, thrust, loss, on_step, tuple(points)).choose(tuple(candidates(setting)))
 
 
 def drag_and_beta(base: Rov, axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:
@@ -93,6 +97,7 @@ class _Fit:
     loss: Loss
     on_step: Callable[[], None]
     """A function that is called at each step of a search."""
+    points: tuple[TablePoints, ...] = ()
 
     @property
     def axes(self) -> list[Axis]:
@@ -209,7 +214,7 @@ class _Fit:
         found: dict[str, HeldOut] = {}
         for axes in self.blocks:
             data = tuple(d for d in self.data if d.axis in axes)
-            alone = replace(self, data=data, base=base, thrust=None)
+            alone = replace(self, data=data, base=base, thrust=None, points=())
             of = {name for axis in axes for name in self._own(axis)}
             own = tuple(e for e in extras if e.of in of or any(e.concerns(d.recording) for d in data))
             model = alone.model(own, analysis.model.sigma[[d.axis in axes for d in self.data]])
@@ -230,7 +235,7 @@ class _Fit:
     def model(self, extras: tuple[Effect, ...], noise: Array, *, with_prior: bool = False) -> Simulator:
         """Return the model with these extras; the prior pulls them to their neutral values."""
         deviations = likely(extras, Setting([d.recording for d in self.data], self.base), all_of_them=with_prior)
-        return Simulator(self.data, self.base, self.names, extras, noise, self.thrust, deviations)
+        return Simulator(self.data, self.base, self.names, extras, noise, self.thrust, deviations, self.points)
 
     def analysed(self, model: Simulator, start: Array, tolerance: float = 1e-8) -> ResidualAnalysis:
         """Fit the model and analyse the residuals."""
@@ -274,6 +279,7 @@ class _Fit:
             tuple(s for s in analysis.simulations if s.recording.axis is axis),
             tuple(of_axis.values()),
             lambda: held_out()[axis.name],
+            points=sum(len(each.points) for each in self.points if each.axis is axis),
             between_rows=any(d.shifts is not None for d in self.data if d.axis is axis),
         )
 

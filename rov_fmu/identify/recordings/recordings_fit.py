@@ -51,6 +51,8 @@ class RecordingsFit:
     simulations: tuple[Simulation, ...]
     effects: tuple[FittedEffect, ...]
     hold_out: Callable[[], HeldOut] = field(repr=False)
+    points: int = 0
+    """The number of points of tables that took part."""
     between_rows: bool = False
     """True when the commands were found to switch between the rows of the logs, at unknown times."""
     disagreement: Mapping[str, float] = field(default_factory=dict)
@@ -98,7 +100,8 @@ class RecordingsFit:
     @property
     def method(self) -> str:
         """A phrase about the method."""
-        return f"output error over {count(len(self.simulations), 'recording')}"
+        points = f" and {count(self.points, 'point')}" if self.points else ""
+        return f"output error over {count(len(self.simulations), 'recording')}{points}"
 
     def band(self, commands: Array) -> tuple[Array, Array, Array, Array]:
         """Return the 95 % confidence band over commands: V_ss low and high, Tau low and high."""

@@ -51,8 +51,9 @@ class ResidualAnalysis:
         psi = np.clip(r, -HUBER, HUBER) if robust else r
         self.simulations: list[Simulation] = []
         self.degrees_of_freedom = float(len(model.thrust.names) if model.thrust else 0) - len(self.x)
+        self.degrees_of_freedom += model.count_of_points
         excess = len(r) / (len(r) - len(self.x))
-        rest = slice(model.rows[-1].stop, None)  # the priors
+        rest = slice(model.rows[-1].stop, None)  # points and priors
         self.gram, self.meat = (J * inside[:, None]).T @ J, J[rest].T @ J[rest]
         size = np.abs(r)
         losses = np.where(inside, r * r, (2.0 * size - HUBER) * HUBER)
