@@ -23,6 +23,8 @@ from rov_fmu.tank.findings import Finding
 
 _LEAST_EXPLAINED = 0.5
 """The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""
+_SIGNIFICANT = 4.0
+"""A difference between directions of so many standard errors is no chance, at any of some ten commands."""
 
 
 def on_thrust(curve: str, fit: ThrustFit) -> Iterator[Finding]:
@@ -178,14 +180,20 @@ def _on_disagreement(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[Finding]
 def _asymmetry(x: Array, y: Array, model: Array) -> dict[str, float] | None:
     """Compare both directions at the same command; return the numbers of a finding, or None.
 
-    There is a finding where the directions differ by 5 % more, or less, than in the model.
+    There is a finding where the directions differ by 5 % more, or less, than in the model, and by more than the scatter
+    of repeated measurements explains.
     """
-    ratios = {}
+    ratios, scatter = {}, _scatter(x, y)
     for level in np.unique(np.round(np.abs(x[x < 0.0]), 6)).tolist():
         backward, forward = np.isclose(x, -level), np.isclose(x, level)
         if forward.any() and y[forward].mean() > 0.0 and model[forward].mean() > 0.0:
             measured, modelled = (-float(part[backward].mean() / part[forward].mean()) for part in (y, model))
-            ratios[level] = measured - 1.0, measured / modelled - 1.0 if modelled else np.inf, modelled - 1.0
+            difference = measured / modelled - 1.0 if modelled else np.inf
+            errors = (
+                scatter / np.sqrt(part.sum()) / max(abs(model[part].mean()), 1e-12) for part in (backward, forward)
+            )
+            if abs(difference) > _SIGNIFICANT * np.hypot(*errors):
+                ratios[level] = measured - 1.0, difference, modelled - 1.0
     if not ratios:
         return None
     level = max(ratios, key=lambda c: abs(ratios[c][1]))
@@ -194,3 +202,10 @@ def _asymmetry(x: Array, y: Array, model: Array) -> dict[str, float] | None:
         return None
     numbers = {"measured": measured, "command": level}
     return numbers if abs(modelled) < 5e-4 else numbers | {"modelled": modelled}
+
+
+def _scatter(x: Array, y: Array) -> float:
+    """Return the standard deviation of measurements that were repeated at the same command; 0 without repetitions."""
+    _, group, count = np.unique(np.round(x, 6), return_inverse=True, return_counts=True)
+    means = np.bincount(group, y) / count
+    return float(np.sqrt(np.sum((y - means[group]) ** 2) / max(len(y) - len(count), 1)))

@@ -387,6 +387,21 @@ def test_window_takes_reverse_thrust_out(tmp_path: Path, k: Rov) -> None:
     assert drag.a == pytest.approx(k["a_d_u"], rel=0.2)
 
 
+@pytest.mark.parametrize(("weaker", "back", "warns"), [(1.0, np.linspace(0.1, 1.0, 10), False), (0.7, [0.5], True)])
+def test_forces_differ_by_direction_where_repetitions_do_not_explain_it(
+    weaker: float, back: Sequence[float], warns: bool, tmp_path: Path, k: Rov
+) -> None:
+    """At 10 % the noise is a tenth of the force, and the directions differ by chance."""
+    random = np.random.default_rng(3)
+    forces = [(c, k.force(HEAVE, c)) for c in np.repeat(np.linspace(0.1, 1.0, 10), 2).tolist()]
+    forces += [(-c, -weaker * k.force(HEAVE, c)) for c in np.repeat(back, 2).tolist()]
+    noisy = [(c, force + 0.007 * random.standard_normal()) for c, force in forces]
+    by_level = {c: float(np.mean([F for command, F in noisy if command == c])) for c, _ in noisy}
+    assert max(abs(by_level[c] / by_level[-c] + 1.0) for c in by_level if -c in by_level) > 0.05
+    found = folder_with(tmp_path, {"thrust_top": noisy}, ["heave"])
+    assert any((f.kind, f.curve) == ("asymmetry", "top") for f in found.findings) is warns
+
+
 @pytest.fixture(scope="module")
 def by_direction(tmp_path_factory: pytest.TempPathFactory) -> Identification:
     """Identify a vehicle with 60 % thrust in reverse, and with twice the drag upward."""
