@@ -18,7 +18,7 @@ _THRUST = Column(
 _CURRENT = Column({"A": 1.0}, minimum=0.0, maximum=1e4)
 _MOST_POINTS = 2000
 _WIDEST = 0.05
-"""The largest part of the commands, on each side, that a table may leave out. A thrust continues with its last slope."""
+"""The largest part of the commands, on each side, that a table may leave out. The last slope of a thrust continues."""
 
 
 @dataclass(frozen=True)

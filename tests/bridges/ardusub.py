@@ -24,8 +24,8 @@ VECTORED_6DOF = (
 )
 """Roll, pitch, yaw, throttle, forward and lateral factor of each motor."""
 KEYS = {"gyro": 3, "accel_body": 3, "position": 3, "attitude": 3, "velocity": 3, "timestamp": 1, "rng_1": 1}
-KEYS |= {"voltage": 1}
-_OPTIONAL = {"rng_1", "voltage"}
+KEYS |= {"voltage": 1, "current": 1}
+_OPTIONAL = {"rng_1", "voltage", "current"}
 
 
 def packet(rate: int, count: int, pulses: list[int]) -> bytes:

@@ -31,7 +31,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.bridges.ardusub import VECTORED_6DOF, ArduSub, packet, parsed
 from tests.commands import ROOT
-from tests.vehicles import pulsed
+from tests.vehicles import THRUST_EFFECTS, pulsed
 
 HEAVY: Rov = load_vehicle(SHIPPED["bluerov2_heavy"]).rov
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -95,6 +95,27 @@ def test_a_reply_byte_by_byte() -> None:
         b'\n{"timestamp":0.0025,"imu":{"gyro":[0.0,0.0,0.0],"accel_body":[0.0,0.0,-9.80665]},"position":[0.0,0.0,3.0],'
         b'"attitude":[0.0,0.0,0.0],"velocity":[0.0,0.0,0.0],"rng_1":17.0}\n'
     )
+
+
+def test_the_battery_of_the_reply_is_the_sum_over_the_thrusters() -> None:
+    """The maker's sheet at 16 V: 23.90 A at 1896 us, 4.58 A at 1700 us, 4.40 A at 1300 us, and 0 A at rest. The file has every third point.
+
+    Where the file has no current, ArduPilot uses its own battery, unless the reply has a voltage.
+    """
+    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
+    setup = replace(setup_of(), electric_currents=heavy.electric_currents)
+    connection, sums = Connection(setup), []
+    for count, pulses in enumerate(([1500] * 8, [0] * 8, [1896, 1700, 1300, *[1500] * 5])):
+        reply = json.loads(connection.answer(packet(400, count, [*pulses, *[0] * 8]), HERE))
+        assert reply["battery"]["voltage"] == 16.0
+        sums.append(reply["battery"]["current"])
+    assert sums == pytest.approx([0.0, 0.0, 23.9 + 4.58 + 4.4], abs=0.1)
+    without = Connection(setup_of())
+    assert "battery" not in json.loads(without.answer(packet(400, 0, NEUTRAL), HERE))
+    effects = load_vehicle(THRUST_EFFECTS).rov
+    table = {n: name.removeprefix("u_") for n, name in enumerate(effects.layout.commands, 1)}
+    powered = Connection(Setup(effects, servos_of(effects.layout, None, table), {"voltage": 13.0}))
+    assert json.loads(powered.answer(packet(400, 0, NEUTRAL), HERE))["battery"] == {"voltage": 13.0}
 
 
 def test_replies_are_json_and_as_ardupilot_parses_them() -> None:
@@ -218,6 +239,34 @@ def test_holds_depth_and_heading_in_a_current() -> None:
     assert np.degrees(np.max(np.abs(turned))) < 2.0
     assert max(abs(at["attitude"][0]) + abs(at["attitude"][1]) for at in held) < 0.1
     assert connection.traffic.frames == len(autopilot.history) == 12 * 400
+
+
+@pytest.mark.parametrize("offset", [0.0, 1.05])
+def test_holds_its_place_in_a_current(offset: float) -> None:
+    """ArduSub's position hold, which faces the current or lies across it: depth to 5 cm, heading to 2 degrees."""
+    heading = atan2(-0.1, -0.2) + offset
+    with served(setup_of(V_N=0.2, V_E=0.1, z=0.9, psi_0=heading + 0.05)) as (_, port):
+        autopilot = ArduSub(port, depth=1.0, heading=heading, place=(0.0, 0.0))
+        autopilot.fly(25.0)
+        autopilot.close()
+    held = [at for at in autopilot.history if at["timestamp"][0] > 15.0]
+    assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05
+    turned = [(at["attitude"][2] - heading + pi) % (2.0 * pi) - pi for at in held]
+    assert np.degrees(np.max(np.abs(turned))) < 2.0
+    assert max(np.hypot(*at["position"][:2]) for at in held) < 0.3
+
+
+def test_the_dead_band_makes_the_heading_swing_when_adrift() -> None:
+    """ArduSub's default gains do not reach 2 degrees without a stick: they reach the dead band at an error of 4.6."""
+    with served(setup_of(V_N=0.2, V_E=0.1, z=1.0, psi_0=0.2)) as (_, port):
+        autopilot = ArduSub(port, rate=100)
+        autopilot.fly(60.0)
+        autopilot.close()
+    held = [at for at in autopilot.history if at["timestamp"][0] > 30.0]
+    assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05
+    turned = np.degrees([at["attitude"][2] for at in held])
+    assert turned.max() == pytest.approx(4.7, abs=0.3)
+    assert turned.min() == pytest.approx(-4.7, abs=0.3)
 
 
 def test_lost_and_repeated_packets_do_not_move_the_time() -> None:
