@@ -98,9 +98,9 @@ def test_a_reply_byte_by_byte() -> None:
 
 
 def test_the_battery_of_the_reply_is_the_sum_over_the_thrusters() -> None:
-    """The maker's sheet at 16 V: 23.90 A at 1896 us, 4.58 A at 1700 us, 4.40 A at 1300 us, and 0 A at rest. The file has every third point.
+    """The maker's sheet at 16 V: 23.90 A at 1896 us, 4.58 A at 1700 us, 4.40 A at 1300 us, and 0 A at rest.
 
-    Where the file has no current, ArduPilot uses its own battery, unless the reply has a voltage.
+    The file has every third point. Where there is no current, ArduPilot uses its own battery, unless the reply has a voltage.
     """
     heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
     setup = replace(setup_of(), electric_currents=heavy.electric_currents)
@@ -253,7 +253,7 @@ def test_holds_its_place_in_a_current(offset: float) -> None:
     assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05
     turned = [(at["attitude"][2] - heading + pi) % (2.0 * pi) - pi for at in held]
     assert np.degrees(np.max(np.abs(turned))) < 2.0
-    assert max(np.hypot(*at["position"][:2]) for at in held) < 0.3
+    assert max(np.hypot(at["position"][0], at["position"][1]) for at in held) < 0.3
 
 
 def test_the_dead_band_makes_the_heading_swing_when_adrift() -> None:

@@ -40,7 +40,7 @@ class Reference:
             return float(entry["value"])
 
         body, curve = self.file["body"], self.file["curves"]["t200"]
-        self.curve = {k: value(q) for k, q in curve.items() if k != "description"}
+        self.curve = {k: value(q) for k, q in curve.items() if "value" in q}
         axes = [{k: value(q) for k, q in self.file["axes"][name].items()} for name in ("surge", "sway", "heave", "yaw")]
         rest = [value(body["m_rov"])] * 3 + [value(body["I_r"])]
         self.M = [inertia + axis["m_a"] for inertia, axis in zip(rest, axes, strict=True)]
