@@ -100,7 +100,7 @@ def test_a_reply_byte_by_byte() -> None:
 def test_the_battery_of_the_reply_is_the_sum_over_the_thrusters() -> None:
     """The maker's sheet at 16 V: 23.90 A at 1896 us, 4.58 A at 1700 us, 4.40 A at 1300 us, and 0 A at rest.
 
-    The file has every third point. Where there is no current, ArduPilot uses its own battery, unless the reply has a voltage.
+    The file has every third point. Without a current and a voltage, ArduPilot uses its own battery.
     """
     heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
     setup = replace(setup_of(), electric_currents=heavy.electric_currents)
