@@ -25,6 +25,7 @@ def folder(tmp_path: Path) -> Path:
     """Return a folder with the tables of thrust."""
     for name in _FILES:
         shutil.copy(THRUST_EFFECTS.with_name(name), tmp_path)
+    (tmp_path / "current.csv").write_text("command [1],current [A]\n-1,9\n0,0\n1,10\n", encoding="utf-8")
     return tmp_path
 
 
@@ -128,6 +129,25 @@ def test_a_table_that_is_no_thrust_curve_is_refused(text: str, wanted: str, tmp_
     assert str(error.value).startswith(str(tmp_path / "t.csv"))
 
 
+def test_a_table_of_current_is_linear_between_its_points(tmp_path: Path) -> None:
+    found = read_current(table(tmp_path, "pulse [us],current [A]\n1120,8\n1500,0\n1900,10\n1900,12\n"))
+    assert (found.commands, found.currents) == ((-0.95, 0.0, 1.0), (8.0, 0.0, 11.0))
+    assert [found.current(c) for c in (-1.0, -0.475, 0.0, 0.5, 1.0)] == pytest.approx([8.0, 4.0, 0.0, 5.5, 11.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("command [1],current [A]\n-1,5\n0,0\n1,-1\n", "must be at least 0"),
+        ("command [1],current [A]\n0,0\n0.5,1\n1,2\n", "must cover the commands from -1 to 1"),
+        ("command [1],thrust [N]\n-1,-5\n0,0\n1,1\n", "there is no such column, but command [1], current [A]"),
+    ],
+)
+def test_a_table_that_is_no_current_is_refused(text: str, wanted: str, tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match=re.escape(wanted)):
+        read_current(table(tmp_path, text))
+
+
 # ---- The vehicle file ------------------------------------------------------------------------------------------------
 
 
@@ -151,6 +171,16 @@ def test_a_written_file_is_the_same_vehicle(folder: Path) -> None:
         "T_d": 0.2,
         "k_t_main": 1.1,
     }
+
+
+def test_the_current_is_read_written_and_moved(folder: Path) -> None:
+    shipped = load_vehicle(SHIPPED["bluerov2_heavy"])
+    write_vehicle(shipped, folder / "written.toml")
+    write_tuned(SHIPPED["bluerov2"], folder / "tuned.toml", {"a_d_u": 20.0}, "by hand")
+    for name in ("written", "tuned"):
+        assert load_vehicle(folder / f"{name}.toml").electric_currents == shipped.electric_currents
+    (current,) = shipped.electric_currents.values()
+    assert current.voltage == 16.0
 
 
 def test_a_file_with_pulse_widths_is_read_and_written(folder: Path) -> None:
@@ -181,7 +211,20 @@ _PULSES = (
     "must be three rising numbers within 500 ... 2500 us and at least 10 us apart: full reverse, neutral, full thrust "
     "ahead"
 )
+_DRAWN = {"voltage": 16.0, "table": "current.csv"}
 MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
+    "the current of one curve": (
+        {"curves.main.electric_current": _DRAWN},
+        "curves.bow.electric_current: this key is missing, and curves.main has it",
+    ),
+    "currents at several voltages": (
+        {f"curves.{n}.electric_current": {**_DRAWN, "voltage": V} for n, V in (("main", 12.0), ("bow", 16.0))},
+        "curves.bow.electric_current.voltage = 16.0: must be 12 V, as for curves.main",
+    ),
+    "thrust for a current": (
+        {"curves.bow.electric_current": {**_DRAWN, "table": _FILES[0]}},
+        "curves.bow.electric_current.table = 'thrust_12_v.csv'",
+    ),
     "coefficients beside a table": (
         {"curves.bow.a_t": quantity(1.0, "N")},
         "curves.bow.a_t: must not stand beside table",
