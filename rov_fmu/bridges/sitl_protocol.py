@@ -49,8 +49,8 @@ def reply(values: Mapping[str, Any]) -> bytes:
     """Return the datagram that answers a servo packet: JSON without blanks, between two line breaks.
 
     The newest ArduPilot parses JSON (AP_JSON_FieldParser, at most 4096 bytes). Older versions search for the first
-    occurrence of `"key":` and read the number or the bracket behind it. So there are no blanks, and no key contains one that stands behind it. Raises ValueError if a
-    number is not finite.
+    occurrence of `"key":` and read the number or the bracket behind it. So there are no blanks, and no key contains
+    one that stands behind it. Raises ValueError if a number is not finite.
     """
     return f"\n{_JSON.encode(values)}\n".encode()
 
