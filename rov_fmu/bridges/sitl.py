@@ -108,11 +108,11 @@ class Flight:
         self._stepper = Stepper(setup.rov, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
         self._held = {**layout.usual_inputs, **setup.start}
-        curves = {thruster: curve.name for thruster, curve in layout.curve_of.items()}
+        currents = setup.electric_currents
         self._draws = [
-            (setup.electric_currents[curve], layout.gains[thruster])
-            for thruster, curve in curves.items()
-            if curve in setup.electric_currents
+            (currents[curve.name], layout.gains[thruster])
+            for thruster, curve in layout.curve_of.items()
+            if curve.name in currents
         ]
         path = setup.log
         if path and number > 1:

@@ -48,9 +48,9 @@ def servo_packet(data: bytes) -> ServoPacket | None:
 def reply(values: Mapping[str, Any]) -> bytes:
     """Return the datagram that answers a servo packet: JSON without blanks, between two line breaks.
 
-    ArduPilot does not parse JSON, but searches for the first occurrence of `"key":` and reads the number or the
-    bracket behind it. So there are no blanks, and no key contains one that stands behind it. Raises ValueError if a
-    number is not finite.
+    The newest ArduPilot parses JSON (AP_JSON_FieldParser, at most 4096 bytes). Older versions search for the first
+    occurrence of `"key":` and read the number or the bracket behind it. So there are no blanks, and no key contains
+    one that stands behind it. Raises ValueError if a number is not finite.
     """
     return f"\n{_JSON.encode(values)}\n".encode()
 
