@@ -212,7 +212,7 @@ def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Result
         expected.append(f"| `{of}` | {index.S1[of]:.2f} | {index.S1_95[of]:.2f} |")
     low, high = stopped["alone"].runs.stopping_distance.quantile([0.05, 0.95])
     expected.append(f"the same study would give {low:.3g} m to {high:.3g} m")
-    expected.append(f"alone makes {index.S1['beta_u']:.0%} of the variance".replace("%", " %"))
+    expected.append(f"which causes {index.S1['beta_u']:.0%} of the variance".replace("%", " %"))
     vehicle = load_vehicle(REFIT)
     rov = vehicle.rov
     a, b = rov["a_d_u"], rov["b_d_u"]
@@ -228,7 +228,7 @@ def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Result
     expected.append(f"{measured[Decimal(50)]} m/s was measured where the refit has {at_half:.2f} m/s")
     expected.append(f"the refit finds β = {rov['beta_w']:.2f}")
     expected.append(f"stops {rov['m_rov']:.2f} kg without")
-    expected.append(f"{rov['m_rov'] / a * log(1.0 + a * 0.31 / b):.2f} m of it are gone at less than 0.31 m/s")
+    expected.append(f"{rov['m_rov'] / a * log(1.0 + a * 0.31 / b):.2f} m of it below 0.31 m/s")
     assert [words for words in expected if words not in text(STOP)] == [], "\n".join(expected)
 
 
