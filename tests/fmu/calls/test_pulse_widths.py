@@ -143,7 +143,7 @@ def test_a_vehicle_file_with_pulse_widths_is_built_run_and_proved(
     for table in THRUST_EFFECTS.parent.glob("thrust_*.csv"):
         shutil.copy(table, tmp_path)
     assert main(["build", str(file), "--platform", "host", "-o", str(fmu)]) == 0
-    assert "valid; runs: u_l = u_r = 1606 gives u = " in capsys.readouterr().out
+    assert "The FMU is valid. In a run, u_l = u_r = 1606 gives u = " in capsys.readouterr().out
     assert main(["prove", str(fmu)]) == 0
     fmpy.extract(str(fmu), unzipdir=str(tmp_path / "delayed"))
     with fmi2.Fmu(tmp_path / "delayed").instance() as rov:
