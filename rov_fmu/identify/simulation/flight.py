@@ -281,6 +281,7 @@ class SimulatedMotion:
         return _between(self.nodes, self.at[name], rate, sample, jumps)
 
 
+@np.errstate(all="ignore")  # data of no vehicle overflow, and the result is then not finite
 def _between(nodes: Array, values: Array, rates: Array, sample: Array, jumps: Flags | None = None) -> Array:
     """Interpolate values between nodes by cubics with their rates, V x n. At a node the result is the value itself.
 
