@@ -105,7 +105,8 @@ def _kill_children() -> None:
     """Kill the worker processes.
 
     multiprocessing does not list a worker that a thread of Dask is just starting. Such a worker would print a traceback
-    when this process ends, so it is found with psutil, which Dask imports.
+    when this process ends, so it is found with psutil, which Dask imports. Until it runs its own program, it has no
+    command line, or that of this process.
     """
     from multiprocessing import active_children
 
@@ -115,9 +116,11 @@ def _kill_children() -> None:
     if "psutil" in sys.modules:
         import psutil
 
-        for process in psutil.Process().children():
+        own = psutil.Process()
+        for process in own.children():
             with suppress(psutil.Error):  # it has ended
-                if any("spawn_main" in part for part in process.cmdline()):
+                command = process.cmdline()
+                if command in ([], own.cmdline()) or any("spawn_main" in part for part in command):
                     process.kill()
 
 

@@ -1,8 +1,9 @@
 """The FMU in pure Python: connect rov_fmu/model/rov.py to PythonFMU's Fmi2Slave.
 
 In the FMU this file is the slave module; variables.json (the declaration) and a copy of the model lie in its folder.
-PythonFMU cannot return fmi2Discard: when a value is refused, a message with this status is logged, the old value is
-kept, and the call returns fmi2OK.
+PythonFMU 0.7 cannot return fmi2Discard, and an exception must not reach it: it then releases its objects twice, which
+ends the importer at a later call. When a value is refused, a message with the status is logged, the old value is kept,
+and the call returns fmi2OK.
 """
 
 import json
@@ -94,7 +95,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         for reference, value in zip(references, values, strict=True):
             v = self.declared[reference]
             if self._is_calculated(reference):
-                raise ValueError(f"{v['name']} is calculated and must not be set")
+                self.log(f"{v['name']} is calculated and must not be set; it was not.", Fmi2Status.error)
+                return
             if not isfinite(value) or (v["causality"] == "parameter" and _limited(v, value) != value):
                 self.log(
                     f"{v['name']} = {value!r} is refused; it stays {self.values[reference]!r}.", Fmi2Status.discard

@@ -213,9 +213,9 @@ class Motion:
         first = self.rates(mean)[0]
         second = self.rates([first[i] if i in turning else x for i, x in enumerate(mean)])[0]
         slope, bend = (hypot(*(rates[i] for i in turning)) for rates in (first, second))
-        if slope and bend:
-            w = bend / slope
-            angle = w * h
+        w = bend / slope if slope else 0.0
+        angle = w * h
+        if angle:
             half, whole = (sin(0.5 * angle), sin(angle)) if isfinite(angle) else (nan, nan)
             for i in turning:
                 along, across = first[i] / w, second[i] / w / w

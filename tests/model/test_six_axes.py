@@ -160,3 +160,13 @@ def test_a_turn_that_overflows_ends_at_once() -> None:
     after = rov.step(still(rov), at_rest(rov) | {"r": 1e10}, 1e300)
     assert not np.isfinite([*after.values()]).all()
     assert simulate(rov, [0.0, 1e300], {"r": 1e10}).failed.tolist() == [1]
+
+
+@pytest.mark.parametrize(("rate", "h"), [(1e-200, 1e-200), (1e-80, 1e-300), (1.0, 5e-324)])
+def test_a_turn_that_underflows_changes_nothing(rate: float, h: float) -> None:
+    rov = frictionless(with_axes("pr"))
+    before = at_rest(rov) | {"r": rate}
+    ran = simulate(rov, [0.0, h], {"r": rate}, [*before])
+    assert ran.failed.tolist() == [2]  # no row
+    for after in (rov.step(still(rov), before, h), dict(zip(before, ran.values[:, 0, 1].tolist(), strict=True))):
+        assert after == pytest.approx(before, rel=1e-15, abs=5e-324)
