@@ -165,7 +165,7 @@ def test_a_turn_that_overflows_ends_at_once() -> None:
 @pytest.mark.parametrize(("rate", "h"), [(1e-200, 1e-200), (1e-80, 1e-300), (1.0, 5e-324)])
 def test_a_turn_that_underflows_changes_nothing(rate: float, h: float) -> None:
     rov = frictionless(with_axes("pr"))
-    before = at_rest(rov) | {"r": rate}
+    before = at_rest(rov) | {"r": rate, "psi": 0.0}
     ran = simulate(rov, [0.0, h], {"r": rate}, [*before])
     assert ran.failed.tolist() == [2]  # no row
     for after in (rov.step(still(rov), before, h), dict(zip(before, ran.values[:, 0, 1].tolist(), strict=True))):
