@@ -572,8 +572,8 @@ def _inspect(path: Path) -> None:
 )
 @click.option(
     "--command",
-    type=_number("a number within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3"),
-    help="Command held by every input that drives the axis, positive along it: 30 % of full thrust is 0.3.",
+    type=_number("a number within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"),
+    help="Command held by every input that drives the axis, positive along it: 30 % of the full command is 0.3.",
 )
 @click.option(
     "--v-ss",

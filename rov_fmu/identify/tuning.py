@@ -145,7 +145,9 @@ def _impossible(rov: Rov, axis: Axis, point: Point) -> str | None:
     """Return the reason why no tuning gives the point, or None."""
     command, value = point.command, point.value
     if not 0.0 < abs(command) <= 1.0:
-        return f"a command of {command:g} must be within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3"
+        return (
+            f"a command of {command:g} must be within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"
+        )
     if not (force := rov.force(axis, command)):
         dead = all("c_0" in rov.layout.curve_of[t.name].keys for t in rov.layout.drivers(axis))
         return f"a command of {command:g} gives no {axis.push}{', it is within the dead band' if dead else ''}"

@@ -46,7 +46,7 @@ def load(vehicle: str | Path) -> "VehicleModel":
 class VehicleModel(Vehicle):
     """A vehicle that can be simulated, changed and built. `rov_fmu.load` returns one.
 
-    All values are in SI units, angles in rad, and commands are fractions of full thrust from -1 to 1
+    All values are in SI units, angles in rad, and commands are fractions of the full command from -1 to 1
     (pulse widths in µs if the vehicle file says so). The variables are
     those of the FMU.
     """

@@ -510,7 +510,7 @@ class Layout:
         return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > FAINT}
 
     def driving(self, axis: Axis, fraction: float) -> dict[str, float]:
-        """Return the commands that drive an axis in its positive direction with a fraction of full thrust."""
+        """Return the commands that drive an axis in its positive direction with a fraction of the full command."""
         return {name: self.command_of(fraction * sign) for name, sign in self.signs(axis).items()}
 
     # -- declarations --
@@ -548,7 +548,7 @@ class Layout:
 
     @cached_property
     def commands(self) -> dict[str, Declaration]:
-        """The inputs that drive the thrusters and the fins: fractions of full thrust, or of the largest angle.
+        """The inputs that drive the thrusters and the fins: fractions of the full command, or of the largest angle.
 
         They are pulse widths instead if the vehicle has these.
         """

@@ -182,7 +182,7 @@ class Rov:
         )
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
-        """Return all inputs: an axis driven at a fraction of full thrust, the other inputs as usual."""
+        """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""
         return self.layout.usual_inputs | self.layout.driving(axis, command)
 
     def force(self, axis: Axis, command: float) -> float:

@@ -1,7 +1,7 @@
 """The columns of tank tests and logs: their units and bounds, and checks of the unit of commands.
 
-Numbers are converted to SI units, and commands to fractions of full thrust. The bounds are far beyond any vehicle, so a
-number outside is a mistake; without bounds, fits could overflow.
+Numbers are converted to SI units, and commands to fractions of the full command. The bounds are far beyond any vehicle,
+so a number outside is a mistake; without bounds, fits could overflow.
 """
 
 from collections.abc import Iterable

@@ -56,7 +56,7 @@ _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
 
 def _check_window(window: tuple[float, float]) -> tuple[float, float]:
     if not -1.0 <= window[0] < window[1] <= 1.0:
-        raise ValueError("must be [low, high] within -1 ... 1, fractions of full thrust: 20 % is 0.2")
+        raise ValueError("must be [low, high] within -1 ... 1, fractions of the full command: 20 % is 0.2")
     return window
 
 
@@ -148,7 +148,9 @@ def _as_fraction(value: object) -> object:
 
 def _check_command(value: float) -> float:
     if not 0.0 < value <= 1.0:
-        raise ValueError('must be above 0 and at most 1, a fraction of full thrust: half is 0.5, or "50 %" in quotes')
+        raise ValueError(
+            'must be above 0 and at most 1, a fraction of the full command: half is 0.5, or "50 %" in quotes'
+        )
     return value
 
 
@@ -169,7 +171,7 @@ class TankLimits(Strict):
     tank_length: Annotated[Finite, _above(0.0, "the length of the tank in m")] = inf
     """The longest distance along surge, sway or heave, m."""
     command_max: Annotated[Finite, BeforeValidator(_as_fraction), AfterValidator(_check_command)] = 1.0
-    """The strongest command, a fraction of full thrust."""
+    """The strongest command, a fraction of the full command."""
     duration: Annotated[Finite, _above(0.0, "the duration of a test in s")] = inf
     """The longest recording, s."""
 

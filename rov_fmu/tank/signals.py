@@ -15,10 +15,10 @@ from rov_fmu.tank.smoothing import velocity, without_spikes
 
 LEAST_SAMPLES = 20
 _SAME_COMMAND = 0.005
-"""The largest difference of equal commands, as a fraction of full thrust: two steps of a pulse of 1 µs."""
+"""The largest difference of equal commands, as a fraction of the full command: two steps of a pulse of 1 µs."""
 _LEAST_CHANGE = 0.02
-"""The smallest change of thrust that counts, as a fraction of full thrust. Smaller changes hold a heading or a depth,
-or are the rounding of a pulse."""
+"""The smallest change of thrust that counts, as a fraction of the full command. Smaller changes hold a heading or a
+depth, or are the rounding of a pulse."""
 _LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
 """A gap is longer than this time, s, and than this many usual intervals."""
 _ROUNDING = 0.01

@@ -101,7 +101,7 @@ class Validity(Strict):
     """The range of thruster commands in which the model holds, and what it leaves out."""
 
     command_max: _Command
-    """The strongest thruster command for which the model was identified, as a fraction of full thrust."""
+    """The strongest thruster command for which the model was identified, as a fraction of the full command."""
     command_min: Annotated[_Command, AfterValidator(_below_maximum)]
     """The weakest thruster command for which the model was identified."""
     limits: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()

@@ -57,7 +57,7 @@ class Response:
 
 @dataclass(frozen=True)
 class ResponseRow:
-    """A row of a table: the command in % of full thrust, and the responses of both models."""
+    """A row of a table: the command in % of the full command, and the responses of both models."""
 
     command: Decimal
     non_linear: Response

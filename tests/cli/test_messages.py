@@ -49,7 +49,7 @@ def test_other_words_stand_for_names() -> None:
 
 _SHIPS = "there is no such file, and no vehicle of this name ships, only " + ", ".join(SHIPPED)
 _PLATFORMS = "host, linux64, linux32, aarch64-linux, win64, win32, darwin64, aarch64-darwin"
-_COMMAND = "must be a number within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3"
+_COMMAND = "must be a number within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"
 _HEAVE = ["tune", "videoray", "--axis", "heave"]
 # What is typed in a folder with the files of `FILES`, and the expected part of the line.
 TYPED: dict[str, tuple[list[str], str]] = {
@@ -104,7 +104,7 @@ TYPED: dict[str, tuple[list[str], str]] = {
     "a decimal comma": ([*_HEAVE, "--command", "0,3", "--v-ss", "0.2"], f"'--command': '0,3' {_COMMAND}"),
     "percent without a sign": (
         [*_HEAVE, "--command", "30", "--v-ss", "0.2"],
-        "heave: a command of 30 must be within -1 ... 1 and not 0, a fraction of full thrust: 30 % is 0.3",
+        "heave: a command of 30 must be within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3",
     ),
     "no number": (
         [*_HEAVE, "--command", "0.3", "--v-ss", "nan"],

@@ -135,7 +135,7 @@ def test_a_step_is_repeated_where_something_drifts(tmp_path: Path, monkeypatch: 
         ('tank_length = "4 m"', "limits.tank_length = '4 m': must be a number"),
         (
             "command_max = 50",
-            "limits.command_max = 50: must be above 0 and at most 1, a fraction of full thrust: half is",
+            "limits.command_max = 50: must be above 0 and at most 1, a fraction of the full command: half is",
         ),
         ('command_max = "120 %"', "limits.command_max = '120 %': must be above 0 and at most 1"),
         ("duration = -1.0", "limits.duration = -1.0: must be the duration of a test in s, above 0"),

@@ -35,7 +35,7 @@ class Commands:
     switches: Array
     """J: the time of each switch, s, ascending."""
     thrusters: Mapping[str, Array]
-    """J each, by thruster: the command, a fraction of full thrust. A thruster that is not named has no commands."""
+    """J each, by thruster: the command, a fraction of the full command. A thruster without a name here has none."""
 
     def at(self, time: Array) -> dict[str, Array]:
         """Return the command of each thruster at some times."""

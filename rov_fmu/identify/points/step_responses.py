@@ -16,7 +16,7 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import WINDOW, kernel, robust_deviation, velocity, without_spikes
 
-_SAME_COMMAND = 0.005  # fraction of full thrust
+_SAME_COMMAND = 0.005  # fraction of the full command
 _LEAST = 20
 """The smallest number of samples of a hold, and of its steady part."""
 _BIAS = 0.002

@@ -25,7 +25,7 @@ LINES = ("teal", "blue", "violet", "orange")
 
 @dataclass(frozen=True)
 class Step:
-    """A command (fraction of full thrust) that is held from rest, and the measurements of the response."""
+    """A command (fraction of the full command) that is held from rest, and the measurements of the response."""
 
     command: float
     V_ss: Sequence[float] = ()

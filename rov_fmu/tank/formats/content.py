@@ -124,9 +124,9 @@ def together(series: Mapping[str, tuple[Array, Array]]) -> Commands:
 
 
 def fraction(file: str, source: str, outputs: Array) -> Array:
-    """Return outputs, which are fractions or pulses by their size, as fractions of full thrust. Raises DataFileError.
+    """Return outputs, which are fractions or pulses by their size, as fractions of the full command.
 
-    An output that is no number is 0, and so is a pulse that stands for none.
+    An output that is no number is 0, and so is a pulse that stands for none. Raises DataFileError.
     """
     values = np.nan_to_num(outputs)
     if (np.abs(values) <= 1.0).all():
