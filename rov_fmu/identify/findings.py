@@ -251,8 +251,8 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{files}: moves against the command: is the sign of {quantity} or of the commands turned? {positive} is +"
     ),
     "fractions as percent": (
-        "{files}: no command is beyond {percent:.2g} % of the full command, which moves no ROV: are fractions [1] taken "
-        "for percent [%]?"
+        "{files}: no command is beyond {percent:.2g} % of the full command, which moves no ROV: are fractions [1] "
+        "taken for percent [%]?"
     ),
     "slow time constants": (
         "{files}: time constant [s] is {ratio:.2g} times that of a vehicle that fits the other data: is it in ms?"
