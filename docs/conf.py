@@ -84,7 +84,10 @@ GALLERY = "".join(
 
 
 def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
-    """Put in what stands elsewhere; its links are seen from docs/, and to what is not on the site there is none."""
+    """Put in what stands elsewhere; its links are seen from docs/, and to what is not on the site there is none.
+
+    The first page of the site is the README.
+    """
 
     def text(match: re.Match[str]) -> str:
         if match[1] == "gallery":
@@ -96,7 +99,7 @@ def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
         whole = re.sub(r"\]\((CHANGELOG|CONTRIBUTING)\.md\)", lambda name: f"]({name[1].lower()}.md)", whole)
         return re.sub(r"\[([^\]]+)\]\(CITATION\.cff\)", r"\1 (`CITATION.cff`)", whole)
 
-    source[0] = re.sub(r"\{\{ (\S+) \}\}", text, source[0])
+    source[0] = re.sub(r"\{\{ (\S+) \}\}", text, source[0]).replace("](../README.md", "](index.md")
 
 
 def _fly(app: Sphinx, error: Exception | None) -> None:

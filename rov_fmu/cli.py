@@ -102,6 +102,13 @@ def _number(allowed: str, low: float = -inf, high: float = inf, kind: type[float
     return number
 
 
+def _setting(text: str) -> str:
+    """Return the text of an option that sets a value."""
+    if "=" not in text:
+        raise click.BadParameter(f"{shown(text)} must be NAME=VALUE, such as u_l=0.3")
+    return text
+
+
 _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is checked by the code that reads it
 
 
@@ -212,6 +219,7 @@ def _print_built(built: "Built", seconds: float) -> None:
     "--set",
     "settings",
     multiple=True,
+    type=_setting,
     metavar="NAME=VALUE",
     help="Set an input that is held, a coefficient, or a state at the start, in SI units. It may be repeated.",
 )
@@ -220,7 +228,8 @@ def _print_built(built: "Built", seconds: float) -> None:
     "commands",
     type=_FILE,
     metavar="COMMANDS.csv",
-    help="Inputs over time. The first column is the time (s); each row is held up to the next one.",
+    help="Inputs over time. The first column is the time (s), the others have the names of inputs and their values "
+    "(0.3 is a command of 30 %); each row is held up to the next one.",
 )
 @click.option(
     "--stop",
@@ -265,7 +274,7 @@ def _simulate(
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
     write_results(result, output, picture)
     if opens and picture:
-        _open(picture)
+        _open(picture, "--plot FILE.svg")
     print_end([path for path in (output, plot) if path and path != Path()])
     if not (output or picture):
         print_final(loaded, result)
@@ -321,17 +330,17 @@ def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     if output:
         print_end([path], "open it in a browser")
     else:
-        _open(path)
+        _open(path, "-o PAGE.html")
 
 
-def _open(path: Path) -> None:
-    """Print the path of a file, and open it in a browser."""
+def _open(path: Path, option: str) -> None:
+    """Print the path of a file, and open it in a browser. The option writes the file where the user wants it."""
     click.echo(path)
     if not webbrowser.open(path.as_uri()):
         click.echo(
             on_terminal(
                 "rov-fmu: no browser could be opened: open this file, which needs no other, in a browser here or on "
-                "another machine; -o PAGE.html writes it where you want it"
+                f"another machine; {option} writes it where you want it"
             ),
             err=True,
         )
@@ -354,6 +363,7 @@ def _open(path: Path) -> None:
     "--set",
     "settings",
     multiple=True,
+    type=_setting,
     metavar="NAME=VALUE",
     help="Set an input that is held (a current: V_N, V_E), a coefficient, or a state at the start, in SI units.",
 )
@@ -442,6 +452,8 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
 )
 def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do."""
+    if str(fmu) in SHIPPED and not fmu.exists():
+        raise FileError(f"{fmu}: must be an FMU; `rov-fmu build {fmu}` makes one of the vehicle with this name")
     from rov_fmu.fmu.proof import prove
     from rov_fmu.report.console import print_proof
     from rov_fmu.report.progress import parts
@@ -661,8 +673,10 @@ def _tables(vehicle: Path) -> None:
 def _figures(folder: Path, form: str, column: str) -> None:
     """Draw those figures of the paper whose data it prints into FOLDER, each with its caption.
 
-    FOLDER is created if it does not exist.
+    FOLDER is created if it does not exist. The figures are the paper's, and so of the VideoRay.
     """
+    if str(folder) in SHIPPED and not folder.exists():
+        raise FileError(f"{folder}: is the name of a vehicle, and must be the folder to write the figures to")
     from rov_fmu.report.console import console, paragraph, shell_words
     from rov_fmu.report.plots.paper_figures import write_figures
 

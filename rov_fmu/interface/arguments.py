@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from math import copysign
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -123,7 +124,7 @@ def _beyond(values: Array, command: Declaration) -> str:
         return ""
     value = values.flat[np.argmax(excess)]
     if command.unit == "1":
-        return f"±{abs(value):.6g}: commands saturate at ±1"
+        return f"{value:.6g}, which acts as {copysign(1.0, value):g}: commands saturate at ±1"
     return f"{value:.6g}: commands are pulse widths, and saturate at {low:g} and {high:g} {command.unit}"
 
 

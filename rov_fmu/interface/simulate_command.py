@@ -34,7 +34,9 @@ def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]
     """
     for option, path, suffixes in (("--output", output, _TABLE_SUFFIXES), ("--plot", plot, _PLOT_SUFFIXES)):
         if path and path.suffix.lower() not in suffixes:
-            raise InputError(f"{option} {path}: the name must end with {', '.join(suffixes[:-1])} or {suffixes[-1]}")
+            last = "; without a file, --plot comes after VEHICLE" if option == "--plot" and not path.suffix else ""
+            endings = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
+            raise InputError(f"{option} {path}: the name must end with {endings}{last}")
     check_targets(filter(None, (output, plot)), inputs)
 
 
@@ -93,9 +95,7 @@ def _read_values(settings: Sequence[str], names: Sequence[str]) -> dict[str, flo
     """Return the values of the options --set by name. Raises InputError."""
     found: dict[str, float] = {}
     for text in settings:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise InputError(f"--set {text}: must be NAME=VALUE, such as u_l=0.3")
+        name, _, value = (part.strip() for part in text.partition("="))
         if name not in names:
             hint = did_you_mean(name, names)
             raise InputError(f"--set {text}: the vehicle has no such input, state or coefficient{hint}")

@@ -9,6 +9,7 @@ from math import isfinite, nan
 from rov_fmu.io.messages import FileError, shown
 
 _NUMBER = re.compile(r"[-+0-9.][-+0-9.eE]*")
+_UNIT = re.compile(r"\s\[[^\[\]]*\]$")
 _WORDS = {"true": 1.0, "false": 0.0}
 
 Series = Mapping[str, Sequence[float]]
@@ -37,6 +38,9 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
     if twice := next((name for name in header if header.count(name) > 1), None):
         raise error(f"column {shown(twice)}: there is such a column before")
     for name in header[1:]:
+        if _UNIT.search(name):
+            plain = shown(_UNIT.sub("", name))
+            raise error(f"column {shown(name)}: must be {plain} without a unit; a command of 30 % is 0.3 here")
         check_column(name)
     rows: list[list[float]] = []
     for n, line in enumerate(lines[1:], 1):

@@ -28,7 +28,8 @@ class Recording:
     """n: s, ascending, from 0."""
     command: Array | None
     """n: the command of the axis, a fraction of the full command, held until the next. Every input that drives the
-    axis has this command, with the sign that drives it to the positive side. None where the thrusters had another pattern."""
+    axis has this command, with the sign that drives it to the positive side. None where the thrusters had another
+    pattern."""
     values: Array
     """n: NaN where the sensor has no value."""
     thrusters: Mapping[str, Array] = field(default_factory=dict)

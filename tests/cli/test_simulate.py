@@ -87,13 +87,13 @@ def test_a_plot_opens_in_a_browser(here: Path, monkeypatch: pytest.MonkeyPatch, 
 
 def test_a_command_beyond_full_is_a_warning(capsys: Capsys) -> None:
     assert main(["simulate", str(BARE), "--set", "u_t=1.5"]) == 0
-    assert capsys.readouterr().err == "rov-fmu: warning: u_t reaches ±1.5: commands saturate at ±1\n"
+    assert capsys.readouterr().err == "rov-fmu: warning: u_t reaches 1.5, which acts as 1: commands saturate at ±1\n"
 
 
 WRONG = {
     "unknown vehicle": (["videorey"], "videorey: there is no such file, "),
     "unknown name": (["--set", "ul=1"], "--set ul=1: the vehicle has no such input, state or coefficient; did you"),
-    "no value": (["--set", "u_l"], "--set u_l: must be NAME=VALUE, such as u_l=0.3"),
+    "no value": (["--set", "u_l"], "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
     "a word": (["--set", "u_l=a"], "--set u_l=a: 'a' must be a finite number"),
     "NaN": (["--set", "u_l=nan"], "--set u_l=nan: 'nan' must be a finite number"),
     "twice": (["--set", "u_l=1", "--set", "u_l=2"], "--set u_l=2: u_l is set before"),
@@ -106,7 +106,10 @@ WRONG = {
     "no duration": (["--stop", "0"], "'--stop': '0' must be a number from 1e-6 (s)"),
     "too many results": (["--step", "1e-6"], "--step 1e-06: gives more than 1000000 results up to 10 s"),
     "another table": (["-o", "result.txt"], "--output result.txt: the name must end with .csv or .parquet"),
-    "another picture": (["--plot", "videoray"], "--plot videoray: the name must end with .png, .svg or .pdf"),
+    "another picture": (["--plot", "a.gif"], "--plot a.gif: the name must end with .png, .svg or .pdf\n"),
+    "a plot before the vehicle": (["--plot", "videoray"], ".png, .svg or .pdf; without a file, --plot comes after VEH"),
+    "a value after a blank": (["--set", "u_l", "0.3"], "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
+    "a unit": (["--input", "unit.csv"], "unit.csv: column 'u_l [%]': must be 'u_l' without a unit; a command of 30 % is"),
     "no folder": (["-o", "none/result.csv"], "none/result.csv: cannot be written: there is no folder none"),
     "its own input": (["--input", "commands.csv", "-o", "commands.csv"], "commands.csv: cannot be written: would"),
     "too fast": (["-o", "a.csv", "--plot", "a.png", "--set", "r=1e300", "--set", "u=1"], "the motion cannot be"),
@@ -117,6 +120,7 @@ WRONG = {
 def test_a_mistake_is_one_line_and_writes_nothing(case: str, here: Path, capsys: Capsys) -> None:
     (here / "wrong.csv").write_text("time,ul\n0,1\n1,1\n", encoding="utf-8")
     (here / "cell.csv").write_text("time,u_l\n0,1\n1,x\n", encoding="utf-8")
+    (here / "unit.csv").write_text("time [s],u_l [%]\n0,30\n1,30\n", encoding="utf-8")
     (here / "short.csv").write_text("time,u_l\n0,1\n", encoding="utf-8")
     before = {path.name: path.read_bytes() for path in here.iterdir()}
     arguments, expected = WRONG[case]
