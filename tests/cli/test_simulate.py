@@ -85,6 +85,13 @@ def test_a_plot_opens_in_a_browser(here: Path, monkeypatch: pytest.MonkeyPatch, 
     assert path.read_bytes().startswith(b"<?xml")
 
 
+def test_without_a_browser_a_plot_has_another_way(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:
+    monkeypatch.setattr(webbrowser, "open", lambda _: False)
+    monkeypatch.setattr("tempfile.tempdir", str(here))
+    assert main(["simulate", str(BARE), "--plot"]) == 0
+    assert capsys.readouterr().err.endswith("; --plot FILE.svg writes it where you want it\n")
+
+
 def test_a_command_beyond_full_is_a_warning(capsys: Capsys) -> None:
     assert main(["simulate", str(BARE), "--set", "u_t=1.5"]) == 0
     assert capsys.readouterr().err == "rov-fmu: warning: u_t reaches 1.5, which acts as 1: commands saturate at ±1\n"
@@ -109,7 +116,10 @@ WRONG = {
     "another picture": (["--plot", "a.gif"], "--plot a.gif: the name must end with .png, .svg or .pdf\n"),
     "a plot before the vehicle": (["--plot", "videoray"], ".png, .svg or .pdf; without a file, --plot comes after VEH"),
     "a value after a blank": (["--set", "u_l", "0.3"], "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
-    "a unit": (["--input", "unit.csv"], "unit.csv: column 'u_l [%]': must be 'u_l' without a unit; a command of 30 % is"),
+    "a unit": (
+        ["--input", "unit.csv"],
+        "unit.csv: column 'u_l [%]': must be 'u_l' without a unit; a command of 30 % is",
+    ),
     "no folder": (["-o", "none/result.csv"], "none/result.csv: cannot be written: there is no folder none"),
     "its own input": (["--input", "commands.csv", "-o", "commands.csv"], "commands.csv: cannot be written: would"),
     "too fast": (["-o", "a.csv", "--plot", "a.png", "--set", "r=1e300", "--set", "u=1"], "the motion cannot be"),

@@ -92,6 +92,16 @@ def test_a_folder_that_cannot_be_made_is_one_line_and_leaves_nothing(
     assert [(found.name, found.read_text("utf-8")) for found in tmp_path.iterdir()] == [("file", "kept")]
 
 
+def test_the_name_of_a_vehicle_is_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["figures", "videoray"]) == 2
+    expected = "rov-fmu: videoray: is the name of a vehicle, and must be the folder to write the figures to\n"
+    assert capsys.readouterr().err == expected
+    assert not [*tmp_path.iterdir()]
+
+
 def test_the_documentation_shows_every_figure_that_is_drawn_with_its_caption() -> None:
     page = " ".join((ROOT / "docs" / "model.md").read_text(encoding="utf-8").split())
     assert {path.name for path in SHIPPED.iterdir()} == {
