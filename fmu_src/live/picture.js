@@ -5,6 +5,9 @@
 /** A part of the vehicle that can be drawn: its class, its path, and how near it is to the viewer.
  * @typedef {{kind: string, path: string, near: number}} Drawn */
 
+/** The width of a letter of a label and the height of its line, in pixels. */
+const [LETTER, LINE] = [6.6, 13];
+
 /** @param {Vector} a @param {Vector} b */
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
@@ -153,17 +156,24 @@ class Figure {
     const [x, y] = look([0, 0, 0]);
     const isLegible = scale * this.vehicle.size > (this.labels.children.length > 4 ? 45 : 24);
     place(this.labels, { visibility: isLegible ? "inherit" : "hidden" });
+    /** @type {{left: number, right: number, y: number}[]} */
+    const taken = [];
     [...this.labels.children].forEach((text, n) => {
       const [u, v] = look(this.shape.tubes[n].at);
       const far = Math.hypot(u - x, v - y);
       const [dx, dy] =
         Math.abs(u - x) < 0.3 * far || far < 2 ? [u < x - 1 ? -1 : 1, 0] : [(u - x) / far, (v - y) / far];
       const out = 1.6 * this.shape.radius * scale;
-      place(text, {
-        x: (u + out * dx).toFixed(1),
-        y: (v + out * dy + 4).toFixed(1),
-        class: dx < 0 ? "right" : "",
-      });
+      const at = u + out * dx;
+      const width = LETTER * (text.textContent ?? "").length;
+      const own = { left: dx < 0 ? at - width : at, right: dx < 0 ? at : at + width, y: v + out * dy + 4 };
+      for (const other of taken) {
+        const gap = own.y - other.y;
+        if (own.left < other.right && other.left < own.right && Math.abs(gap) < LINE)
+          own.y = other.y + (gap < 0 ? -LINE : LINE);
+      }
+      taken.push(own);
+      place(text, { x: at.toFixed(1), y: own.y.toFixed(1), class: dx < 0 ? "right" : "" });
     });
   }
 }
