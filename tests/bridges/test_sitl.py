@@ -392,9 +392,9 @@ def test_bad_options_are_one_line(options: Sequence[str], said: str, capsys: pyt
 
 @pytest.mark.weekly
 def test_intervals_from_flights_cover_the_truth(tmp_path: Path) -> None:
-    """The 95 % intervals of drag, identified from 20 flights with manoeuvres and sensor noise.
+    """The 95 % intervals of drag and beta, identified from 20 flights with manoeuvres and sensor noise.
 
-    A flight takes about a minute. Each row of the log has the commands of one frame, because a mean command is not the
+    A flight takes half a minute. Each row of the log has the commands of one frame, because a mean command is not the
     command of the mean thrust.
     """
     hits = []
@@ -421,8 +421,8 @@ def test_intervals_from_flights_cover_the_truth(tmp_path: Path) -> None:
         (folder / "rov.toml").write_text(ROV_TOML, encoding="utf-8")
         found = identify(load_tank_tests(folder))
         intervals = found.vehicle.intervals.items()
-        hits += [low <= HEAVY[name] <= high for name, (low, high) in intervals if name[:4] in ("a_d_", "b_d_")]
-    assert len(hits) >= 20 * 6
+        hits += [low <= HEAVY[name] <= high for name, (low, high) in intervals if name.startswith(("a_d_", "b_d_", "beta_"))]
+    assert len(hits) >= 20 * 12
     assert 0.85 <= np.mean(hits) <= 0.99
 
 
