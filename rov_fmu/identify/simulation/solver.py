@@ -21,6 +21,9 @@ _FINE = 1e-5
 """With a larger tolerance, a fit only searches for a start, and need not end at the bounds."""
 _ITERATIONS = 12
 _HALVINGS = 6
+_STEEPEST = 1e140
+"""A bound of derivatives whose squares and products do not overflow."""
+_NO_MOTION = "the motion cannot be computed with these coefficients"
 
 
 def solve(
@@ -33,7 +36,7 @@ def solve(
     low, high = limits(model.base, model.data, model.names, model.extras, len(start))
     x = np.clip(start, low, high)
     if not np.isfinite(model.residuals(x)).all():
-        raise MotionError("the motion cannot be computed with these coefficients")
+        raise MotionError(_NO_MOTION)
     search = _Search(model, x, robust=loss == "huber", tolerance=tolerance, on_step=on_step)
     p = model.shared
     if p:
@@ -56,7 +59,7 @@ def solve(
 def settled(model: Simulator, x: Array) -> Array:
     """Return the parameters with the values at the start that fit best. Raises MotionError."""
     if not np.isfinite(model.residuals(x)).all():
-        raise MotionError("the motion cannot be computed with these coefficients")
+        raise MotionError(_NO_MOTION)
     return _Search(model, x, robust=False, tolerance=1e-6).settled(x[: model.shared])
 
 
@@ -101,6 +104,8 @@ class _Search:
         """Return the derivatives of the residuals, without what the values at the start absorb."""
         model, p = self.model, self.model.shared
         r, J = self.linear(self.settled(shared))
+        if not (np.abs(J) < _STEEPEST).all():
+            raise MotionError(_NO_MOTION)
         found = J[:, :p].copy()
         for n, place in enumerate(model.flights):
             rows = np.concatenate([place.rows, model.prior_rows(place)])
