@@ -218,8 +218,8 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
     **{kind: _effect(f"{{axes}}: {effect.sentence}") for kind, effect in EFFECTS.items()},
     "delay not modelled": _effect(
-        "The motion in {axes} followed the commands {value} s late{interval}: the model has no delay, put one in "
-        "front of the commands."
+        "The motion in {axes} followed the commands {value} s late{interval}: the vehicle file has no delay; "
+        "T_d in [commands] adds one to the FMU."
     ),
     # Structure of the model
     "unexplained": _unexplained,
