@@ -93,12 +93,14 @@ def test_intervals_cover_and_are_narrower_with_the_table() -> None:
     assert sum(covered) >= len(covered) - 2
 
 
-@pytest.mark.parametrize("scale", [1.1, 1.3])
+@pytest.mark.parametrize("scale", [1.02, 1.05, 1.1, 1.3])
 def test_a_wrong_table_does_not_spoil_the_fit(scale: float) -> None:
     """A velocity that is far off, as with a wrong unit, counts linearly and not by its square."""
     fit = fitted(0, tables=True, scale=scale)
     for command in COMMANDS[1:6]:
         assert fit.rov.response(HEAVE, command)[0] == pytest.approx(responses(command)[0], rel=0.01)
+    if scale <= 1.05:
+        assert all(low <= TRUTH[name] <= high for name, (low, high) in fit.estimate.part(NAMES).intervals.items())
 
 
 def test_the_points_are_counted() -> None:
