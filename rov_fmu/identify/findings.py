@@ -144,10 +144,12 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{curve} thrust: {count:g} points for two coefficients leave no degree of freedom, so there are no intervals"
     ),
     "backward thrust": (
-        "{curve} thrust: the curve points backward below {command:.0%}; weigh high commands out (windows)"
+        "{curve} thrust: the curve points backward below {command:.0%}; forces at weaker commands show whether it is "
+        "a dead band, otherwise weigh high commands out (windows)"
     ),
     "backward thrust in reverse": (
-        "{curve} thrust: the curve in reverse points backward below {command:.0%}; weigh high commands out (windows)"
+        "{curve} thrust: the curve in reverse points backward below {command:.0%}; forces at weaker commands show whether it is "
+        "a dead band, otherwise weigh high commands out (windows)"
     ),
     "asymmetry": _asymmetry,
     # Drag and beta from points

@@ -365,6 +365,9 @@ def _title(name: str, column: Column) -> str:
     return f"{name} [{next(iter(column.units))}]"
 
 
+FORCE_UNITS = {"N": 1.0, "kgf": 1.0 / 9.80665, "lbf": 1.0 / 4.4482216152605}
+"""The units of a force, as files spell them, and 1 N in each."""
+
 # ---- Pulses ----------------------------------------------------------------------------------------------------------
 
 NEUTRAL, SPAN = 1500.0, 400.0

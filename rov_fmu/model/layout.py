@@ -210,14 +210,18 @@ CROSS = {
 """Coefficients of two or three axes. Names end in the velocities: m_a_uq; of lift, they begin with the force: Y_ur."""
 COMMANDS = {"T_d": CoefficientKind("s", "Dead time T_d from a command to its effect", 1e-4, 1.0, needed=False)}
 """The coefficients of all commands together."""
+_QUARTER = 1.5708
+"""A quarter of a turn, rad, rounded up as people write it."""
 ARM = {
     "R": CoefficientKind("m", "Distance from the centre of mass to a rear thruster R, (4)", 0.0, 100.0),
-    "gamma": CoefficientKind("rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, pi / 2),
+    "gamma": CoefficientKind(
+        "rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, _QUARTER
+    ),
 }
 FIN = {
     "lift": CoefficientKind("N.s2/(m2.rad)", "Lift of the {fin} per u|u| and angle", 0.0, 1e6),
     "drag": CoefficientKind("N.s2/(m2.rad2)", "Drag of the {fin} per u|u| and square of its angle", 0.0, 1e6, False),
-    "angle_max": CoefficientKind("rad", "Angle of the {fin} at full command", 1e-3, pi / 2),
+    "angle_max": CoefficientKind("rad", "Angle of the {fin} at full command", 1e-3, _QUARTER),
 }
 """The coefficients of a control surface."""
 CURVE = {

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from math import pi
 
-from rov_fmu.io.csv_table import PULSES, Column, Columns, DataFileError, pulses
+from rov_fmu.io.csv_table import FORCE_UNITS, PULSES, Column, Columns, DataFileError, pulses
 from rov_fmu.io.messages import shown
 from rov_fmu.model.layout import Axis
 
@@ -22,7 +22,7 @@ _MOST_POSITION = 1e7
 COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
 HELD_COMMAND = replace(COMMAND, least=1e-4)
 LOGGED_COMMAND = replace(COMMAND, conversions=dict.fromkeys(PULSES, pulses))
-FORCE = Column({"N": 1.0}, minimum=-1e6, maximum=1e6)
+FORCE = Column(FORCE_UNITS, also=("thrust",), minimum=-1e6, maximum=1e6)
 TIME = Column(TIMES, minimum=-1e10, maximum=1e10)  # some loggers count from 1970
 
 VOLTAGE = Column({"V": 1.0, "mV": 1000.0}, True, True, 0.0, 1e4, also=("battery", "battery voltage"))

@@ -205,7 +205,8 @@ def _missing_hardware(description: Description, layout: Layout, known: Collectio
         needed |= dict.fromkeys(ARM, YAW)
     for name in layout.coefficients:
         if name in needed and name not in {*known, *description.named}:
-            yield key_line(f"known.{name}", f"this key is missing, and the vehicle has {needed[name].name}")
+            form = f'{name} = {{ value = ..., unit = "{layout.coefficients[name].unit}", source = "..." }}'
+            yield key_line(f"known.{name}", f"this key is missing, and the vehicle has {needed[name].name}: {form}")
 
 
 def _missing_or_doubled_tests(

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 
-from rov_fmu.io.csv_table import PULSES, Column, DataFileError, pulses, read_columns
+from rov_fmu.io.csv_table import FORCE_UNITS, PULSES, Column, DataFileError, pulses, read_columns
 from rov_fmu.model.layout import ThrustTable
 
 _COMMAND = Column(
     {"1": 1.0, "%": 100.0}, minimum=-1.0, maximum=1.0, also=("pulse", "pwm"), conversions=dict.fromkeys(PULSES, pulses)
 )
-_THRUST = Column(
-    {"N": 1.0, "kgf": 1.0 / 9.80665, "lbf": 1.0 / 4.4482216152605}, also=("force",), minimum=-1e6, maximum=1e6
-)
+_THRUST = Column(FORCE_UNITS, also=("force",), minimum=-1e6, maximum=1e6)
 _CURRENT = Column({"A": 1.0}, minimum=0.0, maximum=1e4)
 _MOST_POINTS = 2000
 _WIDEST = 0.05
