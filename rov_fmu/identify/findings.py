@@ -148,8 +148,8 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "a dead band, otherwise weigh high commands out (windows)"
     ),
     "backward thrust in reverse": (
-        "{curve} thrust: the curve in reverse points backward below {command:.0%}; forces at weaker commands show whether it is "
-        "a dead band, otherwise weigh high commands out (windows)"
+        "{curve} thrust: the curve in reverse points backward below {command:.0%}; forces at weaker commands show "
+        "whether it is a dead band, otherwise weigh high commands out (windows)"
     ),
     "asymmetry": _asymmetry,
     # Drag and beta from points
