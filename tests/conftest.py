@@ -7,6 +7,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from filelock import FileLock
+from fmpy.fmi2 import defaultCallbacks, fmi2CallbackLoggerTYPE, printLogMessage
 from hypothesis import settings
 
 from rov_fmu.build import chosen_platforms
@@ -18,6 +19,11 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.fmi2 import Fmu
 from tests.model.steps import Step, in_fmu, in_python
 from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
+
+_LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
+defaultCallbacks.logger = _LOGGER
+"""The logger of instances without one. FMPy 0.3 forwards messages to the logger that it was given last in the process,
+even after that logger is gone, and would then crash."""
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -19,7 +19,7 @@ NUMBERS = {
     "m_rov": (1e-3, 1e6, None),
     "I_r": (1e-6, 1e6, None),
     "R": (0.0, 100.0, None),
-    "gamma": (0.0, pi / 2.0, None),
+    "gamma": (0.0, 1.5708, None),
     CURVES: (-1e6, 1e6, None),
     DRAG: (0.0, 1e6, None),
     TUNING: (0.0, 1e3, None),
