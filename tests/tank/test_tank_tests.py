@@ -71,6 +71,14 @@ def test_columns_in_any_order_and_unit(folder: Path) -> None:
     assert found.time_constants["yaw"][0].value == pytest.approx(3.05)
 
 
+@pytest.mark.parametrize(("header", "newton"), [("force [kgf]", 9.80665), ("thrust [lbf]", 4.4482216152605)])
+def test_a_spring_balance_in_other_units(header: str, newton: float, folder: Path) -> None:
+    (folder / "thrust_rear.csv").write_text(f"command [%],{header}\n50,1.5\n-20,-0.3\n", encoding="utf-8")
+    without_curve(folder, "rear")
+    forces = [row.value for row in load_tank_tests(folder).thrust["rear"]]
+    assert forces == pytest.approx([1.5 * newton, -0.3 * newton], rel=1e-15)
+
+
 def without_curve(folder: Path, name: str) -> None:
     """Return a folder without a given thrust curve."""
     path = folder / "rov.toml"
