@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 import tomlkit
 
-from docs import reference
+from docs import compared, reference
 from rov_fmu import __version__
 from rov_fmu.cli import _commands, main
 from rov_fmu.model.layout import ARM, AXIS, BODY, CURVE, TUNING
@@ -114,6 +114,13 @@ def module_of(words: Sequence[str]) -> tuple[tuple[str, ...], Sequence[str]]:
 
 def test_readme_is_read_in_one_sitting() -> None:
     assert len(README.read_text(encoding="utf-8").splitlines()) <= 90
+
+
+def test_the_first_page_says_how_far_its_models_are_off() -> None:
+    _, _, *rows = compared.tables()["videoray_measured"]
+    paper, refit = (max(abs(float(row[n].rstrip("%"))) for row in rows) for n in (1, 2))
+    text = " ".join(README.read_text(encoding="utf-8").split())
+    assert f"up to {paper:.0f} % off the steady velocities that it measured, the refit up to {refit:.0f} %" in text
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
