@@ -1,7 +1,7 @@
 """The sentences about an identification, by kind of finding."""
 
 from collections.abc import Callable, Iterable, Mapping
-from math import pi
+from math import log, pi
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +111,22 @@ def _wrong_scale(values: Mapping[str, Any]) -> str:
     )
 
 
+def _weak_thrust(values: Mapping[str, Any]) -> str:
+    """Explain that all axes of a curve move as if the thrust were several times as strong.
+
+    The factor makes β 1. With added mass, the usual β of ROVs is about 0.65, so the forces are weaker than it tells.
+    """
+    factor = float(values["factor"])
+    causes = {9.80665: "are they in kgf", 4.4482216: "are they in lbf"}
+    if values["together"] != "1":
+        causes[float(values["together"])] = f"are they of one thruster, and not of all {values['together']} together"
+    cause = causes[min(causes, key=lambda other: abs(log(0.65 * other / factor)))]
+    return (
+        f"{values['curve']} thrust: {values['axes']} move as if the forces of thrust_{values['curve']}*.csv were at "
+        f"least {factor:.2g} times as strong: {cause}?"
+    )
+
+
 _CAUSES = {
     "voltage": (
         "the residuals grow as the voltage changes. A thrust that depends on it would explain it: put "
@@ -144,12 +160,12 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{curve} thrust: {count:g} points for two coefficients leave no degree of freedom, so there are no intervals"
     ),
     "backward thrust": (
-        "{curve} thrust: the curve points backward below {command:.0%}; forces at weaker commands show whether it is "
-        "a dead band, otherwise weigh high commands out (windows)"
+        "{curve} thrust: the curve points backward below {command:.0%}; a dead band would explain it: measure forces "
+        "at weaker commands, or state it as c_0_{curve} in [known]"
     ),
     "backward thrust in reverse": (
-        "{curve} thrust: the curve in reverse points backward below {command:.0%}; forces at weaker commands show "
-        "whether it is a dead band, otherwise weigh high commands out (windows)"
+        "{curve} thrust: the curve in reverse points backward below {command:.0%}; a dead band would explain it: "
+        "measure forces at weaker commands, or state it as c_0_{curve} in [known]"
     ),
     "asymmetry": _asymmetry,
     # Drag and beta from points
@@ -244,6 +260,7 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{beta} = {value:.3g} is not within the usual {low:g} ... {high:g}: the vehicle would move as if its inertia "
         "were {inertia}, which no known vehicle does. Check the wanted Tau (s) and {mass}"
     ),
+    "weak thrust": _weak_thrust,
     "wrong scale": _wrong_scale,
     "too fast": (
         "{files}: {quantity} [{unit}] tells of {speed:.3g} {speed_unit}, which no ROV reaches: is its unit right, and "

@@ -26,7 +26,7 @@ from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, measured
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit, count
 from rov_fmu.identify.simulation.limits import MotionError, NoFitError
-from rov_fmu.identify.slips.search import beta_out_of_range
+from rov_fmu.identify.slips.search import beta_out_of_range, weak_thrust
 from rov_fmu.identify.together import Together
 from rov_fmu.identify.usable import UnusableError, check_push, check_recording, check_slips, is_pushed
 from rov_fmu.io.csv_table import DataFileError
@@ -100,12 +100,15 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
         if backward := [*no_thrust(curve, found.rov.coefficients, place)]:
             raise DataFileError(f"{tests.folder}: {backward[0]}")
     results.sort(key=lambda result: [*given.rov.layout.kinds].index(result.axis.name))
-    findings = [*tests.findings, *doubts]
+    fitted = [result.axis for result in results if result.estimate]
+    weak = weak_thrust(found.rov, thrust, fitted)
+    explained = {finding.axis for finding in weak}
+    findings = [*weak, *tests.findings, *(f for f in doubts if f.kind != "wrong scale" or f.axis not in explained)]
     for name, fit in thrust.items():
         findings += diagnostics.on_thrust(name, fit)
     for result in results:
         findings += result.findings
-    findings += filter(None, (beta_out_of_range(found.rov, result.axis) for result in results if result.estimate))
+    findings += filter(None, (beta_out_of_range(found.rov, axis) for axis in fitted if axis.name not in explained))
     drifting = {finding.axis for finding in findings if finding.names.get("cause") == "drift"}
     for n, result in enumerate(results):
         on_progress(f"what to measure next of {result.axis.name}", _FITTED + (1.0 - _FITTED) * n / len(results))

@@ -96,6 +96,13 @@ def check_slips(tests: TankTests, axes: Sequence[Axis], base: Rov) -> list[Findi
         {axis.name: _by_file(rows.get(axis.name, ())) for axis in axes} for rows in (tests.steady, tests.time_constants)
     )
     findings = slips(recordings, base, tests.given.known, steady, time_constants)
+    for axis in axes:
+        files = {*(recording.file for recording in recordings[axis.name]), *steady[axis.name]}
+        wrong = [f for f in findings if f.kind == "wrong scale" and f.axis == axis.name]
+        if files == {finding.file for finding in wrong}:  # no other file of the axis agrees with the thrust
+            curves = {thruster.curve for thruster in base.layout.drivers(axis)}
+            forces = ", ".join(sorted({row.file for curve in curves for row in tests.thrust.get(curve, ())}))
+            findings = tuple(replace(f, names={**f.names, "others": forces}) if f in wrong else f for f in findings)
     if certain := [finding for finding in findings if finding.certain]:
         raise DataFileError(*refusals(certain, tests.folder))
     return list(findings)

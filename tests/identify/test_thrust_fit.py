@@ -204,3 +204,13 @@ def test_intervals_cover_the_truth(form: str, seeds: int, most_wrong: float) -> 
     assert all(low <= share <= high for share in found.values()), found
     assert ((bands >= low) & (bands <= high)).all(), bands
     assert wrong <= most_wrong
+
+
+def test_dead_band_is_found_from_forces_at_twice_its_commands() -> None:
+    """The curve beyond it tells where it ends, and a curve that points backward is less likely."""
+    levels = np.repeat([0.08, 0.15, 0.25, 0.4, 0.55, 0.75, 1.0], 2)
+    commands = np.concatenate([-levels, levels])
+    fits = [fit_of(commands, seed, noise=0.05, c_0=0.04) for seed in range(10)]
+    found = [fit.values[CURVE.coefficient("c_0")] for fit in fits if taken(fit)[DEAD]]
+    assert len(found) >= 8
+    assert np.median(found) == pytest.approx(0.04, rel=0.1)

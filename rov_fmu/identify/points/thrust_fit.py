@@ -27,6 +27,8 @@ from rov_fmu.vehicle.uncertainty import quantile
 
 _DIGITS = 1e-5
 """The resolution of a scale, relative to the strongest force."""
+_WEAKEST = 3.0
+"""The weakest command is at most this many dead bands. The curve beyond tells a dead band less and less well."""
 _GRID = {1: 24, 2: 8}
 """The number of dead bands to start from, by the number of dead bands that are fitted."""
 
@@ -170,10 +172,10 @@ class _Candidate:
         for end in ends or ():
             if (self.data.levels(end) > dead[end]).sum() < 2:
                 return False
-        for end in ("", REVERSE):  # a dead band has a command inside it, or as far from its end as that is from zero
+        for end in ("", REVERSE):
             if self.curve.coefficient("c_0" + end) in self.names:
                 levels = self.data.levels(end) if "c_0" + REVERSE in self.curve.keys else self.data.levels("", REVERSE)
-                if levels.min(initial=inf) > 2.0 * dead[end]:
+                if levels.min(initial=inf) > _WEAKEST * dead[end]:
                     return False
         return True
 

@@ -4,7 +4,7 @@ Every recording is examined by itself first (rov_fmu/identify/slips/single_recor
 together (rov_fmu/identify/slips/explanation.py). A finding that is certain refuses the file; others become warnings.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import inf, isfinite, nan
 
 import numpy as np
@@ -25,6 +25,8 @@ BETA = 0.05, 1.2
 BETA_WITH_ADDED_MASS = 0.3, 3.0
 _WEAKEST_COMMANDS = 0.01
 """Commands that never exceed this are fractions taken for percent."""
+_ALIKE = 2.5
+"""The ratio below which β of two axes may be wrong by one cause."""
 _FAR, _VERY_FAR = 20.0, 100.0
 """The ratio of time constants from which a file is doubtful, and from which it is refused."""
 
@@ -78,6 +80,27 @@ def beta_out_of_range(rov: Rov, axis: Axis) -> Finding | None:
     return Finding(
         "implausible beta", axis=axis.name, names=names, numbers={"value": rov[beta], "low": low, "high": high}
     )
+
+
+def weak_thrust(rov: Rov, curves: Collection[str], axes: Iterable[Axis]) -> tuple[Finding, ...]:
+    """Return the tested thrust curves that must be too weak, each as one finding about every axis that they drive.
+
+    All axes of such a curve have about the same β, and it is beyond those of known vehicles.
+    """
+    found: list[Finding] = []
+    by_curve: dict[str, list[Axis]] = {}
+    for axis in axes:
+        first, *others = {thruster.curve for thruster in rov.layout.drivers(axis)}
+        if first in curves and not others:
+            by_curve.setdefault(first, []).append(axis)
+    for curve, driven in by_curve.items():
+        betas = [rov[axis.coefficient("beta")] for axis in driven]
+        beyond = [beta > beta_range(rov, axis)[1] for axis, beta in zip(driven, betas, strict=True)]
+        if len(driven) > 1 and all(beyond) and max(betas) < _ALIKE * min(betas):
+            together = next(c.together for c in rov.layout.curves if c.name == curve)
+            names = {"factor": repr(float(np.exp(np.mean(np.log(betas))))), "together": str(together)}
+            found += [Finding("weak thrust", axis.name, curve, names=names) for axis in driven]
+    return tuple(found)
 
 
 def _examine_each(
