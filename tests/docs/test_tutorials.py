@@ -18,6 +18,7 @@ from examples.tank_tests import DELAY, OTTER, bollard_pull, write_tests
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import SURGE
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.findings import accuracies, by_heading
@@ -247,3 +248,31 @@ def test_what_the_tutorial_says_of_the_stopping_distance_is_so(stopped: dict[str
         if line.startswith(("a_d_u = { e", "b_d_u = { e"))
     )
     assert f"[estimates]\n{table}" in STOP.read_text(encoding="utf-8")
+
+
+def in_another_unit(folder: Path, newton: float) -> None:
+    """Make a folder of tank tests whose rear forces are in another unit than their header says."""
+    write_tests(folder)
+    path = folder / "thrust_rear.csv"
+    header, *rows = path.read_text(encoding="utf-8").splitlines()
+    weak = [f"{command},{float(force) / newton:.4f}" for command, force in (row.split(",") for row in rows)]
+    path.write_text("\n".join([header, *weak]) + "\n", encoding="utf-8")
+
+
+def test_forces_in_lbf_are_named_and_not_the_recordings(tmp_path: Path) -> None:
+    """Surge and yaw share the forces of the rear thrusters and no recording."""
+    in_another_unit(tmp_path, 4.4482)
+    found = identify(load_tank_tests(tmp_path)).warnings
+    assert found[0].startswith("rear thrust: surge and yaw move as if the forces of thrust_rear*.csv were at least ")
+    assert found[0].endswith("times as strong: are they in lbf?")
+    assert not [line for line in found if "fits thrust, size and other files" in line or "of any vehicle known" in line]
+
+
+def test_recordings_that_contradict_all_forces_may_be_right(tmp_path: Path) -> None:
+    in_another_unit(tmp_path, 9.80665)
+    with pytest.raises(DataFileError) as refused:
+        identify(load_tank_tests(tmp_path))
+    lines = str(refused.value).splitlines()
+    assert [line.endswith("Or else are those wrong that it contradicts: thrust_rear.csv?") for line in lines] == [
+        True
+    ] * 3

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from examples.tank_tests import OTTER, write_tests
 from rov_fmu.cli import main
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
@@ -253,34 +252,6 @@ def test_an_identification_takes_seconds(logs: Callable[[], list[Recording]], se
     assert time.process_time() - began <= seconds
 
 
-def in_another_unit(folder: Path, newton: float) -> None:
-    """Make a folder of tank tests whose rear forces are in another unit than their header says."""
-    write_tests(folder)
-    path = folder / "thrust_rear.csv"
-    header, *rows = path.read_text(encoding="utf-8").splitlines()
-    weak = [f"{command},{float(force) / newton:.4f}" for command, force in (row.split(",") for row in rows)]
-    path.write_text("\n".join([header, *weak]) + "\n", encoding="utf-8")
-
-
-def test_forces_in_lbf_are_named_and_not_the_recordings(tmp_path: Path) -> None:
-    """Surge and yaw share the forces of the rear thrusters and no recording."""
-    in_another_unit(tmp_path, 4.4482)
-    found = identify(load_tank_tests(tmp_path)).warnings
-    assert found[0].startswith("rear thrust: surge and yaw move as if the forces of thrust_rear*.csv were at least ")
-    assert found[0].endswith("times as strong: are they in lbf?")
-    assert not [line for line in found if "fits thrust, size and other files" in line or "of any vehicle known" in line]
-
-
-def test_recordings_that_contradict_all_forces_may_be_right(tmp_path: Path) -> None:
-    in_another_unit(tmp_path, 9.80665)
-    with pytest.raises(DataFileError) as refused:
-        identify(load_tank_tests(tmp_path))
-    lines = str(refused.value).splitlines()
-    assert [line.endswith("Or else are those wrong that it contradicts: thrust_rear.csv?") for line in lines] == [
-        True
-    ] * 3
-
-
 @pytest.mark.parametrize(
     ("beta_u", "beta_r", "curves", "said"),
     [
@@ -298,7 +269,7 @@ def test_recordings_that_contradict_all_forces_may_be_right(tmp_path: Path) -> N
 def test_weak_forces_are_seen_in_all_axes_of_a_curve(
     beta_u: float, beta_r: float, curves: tuple[str, ...], said: str
 ) -> None:
-    rov = OTTER.replaced({"beta_u": beta_u, "beta_r": beta_r})
+    rov = VIDEORAY.replaced({"beta_u": beta_u, "beta_r": beta_r})
     (line,) = sentences(weak_thrust(rov, curves, [SURGE, HEAVE, YAW])) or ("",)
     assert line.endswith(said)
     assert bool(line) == bool(said)
