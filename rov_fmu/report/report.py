@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
 from rov_fmu.identify.next_test import REPEATED
+from rov_fmu.identify.recordings.prediction_errors import shown_in
 from rov_fmu.identify.recordings.recordings_fit import count
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.io.messages import Progress, silent
@@ -171,7 +172,9 @@ def _holds(tests: TankTests) -> dict[str, str]:
 
 def scatter(simulation: Simulation) -> str:
     """Return the size of the residuals in words, and whether they are white noise."""
-    size, unit = number(simulation.noise, 2), simulation.recording.unit
+    recording = simulation.recording
+    factor, unit = shown_in(recording.axis, "position" if recording.is_position else "velocity")
+    size, unit = number(factor * simulation.noise, 2), unit.replace("deg", "°")
     if simulation.correlation_time < _WHITE:
         return f"residuals of {size} {unit}, white: the sensor’s noise"
     return f"residuals of {size} {unit}, correlated over {simulation.correlation_time:.0f} samples: more than noise"

@@ -1,6 +1,7 @@
 """The parts of a report, from results made by hand: what is known, steps close up, effects, noise that is none."""
 
-from math import exp, log
+from dataclasses import replace
+from math import degrees, exp, log
 
 import numpy as np
 import pytest
@@ -11,12 +12,13 @@ from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings.held_out import HeldOut
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.layout import HEAVE, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.findings import Known, acting, effects, verdict
 from rov_fmu.report.plots.fits import plot_known
 from rov_fmu.report.plots.recordings import clearest_step, modelled, plot_recording, plot_step
 from rov_fmu.report.report import scatter
+from rov_fmu.report.templates import number
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -165,3 +167,6 @@ def test_residuals_are_noise_only_where_they_are_white() -> None:
     assert scatter(recorded("a.csv", {1.0: 0.3})) == "residuals of 10⁻⁵ m, white: the sensor’s noise"
     found = scatter(recorded("a.csv", {1.0: 0.3}, white=12.3))
     assert found == "residuals of 10⁻⁵ m, correlated over 12 samples: more than noise"
+    heave = recorded("a.csv", {1.0: 0.3})
+    yaw = replace(heave, recording=replace(heave.recording, axis=YAW, quantity="heading"))
+    assert scatter(yaw) == f"residuals of {number(degrees(yaw.noise), 2)} °, white: the sensor’s noise"

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from typing import Any, ClassVar
 
 from rov_fmu.identify.driving import curves_of
@@ -68,7 +69,7 @@ class Effect(ABC):
     """The value with which the search begins."""
     likely: ClassVar[float] = 0.0
     """The value that is expected before the data are seen."""
-    limits: ClassVar[tuple[float, float]]
+    limits: ClassVar[tuple[float, float]] = -inf, inf
     """The least and the greatest value that the search may reach."""
     deviation: ClassVar[float] = 0.5
     """The standard deviation of the value before the data are seen."""

@@ -147,7 +147,8 @@ def effects_of(analysis: ResidualAnalysis, kept: Collection[Effect]) -> dict[Eff
     for n, (extra, value) in enumerate(model.extra_values(analysis.x).items(), len(model.names)):
         half = reach * float(np.sqrt(found[n, n]))
         axis = axis_of(extra, recordings)
-        interval = (value - half, value + half) if np.isfinite(half) else None
+        low, high = value - half, value + half
+        interval = None if (low < extra.limits[0] and high > extra.limits[1]) or not np.isfinite(half) else (low, high)
         effects[extra] = FittedEffect(extra.kind, extra.of, extra.unit(axis), value, interval, extra in kept)
     return effects
 
