@@ -40,7 +40,7 @@ def _drag_at_zero(values: Mapping[str, Any]) -> str:
     unbounded = f" (by (11)-(13) alone {values['unbounded']:.3g})" if "unbounded" in values else ""
     return (
         f"{values['axes']}: {values['coefficient']} is at its bound of 0, the fit without bounds is "
-        f"negative{unbounded}, which drag cannot be"
+        f"negative{unbounded}, which it cannot be"
     )
 
 
