@@ -102,6 +102,12 @@ def _number(allowed: str, low: float = -inf, high: float = inf, kind: type[float
     return number
 
 
+def _refuse_vehicle(path: Path, reason: str) -> None:
+    """Raise FileError if a path that does not exist is the name of a vehicle that ships."""
+    if str(path) in SHIPPED and not path.exists():
+        raise FileError(f"{path}: {reason}")
+
+
 def _setting(text: str) -> str:
     """Return the text of an option that sets a value."""
     if "=" not in text:
@@ -452,8 +458,7 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
 )
 def _prove(fmu: Path, interface: str | None, tolerance: float | None) -> None:
     """Run the experiments that an FMU contains (FMI-LS-REF), and compare the results. Any exporter's FMU will do."""
-    if str(fmu) in SHIPPED and not fmu.exists():
-        raise FileError(f"{fmu}: must be an FMU; `rov-fmu build {fmu}` makes one of the vehicle with this name")
+    _refuse_vehicle(fmu, f"must be an FMU; `rov-fmu build {fmu}` makes one of the vehicle with this name")
     from rov_fmu.fmu.proof import prove
     from rov_fmu.report.console import print_proof
     from rov_fmu.report.progress import parts
@@ -675,8 +680,7 @@ def _figures(folder: Path, form: str, column: str) -> None:
 
     FOLDER is created if it does not exist. The figures are the paper's, and so of the VideoRay.
     """
-    if str(folder) in SHIPPED and not folder.exists():
-        raise FileError(f"{folder}: is the name of a vehicle, and must be the folder to write the figures to")
+    _refuse_vehicle(folder, "is the name of a vehicle, and must be the folder to write the figures to")
     from rov_fmu.report.console import console, paragraph, shell_words
     from rov_fmu.report.plots.paper_figures import write_figures
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu.identify.effects.catalogue import EFFECTS
+from rov_fmu.io.csv_table import FORCE_UNITS
 from rov_fmu.tank import findings
 from rov_fmu.tank.findings import Finding, SentenceForm
 from rov_fmu.vehicle.uncertainty import with_interval
@@ -111,16 +112,21 @@ def _wrong_scale(values: Mapping[str, Any]) -> str:
     )
 
 
+_USUAL_BETA = 0.65
+"""β of an ROV whose added mass is about half of its mass."""
+
+
 def _weak_thrust(values: Mapping[str, Any]) -> str:
     """Explain that all axes of a curve move as if the thrust were several times as strong.
 
-    The factor makes β 1. With added mass, the usual β of ROVs is about 0.65, so the forces are weaker than it tells.
+    The factor is the mean of β, so with forces that are stronger by it, β would be 1. It is a lower bound, because β of
+    an ROV is below 1. The likely cause is the one whose factor leads to a usual β.
     """
     factor = float(values["factor"])
-    causes = {9.80665: "are they in kgf", 4.4482216: "are they in lbf"}
+    causes = {1.0 / of_newton: f"are they in {unit}" for unit, of_newton in FORCE_UNITS.items() if unit != "N"}
     if values["together"] != "1":
         causes[float(values["together"])] = f"are they of one thruster, and not of all {values['together']} together"
-    cause = causes[min(causes, key=lambda other: abs(log(0.65 * other / factor)))]
+    cause = causes[min(causes, key=lambda other: abs(log(_USUAL_BETA * other / factor)))]
     return (
         f"{values['curve']} thrust: {values['axes']} move as if the forces of thrust_{values['curve']}*.csv were at "
         f"least {factor:.2g} times as strong: {cause}?"

@@ -1,6 +1,6 @@
 """Check that the tests have enough content for a fit, and that their units and signs make sense."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -97,15 +97,22 @@ def check_slips(tests: TankTests, axes: Sequence[Axis], base: Rov) -> list[Findi
     )
     findings = slips(recordings, base, tests.given.known, steady, time_constants)
     for axis in axes:
-        files = {*(recording.file for recording in recordings[axis.name]), *steady[axis.name]}
-        wrong = [f for f in findings if f.kind == "wrong scale" and f.axis == axis.name]
-        if files == {finding.file for finding in wrong}:  # no other file of the axis agrees with the thrust
-            curves = {thruster.curve for thruster in base.layout.drivers(axis)}
-            forces = ", ".join(sorted({row.file for curve in curves for row in tests.thrust.get(curve, ())}))
-            findings = tuple(replace(f, names={**f.names, "others": forces}) if f in wrong else f for f in findings)
+        wrong = {finding.file for finding in findings if finding.kind == "wrong scale" and finding.axis == axis.name}
+        if wrong == {*(recording.file for recording in recordings[axis.name]), *steady[axis.name]}:
+            findings = _with_forces(findings, axis, tests, base)
     if certain := [finding for finding in findings if finding.certain]:
         raise DataFileError(*refusals(certain, tests.folder))
     return list(findings)
+
+
+def _with_forces(findings: Iterable[Finding], axis: Axis, tests: TankTests, base: Rov) -> tuple[Finding, ...]:
+    """Name the files of the forces in the wrong scales of an axis, because no file of the axis agrees with them."""
+    curves = {thruster.curve for thruster in base.layout.drivers(axis)}
+    files = ", ".join(sorted({row.file for curve in curves for row in tests.thrust.get(curve, ())}))
+    return tuple(
+        replace(f, names={**f.names, "others": files}) if (f.kind, f.axis) == ("wrong scale", axis.name) else f
+        for f in findings
+    )
 
 
 def _by_file(rows: Sequence[Row]) -> dict[str, list[tuple[float, float]]]:

@@ -120,7 +120,10 @@ def test_the_first_page_says_how_far_its_models_are_off() -> None:
     _, _, *rows = compared.tables()["videoray_measured"]
     paper, refit = (max(abs(float(row[n].rstrip("%"))) for row in rows) for n in (1, 2))
     text = " ".join(README.read_text(encoding="utf-8").split())
-    assert f"up to {paper:.0f} % off the steady velocities that it measured, the refit up to {refit:.0f} %" in text
+    assert (
+        f"up to {paper:.0f} % off the steady velocities that the paper measured, and the refit is up to {refit:.0f} %"
+        in text
+    )
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)

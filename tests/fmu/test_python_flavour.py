@@ -179,6 +179,9 @@ def test_both_flavours_tilt_the_same_way(tmp_path: Path, six_dir: Path) -> None:
         slave.setFMUState(state)
     compare()
     assert both[0].getReal([place["psi"]]) == pytest.approx([7.0])
+    before = both[0].getReal([place["eta"]])
+    both[0].setReal([place["eta"]], [1.0])
+    assert both[0].getReal([place["eta"]]) == before != [1.0]
     for slave in both:
         slave.terminate()
         slave.freeInstance()

@@ -32,7 +32,7 @@ class FittedEffect:
     unit: str
     value: float
     interval: tuple[float, float] | None
-    """The 95 % interval; None where the effect is not identifiable."""
+    """The 95 % interval; None where it is not finite, or is beyond both limits of the search."""
     kept: bool
     """True when the data justify the effect; otherwise the fit is without it."""
 
@@ -147,8 +147,9 @@ def effects_of(analysis: ResidualAnalysis, kept: Collection[Effect]) -> dict[Eff
     for n, (extra, value) in enumerate(model.extra_values(analysis.x).items(), len(model.names)):
         half = reach * float(np.sqrt(found[n, n]))
         axis = axis_of(extra, recordings)
-        low, high = value - half, value + half
-        interval = None if (low < extra.limits[0] and high > extra.limits[1]) or not np.isfinite(half) else (low, high)
+        low, high = extra.limits
+        is_known = np.isfinite(half) and not (value - half < low and high < value + half)
+        interval = (value - half, value + half) if is_known else None
         effects[extra] = FittedEffect(extra.kind, extra.of, extra.unit(axis), value, interval, extra in kept)
     return effects
 

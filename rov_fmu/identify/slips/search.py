@@ -90,9 +90,9 @@ def weak_thrust(rov: Rov, curves: Collection[str], axes: Iterable[Axis]) -> tupl
     found: list[Finding] = []
     by_curve: dict[str, list[Axis]] = {}
     for axis in axes:
-        first, *others = {thruster.curve for thruster in rov.layout.drivers(axis)}
-        if first in curves and not others:
-            by_curve.setdefault(first, []).append(axis)
+        drivers = [*{thruster.curve for thruster in rov.layout.drivers(axis)}]
+        if len(drivers) == 1 and drivers[0] in curves:
+            by_curve.setdefault(drivers[0], []).append(axis)
     for curve, driven in by_curve.items():
         betas = [rov[axis.coefficient("beta")] for axis in driven]
         beyond = [beta > beta_range(rov, axis)[1] for axis, beta in zip(driven, betas, strict=True)]
