@@ -5,11 +5,12 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from scipy.special import fdtrc
 
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_rms
-from rov_fmu.identify.points.thrust_fit import ThrustFit
+from rov_fmu.identify.points.thrust_fit import ThrustFit, forces
 from rov_fmu.identify.recordings.held_out import of_velocity
 from rov_fmu.identify.recordings.prediction_errors import shown_in
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit
@@ -23,6 +24,8 @@ from rov_fmu.tank.findings import Finding
 
 _LEAST_EXPLAINED = 0.5
 """The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""
+_CHANCE = 0.003
+"""The probability that forces and recordings of the same thrust seem to differ."""
 _SIGNIFICANT = 4.0
 """A difference between directions of so many standard errors is no chance, at any of some ten commands."""
 
@@ -74,7 +77,7 @@ def on_axis(result: AxisResult, base: Rov, thrust: Mapping[str, ThrustFit]) -> I
     if result.recordings:
         yield from _on_recordings(result, result.recordings)
         for fit in thrust.values():
-            yield from _on_disagreement(result.recordings, fit)
+            yield from on_forces(result.recordings, fit)
 
 
 def _on_drag(result: AxisResult, estimate: Estimate) -> Iterator[Finding]:
@@ -167,14 +170,23 @@ def on_delay(fit: RecordingsFit) -> Iterator[Finding]:
             yield replace(_on_effect(fit, effect), kind="delay not modelled")
 
 
-def _on_disagreement(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[Finding]:
-    """Yield the coefficients of thrust that the recordings change by more than the tests allow."""
-    for name in thrust.estimate.names:
-        if name in fit.estimate.names:
-            value, tested, error = fit.estimate[name], thrust.estimate[name], thrust.estimate.errors[name]
-            if abs(value - tested) > 3.0 * error:
-                numbers = {"value": value, "tested": tested, "error": error}
-                yield Finding("recordings against thrust", fit.axis.name, names={"coefficient": name}, numbers=numbers)
+def on_forces(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[Finding]:
+    """Yield a finding when the recordings change a thrust curve by more than the scatter of the forces allows.
+
+    The increase of the sum of squares is compared with the scatter of the forces (an F-test).
+    """
+    own, curve = thrust.estimate, thrust.curve.name
+    if not own.noise > 0.0 or not {*own.names} <= {*fit.estimate.names}:
+        return
+    x, counts = thrust.x, thrust.counts
+    (joint,) = (forces(each, fit.rov.coefficients, x) for each in fit.rov.layout.curves if each.name == curve)
+    increase = float(np.sum((thrust.y - joint)[counts] ** 2) - np.sum(thrust.residuals[counts] ** 2))
+    p = len(own.names)
+    if fdtrc(p, own.degrees_of_freedom, max(increase, 0.0) / p / own.noise**2) < _CHANCE:
+        alone = thrust.value(x)
+        n = int(np.argmax(np.where(counts, np.abs(joint - alone), 0.0)))
+        numbers = {"command": float(x[n]), "joint": float(joint[n]), "alone": float(alone[n])}
+        yield Finding("recordings against forces", fit.axis.name, curve, numbers=numbers)
 
 
 def _asymmetry(x: Array, y: Array, model: Array) -> dict[str, float] | None:

@@ -231,9 +231,10 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{axes}: the motion of {files} cannot be computed with a fit to the others, so its prediction is left out: "
         "check its units and signs, and whether a thruster was saturated or a tether was taut"
     ),
-    "recordings against thrust": (
-        "{axes}: the recordings ask for {coefficient} = {value:.3g}, while the thrust tests gave {tested:.3g} +- "
-        "{error:.1g}: a thruster in motion is not one that is held. The vehicle has the value of the recordings"
+    "recordings against forces": (
+        "{axes}: the recordings ask for another {curve} thrust than its forces: {joint:.3g} N and not {alone:.3g} N at "
+        "a command of {command:.0%}. A thruster may push less in motion than at a scale, or the scale or the battery "
+        "may differ. The vehicle has the curve that fits both best"
     ),
     # Effects
     "switches between rows": (

@@ -21,7 +21,7 @@ from rov_fmu.identify.points.drag_forms import Point, drag_and_beta, free_coeffi
 from rov_fmu.identify.points.quadratic_fit import fit_quadratic
 from rov_fmu.identify.points.response_fit import ResponseFit, fit_response
 from rov_fmu.identify.points.step_responses import StepResponse, steps
-from rov_fmu.identify.points.table_points import TablePoints
+from rov_fmu.identify.points.tables import TableForces, TablePoints
 from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, measured
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit, count
@@ -257,7 +257,8 @@ def _fit_recordings(
         return {}, []
 
     def fit(some: Sequence[Recording]) -> dict[str, RecordingsFit]:
-        tested, requests, known = measured(thrust.values()), tests.given.requests, tests.given.known
+        requests, known = tests.given.requests, tests.given.known
+        tested = [table for each in thrust.values() if (table := TableForces.of(each))]
         points = _table_points(tests, dict.fromkeys(recording.axis for recording in some), base)
         fits = fit_recordings(some, base, known, tested, requests=requests, points=points, on_progress=on_progress)
         return {found.axis.name: found.widened() for found in fits}

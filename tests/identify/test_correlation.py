@@ -13,6 +13,7 @@ from scipy.stats import binom, chi2
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.points.tables import TableForces
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.model.layout import SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
@@ -119,7 +120,6 @@ def test_recordings_scatter_as_the_fit_of_all_axes_says(seeds: int) -> None:
     The ratio of thrust to drag is known a hundred times better than either.
     """
     clean_ones = {axis: [clean(K, axis, plan, 5.0) for plan in PLANS[axis.name]] for axis in (SURGE, YAW)}
-    of_thrust = 0.3**2 * np.linalg.inv(M.T @ M)
     far = []
     for seed in range(seeds):
         random = np.random.default_rng(seed)
@@ -128,10 +128,12 @@ def test_recordings_scatter_as_the_fit_of_all_axes_says(seeds: int) -> None:
             for axis, found in clean_ones.items()
             for n, recording in enumerate(found)
         ]
-        pulled = random.multivariate_normal([K[name] for name in THRUST], of_thrust)
+        F = M @ [K[name] for name in THRUST] + 0.3 * random.standard_normal(len(M))
+        pulled = np.linalg.lstsq(M, F, rcond=None)[0]
+        forces = TableForces("rear", COMMANDS, F, 0.3, Estimate(THRUST, pulled, np.eye(2), 5.0, 0.3))
         unknown = dict.fromkeys((*names_of(SURGE), *names_of(YAW)), 1.0)
         base = K.replaced(unknown | dict(zip(THRUST, pulled.tolist(), strict=True)))
-        fits = fit_recordings(recordings, base, thrust=Estimate(THRUST, pulled, of_thrust, 1e6, 0.3))
+        fits = fit_recordings(recordings, base, forces=[forces])
         together = fits[0].together
         if {*together.names} != {*THRUST, *unknown}:  # a load or the like, by chance
             continue

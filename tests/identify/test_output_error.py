@@ -9,10 +9,11 @@ import pytest
 from scipy.signal import lfilter
 
 from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.points.quadratic_fit import fit_quadratic
+from rov_fmu.identify.points.tables import TableForces
+from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
-from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -199,21 +200,33 @@ def test_what_is_known_is_kept(k: Rov) -> None:
     assert fit.rov["a_d_r"] == pytest.approx(k["a_d_r"], rel=1e-3)
 
 
-def thrust_test(k: Rov, thruster: str, spread: float, seed: int) -> Estimate:
-    """Return the thrust curve of a bollard pull with a noisy sensor."""
-    names = (f"a_t_{thruster}", f"b_t_{thruster}")
+def thrust_test(k: Rov, thruster: str, spread: float, seed: int) -> ThrustFit:
+    """Return the fit to a bollard pull with a noisy sensor."""
     commands = np.arange(0.1, 0.81, 0.1)
-    forces = k[names[0]] * commands**2 + k[names[1]] * commands
+    measured = k[f"a_t_{thruster}"] * commands**2 + k[f"b_t_{thruster}"] * commands
     noise = spread * np.random.default_rng(seed).standard_normal(len(commands))
-    return fit_quadratic(names, commands, forces + noise).estimate
+    return fit_thrust(Curve(thruster), commands, measured + noise)
+
+
+def forces_of(fit: ThrustFit) -> list[TableForces]:
+    """Return the forces of a fit as residuals of the fit to recordings."""
+    table = TableForces.of(fit)
+    assert table is not None
+    return [table]
 
 
 def test_scale_of_uncertain_thrust_is_that_of_drag(k: Rov) -> None:
-    """A common error of thrust of 5 % goes into drag and β, but not into V_ss."""
-    values = np.array([k["a_t_rear"], k["b_t_rear"]])
-    spread = 0.05**2 * np.outer(values, values) + np.diag((1e-3 * values) ** 2)
-    thrust = Estimate(("a_t_rear", "b_t_rear"), values, spread, 6.0, 1.0)
-    fit = only(recorded(k, YAW, 6, plans=1), unknowing(k, YAW), thrust=thrust)
+    """A common error of thrust of 5 % goes into drag and β, but not into V_ss.
+
+    The motion tells the shape of the curve much better than the forces, which then only tell its scale: forces F with
+    the standard error s tell it to s / |F|.
+    """
+    commands = np.arange(0.1, 0.81, 0.1)
+    names = ("a_t_rear", "b_t_rear")
+    F = k["a_t_rear"] * commands**2 + k["b_t_rear"] * commands
+    start = Estimate(names, np.array([k[name] for name in names]), np.eye(2), 6.0, 1.0)
+    thrust = TableForces("rear", commands, F, 0.05 * float(np.linalg.norm(F)), start)
+    fit = only(recorded(k, YAW, 6, plans=1), unknowing(k, YAW), forces=[thrust])
     for name in ("a_t_rear", "a_d_r", "b_d_r", "beta_r"):
         assert fit.estimate.errors[name] == pytest.approx(0.05 * k[name], rel=0.05)
     low, high, *_ = fit.band(COMMANDS)
@@ -223,17 +236,17 @@ def test_scale_of_uncertain_thrust_is_that_of_drag(k: Rov) -> None:
 def test_recordings_mend_the_shape_of_the_thrust_curve(k: Rov) -> None:
     """A force sensor with 0.05 N noise gives a wrong thrust at 20 %; motion under many commands corrects it."""
     recordings, thrust = recorded(k, HEAVE, 7), thrust_test(k, "top", 0.05, 3)
-    base = unknowing(k, HEAVE).replaced(thrust.named)
-    taken, mended = only(recordings, base), only(recordings, base, thrust=thrust)
-    assert mended.estimate.errors["b_t_top"] < 0.1 * thrust.errors["b_t_top"]
+    base = unknowing(k, HEAVE).replaced(thrust.estimate.named)
+    taken, mended = only(recordings, base), only(recordings, base, forces=forces_of(thrust))
+    assert mended.estimate.errors["b_t_top"] < 0.1 * thrust.estimate.errors["b_t_top"]
     assert steady_error(mended, k) < 0.1 * steady_error(taken, k)
 
 
 def test_surge_and_yaw_share_the_thrust_of_the_rear_pair(k: Rov) -> None:
     recordings = [*recorded(k, SURGE, 8, plans=1), *recorded(k, YAW, 8, plans=1)]
     thrust = thrust_test(k, "rear", 0.3, 4)
-    base = unknowing(unknowing(k, SURGE), YAW).replaced(thrust.named)
-    surge, yaw = fit_recordings(each_by_itself(recordings), base, thrust=thrust)
+    base = unknowing(unknowing(k, SURGE), YAW).replaced(thrust.estimate.named)
+    surge, yaw = fit_recordings(each_by_itself(recordings), base, forces=forces_of(thrust))
     assert surge.rov == yaw.rov
     assert surge.estimate.names == ("a_t_rear", "b_t_rear", "a_d_u", "b_d_u", "beta_u")
     assert yaw.estimate.names == ("a_t_rear", "b_t_rear", "a_d_r", "b_d_r", "beta_r")

@@ -3,8 +3,8 @@
 The fit compares what the sensor measures, such as a depth and not its derivative, so white noise stays white. Commands
 and motion determine A, B and C of v' = C - B v - A |v| v, and with given thrust, inertia and α also a_d, b_d and β.
 Load, delay, current, lag and different coefficients in reverse are fitted where they are identifiable. Motion under
-many commands also determines the shape of the thrust curve, so a tested curve takes part with its uncertainty, and all
-axes that share it are fitted at once. Each recording adds its initial velocity and position.
+many commands also determines the shape of the thrust curve, so the measured forces are residuals of the same fit, and
+all axes that share a tested curve are fitted at once. Each recording adds its initial velocity and position.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -23,8 +23,9 @@ from rov_fmu.identify.effects.delay import Delay
 from rov_fmu.identify.effects.effect import Effect, Setting
 from rov_fmu.identify.effects.lag import Lag
 from rov_fmu.identify.effects.load import Load
-from rov_fmu.identify.least_squares import Estimate, Loss
-from rov_fmu.identify.points.table_points import TablePoints
+from rov_fmu.identify.least_squares import Loss
+from rov_fmu.identify.points.tables import Table, TableForces, TablePoints
+from rov_fmu.identify.recordings.dead_bands import with_secants
 from rov_fmu.identify.recordings.held_out import HeldOut, hold_out
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit, effects_of, estimate_of, part_of
 from rov_fmu.identify.recordings.residual_analysis import ResidualAnalysis
@@ -57,7 +58,7 @@ def fit_recordings(
     recordings: Sequence[Recording],
     base: Rov,
     known: Collection[str] = (),
-    thrust: Estimate | None = None,
+    forces: Sequence[TableForces] = (),
     loss: Loss = "huber",
     requests: Requests = NO_REQUESTS,
     points: Sequence[TablePoints] = (),
@@ -65,8 +66,8 @@ def fit_recordings(
 ) -> tuple[RecordingsFit, ...]:
     """Fit the unknown drag and β of every recorded axis, and optional effects; `base` has the other coefficients.
 
-    `thrust` is the estimate of tested curves; `requests` are those of [fit]. `points` of tables are residuals of the
-    same fit. The intervals account for the correlation of the residuals. `on_progress` is called at each step of a
+    `requests` are those of [fit]. `forces` of tested curves and `points` of tables are residuals of the same fit. The
+    intervals account for the correlation of the residuals. `on_progress` is called at each step of a
     search. Raises MotionError or NoFitError.
     """
     order = list(base.layout.kinds)
@@ -76,7 +77,7 @@ def fit_recordings(
     data = divided(data, _PIECE if base.layout.is_linked else inf)
     with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
         on_step = _counting(data, on_progress)
-        return _Fit(data, base, known, thrust, loss, on_step, tuple(points)).choose(tuple(candidates(setting)))
+        return _Fit(data, base, known, loss, on_step, tuple(forces), tuple(points)).choose(tuple(candidates(setting)))
 
 
 def drag_and_beta(base: Rov, axis: Axis, known: Collection[str] = ()) -> tuple[str, ...]:
@@ -93,10 +94,10 @@ class _Fit:
     data: tuple[PreparedRecording, ...]
     base: Rov
     known: Collection[str]
-    thrust: Estimate | None
     loss: Loss
     on_step: Callable[[], None]
     """A function that is called at each step of a search."""
+    forces: tuple[TableForces, ...] = ()
     points: tuple[TablePoints, ...] = ()
 
     @property
@@ -108,7 +109,7 @@ class _Fit:
     def names(self) -> tuple[str, ...]:
         """The coefficients to fit: those of thrust, then those of each axis."""
         drag = (name for axis in self.axes for name in drag_and_beta(self.base, axis, self.known))
-        return (*(self.thrust.names if self.thrust else ()), *drag)
+        return (*(name for table in self.forces for name in table.fitted.names), *drag)
 
     def choose(self, extras: tuple[Effect, ...]) -> tuple[RecordingsFit, ...]:
         """Find a start and the times of switches, fit all extras, and leave out those that the data do not justify."""
@@ -155,7 +156,8 @@ class _Fit:
     def starts(self, model: Simulator) -> Iterator[Array]:
         """Yield the starts of the search: the first guess, and that without delays where the guess has some."""
         for delays in (DELAYS, (0.0,)):
-            coefficients, values = dict(self.thrust.named if self.thrust else {}), {e: e.begin for e in model.extras}
+            coefficients = {name: value for table in self.forces for name, value in table.fitted.named.items()}
+            values = {e: e.begin for e in model.extras}
             late = False
             for axis in self.axes:
                 guess, delay = first_guess(axis, self.data, self.base, delays)
@@ -214,7 +216,7 @@ class _Fit:
         found: dict[str, HeldOut] = {}
         for axes in self.blocks:
             data = tuple(d for d in self.data if d.axis in axes)
-            alone = replace(self, data=data, base=base, thrust=None, points=())
+            alone = replace(self, data=data, base=base, forces=(), points=())
             of = {name for axis in axes for name in self._own(axis)}
             own = tuple(e for e in extras if e.of in of or any(e.concerns(d.recording) for d in data))
             model = alone.model(own, analysis.model.sigma[[d.axis in axes for d in self.data]])
@@ -235,12 +237,13 @@ class _Fit:
     def model(self, extras: tuple[Effect, ...], noise: Array, *, with_prior: bool = False) -> Simulator:
         """Return the model with these extras; the prior pulls them to their neutral values."""
         deviations = likely(extras, Setting([d.recording for d in self.data], self.base), all_of_them=with_prior)
-        return Simulator(self.data, self.base, self.names, extras, noise, self.thrust, deviations, self.points)
+        tables: tuple[Table, ...] = (*self.forces, *self.points)
+        return Simulator(self.data, self.base, self.names, extras, noise, deviations, tables)
 
     def analysed(self, model: Simulator, start: Array, tolerance: float = 1e-8) -> ResidualAnalysis:
         """Fit the model and analyse the residuals."""
         solution = solve(model, start, self.loss, tolerance, self.on_step)
-        return ResidualAnalysis(model, solution, robust=self.loss == "huber")
+        return with_secants(ResidualAnalysis(model, solution, robust=self.loss == "huber"))
 
     def noise(self, extras: tuple[Effect, ...], x: Array) -> Array:
         """Return the robust standard deviation of each recording's residuals."""

@@ -46,14 +46,14 @@ class ResidualAnalysis:
 
     def __init__(self, model: Simulator, solution: Solution, *, robust: bool) -> None:
         self.x, self.model = solution.x, model
+        self.solution, self.robust = solution, robust
         r, J = solution.residuals, solution.jacobian
         inside = np.abs(r) <= HUBER if robust else np.ones(len(r), bool)
         psi = np.clip(r, -HUBER, HUBER) if robust else r
         self.simulations: list[Simulation] = []
-        self.degrees_of_freedom = float(len(model.thrust.names) if model.thrust else 0) - len(self.x)
-        self.degrees_of_freedom += model.count_of_points
+        self.degrees_of_freedom = float(model.count_of_tables - len(self.x))
         excess = len(r) / (len(r) - len(self.x))
-        rest = slice(model.rows[-1].stop, None)  # points and priors
+        rest = slice(model.rows[-1].stop, None)  # tables and priors
         self.gram, self.meat = (J * inside[:, None]).T @ J, J[rest].T @ J[rest]
         size = np.abs(r)
         losses = np.where(inside, r * r, (2.0 * size - HUBER) * HUBER)

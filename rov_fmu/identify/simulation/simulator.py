@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.effects.effect import Effect, with_effects
-from rov_fmu.identify.least_squares import Estimate, external, internal
-from rov_fmu.identify.points.table_points import TablePoints
+from rov_fmu.identify.least_squares import external, internal
+from rov_fmu.identify.points.tables import Table
 from rov_fmu.identify.simulation.flight import Flight, unmixed
 from rov_fmu.identify.simulation.limits import MotionError
 from rov_fmu.identify.simulation.prepared import PreparedRecording
@@ -55,8 +55,8 @@ class Simulator:
     """Recordings as a function of x: coefficients (internal parameters), extras, then values at the start.
 
     The residuals are modelled less measured values of one recording after the other, in standard deviations (sigma, one
-    per recording). They are followed by the residuals of the points of tables, by those of the measured thrust
-    coefficients, by those of the extras, and by those of the values at the start that are not measured.
+    per recording). They are followed by the residuals of the tables, by those of the extras, and by those of the values
+    at the start that are not measured.
     """
 
     data: tuple[PreparedRecording, ...]
@@ -64,10 +64,9 @@ class Simulator:
     names: tuple[str, ...]
     extras: tuple[Effect, ...]
     sigma: Array
-    thrust: Estimate | None = None
     likely: Array | None = None
     """The prior standard deviation of each extra, infinite for one without; None if none has a prior."""
-    points: tuple[TablePoints, ...] = ()
+    tables: tuple[Table, ...] = ()
 
     # ---- Parameters ----
 
@@ -252,7 +251,7 @@ class Simulator:
         found = np.empty(self._count)
         for place in self.flights:
             found[place.rows] = self.of_flight(place, x[None, :])[0]
-        found[self._of_points] = self._residuals_of_points(x)
+        found[self._of_tables] = self._residuals_of_tables(x)
         if not np.isfinite(found[: self._measured]).all():
             return np.full(self._count, np.nan)
         found[self._measured :] = self._priors @ x - self._expected
@@ -264,20 +263,20 @@ class Simulator:
         for place in self.flights:
             columns = [*place.shared, *place.own_places]
             J[place.rows[:, None], columns] = self.slopes_of_flight(place, x, columns)[1]
-        for n in range(self.shared) if self.points else ():
+        for n in range(self.shared) if self.tables else ():
             changed = x.copy()
             changed[n] += _CHANGE * max(abs(x[n]), 0.01)
-            change = self._residuals_of_points(changed) - self._residuals_of_points(x)
-            J[self._of_points, n] = change / (changed[n] - x[n])
+            change = self._residuals_of_tables(changed) - self._residuals_of_tables(x)
+            J[self._of_tables, n] = change / (changed[n] - x[n])
         J[self._measured :] = self._priors
         return J
 
-    def _residuals_of_points(self, x: Array) -> Array:
-        """Return the residuals of the points of tables, one axis after the other."""
-        if not self.points:
+    def _residuals_of_tables(self, x: Array) -> Array:
+        """Return the residuals of the tables, one after the other."""
+        if not self.tables:
             return np.zeros(0)
         rov = self.rov(x)
-        return np.concatenate([points.residuals(rov) for points in self.points])
+        return np.concatenate([table.residuals(rov) for table in self.tables])
 
     # ---- Priors ----
 
@@ -288,30 +287,24 @@ class Simulator:
 
     @property
     def _measured(self) -> int:
-        """The number of samples and points."""
-        return int(self.rows[-1].stop) + self.count_of_points
+        """The number of samples and measurements of tables."""
+        return int(self.rows[-1].stop) + self.count_of_tables
 
     @property
-    def _of_points(self) -> slice:
-        """The rows of the residuals of the points of tables."""
-        return slice(self._measured - self.count_of_points, self._measured)
+    def _of_tables(self) -> slice:
+        """The rows of the residuals of the tables."""
+        return slice(self._measured - self.count_of_tables, self._measured)
 
     @property
-    def count_of_points(self) -> int:
-        """The number of points of tables."""
-        return sum(len(points.points) for points in self.points)
+    def count_of_tables(self) -> int:
+        """The number of measurements of tables."""
+        return sum(map(len, self.tables))
 
     @cached_property
     def _prior(self) -> tuple[Array, Array]:
-        """The matrix P and the vector e of the residuals P x - e of thrust, extras and values at the start."""
+        """The matrix P and the vector e of the residuals P x - e of extras and values at the start."""
         rows: list[Array] = []
         expected: list[float] = []
-        if self.thrust:
-            whitening = np.linalg.inv(np.linalg.cholesky(self.thrust.covariance))
-            matrix = np.zeros((len(whitening), self.size))
-            matrix[:, [self.names.index(name) for name in self.thrust.names]] = whitening
-            rows += [*matrix]
-            expected += (whitening @ self.thrust.values).tolist()
         for n, value, deviation in self._likely():
             rows.append(np.eye(1, self.size, n)[0] / deviation)
             expected.append(value / deviation)

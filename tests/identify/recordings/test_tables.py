@@ -1,21 +1,27 @@
-"""Points of tables take part in the fit to recordings. The truth is integrated with DOP853."""
+"""Tables of points and of forces take part in the fit to recordings. The truth is integrated with DOP853."""
 
+import re
 from functools import cache
 from math import exp
 
 import numpy as np
 import pytest
 
+from rov_fmu.identify.diagnostics import on_forces
+from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.drag_forms import Point
 from rov_fmu.identify.points.response_fit import fit_response
-from rov_fmu.identify.points.table_points import TablePoints
+from rov_fmu.identify.points.tables import TableForces, TablePoints
+from rov_fmu.identify.points.thrust_fit import fit_thrust
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.layout import HEAVE, Curve
+from rov_fmu.model.rov import Rov
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.pool import run
+from tests.pool import NOISE, run, with_more
 
 TRUTH = load_vehicle(VIDEORAY).rov
 NAMES = ("a_d_w", "b_d_w", "beta_w")
@@ -127,3 +133,82 @@ def test_points_scatter_more_than_few_of_them_show() -> None:
 def test_residuals_are_finite_without_drag() -> None:
     still = TRUTH.replaced({"a_d_w": 0.0, "b_d_w": 0.0})
     assert np.isfinite(table(0).residuals(still)).all()
+
+
+# ---- Forces ----------------------------------------------------------------------------------------------------------
+
+PULLS = np.array([sign * c for sign in (-1.0, 1.0) for c in (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8)])
+CURVE = ("a_t_top", "b_t_top", "c_0_top")
+SCALE = 0.1
+"""The standard error of a force, N."""
+
+
+def with_dead_band(b_t: float) -> Rov:
+    """Return a vehicle whose top thruster begins at 8 %."""
+    return with_more(TRUTH, c_0_top=0.08, b_t_top=b_t)
+
+
+def pulled(k: Rov, seed: int) -> Array:
+    """Return forces of the top thruster with noise."""
+    m = np.maximum(np.abs(PULLS) - k["c_0_top"], 0.0)
+    F = np.sign(PULLS) * (k["a_t_top"] * m**2 + k["b_t_top"] * m)
+    return np.asarray(F + SCALE * np.random.default_rng(seed).standard_normal(len(PULLS)))
+
+
+@cache
+def with_forces(b_t: float, seed: int, held: float | None = None) -> tuple[RecordingsFit, float]:
+    """Return the fit to a depth and to forces, and its cost; b_t may be held."""
+    k = with_dead_band(b_t)
+    names = tuple(name for name in CURVE if held is None or name != "b_t_top")
+    start = Estimate(names, np.array([k[name] for name in names]), np.eye(len(names)), 13.0, SCALE)
+    forces = TableForces("top", PULLS, pulled(k, seed), SCALE, start)
+    recording = run(k, HEAVE, PLAN, 10.0).recorded(np.random.default_rng(200 + seed), "depth")
+    base = k.replaced(dict.fromkeys(NAMES, 1.0) | ({} if held is None else {"b_t_top": held}))
+    (fit,) = fit_recordings([recording], base, forces=[forces])
+    (simulation,) = fit.simulations
+    noise = NOISE["depth"]
+    return fit, float(np.sum((simulation.residuals / noise) ** 2) + np.sum(forces.residuals(fit.rov) ** 2))
+
+
+@pytest.mark.parametrize("b_t", [0.0, pytest.param(0.3, marks=pytest.mark.long), 3.0])
+def test_intervals_beside_a_dead_band(b_t: float) -> None:
+    """The cost with b_t held at an end of its interval is higher by about that of 1.96 standard errors, 3.8.
+
+    At b_t = 0 the cost grows with the fourth power of b_t, so a factor of two in the cost is one of 1.2 in b_t.
+    """
+    truth, missed = with_dead_band(b_t), 0
+    for seed in range(2):
+        fit, least = with_forces(b_t, seed)
+        for name, (low, high) in fit.estimate.intervals.items():
+            missed += not low <= truth[name] <= high
+        _, end = fit.estimate.intervals["b_t_top"]
+        assert 2.5 < with_forces(b_t, seed, end)[1] - least < 10.0, seed
+    assert missed <= 1
+
+
+def test_forces_of_exact_curves_take_no_part() -> None:
+    exact = fit_thrust(Curve("top"), PULLS, TRUTH["a_t_top"] * np.abs(PULLS) * PULLS + TRUTH["b_t_top"] * PULLS)
+    assert TableForces.of(exact) is None
+
+
+@pytest.mark.parametrize("wrong", [False, True])
+def test_forces_that_the_recording_contradicts_are_told(*, wrong: bool) -> None:
+    """A scale that reads more, the stronger the pull, shows another curve. No drag and no β explains that."""
+    F = TRUTH["a_t_top"] * np.abs(PULLS) * PULLS + TRUTH["b_t_top"] * PULLS + (2.0 * PULLS if wrong else 0.0)
+    thrust = fit_thrust(Curve("top"), PULLS, F + 0.05 * np.random.default_rng(3).standard_normal(len(PULLS)))
+    forces = TableForces.of(thrust)
+    assert forces is not None
+    recording = run(TRUTH, HEAVE, PLAN, 20.0).recorded(np.random.default_rng(9), "depth")
+    (fit,) = fit_recordings([recording], UNKNOWN.extended(thrust.values), forces=[forces])
+    found = list(on_forces(fit, thrust))
+    assert bool(found) is wrong
+    if wrong:
+        (line,) = sentences(found)
+        told = re.fullmatch(
+            r"heave: .* another top thrust than its forces: (.*) N and not (.*) N at .* of (.*)%\. .*", line
+        )
+        assert told, line
+        joint, alone, command = map(float, told.groups())
+        at = np.array([0.01 * command])
+        for number, curve in ((joint, fit.rov.coefficients), (alone, thrust.values)):
+            assert number == pytest.approx(curve["a_t_top"] * at * np.abs(at) + curve["b_t_top"] * at, rel=0.01)

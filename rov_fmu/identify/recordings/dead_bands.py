@@ -1,0 +1,83 @@
+"""The uncertainty of a dead band and of the linear thrust beside it, which derivatives alone do not tell.
+
+The thrust is a_t m^2 + b_t m with m = |command| - c_0. If c_0 grows by h and b_t by 2 a_t h, it changes by the constant
+-(b_t + a_t h) h. Near b_t = 0 the derivative along this direction vanishes, so the covariance from derivatives would be
+endless although the data determine both. A secant along the direction includes the term with h^2.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+from scipy.optimize import brentq
+
+from rov_fmu.identify.effects.dead_band import DeadBand
+from rov_fmu.identify.least_squares import covariance
+from rov_fmu.identify.recordings.residual_analysis import ResidualAnalysis
+from rov_fmu.identify.simulation.simulator import Simulator
+from rov_fmu.model.layout import REVERSE
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.uncertainty import quantile
+
+_LENGTHS = 1e-5, 0.3
+"""The shortest and the longest secant, as a change of c_0."""
+
+
+def with_secants(analysis: ResidualAnalysis) -> ResidualAnalysis:
+    """Return the analysis with secants in place of derivatives by dead bands, where b_t may be 0.
+
+    A secant is as long as half of the interval of c_0. The interval extends at least to the c_0 at which b_t is 0.
+    """
+    model, x, r = analysis.model, analysis.x, analysis.solution.residuals
+    J = analysis.solution.jacobian.copy()
+    reach = quantile(max(analysis.degrees_of_freedom, 1.0))
+
+    def half(n: int) -> float:
+        """Return half of the interval of a parameter."""
+        return reach * float(np.sqrt(covariance(J.T @ J)[n, n]))
+
+    for n, direction, room in _directions(model, x):
+        if half(n) < room:
+            continue
+        others = direction.copy()
+        others[n] = 0.0
+        derivative = J[:, n].copy()
+
+        def excess(
+            length: float, n: int = n, direction: Array = direction, others: Array = others, room: float = room
+        ) -> float:
+            """Take a secant into J; return how much longer half of the interval is than the secant."""
+            J[:, n] = (model.residuals(x + length * direction) - r) / length - J @ others
+            return min(half(n), 1.0) - max(length, room) if np.isfinite(J[:, n]).all() else -inf
+
+        if excess(_LENGTHS[0]) > 0.0 > excess(_LENGTHS[1]):
+            brentq(excess, *_LENGTHS, xtol=1e-4)
+        if not np.isfinite(J[:, n]).all():
+            J[:, n] = derivative
+    if np.array_equal(J, analysis.solution.jacobian):
+        return analysis
+    return ResidualAnalysis(model, replace(analysis.solution, jacobian=J), robust=analysis.robust)
+
+
+def _directions(model: Simulator, x: Array) -> Iterator[tuple[int, Array, float]]:
+    """Yield the place of each fitted c_0, the direction in x that hardly changes thrust, and c_0 less that of b_t = 0.
+
+    The linear coefficients of both directions of command change if they share the dead band.
+    """
+    rov = model.rov(x)
+    for curve in rov.layout.curves:
+        for dead in dict.fromkeys(curve.coefficient("c_0" + end) for end in ("", REVERSE)):
+            names = [*model.names, *(f"c_0_{e.of}" if isinstance(e, DeadBand) else "" for e in model.extras)]
+            if dead not in names:
+                continue
+            n, rooms = names.index(dead), []
+            direction = np.zeros(len(x))
+            direction[n] = 1.0
+            for end in ("", REVERSE):
+                a_t, b_t, c_0 = (curve.coefficient(key + end) for key in ("a_t", "b_t", "c_0"))
+                if c_0 == dead and b_t in names and rov[a_t] > 0.0:
+                    direction[names.index(b_t)] = 2.0 * rov[a_t]
+                    rooms.append(rov[b_t] / (2.0 * rov[a_t]))
+            if rooms:
+                yield n, direction, min(rooms)
