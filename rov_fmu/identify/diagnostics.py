@@ -24,23 +24,23 @@ from rov_fmu.tank.findings import Finding
 
 _LEAST_EXPLAINED = 0.5
 """The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""
+_BACKWARD = 0.005
+"""The command below which thrust that points backward is rounding."""
 _CHANCE = 0.003
 """The probability that forces and recordings of the same thrust seem to differ."""
 _SIGNIFICANT = 4.0
 """A difference between directions of so many standard errors is no chance, at any of some ten commands."""
 
 
-def on_thrust(curve: str, fit: ThrustFit) -> Iterator[Finding]:
-    """Yield findings about a thrust curve."""
+def on_thrust(curve: str, fit: ThrustFit, rov: Rov) -> Iterator[Finding]:
+    """Yield findings about a thrust curve; the recordings may have changed that of the vehicle."""
     finding = partial(Finding, curve=curve)
     if fit.estimate.degrees_of_freedom <= 0.0:
         yield finding("thrust without freedom", numbers={"count": int(fit.counts.sum())})
-    directions = {"": "backward thrust"}
-    if "a_t" + REVERSE in fit.curve.keys:
-        directions[REVERSE] = "backward thrust in reverse"
-    for end, kind in directions.items():
-        a_t, b_t = (fit.values[fit.curve.coefficient(key + end)] for key in ("a_t", "b_t"))
-        if b_t < 0.0 < a_t:
+    (of_vehicle,) = (each for each in rov.layout.curves if each.name == curve)
+    for end, kind in (("", "backward thrust"), (REVERSE, "backward thrust in reverse")):
+        a_t, b_t = (rov[of_vehicle.coefficient(key + end)] for key in ("a_t", "b_t"))
+        if "a_t" + end in of_vehicle.keys and a_t > 0.0 and -b_t / a_t > _BACKWARD:
             yield finding(kind, numbers={"command": -b_t / a_t})
     x, y = fit.x[fit.counts], fit.y[fit.counts]
     clear = np.abs(y) > 2.0 * fit.residual_rms
@@ -65,7 +65,7 @@ def on_axis(result: AxisResult, base: Rov, thrust: Mapping[str, ThrustFit]) -> I
     asymmetry = _asymmetry(x, y, predict(axis, fitted.rov if fitted else base, steady))
     if asymmetry:
         yield finding("asymmetry", names={"quantity": "V_ss", "window": axis.name}, numbers=asymmetry)
-    used = [abs(p.command) for p in result.points if p.weight > 0.0]
+    used = [abs(p.command) for p in result.points if p.weight > 0.0 or p.error is not None]
     for name, fit in thrust.items() if used else ():
         tested = np.abs(fit.x[fit.counts])
         if max(used) > tested.max() + 0.005 or min(used) < tested.min() - 0.005:

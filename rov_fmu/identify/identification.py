@@ -29,7 +29,7 @@ class AxisResult:
 
     axis: Axis
     points: tuple[Point, ...]
-    """The points of the tables and of the recordings."""
+    """The points of the tables, and those read off the recordings, without weight where the recordings are fitted."""
     steps: tuple[StepResponse, ...]
     """The held commands of the recordings."""
     drag: QuadraticFit | None
@@ -110,6 +110,11 @@ class Comparison:
     leave_one_out: Array
     """Leave-one-thrust-out: the prediction by a fit without the points of the same thrust."""
     against: Array | None
+
+    @property
+    def counts(self) -> int:
+        """The number of points that count."""
+        return sum(p.weight > 0.0 for p in self.points)
 
     @property
     def columns(self) -> list[Array]:

@@ -2,7 +2,7 @@
 
 An axis with recordings takes its coefficients from them (output error) and from the points of its tables. The
 recordings also correct the thrust curves. An axis without recordings takes its coefficients from the measured points
-V_ss and Tau. The points of tables and recordings are fitted in either case, for comparison.
+V_ss and Tau. The points of tables are fitted in either case, for comparison.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -105,14 +105,14 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
     explained = {finding.axis for finding in weak}
     findings = [*weak, *tests.findings, *(f for f in doubts if f.kind != "wrong scale" or f.axis not in explained)]
     for name, fit in thrust.items():
-        findings += diagnostics.on_thrust(name, fit)
+        findings += diagnostics.on_thrust(name, fit, found.rov)
     for result in results:
         findings += result.findings
     findings += filter(None, (beta_out_of_range(found.rov, axis) for axis in fitted if axis.name not in explained))
     drifting = {finding.axis for finding in findings if finding.names.get("cause") == "drift"}
     for n, result in enumerate(results):
         on_progress(f"what to measure next of {result.axis.name}", _FITTED + (1.0 - _FITTED) * n / len(results))
-        test = _next_test(tests, result, found.rov, repeat=result.axis.name in drifting)
+        test = _next_test(tests, result, found.rov, thrust, repeat=result.axis.name in drifting)
         results[n] = replace(result, next_test=test)
     vehicle = found.vehicle(results, Together(thrust.values(), results), findings)
     return Identification(tests, vehicle, thrust, tuple(results), against, tuple(findings))
@@ -343,6 +343,8 @@ def _axis(
     check_push(tests.folder, axis, base, [p.command for p in points if p.weight > 0.0])
     points = tuple(p if is_pushed(axis, base, p.command) else replace(p, weight=0.0) for p in points)
     used = [p for p in points if p.weight > 0.0]
+    if fitted:  # to every sample, so what is read off the same recordings tells nothing more
+        points = tuple(p if p.error is None else replace(p, weight=0.0) for p in points)
     response = _response(axis, points, base, known, _thrust_of(fitted, driving))
     wanted = set(drag_and_beta(axis, known))
     if not fitted and not response and (missing := sorted(wanted - {axis.coefficient("beta")})):
@@ -407,7 +409,9 @@ def _points(tests: TankTests, axis: Axis, found: Sequence[StepResponse]) -> tupl
     return tuple(points)
 
 
-def _next_test(tests: TankTests, result: AxisResult, rov: Rov, *, repeat: bool) -> NextTest | None:
+def _next_test(
+    tests: TankTests, result: AxisResult, rov: Rov, thrust: Mapping[str, ThrustFit], *, repeat: bool
+) -> NextTest | None:
     """Return the test that would help an axis most, with the sensor of its recordings or a typical one."""
     if result.estimate is None:
         return None
@@ -415,7 +419,9 @@ def _next_test(tests: TankTests, result: AxisResult, rov: Rov, *, repeat: bool) 
     quantity = fit.simulations[0].recording.quantity if fit else result.axis.position
     noise = max(s.noise * np.sqrt(s.correlation_time) for s in fit.simulations) if fit else NOISE[quantity]
     sensor, limits = Sensor(quantity, max(float(noise), 1e-9)), tests.given.description.tank_limits
-    return next_test(result.axis, rov, result.estimate, sensor, limits, repeat=repeat)
+    driving = {curve.name for curve in curves_of(rov.layout, result.axis)}
+    scales = {name: fit.estimate.noise for name, fit in thrust.items() if name in driving and fit.estimate.noise > 0.0}
+    return next_test(result.axis, rov, result.estimate, sensor, limits, scales, repeat=repeat)
 
 
 def _weight(tests: TankTests, window: str, command: float) -> float:

@@ -1,19 +1,24 @@
-"""Suggest the next test: the recording that would narrow the widest interval most, by its Fisher information.
+"""Suggest the next test: the one that would narrow the widest interval most, by its Fisher information.
+
+It is a recording of steps from rest, or forces at weak commands where forces were measured before.
 
 The test stays within the limits that rov.toml gives. Enough is known where the widest interval is narrow, or where no
 test within the limits would narrow it by a useful amount.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
+from types import MappingProxyType
 
 import numpy as np
 
 from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.points.thrust_fit import forces
 from rov_fmu.identify.simulation.limits import MotionError
 from rov_fmu.identify.simulation.prepared import prepare
 from rov_fmu.identify.simulation.simulator import Simulator
+from rov_fmu.io.toml_file import join_names
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
@@ -22,6 +27,10 @@ from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.uncertainty import is_factor, quantile
 
 _COMMANDS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
+_PULLS = (0.05, 0.1, 0.15, 0.2)
+"""The weak commands of a test of forces, where the shape of the thrust curve is hard to see."""
+_TIMES = 4
+"""The number of forces at each of these commands."""
 _RATE = 10.0  # Hz
 _HOLDS = 5.0, 60.0
 """The shortest and the longest hold, s, where no limit asks for a shorter one."""
@@ -29,6 +38,8 @@ _SHORTER = (1.0, 0.5, 0.25, 0.125)
 """The shares of a hold that are tried until the test is within the limits."""
 _KNOWN = 0.05
 """Half the width of an interval, relative to the value, from which on enough is known."""
+_LEAST_PART = 0.1
+"""The share of the quadratic part below which a linear part of thrust or drag hardly matters."""
 _USEFUL = 0.9
 """The width of an interval after a test, relative to the width before it, from which on the test is of use."""
 _VAGUE = 1e3
@@ -78,16 +89,24 @@ class NextTest:
 
 
 def next_test(
-    axis: Axis, rov: Rov, found: Estimate, sensor: Sensor, limits: TankLimits = NO_LIMITS, *, repeat: bool = False
+    axis: Axis,
+    rov: Rov,
+    found: Estimate,
+    sensor: Sensor,
+    limits: TankLimits = NO_LIMITS,
+    scales: Mapping[str, float] = MappingProxyType({}),
+    *,
+    repeat: bool = False,
 ) -> NextTest | None:
     """Return the best of many tests within the limits; None where nothing is fitted or nothing moves.
 
-    `repeat` says that something drifts over a dive of the axis.
+    `scales` has the standard deviation of a force (N) of each thrust curve that was tested. `repeat` says that
+    something drifts over a dive of the axis.
     """
     if not found.names:
         return None
     error = np.sqrt(np.diag(found.covariance))
-    size = np.maximum(np.abs(found.values), 1e-9)
+    size = np.maximum([_size(axis, rov, name) for name in found.names], 1e-9)
     relative = np.where(np.isfinite(error), quantile(max(found.degrees_of_freedom, 1.0)) * error / size, inf)
     widest = int(np.argmax(relative))
     error = np.maximum(np.where(np.isfinite(error), error, _VAGUE * size), 1e-12 * size)
@@ -97,18 +116,45 @@ def next_test(
     internal = error * [1.0 / v if is_factor(n) else 1.0 for n, v in zip(found.names, found.values, strict=True)]
     best: tuple[float, str] = (1.0, "")
     moves = False
+
+    def try_test(words: str, information: Array) -> None:
+        """Take a test if it narrows the widest interval more than the best one so far."""
+        nonlocal best
+        information = information * np.outer(internal, internal)
+        if np.isfinite(information).all():
+            after = np.linalg.pinv(before + information, hermitian=True)
+            best = min(best, (float(np.sqrt(np.clip(after[widest, widest], 0.0, 1.0))), words))
+
     for words, command in _tests(axis, rov, limits):
         moves = True
         if not words:
             continue
-        information = _information(axis, rov, found.names, sensor, command) * np.outer(internal, internal)
-        if np.isfinite(information).all():
-            after = np.linalg.pinv(before + information, hermitian=True)
-            best = min(best, (float(np.sqrt(np.clip(after[widest, widest], 0.0, 1.0))), words))
+        try_test(words, _information(axis, rov, found.names, sensor, command))
     if not moves:
         return None
+    pulls = np.array([c for c in _PULLS if c <= limits.command_max])
+    for curve, noise in scales.items() if pulls.size else ():
+        of_forces = _information_of_forces(
+            curve, rov, dict(zip(found.names, error.tolist(), strict=True)), noise, pulls
+        )
+        levels = join_names(f"{c:.0%}" for c in pulls)
+        try_test(f"{_TIMES} forces of the {curve} thrust at each of {levels}, ahead and in reverse", of_forces)
     name = found.names[widest]
     return NextTest(axis, name, found.interval(name), float(relative[widest]), *best, repeat)
+
+
+def _size(axis: Axis, rov: Rov, name: str) -> float:
+    """Return the size of a coefficient that its interval is compared with.
+
+    A linear part of thrust or drag that is nearly 0 hardly matters, so it is compared with a share of the quadratic
+    part at full command.
+    """
+    size = abs(rov[name])
+    for linear, quadratic in (("b_t", "a_t"), ("b_d", "a_d")):
+        if name.startswith(linear) and (beside := name.replace(linear, quadratic, 1)) in rov.coefficients:
+            fastest = abs(rov.response(axis, 1.0)[0]) if linear == "b_d" and rov.force(axis, 1.0) else 1.0
+            size = max(size, _LEAST_PART * abs(rov[beside]) * (fastest if np.isfinite(fastest) else 0.0))
+    return size
 
 
 def _tests(axis: Axis, rov: Rov, limits: TankLimits) -> Iterator[tuple[str, Array]]:
@@ -173,3 +219,19 @@ def _information(axis: Axis, rov: Rov, names: tuple[str, ...], sensor: Sensor, c
     p, gram = len(names), J.T @ J
     cross = gram[:p, p:]
     return np.asarray(gram[:p, :p] - cross @ np.linalg.pinv(gram[p:, p:]) @ cross.T)
+
+
+def _information_of_forces(curve: str, rov: Rov, errors: Mapping[str, float], noise: float, pulls: Array) -> Array:
+    """Return the information of repeated forces, ahead and in reverse, about the coefficients with these errors.
+
+    The derivatives are secants over a standard error, because those by c_0 and by b_t are alike where b_t is 0.
+    """
+    x = np.concatenate([pulls, -pulls])
+    (of_curve,) = (each for each in rov.layout.curves if each.name == curve)
+    here = forces(of_curve, rov.coefficients, x)
+    columns = []
+    for name, error in errors.items():
+        changed = forces(of_curve, {**rov.coefficients, name: rov[name] + error}, x)
+        columns.append((changed - here) / error)
+    J = np.column_stack(columns)
+    return np.asarray(_TIMES / noise**2 * J.T @ J)

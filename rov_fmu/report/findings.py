@@ -126,7 +126,7 @@ class MeasuredAndFitted:
     fitted: float
     fitted_interval: tuple[float, float] | None
     reason: str
-    """Why the two values may differ."""
+    """What the two values are, and why they may differ."""
 
     @property
     def differ(self) -> bool:
@@ -136,6 +136,18 @@ class MeasuredAndFitted:
         return max(self.measured_interval[0], self.fitted_interval[0]) > min(
             self.measured_interval[1], self.fitted_interval[1]
         )
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """The identified inertia m/β along an axis, and the part of it that is added mass, in kg or kg.m2."""
+
+    axis: Axis
+    unit: str
+    total: float
+    interval: tuple[float, float]
+    added: float
+    added_interval: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -179,7 +191,7 @@ def unseen(results: Identification, comparisons: Sequence[Comparison]) -> Iterat
             yield Unseen(result.axis, count(len(result.recordings.simulations), "recording"), "cannot be computed")
         elif result.response:
             for c in (c for c in comparisons if c.result is result):
-                points = count(sum(p.weight > 0.0 for p in c.points), "point")
+                points = count(c.counts, "point")
                 by = "each by a fit without its thrust"
                 yield Unseen(result.axis, f"{c.quantity} of {points}", by, error=c.rms(c.leave_one_out))
 
@@ -215,17 +227,18 @@ def measured_and_fitted(results: Identification) -> Iterator[MeasuredAndFitted]:
         fitted = result.recordings.estimate
         for curve, thrust in results.thrust.items():
             yield from compare(thrust.estimate, fitted, f"thrust tests of {curve}", _OF_THRUST)
-        if result.response and any(p.error is None and p.weight for p in result.points):
+        if result.response:
             yield from compare(result.response.estimate, fitted, f"points of {result.axis.name}", _OF_POINTS)
 
 
 _OF_THRUST = (
-    "The fit weighs the thrust tests and the recordings by their uncertainty. They may differ because a thruster "
-    "pushes less in motion than held at a scale, and because the scale and the battery have errors of their own"
+    "The measured value is that of the forces alone. The fitted one explains the forces and the recordings together. "
+    "They differ by chance, because forces alone hardly tell a dead band from the shape of the curve, because a "
+    "thruster pushes less in motion than held at a scale, or because the scale or the battery differs"
 )
 _OF_POINTS = (
-    "The recordings show load, delay, lag and current apart from the drag, and every sample counts; a table of steady "
-    "velocities and time constants has them all in its numbers, from other days and by other readings"
+    "The measured value is that of the tables alone. The fitted one explains the tables and the recordings together, "
+    "and has load, delay, lag and current apart from drag and β. The numbers of a table contain all of them"
 )
 
 
@@ -243,6 +256,19 @@ def known(results: Identification) -> tuple[Known, ...]:
         for name, meta in vehicle.layout.coefficients.items()
         if name in fitted | assumed
     )
+
+
+def inertias(results: Identification) -> Iterator[Inertia]:
+    """Yield the inertia of each axis whose β was identified."""
+    rov, layout = results.vehicle.rov, results.vehicle.layout
+    of = {c.name: c for c in known(results)}
+    for form in layout.axes:
+        beta = of.get(form.coefficient("beta"))
+        if beta and beta.interval and beta.interval[0] > 0.0:
+            own, given = rov[form.axis.inertia], rov.inertia(form)
+            total, high, low = (given / value for value in (beta.value, *beta.interval))
+            unit = layout.coefficients[form.axis.inertia].unit
+            yield Inertia(form.axis, unit, total, (low, high), total - own, (low - own, high - own))
 
 
 def effects(result: AxisResult) -> tuple[FittedEffect, ...]:

@@ -176,6 +176,8 @@ _EXACT = 1e-9
 """The width of an interval relative to its value up to which the value is exact, and the width is rounding."""
 _WIDTH_IN_UNITS = 3.0
 """The least width of a written interval in units of the last digit, which tells the width to a third."""
+_NEAR_ZERO = 1e-6
+"""The value relative to the width of an interval around 0 below which it is written as 0."""
 
 
 def with_interval(value: float, interval: tuple[float, float] | None, digits: int = 4) -> tuple[str, str, str]:
@@ -183,14 +185,17 @@ def with_interval(value: float, interval: tuple[float, float] | None, digits: in
 
     36.98 from 36.974 to 37.004 becomes 36.98, 36.97, 37.00: all three have the same decimals, and the interval is at
     least three units of the last one wide. Where this would leave less than two digits of the value, each number has
-    two significant digits of its own. Rounding keeps the order of numbers, so an interval that contains its value is
-    never written as one that does not. Where there is no interval, or one that is as narrow as rounding, the value has
-    the given number of significant digits. The ends are empty where there is no interval.
+    two significant digits of its own, and a value that is tiny beside an interval around 0 becomes 0. Rounding keeps
+    the order of numbers, so an interval that contains its value is never written as one that does not. Where there is
+    no interval, or one that is as narrow as rounding, the value has the given number of significant digits. The ends
+    are empty where there is no interval.
     """
     if interval is None:
         return _significant(value, digits), "", ""
-    numbers = value, *interval
     width = interval[1] - interval[0]
+    if interval[0] <= 0.0 <= interval[1] and abs(value) < _NEAR_ZERO * width:
+        value = 0.0
+    numbers = value, *interval
     if width > _EXACT * abs(value) and all(map(isfinite, numbers)):
         place = floor(log10(width / _WIDTH_IN_UNITS))
         if abs(value) >= 10.0 ** (place + 1):

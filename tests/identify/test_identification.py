@@ -235,7 +235,9 @@ def test_full_folder_gives_the_vehicle_back(full: Identification, full_folder: P
         *(f"{kind}_{v}" for kind in ("a_d", "b_d", "beta") for v in "uwr"),
     }
     assert [axis.chosen for axis in full.axes] == ["recordings"] * 3
-    assert all(axis.response for axis in full.axes), "the points of the recordings are fitted too"
+    points = [p for axis in full.axes for p in axis.points]
+    assert points
+    assert not any(p.weight for p in points), "the fit to the recordings has all that was read off them"
     assert full.vehicle.provenance
     assert set(full.vehicle.provenance.inputs) == {path.name for path in full_folder.iterdir()}
     assert full.vehicle.command_range == (0.2, 0.7)
@@ -262,7 +264,9 @@ def test_full_folder_reaches_the_vehicle_file(full: Identification, tmp_path: Pa
 def test_points_of_a_comparison_stand_beside_the_model(full: Identification) -> None:
     for comparison in compare(full):
         assert len(comparison.points) == len(comparison.model) == len(comparison.leave_one_out)
-        assert comparison.rms(comparison.model) < 0.05
+        deviations = comparison.model / [p.value for p in comparison.points] - 1.0
+        assert np.sqrt(np.mean(deviations**2)) < 0.05
+        assert comparison.counts == 0
         assert comparison.against is None, "there is nothing to set beside"
 
 

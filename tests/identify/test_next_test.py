@@ -90,6 +90,50 @@ def test_no_test_is_of_use_where_none_fits_or_none_narrows() -> None:
     assert not blind.is_useful
 
 
+# ---- Forces ----------------------------------------------------------------------------------------------------------
+
+THRUST = ("a_t_top", "b_t_top")
+
+
+def uncertain_thrust(*errors: float) -> Estimate:
+    """Return an estimate of the top thrust curve with these standard errors, N."""
+    return Estimate(THRUST, np.array([VIDEORAY[name] for name in THRUST]), np.diag(errors) ** 2, 1000.0, 1.0)
+
+
+@pytest.mark.parametrize("most", [1.0, 0.12])
+def test_weak_forces_are_proposed_where_they_help_most(most: float) -> None:
+    """The interval after them is that of least squares with the present estimate as a prior."""
+    noise, limits = 0.05, TankLimits(command_max=most)
+    found = next_test(HEAVE, VIDEORAY, uncertain_thrust(0.3, 0.5), Sensor("velocity", 10.0), limits, {"top": noise})
+    assert found
+    levels = [c for c in (0.05, 0.1, 0.15, 0.2) if c <= most]
+    words = ", ".join(f"{c:.0%}" for c in levels)
+    assert found.words == f"4 forces of the top thrust at each of {words}, ahead and in reverse"
+    assert found.coefficient == "b_t_top"
+    x = np.repeat(levels, 8)
+    M = np.column_stack([x**2, x]) / noise
+    after = np.linalg.inv(M.T @ M + np.diag([0.3**-2.0, 0.5**-2.0]))
+    assert found.narrowed == pytest.approx(np.sqrt(after[1, 1]) / 0.5, rel=1e-6)
+
+
+def test_forces_of_a_coarse_scale_are_not_proposed() -> None:
+    found = next_test(HEAVE, VIDEORAY, uncertain_thrust(0.3, 0.5), Sensor("velocity", 0.001), scales={"top": 100.0})
+    assert found
+    assert "recording of" in found.words
+
+
+def test_a_linear_part_near_zero_need_not_be_known_to_a_share_of_itself() -> None:
+    """It is compared with a tenth of the quadratic part at full command."""
+    for key, full in (("b_t_top", VIDEORAY["a_t_top"]), ("b_d_w", None)):
+        k = VIDEORAY.replaced({key: 0.0})
+        size = 0.1 * (full or VIDEORAY["a_d_w"] * k.response(HEAVE, 1.0)[0])
+        for share, known in ((0.04, True), (0.06, False)):
+            estimate = Estimate((key,), np.zeros(1), np.array([[(share * size / 1.96) ** 2]]), 1e6, 1.0)
+            found = next_test(HEAVE, k, estimate, Sensor("velocity", 0.01))
+            assert found
+            assert found.is_known is known
+
+
 # ---- In a folder -----------------------------------------------------------------------------------------------------
 
 TESTS = {

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from rov_fmu.identify.points.forms import with_keys
 from rov_fmu.identify.points.thrust_fit import ThrustFit, fit_thrust, forces, measured
 from rov_fmu.model.layout import Curve
 from rov_fmu.model.rov import Rov
@@ -144,6 +145,16 @@ def test_thrusts_left_out_are_left_out_both_ways() -> None:
         M = np.column_stack([BOTH_WAYS[side] ** 2, np.abs(BOTH_WAYS[side])])
         by_hand = np.linalg.lstsq(M, fit.y[side], rcond=None)[0].sum()
         assert fit.leave_one_out[~rest & (way * BOTH_WAYS > 0.0)] == pytest.approx([by_hand])
+
+
+def test_a_known_dead_band_holds_in_both_directions() -> None:
+    measured_ones = truth(FINE, 20.0, 5.0, c_0=0.08, c_0_reverse=0.16)
+    measured_ones += 0.05 * np.random.default_rng(4).standard_normal(len(FINE))
+    assert "c_0_x_reverse" in fit_thrust(CURVE, FINE, measured_ones).values
+    given = with_keys(CURVE, {"a_t", "b_t", "c_0"})
+    fit = fit_thrust(given, FINE, measured_ones, known={"c_0_x": 0.08})
+    assert fit.values["c_0_x"] == 0.08
+    assert "c_0_x_reverse" not in fit.values
 
 
 def test_two_curves_are_measured_together() -> None:

@@ -132,6 +132,22 @@ def test_fitted_coefficients_are_in_a_plot_and_a_table(results: Identification, 
     assert not [label for label in labels if label.startswith(("alpha", "m_rov"))], "what is given, or by convention"
 
 
+def test_inertia_and_added_mass_follow_from_beta(results: Identification, page: str) -> None:
+    """The inertia is m/β, and the smallest β is that of the largest inertia."""
+    table = {row[0]: row for row in rows(page) if len(row) == 8 and row[7] in ("kg", "kg·m²")}
+    vehicle = results.vehicle
+    for axis, own, beta in (("Surge", "m_rov", "beta_u"), ("Heave", "m_rov", "beta_w"), ("Yaw", "I_r", "beta_r")):
+        fitted = any(beta in result.estimate.names for result in results.axes if result.estimate)
+        assert (axis in table) is fitted
+        if fitted:
+            low, high = vehicle.intervals[beta]
+            ends = vehicle.rov[own] / high, vehicle.rov[own] / low
+            total = vehicle.rov[own] / vehicle.rov[beta]
+            assert table[axis][1:4] == with_interval(total, ends)
+            mass = vehicle.rov[own]
+            assert table[axis][4:7] == with_interval(total - mass, (ends[0] - mass, ends[1] - mass))
+
+
 def test_warnings_points_and_predictions_of_tables(of_tables: Identification, pages: Mapping[int, str]) -> None:
     page = pages[id(of_tables)]
     items = [item.text_content().strip() for item in html.fromstring(page).iter("li")]

@@ -105,7 +105,8 @@ _DEAD_BANDS = ((), ("c_0",), ("c_0", "c_0" + REVERSE))
 def _forms(curve: Curve, known: Collection[str]) -> Iterable[Curve]:
     """Return the plain form (known keys, a_t and b_t) and then those with more keys."""
     given = {key for key in curve.keys if key == "T" or curve.coefficient(key) in known}
-    sets = (given | {"a_t", "b_t", *reverse, *dead} for reverse, dead in product(((), _BY_DIRECTION), _DEAD_BANDS))
+    dead_bands = ((),) if "c_0" in given else _DEAD_BANDS  # a given one holds in both directions
+    sets = (given | {"a_t", "b_t", *reverse, *dead} for reverse, dead in product(((), _BY_DIRECTION), dead_bands))
     return [with_keys(curve, keys) for keys in dict.fromkeys(map(frozenset, sets))]
 
 
