@@ -565,15 +565,19 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
 def _inspect(path: Path) -> None:
     """List what logs contain, and write a draft of rov.toml."""
     from rov_fmu.interface.inspect_command import inspect_logs, write_draft
-    from rov_fmu.report.console import print_end, shell_words
+    from rov_fmu.report.console import console, paragraph, print_end, shell_words
     from rov_fmu.report.console_log import print_inspection
 
     found, draft, text = inspect_logs(path)
     for inspection in found:
         print_inspection(inspection)
-    write_draft(draft, text)
     following = shell_words("rov-fmu", "identify", draft.parent)
-    print_end([draft], f"edit this draft, then {following}")
+    if draft.exists():
+        paragraph(console(), f"There is a {draft} already, so no draft was written.")
+        print_end([], following)
+    else:
+        write_draft(draft, text)
+        print_end([draft], f"edit this draft, then {following}")
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

@@ -274,7 +274,8 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "that of time?"
     ),
     "wrong sign": (
-        "{files}: moves against the command: is the sign of {quantity} or of the commands turned? {positive} is +"
+        "{files}: moves against the command: is the sign of {quantity} or of the commands turned, or are "
+        "thrusters swapped? {positive} is +"
     ),
     "fractions as percent": (
         "{files}: no command is beyond {percent:.2g} % of the full command, which moves no ROV: are fractions [1] "

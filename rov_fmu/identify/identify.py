@@ -32,7 +32,7 @@ from rov_fmu.identify.usable import UnusableError, check_push, check_recording, 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, part, silent
 from rov_fmu.io.toml_file import join_names
-from rov_fmu.model.layout import Axis, Curve
+from rov_fmu.model.layout import REVERSE, Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
@@ -430,7 +430,7 @@ def _weight(tests: TankTests, window: str, command: float) -> float:
 
 
 def _command_range(results: Sequence[AxisResult], rov: Rov) -> tuple[float, float]:
-    """Return the weakest and the strongest command that counts."""
+    """Return the weakest command that counts and is beyond every dead band, and the strongest one."""
 
     def used() -> Iterator[float]:
         for result in results:
@@ -440,6 +440,8 @@ def _command_range(results: Sequence[AxisResult], rov: Rov) -> tuple[float, floa
                 command = recording.command if recording.command is not None else recording.reaching(rov.layout)
                 yield from np.unique(np.abs(command)).tolist()
 
-    commands = {round(c, 6) for c in used()} - {0.0}
+    ends = ("c_0" + end for end in ("", REVERSE))
+    dead = max((rov.coefficients.get(c.coefficient(end), 0.0) for end in ends for c in rov.layout.curves), default=0.0)
+    commands = {round(c, 6) for c in used() if c > dead} - {0.0}
     low, high = min(commands, default=0.0), max(commands, default=1.0)
     return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))

@@ -1,6 +1,7 @@
 """The printout of what a log contains."""
 
 from collections.abc import Iterator
+from math import pi
 
 from rich.table import Table
 
@@ -31,12 +32,13 @@ def print_inspection(inspection: Inspection) -> None:
 
 
 def _rows(inspection: Inspection) -> Table:
-    """Return the table of the commands and signals."""
+    """Return the table of the commands and signals; angles are in degrees."""
     numbers = ("unit", "samples", "rate [Hz]", "least", "largest")
     found = table(str(inspection.path), "", numbers, ("gaps",))
     for row in (*inspection.commands, *inspection.signals):
-        digits = [text(number, ".4g") for number in (row.rate, row.low, row.high)]
-        found.add_row(row.name, row.unit, str(row.samples), *digits, ", ".join(_gaps(row)))
+        factor = 180.0 / pi if row.unit in ("rad", "rad/s") else 1.0
+        digits = [text(number, ".4g") for number in (row.rate, factor * row.low, factor * row.high)]
+        found.add_row(row.name, row.unit.replace("rad", "deg"), str(row.samples), *digits, ", ".join(_gaps(row)))
     return found
 
 

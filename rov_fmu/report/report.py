@@ -42,6 +42,7 @@ from rov_fmu.report.plots.recordings import CommandStep, clearest_step, plot_rec
 from rov_fmu.report.plots.svg import Draw, inline_svg, with_even_text
 from rov_fmu.report.templates import number, page
 from rov_fmu.tank.description import ROV_FILE
+from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import TankTests
 
 _WIDTH = 3.7
@@ -167,9 +168,20 @@ def _holds(tests: TankTests) -> dict[str, str]:
     for what, rows in tables.items():
         files = Counter(row.file for row in chain(*rows.values()))
         holds.update({file: count(n, what) for file, n in files.items()})
-    for r in chain(*tests.recordings.values()):
-        holds[r.file] = f"{len(r.time)} samples of command and {r.quantity} in {r.time[-1]:.4g} s"
+    logs: dict[str, list[Recording]] = {}
+    for recording in chain(*tests.recordings.values()):
+        logs.setdefault(recording.file, []).append(recording)
+    for file, recordings in logs.items():
+        samples, seconds = (max(of(r.time) for r in recordings) for of in (len, lambda time: float(time[-1])))
+        names = ["command", *dict.fromkeys(_signal(r) for r in recordings)]
+        holds[file] = f"{samples} samples of {', '.join(names[:-1])} and {names[-1]} in {seconds:.4g} s"
     return holds
+
+
+def _signal(recording: Recording) -> str:
+    """Return what a recording measures, in words."""
+    alike = recording.quantity in ("velocity", "distance")
+    return f"{recording.axis.name} {recording.quantity}" if alike else recording.quantity
 
 
 def scatter(simulation: Simulation) -> str:

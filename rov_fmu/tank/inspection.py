@@ -19,6 +19,7 @@ from rov_fmu.tank.formats.csv_log import read_csv
 from rov_fmu.tank.logs import READERS
 from rov_fmu.tank.recording import CONTEXT
 from rov_fmu.tank.signals import gaps
+from rov_fmu.tank.tables import KINDS
 
 _HEADER = re.compile(r"(?P<name>[^\[(]*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*")
 _COMMAND = re.compile(r"\b(?:thruster|motor|propeller|pwm|servo|esc|cmd|command|u)[ _]*(\d+)\b|^(?:u_|thruster )\S+$")
@@ -90,10 +91,12 @@ def inspect(path: Path, layouts: Iterable[Layout]) -> Inspection:
 
 
 def logs_of(path: Path) -> list[Path]:
-    """Return the logs in a folder, or in the folder of a bag, or the path itself."""
+    """Return the logs in a folder, or in the folder of a bag, or the path itself; tables of tank tests are no logs."""
     if not path.is_dir():
         return [path]
-    return sorted(file for file in path.iterdir() if file.name.lower().endswith((".csv", *LOG_SUFFIXES)))
+    tables = tuple(f"{kind}_" for kind in KINDS)
+    logs = (file for file in path.iterdir() if file.name.lower().endswith((".csv", *LOG_SUFFIXES)))
+    return sorted(file for file in logs if not file.name.lower().startswith(tables))
 
 
 def fitting(count: int, layouts: Iterable[Layout]) -> Layout | None:

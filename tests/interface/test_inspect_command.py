@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.interface.inspect_command import write_draft
+from rov_fmu.io.output import WriteError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
 from tests.tank.formats import motion, test_mavlink, test_ulog
@@ -103,13 +105,45 @@ def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
 
 def test_a_rov_toml_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "rov.toml").write_text("mine", encoding="utf-8")
-    assert main(["identify", "--inspect", str(one_file(tmp_path))]) == 2
+    assert main(["identify", "--inspect", str(one_file(tmp_path))]) == 0
     found = capsys.readouterr()
     assert "depth" in found.out
-    assert (
-        found.err == f"rov-fmu: {tmp_path / 'rov.toml'}: cannot be written: the file there is not replaced by a draft\n"
-    )
+    assert f"There is a {tmp_path / 'rov.toml'} already, so no draft was written." in found.out
+    assert found.err == ""
+    with pytest.raises(WriteError, match="the file there is not replaced by a draft"):
+        write_draft(tmp_path / "rov.toml", "a draft")
     assert (tmp_path / "rov.toml").read_text(encoding="utf-8") == "mine"
+
+
+def test_tables_beside_the_logs_are_no_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one_file(tmp_path)
+    for name in ("thrust_rear.csv", "steady_surge.csv", "Time_constant_yaw.csv"):
+        (tmp_path / name).write_text("command [%],force [N]\n50,1\n", encoding="utf-8")
+    assert main(["identify", "--inspect", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "thrust_rear" not in out
+    assert "steady_surge" not in out
+
+
+def test_angles_are_in_degrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    heading: Array = 10.0 + 33.0 * TIME / TIME[-1]
+    log = tmp_path / "log_dive.csv"
+    table(
+        log,
+        "time [s],u_1 [%],heading [deg],roll [deg],r [rad/s]",
+        TIME,
+        np.where(TIME > 1.0, 30.0, 0.0),
+        heading,
+        -DEPTH,
+        DEPTH,
+    )
+    assert main(["identify", "--inspect", str(log)]) == 0
+    rows = {line.split("  ")[0]: line.split() for line in capsys.readouterr().out.splitlines() if line}
+    assert (rows["heading"][1], *rows["heading"][-2:]) == ("deg", "10", "43")
+    assert rows["roll angle"][2] == "deg"
+    assert float(rows["roll angle"][-1]) == pytest.approx(-DEPTH.min(), rel=1e-3)
+    assert rows["yaw velocity"][2] == "deg/s"
+    assert float(rows["yaw velocity"][-1]) == pytest.approx(np.degrees(DEPTH.max()), rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.bag", "a.db3", "a.mcap", "a.ulg", "a.tlog", "a.bin", "missing.csv"])
