@@ -112,24 +112,25 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
 
 
 def print_proof(findings: "Sequence[Finding]") -> None:
-    """Print how far each variable of each experiment deviates from its expected values."""
-    found = table("", "experiment", (), ("variable",))
-    for header in ("deviation", "tolerance"):
-        found.add_column(header, justify="right", no_wrap=True)
-    found.add_column("")
-    for f in findings:
-        found.add_row(
-            f.experiment,
-            f.variable,
-            text(f.deviation, ".1e"),
-            text(f.tolerance, ".1e"),
-            "pass" if f.passed else f"FAIL {f.error}",
-        )
+    """Print how many results are as expected, then the largest deviation of each experiment and each failed result."""
     out = console()
-    print_table(found, out)
-    out.print()
     passed = f"{sum(f.passed for f in findings)} of {len(findings)} pass"
     paragraph(out, f"{passed}. A deviation is the largest one, relative to the largest expected value.")
+    out.print()
+    found = table("", "experiment", ("deviation", "tolerance"), ("result", "of"))
+    for experiment in dict.fromkeys(f.experiment for f in findings):
+        own = [f for f in findings if f.experiment == experiment]
+        if good := [f for f in own if f.passed]:
+            worst = max(good, key=lambda f: f.deviation)
+            found.add_row(experiment, *_deviation(worst), "pass", ", ".join(f.variable for f in good))
+        for f in own:
+            if not f.passed:
+                found.add_row(experiment, *_deviation(f), "FAIL", f.error or f.variable)
+    print_table(found, out)
+
+
+def _deviation(f: "Finding") -> tuple[str, str]:
+    return text(f.deviation, ".1e"), text(f.tolerance, ".1e")
 
 
 def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:

@@ -72,7 +72,8 @@ def _print_coefficients(out: Console, vehicle: Vehicle, lines: int) -> None:
         unit = vehicle.layout.coefficients[name].unit
         value, low, high = with_interval(vehicle.rov[name], vehicle.intervals[name])
         texts.append(f"{name} {value} ({low} to {high}) {'' if unit == '1' else unit}".rstrip())
-    fitting = (n for n in range(len(texts), _FEWEST_COEFFICIENTS, -1) if n <= lines * _columns(texts[:n], out.width))
+    lines_of = {n: lines + (n == len(texts)) for n in range(len(texts), _FEWEST_COEFFICIENTS, -1)}  # one more for all
+    fitting = (n for n, most in lines_of.items() if n <= most * _columns(texts[:n], out.width))
     shown = texts[: next(fitting, _FEWEST_COEFFICIENTS)]
     columns = _columns(shown, out.width)
     of = f", the {len(shown)} widest of {len(texts)}" if len(shown) < len(texts) else ""

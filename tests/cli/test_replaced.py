@@ -57,7 +57,7 @@ def test_unchanged_files_are_replaced_and_reported(tank_tests: Path, folder: Pat
     out, err = capsys.readouterr()
     assert without_progress(err) == ""
     assert out.splitlines()[:2] == [
-        f"{folder / name}: replaced a file that was as identify wrote it" for name in ("rov.toml", "r.html")
+        f"{folder / name}: replaced the result of an earlier run" for name in ("rov.toml", "r.html")
     ]
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     assert load_vehicle(folder / "rov.toml").provenance
@@ -139,7 +139,7 @@ def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: 
     text = sealed("a = 1\nb = 2\n", "# {}")
     for whole in (text, text.replace("\n", "\r\n"), f"\ufeff{text}"):
         path.write_bytes(whole.encode())
-        assert _check([path]) == [f"{path}: replaced a file that was as identify wrote it"]
+        assert _check([path]) == [f"{path}: replaced the result of an earlier run"]
     for other in (text + "\n", text.replace("a", "c", 1), text.partition("\n")[2], f"\n{text}", "", text[:40]):
         path.write_bytes(other.encode())
         with pytest.raises(WriteError):
@@ -147,4 +147,4 @@ def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: 
 
 
 def test_the_vehicle_that_ships_is_as_identify_wrote_it() -> None:
-    assert _check([REFIT]) == [f"{REFIT}: replaced a file that was as identify wrote it"]
+    assert _check([REFIT]) == [f"{REFIT}: replaced the result of an earlier run"]
