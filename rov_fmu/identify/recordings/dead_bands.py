@@ -25,39 +25,38 @@ _LENGTHS = 1e-5, 0.3
 
 
 def with_secants(analysis: ResidualAnalysis) -> ResidualAnalysis:
-    """Return the analysis with secants in place of derivatives by dead bands, where b_t may be 0.
-
-    A secant is as long as half of the interval of c_0. The interval extends at least to the c_0 at which b_t is 0.
-    """
-    model, x, r = analysis.model, analysis.x, analysis.solution.residuals
+    """Return the analysis with secants in place of derivatives by dead bands, where b_t may be 0."""
     J = analysis.solution.jacobian.copy()
+    for n, direction, room in _directions(analysis.model, analysis.x):
+        _take_secant(analysis, J, n, direction, room)
+    if np.array_equal(J, analysis.solution.jacobian):
+        return analysis
+    return ResidualAnalysis(analysis.model, replace(analysis.solution, jacobian=J), robust=analysis.robust)
+
+
+def _take_secant(analysis: ResidualAnalysis, J: Array, n: int, direction: Array, room: float) -> None:
+    """Replace column n of J, the derivative by a c_0, if half of its interval is longer than the room.
+
+    The secant along the direction is as long as half of the interval. The interval extends at least by the room.
+    """
+    derivative, others = J[:, n].copy(), direction.copy()
+    others[n] = 0.0
     reach = quantile(max(analysis.degrees_of_freedom, 1.0))
 
-    def half(n: int) -> float:
-        """Return half of the interval of a parameter."""
+    def half() -> float:
         return reach * float(np.sqrt(covariance(J.T @ J)[n, n]))
 
-    for n, direction, room in _directions(model, x):
-        if half(n) < room:
-            continue
-        others = direction.copy()
-        others[n] = 0.0
-        derivative = J[:, n].copy()
+    def excess(length: float) -> float:
+        """Take a secant of this length; return how much longer half of the interval then is."""
+        change = analysis.model.residuals(analysis.x + length * direction) - analysis.solution.residuals
+        J[:, n] = change / length - J @ others
+        return min(half(), 1.0) - max(length, room) if np.isfinite(change).all() else -inf
 
-        def excess(
-            length: float, n: int = n, direction: Array = direction, others: Array = others, room: float = room
-        ) -> float:
-            """Take a secant into J; return how much longer half of the interval is than the secant."""
-            J[:, n] = (model.residuals(x + length * direction) - r) / length - J @ others
-            return min(half(n), 1.0) - max(length, room) if np.isfinite(J[:, n]).all() else -inf
-
+    if half() > room:
         if excess(_LENGTHS[0]) > 0.0 > excess(_LENGTHS[1]):
             brentq(excess, *_LENGTHS, xtol=1e-4)
         if not np.isfinite(J[:, n]).all():
             J[:, n] = derivative
-    if np.array_equal(J, analysis.solution.jacobian):
-        return analysis
-    return ResidualAnalysis(model, replace(analysis.solution, jacobian=J), robust=analysis.robust)
 
 
 def _directions(model: Simulator, x: Array) -> Iterator[tuple[int, Array, float]]:
