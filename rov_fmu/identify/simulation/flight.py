@@ -22,6 +22,8 @@ _SETTLED = 30.0
 _POSITIONS = {HEAVE: "z", ROLL: "phi", PITCH: "theta", YAW: "psi"}
 _VAGUE = 0.3
 """The prior standard deviation of a velocity at the start that is not measured, m/s or rad/s."""
+_FAST = 1.0
+"""The prior standard deviation of a measured velocity at the start, m/s or rad/s, much larger than its error."""
 _TILT = 0.1
 """The prior standard deviation of a roll or pitch angle at the start that is not measured, rad."""
 _STEP = 0.05
@@ -78,13 +80,17 @@ class Flight:
 
     @cached_property
     def vague(self) -> dict[str, tuple[float, float]]:
-        """The unmeasured variables at the start that act on measured ones: their likely values and deviations.
+        """The variables at the start of a vehicle whose axes act on each other: their likely values and deviations.
 
-        At the beginning of a file the vehicle is taken to be at rest.
+        These are the measured velocities, because drag would stop even one of 100 m/s at once, and the search may not
+        find the way back from there; and the unmeasured variables that act on measured ones. At the beginning of a file
+        the unmeasured ones are taken to be at rest.
         """
-        if not self.layout.is_linked or not self.members[0].piece:
+        if not self.layout.is_linked:
             return {}
-        found = {}
+        found = {name: (value, _FAST) for name, value in self.measured.items() if name in self.layout.velocities}
+        if not self.members[0].piece:
+            return found
         for name in self.layout.velocities:
             if name not in self.measured:
                 found[name] = self._logged(name), _VAGUE
