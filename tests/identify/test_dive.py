@@ -99,7 +99,7 @@ def test_the_search_leaves_an_absurd_velocity_at_the_start() -> None:
         far = settled(model, far)
     assert far[n] == pytest.approx(best[n], abs=0.001)
     assert np.abs(model.deviations_of(place, replace_at(best, n, -700.0))).max() > 500.0
-    assert np.abs(model.deviations_of(place, best)).max() < 0.2, "the error of the first velocity hardly matters"
+    assert np.abs(model.deviations_of(place, best)).max() < 0.5, "the error of the first velocity hardly matters"
 
 
 def test_a_fit_at_a_limit_is_refused_with_one_line() -> None:
