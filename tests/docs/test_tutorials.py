@@ -164,6 +164,7 @@ def test_dive(harbour: Identification) -> None:
     assert f"a current of {north} m/s north and {east} m/s east" in told
     for test in (axis.next_test for axis in harbour.axes):
         assert test
+        assert test.is_known
         ((held, rest),) = re.findall(r"steps from rest at .*, (\d+) s each, with (\d+) s of rest", test.words)
         assert 2 * (int(held) + int(rest)) < 60, "less than a minute"
 
