@@ -25,19 +25,19 @@ from rov_fmu.tank.findings import Finding
 _LEAST_EXPLAINED = 0.5
 """The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""
 _BACKWARD = 0.005
-"""The command below which thrust that points backward is rounding."""
+"""A thrust curve that points backward only at commands below this one does so by rounding."""
 _CHANCE = 0.003
-"""The probability that forces and recordings of the same thrust seem to differ."""
+"""The probability of a false alarm, that the forces and the recordings seem to show different thrust curves."""
 _SIGNIFICANT = 4.0
 """A difference between directions of so many standard errors is no chance, at any of some ten commands."""
 
 
 def on_thrust(curve: str, fit: ThrustFit, rov: Rov) -> Iterator[Finding]:
-    """Yield findings about a thrust curve; the recordings may have changed that of the vehicle."""
+    """Yield findings about a fit to forces; `rov` has the thrust curve as the recordings changed it."""
     finding = partial(Finding, curve=curve)
     if fit.estimate.degrees_of_freedom <= 0.0:
         yield finding("thrust without freedom", numbers={"count": int(fit.counts.sum())})
-    (of_vehicle,) = (each for each in rov.layout.curves if each.name == curve)
+    of_vehicle = rov.layout.curves_by_name[curve]
     for end, kind in (("", "backward thrust"), (REVERSE, "backward thrust in reverse")):
         a_t, b_t = (rov[of_vehicle.coefficient(key + end)] for key in ("a_t", "b_t"))
         if "a_t" + end in of_vehicle.keys and a_t > 0.0 and -b_t / a_t > _BACKWARD:
@@ -65,7 +65,7 @@ def on_axis(result: AxisResult, base: Rov, thrust: Mapping[str, ThrustFit]) -> I
     asymmetry = _asymmetry(x, y, predict(axis, fitted.rov if fitted else base, steady))
     if asymmetry:
         yield finding("asymmetry", names={"quantity": "V_ss", "window": axis.name}, numbers=asymmetry)
-    used = [abs(p.command) for p in result.points if p.weight > 0.0 or p.error is not None]
+    used = [abs(p.command) for p in result.points if p.weight > 0.0 or p.is_read_off]
     for name, fit in thrust.items() if used else ():
         tested = np.abs(fit.x[fit.counts])
         if max(used) > tested.max() + 0.005 or min(used) < tested.min() - 0.005:
@@ -145,7 +145,7 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
     for effect in fit.effects:
         if effect.kept:
             yield _on_effect(fit, effect)
-    tables = [p for p in result.points if p.error is None and p.weight > 0.0]
+    tables = [p for p in result.points if not p.is_read_off and p.weight > 0.0]
     for quantity in ("V_ss", "Tau"):
         error = relative_rms(tables, predict(axis, fit.rov, tables), quantity)
         if error > 0.05:
@@ -179,7 +179,7 @@ def on_forces(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[Finding]:
     if not own.noise > 0.0 or not {*own.names} <= {*fit.estimate.names}:
         return
     x, counts = thrust.x, thrust.counts
-    (joint,) = (forces(each, fit.rov.coefficients, x) for each in fit.rov.layout.curves if each.name == curve)
+    joint = forces(fit.rov.layout.curves_by_name[curve], fit.rov.coefficients, x)
     increase = float(np.sum((thrust.y - joint)[counts] ** 2) - np.sum(thrust.residuals[counts] ** 2))
     p = len(own.names)
     if fdtrc(p, own.degrees_of_freedom, max(increase, 0.0) / p / own.noise**2) < _CHANCE:

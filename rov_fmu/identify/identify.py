@@ -343,8 +343,8 @@ def _axis(
     check_push(tests.folder, axis, base, [p.command for p in points if p.weight > 0.0])
     points = tuple(p if is_pushed(axis, base, p.command) else replace(p, weight=0.0) for p in points)
     used = [p for p in points if p.weight > 0.0]
-    if fitted:  # to every sample, so what is read off the same recordings tells nothing more
-        points = tuple(p if p.error is None else replace(p, weight=0.0) for p in points)
+    if fitted:  # this fit has every sample, so points that were read off the recordings tell nothing more
+        points = tuple(replace(p, weight=0.0) if p.is_read_off else p for p in points)
     response = _response(axis, points, base, known, _thrust_of(fitted, driving))
     wanted = set(drag_and_beta(axis, known))
     if not fitted and not response and (missing := sorted(wanted - {axis.coefficient("beta")})):
@@ -440,8 +440,8 @@ def _command_range(results: Sequence[AxisResult], rov: Rov) -> tuple[float, floa
                 command = recording.command if recording.command is not None else recording.reaching(rov.layout)
                 yield from np.unique(np.abs(command)).tolist()
 
-    ends = ("c_0" + end for end in ("", REVERSE))
-    dead = max((rov.coefficients.get(c.coefficient(end), 0.0) for end in ends for c in rov.layout.curves), default=0.0)
-    commands = {round(c, 6) for c in used() if c > dead} - {0.0}
+    names = [curve.coefficient(key) for curve in rov.layout.curves for key in ("c_0", "c_0" + REVERSE)]
+    widest = max((rov.coefficients.get(name, 0.0) for name in names), default=0.0)
+    commands = {round(c, 6) for c in used() if c > widest} - {0.0}
     low, high = min(commands, default=0.0), max(commands, default=1.0)
     return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))

@@ -6,7 +6,7 @@ are.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp, isfinite, log, nan, sqrt
+from math import exp, inf, isfinite, log, nan, sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -39,6 +39,20 @@ class Estimate:
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
+
+    @property
+    def student(self) -> float:
+        """The width of an interval by Student's distribution, relative to that by the normal distribution.
+
+        A fit to few data underestimates their scatter by chance. An error times this factor allows for that.
+        """
+        return quantile(self.degrees_of_freedom) / quantile(inf)
+
+    def as_normal(self) -> "Estimate":
+        """Return the estimate with larger errors, so that the normal distribution gives the same 95 % intervals."""
+        if not self.degrees_of_freedom > 0.0:
+            return self
+        return replace(self, covariance=self.student**2 * self.covariance)
 
     @property
     def named(self) -> dict[str, float]:

@@ -114,31 +114,17 @@ def next_test(
     prior[np.diag_indices(len(size))] = 1.0  # in present standard errors
     before = np.linalg.pinv(prior, hermitian=True)
     internal = error * [1.0 / v if is_factor(n) else 1.0 for n, v in zip(found.names, found.values, strict=True)]
+    recordings = [*_recordings(axis, rov, limits)]
+    if not recordings:
+        return None
+    tests = [(words, _information(axis, rov, found.names, sensor, command)) for words, command in recordings if words]
+    tests += _forces(rov, dict(zip(found.names, error.tolist(), strict=True)), scales, limits)
     best: tuple[float, str] = (1.0, "")
-    moves = False
-
-    def try_test(words: str, information: Array) -> None:
-        """Take a test if it narrows the widest interval more than the best one so far."""
-        nonlocal best
-        information = information * np.outer(internal, internal)
+    for words, gained in tests:
+        information = gained * np.outer(internal, internal)
         if np.isfinite(information).all():
             after = np.linalg.pinv(before + information, hermitian=True)
             best = min(best, (float(np.sqrt(np.clip(after[widest, widest], 0.0, 1.0))), words))
-
-    for words, command in _tests(axis, rov, limits):
-        moves = True
-        if not words:
-            continue
-        try_test(words, _information(axis, rov, found.names, sensor, command))
-    if not moves:
-        return None
-    pulls = np.array([c for c in _PULLS if c <= limits.command_max])
-    for curve, noise in scales.items() if pulls.size else ():
-        of_forces = _information_of_forces(
-            curve, rov, dict(zip(found.names, error.tolist(), strict=True)), noise, pulls
-        )
-        levels = join_names(f"{c:.0%}" for c in pulls)
-        try_test(f"{_TIMES} forces of the {curve} thrust at each of {levels}, ahead and in reverse", of_forces)
     name = found.names[widest]
     return NextTest(axis, name, found.interval(name), float(relative[widest]), *best, repeat)
 
@@ -157,8 +143,8 @@ def _size(axis: Axis, rov: Rov, name: str) -> float:
     return size
 
 
-def _tests(axis: Axis, rov: Rov, limits: TankLimits) -> Iterator[tuple[str, Array]]:
-    """Yield tests of steps from rest in one or both directions: a phrase, and the command at each sample.
+def _recordings(axis: Axis, rov: Rov, limits: TankLimits) -> Iterator[tuple[str, Array]]:
+    """Yield recordings of steps from rest in one or both directions: a phrase, and the command at each sample.
 
     The phrase is empty where such steps are beyond the limits.
     """
@@ -221,17 +207,22 @@ def _information(axis: Axis, rov: Rov, names: tuple[str, ...], sensor: Sensor, c
     return np.asarray(gram[:p, :p] - cross @ np.linalg.pinv(gram[p:, p:]) @ cross.T)
 
 
-def _information_of_forces(curve: str, rov: Rov, errors: Mapping[str, float], noise: float, pulls: Array) -> Array:
-    """Return the information of repeated forces, ahead and in reverse, about the coefficients with these errors.
+def _forces(
+    rov: Rov, errors: Mapping[str, float], scales: Mapping[str, float], limits: TankLimits
+) -> Iterator[tuple[str, Array]]:
+    """Yield tests of the weak forces of each curve within the limits: a phrase, and the information about coefficients.
 
-    The derivatives are secants over a standard error, because those by c_0 and by b_t are alike where b_t is 0.
+    `errors` has the standard errors of the coefficients. The derivatives are secants over these, because those by c_0
+    and by b_t are alike where b_t is 0.
     """
-    x = np.concatenate([pulls, -pulls])
-    (of_curve,) = (each for each in rov.layout.curves if each.name == curve)
-    here = forces(of_curve, rov.coefficients, x)
-    columns = []
-    for name, error in errors.items():
-        changed = forces(of_curve, {**rov.coefficients, name: rov[name] + error}, x)
-        columns.append((changed - here) / error)
-    J = np.column_stack(columns)
-    return np.asarray(_TIMES / noise**2 * J.T @ J)
+    pulls = np.array([c for c in _PULLS if c <= limits.command_max])
+    if not pulls.size:
+        return
+    x, levels = np.concatenate([pulls, -pulls]), join_names(f"{c:.0%}" for c in pulls)
+    for name, noise in scales.items():
+        curve = rov.layout.curves_by_name[name]
+        here = forces(curve, rov.coefficients, x)
+        changed = (forces(curve, {**rov.coefficients, n: rov[n] + error}, x) for n, error in errors.items())
+        J = np.column_stack([(F - here) / error for F, error in zip(changed, errors.values(), strict=True)])
+        words = f"{_TIMES} forces of the {name} thrust at each of {levels}, ahead and in reverse"
+        yield words, np.asarray(_TIMES / noise**2 * J.T @ J)

@@ -1,8 +1,6 @@
 """The joint covariance of all identified coefficients: fits that share a thrust curve have correlated errors."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from math import inf
 
 import numpy as np
 
@@ -10,7 +8,6 @@ from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.thrust_fit import ThrustFit
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.uncertainty import quantile
 
 
 class Together:
@@ -27,12 +24,12 @@ class Together:
         chosen = [*results]
         for result in chosen:
             if result.recordings:  # axes that were fitted at once share this estimate
-                self._add(_as_normal(result.recordings.together))
+                self._add(result.recordings.together.as_normal())
         for fit in thrust:
-            self._add(_as_normal(fit.estimate))
+            self._add(fit.estimate.as_normal())
         for result in chosen:
             if result.response and result.chosen == "points":
-                self._add(_as_normal(result.response.given_thrust), result.response.by_thrust)
+                self._add(result.response.given_thrust.as_normal(), result.response.by_thrust)
         for result in chosen:
             for name, by in result.recordings.disagreement.items() if result.recordings else ():
                 self._widen(name, by)
@@ -71,10 +68,3 @@ class Together:
             if n is not None and m is not None and (shared := float(self.covariance[n, m])):
                 found[other] = shared / float(np.sqrt(self.covariance[n, n] * self.covariance[m, m]))
         return {other: min(max(value, -1.0), 1.0) for other, value in found.items()}
-
-
-def _as_normal(found: Estimate) -> Estimate:
-    """Increase the errors so that the normal distribution gives the same 95 % intervals."""
-    if not found.degrees_of_freedom > 0.0:
-        return found
-    return replace(found, covariance=(quantile(found.degrees_of_freedom) / quantile(inf)) ** 2 * found.covariance)

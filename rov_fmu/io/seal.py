@@ -30,7 +30,8 @@ def check_replaced(paths: Iterable[Path], *, force: bool) -> list[str]:
             continue
         if (reason := _not_as_written(path)) and not force:
             raise WriteError(errno.EEXIST, f"the file there {reason}; --force replaces it", str(path))
-        lines.append(f"{path}: replaced {f'a file that {reason}' if reason else 'the result of an earlier run'}")
+        replaced = f"a file that {reason}" if reason else "the result of an earlier run"
+        lines.append(f"{path}: replaced {replaced}")
     return lines
 
 

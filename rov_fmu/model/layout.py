@@ -454,10 +454,14 @@ class Layout:
         return {form.axis.velocity: form for form in self.axes}
 
     @cached_property
+    def curves_by_name(self) -> dict[str, Curve]:
+        """The thrust curves by name."""
+        return {curve.name: curve for curve in self.curves}
+
+    @cached_property
     def curve_of(self) -> dict[str, Curve]:
         """The curve of each thruster, by its name."""
-        curves = {curve.name: curve for curve in self.curves}
-        return {thruster.name: curves[thruster.curve] for thruster in self.thrusters}
+        return {thruster.name: self.curves_by_name[thruster.curve] for thruster in self.thrusters}
 
     def has(self, *axes: Axis) -> bool:
         """Return True when the vehicle has one of these axes."""

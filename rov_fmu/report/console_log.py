@@ -1,11 +1,11 @@
 """The printout of what a log contains."""
 
 from collections.abc import Iterator
-from math import pi
 
 from rich.table import Table
 
 from rov_fmu.report.console import console, paragraph, print_table, table, text
+from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection import Inspection, Row
 
@@ -36,9 +36,9 @@ def _rows(inspection: Inspection) -> Table:
     numbers = ("unit", "samples", "rate [Hz]", "least", "largest")
     found = table(str(inspection.path), "", numbers, ("gaps",))
     for row in (*inspection.commands, *inspection.signals):
-        factor = 180.0 / pi if row.unit in ("rad", "rad/s") else 1.0
+        factor, unit = in_degrees(row.unit)
         digits = [text(number, ".4g") for number in (row.rate, factor * row.low, factor * row.high)]
-        found.add_row(row.name, row.unit.replace("rad", "deg"), str(row.samples), *digits, ", ".join(_gaps(row)))
+        found.add_row(row.name, unit, str(row.samples), *digits, ", ".join(_gaps(row)))
     return found
 
 

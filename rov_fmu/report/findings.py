@@ -233,12 +233,12 @@ def measured_and_fitted(results: Identification) -> Iterator[MeasuredAndFitted]:
 
 _OF_THRUST = (
     "The measured value is that of the forces alone. The fitted one explains the forces and the recordings together. "
-    "They differ by chance, because forces alone hardly tell a dead band from the shape of the curve, because a "
+    "They may differ by chance, because forces alone hardly tell a dead band from the shape of the curve, because a "
     "thruster pushes less in motion than held at a scale, or because the scale or the battery differs"
 )
 _OF_POINTS = (
-    "The measured value is that of the tables alone. The fitted one explains the tables and the recordings together, "
-    "and has load, delay, lag and current apart from drag and β. The numbers of a table contain all of them"
+    "The measured value is that of the tables alone, whose numbers contain load, delay, lag and current. The fitted "
+    "one explains the tables and the recordings together, and these effects are separate from drag and β"
 )
 
 

@@ -42,7 +42,7 @@ from rov_fmu.report.plots.recordings import CommandStep, clearest_step, plot_rec
 from rov_fmu.report.plots.svg import Draw, inline_svg, with_even_text
 from rov_fmu.report.templates import number, page
 from rov_fmu.tank.description import ROV_FILE
-from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.recording import Recording, signal_name
 from rov_fmu.tank.tank_tests import TankTests
 
 _WIDTH = 3.7
@@ -172,16 +172,10 @@ def _holds(tests: TankTests) -> dict[str, str]:
     for recording in chain(*tests.recordings.values()):
         logs.setdefault(recording.file, []).append(recording)
     for file, recordings in logs.items():
-        samples, seconds = (max(of(r.time) for r in recordings) for of in (len, lambda time: float(time[-1])))
-        names = ["command", *dict.fromkeys(_signal(r) for r in recordings)]
+        samples, seconds = max(len(r.time) for r in recordings), max(r.time[-1] for r in recordings)
+        names = ["command", *dict.fromkeys(signal_name(r.axis, r.quantity) for r in recordings)]
         holds[file] = f"{samples} samples of {', '.join(names[:-1])} and {names[-1]} in {seconds:.4g} s"
     return holds
-
-
-def _signal(recording: Recording) -> str:
-    """Return what a recording measures, in words."""
-    alike = recording.quantity in ("velocity", "distance")
-    return f"{recording.axis.name} {recording.quantity}" if alike else recording.quantity
 
 
 def scatter(simulation: Simulation) -> str:

@@ -28,6 +28,11 @@ TIME = Column(TIMES, minimum=-1e10, maximum=1e10)  # some loggers count from 197
 VOLTAGE = Column({"V": 1.0, "mV": 1000.0}, True, True, 0.0, 1e4, also=("battery", "battery voltage"))
 
 
+def in_degrees(unit: str) -> tuple[float, str]:
+    """Return the factor from an SI unit to the one that is printed, and its name: angles are printed in degrees."""
+    return (ANGLES["deg"], unit.replace("rad", "deg")) if "rad" in unit else (1.0, unit)
+
+
 def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCITIES[0]) -> Column:
     """Return a column of velocities along the axis; an optional column may have blanks."""
     lengths = ANGLES if axis.unit == "rad/s" else LENGTHS

@@ -17,9 +17,9 @@ from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
 from rov_fmu.tank.formats.csv_columns import Names, is_column
 from rov_fmu.tank.formats.csv_log import read_csv
 from rov_fmu.tank.logs import READERS
-from rov_fmu.tank.recording import CONTEXT
+from rov_fmu.tank.recording import CONTEXT, signal_name
 from rov_fmu.tank.signals import gaps
-from rov_fmu.tank.tables import KINDS
+from rov_fmu.tank.tables import TABLES
 
 _HEADER = re.compile(r"(?P<name>[^\[(]*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*")
 _COMMAND = re.compile(r"\b(?:thruster|motor|propeller|pwm|servo|esc|cmd|command|u)[ _]*(\d+)\b|^(?:u_|thruster )\S+$")
@@ -94,7 +94,7 @@ def logs_of(path: Path) -> list[Path]:
     """Return the logs in a folder, or in the folder of a bag, or the path itself; tables of tank tests are no logs."""
     if not path.is_dir():
         return [path]
-    tables = tuple(f"{kind}_" for kind in KINDS)
+    tables = tuple(f"{kind}_" for kind in TABLES)
     logs = (file for file in path.iterdir() if file.name.lower().endswith((".csv", *LOG_SUFFIXES)))
     return sorted(file for file in logs if not file.name.lower().startswith(tables))
 
@@ -129,9 +129,8 @@ def _signals(content: Content) -> Iterator[Row]:
         if axis is None:
             yield _row(name, CONTEXT[name], signal.time, signal.values)
         else:
-            words = f"{axis.name} {name}" if name in ("velocity", "distance") else name
             unit = axis.unit if name == "velocity" else axis.position_unit
-            yield _row(words, unit, signal.time, signal.unwrapped())
+            yield _row(signal_name(axis, name), unit, signal.time, signal.unwrapped())
 
 
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------

@@ -16,6 +16,11 @@ CLOCK_ERROR = 5.0
 """The largest error of times that were aligned with those of another clock, s."""
 
 
+def signal_name(axis: Axis, quantity: str) -> str:
+    """Return the name of a measured quantity: surge velocity, surge distance, depth, heading."""
+    return f"{axis.name} {quantity}" if quantity in ("velocity", "distance") else quantity
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Commands and motion over time, n samples in SI units; a heading is unwrapped."""

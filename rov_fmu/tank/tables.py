@@ -7,7 +7,7 @@ from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.columns import FORCE, HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
 
-KINDS = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}
+TABLES = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}
 """The words that the name of a table begins with, each with the measured quantity."""
 _MOST_LINES = 10
 """The number of wrong rows in a file that get a line of their own."""
@@ -25,7 +25,7 @@ class Row:
 
 def read_rows(path: Path, kind: str, axis: Axis | None = None) -> list[Row]:
     """Read rows of a command and a force (`thrust`), velocity (`steady`) or time constant. Raises DataFileError."""
-    name = KINDS[kind]
+    name = TABLES[kind]
     column = FORCE if kind == "thrust" else time_constant_column()
     if axis and kind == "steady":
         column = velocity_column(axis)

@@ -31,10 +31,10 @@ from rov_fmu.tank.formats.csv_columns import Names, names_of
 from rov_fmu.tank.logs import Log, read_dive, read_log
 from rov_fmu.tank.narrowing import Given, Narrowed, Tested, narrowed
 from rov_fmu.tank.recording import CONTEXT, Recording
-from rov_fmu.tank.tables import KINDS, Row, read_rows
+from rov_fmu.tank.tables import TABLES, Row, read_rows
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
-_KINDS = (*KINDS, "log")
+_KINDS = (*TABLES, "log")
 """The words that the name of a file begins with."""
 
 

@@ -6,15 +6,13 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.identify.identify import identify
-from rov_fmu.tank.tank_tests import load_tank_tests
-from tests.folders import FORCE, RATE, SPEED, TAU
+from tests.folders import FORCE, RATE, SPEED, TAU, read
 
 PAGE = Path(__file__).parents[2] / "docs" / "identify.md"
 
 
 def test_the_complete_rov_toml_makes_a_vehicle(tmp_path: Path) -> None:
     (example,) = re.findall(r'```toml\n(\[vehicle\]\nname = "Tadpole".*?)```', PAGE.read_text("utf-8"), re.DOTALL)
-    (tmp_path / "rov.toml").write_text(example, encoding="utf-8")
     levels = (0.2, 0.4, 0.6, 0.8)
     of_level = {
         "thrust_rear": (FORCE, [31.0 * c * c + c for c in levels]),
@@ -24,10 +22,11 @@ def test_the_complete_rov_toml_makes_a_vehicle(tmp_path: Path) -> None:
         "steady_yaw": (RATE, [1.3 * c for c in levels]),
         "time_constant_surge": (TAU, [0.6 / c for c in levels]),
     }
-    for name, (header, values) in of_level.items():
-        rows = "".join(f"{c},{value:.6f}\n" for c, value in zip(levels, values, strict=True))
-        (tmp_path / f"{name}.csv").write_text(f"{header}\n{rows}", encoding="utf-8")
-    found = identify(load_tank_tests(tmp_path))
+    tables = {
+        f"{name}.csv": "\n".join([header, *(f"{c},{value:.6f}" for c, value in zip(levels, values, strict=True)), ""])
+        for name, (header, values) in of_level.items()
+    }
+    found = identify(read(tmp_path, example, tables))
     assert [result.axis.name for result in found.axes] == ["surge", "heave", "yaw"]
     assert found.vehicle.rov["m_rov"] == 8.2
     assert found.vehicle.layout.drivers(found.axes[2].axis)

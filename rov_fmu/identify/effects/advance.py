@@ -41,7 +41,7 @@ class Advance(Effect):
 
     def prior(self, setting: Setting) -> float:
         """Return the usual loss of thrusters of this strength."""
-        (curve,) = (curve for curve in setting.base.layout.curves if curve.name == self.of)
+        curve = setting.base.layout.curves_by_name[self.of]
         return max(curve.together * setting.base.curve_force(curve, 1.0), 1e-3) / _NO_THRUST
 
     def is_none(self, value: float) -> bool:

@@ -22,7 +22,12 @@ class Point:
     source: str
     """File and line, or file and time."""
     error: float | None = None
-    """The standard error of a point from a recording."""
+    """The standard error of a point that was read off a recording; None for one of a table."""
+
+    @property
+    def is_read_off(self) -> bool:
+        """True for a point that was read off a recording."""
+        return self.error is not None
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Tables of points and of forces as residuals of the fit to recordings."""
 
 from dataclasses import dataclass
-from math import inf
 from typing import Protocol
 
 import numpy as np
@@ -14,14 +13,11 @@ from rov_fmu.identify.points.thrust_fit import ThrustFit, forces
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.uncertainty import quantile
 
 _LEAST = 0.01
 """The least relative error of a point. The points of a table share errors that their scatter does not show."""
 _FAR = 10.0
 """The ratio of a modelled to a measured value beyond which a residual does not grow."""
-_EXACT = 1e-6
-"""The relative error of thrust below which it counts as exact."""
 
 
 class Table(Protocol):
@@ -45,17 +41,12 @@ class TablePoints:
 
     @classmethod
     def of(cls, fit: ResponseFit) -> Self | None:
-        """Return the points of a fit, as uncertain as they scatter about it; None where their scatter is unknown.
-
-        The fit to few points underestimates the scatter by chance, so the error is increased as in Student's
-        distribution.
-        """
+        """Return the points of a fit, as uncertain as they scatter about it; None where their scatter is unknown."""
         own = fit.given_thrust
         if not own.degrees_of_freedom > 0.0:
             return None
         points = tuple(p for p in fit.points if p.weight > 0.0)
-        scatter = own.noise * quantile(own.degrees_of_freedom) / quantile(inf)
-        return cls(fit.axis, points, max(scatter, _LEAST))
+        return cls(fit.axis, points, max(own.noise * own.student, _LEAST))
 
     def __len__(self) -> int:
         return len(self.points)
@@ -84,23 +75,16 @@ class TableForces:
 
     @classmethod
     def of(cls, fit: ThrustFit) -> Self | None:
-        """Return the forces of a fit, as uncertain as they scatter about it; None where they do not scatter.
-
-        The fit to few forces underestimates the scatter by chance, so the error is increased as in Student's
-        distribution.
-        """
-        own = fit.estimate
-        if not own.names or not np.isfinite(own.covariance).all():
+        """Return the forces of a fit, as uncertain as they scatter about it; None where they do not scatter."""
+        if not fit.is_uncertain:
             return None
-        if np.sqrt(np.diag(own.covariance)).max() < _EXACT * np.abs(own.values).max():
-            return None
-        scatter = own.noise * quantile(own.degrees_of_freedom) / quantile(inf)
-        return cls(fit.curve.name, fit.x[fit.counts], fit.y[fit.counts], scatter, own)
+        own, counts = fit.estimate, fit.counts
+        return cls(fit.curve.name, fit.x[counts], fit.y[counts], own.noise * own.student, own)
 
     def __len__(self) -> int:
         return len(self.x)
 
     def residuals(self, rov: Rov) -> Array:
         """Return the modelled less the measured forces, in standard errors, n."""
-        curve = next(curve for curve in rov.layout.curves if curve.name == self.curve)
+        curve = rov.layout.curves_by_name[self.curve]
         return np.asarray((forces(curve, rov.coefficients, self.x) - self.y) / self.error)

@@ -23,10 +23,11 @@ from rov_fmu.identify.points.forms import with_keys
 from rov_fmu.model.layout import REVERSE, Curve
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.checks import no_thrust
-from rov_fmu.vehicle.uncertainty import quantile
 
 _DIGITS = 1e-5
 """The resolution of a scale, relative to the strongest force."""
+_EXACT = 1e-6
+"""The error of the coefficients, relative to the largest one, below which it is that of rounding."""
 _WEAKEST = 3.0
 """The weakest command is at most this many dead bands. The curve beyond tells a dead band less and less well."""
 _GRID = {1: 24, 2: 8}
@@ -43,6 +44,14 @@ class ThrustFit(CurveFit):
     """Every coefficient of the curve but the lag, by name."""
     choices: tuple[Choice, ...] = ()
     """The possible extensions of the curve, and whether it has them."""
+
+    @property
+    def is_uncertain(self) -> bool:
+        """True if the scatter of the forces gives finite errors of the coefficients, beyond those of rounding."""
+        found = self.estimate
+        if not found.names or not np.isfinite(found.covariance).all():
+            return False
+        return bool(np.sqrt(np.diag(found.covariance)).max() >= _EXACT * np.abs(found.values).max())
 
     def value(self, x: Array) -> Array:
         """Return the curve at x."""
@@ -83,12 +92,7 @@ def measured(fits: Iterable[ThrustFit]) -> Estimate | None:
 
     Student's distribution accounts for few forces; here the errors are increased for the normal distribution instead.
     """
-    found = []
-    for estimate in (fit.estimate for fit in fits):
-        if np.isfinite(estimate.covariance).all() and estimate.names:
-            few = quantile(estimate.degrees_of_freedom) / quantile(inf)
-            if np.sqrt(np.diag(estimate.covariance)).max() >= 1e-6 * np.abs(estimate.values).max():
-                found.append(replace(estimate, covariance=few**2 * estimate.covariance))
+    found = [fit.estimate.as_normal() for fit in fits if fit.is_uncertain]
     if not found:
         return None
     names, values = (np.concatenate([getattr(e, key) for e in found]) for key in ("names", "values"))

@@ -1,8 +1,8 @@
-"""The uncertainty of a dead band and of the linear thrust beside it, which derivatives alone do not tell.
+"""The uncertainty of a dead band and of the linear thrust, which do not follow from derivatives where b_t is near 0.
 
 The thrust is a_t m^2 + b_t m with m = |command| - c_0. If c_0 grows by h and b_t by 2 a_t h, it changes by the constant
--(b_t + a_t h) h. Near b_t = 0 the derivative along this direction vanishes, so the covariance from derivatives would be
-endless although the data determine both. A secant along the direction includes the term with h^2.
+-(b_t + a_t h) h. Near b_t = 0 the derivative along this direction vanishes, so derivatives would give infinite errors
+of c_0 and b_t, although the data determine both. A secant along the direction includes the term with h^2.
 """
 
 from collections.abc import Iterator
@@ -35,9 +35,10 @@ def with_secants(analysis: ResidualAnalysis) -> ResidualAnalysis:
 
 
 def _take_secant(analysis: ResidualAnalysis, J: Array, n: int, direction: Array, room: float) -> None:
-    """Replace column n of J, the derivative by a c_0, if half of its interval is longer than the room.
+    """Replace column n of J, the derivatives by a c_0, if half of its interval is longer than the room.
 
-    The secant along the direction is as long as half of the interval. The interval extends at least by the room.
+    The new column is that of a secant along the direction, which is as long as half of the new interval. This half is
+    at least as long as the room.
     """
     derivative, others = J[:, n].copy(), direction.copy()
     others[n] = 0.0
@@ -60,14 +61,15 @@ def _take_secant(analysis: ResidualAnalysis, J: Array, n: int, direction: Array,
 
 
 def _directions(model: Simulator, x: Array) -> Iterator[tuple[int, Array, float]]:
-    """Yield the place of each fitted c_0, the direction in x that hardly changes thrust, and c_0 less that of b_t = 0.
+    """Yield the place of each fitted c_0, the direction in x that hardly changes the thrust, and the room.
 
-    The linear coefficients of both directions of command change if they share the dead band.
+    The direction has the change of b_t per change of c_0; both directions of command take part if they share the dead
+    band. The room is how much c_0 may fall until a b_t is 0.
     """
     rov = model.rov(x)
+    names = [*model.names, *(f"c_0_{e.of}" if isinstance(e, DeadBand) else "" for e in model.extras)]
     for curve in rov.layout.curves:
         for dead in dict.fromkeys(curve.coefficient("c_0" + end) for end in ("", REVERSE)):
-            names = [*model.names, *(f"c_0_{e.of}" if isinstance(e, DeadBand) else "" for e in model.extras)]
             if dead not in names:
                 continue
             n, rooms = names.index(dead), []

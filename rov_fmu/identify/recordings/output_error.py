@@ -67,8 +67,8 @@ def fit_recordings(
     """Fit the unknown drag and β of every recorded axis, and optional effects; `base` has the other coefficients.
 
     `requests` are those of [fit]. `forces` of tested curves and `points` of tables are residuals of the same fit. The
-    intervals account for the correlation of the residuals. `on_progress` is called at each step of a
-    search. Raises MotionError or NoFitError.
+    intervals account for the correlation of the residuals. `on_progress` is called at each step of a search. Raises
+    MotionError or NoFitError.
     """
     order = list(base.layout.kinds)
     recordings = sorted(recordings, key=lambda r: order.index(r.axis.name))

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import nan, pi
+from math import nan
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from rov_fmu.identify.simulation.prepared import PreparedRecording
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.smoothing import WINDOW, kernel, sensor_noise, velocity, without_spikes
 
 Span = Literal["10 s", "whole recording"]
@@ -84,5 +85,4 @@ def errors_of(data: PreparedRecording, predicted: Array, first: int) -> dict[Qua
 
 def shown_in(axis: Axis, quantity: Quantity) -> tuple[float, str]:
     """Return the factor from SI units to those of a report, and their name: angles are in degrees there."""
-    unit = axis.position_unit if quantity == "position" else axis.unit
-    return (180.0 / pi, unit.replace("rad", "deg")) if axis.is_rotation else (1.0, unit)
+    return in_degrees(axis.position_unit if quantity == "position" else axis.unit)

@@ -23,7 +23,7 @@ _POSITIONS = {HEAVE: "z", ROLL: "phi", PITCH: "theta", YAW: "psi"}
 _VAGUE = 0.3
 """The prior standard deviation of a velocity at the start that is not measured, m/s or rad/s."""
 _FAST = 1.0
-"""The prior standard deviation of a measured velocity at the start, m/s or rad/s, much larger than its error."""
+"""The prior standard deviation of a measured velocity at the start, m/s or rad/s. Its real error is much smaller."""
 _TILT = 0.1
 """The prior standard deviation of a roll or pitch angle at the start that is not measured, rad."""
 _STEP = 0.05
@@ -79,12 +79,12 @@ class Flight:
         return found
 
     @cached_property
-    def vague(self) -> dict[str, tuple[float, float]]:
-        """The variables at the start of a vehicle whose axes act on each other: their likely values and deviations.
+    def start_prior(self) -> dict[str, tuple[float, float]]:
+        """The likely values and their standard deviations of variables at the start, if axes act on each other.
 
-        These are the measured velocities, because drag would stop even one of 100 m/s at once, and the search may not
-        find the way back from there; and the unmeasured variables that act on measured ones. At the beginning of a file
-        the unmeasured ones are taken to be at rest.
+        Measured velocities have a prior because drag stops even 100 m/s within a sample: the residuals hardly change
+        with such a velocity, so the search would not return from there. Unmeasured variables have one because they act
+        on measured ones; at the beginning of a file the vehicle is taken to be at rest.
         """
         if not self.layout.is_linked:
             return {}
@@ -102,7 +102,7 @@ class Flight:
     @property
     def start(self) -> dict[str, float]:
         """The fitted variables at the start, with their first guess."""
-        return self.measured | {name: value for name, (value, _) in self.vague.items()}
+        return self.measured | {name: value for name, (value, _) in self.start_prior.items()}
 
     def _position(self, data: PreparedRecording) -> str:
         """Return the name of a position: that of the vehicle's variable, or that of a distance."""

@@ -55,8 +55,8 @@ class Simulator:
     """Recordings as a function of x: coefficients (internal parameters), extras, then values at the start.
 
     The residuals are modelled less measured values of one recording after the other, in standard deviations (sigma, one
-    per recording). They are followed by the residuals of the tables, by those of the extras, and by those of the values
-    at the start that are not measured.
+    per recording). They are followed by the residuals of the tables, by those of the priors of the extras, and of the
+    values at the start.
     """
 
     data: tuple[PreparedRecording, ...]
@@ -318,15 +318,15 @@ class Simulator:
                     yield len(self.names) + n, extra.likely, float(self.likely[n])
         for place in self.flights:
             for n, name in enumerate(place.flight.start, place.own.start):
-                if name in place.flight.vague:
-                    yield n, *place.flight.vague[name]
+                if name in place.flight.start_prior:
+                    yield n, *place.flight.start_prior[name]
 
     def prior_rows(self, place: FlightPlace) -> NDArray[np.intp]:
-        """Return the rows of the residuals for the values at the start of a flight that are not measured."""
+        """Return the rows of the residuals of the priors of the values at the start of a flight."""
         return self._measured + np.flatnonzero(np.any(self._priors[:, place.own] != 0.0, axis=1))
 
     def deviations_of(self, place: FlightPlace, x: Array) -> Array:
-        """Return the residuals for the values at the start of a flight that are not measured."""
+        """Return the residuals of the priors of the values at the start of a flight."""
         rows = self.prior_rows(place) - self._measured
         return np.asarray(self._priors[rows] @ x - self._expected[rows])
 

@@ -97,7 +97,7 @@ def weak_thrust(rov: Rov, curves: Collection[str], axes: Iterable[Axis]) -> tupl
         betas = [rov[axis.coefficient("beta")] for axis in driven]
         beyond = [beta > beta_range(rov, axis)[1] for axis, beta in zip(driven, betas, strict=True)]
         if len(driven) > 1 and all(beyond) and max(betas) < _ALIKE * min(betas):
-            together = next(c.together for c in rov.layout.curves if c.name == curve)
+            together = rov.layout.curves_by_name[curve].together
             names = {"factor": repr(float(np.exp(np.mean(np.log(betas))))), "together": str(together)}
             found += [Finding("weak thrust", axis.name, curve, names=names) for axis in driven]
     return tuple(found)

@@ -29,7 +29,7 @@ _STANDARD_ERRORS = 1.96
 def plot_thrust(figure: Figure, results: Identification, fit: ThrustFit) -> None:
     """Plot force over command, and the curve of the vehicle if recordings have moved it away from the fit."""
     rov = results.vehicle.rov
-    curve = next(curve for curve in rov.layout.curves if curve.name == fit.curve.name)
+    curve = rov.layout.curves_by_name[fit.curve.name]
     moved = curve != fit.curve or not all(np.isclose(rov[name], value, rtol=1e-9) for name, value in fit.values.items())
     above, below, x = _fitted(figure, fit, 100.0, "grey" if moved else "blue", "fit to the forces")
     if moved:
