@@ -1,6 +1,6 @@
 """Find what is not identifiable from the data, and what contradicts the model."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -17,10 +17,11 @@ from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsF
 from rov_fmu.identify.structure import on_structure
 from rov_fmu.identify.usable import is_pushed
 from rov_fmu.io.toml_file import join_names
-from rov_fmu.model.layout import REVERSE
+from rov_fmu.model.layout import REVERSE, SURGE, SWAY, YAW, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.recording import Recording
 
 _LEAST_EXPLAINED = 0.5
 """The least share of the change of velocity, beyond the sensor's noise, that a good model predicts."""
@@ -28,6 +29,8 @@ _BACKWARD = 0.005
 """A thrust curve that points backward only at commands below this one does so by rounding."""
 _CHANCE = 0.003
 """The probability of a false alarm, that the forces and the recordings seem to show different thrust curves."""
+_MANY = 0.15
+"""The share of outliers above which a recording is doubtful."""
 _SIGNIFICANT = 4.0
 """A difference between directions of so many standard errors is no chance, at any of some ten commands."""
 
@@ -127,7 +130,8 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
             yield finding("correlated residuals", file=file, numbers={"samples": s.correlation_time})
         share = s.outliers / len(s.time)
         if share > 0.03:
-            yield finding("outliers", file=file, numbers={"share": share})
+            kind = "many outliers" if share > _MANY else "outliers"
+            yield finding(kind, file=file, numbers={"share": share})
     if fit.between_rows:
         yield finding("switches between rows")
     yield from on_structure(fit)
@@ -168,6 +172,19 @@ def on_delay(fit: RecordingsFit) -> Iterator[Finding]:
     for effect in fit.effects:
         if effect.kept and effect.kind == "delay" and effect.of == fit.axis.name and effect.value > 0.0:
             yield replace(_on_effect(fit, effect), kind="delay not modelled")
+
+
+def on_coupling(recordings: Mapping[str, Sequence[Recording]], layout: Layout) -> Iterator[Finding]:
+    """Yield a finding for each log that shows yaw with surge or sway, if the vehicle could have coupling but has none.
+
+    `recordings` are given by axis name.
+    """
+    if layout.coupled or not all(layout.has(axis) for axis in (SURGE, SWAY, YAW)):
+        return
+    files = {axis: [r.file for r in recordings.get(axis.name, ())] for axis in (SURGE, SWAY, YAW)}
+    for file in files[YAW]:
+        if file in files[SURGE] or file in files[SWAY]:
+            yield Finding("not modelled coupling", file=file)
 
 
 def on_forces(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[Finding]:

@@ -63,10 +63,11 @@ def _disagreement(values: Mapping[str, Any]) -> str:
     )
 
 
-def _effect(form: str) -> Callable[[Mapping[str, Any]], str]:
+def _effect(form: str, form_of_file: str = "") -> Callable[[Mapping[str, Any]], str]:
     """Return a form that has {value}, {interval}, which may be empty, and {of}: an axis, a curve or the files.
 
-    The digits suit the interval. Several findings share the range of their values and one interval around all.
+    Effects of single recordings may have another form. The digits suit the interval. Several findings share the range
+    of their values and one interval around all.
     """
 
     def sentence(values: Mapping[str, Any]) -> str:
@@ -77,7 +78,10 @@ def _effect(form: str) -> Callable[[Mapping[str, Any]], str]:
             (least, low, high), (most, *_) = (with_interval(number, around) for number in (value.low, value.high))
             ends, interval = [least, most], f" ({low} to {high})"
         written = {"value": " ... ".join(dict.fromkeys(ends)), "interval": interval}
-        return form.format(**{"of": values["files"], **values, **written})
+        of_file = "of" not in values
+        return (form_of_file if of_file and form_of_file else form).format(
+            **{"of": values["files"], **values, **written}
+        )
 
     return sentence
 
@@ -104,11 +108,12 @@ def _wrong_scale(values: Mapping[str, Any]) -> str:
     factor = float(values["factor"])
     causes = _ANGLE_CAUSES if values["unit"].startswith("rad") else _LENGTH_CAUSES
     cause = causes[min(causes, key=lambda other: abs(other / factor - 1.0))]
-    correction = f"x {1.0 / factor:.4g}" if factor < 1.0 else f"/ {factor:.4g}"
-    others = f" Or else are those wrong that it contradicts: {values['others']}?" if values["others"] else ""
+    others = f" If not, check {values['others']}." if values["others"] else ""
+    if values["unit"].startswith("rad"):
+        others += " If it is right, check the positions and directions of the thrusters in rov.toml."
     return (
-        f"{values['files']}: {values['quantity']} [{values['unit']}] fits thrust, size and other files only "
-        f"{correction}: {cause}?{others}"
+        f"{values['files']}: {values['quantity']} is about {factor:.4g} times what the thrust, the size and the other "
+        f"files predict: {cause}?{others}"
     )
 
 
@@ -147,7 +152,8 @@ _CAUSES = {
     "tether": "a force grows with the distance from the start, as when a tether pulls",
     "saturation": "the thrust differs from its curve at the highest commands, as when thrusters saturate",
     "drift": "the thrust or the load changes with time, as when the voltage falls",
-    "recording": "thrust or drag differ between the recordings",
+    "recording": "thrust or drag differ between the recordings. Did the battery, the ballast, the tether or the place "
+    "of a sensor change between them?",
     "scale": "the sensors of position and velocity disagree, so one of them has a wrong scale",
     "unknown": "a force that changes slowly remains, and none of the causes that are tested explains it",
 }
@@ -155,8 +161,10 @@ _CAUSES = {
 
 
 def _unexplained(values: Mapping[str, Any]) -> str:
-    return "{axes}: the model does not explain {files} from {start:.0f} s on: {words}".format(
-        **values, words=_CAUSES[values["cause"]]
+    low, high = f"{values['start'].low:.0f}", f"{values['start'].high:.0f}"
+    start = f"{low} s" if low == high else f"{low} to {high} s, depending on the recording,"
+    return "{axes}: the model does not explain {files} from {at} on: {words}".format(
+        **values, at=start, words=_CAUSES[values["cause"]]
     )
 
 
@@ -206,6 +214,14 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "(turbulence, tether, or the model); the intervals are widened for it"
     ),
     "outliers": "{axes}: {share:.0%} of the samples of {files} are outliers and count less",
+    "many outliers": (
+        "{axes}: {share:.0%} of the samples of {files} are outliers and count less. Does the sensor jump, or did "
+        "something hold or push the vehicle for a time?"
+    ),
+    "not modelled coupling": (
+        "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and Munk "
+        "forces of such a motion: `coupling = true` in [body] of rov.toml adds them"
+    ),
     "disagreement": _disagreement,
     "impossible velocity": (
         "{files}: no recording of {axes}: {quantity} tells of a velocity of {speed:.3g} {unit}, which is possible from "
@@ -241,10 +257,15 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{axes}: the commands change between the rows of the logs. A change is taken to be midway between two rows, "
         "and the intervals allow for its unknown time"
     ),
-    **{kind: _effect(f"{{axes}}: {effect.sentence}") for kind, effect in EFFECTS.items()},
+    **{
+        kind: _effect(
+            f"{{axes}}: {effect.sentence}", effect.sentence_of_file and f"{{axes}}: {effect.sentence_of_file}"
+        )
+        for kind, effect in EFFECTS.items()
+    },
     "delay not modelled": _effect(
         "The motion in {axes} followed the commands {value} s late{interval}: the vehicle file has no delay; "
-        "T_d in [commands] adds one to the FMU."
+        "T_d in [commands] adds one delay, the same for all axes, to the FMU."
     ),
     # Structure of the model
     "unexplained": _unexplained,
@@ -256,7 +277,12 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     "implausible beta": (
         "{axes}: {beta} = {value:.3g} is not within {low:g} ... {high:g}, as of any vehicle known: it moves as if its "
         "inertia were {inertia}. A wrong unit or scale (of the motion, the commands, the thrust, {mass}) may cause it, "
-        "or a delay or a lag that the fit does not have"
+        "a wrong position or direction of a thruster, or a delay or a lag that the fit does not have"
+    ),
+    "inertia below mass": (
+        "{axes}: {beta} = {value:.3g} ({low:.3g} to {high:.3g}) is above 1, so the vehicle moves as if its inertia "
+        "with the added mass were less than {mass} alone. Check {mass}, the positions and directions of the thrusters, "
+        "and the measured forces"
     ),
     "implausible tuned alpha": (
         "{alpha} = {value:.3g} is not within the usual {low:g} ... {high:g}: the {push} would be {value:.3g} times "

@@ -103,12 +103,15 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
     fitted = [result.axis for result in results if result.estimate]
     weak = weak_thrust(found.rov, thrust, fitted)
     explained = {finding.axis for finding in weak}
-    findings = [*weak, *tests.findings, *(f for f in doubts if f.kind != "wrong scale" or f.axis not in explained)]
+    uncoupled = diagnostics.on_coupling(tests.recordings, found.rov.layout)
+    findings = [*weak, *uncoupled, *tests.findings]
+    findings += (f for f in doubts if f.kind != "wrong scale" or f.axis not in explained)
     for name, fit in thrust.items():
         findings += diagnostics.on_thrust(name, fit, found.rov)
     for result in results:
         findings += result.findings
-    findings += filter(None, (beta_out_of_range(found.rov, axis) for axis in fitted if axis.name not in explained))
+    unexplained = [axis for axis in fitted if axis.name not in explained]
+    findings += filter(None, (beta_out_of_range(found.rov, axis, found.intervals) for axis in unexplained))
     drifting = {finding.axis for finding in findings if finding.names.get("cause") == "drift"}
     for n, result in enumerate(results):
         on_progress(f"what to measure next of {result.axis.name}", _FITTED + (1.0 - _FITTED) * n / len(results))

@@ -10,7 +10,7 @@ from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import brief
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.model.layout import BODY
-from rov_fmu.tank.description import ROV_FILE
+from rov_fmu.tank.description import ROV_FILE, read_description
 from rov_fmu.tank.inspection import Inspection, fitting, inspect, logs_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -22,17 +22,19 @@ _BAG = "metadata.yaml"
 def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
     """Return what a log, or each log in a folder, contains, with the place and the text of a draft of rov.toml.
 
-    Raises DataFileError.
+    A rov.toml that is there already tells the names of thrusters and columns, if it has no mistake in its hardware.
+    Raises DataFileError, and VehicleFileError for a rov.toml that is no TOML.
     """
     if not path.exists():
         raise DataFileError(f"{path}: there is no such file")
     vehicles = {name: load_vehicle(file) for name, file in SHIPPED.items()}
     layouts = [vehicle.layout for vehicle in vehicles.values()]
-    found = [inspect(log, layouts) for log in logs_of(path)]
-    if not found:
-        raise DataFileError(f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it")
     folder = path if path.is_dir() else path.parent
     folder = folder.parent if (folder / _BAG).is_file() else folder
+    described = read_description(folder / ROV_FILE)[0] if (folder / ROV_FILE).is_file() else None
+    found = [inspect(log, layouts, described) for log in logs_of(path)]
+    if not found:
+        raise DataFileError(f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it")
     count, changing = max((len(one.commands), _changing(one)) for one in found)
     if not (fits := fitting(count, layouts)):
         count, fits = changing, fitting(changing, layouts)
@@ -61,10 +63,10 @@ def _draft(found: Sequence[Inspection], count: int, base: str, vehicle: Vehicle 
     names = brief(", ".join(one.path.name for one in found))
     word = re.sub(r"[^a-z0-9]+", "_", first.stem.lower()).strip("_")
     yield f"# A draft by `rov-fmu identify --inspect` of {names}: edit it, then run `rov-fmu identify` on its folder."
-    alone = count == 1
     why = f"the first vehicle that ships with {count} thrusters" if base else "no vehicle that ships has such thrusters"
-    why = "a log of one axis: the vehicle that it is of" if alone else why
-    yield f"base = {_quoted(base or 'videoray')}  # {why}: or your vehicle file, or {', '.join(SHIPPED)}"
+    why = "a log of one axis does not tell the vehicle" if count == 1 else why
+    yield f"# {why[0].upper()}{why[1:]}. Write the path of your vehicle file, or {', '.join(SHIPPED)}."
+    yield f"base = {_quoted(base or 'videoray')}"
     yield from ("", "[vehicle]", f"name = {_quoted(first.stem)}")
     yield f"identifier = {_quoted(word if word[:1].isalpha() else f'rov_{word}')}"
     yield from ('version = "1.0"', f'description = "A vehicle identified from {_quoted(names)[1:-1]}"')
@@ -86,6 +88,8 @@ def _draft(found: Sequence[Inspection], count: int, base: str, vehicle: Vehicle 
     others = {name for one in found if is_csv[one.path] for name in one.unread}
     if columns or others:
         yield from ("", "[columns]  # what headers of the CSV files stand for: check their units and signs")
+        if others:
+            yield "# These headers are not known. Remove the # of a header, and write what it stands for, such as:"
         yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
         yield from (f'# {_quoted(title)} = "depth [m]"' for title in sorted(others))
     topics = {name: what for one in found if not is_csv[one.path] for name, what in one.unread.items()}

@@ -1,17 +1,20 @@
 """The printout of an identification and of a tuning."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from math import inf
 
 from rich.console import Console
 from rich.table import Table
 
+from rov_fmu.identify.effects.catalogue import EFFECTS
+from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.next_test import REPEATED, NextTest
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, count
 from rov_fmu.identify.tuning import Tuning
+from rov_fmu.model.layout import AXES
 from rov_fmu.report.console import DEVIATION, console, listed, paragraph, print_table, table, text
-from rov_fmu.report.findings import Unseen, acting, by_heading, effects, unseen
+from rov_fmu.report.findings import Unseen, acting, by_heading, effects, is_warning, unseen
 from rov_fmu.report.overview import main_errors
 from rov_fmu.vehicle.uncertainty import with_interval
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -95,8 +98,9 @@ def _conclusions(identification: Identification, most: int) -> Iterator[str]:
     kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
     if kept:
         yield f"What else acts: {_acting(kept)}."
-    if line := " ".join(_next_tests(identification.next_tests)):
+    if line := " ".join(_next_tests(identification.next_tests, warned(identification))):
         yield line
+    yield from sentences(f for f in identification.findings if f.kind == "axis left out")
     groups = by_heading(identification.findings)
     warnings = groups["Warnings"]
     rest = {"warning": warnings[most:], "doubt": groups["Doubts"], "fact": groups["Facts"]}
@@ -110,7 +114,12 @@ def _conclusions(identification: Identification, most: int) -> Iterator[str]:
         yield f"- {warning}"
 
 
-def _next_tests(tests: Sequence[NextTest]) -> Iterator[str]:
+def warned(identification: Identification) -> set[str]:
+    """Return the axes that warnings are about; an empty name stands for a warning about no axis."""
+    return {finding.axis for finding in identification.findings if is_warning(finding)}
+
+
+def _next_tests(tests: Sequence[NextTest], warned: Container[str]) -> Iterator[str]:
     """Yield sentences about the most useful test, and the axes of which enough is known."""
     if unknown := [test for test in tests if not test.is_known]:
         widest = unknown[0]
@@ -121,8 +130,10 @@ def _next_tests(tests: Sequence[NextTest]) -> Iterator[str]:
         else:
             yield "To measure next: no step within the limits would narrow an interval by a tenth; the widest"
             yield f"is that of {widest.coefficient}."
-    if known := [test.axis.name for test in tests if test.is_known]:
+    if known := [test.axis.name for test in tests if test.is_known and test.axis.name not in warned]:
         yield f"Enough is known of {listed(known)}."
+    if doubtful := [test.axis.name for test in tests if test.is_known and test.axis.name in warned]:
+        yield f"The intervals of {listed(doubtful)} are narrow enough, but check the warnings first."
     if drifting := [test.axis.name for test in tests if test.repeat]:
         yield f"In {listed(drifting)}: {REPEATED}."
 
@@ -133,7 +144,9 @@ def _acting(kept: Iterable[FittedEffect]) -> str:
     for effect in kept:
         value, *_ = with_interval(effect.value, effect.interval)
         unit = "" if effect.unit == "1" else f" {effect.unit}"
-        values.setdefault(acting(effect), []).append(f"{effect.of} {value}{unit}")
+        of_file = EFFECTS[effect.kind].sentence_of_file and effect.of not in AXES
+        more = " more" if of_file else ""  # than in the other recordings of the axis
+        values.setdefault(acting(effect), []).append(f"{effect.of} {value}{unit}{more}")
     return "; ".join(f"{words} ({', '.join(some)})" for words, some in values.items())
 
 

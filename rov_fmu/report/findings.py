@@ -69,6 +69,11 @@ EXPLAINED = {
 """What each group of findings says, by its heading."""
 
 
+def is_warning(finding: Finding) -> bool:
+    """Return True for a finding that contradicts the model or the data."""
+    return finding.kind not in FACTS | DOUBTS
+
+
 def by_heading(found: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
     """Return the sentences of findings by the headings of EXPLAINED."""
     groups: dict[str, list[Finding]] = {heading: [] for heading in EXPLAINED}

@@ -153,9 +153,13 @@ def _plots(results: Identification, found: tuple[Known, ...], closeups: Mapping[
         yield f"Thrust: {name}", partial(plot_thrust, results=results, fit=fit), _HIGH
     for result in results.axes:
         for s in result.recordings.simulations if result.recordings else ():
-            yield f"Recording: {s.recording.file}", partial(plot_recording, result=result, simulation=s), _LOW
+            yield (
+                f"Recording of {result.axis.name}: {s.recording.file}",
+                partial(plot_recording, result=result, simulation=s),
+                _LOW,
+            )
         if step := closeups.get(result.axis.name):
-            yield f"Step in {step.simulation.recording.file}", partial(plot_step, result=result, step=step), _LOW
+            yield f"Step of {result.axis.name}", partial(plot_step, result=result, step=step), _LOW
 
 
 def _holds(tests: TankTests) -> dict[str, str]:

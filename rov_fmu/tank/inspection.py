@@ -12,6 +12,7 @@ from rov_fmu.io.csv_table import PULSES, Column, read_columns, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.description import Description
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
 from rov_fmu.tank.formats.csv_columns import Names, is_column
@@ -66,12 +67,13 @@ class Inspection:
     """Headers of columns of logs that seem to be meant, by the headers of the file."""
 
 
-def inspect(path: Path, layouts: Iterable[Layout]) -> Inspection:
-    """Return what a log contains; its thrusters have the names of the first layout with as many.
+def inspect(path: Path, layouts: Iterable[Layout], described: Description | None = None) -> Inspection:
+    """Return what a log contains.
 
-    Raises DataFileError.
+    Its thrusters and columns have the names of the described vehicle; else the thrusters have those of the first layout
+    with as many. Raises DataFileError.
     """
-    columns: dict[str, str] = {}
+    columns = dict(described.columns) if described else {}
     if read := READERS.get(path.suffix.lower()):
         content = read(path, Wanted())
         command = None
@@ -79,10 +81,11 @@ def inspect(path: Path, layouts: Iterable[Layout]) -> Inspection:
         titles = read_header(path)
         numbers = _numbers(path, titles)
         commanding = [title for title in titles if _is_command(title, numbers[title])]
-        layout = fitting(len(commanding), layouts) or _layout(len(commanding))
+        layout = described.layout if described else fitting(len(commanding), layouts) or _layout(len(commanding))
         layout = replace(layout, axes=tuple(VehicleAxis(axis) for axis in AXES.values()))
         axis = next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
-        columns = dict(_renamed(titles, numbers, commanding, layout, axis))
+        if not described:
+            columns = dict(_renamed(titles, numbers, commanding, layout, axis))
         content, command = read_csv(path, layout, axis, Names(columns), is_part=True)
         unread = [title for title in titles if not is_column(columns.get(title, title), layout, axis)]
         content.unread = dict.fromkeys(unread, "")
@@ -152,9 +155,11 @@ def _numbers(path: Path, titles: Sequence[str]) -> dict[str, Array]:
 
 
 def _is_command(title: str, numbers: Array) -> bool:
-    """Return True for the command of a thruster, by its name and size."""
-    name, _ = _parts(title)
-    return bool(_COMMAND.search(name.casefold())) and bool(len(numbers)) and np.abs(numbers).max() <= PULSE_RANGE[1]
+    """Return True for the command of a thruster, by its name, unit and size."""
+    name, unit = _parts(title)
+    is_share = unit == "%" and not {*_WORDS, "humidity"} & {*re.findall("[a-z]+", name.casefold())}
+    is_named = is_share or bool(_COMMAND.search(name.casefold()))
+    return is_named and bool(len(numbers)) and np.abs(numbers).max() <= PULSE_RANGE[1]
 
 
 def _renamed(

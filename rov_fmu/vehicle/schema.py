@@ -110,8 +110,9 @@ class Body(_coefficients("Body", {key: kind.meta() for key, kind in (BODY | REST
     model_config = DOCUMENTED
 
     coupling: bool = False
-    """True if the axes are coupled by the Coriolis and Munk terms of the mass matrix. Without roll and pitch, these act
-    in surge, sway and yaw."""
+    """True if the forces include the Coriolis and Munk terms of the mass matrix, which couple the axes: a vehicle that
+    turns while it moves is pushed sideways. Set it for a vehicle that moves along several axes at once. Without roll
+    and pitch, the terms act in surge, sway and yaw, and the vehicle needs all three."""
 
 
 _PULSES = (500.0, 2500.0)

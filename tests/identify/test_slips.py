@@ -204,14 +204,14 @@ def test_a_table_that_contradicts_recordings_is_refused() -> None:
 
 
 def test_a_beta_that_no_vehicle_has_is_told() -> None:
-    assert beta_out_of_range(K, HEAVE) is None
+    assert beta_out_of_range(K, HEAVE, {}) is None
     for beta in (0.04, 1.3):
-        found = beta_out_of_range(K.replaced({"beta_w": beta}), HEAVE)
+        found = beta_out_of_range(K.replaced({"beta_w": beta}), HEAVE, {})
         assert found
         assert (found.axis, found.numbers["value"]) == ("heave", beta)
     heavy = VEHICLES["bluerov2_heavy"]
-    assert beta_out_of_range(heavy.replaced({"beta_w": 2.0}), HEAVE) is None
-    found = beta_out_of_range(heavy.replaced({"beta_w": 0.2}), HEAVE)
+    assert beta_out_of_range(heavy.replaced({"beta_w": 2.0}), HEAVE, {}) is None
+    found = beta_out_of_range(heavy.replaced({"beta_w": 0.2}), HEAVE, {})
     assert found
     assert found.names["inertia"] == "5 times m_rov and the added one"
 
@@ -273,3 +273,24 @@ def test_weak_forces_are_seen_in_all_axes_of_a_curve(
     (line,) = sentences(weak_thrust(rov, curves, [SURGE, HEAVE, YAW])) or ("",)
     assert line.endswith(said)
     assert bool(line) == bool(said)
+
+
+@pytest.mark.parametrize(
+    ("beta", "interval", "is_told"),
+    [
+        (1.06, (1.04, 1.07), True),
+        (1.06, (0.99, 1.13), False),
+        (1.01, (1.005, 1.015), False),
+        (0.97, (0.96, 0.98), False),
+    ],
+)
+def test_an_inertia_below_the_mass_is_told(beta: float, interval: tuple[float, float], is_told: bool) -> None:
+    """It would be a negative added mass, as when two thrusters are swapped in rov.toml."""
+    found = beta_out_of_range(K.replaced({"beta_w": beta}), HEAVE, {"beta_w": interval})
+    assert bool(found) == is_told
+    if found:
+        (sentence,) = sentences([found])
+        assert sentence.startswith(f"heave: beta_w = {beta:.3g} ({interval[0]:.3g} to {interval[1]:.3g}) is above 1")
+        assert "positions and directions of the thrusters" in sentence
+    heavy = VEHICLES["bluerov2_heavy"].replaced({"beta_w": beta})
+    assert beta_out_of_range(heavy, HEAVE, {"beta_w": interval}) is None, "it has an added mass of its own"

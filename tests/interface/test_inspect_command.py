@@ -104,7 +104,7 @@ def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
 
 
 def test_a_rov_toml_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "rov.toml").write_text("mine", encoding="utf-8")
+    (tmp_path / "rov.toml").write_text("# mine", encoding="utf-8")
     assert main(["identify", "--inspect", str(one_file(tmp_path))]) == 0
     found = capsys.readouterr()
     assert "depth" in found.out
@@ -112,7 +112,29 @@ def test_a_rov_toml_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixt
     assert found.err == ""
     with pytest.raises(WriteError, match="the file there is not replaced by a draft"):
         write_draft(tmp_path / "rov.toml", "a draft")
-    assert (tmp_path / "rov.toml").read_text(encoding="utf-8") == "mine"
+    assert (tmp_path / "rov.toml").read_text(encoding="utf-8") == "# mine"
+
+
+def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    titles = ["time [s]", "fore [%]", "aft [%]", "sonde [m]", "battery [%]"]
+    table(tmp_path / "log_dive.csv", ",".join(titles), TIME, 100 * THRUSTERS[0], 100 * THRUSTERS[1], DEPTH, TIME)
+    assert main(["identify", "--inspect", str(tmp_path)]) == 0
+    draft = tmp_path / "rov.toml"
+    assert '"fore [%]" = "u_' in draft.read_text(encoding="utf-8"), "a column in percent is a command"
+    assert "- battery [%]" not in capsys.readouterr().out.split("Not recognised")[0]
+    thrusters = "".join(
+        f'[[thruster]]\nname = "{name}"\ncurve = "t"\ndirection = {{ value = [0, 0, 1], source = "CAD" }}\n'
+        for name in ("fore", "aft")
+    )
+    draft.write_text(
+        f'[columns]\n"sonde [m]" = "depth [m]"\n[curves.t]\ntogether = 2\n{thrusters}[axes.heave]\n', encoding="utf-8"
+    )
+    assert main(["identify", "--inspect", str(tmp_path)]) == 0
+    rows = [line.split("  ")[0] for line in capsys.readouterr().out.splitlines()]
+    assert {"thruster fore", "thruster aft", "depth", "- battery [%]"} <= {*rows}
+    assert "- sonde [m]" not in rows
 
 
 def test_tables_beside_the_logs_are_no_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

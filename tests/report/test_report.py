@@ -188,7 +188,7 @@ def test_recordings_are_drawn_listed_and_predicted(of_recordings: Identification
     assert ["80 %", "weight 0"] in [[row[0], row[-1]] for row in table if len(row) == 6]
     for result in of_recordings.axes[:2]:
         file = f"log_{result.axis.name}_a&b $1.csv"
-        assert f"Recording: {file}" in labels
+        assert f"Recording of {result.axis.name}: {file}" in labels
         assert sum(row[0] == file for row in table) >= len(result.steps) > 0
         first, *others = (row for row in table if row[-1] == f"halves of {file}, each by a fit to the other")
         assert not others

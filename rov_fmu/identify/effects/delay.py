@@ -15,6 +15,10 @@ class Delay(Effect):
         "the motion of {of} follows the commands {value} s late{interval}; the delay is not in the model but told "
         "with it"
     )
+    sentence_of_file = (
+        "the motion in {of} follows the commands {value} s later{interval} than in the other recordings; this is not "
+        "in the model"
+    )
     limits = -2.0, 5.0
     order = 8
     is_delay = True

@@ -63,6 +63,8 @@ class Effect(ABC):
     """The effect in a table of the report."""
     sentence: ClassVar[str]
     """What a finding says about the effect, with {value}, {unit}, {interval} and {of}."""
+    sentence_of_file: ClassVar[str] = ""
+    """What it says about an effect of a single recording, which adds to that of the axis; empty for the same."""
     neutral: ClassVar[float] = 0.0
     """The value without any effect."""
     begin: ClassVar[float] = 0.0

@@ -18,6 +18,10 @@ class Load(Effect):
     kind = "load"
     words = "constant load"
     sentence = "a constant load of {value} {unit}{interval} acts in {of} (net weight, tether), and is in the model"
+    sentence_of_file = (
+        "in {of} a constant load acts that differs by {value} {unit}{interval} from the other recordings (other "
+        "ballast, a tether, a current); this is not in the model"
+    )
     order = 6
 
     @classmethod

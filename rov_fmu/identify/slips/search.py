@@ -23,6 +23,8 @@ Tables = Mapping[str, Sequence[tuple[float, float]]]
 BETA = 0.05, 1.2
 """The range of β without added mass: m/β is between about the mass alone and 20 times the mass."""
 BETA_WITH_ADDED_MASS = 0.3, 3.0
+_ERROR_OF_MASS = 1.02
+"""β above 1 up to which the mass or the forces may simply be wrong by 2 %."""
 _WEAKEST_COMMANDS = 0.01
 """Commands that never exceed this are fractions taken for percent."""
 _ALIKE = 2.5
@@ -71,15 +73,23 @@ def beta_range(rov: Rov, axis: Axis) -> tuple[float, float, str]:
     return (*(BETA_WITH_ADDED_MASS if has_added else BETA), inertia)
 
 
-def beta_out_of_range(rov: Rov, axis: Axis) -> Finding | None:
-    """Return a finding about a fitted β that no known vehicle has, or None."""
+def beta_out_of_range(rov: Rov, axis: Axis, intervals: Mapping[str, tuple[float, float]]) -> Finding | None:
+    """Return a finding about a fitted β that no known vehicle has, or None; `intervals` are given by coefficient.
+
+    A β above 1 means a negative added mass. It is a finding if the interval of β and an error of the mass do not
+    explain it.
+    """
     beta, (low, high, inertia) = axis.coefficient("beta"), beta_range(rov, axis)
-    if low <= rov[beta] <= high:
-        return None
     names = {"beta": beta, "inertia": inertia, "mass": axis.inertia}
-    return Finding(
-        "implausible beta", axis=axis.name, names=names, numbers={"value": rov[beta], "low": low, "high": high}
-    )
+    value = rov[beta]
+    if not low <= value <= high:
+        numbers = {"value": value, "low": low, "high": high}
+        return Finding("implausible beta", axis=axis.name, names=names, numbers=numbers)
+    least, most = intervals.get(beta, (value, value))
+    if min(least, value / _ERROR_OF_MASS) > 1.0 and "m_a" not in rov.layout.kinds[axis.name].keys:
+        numbers = {"value": value, "low": least, "high": most}
+        return Finding("inertia below mass", axis=axis.name, names=names, numbers=numbers)
+    return None
 
 
 def weak_thrust(rov: Rov, curves: Collection[str], axes: Iterable[Axis]) -> tuple[Finding, ...]:
