@@ -49,6 +49,8 @@ _LARGEST = 20_000_000
 Checked = TypeVar("Checked", bound=Strict)
 Toml = dict[str, Any]
 _Place = tuple[int | str, ...]
+_DECIMAL_COMMA = re.compile(r"^[^#\[]*=\s*[-+]?\d+,\d")
+"""The beginning of a line whose number has a comma, and is in no list."""
 
 
 def read_checked(path: Path, kind: str, model: type[Checked], failure: type[FileError], **context: object) -> Checked:
@@ -69,7 +71,8 @@ def read_toml(path: Path, failure: type[FileError]) -> Toml:
     except (ValueError, RecursionError) as error:
         position = re.search(r"at line (\d+)", str(error))
         line = text.split("\n")[int(position[1]) - 1].strip() if position else ""
-        raise failure(f"{path}: not TOML: {brief(str(error))}{': ' if line else ''}{brief(line)}") from error
+        hint = " (a number needs a decimal point)" if _DECIMAL_COMMA.search(line) else ""
+        raise failure(f"{path}: not TOML: {brief(str(error))}{': ' if line else ''}{brief(line)}{hint}") from error
 
 
 def validate(data: Toml, model: type[Checked], **context: object) -> tuple[Checked | None, list[ErrorDetails]]:

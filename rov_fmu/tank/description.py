@@ -245,6 +245,11 @@ class Description:
     """The vehicle file to compare with."""
 
     @property
+    def has_hardware_tables(self) -> bool:
+        """True when the file itself describes the thrusters, and neither a base nor the paper's form does."""
+        return not self.base_name and self.thruster_sources is not PAPER_SOURCES
+
+    @property
     def logged(self) -> Layout:
         """The layout with the axes of which a log of several axes may have recordings.
 

@@ -206,7 +206,8 @@ def _missing_hardware(description: Description, layout: Layout, known: Collectio
     for name in layout.coefficients:
         if name in needed and name not in {*known, *description.named}:
             form = f'{name} = {{ value = ..., unit = "{layout.coefficients[name].unit}", source = "..." }}'
-            yield key_line(f"known.{name}", f"this key is missing, and the vehicle has {needed[name].name}: {form}")
+            table = ("arm" if name in ARM else "body") if description.has_hardware_tables else "known"
+            yield key_line(f"{table}.{name}", f"this key is missing, and the vehicle has {needed[name].name}: {form}")
 
 
 def _missing_or_doubled_tests(

@@ -84,11 +84,11 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         "/rov.toml: curves.t200: a_t_t200 is given, but b_t_t200 is not",
     ),
     (DOWN + f"[body]\n{MASS}", WITH_THRUST, "/rov.toml: known.m_rov: is given in [body] too"),
-    (DOWN.replace(MASS, ""), WITH_THRUST, "/rov.toml: known.m_rov: this key is missing, and the vehicle has he"),
+    (DOWN.replace(MASS, ""), WITH_THRUST, "/rov.toml: body.m_rov: this key is missing, and the vehicle has he"),
     (
         VECTORED.replace(TURNS, ""),
         {"thrust_t200.csv": pulled(30.0, 20.0), "steady_yaw.csv": f"{RATE}\n0.3,0.2\n"},
-        "/rov.toml: known.I_r: this key is missing, and the vehicle has yaw",
+        "/rov.toml: body.I_r: this key is missing, and the vehicle has yaw",
     ),
     (
         f"{HEAD}[known]\n{TURNS}",

@@ -171,6 +171,7 @@ BAD_FILES: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "an endless number": (value("m_rov", "1" * 5000), ("not TOML",)),
     "a key over two lines": (lambda text: text + '\n["two\\nlines"]\n', ("two\\nlines", "no such key")),
     "missing folder": (edit(r"^data = .*$", 'data = "nowhere"'), ("vehicle.data", "'nowhere'", "no such folder")),
+    "a decimal comma": (value("m_rov", "6,57"), ("not TOML", "(a number needs a decimal point)")),
     "not TOML": (edit(r"^\[body\]$", "[body"), ("not TOML", "line ", ": [body")),
     "a key twice": (edit(r"(?=^R = )", "R = 1.0\n"), ("not TOML", "line ", ": R = {")),
     "another format": (edit("^format = 2$", "format = 3"), ("format = 3", "must be 2")),
