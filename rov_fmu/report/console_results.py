@@ -97,7 +97,7 @@ def _conclusions(identification: Identification, most: int) -> Iterator[str]:
     """Yield the paragraphs about other effects, the next test, the first warnings, and what else the report has."""
     kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
     if kept:
-        yield f"What else acts: {_acting(kept)}."
+        yield f"What else acts: {acting_words(kept)}."
     if line := " ".join(_next_tests(identification.next_tests, warned(identification))):
         yield line
     yield from sentences(f for f in identification.findings if f.kind == "axis left out")
@@ -138,15 +138,16 @@ def _next_tests(tests: Sequence[NextTest], warned: Container[str]) -> Iterator[s
         yield f"In {listed(drifting)}: {REPEATED}."
 
 
-def _acting(kept: Iterable[FittedEffect]) -> str:
+def acting_words(kept: Iterable[FittedEffect]) -> str:
     """Return the other effects that were kept, in words, with the value along each axis."""
     values: dict[str, list[str]] = {}
     for effect in kept:
         value, *_ = with_interval(effect.value, effect.interval)
         unit = "" if effect.unit == "1" else f" {effect.unit}"
-        of_file = EFFECTS[effect.kind].sentence_of_file and effect.of not in AXES
-        more = " more" if of_file else ""  # than in the other recordings of the axis
-        values.setdefault(acting(effect), []).append(f"{effect.of} {value}{unit}{more}")
+        words = f"{effect.of} {value}{unit}"
+        if EFFECTS[effect.kind].sentence_of_file and effect.of not in AXES:  # it adds to the value of the axis
+            words = f"{effect.of} {value.lstrip('-')}{unit} {'less' if effect.value < 0.0 else 'more'}"
+        values.setdefault(acting(effect), []).append(words)
     return "; ".join(f"{words} ({', '.join(some)})" for words, some in values.items())
 
 

@@ -7,7 +7,9 @@ import pytest
 
 from rov_fmu.identify.diagnostics import on_coupling
 from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.report.console_results import acting_words
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -47,3 +49,14 @@ def test_what_a_recording_adds_is_not_taken_for_the_whole() -> None:
     whole, more = sentences([of_axis, of_file])
     assert whole.startswith("surge: the motion of surge follows the commands 0.2 s late;")
     assert more.startswith("surge: the motion in a.csv follows the commands 0.05 s later than in the other recordings;")
+
+
+def test_the_printout_tells_more_or_less_of_a_recording() -> None:
+    effects = [
+        FittedEffect("delay", of, "s", value, (value - 0.01, value + 0.01), kept=True)
+        for of, value in (("surge", 0.2), ("a.csv", 0.05), ("b.csv", -0.05))
+    ]
+    whole, more, less = acting_words(effects).split(", ")
+    assert "more" not in whole
+    assert more == "a.csv 0.050 s more"
+    assert less == "b.csv 0.050 s less)"
