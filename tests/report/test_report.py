@@ -234,6 +234,20 @@ def test_the_opening_screen_shows_an_unseen_recording_with_its_band(
     assert "Identification from tank tests · 2026-11-23" in text_of(page)
 
 
+@pytest.mark.usefixtures("without_plots")
+def test_a_band_that_misses_most_samples_has_a_consequence(
+    of_recordings: Identification, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = "so the intervals below may be too narrow"
+    assert words not in text_of(report_page(of_recordings))
+    shown = shown_prediction(of_recordings)
+    assert shown
+    assert shown.half_band is not None
+    narrow = replace(shown, half_band=0.05 * shown.half_band)
+    monkeypatch.setattr("rov_fmu.report.report.shown_prediction", lambda _: narrow)
+    assert words in text_of(report_page(of_recordings))
+
+
 def test_every_kind_of_finding_is_a_fact_a_doubt_or_a_warning() -> None:
     assert {*_SENTENCES} >= FACTS | DOUBTS
     assert not FACTS & DOUBTS
