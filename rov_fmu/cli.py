@@ -548,7 +548,7 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
         return
     from rov_fmu.interface.identify_command import identify_folder
     from rov_fmu.report.console import console, paragraph, print_end, shell_words
-    from rov_fmu.report.console_results import print_identification, warned
+    from rov_fmu.report.console_results import axes_with_warnings, print_identification
     from rov_fmu.report.progress import parts
 
     with parts() as shown:
@@ -559,8 +559,9 @@ def _identify(folder: Path, output: Path | None, report: Path | None, force: boo
     name = identification.vehicle.identifier
     whole = "identify", folder, "-o", f"{name}.toml", "--report", report or f"{name}.html"
     following = shell_words("rov-fmu", *(("build", output) if output else whole))
-    check = "settle the warnings, then " if warned(identification) else ""
-    print_end([path for path in (output, report) if path], check + following)
+    if axes_with_warnings(identification):
+        following = f"settle the warnings, then {following}"
+    print_end([path for path in (output, report) if path], following)
 
 
 def _inspect(path: Path) -> None:

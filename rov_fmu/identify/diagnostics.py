@@ -17,7 +17,7 @@ from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsF
 from rov_fmu.identify.structure import on_structure
 from rov_fmu.identify.usable import is_pushed
 from rov_fmu.io.toml_file import join_names
-from rov_fmu.model.layout import REVERSE, SURGE, SWAY, YAW, Layout
+from rov_fmu.model.layout import COUPLED_AXES, REVERSE, SURGE, SWAY, YAW, Layout
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
@@ -28,9 +28,9 @@ _LEAST_EXPLAINED = 0.5
 _BACKWARD = 0.005
 """A thrust curve that points backward only at commands below this one does so by rounding."""
 _CHANCE = 0.003
-"""The probability of a false alarm, that the forces and the recordings seem to show different thrust curves."""
-_MANY = 0.15
-"""The share of outliers above which a recording is doubtful."""
+"""The probability that forces and recordings of the same thrust seem to differ, although they do not."""
+_SOME_OUTLIERS, _MANY_OUTLIERS = 0.03, 0.15
+"""The shares of outliers above which they are reported, and above which a recording is doubtful."""
 _SIGNIFICANT = 4.0
 """A difference between directions of so many standard errors is no chance, at any of some ten commands."""
 
@@ -129,8 +129,8 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
         if s.correlation_time > 3.0 and s.noise > 1e-4 * float(np.ptp(s.measured)):
             yield finding("correlated residuals", file=file, numbers={"samples": s.correlation_time})
         share = s.outliers / len(s.time)
-        if share > 0.03:
-            kind = "many outliers" if share > _MANY else "outliers"
+        if share > _SOME_OUTLIERS:
+            kind = "many outliers" if share > _MANY_OUTLIERS else "outliers"
             yield finding(kind, file=file, numbers={"share": share})
     if fit.between_rows:
         yield finding("switches between rows")
@@ -179,12 +179,12 @@ def on_coupling(recordings: Mapping[str, Sequence[Recording]], layout: Layout) -
 
     `recordings` are given by axis name.
     """
-    if layout.coupled or not all(layout.has(axis) for axis in (SURGE, SWAY, YAW)):
+    if layout.coupled or not all(layout.has(axis) for axis in COUPLED_AXES):
         return
-    files = {axis: [r.file for r in recordings.get(axis.name, ())] for axis in (SURGE, SWAY, YAW)}
-    for file in files[YAW]:
-        if file in files[SURGE] or file in files[SWAY]:
-            yield Finding("not modelled coupling", file=file)
+    moving = {r.file for axis in (SURGE, SWAY) for r in recordings.get(axis.name, ())}
+    for recording in recordings.get(YAW.name, ()):
+        if recording.file in moving:
+            yield Finding("coupling left out", file=recording.file)
 
 
 def on_forces(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[Finding]:

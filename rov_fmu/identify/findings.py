@@ -66,8 +66,8 @@ def _disagreement(values: Mapping[str, Any]) -> str:
 def _effect(form: str, form_of_file: str = "") -> Callable[[Mapping[str, Any]], str]:
     """Return a form that has {value}, {interval}, which may be empty, and {of}: an axis, a curve or the files.
 
-    Effects of single recordings may have another form. The digits suit the interval. Several findings share the range
-    of their values and one interval around all.
+    `form_of_file` replaces the form for a single recording. The digits suit the interval. Several findings share the
+    range of their values and one interval around all.
     """
 
     def sentence(values: Mapping[str, Any]) -> str:
@@ -78,10 +78,8 @@ def _effect(form: str, form_of_file: str = "") -> Callable[[Mapping[str, Any]], 
             (least, low, high), (most, *_) = (with_interval(number, around) for number in (value.low, value.high))
             ends, interval = [least, most], f" ({low} to {high})"
         written = {"value": " ... ".join(dict.fromkeys(ends)), "interval": interval}
-        of_file = "of" not in values
-        return (form_of_file if of_file and form_of_file else form).format(
-            **{"of": values["files"], **values, **written}
-        )
+        chosen = form if "of" in values else form_of_file or form
+        return chosen.format(**{"of": values["files"], **values, **written})
 
     return sentence
 
@@ -110,7 +108,7 @@ def _wrong_scale(values: Mapping[str, Any]) -> str:
     cause = causes[min(causes, key=lambda other: abs(other / factor - 1.0))]
     others = f" If not, check {values['others']}." if values["others"] else ""
     if values["unit"].startswith("rad"):
-        others += " If it is right, check the positions and directions of the thrusters in rov.toml."
+        others += " Also check the positions and directions of the thrusters in rov.toml."
     return (
         f"{values['files']}: {values['quantity']} is about {factor:.4g} times what the thrust, the size and the other "
         f"files predict: {cause}?{others}"
@@ -161,13 +159,12 @@ _CAUSES = {
 
 
 def _unexplained(values: Mapping[str, Any]) -> str:
-    low, high = f"{values['start'].low:.0f}", f"{values['start'].high:.0f}"
-    start = f"{low} s" if low == high else f"{low} to {high} s, depending on the recording,"
-    return "{axes}: the model does not explain {files} from {at} on: {words}".format(
-        **values, at=start, words=_CAUSES[values["cause"]]
+    return "{axes}: the model does not explain {files} after the first {start:.0f} s: {words}".format(
+        **values, words=_CAUSES[values["cause"]]
     )
 
 
+_OUTLIERS = "{axes}: {share:.0%} of the samples of {files} are outliers and count less"
 _OWN_SENTENCES: dict[str, SentenceForm] = {
     # Thrust curves
     "thrust without freedom": (
@@ -213,12 +210,9 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{axes}: the residuals of {files} are correlated over {samples:.0f} samples, so more than the sensor's noise "
         "(turbulence, tether, or the model); the intervals are widened for it"
     ),
-    "outliers": "{axes}: {share:.0%} of the samples of {files} are outliers and count less",
-    "many outliers": (
-        "{axes}: {share:.0%} of the samples of {files} are outliers and count less. Does the sensor jump, or did "
-        "something hold or push the vehicle for a time?"
-    ),
-    "not modelled coupling": (
+    "outliers": _OUTLIERS,
+    "many outliers": f"{_OUTLIERS}. Does the sensor jump, or did something hold or push the vehicle for a time?",
+    "coupling left out": (
         "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and Munk "
         "forces of such a motion: `coupling = true` in [body] of rov.toml adds them"
     ),
@@ -258,9 +252,7 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "and the intervals allow for its unknown time"
     ),
     **{
-        kind: _effect(
-            f"{{axes}}: {effect.sentence}", effect.sentence_of_file and f"{{axes}}: {effect.sentence_of_file}"
-        )
+        kind: _effect(*(f"{{axes}}: {form}" for form in (effect.sentence, effect.sentence_of_file) if form))
         for kind, effect in EFFECTS.items()
     },
     "delay not modelled": _effect(

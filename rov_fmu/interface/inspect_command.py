@@ -22,8 +22,8 @@ _BAG = "metadata.yaml"
 def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
     """Return what a log, or each log in a folder, contains, with the place and the text of a draft of rov.toml.
 
-    A rov.toml that is there already tells the names of thrusters and columns, if it has no mistake in its hardware.
-    Raises DataFileError, and VehicleFileError for a rov.toml that is no TOML.
+    If there is a rov.toml already, thrusters and columns have its names, unless its hardware tables have a mistake.
+    Raises DataFileError, and VehicleFileError if rov.toml is not TOML.
     """
     if not path.exists():
         raise DataFileError(f"{path}: there is no such file")
@@ -88,9 +88,9 @@ def _draft(found: Sequence[Inspection], count: int, base: str, vehicle: Vehicle 
     others = {name for one in found if is_csv[one.path] for name in one.unread}
     if columns or others:
         yield from ("", "[columns]  # what headers of the CSV files stand for: check their units and signs")
+        yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
         if others:
             yield "# These headers are not known. Remove the # of a header, and write what it stands for, such as:"
-        yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
         yield from (f'# {_quoted(title)} = "depth [m]"' for title in sorted(others))
     topics = {name: what for one in found if not is_csv[one.path] for name, what in one.unread.items()}
     mappable = [f"{name}.{what.rpartition(': ')[2].split(', ')[0]}" for name, what in topics.items() if ": " in what]

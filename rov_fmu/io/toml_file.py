@@ -50,7 +50,7 @@ Checked = TypeVar("Checked", bound=Strict)
 Toml = dict[str, Any]
 _Place = tuple[int | str, ...]
 _DECIMAL_COMMA = re.compile(r"^[^#\[]*=\s*[-+]?\d+,\d")
-"""The beginning of a line whose number has a comma, and is in no list."""
+"""The beginning of a line that has a number with a decimal comma, outside a list."""
 
 
 def read_checked(path: Path, kind: str, model: type[Checked], failure: type[FileError], **context: object) -> Checked:

@@ -14,7 +14,7 @@ from rov_fmu.identify.recordings.recordings_fit import FittedEffect, count
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.model.layout import AXES
 from rov_fmu.report.console import DEVIATION, console, listed, paragraph, print_table, table, text
-from rov_fmu.report.findings import Unseen, acting, by_heading, effects, is_warning, unseen
+from rov_fmu.report.findings import Unseen, acting, by_heading, effects, heading, unseen
 from rov_fmu.report.overview import main_errors
 from rov_fmu.vehicle.uncertainty import with_interval
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -98,7 +98,7 @@ def _conclusions(identification: Identification, most: int) -> Iterator[str]:
     kept = dict.fromkeys(e for result in identification.axes for e in effects(result) if e.kept)  # axes share a lag
     if kept:
         yield f"What else acts: {acting_words(kept)}."
-    if line := " ".join(_next_tests(identification.next_tests, warned(identification))):
+    if line := " ".join(_next_tests(identification.next_tests, axes_with_warnings(identification))):
         yield line
     yield from sentences(f for f in identification.findings if f.kind == "axis left out")
     groups = by_heading(identification.findings)
@@ -114,13 +114,13 @@ def _conclusions(identification: Identification, most: int) -> Iterator[str]:
         yield f"- {warning}"
 
 
-def warned(identification: Identification) -> set[str]:
-    """Return the axes that warnings are about; an empty name stands for a warning about no axis."""
-    return {finding.axis for finding in identification.findings if is_warning(finding)}
+def axes_with_warnings(identification: Identification) -> set[str]:
+    """Return the names of the axes that warnings are about; an empty name stands for a warning about no axis."""
+    return {finding.axis for finding in identification.findings if heading(finding) == "Warnings"}
 
 
 def _next_tests(tests: Sequence[NextTest], warned: Container[str]) -> Iterator[str]:
-    """Yield sentences about the most useful test, and the axes of which enough is known."""
+    """Yield sentences about the most useful test, and the axes of which enough is known; some axes have warnings."""
     if unknown := [test for test in tests if not test.is_known]:
         widest = unknown[0]
         if useful := next((test for test in unknown if test.is_useful), None):
@@ -139,15 +139,15 @@ def _next_tests(tests: Sequence[NextTest], warned: Container[str]) -> Iterator[s
 
 
 def acting_words(kept: Iterable[FittedEffect]) -> str:
-    """Return the other effects that were kept, in words, with the value along each axis."""
+    """Return the other effects that were kept, in words, with the value along each axis and in single recordings."""
     values: dict[str, list[str]] = {}
     for effect in kept:
         value, *_ = with_interval(effect.value, effect.interval)
         unit = "" if effect.unit == "1" else f" {effect.unit}"
-        words = f"{effect.of} {value}{unit}"
+        amount = f"{value}{unit}"
         if EFFECTS[effect.kind].sentence_of_file and effect.of not in AXES:  # it adds to the value of the axis
-            words = f"{effect.of} {value.lstrip('-')}{unit} {'less' if effect.value < 0.0 else 'more'}"
-        values.setdefault(acting(effect), []).append(words)
+            amount = f"{value.lstrip('-')}{unit} {'less' if effect.value < 0.0 else 'more'}"
+        values.setdefault(acting(effect), []).append(f"{effect.of} {amount}")
     return "; ".join(f"{words} ({', '.join(some)})" for words, some in values.items())
 
 

@@ -69,18 +69,17 @@ EXPLAINED = {
 """What each group of findings says, by its heading."""
 
 
-def is_warning(finding: Finding) -> bool:
-    """Return True for a finding that contradicts the model or the data."""
-    return finding.kind not in FACTS | DOUBTS
+def heading(finding: Finding) -> str:
+    """Return the heading of EXPLAINED that a finding belongs to."""
+    return "Facts" if finding.kind in FACTS else "Doubts" if finding.kind in DOUBTS else "Warnings"
 
 
 def by_heading(found: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
     """Return the sentences of findings by the headings of EXPLAINED."""
-    groups: dict[str, list[Finding]] = {heading: [] for heading in EXPLAINED}
+    groups: dict[str, list[Finding]] = {name: [] for name in EXPLAINED}
     for finding in found:
-        is_fact, is_doubt = finding.kind in FACTS, finding.kind in DOUBTS
-        groups["Facts" if is_fact else "Doubts" if is_doubt else "Warnings"].append(finding)
-    return {heading: sentences(some) for heading, some in groups.items()}
+        groups[heading(finding)].append(finding)
+    return {name: sentences(some) for name, some in groups.items()}
 
 
 @dataclass(frozen=True)

@@ -246,7 +246,7 @@ class Description:
 
     @property
     def has_hardware_tables(self) -> bool:
-        """True when the file itself describes the thrusters, and neither a base nor the paper's form does."""
+        """True if the file itself describes the thrusters; otherwise they are those of the base or of the paper."""
         return not self.base_name and self.thruster_sources is not PAPER_SOURCES
 
     @property

@@ -70,22 +70,20 @@ class Inspection:
 def inspect(path: Path, layouts: Iterable[Layout], described: Description | None = None) -> Inspection:
     """Return what a log contains.
 
-    Its thrusters and columns have the names of the described vehicle; else the thrusters have those of the first layout
-    with as many. Raises DataFileError.
+    The thrusters and columns of a CSV log have the names of the described vehicle. Without one, the thrusters have the
+    names of the first layout with as many. Raises DataFileError.
     """
-    columns = dict(described.columns) if described else {}
+    columns: Mapping[str, str] = {}
     if read := READERS.get(path.suffix.lower()):
         content = read(path, Wanted())
         command = None
     else:
         titles = read_header(path)
-        numbers = _numbers(path, titles)
-        commanding = [title for title in titles if _is_command(title, numbers[title])]
-        layout = described.layout if described else fitting(len(commanding), layouts) or _layout(len(commanding))
-        layout = replace(layout, axes=tuple(VehicleAxis(axis) for axis in AXES.values()))
         axis = next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
-        if not described:
-            columns = dict(_renamed(titles, numbers, commanding, layout, axis))
+        if described:
+            layout, columns = _with_all_axes(described.layout), described.columns
+        else:
+            layout, columns = _guessed(path, titles, axis, layouts)
         content, command = read_csv(path, layout, axis, Names(columns), is_part=True)
         unread = [title for title in titles if not is_column(columns.get(title, title), layout, axis)]
         content.unread = dict.fromkeys(unread, "")
@@ -105,6 +103,10 @@ def logs_of(path: Path) -> list[Path]:
 def fitting(count: int, layouts: Iterable[Layout]) -> Layout | None:
     """Return the first layout with this number of thrusters."""
     return next((layout for layout in layouts if len(layout.thrusters) == count), None)
+
+
+def _with_all_axes(layout: Layout) -> Layout:
+    return replace(layout, axes=tuple(VehicleAxis(axis) for axis in AXES.values()))
 
 
 def _layout(count: int) -> Layout:
@@ -152,6 +154,16 @@ def _numbers(path: Path, titles: Sequence[str]) -> dict[str, Array]:
     table = read_columns(path, columns, others=True, loose=True, renamed=names)
     found = {title: np.frombuffer(table.values[str(n)]) for n, title in enumerate(titles)}
     return {title: values[np.isfinite(values)] for title, values in found.items()}
+
+
+def _guessed(
+    path: Path, titles: Sequence[str], axis: Axis | None, layouts: Iterable[Layout]
+) -> tuple[Layout, dict[str, str]]:
+    """Return the first layout with as many thrusters as a CSV file seems to have, and what its headers seem to mean."""
+    numbers = _numbers(path, titles)
+    commanding = [title for title in titles if _is_command(title, numbers[title])]
+    layout = _with_all_axes(fitting(len(commanding), layouts) or _layout(len(commanding)))
+    return layout, dict(_renamed(titles, numbers, commanding, layout, axis))
 
 
 def _is_command(title: str, numbers: Array) -> bool:

@@ -9,10 +9,9 @@ from rov_fmu.model.layout import (
     ARM,
     AXES,
     AXIS,
+    COUPLED_AXES,
     CURVE,
     REVERSE,
-    SURGE,
-    SWAY,
     YAW,
     Axis,
     CoefficientKind,
@@ -28,7 +27,6 @@ from rov_fmu.vehicle.quantity import Quantity
 
 UNKNOWN = 1.0
 """The value of a coefficient that is yet to be identified."""
-_COUPLED_AXES = (SURGE, SWAY, YAW)
 
 
 @dataclass(frozen=True)
@@ -175,7 +173,7 @@ def _with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
         curves=tuple(curve for curve in layout.curves if curve.name in curves),
         thrusters=thrusters,
         mix={name: gains for name, gains in mix.items() if any(gains.values())},
-        coupled=layout.coupled and all(layout.has(axis) for axis in _COUPLED_AXES),
+        coupled=layout.coupled and all(layout.has(axis) for axis in COUPLED_AXES),
     )
     # The gains of an input that drives none of the axes cancel out.
     driving = {name for axis in axes for name in layout.signs(axis)}

@@ -13,6 +13,7 @@ from rov_fmu.model.layout import (
     AXES,
     AXIS,
     BODY,
+    COUPLED_AXES,
     CURVE,
     HEAVE,
     LEAST_BETA,
@@ -21,7 +22,6 @@ from rov_fmu.model.layout import (
     REVERSE,
     ROLL,
     SURGE,
-    SWAY,
     YAW,
     Axis,
     CoefficientKind,
@@ -363,7 +363,7 @@ def _check_coupling(parts: Parts, layout: Layout) -> Iterator[str]:
     has_entries = "m_a" in {key for key, *_ in layout.cross} or not {"x_G", "y_G", "z_G"}.isdisjoint(layout.restoring)
     if not (layout.coupled or has_entries):
         return
-    coupled = tuple(parts.axis_tables) if layout.has_attitude or has_entries else (SURGE, SWAY, YAW)
+    coupled = tuple(parts.axis_tables) if layout.has_attitude or has_entries else COUPLED_AXES
     if missing := [axis.name for axis in coupled if not layout.has(axis)]:
         yield key_line("body.coupling", f"needs surge, sway and yaw; there is no {' and no '.join(missing)}")
         return

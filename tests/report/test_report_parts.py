@@ -14,6 +14,7 @@ from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsF
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.model.layout import HEAVE, YAW
 from rov_fmu.model.rov import Rov
+from rov_fmu.report.console_results import acting_words
 from rov_fmu.report.findings import Known, acting, effects, verdict
 from rov_fmu.report.plots.fits import plot_known
 from rov_fmu.report.plots.recordings import clearest_step, modelled, plot_recording, plot_step
@@ -170,3 +171,14 @@ def test_residuals_are_noise_only_where_they_are_white() -> None:
     heave = recorded("a.csv", {1.0: 0.3})
     yaw = replace(heave, recording=replace(heave.recording, axis=YAW, quantity="heading"))
     assert scatter(yaw) == f"residuals of {number(degrees(yaw.noise), 2)} °, white: the sensor’s noise"
+
+
+def test_the_printout_tells_more_or_less_of_a_recording() -> None:
+    effects = [
+        FittedEffect("delay", of, "s", value, (value - 0.01, value + 0.01), kept=True)
+        for of, value in (("surge", 0.2), ("a.csv", 0.05), ("b.csv", -0.05))
+    ]
+    whole, more, less = acting_words(effects).split(", ")
+    assert "more" not in whole
+    assert more == "a.csv 0.050 s more"
+    assert less == "b.csv 0.050 s less)"

@@ -66,3 +66,12 @@ def test_effects_name_their_interval_and_what_they_act_on() -> None:
     )
     current = Finding("current", "surge", file=C, names={"unit": "m/s"}, numbers={"value": 0.1})
     assert sentences([current]) == (f"surge: the water moved at 0.1 m/s in {C}, which is taken out",)
+
+
+def test_what_a_recording_adds_is_not_taken_for_the_whole() -> None:
+    """A delay of a single recording comes on top of that of its axis."""
+    of_axis = Finding("delay", "surge", names={"unit": "s", "of": "surge"}, numbers={"value": 0.2})
+    of_file = Finding("delay", "surge", file="a.csv", names={"unit": "s"}, numbers={"value": 0.05})
+    whole, more = sentences([of_axis, of_file])
+    assert whole.startswith("surge: the motion of surge follows the commands 0.2 s late;")
+    assert more.startswith("surge: the motion in a.csv follows the commands 0.05 s later than in the other recordings;")

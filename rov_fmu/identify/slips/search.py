@@ -24,7 +24,7 @@ BETA = 0.05, 1.2
 """The range of β without added mass: m/β is between about the mass alone and 20 times the mass."""
 BETA_WITH_ADDED_MASS = 0.3, 3.0
 _ERROR_OF_MASS = 1.02
-"""β above 1 up to which the mass or the forces may simply be wrong by 2 %."""
+"""The β up to which an error of 2 % of the mass or of the forces explains that β is above 1."""
 _WEAKEST_COMMANDS = 0.01
 """Commands that never exceed this are fractions taken for percent."""
 _ALIKE = 2.5
@@ -74,10 +74,10 @@ def beta_range(rov: Rov, axis: Axis) -> tuple[float, float, str]:
 
 
 def beta_out_of_range(rov: Rov, axis: Axis, intervals: Mapping[str, tuple[float, float]]) -> Finding | None:
-    """Return a finding about a fitted β that no known vehicle has, or None; `intervals` are given by coefficient.
+    """Return a finding about a fitted β that no known vehicle has, or None.
 
-    A β above 1 means a negative added mass. It is a finding if the interval of β and an error of the mass do not
-    explain it.
+    `intervals` has the intervals of coefficients by name. A β above 1 means a negative added mass; there is a finding
+    unless the interval of β or a small error of the mass explains it.
     """
     beta, (low, high, inertia) = axis.coefficient("beta"), beta_range(rov, axis)
     names = {"beta": beta, "inertia": inertia, "mass": axis.inertia}

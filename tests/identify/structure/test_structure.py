@@ -141,7 +141,7 @@ def test_the_sentence_names_recordings_time_and_remedy() -> None:
         for file, start in zip(FILES, (3.2, 41.0), strict=True)
     ]
     (sentence,) = sentences(found)
-    when = "from 3 to 41 s, depending on the recording, on"
+    when = "after the first 3 ... 41 s"
     assert sentence.startswith(f"heave: the model does not explain log_1.csv and log_2.csv {when}: ")
     assert "`voltage = true`" in sentence
 
