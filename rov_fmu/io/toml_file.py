@@ -114,7 +114,8 @@ _COMPARED = 100
 def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> Iterator[str]:
     """Yield a line for each problem with the file: key, value, what is allowed.
 
-    After the first ten the lines are empty, because it takes long to find the most similar key for many unknown ones.
+    A mistake that several entries of a list of tables repeat gives one line. After the first ten the lines are empty,
+    because it takes long to find the most similar key for many unknown ones.
     """
     if not problems:  # making the JSON schema takes long
         return
@@ -123,14 +124,18 @@ def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Stri
     for problem in problems:
         if problem["type"] == "extra_forbidden":
             unknown.setdefault(problem["loc"][:-1], []).append(problem["loc"])
-    number = 0
-    for problem in problems:
-        place = problem["loc"]
-        if number == MOST:
-            yield ""
-        elif problem["type"] != "missing" or not _is_misspelt(place, unknown.get(place[:-1], ()), schema):
-            number += 1
-            yield _problem_line(problem, data, schema, model.hint)
+    real = [
+        problem
+        for problem in problems
+        if problem["type"] != "missing"
+        or not _is_misspelt(problem["loc"], unknown.get(problem["loc"][:-1], ()), schema)
+    ]
+    entries: dict[tuple[object, ...], list[ErrorDetails]] = {}  # the problems of each mistake
+    for problem in real:
+        entries.setdefault(_mistake(problem), []).append(problem)
+    for number, (first, *others) in enumerate(entries.values()):
+        more = f" (and in {len(others)} more {'entry' if len(others) == 1 else 'entries'})" if others else ""
+        yield _problem_line(first, data, schema, model.hint) + more if number < MOST else ""
 
 
 def join_names(names: Iterable[str]) -> str:
@@ -201,6 +206,13 @@ def _constant(schema: dict[str, Any]) -> Any:
     """Return the only value that a key may have, or None if it may have several."""
     allowed = schema.get("enum", [schema.get("const")])
     return allowed[0] if len(allowed) == 1 else None
+
+
+def _mistake(problem: ErrorDetails) -> tuple[object, ...]:
+    """Return what two problems have in common if they are the same mistake in two entries of a list of tables."""
+    key = tuple(step for step in problem["loc"][:-1] if isinstance(step, str))
+    value = "" if problem["type"] in ("missing", "extra_forbidden") else shown(problem["input"])
+    return problem["type"], key, problem["loc"][-1:], problem["msg"], value
 
 
 def _is_misspelt(place: _Place, unknown: Sequence[_Place], schema: _Schema) -> bool:

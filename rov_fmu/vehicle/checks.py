@@ -419,7 +419,7 @@ def check_quantities(
             yield key_line(key, f"there is no such coefficient of this vehicle{did_you_mean(name, declarations)}")
             continue
         if quantity.unit != declaration.unit:
-            yield key_line(f"{key}.unit", f"must be {declaration.unit!r}", quantity.unit)
+            yield key_line(f"{key}.unit", f"must be {declaration.unit!r}; convert the value", quantity.unit)
         try:
             within(quantity.value, declaration)
         except ValueError as error:

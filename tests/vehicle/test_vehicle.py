@@ -227,6 +227,17 @@ def test_every_mistake_in_a_file_is_reported(tmp_path: Path) -> None:
         assert line.startswith(f"{path}: {words}")
 
 
+def test_a_mistake_in_several_thrusters_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "bad.toml"
+    thrusters = ALONE.count("[[thruster]]")
+    text = ALONE.replace("\ndirection = ", "\ndrection = ").replace('curve = "top"', "curve = 7", 1)
+    path.write_text(text, encoding="utf-8")
+    direction, curve = refusal(path).splitlines()
+    assert curve.endswith(".curve = 7: must be text in quotes")
+    assert "drection: there is no such key" in direction
+    assert direction.endswith(f"did you mean direction? (and in {thrusters - 1} more entries)")
+
+
 def test_missing_folders_are_reported_together_with_other_mistakes(tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
     text = TEXT.replace("command_min = 0.2", "command_min = 0.8")
