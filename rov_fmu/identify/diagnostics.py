@@ -47,7 +47,8 @@ def on_thrust(curve: str, fit: ThrustFit, rov: Rov) -> Iterator[Finding]:
             yield finding(kind, numbers={"command": -b_t / a_t})
     x, y = fit.x[fit.counts], fit.y[fit.counts]
     clear = np.abs(y) > 2.0 * fit.residual_rms
-    asymmetry = _asymmetry(x[clear], y[clear], fit.value(x[clear]))
+    noise = fit.residual_rms if f"a_t{REVERSE}" in of_vehicle.keys else 0.0  # a common curve leaves the asymmetry in it
+    asymmetry = _asymmetry(x[clear], y[clear], fit.value(x[clear]), noise)
     if asymmetry:
         yield finding("asymmetry", names={"quantity": "force", "window": f"thrust_{curve}"}, numbers=asymmetry)
 
@@ -206,13 +207,13 @@ def on_forces(fit: RecordingsFit, thrust: ThrustFit) -> Iterator[Finding]:
         yield Finding("recordings against forces", fit.axis.name, curve, numbers=numbers)
 
 
-def _asymmetry(x: Array, y: Array, model: Array) -> dict[str, float] | None:
+def _asymmetry(x: Array, y: Array, model: Array, noise: float = 0.0) -> dict[str, float] | None:
     """Compare both directions at the same command; return the numbers of a finding, or None.
 
-    There is a finding where the directions differ by 5 % more, or less, than in the model, and by more than the scatter
-    of repeated measurements explains.
+    There is a finding where the directions differ by 5 % more, or less, than in the model, and by more than the noise
+    and the scatter of repeated measurements explain.
     """
-    ratios, scatter = {}, _scatter(x, y)
+    ratios, scatter = {}, max(noise, _scatter(x, y))
     for level in np.unique(np.round(np.abs(x[x < 0.0]), 6)).tolist():
         backward, forward = np.isclose(x, -level), np.isclose(x, level)
         if forward.any() and y[forward].mean() > 0.0 and model[forward].mean() > 0.0:

@@ -45,13 +45,25 @@ def _drag_at_zero(values: Mapping[str, Any]) -> str:
     )
 
 
+_EQUAL = 0.005
+"""A relative difference below this one is printed as none."""
+
+
 def _asymmetry(values: Mapping[str, Any]) -> str:
     whose = f"{values['curve']} thrust" if values["curve"] else values["axes"]
-    by_model = f"to differ by {values['modelled']:+.0%}" if "modelled" in values else "as equal"
+    measured, modelled = values["measured"], values.get("modelled", 0.0)
+    word = "as" if abs(measured) < _EQUAL else "than"
     return (
-        f"{whose}: {values['quantity']} differs by {values['measured']:+.0%} from positive to negative commands at "
-        f"{values['command']:.0%}, which the model takes {by_model}; windows.{values['window']} picks a direction"
+        f"{whose}: {values['quantity']} at {-values['command']:.0%} is {_larger(measured)} {word} at "
+        f"{values['command']:.0%}, and {_larger(modelled)} in the model; {values['window']} in [windows] can leave out "
+        "one direction"
     )
+
+
+def _larger(difference: float) -> str:
+    if abs(difference) < _EQUAL:
+        return "as large"
+    return f"{abs(difference):.0%} {'larger' if difference > 0.0 else 'smaller'}"
 
 
 def _disagreement(values: Mapping[str, Any]) -> str:

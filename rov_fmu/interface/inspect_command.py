@@ -2,16 +2,16 @@
 
 import errno
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import brief
 from rov_fmu.io.output import Output, WriteError, write_whole
-from rov_fmu.model.layout import BODY
+from rov_fmu.model.layout import AXES, BODY, PITCH, ROLL
 from rov_fmu.tank.description import ROV_FILE, read_description
-from rov_fmu.tank.inspection import Inspection, fitting, inspect, logs_of
+from rov_fmu.tank.inspection import Inspection, fitting, inspect, logs_of, possible_column
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -35,11 +35,15 @@ def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
     found = [inspect(log, layouts, described) for log in logs_of(path)]
     if not found:
         raise DataFileError(f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it")
-    count, changing = max((len(one.commands), _changing(one)) for one in found)
-    if not (fits := fitting(count, layouts)):
-        count, fits = changing, fitting(changing, layouts)
+    most = max(found, key=lambda one: (len(one.commands), _changing(one)))
+    count = len(most.commands)
+    fits = fitting(count, layouts)
+    if not fits and most.path.suffix.lower() in LOG_SUFFIXES:
+        count = _changing(most)
+        fits = fitting(count, layouts)
     base = next((name for name, vehicle in vehicles.items() if vehicle.layout == fits), "")
-    return found, folder / ROV_FILE, "\n".join(_draft(found, count, base, vehicles.get(base))) + "\n"
+    thrusters = [row.name.removeprefix("thruster ") for row in most.commands[:count]]
+    return found, folder / ROV_FILE, "\n".join(_draft(found, thrusters, base, vehicles.get(base))) + "\n"
 
 
 def _changing(inspection: Inspection) -> int:
@@ -57,26 +61,34 @@ def write_draft(path: Path, text: str) -> None:
 # ---- The draft -------------------------------------------------------------------------------------------------------
 
 
-def _draft(found: Sequence[Inspection], count: int, base: str, vehicle: Vehicle | None) -> Iterator[str]:
-    """Yield the lines of a draft, which is a complete rov.toml."""
+def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, vehicle: Vehicle | None) -> Iterator[str]:
+    """Yield the lines of a draft, which is a complete rov.toml if a vehicle that ships has so many thrusters."""
     first = found[0].path
     names = brief(", ".join(one.path.name for one in found))
     word = re.sub(r"[^a-z0-9]+", "_", first.stem.lower()).strip("_")
     yield f"# A draft by `rov-fmu identify --inspect` of {names}: edit it, then run `rov-fmu identify` on its folder."
-    why = f"the first vehicle that ships with {count} thrusters" if base else "no vehicle that ships has such thrusters"
-    why = "a log of one axis does not tell the vehicle" if count == 1 else why
-    yield f"# {why[0].upper()}{why[1:]}. Write the path of your vehicle file, or {', '.join(SHIPPED)}."
-    yield f"base = {_quoted(base or 'videoray')}"
+    signals = {row.name for one in found for row in one.signals}
+    is_own = not base and len(thrusters) > 1
+    if is_own:
+        yield f'# No vehicle that ships has {len(thrusters)} thrusters, so the draft describes them. Replace each "?".'
+        yield '# For a vehicle file that you have, write base = "its path" here, and remove the tables from [body] on.'
+    else:
+        first_fitting = f"The first vehicle that ships with {len(thrusters)} thrusters"
+        why = first_fitting if base else "These logs do not tell how many thrusters the vehicle has"
+        yield f"# {why}. Write the path of your vehicle file, or {', '.join(SHIPPED)}."
+        yield f"base = {_quoted(base or 'videoray')}"
     yield from ("", "[vehicle]", f"name = {_quoted(first.stem)}")
     yield f"identifier = {_quoted(word if word[:1].isalpha() else f'rov_{word}')}"
     yield from ('version = "1.0"', f'description = "A vehicle identified from {_quoted(names)[1:-1]}"')
     yield f"source = {_quoted(names)}"
-    yield from ("", "[known]  # what no log tells: write the values of your vehicle instead of those of the base")
+    if is_own:
+        yield from _hardware(thrusters, signals)
+    else:
+        yield from ("", "[known]  # what no log tells: write the values of your vehicle instead of those of the base")
     for key in BODY:
         if vehicle and key in vehicle.layout.coefficients:
             unit = vehicle.layout.coefficients[key].unit
             yield f'# {key} = {{ value = {vehicle.rov[key]:g}, unit = "{unit}", source = "..." }}'
-    signals = {row.name for one in found for row in one.signals}
     effects = {"voltage": {"voltage"}}
     if not (vehicle and vehicle.layout.has_attitude):
         effects["attitude"] = {"roll", "pitch"}
@@ -91,7 +103,7 @@ def _draft(found: Sequence[Inspection], count: int, base: str, vehicle: Vehicle 
         yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
         if others:
             yield "# These headers are not known. Remove the # of a header, and write what it stands for, such as:"
-        yield from (f'# {_quoted(title)} = "depth [m]"' for title in sorted(others))
+        yield from (f"# {_quoted(title)} = {_quoted(possible_column(title))}" for title in sorted(others))
     topics = {name: what for one in found if not is_csv[one.path] for name, what in one.unread.items()}
     mappable = [f"{name}.{what.rpartition(': ')[2].split(', ')[0]}" for name, what in topics.items() if ": " in what]
     if mappable:
@@ -101,6 +113,21 @@ def _draft(found: Sequence[Inspection], count: int, base: str, vehicle: Vehicle 
         files = ", ".join(_quoted(one.path.name) for one in found)
         yield from ("", f"[dives.{word or 'dive'}]", f"files = [{files}]")
         yield "# other_clock = [...]  # those of the files whose clock is not that of the commands"
+
+
+def _hardware(thrusters: Sequence[str], signals: Collection[str]) -> Iterator[str]:
+    """Yield tables for the hardware of a vehicle; the values that must be given are question marks."""
+    yield from ("", "[body]", 'm_rov = { value = "?", unit = "kg", source = "Weighed" }')
+    yield 'I_r = { value = "?", unit = "kg.m2", source = "CAD" }   # moment of inertia about the vertical axis'
+    yield "# coupling = true   # if the vehicle turns while it moves in surge or sway"
+    yield from ("", "[curves.all]   # a curve for each kind of thruster; thrust_all.csv has the forces of one thruster")
+    for name in thrusters:
+        yield from ("", "[[thruster]]", f"name = {_quoted(name)}", 'curve = "all"')
+        yield 'direction = { value = ["?", "?", "?"], source = "CAD" }   # of its thrust: forward, starboard, down'
+        yield 'position = { value = ["?", "?", "?"], unit = "m", source = "CAD" }   # from the centre of mass'
+    measured = [axis for axis in AXES.values() if {axis.position, f"{axis.name} velocity"} & {*signals}]
+    yield from ("", "# axes that the logs measure: remove those that no thruster drives")
+    yield from (f"[axes.{axis.name}]" for axis in measured if axis not in (ROLL, PITCH))
 
 
 def _quoted(text: str) -> str:

@@ -212,7 +212,8 @@ def _mistake(problem: ErrorDetails) -> tuple[object, ...]:
     """Return what two problems have in common if they are the same mistake in two entries of a list of tables."""
     key = tuple(step for step in problem["loc"][:-1] if isinstance(step, str))
     value = "" if problem["type"] in ("missing", "extra_forbidden") else shown(problem["input"])
-    return problem["type"], key, problem["loc"][-1:], problem["msg"], value
+    last = [step for step in problem["loc"][-1:] if isinstance(step, str)]
+    return problem["type"], key, *last, problem["msg"], value
 
 
 def _is_misspelt(place: _Place, unknown: Sequence[_Place], schema: _Schema) -> bool:

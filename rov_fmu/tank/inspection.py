@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from math import inf, pi
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from rov_fmu.io.csv_table import PULSES, Column, read_columns, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.columns import velocity_column
 from rov_fmu.tank.description import Description
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
@@ -24,6 +26,8 @@ from rov_fmu.tank.tables import TABLES
 
 _HEADER = re.compile(r"(?P<name>[^\[(]*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*")
 _COMMAND = re.compile(r"\b(?:thruster|motor|propeller|pwm|servo|esc|cmd|command|u)[ _]*(\d+)\b|^(?:u_|thruster )\S+$")
+_NAME = re.compile(r"[a-z][a-z0-9_]*", re.IGNORECASE)
+"""A name of a thruster that a vehicle file may have."""
 _LIKELY = {
     "depth": {"m": 100.0, "cm": 1e4, "mm": inf},
     "heading": {"rad": 2.1 * pi, "deg": inf},
@@ -33,7 +37,17 @@ _LIKELY = {
 }
 """The columns that are recognised by a word, and their units, each with the largest number that it is likely for."""
 _WORDS = {name: name for name in _LIKELY} | {"yaw": "heading", "battery": "voltage"}
-_NOT_MEASURED = {"rate", "speed", "set", "target", "desired"}
+_WANTED = {"set", "target", "desired"}
+_NOT_MEASURED = {"rate", "speed", *_WANTED}
+_DIRECTIONS = {
+    "surge": ("surge", "forward", "ahead"),
+    "sway": ("sway", "side", "sideways", "lateral"),
+    "heave": ("heave", "vertical"),
+    "yaw": ("yaw", "turn", "heading"),
+    "roll": ("roll",),
+    "pitch": ("pitch",),
+}
+"""The words by which the axis of a column of velocities is recognised."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +114,15 @@ def logs_of(path: Path) -> list[Path]:
     return sorted(file for file in logs if not file.name.lower().startswith(tables))
 
 
+def possible_column(title: str) -> str:
+    """Return a column that a header may stand for, as its unit says."""
+    _, unit = _parts(title)
+    columns = (f"{axis.name} velocity" for axis in (AXES["surge"], AXES["yaw"]) if unit in velocity_column(axis).units)
+    columns_with_unit = (name for name, units in _LIKELY.items() if unit in units)
+    name = next(chain(columns, columns_with_unit), "")
+    return f"{name} [{unit}]" if name else "depth [m]"
+
+
 def fitting(count: int, layouts: Iterable[Layout]) -> Layout | None:
     """Return the first layout with this number of thrusters."""
     return next((layout for layout in layouts if len(layout.thrusters) == count), None)
@@ -109,9 +132,16 @@ def _with_all_axes(layout: Layout) -> Layout:
     return replace(layout, axes=tuple(VehicleAxis(axis) for axis in AXES.values()))
 
 
-def _layout(count: int) -> Layout:
-    """Return a layout of thrusters that are only numbered."""
-    return Layout((), (Curve("t"),), tuple(Thruster(str(n + 1), "t", (1.0, 0.0, 0.0), arm=1) for n in range(count)))
+def _layout(names: Iterable[str]) -> Layout:
+    """Return a layout of thrusters of which only the names are known."""
+    return Layout((), (Curve("t"),), tuple(Thruster(name, "t", (1.0, 0.0, 0.0), arm=1) for name in names))
+
+
+def _names(titles: Sequence[str]) -> list[str]:
+    """Return names of thrusters for columns of commands: those of the columns, or else numbers."""
+    names = [_parts(title)[0] for title in titles]
+    are_names = all(_NAME.fullmatch(name) for name in names) and len({name.casefold() for name in names}) == len(names)
+    return [name.removeprefix("u_") for name in names] if are_names else [str(n + 1) for n in range(len(names))]
 
 
 def _row(name: str, unit: str, time: Array, values: Array) -> Row:
@@ -135,7 +165,7 @@ def _signals(content: Content) -> Iterator[Row]:
             yield _row(name, CONTEXT[name], signal.time, signal.values)
         else:
             unit = axis.unit if name == "velocity" else axis.position_unit
-            yield _row(signal_name(axis, name), unit, signal.time, signal.unwrapped())
+            yield _row(signal_name(axis, name), unit, signal.time, signal.values)
 
 
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------
@@ -162,7 +192,7 @@ def _guessed(
     """Return the first layout with as many thrusters as a CSV file seems to have, and what its headers seem to mean."""
     numbers = _numbers(path, titles)
     commanding = [title for title in titles if _is_command(title, numbers[title])]
-    layout = _with_all_axes(fitting(len(commanding), layouts) or _layout(len(commanding)))
+    layout = _with_all_axes(fitting(len(commanding), layouts) or _layout(_names(commanding)))
     return layout, dict(_renamed(titles, numbers, commanding, layout, axis))
 
 
@@ -193,10 +223,22 @@ def _renamed(
             usual = float(np.median(np.diff(numbers[title]))) if len(numbers[title]) > 1 else 0.0
             yield title, f"time [{unit if unit in ('s', 'ms') else 'ms' if usual > 5.0 else 's'}]"
             taken.add("time")
+        elif (velocity := _velocity(words, unit)) and velocity not in taken:
+            yield title, f"{velocity} [{unit}]"
+            taken.add(velocity)
         elif meant and meant not in taken and not _NOT_MEASURED & {*words}:
             likely = next(one for one, largest in _LIKELY[meant].items() if most <= largest)
             yield title, f"{meant} [{unit if unit in _LIKELY[meant] else likely}]"
             taken.add(meant)
+
+
+def _velocity(words: Sequence[str], unit: str) -> str:
+    """Return the column of velocities that the words and the unit of a header mean, or an empty text."""
+    if not _WANTED & {*words}:
+        for name, directions in _DIRECTIONS.items():
+            if {*directions} & {*words} and unit in velocity_column(AXES[name]).units:
+                return f"{name} velocity"
+    return ""
 
 
 def _unit_of_command(title: str, numbers: Mapping[str, Array]) -> str:

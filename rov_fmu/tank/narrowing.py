@@ -216,7 +216,7 @@ def _missing_or_doubled_tests(
         names = curve.coefficient("a_t"), curve.coefficient("b_t")
         if curve.name not in tested.thrust:
             if not {*names} & {*known, *description.named}:
-                yield f"no thrust_{curve.name}*.csv, and rov.toml does not give {names[0]}"
+                yield f"no thrust_{curve.name}*.csv, and [known] in rov.toml does not give {names[0]}"
             continue
         file, backward = tested.thrust[curve.name]
         reverse_names = tuple(f"{name}{REVERSE}" for name in names)
@@ -227,6 +227,6 @@ def _missing_or_doubled_tests(
         drag = [name for name in (axis.coefficient("a_d"), axis.coefficient("b_d")) if name not in known]
         if drag and axis.name not in {*tested.steady, *tested.logs}:
             yield (
-                f"no steady_{axis.name}*.csv or log_{axis.name}*.csv that counts, and rov.toml does not give "
+                f"no steady_{axis.name}*.csv or log of {axis.name} that counts, and [known] in rov.toml does not give "
                 f"{', '.join(drag)}"
             )

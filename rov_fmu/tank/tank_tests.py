@@ -7,7 +7,7 @@ anything may follow another underscore:
     steady_<surge|sway|heave|yaw>*.csv         command, velocity               Tables 3-5
     time_constant_<surge|sway|heave|yaw>*.csv  command, time constant          (17), Tables 6-8
     log_<surge|sway|heave|yaw>*.csv            time, command, and distance, depth or heading, or velocity
-    log_*.csv, *.bin, *.tlog, *.ulg,           time, commands, and the motion of several axes
+    *.csv, *.bin, *.tlog, *.ulg,               time, commands, and the motion of several axes
     *.bag, *.db3, *.mcap
 
 A bag of ROS 2 may be in a folder of its own. The files of the tables [dives] of rov.toml may have any names.
@@ -20,7 +20,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.csv_table import DataFileError, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on
 from rov_fmu.io.toml_file import join_names, key_line
@@ -253,11 +253,13 @@ class _Reader:
             kind, subject = "log", subject if kind == "log" else ""
         axes = [*(self.layout.kinds if self.layout else AXES)]
         known = (curves or []) if kind == "thrust" else axes
+        if not kind and path.name.isprintable() and self._has_times(path):
+            return "log", ""
         if not (kind and path.name.isprintable()) or not (subject or known):
             hint = did_you_mean(path.stem.lower().partition("_")[0], _KINDS, also={"time": "time_constant"})
             raise DataFileError(
-                f"{path}: no name of a test; thrust_ begins one, then {_either(curves or ['the name of a curve'])}, or "
-                f"steady_, time_constant_ or log_, then {_either(axes)}, then _ and any printable characters{hint}"
+                f"{path}: neither a log, which has a column 'time [s]', nor a table, whose name begins with "
+                f"thrust_<curve>, steady_<axis> or time_constant_<axis>, of {_either([*(curves or []), *axes])}{hint}"
             )
         if not subject and kind != "log":
             word = path.stem.lower().removeprefix(f"{kind}_").partition("_")[0]
@@ -270,6 +272,11 @@ class _Reader:
         if self.layout and subject in AXES and kind != "thrust" and not self.layout.signs(AXES[subject]):
             raise DataFileError(f"{path}: no thruster of the vehicle drives {subject}")
         return kind, subject
+
+    def _has_times(self, path: Path) -> bool:
+        """Return True if the header of a CSV file has the column of times that a log has."""
+        titles = (self.names.columns.get(title, title) for title in read_header(path))
+        return any(title.partition("[")[0].strip().casefold() == "time" for title in titles)
 
     def tested(self, description: Description | None) -> Tested:
         """Return what the files test."""

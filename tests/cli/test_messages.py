@@ -384,7 +384,7 @@ TABLES: dict[str, tuple[str, str, str]] = {
         "",
         "raer is not a thrust curve of this vehicle, only rear and top; did you mean rear?",
     ),
-    "a kind of test misspelt": ("stedy_surge.csv", "", "then _ and any printable characters; did you mean steady?"),
+    "a kind of test misspelt": ("stedy_surge.csv", "", "of rear, top, surge, heave or yaw; did you mean steady?"),
 }
 
 

@@ -285,7 +285,7 @@ def test_names_that_are_no_text_are_one_clear_line(tests: Path, capsys: Capsys) 
         assert main(["identify", str(tests)]) == 2
         said = without_progress(capsys.readouterr().err).removesuffix("\n")
         check_line(said, tests)
-        assert "no name of a test" in said
+        assert "neither a log" in said
         path.unlink()
 
 

@@ -122,7 +122,7 @@ def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(
     table(tmp_path / "log_dive.csv", ",".join(titles), TIME, 100 * THRUSTERS[0], 100 * THRUSTERS[1], DEPTH, TIME)
     assert main(["identify", "--inspect", str(tmp_path)]) == 0
     draft = tmp_path / "rov.toml"
-    assert '"fore [%]" = "u_' in draft.read_text(encoding="utf-8"), "a column in percent is a command"
+    assert 'name = "fore"' in draft.read_text(encoding="utf-8"), "a column in percent is a command"
     assert "- battery [%]" not in capsys.readouterr().out.split("Not recognised")[0]
     thrusters = "".join(
         f'[[thruster]]\nname = "{name}"\ncurve = "t"\ndirection = {{ value = [0, 0, 1], source = "CAD" }}\n'
@@ -135,6 +135,33 @@ def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(
     rows = [line.split("  ")[0] for line in capsys.readouterr().out.splitlines()]
     assert {"thruster fore", "thruster aft", "depth", "- battery [%]"} <= {*rows}
     assert "- sonde [m]" not in rows
+
+
+def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Columns have the names that their user chose, and the name of the file is no name of a test."""
+    titles = "time [s],bow [%],stern [%],vertical speed [cm/s],sonar range [m/s],turn rate [deg/s],set heading [deg]"
+    log = tmp_path / "dive 7.csv"
+    table(log, titles, TIME, 100 * THRUSTERS[0], 100 * THRUSTERS[1], 100 * DEPTH, DEPTH, TIME, TIME)
+    assert main(["identify", "--inspect", str(log)]) == 0
+    draft = tmp_path / "rov.toml"
+    text = draft.read_text(encoding="utf-8")
+    assert '"vertical speed [cm/s]" = "heave velocity [cm/s]"' in text
+    assert '"turn rate [deg/s]" = "yaw velocity [deg/s]"' in text
+    assert '# "sonar range [m/s]" = "surge velocity [m/s]"' in text
+    assert '# "set heading [deg]" = "heading [deg]"' in text
+    assert main(["identify", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert "body.m_rov.value = '?': must be a number" in told
+    assert "thruster.bow.direction.value" in told
+    assert "(and in 5 more entries)" in told, "each mistake of all thrusters is one line"
+    text = text.replace('direction = { value = ["?", "?", "?"]', "direction = { value = [0, 0, 1]")
+    text = text.replace('["?", "?", "?"]', "[0, 0, 0]").replace('"?"', "9.0")
+    text = text.replace("[axes.yaw]", "").replace('"turn rate [deg/s]" =', "#")
+    thrust = "".join(f'{key}_all = {{ value = 10.0, unit = "N", source = "Guessed" }}\n' for key in ("a_t", "b_t"))
+    draft.write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
+    assert {*load_tank_tests(tmp_path).recordings} == {"heave"}
 
 
 def test_tables_beside_the_logs_are_no_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

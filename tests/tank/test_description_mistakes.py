@@ -105,7 +105,7 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         WITH_THRUST | {"steady_surge.csv": f"{SPEED}\n0.3,0.2\n"},
         "/steady_surge.csv: no thruster of the vehicle drives surge",
     ),
-    (DOWN, HEAVE_ALONE, ": no thrust_t200*.csv, and rov.toml does not give a_t_t200"),
+    (DOWN, HEAVE_ALONE, ": no thrust_t200*.csv, and [known] in rov.toml does not give a_t_t200"),
     (DOWN, {"thrust_t200.csv": pulled(30.0, 20.0)}, ": no axis is tested: there is no steady_, time_co"),
     (
         DOWN.replace("[curves.t200]", "[curves.t200]\n" + TOP.replace("_top", "")),
@@ -115,9 +115,9 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (
         DOWN,
         {"thrust_t200.csv": pulled(30.0, 20.0), "time_constant_heave.csv": f"{TAU}\n0.3,2\n"},
-        ": no steady_heave*.csv or log_heave*.csv that counts, and rov.toml does not give a_d_w, b_d_w",
+        ": no steady_heave*.csv or log of heave that counts, and [known] in rov.toml does not give a_d_w, b_d_w",
     ),
-    (DOWN, {"steadyheave.csv": f"{SPEED}\n0.3,0.2\n"}, "/steadyheave.csv: no name of a test"),
+    (DOWN, {"steadyheave.csv": f"{SPEED}\n0.3,0.2\n"}, "/steadyheave.csv: neither a log, which has"),
     (
         f"{BLUEROV2}[known]\nmass = 11.5\n",
         HEAVE_ALONE,
@@ -206,7 +206,7 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
         "/steady_heave.csv, line 3, column 'command [1]' = 0",
         "/steady_heave.csv, line 4",
         "/steady_surge.csv, line 2",
-        "/stedy_surge.csv: no name of a test",
+        "/stedy_surge.csv: neither a log, which has",
         "/thrust_left.csv: left is not a thrust c",
         "/thrust_rear.csv, line 3",
         "/rov.toml: known.I_r",

@@ -181,7 +181,7 @@ BAD: list[tuple[str, str, str]] = [
     ("log_heave.csv", LOG + "0,,0\n", "no row has both a time and a command"),
     ("log_heave.csv", "time [s],command [%]\n0,0\n", "line 1 | 'depth [m]' or 'velocity [m/s]'"),
     ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", "line 1 | 'depth [m]' or"),
-    ("stedy_surge.csv", STEADY, "no name of a test | steady_"),
+    ("stedy_surge.csv", STEADY, "neither a log, which has a column 'time [s]' | steady_"),
     ("steady_sway.csv", STEADY, "no thruster of the vehicle drives sway"),
     ("steady_roll.csv", STEADY, "no thruster of the vehicle drives roll"),
     ("steady_twist.csv", STEADY, "twist is not an axis | surge, heave and yaw"),

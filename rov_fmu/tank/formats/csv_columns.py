@@ -53,7 +53,8 @@ def sensors_of(axes: Iterable[Axis], *, of_one: bool) -> dict[str, Sensor]:
             velocity = quantity == "velocity"
             column = velocity_column(axis, optional=True, least=0.0) if velocity else position_column(axis)
             long_name = f"{axis.name} {quantity}"
-            others = (axis.velocity,) if velocity else _POSITION_NAMES.get(axis, ())
+            rate = f"{axis.name} {'rate' if axis.unit == 'rad/s' else 'speed'}"
+            others = (axis.velocity, rate) if velocity else _POSITION_NAMES.get(axis, ())
             name = quantity if of_one or (axis in _POSITION_NAMES and not velocity) else long_name
             column = replace(column, also=(long_name, *others))
             found[name] = Sensor(axis, quantity, column)
