@@ -45,25 +45,13 @@ def _drag_at_zero(values: Mapping[str, Any]) -> str:
     )
 
 
-_EQUAL = 0.005
-"""A relative difference below this one is printed as none."""
-
-
 def _asymmetry(values: Mapping[str, Any]) -> str:
     whose = f"{values['curve']} thrust" if values["curve"] else values["axes"]
-    measured, modelled = values["measured"], values.get("modelled", 0.0)
-    word = "as" if abs(measured) < _EQUAL else "than"
+    by_model = f"by {values['modelled']:+.0%}" if "modelled" in values else "not"
     return (
-        f"{whose}: {values['quantity']} at {-values['command']:.0%} is {_larger(measured)} {word} at "
-        f"{values['command']:.0%}, and {_larger(modelled)} in the model; {values['window']} in [windows] can leave out "
-        "one direction"
+        f"{whose}: at {values['command']:.0%}, {values['quantity']} in reverse differs by {values['measured']:+.0%} "
+        f"from that ahead, and {by_model} in the model; {values['window']} in [windows] can leave out one direction"
     )
-
-
-def _larger(difference: float) -> str:
-    if abs(difference) < _EQUAL:
-        return "as large"
-    return f"{abs(difference):.0%} {'larger' if difference > 0.0 else 'smaller'}"
 
 
 def _disagreement(values: Mapping[str, Any]) -> str:
@@ -171,9 +159,9 @@ _CAUSES = {
 
 
 def _unexplained(values: Mapping[str, Any]) -> str:
-    return "{axes}: the model does not explain {files} after the first {start:.0f} s: {words}".format(
-        **values, words=_CAUSES[values["cause"]]
-    )
+    start = f"{values['start']:.0f}"
+    when = "from the start on" if start == "0" else f"after the first {start} s"
+    return f"{values['axes']}: the model does not explain {values['files']} {when}: {_CAUSES[values['cause']]}"
 
 
 _OUTLIERS = "{axes}: {share:.0%} of the samples of {files} are outliers and count less"

@@ -163,6 +163,7 @@ class _Found:
         for name in fit.estimate.names:
             tested = self.tested.get(name)
             self.sources[name] = f"{tested}, and the recordings" if tested else _capitalized(fit.method)
+            self.intervals.pop(name, None)  # that of the forces alone
         self.intervals |= fit.estimate.intervals
 
     def take(self, result: AxisResult) -> None:

@@ -406,6 +406,16 @@ def test_forces_differ_by_direction_where_repetitions_do_not_explain_it(
     assert any((f.kind, f.curve) == ("asymmetry", "top") for f in found.findings) is warns
 
 
+def test_forces_that_a_person_rounds_do_not_differ_by_direction(tmp_path: Path, k: Rov) -> None:
+    """The thrust in reverse is 76 % of that ahead; at 20 %, rounding to 0.5 N is a quarter of the force."""
+    commands = (0.2, 0.4, 0.6, 0.8, 1.0)
+    exact = [(c, 5.0 * k.force(HEAVE, c)) for c in commands]
+    forces = [(c, round(2.0 * force) / 2.0) for c, force in (*exact, *((-c, -0.76 * force) for c, force in exact))]
+    found = folder_with(tmp_path, {"thrust_top": forces}, ["heave"])
+    assert "a_t_top_reverse" in found.thrust["top"].estimate.names
+    assert not [finding for finding in found.findings if finding.kind == "asymmetry"]
+
+
 @pytest.fixture(scope="module")
 def by_direction(tmp_path_factory: pytest.TempPathFactory) -> Identification:
     """Identify a vehicle with 60 % thrust in reverse, and with twice the drag upward."""

@@ -14,6 +14,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation
 
+_LEAST_FREEDOM = 8.0
+"""The least number of degrees of freedom of many samples, for the spectrum of their noise is estimated from more."""
 _COLOURED = 2.0
 """The correlation time in samples from which a fit absorbs a relevant part of the noise."""
 
@@ -82,6 +84,8 @@ class ResidualAnalysis:
             self.simulations.append(
                 Simulation(d.recording, time, measured, modelled, velocity, noise, correlation, outliers)
             )
+        samples = len(r) - len(self.x)
+        self.degrees_of_freedom = max(self.degrees_of_freedom, min(_LEAST_FREEDOM, samples))
         self.cost = np.array(cost)
         """The contribution of each recording to the cost."""
 

@@ -77,8 +77,6 @@ class Scenario:
     """More lines of rov.toml."""
     effects: tuple[str, ...] = ()
     """The kinds of findings about effects that are really there."""
-    vague: bool = False
-    """True when coefficients may turn out not to be identifiable: a missing interval then counts as one that covers."""
     unexplained: tuple[str, ...] = ()
     """The axes where the model cannot explain the data; none for a complete model."""
 
@@ -193,7 +191,7 @@ COMPLETE: dict[str, Scenario] = {
     "dead band in heave": _usual(Logs(axes=(HEAVE,)), more={"c_0_top": 0.05}, effects=("dead band",)),
     "more drag up than down": _usual(Logs(axes=(HEAVE,)), more=_UP, effects=("reverse drag",)),
     **{
-        f"noise of {seconds} s in heave": _usual(Logs(axes=(HEAVE,), correlation_time=seconds), vague=seconds > 1.0)
+        f"noise of {seconds} s in heave": _usual(Logs(axes=(HEAVE,), correlation_time=seconds))
         for seconds in (0.2, 1.0, 3.0)
     },
     "jitter": _usual(Logs(jitter=0.01), effects=("delay",)),

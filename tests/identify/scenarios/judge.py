@@ -41,17 +41,17 @@ class Coverage:
 
 
 def coverages(outcomes: Sequence[Outcome], scenario: Scenario) -> list[Coverage]:
-    """Return the coverage of each coefficient. One without an interval is not covered, except in vague scenarios."""
+    """Return the coverage of each coefficient. One without an interval is not covered."""
     found, truth = [], scenario.truth
     for name in scenario.coefficients:
         estimates = [o.coefficients.get(name) for o in outcomes]
-        covered = sum(estimate is not None and _covers(estimate, truth[name], scenario.vague) for estimate in estimates)
+        covered = sum(estimate is not None and _covers(estimate, truth[name]) for estimate in estimates)
         found.append(Coverage(name, covered, len(outcomes), truth[name] == 0.0))
     return found
 
 
-def _covers(estimate: Estimate, truth: float, vague: bool) -> bool:
-    return estimate.interval[0] <= truth <= estimate.interval[1] if estimate.interval else vague
+def _covers(estimate: Estimate, truth: float) -> bool:
+    return estimate.interval is not None and estimate.interval[0] <= truth <= estimate.interval[1]
 
 
 def pooled(found: Iterable[Coverage]) -> list[Coverage]:

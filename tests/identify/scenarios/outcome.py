@@ -246,7 +246,7 @@ class Outcome:
     findings: tuple[Finding, ...]
     sentences: tuple[str, ...]
     error: str
-    """The message of a refusal, or of a crash; empty without."""
+    """The message of a refusal or of a crash, or which intervals exclude their values; empty without."""
     seconds: float
     """The processor time of reading and identification."""
 
@@ -272,4 +272,6 @@ def outcome(scenario: Scenario, seed: int, folder: Path) -> Outcome:
         for name in scenario.coefficients
         if name in vehicle.rov.coefficients
     }
-    return Outcome(coefficients, vehicle.rov, found.findings, found.warnings, "", seconds)
+    wrong = [name for name, (low, high) in vehicle.intervals.items() if not low <= vehicle.rov[name] <= high]
+    excluded = f"intervals exclude their values: {', '.join(wrong)}" if wrong else ""
+    return Outcome(coefficients, vehicle.rov, found.findings, found.warnings, excluded, seconds)

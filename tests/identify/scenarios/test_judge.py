@@ -61,13 +61,11 @@ def test_one_wrong_coefficient_fails() -> None:
     assert line.startswith("b_d_w: 160 of 200")
 
 
-def test_a_missing_interval_is_no_coverage_except_in_vague_scenarios() -> None:
+def test_a_missing_interval_is_no_coverage() -> None:
     outcomes = [
         replace(o, coefficients={name: Estimate(TRUTH[name], None) for name in o.coefficients}) for o in seeds(20)
     ]
     assert "0 of 60 intervals cover" in problems(outcomes, SCENARIO)[0]
-    vague = replace(SCENARIO, vague=True)
-    assert all(coverage.covered == 20 for coverage in coverages(outcomes, vague))
 
 
 def test_exact_binomial_limits() -> None:

@@ -7,7 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.recordings import output_error
+from rov_fmu.identify.recordings.recordings_fit import estimate_of
 from rov_fmu.model.layout import HEAVE, YAW
+from rov_fmu.tank.tank_tests import load_tank_tests
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.identify.scenarios.catalogue import COMPLETE, DEPTH, HEADING, INCOMPLETE, SCENARIOS, Logs, Scenario, Sensor
 from tests.identify.scenarios.judge import problems
 from tests.identify.scenarios.outcome import flights, moved, outcome, true_values, write
@@ -171,3 +177,23 @@ def test_values_are_as_a_scenario_measures_them(tmp_path: Path) -> None:
     assert (heading - wrapped) / 360.0 == pytest.approx(np.round((heading - wrapped) / 360.0), abs=1e-6)
     assert np.isnan(late[1::2]).all()
     assert late[10::2] == pytest.approx(heading[:-10:2], abs=1e-4)
+
+
+def test_a_curve_that_recordings_change_does_not_keep_the_interval_of_its_forces(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The interval belongs to another value, so without one of the fit to everything there is none."""
+    monkeypatch.setattr(
+        output_error, "estimate_of", lambda analysis: replace(estimate_of(analysis), degrees_of_freedom=0.0)
+    )
+    write(SCENARIOS["load of 0.1 N in heave"], 0, tmp_path)
+    rov_file = tmp_path / "rov.toml"
+    lines = rov_file.read_text(encoding="utf-8").splitlines()
+    text = "\n".join(line for line in lines if not line.startswith(("a_t_top", "b_t_top")))
+    rov_file.write_text(text, encoding="utf-8")
+    rov = load_vehicle(SHIPPED["videoray"]).rov
+    forces = "".join(f"{c},{rov.force(HEAVE, 0.01 * c) + 0.02 * (c % 3)}\n" for c in range(20, 101, 10))
+    (tmp_path / "thrust_top.csv").write_text(f"command [%],force [N]\n{forces}", encoding="utf-8")
+    found = identify(load_tank_tests(tmp_path))
+    assert found.thrust["top"].estimate.intervals.keys() >= {"a_t_top", "b_t_top"}
+    assert not {"a_t_top", "b_t_top", "a_d_w"} & {*found.vehicle.intervals}

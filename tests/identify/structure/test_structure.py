@@ -140,6 +140,8 @@ def test_the_sentence_names_recordings_time_and_remedy() -> None:
         Finding("unexplained", "heave", file=file, names={"cause": "voltage"}, numbers={"start": start})
         for file, start in zip(FILES, (3.2, 41.0), strict=True)
     ]
+    (at_once,) = sentences([replace(found[0], numbers={"start": 0.2})])
+    assert at_once.startswith("heave: the model does not explain log_1.csv from the start on: ")
     (sentence,) = sentences(found)
     when = "after the first 3 ... 41 s"
     assert sentence.startswith(f"heave: the model does not explain log_1.csv and log_2.csv {when}: ")
