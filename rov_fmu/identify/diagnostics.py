@@ -1,6 +1,6 @@
 """Find what is not identifiable from the data, and what contradicts the model."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -31,6 +31,8 @@ _CHANCE = 0.003
 """The probability that forces and recordings of the same thrust seem to differ, although they do not."""
 _SOME_OUTLIERS, _MANY_OUTLIERS = 0.03, 0.15
 """The shares of outliers above which they are reported, and above which a recording is doubtful."""
+_TURNS = 0.05
+"""A rate of turn, rad/s, that changes a test of surge or sway."""
 _SIGNIFICANT = 4.0
 """A difference between directions of so many standard errors is no chance, at any of some ten commands."""
 
@@ -51,6 +53,20 @@ def on_thrust(curve: str, fit: ThrustFit, rov: Rov) -> Iterator[Finding]:
     asymmetry = _asymmetry(x[clear], y[clear], fit.value(x[clear]), noise)
     if asymmetry:
         yield finding("asymmetry", names={"quantity": "force", "window": f"thrust_{curve}"}, numbers=asymmetry)
+
+
+def on_turning(results: Iterable[AxisResult], rov: Rov) -> Iterator[Finding]:
+    """Yield a finding for each axis with tables whose thrusters would also turn the vehicle; `rov` is the result."""
+    yaw = [*rov.layout.kinds].index(YAW.name) if YAW.name in rov.layout.kinds else None
+    for result in results:
+        commands = {p.command for p in result.points if p.weight > 0.0}
+        if yaw is None or result.axis not in (SURGE, SWAY) or result.chosen != "points" or not commands:
+            continue
+        turning = {c: rov.axes(rov.held_inputs(result.axis, c))[yaw].steady_velocity() for c in commands}
+        command, rate = max(turning.items(), key=lambda turn: abs(turn[1]))
+        if abs(rate) > _TURNS:
+            numbers = {"command": command, "rate": abs(float(np.degrees(rate)))}
+            yield Finding("tests turn", result.axis.name, numbers=numbers)
 
 
 def on_axis(result: AxisResult, base: Rov, thrust: Mapping[str, ThrustFit]) -> Iterator[Finding]:

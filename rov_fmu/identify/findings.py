@@ -188,6 +188,11 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{axes}: what moves at {commands} is left out: the thrust curve gives no push there (its dead band, or a slip "
         "in one of the tables)"
     ),
+    "tests turn": (
+        "{axes}: at a command of {command:.0%} its thrusters also turn the vehicle, at up to {rate:.0f} deg/s. The "
+        "tables are taken as those of a vehicle that keeps its heading. If yours turned, record a log of commands, "
+        "velocities and heading instead"
+    ),
     "untested thrust": (
         "{axes}: commands of {low:.0%} to {high:.0%} are used, but {curve} thrust was tested from {tested_low:.0%} to "
         "{tested_high:.0%} only"
