@@ -1,7 +1,7 @@
-"""Fits of drag and β to points: the choice of the form, different vehicles, drag by direction."""
+"""Fits of drag and β to points: the choice of the form, different vehicles, drag by direction, a constant load."""
 
 from dataclasses import replace
-from math import atanh, exp, inf, sqrt
+from math import atanh, copysign, exp, inf, sqrt
 
 import numpy as np
 import pytest
@@ -27,11 +27,12 @@ def points_of(
     commands: tuple[float, ...] = BOTH_WAYS,
     mass: float = 10.0,
     beta: float = 0.8,
+    load: float = 0.0,
 ) -> list[Point]:
-    """Return V_ss and Tau of 10 kg under a thrust of 20 c^2 + 5 c N, with relative errors."""
+    """Return V_ss and Tau of 10 kg under a thrust of 20 c^2 + 5 c N and a load, with relative errors."""
     random, found = np.random.default_rng(seed), []
     for c in commands:
-        (a, b), F = drag if c > 0.0 else reverse, 20.0 * c * c + 5.0 * abs(c)
+        (a, b), F = drag if c > 0.0 else reverse, 20.0 * c * c + 5.0 * abs(c) + copysign(load, c * load)
         V = (sqrt(b * b + 4.0 * a * F) - b) / (2.0 * a) if a else F / b
         # From rest v = F tanh(w t)/(root + b/2 tanh(w t)), w = beta/m root.
         root = sqrt(a * F + b * b / 4.0)
@@ -47,6 +48,13 @@ def sway() -> Rov:
     layout = Layout((VehicleAxis(SWAY),), (Curve("t"),), (Thruster("s", "t", (0.0, 1.0, 0.0)),))
     numbers = dict.fromkeys(layout.coefficients, 1.0) | {"m_rov": 10.0, "a_t_t": 20.0, "b_t_t": 5.0}
     return Rov(layout, numbers)
+
+
+@pytest.fixture
+def heave() -> Rov:
+    """Return a vehicle of heave alone."""
+    layout = Layout((VehicleAxis(HEAVE),), (Curve("t"),), (Thruster("v", "t", (0.0, 0.0, 1.0)),))
+    return Rov(layout, dict.fromkeys(layout.coefficients, 1.0) | {"m_rov": 10.0, "a_t_t": 20.0, "b_t_t": 5.0})
 
 
 def kept(fit: ResponseFit) -> list[str]:
@@ -81,6 +89,43 @@ def test_drag_alike_both_ways_stays_so(seeds: int, sway: Rov) -> None:
     """With 3 % scatter, at most one of ten fits has drag by direction."""
     fits = [fit_response(SWAY, points_of((15.0, 4.0), (15.0, 4.0), 0.03, seed), sway) for seed in range(seeds)]
     assert sum("a_d_v_reverse" in fit.estimate.names for fit in fits) <= 0.1 * seeds
+
+
+@pytest.mark.parametrize("load", [0.8, -0.8])
+def test_a_net_weight_is_found_from_points_in_both_directions(load: float, heave: Rov) -> None:
+    fit = fit_response(HEAVE, points_of((15.0, 4.0), (15.0, 4.0), load=load), heave)
+    assert kept(fit) == ["a constant load (net weight)"]
+    assert fit.rov["F_0_w"] == pytest.approx(load, rel=1e-6)
+    assert fit.rov["a_d_w"] == pytest.approx(15.0, rel=1e-6)
+
+
+def test_drag_by_direction_is_not_taken_for_a_net_weight(heave: Rov) -> None:
+    fit = fit_response(HEAVE, points_of((15.0, 4.0), (30.0, 6.0)), heave)
+    assert kept(fit) == ["drag by direction"]
+
+
+def test_a_known_net_weight_is_not_fitted(heave: Rov) -> None:
+    fit = fit_response(HEAVE, points_of((15.0, 4.0), (15.0, 4.0), load=0.8), heave.extended({"F_0_w": 0.5}))
+    assert fit.rov["F_0_w"] == 0.5
+    assert "F_0_w" not in fit.estimate.names
+
+
+@pytest.mark.parametrize(
+    "seeds", [pytest.param(30, marks=pytest.mark.long), pytest.param(100, marks=pytest.mark.weekly)]
+)
+def test_intervals_of_a_net_weight_cover_and_none_is_invented(seeds: int, heave: Rov) -> None:
+    """With 3 % scatter, at most one of ten fits invents a load, and few intervals miss that of 0.8 N."""
+    invented = covered = 0
+    for seed in range(seeds):
+        without, with_load = (
+            fit_response(HEAVE, points_of((15.0, 4.0), (15.0, 4.0), 0.03, seed, load=load), heave)
+            for load in (0.0, 0.8)
+        )
+        invented += "F_0_w" in without.estimate.names
+        low, high = with_load.estimate.intervals["F_0_w"]
+        covered += low <= 0.8 <= high
+    assert invented <= 0.1 * seeds
+    assert covered >= 0.85 * seeds
 
 
 def test_one_command_in_reverse_tells_no_direction(sway: Rov) -> None:

@@ -1,10 +1,10 @@
-"""The possible forms of drag: linear, quadratic or both, with or without a dependence on the direction."""
+"""The possible forms of drag: linear, quadratic or both; the same in both directions, or not, or with a net weight."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from rov_fmu.identify.points.forms import widened
-from rov_fmu.model.layout import REVERSE, Axis
+from rov_fmu.model.layout import HEAVE, REVERSE, Axis
 from rov_fmu.model.rov import Rov
 
 LEFT_OUT = "Left at 0: neither the information criterion (AICc) nor leave-one-thrust-out misses it"
@@ -58,9 +58,10 @@ class DragForm:
         beta = self.axis.coefficient("beta")
         if beta in self.names and not any(p.quantity == "Tau" for p in points):
             return False
-        directions = (1.0, -1.0) if self.axis.coefficient("a_d" + REVERSE) in self.names else (0.0,)
-        drag = [name for name in self.names if name != beta]
-        least = min(len(drag) // len(directions), 2)
+        load = self.axis.coefficient("F_0")
+        directions = (1.0, -1.0) if {self.axis.coefficient("a_d" + REVERSE), load} & {*self.names} else (0.0,)
+        drag = [name for name in self.names if name not in (beta, load)]
+        least = min(max(len(drag) // len(directions), 1), 2)
         return all(len(levels(points, direction)) >= least for direction in directions)
 
 
@@ -104,11 +105,20 @@ def candidate_forms(axis: Axis, points: Sequence[Point], base: Rov, known: Colle
         yield from (_alone(plain, key, "") for key in ("a_d", "b_d"))
         steady = [p for p in used if p.quantity == "V_ss"]
         reverse = tuple(axis.coefficient(key + REVERSE) for key in ("a_d", "b_d"))
-        if not set(reverse) & set(known) and all(len(levels(steady, side)) >= 2 for side in (1.0, -1.0)):
-            base = _having(base, axis, known, by_direction=True)
-            both = DragForm(axis, base, (*names, *reverse), (), assumed, "drag by direction")
+        if not all(len(levels(steady, side)) >= 2 for side in (1.0, -1.0)):
+            return
+        if not set(reverse) & set(known):
+            by_direction = _having(base, axis, known, by_direction=True)
+            both = DragForm(axis, by_direction, (*names, *reverse), (), assumed, "drag by direction")
             yield both
             yield from (_alone(both, key, ", by direction") for key in ("a_d", "b_d"))
+        load = axis.coefficient("F_0")
+        if axis is HEAVE and load not in base.coefficients:
+            heavy = DragForm(
+                axis, base.extended({load: 0.0}), (*names, load), (), assumed, "a constant load (net weight)"
+            )
+            yield heavy
+            yield from (_alone(heavy, key, " with a constant load") for key in ("a_d", "b_d"))
 
 
 def _alone(form: DragForm, kind: str, suffix: str) -> DragForm:

@@ -240,7 +240,7 @@ def _start(axis: Axis, used: Sequence[Point], base: Rov, names: tuple[str, ...])
     drag = [d for p in steady if (d := alpha * base.force(axis, p.command) / p.value) > 0.0]
     speed = float(np.mean([abs(p.value) for p in steady])) if steady else 1.0
     mean = float(np.mean(drag)) if drag else 1.0
-    share = {"a_d": 0.5 * mean / speed, "b_d": 0.5 * mean, "beta": 1.0}
+    share = {"a_d": 0.5 * mean / speed, "b_d": 0.5 * mean, "beta": 1.0, "F_0": 0.0}
     start = {name: share[next(key for key in share if name.startswith(key))] for name in names}
     rov = base.replaced(start)
     ratios = [rov.response(axis, p.command)[1] / p.value for p in used if p.quantity == "Tau"]
