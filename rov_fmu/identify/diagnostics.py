@@ -17,9 +17,10 @@ from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsF
 from rov_fmu.identify.structure import on_structure
 from rov_fmu.identify.usable import is_pushed
 from rov_fmu.io.toml_file import join_names
-from rov_fmu.model.layout import COUPLED_AXES, REVERSE, SURGE, SWAY, YAW, Layout
+from rov_fmu.model.layout import COUPLED_AXES, REVERSE, SURGE, SWAY, YAW, Layout, coefficient_name
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.description import Requests
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
 
@@ -67,6 +68,15 @@ def on_turning(results: Iterable[AxisResult], rov: Rov) -> Iterator[Finding]:
         if abs(rate) > _TURNS:
             numbers = {"command": command, "rate": abs(float(np.degrees(rate)))}
             yield Finding("tests turn", result.axis.name, numbers=numbers)
+
+
+def on_voltage(rov: Rov, requests: Requests) -> Iterator[Finding]:
+    """Yield a finding if the voltage was fitted, and nobody said at which voltage the thrust was measured."""
+    fitted = [curve.name for curve in rov.layout.curves if "V_0" in curve.keys]
+    if requests.voltage and (unsaid := [name for name in fitted if name not in requests.measured_at]):
+        key = coefficient_name("V_0", unsaid[0])
+        names = {"curves": join_names(unsaid), "key": key}
+        yield Finding("unknown voltage", names=names, numbers={"voltage": rov[key]})
 
 
 def on_axis(result: AxisResult, base: Rov, thrust: Mapping[str, ThrustFit]) -> Iterator[Finding]:

@@ -188,6 +188,11 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "{axes}: what moves at {commands} is left out: the thrust curve gives no push there (its dead band, or a slip "
         "in one of the tables)"
     ),
+    "unknown voltage": (
+        "{curves} thrust is taken as measured at {voltage:.1f} V, the mean voltage of the logs. If it was measured at "
+        "another voltage, thrust, drag and β are wrong by a common factor: write the voltage into [known], such as "
+        '{key} = {{ value = 16.0, unit = "V", source = "Multimeter" }}'
+    ),
     "tests turn": (
         "{axes}: at a command of {command:.0%} its thrusters also turn the vehicle, at up to {rate:.0f} deg/s. The "
         "tables are taken as those of a vehicle that keeps its heading. If yours turned, record a log of commands, "

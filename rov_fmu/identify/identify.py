@@ -111,6 +111,7 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
     for result in results:
         findings += result.findings
     findings += diagnostics.on_turning(results, found.rov)
+    findings += diagnostics.on_voltage(found.rov, given.requests)
     unexplained = [axis for axis in fitted if axis.name not in explained]
     findings += filter(None, (beta_out_of_range(found.rov, axis, found.intervals) for axis in unexplained))
     drifting = {finding.axis for finding in findings if finding.names.get("cause") == "drift"}

@@ -6,11 +6,14 @@ from math import atanh, copysign, exp, inf, sqrt
 import numpy as np
 import pytest
 
+from rov_fmu.identify.diagnostics import on_turning
+from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.choice import MARGIN
 from rov_fmu.identify.points.drag_forms import LEFT_OUT, Point
 from rov_fmu.identify.points.response_fit import ResponseFit, fit_response, response_band
-from rov_fmu.model.layout import HEAVE, SWAY, Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.model.layout import HEAVE, SWAY, YAW, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -241,3 +244,19 @@ def test_the_band_of_drag_at_its_bound(sway: Rov) -> None:
     low, high, *_ = response_band(SWAY, rov, found, np.array([0.5]))
     F = 20.0 * 0.5**2 + 5.0 * 0.5
     assert high - low == pytest.approx([2.0 * 1.96 * F**2 / 20.0**3], rel=1e-3)
+
+
+@pytest.mark.parametrize(("forward", "turns"), [(0.0, False), (0.12, True)])
+def test_tables_of_thrusters_that_also_turn_the_vehicle_are_told(forward: float, turns: bool) -> None:
+    """A thruster at the centre of mass pushes aside only, and one in front of it turns the bow too."""
+    thruster = Thruster("s", "t", (0.0, 1.0, 0.0), position=(forward, 0.0, 0.0))
+    layout = Layout((VehicleAxis(SWAY), VehicleAxis(YAW)), (Curve("t"),), (thruster,))
+    numbers = dict.fromkeys(layout.coefficients, 1.0) | {"m_rov": 10.0, "a_t_t": 20.0, "b_t_t": 5.0}
+    rov = Rov(layout, numbers)
+    points = tuple(points_of((15.0, 4.0), (15.0, 4.0)))
+    fit = fit_response(SWAY, points, rov)
+    result = AxisResult(SWAY, points, (), None, fit, None, {}, ())
+    (line,) = sentences(on_turning([result], fit.rov)) or ("",)
+    # At 70 %, 13.3 N turn the vehicle by 1.6 N.m against a drag of r^2 + r: 0.86 rad/s.
+    assert line.startswith("sway: at a command of 70% its thrusters also turn the vehicle, at up to 49 deg/s.") is turns
+    assert bool(line) is turns

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from rov_fmu.engine.simulation import simulate
+from rov_fmu.identify.diagnostics import on_voltage
 from rov_fmu.identify.effects.advance import Advance
 from rov_fmu.identify.effects.attitude import Attitude
 from rov_fmu.identify.effects.effect import Setting, with_effects
 from rov_fmu.identify.effects.voltage import Voltage, voltage_at
+from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.model.layout import HEAVE, SURGE
@@ -52,7 +54,9 @@ def test_the_loss_by_advance_is_fitted_where_there_is_one(loss: float) -> None:
 
 def test_a_vehicle_of_logs_with_voltage_has_the_battery_and_the_exponent(tmp_path: Path) -> None:
     scenario = SCENARIOS["sag with voltage"]
-    vehicle = identify(load_tank_tests(write(scenario, 0, tmp_path / "tests"))).vehicle
+    found = identify(load_tank_tests(write(scenario, 0, tmp_path / "tests")))
+    vehicle = found.vehicle
+    assert not [finding for finding in found.findings if finding.kind == "unknown voltage"], "rov.toml says it"
     path = tmp_path / "rov.toml"
     path.write_text(vehicle_text(vehicle, tmp_path), encoding="utf-8")
     again = load_vehicle(path)
@@ -60,6 +64,16 @@ def test_a_vehicle_of_logs_with_voltage_has_the_battery_and_the_exponent(tmp_pat
     assert again.rov["V_0_top"] == 16.0
     low, high = again.intervals["n_V_rear"]
     assert low < 1.5 < high < low + 0.05
+
+
+def test_thrust_of_an_unknown_voltage_is_told() -> None:
+    rov = VIDEORAY.extended({"V_0_rear": 15.2, "n_V_rear": 1.8, "V_0_top": 15.2, "n_V_top": 1.8})
+    said = Requests(voltage=True, measured_at={"rear": 16.4})
+    (line,) = sentences(on_voltage(rov, said))
+    assert line.startswith("top thrust is taken as measured at 15.2 V, the mean voltage of the logs. ")
+    assert 'V_0_top = { value = 16.0, unit = "V"' in line
+    assert [*on_voltage(rov, replace(said, measured_at={"rear": 16.4, "top": 16.4}))] == []
+    assert [*on_voltage(rov, Requests())] == [], "the vehicle file has them"
 
 
 def test_a_log_without_the_column_is_refused_with_one_line(tmp_path: Path) -> None:
