@@ -168,11 +168,11 @@ def _of_recordings(found: Sequence[Unseen]) -> Table:
 
 def _of_points(comparisons: Iterable[Comparison], other: Sequence[str]) -> Table:
     """Return the table of the RMS errors of points, by each model."""
-    found = table("Prediction of points, RMS of the relative errors", "", ("model", "leave-one-out", *other))
+    found = table("Relative errors of the points, RMS", "", ("model", "leave-one-out", *other))
     found.box, found.padding = None, _GAP
     found.caption = "leave-one-out: by a fit without the points of the same thrust."
     for c in comparisons:
-        found.add_row(f"{c.result.axis.name} {c.quantity}", *(text(c.rms(column), ".4f") for column in c.columns))
+        found.add_row(f"{c.result.axis.name} {c.quantity}", *(text(c.rms(column), ".1%") for column in c.columns))
     return found
 
 
