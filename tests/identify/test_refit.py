@@ -65,7 +65,7 @@ def test_shipped_file_is_what_the_command_writes(
     assert without_progress(err) == ""
     assert "VideoRay Pro 4" in out
     for (axis, quantity), numbers in RMS.items():
-        assert re.search(rf"^{axis} {quantity} +" + " +".join(f"{n:.4f}" for n in numbers), out, re.M)
+        assert re.search(rf"^{axis} {quantity} +" + " +".join(f"{n:.1%}" for n in numbers), out, re.M)
     (warning,) = by_heading(refit.findings)["Warnings"]
     assert f"Warnings (6 doubts more are in the report):\n- {warning}\n" in out
 
