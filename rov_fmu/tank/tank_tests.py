@@ -20,11 +20,12 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rov_fmu.io.csv_table import DataFileError, read_header
+from rov_fmu.io.csv_table import DataFileError, find_column, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import AXES, Axis, Layout
+from rov_fmu.tank.columns import TIME
 from rov_fmu.tank.description import ROV_FILE, Description, Dive, Requests, read_description
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.csv_columns import Names, names_of
@@ -275,8 +276,13 @@ class _Reader:
 
     def _has_times(self, path: Path) -> bool:
         """Return True if the header of a CSV file has the column of times that a log has."""
-        titles = (self.names.columns.get(title, title) for title in read_header(path))
-        return any(title.partition("[")[0].strip().casefold() == "time" for title in titles)
+        for title in read_header(path):
+            try:
+                if find_column(self.names.columns.get(title, title), {"time": TIME}, others=True):
+                    return True
+            except ValueError:  # times without a known unit
+                return True
+        return False
 
     def tested(self, description: Description | None) -> Tested:
         """Return what the files test."""

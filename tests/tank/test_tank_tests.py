@@ -182,6 +182,8 @@ BAD: list[tuple[str, str, str]] = [
     ("log_heave.csv", "time [s],command [%]\n0,0\n", "line 1 | 'depth [m]' or 'velocity [m/s]'"),
     ("log_heave.csv", "time [s],command [%],heading [deg]\n0,0,0\n", "line 1 | 'depth [m]' or"),
     ("stedy_surge.csv", STEADY, "neither a log, which has a column 'time [s]' | steady_"),
+    ("notes.csv", "day,weather\n1,rain\n", "neither a log, which has a column 'time [s]' | thrust_<curve>"),
+    ("dive.csv", "time,u_l [%],depth [m]\n0,0,0\n", "line 1 | 'time': must be 'time [s]' or 'time [ms]'"),
     ("steady_sway.csv", STEADY, "no thruster of the vehicle drives sway"),
     ("steady_roll.csv", STEADY, "no thruster of the vehicle drives roll"),
     ("steady_twist.csv", STEADY, "twist is not an axis | surge, heave and yaw"),
