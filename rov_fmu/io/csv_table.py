@@ -245,7 +245,7 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
     if _is_blank(text) and (loose or (column.blanks and (exists or column.optional))):
         return nan
     if not text:
-        raise ValueError("this cell is missing; leave out the row if there is none")
+        raise ValueError("this cell is missing; leave out the row if nothing was measured")
     if (number := _number(text)) is None:
         if loose:
             return nan
@@ -255,7 +255,7 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
         elif ";" in text or "\t" in text:
             hint = "; what separates the cells must be the same as in the header"
         elif not any(map(str.isdigit, text)):
-            hint = "; leave out the row if there is none"
+            hint = "; leave out the row if nothing was measured"
         raise ValueError(f"must be a number{hint}")
     value = file_column.convert(number)
     if file_column.unit in column.conversions:

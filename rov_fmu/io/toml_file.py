@@ -108,7 +108,7 @@ _PYDANTIC_START = re.compile("^(Input|String|List|Tuple|Dictionary) should ")
 _LISTED = 10
 """The number of names that a line lists."""
 _COMPARED = 100
-"""The number of unknown keys of a table that are compared with a missing key."""
+"""The number of unknown keys of a table that are compared with a missing key, and of entries with the same mistake."""
 
 
 def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Strict]) -> Iterator[str]:
@@ -124,18 +124,20 @@ def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Stri
     for problem in problems:
         if problem["type"] == "extra_forbidden":
             unknown.setdefault(problem["loc"][:-1], []).append(problem["loc"])
-    real = [
-        problem
-        for problem in problems
-        if problem["type"] != "missing"
-        or not _is_misspelt(problem["loc"], unknown.get(problem["loc"][:-1], ()), schema)
-    ]
-    entries: dict[tuple[object, ...], list[ErrorDetails]] = {}  # the problems of each mistake
-    for problem in real:
-        entries.setdefault(_mistake(problem), []).append(problem)
-    for number, (first, *others) in enumerate(entries.values()):
-        more = f" (and in {len(others)} more {'entry' if len(others) == 1 else 'entries'})" if others else ""
-        yield _problem_line(first, data, schema, model.hint) + more if number < MOST else ""
+    repeated: dict[tuple[object, ...], list[ErrorDetails]] = {}
+    for problem in problems:
+        repeated.setdefault(_mistake(problem), []).append(problem)
+    number = 0
+    for some in repeated.values():
+        if number == MOST:
+            yield ""
+            continue
+        real = [p for p in some[:_COMPARED] if not _is_misspelt(p, unknown.get(p["loc"][:-1], ()), schema)]
+        if real:
+            number += 1
+            others = len(real) - 1 + len(some[_COMPARED:])
+            more = f" (and in {others} more {'entry' if others == 1 else 'entries'})" if others else ""
+            yield _problem_line(real[0], data, schema, model.hint) + more
 
 
 def join_names(names: Iterable[str]) -> str:
@@ -216,9 +218,10 @@ def _mistake(problem: ErrorDetails) -> tuple[object, ...]:
     return problem["type"], key, *last, problem["msg"], value
 
 
-def _is_misspelt(place: _Place, unknown: Sequence[_Place], schema: _Schema) -> bool:
-    """Return True when one of the unknown keys of a table is probably the missing key, misspelt."""
-    return any(schema.nearest(other) == place[-1] for other in unknown[:_COMPARED])
+def _is_misspelt(problem: ErrorDetails, unknown: Sequence[_Place], schema: _Schema) -> bool:
+    """Return True when a key is missing, and one of the unknown keys of its table is probably this key, misspelt."""
+    key = problem["loc"][-1]
+    return problem["type"] == "missing" and any(schema.nearest(other) == key for other in unknown[:_COMPARED])
 
 
 def _problem_line(problem: ErrorDetails, data: Toml, schema: _Schema, hint_of: Callable[[str], str]) -> str:

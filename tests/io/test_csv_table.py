@@ -94,7 +94,9 @@ def test_a_text_that_is_not_a_number(cell: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("cell", ["-", "nan", "inf", "none", ""])
 def test_a_cell_without_a_number_says_what_to_do_where_a_number_is_needed(cell: str, tmp_path: Path) -> None:
-    with pytest.raises(DataFileError, match=r"line 2, column 'length \[m\]'.*; leave out the row if there is none$"):
+    with pytest.raises(
+        DataFileError, match=r"line 2, column 'length \[m\]'.*; leave out the row if nothing was measured$"
+    ):
         _table(tmp_path, f"length [m];time [s]\n{cell};1\n", time=MAYBE)
 
 

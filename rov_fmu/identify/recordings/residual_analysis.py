@@ -15,7 +15,7 @@ from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.smoothing import robust_deviation
 
 _LEAST_FREEDOM = 8.0
-"""The least number of degrees of freedom of many samples, for the spectrum of their noise is estimated from more."""
+"""The least number of degrees of freedom, unless the samples are fewer: the spectrum of slow noise has more."""
 _COLOURED = 2.0
 """The correlation time in samples from which a fit absorbs a relevant part of the noise."""
 
