@@ -6,7 +6,7 @@ from functools import partial
 
 from rov_fmu.io.csv_table import Column, Conversion, find_column
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import HEAVE, PITCH, ROLL, YAW, Axis, Layout
+from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, YAW, Axis, Layout
 from rov_fmu.tank.columns import LOGGED_COMMAND, TIME, VOLTAGE, position_column, velocity_column
 from rov_fmu.tank.formats.content import Entry
 
@@ -73,8 +73,11 @@ def thrusters_of(layout: Layout) -> dict[str, Column]:
 
 
 def names_of(layout: Layout, columns: Mapping[str, str], topics: Mapping[str, str]) -> tuple[Names, list[str]]:
-    """Return the names of rov.toml, and a line for every value that is no column of a log."""
-    sensors = sensors_of((form.axis for form in layout.axes), of_one=False) | CONDITIONS
+    """Return the names of rov.toml, and a line for every value that is no column of a log.
+
+    A log may also measure the motion along axes that the vehicle does not have.
+    """
+    sensors = sensors_of(AXES.values(), of_one=False) | CONDITIONS
     commands = inputs_of(layout) | thrusters_of(layout)
     known = commands | {name: sensor.column for name, sensor in sensors.items()}
     of_csv = {"time": TIME, COMMAND: LOGGED, **known}
