@@ -150,7 +150,7 @@ class _Case:
         The unknown times of switches add to the noise of the sensor.
         """
         assert self.spectrum is not None
-        S = cosines(self.response.by_switches)[:_COEFFICIENTS]
+        S = cosines(self.response.by_switches())[:_COEFFICIENTS]
         return np.asarray(np.linalg.cholesky(S @ S.T + np.diag(self.spectrum[:_COEFFICIENTS])))
 
     def white(self, values: Array) -> Array:

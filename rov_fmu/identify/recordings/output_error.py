@@ -49,6 +49,8 @@ _BEYOND_DOUBT = 100.0
 """The value of Wald's statistic from which no held-out prediction is needed."""
 _STEPS = 30
 """The number of steps of a search after which half of the work seems to be done."""
+_ITERATIONS = 6
+"""The number of iterations of the noise of recordings with uncertain times of switches."""
 _PIECE = 5.0
 """The length of a piece of a recording, s, where the axes act on each other. The coupling makes a vehicle that moves
 ahead unstable in yaw, so small errors grow quickly, and the simulation of a long piece tells little."""
@@ -246,15 +248,18 @@ class _Fit:
         return with_secants(ResidualAnalysis(model, solution, robust=self.loss == "huber"))
 
     def noise(self, extras: tuple[Effect, ...], x: Array) -> Array:
-        """Return the robust standard deviation of each recording's residuals."""
-        plain = replace(self, data=tuple(replace(d, shifts=None) for d in self.data)).model(
-            extras, np.ones(len(self.data))
-        )
-        residuals = plain.residuals(x)
-        found = np.empty(len(self.data))
-        for pieces in plain.recordings:
-            parts = [_without_shifts(residuals[plain.rows[n]], self.data[n]) for n in pieces]
-            found[pieces] = _at_least(robust_deviation(np.concatenate(parts)), self.data[pieces[0]])
+        """Return the robust standard deviation of each recording's noise, by the residuals at x.
+
+        Where times of switches are uncertain, the residuals depend on the noise that is sought, so it is iterated.
+        """
+        found = np.array([_at_least(white_noise(d.values), d) for d in self.data])
+        uncertain = any(d.shifts is not None for d in self.data)
+        for _ in range(_ITERATIONS if uncertain else 1):
+            model = self.model(extras, found)
+            residuals = model.residuals(x)
+            for pieces in model.recordings:
+                white = np.concatenate([residuals[model.rows[n]] for n in pieces])
+                found[pieces] = _at_least(found[pieces[0]] * robust_deviation(white), self.data[pieces[0]])
         return found
 
     def _result(
@@ -283,7 +288,7 @@ class _Fit:
             tuple(of_axis.values()),
             lambda: held_out()[axis.name],
             points=sum(len(each.points) for each in self.points if each.axis is axis),
-            between_rows=any(d.shifts is not None for d in self.data if d.axis is axis),
+            between_rows=any(d.between_rows for d in self.data if d.axis is axis),
         )
 
 
@@ -305,13 +310,6 @@ def _key(name: str) -> str:
 
 def _at_least(noise: float, data: PreparedRecording) -> float:
     return max(noise, 1e-6 * float(np.ptp(data.values)), 1e-12)
-
-
-def _without_shifts(residuals: Array, data: PreparedRecording) -> Array:
-    """Return residuals without what uncertain times of switches may explain."""
-    if data.shifts is None:
-        return residuals
-    return np.asarray(residuals - data.shifts @ np.linalg.lstsq(data.shifts, residuals, rcond=None)[0])
 
 
 def _cost(model: Simulator, x: Array) -> float:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import nnls
 
 from rov_fmu.identify.effects.effect import Effect
 from rov_fmu.identify.least_squares import Solution, covariance
@@ -43,6 +44,19 @@ class Simulation:
         return self.measured - self.modelled
 
 
+def _variances(residuals: Array, rates: Array) -> Array:
+    """Return the variances of n residuals, for values that change at some rates.
+
+    Errors of the time stamps are errors of the values in proportion to their rates of change, so the variance is
+    a + b rate², with a and b >= 0 by least squares.
+    """
+    squares = residuals * residuals
+    regressors = np.column_stack([np.ones(len(rates)), rates * rates])
+    scale = np.maximum(regressors.max(axis=0), 1e-300)
+    found, _ = nnls(regressors / scale, squares)
+    return np.asarray(regressors / scale @ found)
+
+
 class ResidualAnalysis:
     """The analysis of the residuals of a fit to recordings."""
 
@@ -72,7 +86,7 @@ class ResidualAnalysis:
             )
             variance = excess * float(np.mean(psi[rows] ** 2))
             correlation = correlation_time(psi[rows])
-            part, weights = J[rows], np.full(len(time), correlation * variance)
+            part, weights = J[rows], correlation * excess * _variances(psi[rows], np.gradient(modelled, time))
             if correlation > _COLOURED:
                 spectrum = noise_spectrum(psi[rows], part * inside[rows, None])
                 if spectrum is not None:

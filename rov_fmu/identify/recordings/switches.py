@@ -1,14 +1,14 @@
-"""Decide whether the commands of logs switch between rows, and allow for the unknown times of the switches.
+"""Decide how exactly a log knows the times of its commands, and allow for the uncertain times of the switches.
 
 A log shows a new command in the first row after it, so the command changed at any time since the row before: on average
 in the middle, with a standard deviation of the time between the rows divided by √12. Where a test program wrote the
-log itself, the command changes at the row. The residuals tell which it is.
+log itself, the command changes at the row, or near it if the time stamps have errors. The residuals tell which it is.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from rov_fmu.identify.effects.effect import delay_of
 from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
@@ -22,45 +22,62 @@ _TESTED = 60
 """The number of switches of a recording that the test uses, strongest first."""
 _COEFFICIENTS = 256
 """The number of coefficients of the cosine transform that the test uses."""
+_SHARES = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 1.0])
+"""The scatter of the switches, relative to that of switches between rows. The last one stands for such switches."""
+_LARGEST = 5.0
+"""The largest loss of log-likelihood of one piece, so that a few pieces with another misfit do not decide."""
 
 
 def allow_for_switches(model: Simulator, x: Array) -> tuple[PreparedRecording, ...]:
-    """Return the recordings, with switches at unknown times between rows if this explains the residuals better.
+    """Return the recordings, with switches at uncertain times if this explains the residuals better.
 
     `x` has the parameters of a fit without this allowance. Raises MotionError.
     """
     rov, extras, J = model.rov(x), model.extra_values(x), model.jacobian(x)
-    gain, shifts = 0.0, []
+    gains, responses = [], []
     for d, output, rows in zip(model.data, model.run(x), model.rows, strict=True):
-        delay = d.delay + delay_of(extras, d.recording)
-        S = LinearResponse(rov, d.recording, d.time, output.velocity, delay).by_switches
-        gain += _gain(without_spikes(d.values - output.values), S[:, :_TESTED], J[rows])
-        shifts.append(S)
-    if gain <= 0.0:
+        response = LinearResponse(rov, d.recording, d.time, output.velocity, d.delay + delay_of(extras, d.recording))
+        responses.append(response)
+        gains.append(_gains(without_spikes(d.values - output.values), response.by_switches(), J[rows]))
+    share = _share(gains)
+    if share == 0.0:
         return model.data
-    return tuple(
-        replace(d, switches=_middle(d, model), shifts=S if S.shape[1] else None)
-        for d, S in zip(model.data, shifts, strict=True)
-    )
+    allow = _between_rows if share == _SHARES[-1] else _near_rows
+    return tuple(allow(d, response, share) for d, response in zip(model.data, responses, strict=True))
 
 
-def _gain(residuals: Array, S: Array, jacobian: Array) -> float:
-    """Return how much larger the logarithm of the likelihood is with unknown times of the switches."""
-    if not S.shape[1]:
-        return 0.0
-    spectrum = noise_spectrum(residuals, np.hstack([S, jacobian]))
+def _share(gains: Sequence[Array]) -> float:
+    """Return the most likely scatter of the switches, by the gains of all pieces."""
+    losses = [np.minimum(each.max() - each, _LARGEST) for each in gains]
+    return float(_SHARES[np.argmin(np.sum(losses, axis=0))])
+
+
+def _near_rows(data: PreparedRecording, response: LinearResponse, share: float) -> PreparedRecording:
+    """Return a recording whose switches scatter about the rows."""
+    S = share * response.by_switches()
+    return replace(data, shifts=S if S.shape[1] else None)
+
+
+def _between_rows(data: PreparedRecording, response: LinearResponse, share: float) -> PreparedRecording:
+    """Return a recording whose switches lie midway between rows, but the first at its row."""
+    time = data.recording.time
+    switched = switched_rows(data.recording.reaching(response.rov.layout))
+    early = 0.5 * np.minimum(time[switched] - time[np.maximum(switched - 1, 0)], LONGEST)
+    middles = time[switched] - early
+    if len(switched) < 2:
+        return replace(data, switches=middles, between_rows=True)
+    S = share * response.by_switches(middles[1:] + early[1:].mean())  # the delay was fitted to switches at rows
+    return replace(data, switches=middles, shifts=S if S.shape[1] else None, between_rows=True)
+
+
+def _gains(residuals: Array, S: Array, jacobian: Array) -> Array:
+    """Return how much larger the logarithm of the likelihood is with a scatter of the switches, for each share."""
+    S = S[:, :_TESTED]
+    spectrum = noise_spectrum(residuals, np.hstack([S, jacobian])) if S.shape[1] else None
     if spectrum is None:
-        return 0.0
+        return np.zeros(len(_SHARES))
     noise = np.sqrt(spectrum[:_COEFFICIENTS])
     r, A = cosines(residuals)[:_COEFFICIENTS] / noise, cosines(S)[:_COEFFICIENTS] / noise[:, None]
-    factor = cho_factor(np.eye(S.shape[1]) + A.T @ A)  # the covariance is I + A A'
-    explained = r @ A @ cho_solve(factor, A.T @ r)
-    return float(0.5 * explained - np.log(np.diag(factor[0])).sum())
-
-
-def _middle(data: PreparedRecording, model: Simulator) -> Array:
-    """Return the times midway between the rows at which commands differ, but the first at its row, s."""
-    time = data.recording.time
-    switched = switched_rows(data.recording.reaching(model.base.layout))
-    before = np.maximum(switched - 1, 0)
-    return np.asarray(time[switched] - 0.5 * np.minimum(time[switched] - time[before], LONGEST))
+    U, s, _ = np.linalg.svd(A, full_matrices=False)
+    explained, scatter = (U.T @ r) ** 2, np.outer(_SHARES, s) ** 2  # the covariance is I + share^2 A A'
+    return np.asarray(0.5 * np.sum(explained * scatter / (1.0 + scatter) - np.log1p(scatter), axis=1))

@@ -75,7 +75,7 @@ class LinearResponse:
         a, b, a_reverse, b_reverse = (
             self.rov[form.coefficient(key + end)] for end in ("", REVERSE) for key in ("a_d", "b_d")
         )
-        v, h, gain = self.velocity[:-1], np.diff(self.time), self.rov.gain(form)
+        v, h, gain = 0.5 * (self.velocity[1:] + self.velocity[:-1]), np.diff(self.time), self.rov.gain(form)
         damping = np.where(v >= 0.0, 2.0 * a * v + b, b_reverse - 2.0 * a_reverse * v)
         fall = np.maximum(gain * damping, 1e-6) * h
         gained = -np.expm1(-fall) / fall * gain * h
@@ -92,27 +92,39 @@ class LinearResponse:
         steps = 0.5 * (values[1:] + values[:-1]) * np.diff(self.time)[:, None]
         return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(steps, axis=0)])
 
-    @cached_property
-    def by_switches(self) -> Array:
-        """The response to a shift of each strong switch by one standard deviation, n x switches.
+    def by_switches(self, between: Array | None = None) -> Array:
+        """Return the response to each strong switch when it comes later by one standard deviation, n x switches.
 
         A command that changes between two rows of a log changes at an unknown time between them, whose standard
-        deviation is the time between the rows divided by √12.
+        deviation is the time between the rows divided by √12. `between` has the times about which the switches of the
+        recording scatter; without it these are the rows.
         """
         rows, reaching = self.recording.time, self.recording.reaching(self.rov.layout)
         switched = switched_rows(reaching)[1:]
-        place = np.searchsorted(self.at, rows[switched] + self.delay, side="right") - 1
-        inside = (place >= 0) & (place < len(self.at) - 1)
-        switched, place = switched[inside], place[inside]
+        at = (rows[switched] if between is None else between) + self.delay
+        inside = (at >= self.at[0]) & (at < self.at[-1])
+        switched, at = switched[inside], at[inside]
         if not len(switched):
             return np.zeros((len(self.at), 0))
         jumps = self._steady(reaching[switched]).sum(axis=1) - self._steady(reaching[switched - 1]).sum(axis=1)
-        between = np.minimum(rows[switched] - rows[switched - 1], LONGEST)
-        impulses = jumps * between / np.sqrt(12.0)
+        impulses = -jumps * np.minimum(rows[switched] - rows[switched - 1], LONGEST) / np.sqrt(12.0)
         last = np.argsort(-np.abs(impulses))[:_MOST]
-        pulses = np.zeros((len(self.at), len(last)))
-        pulses[place[last], np.arange(len(last))] = (impulses / np.diff(self.at)[place])[last]
-        return self.by_force(pulses)
+        return self.by_force(self._pulses(at[last]) * impulses[last])
+
+    def _pulses(self, times: Array) -> Array:
+        """Return forces, held from each sample to the next, that equal unit impulses at some times, n x times.
+
+        An impulse is divided between the two neighbouring steps whose middles lie before and after it, in such a way
+        that its mean time is exact.
+        """
+        steps = np.diff(self.at)
+        middles = self.at[:-1] + 0.5 * steps
+        after = np.clip(np.searchsorted(middles, times), 1, len(middles) - 1)
+        share = np.clip((times - middles[after - 1]) / (middles[after] - middles[after - 1]), 0.0, 1.0)
+        found, column = np.zeros((len(self.at), len(times))), np.arange(len(times))
+        found[after - 1, column] = (1.0 - share) / steps[after - 1]
+        found[after, column] = share / steps[after]
+        return found
 
 
 def _recursion(factor: Array, terms: Array) -> Array:

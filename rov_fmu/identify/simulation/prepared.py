@@ -47,6 +47,8 @@ class PreparedRecording:
     shifts: Array | None = None
     """n x switches: the change of the values when a switch comes later by one standard deviation; None when the times
     of all switches are known."""
+    between_rows: bool = False
+    """True when the commands switch between the rows of the log."""
     attitude: Attitude | None = None
     """The measured attitude at which the vehicle is simulated; None for a level vehicle, or one with roll or pitch."""
 

@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from rov_fmu.identify.recordings.output_error import fit_recordings
+from rov_fmu.identify.recordings.switches import _LARGEST, _gains, _share
 from rov_fmu.identify.simulation.linear_response import LinearResponse
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
@@ -46,37 +47,62 @@ def recording(k: Rov, switches: Array, seed: int) -> Recording:
     return Recording(f"log_{seed}.csv", HEAVE, "depth", time, command, depth(k, switches, time)[0] + noise)
 
 
-def switches(seed: int, *, between: bool) -> Array:
-    """Return the times of the switches, at rows or at any time."""
-    rows = 6.0 * np.arange(len(LEVELS))
-    early = np.random.default_rng(seed).uniform(0.0, 0.2, len(rows)) if between else np.zeros(len(rows))
+SCATTER = {"at rows": 0.0, "near rows": 0.01, "between rows": 0.2 / np.sqrt(12.0)}
+"""The standard deviation of the times of the switches, s."""
+
+
+def switches(seed: int, where: str) -> Array:
+    """Return the times of the switches: at rows, near rows because time stamps have errors, or at any time."""
+    random, rows = np.random.default_rng(seed), 6.0 * np.arange(len(LEVELS))
+    if where == "between rows":
+        early = random.uniform(0.0, 0.2, len(rows))
+    else:
+        early = SCATTER[where] * np.abs(random.standard_normal(len(rows)))  # the row after the switch is the first one
     return np.asarray(np.maximum(rows - early, 0.0))
 
 
-@pytest.mark.parametrize("between", [False, True])
-def test_unknown_times_are_allowed_for_where_they_are_unknown(k: Rov, between: bool) -> None:
-    recordings = [recording(k, switches(seed, between=between), seed) for seed in range(3)]
+@pytest.mark.parametrize("where", SCATTER)
+def test_unknown_times_are_allowed_for_where_they_are_unknown(k: Rov, where: str) -> None:
+    recordings = [recording(k, switches(seed, where), seed) for seed in range(3)]
     base = k.replaced({"a_d_w": 1.0, "b_d_w": 1.0, "beta_w": 1.0})
     (fit,) = fit_recordings(recordings, base)
-    assert fit.between_rows == between
-    assert not [effect for effect in fit.effects if effect.kept]
+    assert fit.between_rows == (where == "between rows")
     for name in ("a_d_w", "b_d_w", "beta_w"):
         assert abs(fit.estimate[name] - k[name]) < 4.0 * fit.estimate.errors[name]
         assert fit.estimate.errors[name] < 0.02 * k[name]
+    assert all(effect.kind == "delay" and abs(effect.value) < 0.02 for effect in fit.effects if effect.kept)
 
 
-def test_the_response_to_a_late_switch_is_that_of_the_equations(k: Rov) -> None:
+def test_a_few_pieces_with_another_misfit_do_not_decide() -> None:
+    """One recording of ten has residuals that look like unknown times of switches."""
+    random, S = np.random.default_rng(0), np.zeros((200, 4))
+    for n in range(4):
+        S[40 * (n + 1) :, n] = 5.0
+    pieces = [random.standard_normal(200) for _ in range(10)]
+    pieces[3] = pieces[3] + S @ np.array([1.0, -1.0, 1.0, -1.0])
+    gains = [_gains(piece, S, np.ones((200, 1))) for piece in pieces]
+    assert gains[3][-1] > 5.0 * _LARGEST
+    assert _share(gains) == 0.0
+    assert _share(gains[3:4]) >= 0.4
+
+
+@pytest.mark.parametrize("early", [0.0, 0.05, 0.1, 0.17])
+def test_the_response_to_a_late_switch_is_that_of_the_equations(k: Rov, early: float) -> None:
     """A shift by one standard deviation is compared with the difference of two solutions."""
-    exact, time = switches(0, between=False), np.arange(0.0, 60.0, 0.2)
+    exact, time = switches(0, "at rows"), np.arange(0.0, 60.0, 0.2)
+    exact[1:] -= early
     shift = 0.2 / np.sqrt(12.0)
     base, velocity = depth(k, exact, time)
-    found = LinearResponse(k, recording(k, exact, 0), time, velocity, 0.0).by_switches
+    found = LinearResponse(k, recording(k, exact, 0), time, velocity, 0.0).by_switches(exact[1:])
     assert found.shape == (len(time), len(LEVELS) - 1)
     late = np.array([depth(k, replace_one(exact, n, 0.01 * shift), time)[0] - base for n in range(1, len(exact))])
-    strongest_first = sorted(100.0 * late, key=lambda change: -float(np.abs(change).max()))
-    found_first = sorted(found.T, key=lambda change: -float(np.abs(change).max()))
-    for expected, response in zip(strongest_first, found_first, strict=True):
-        assert np.abs(np.abs(expected) - np.abs(response)).max() < 0.1 * np.abs(expected).max()
+    for expected, response in zip(sorted(100.0 * late, key=onset), sorted(found.T, key=onset), strict=True):
+        assert np.abs(expected - response).max() < 0.06 * np.abs(expected).max()
+
+
+def onset(change: Array) -> int:
+    """Return the first sample at which a change is a tenth of its largest value."""
+    return int(np.argmax(np.abs(change) > 0.1 * np.abs(change).max()))
 
 
 def replace_one(values: Array, n: int, change: float) -> Array:
