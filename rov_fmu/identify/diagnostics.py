@@ -9,6 +9,7 @@ from scipy.special import fdtrc
 
 from rov_fmu.identify.identification import AxisResult
 from rov_fmu.identify.least_squares import Estimate
+from rov_fmu.identify.points.drag_forms import Point
 from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_rms
 from rov_fmu.identify.points.thrust_fit import ThrustFit, forces
 from rov_fmu.identify.recordings.held_out import of_velocity
@@ -29,7 +30,7 @@ _LEAST_EXPLAINED = 0.5
 _BACKWARD = 0.005
 """A thrust curve that points backward only at commands below this one does so by rounding."""
 _CHANCE = 0.003
-"""The probability that forces and recordings of the same thrust seem to differ, although they do not."""
+"""The probability that forces or tables and recordings of the same vehicle seem to differ, although they do not."""
 _SOME_OUTLIERS, _MANY_OUTLIERS = 0.03, 0.15
 """The shares of outliers above which they are reported, and above which a recording is doubtful."""
 _TURNS = 0.05
@@ -178,9 +179,27 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
             yield _on_effect(fit, effect)
     tables = [p for p in result.points if not p.is_read_off and p.weight > 0.0]
     for quantity in ("V_ss", "Tau"):
-        error = relative_rms(tables, predict(axis, fit.rov, tables), quantity)
-        if error > 0.05:
+        predicted = predict(axis, fit.rov, tables)
+        error = relative_rms(tables, predicted, quantity)
+        if error > 0.05 and not _is_scatter(tables, predicted, quantity):
             yield finding("tables against recordings", names={"quantity": quantity}, numbers={"error": error})
+
+
+def _is_scatter(points: Sequence[Point], predicted: Array, quantity: str) -> bool:
+    """Return True when the differences of one quantity from its predictions may be scatter about zero.
+
+    Scatter has neither a mean nor a trend with the command (an F-test). Fewer than five points do not tell.
+    """
+    pairs = [(abs(p.command), m / p.value - 1.0) for p, m in zip(points, predicted, strict=True)]
+    of = [p.quantity == quantity and np.isfinite(m) for p, m in zip(points, predicted, strict=True)]
+    command, errors = np.array(pairs)[of].T
+    n = len(errors)
+    if n < 5:
+        return False
+    A = np.column_stack([np.ones(n), command])
+    trend = A @ np.linalg.lstsq(A, errors, rcond=None)[0]
+    within = float(np.sum((errors - trend) ** 2)) / (n - 2)
+    return bool(fdtrc(2, n - 2, float(trend @ trend) / 2.0 / max(within, 1e-12)) > _CHANCE)
 
 
 def _on_effect(fit: RecordingsFit, effect: FittedEffect) -> Finding:
