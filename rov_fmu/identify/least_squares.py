@@ -74,7 +74,8 @@ class Estimate:
     @property
     def correlation(self) -> Array:
         """The correlation matrix, p x p; NaN where a coefficient is not identifiable."""
-        error = np.sqrt(np.diag(self.covariance))
+        variance = np.diag(self.covariance)
+        error = np.sqrt(np.where(np.isfinite(variance), variance, nan))
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(self.covariance / np.outer(error, error))
 
