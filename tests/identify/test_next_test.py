@@ -8,11 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.identify import next_test as module
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import REPEATED, NextTest, Sensor, next_test
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
+from rov_fmu.model.rov import Rov
 from rov_fmu.report.console_results import print_identification
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 from rov_fmu.tank.findings import Finding
 from tests.folders import FORCE, HEAD, MASS, SPEED, read
@@ -132,6 +135,123 @@ def test_a_linear_part_near_zero_need_not_be_known_to_a_share_of_itself() -> Non
             found = next_test(HEAVE, k, estimate, Sensor("velocity", 0.01))
             assert found
             assert found.is_known is known
+
+
+# ---- The steps -------------------------------------------------------------------------------------------------------
+
+
+def offered(
+    monkeypatch: pytest.MonkeyPatch, axis: Axis = HEAVE, rov: Rov = VIDEORAY, **limits: float
+) -> dict[str, Array]:
+    """Return the commands of every recording that is considered, by its words."""
+    found: dict[str, Array] = {}
+
+    def informed(*of: object) -> Array:
+        command = of[-1]
+        assert isinstance(command, np.ndarray)
+        words = next(words for words, c in recordings if c is command)
+        found[words] = command
+        return np.zeros((3, 3))
+
+    recordings = [*module._recordings(axis, rov, TankLimits(**limits))]
+    monkeypatch.setattr(module, "_recordings", lambda *_: iter(recordings))
+    monkeypatch.setattr(module, "_information", informed)
+    next_test(axis, rov, estimate(axis, 0.2), Sensor("velocity", 0.01), TankLimits(**limits))
+    return found
+
+
+def test_steps_of_all_sizes_last_four_time_constants(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = offered(monkeypatch, command_max=0.45)
+    expected = {}
+    for level in (0.1, 0.2, 0.3, 0.4, 0.45):
+        longest = float(np.clip(round(4.0 * VIDEORAY.response(HEAVE, level)[1]), 5.0, 60.0))
+        for ways, step in (((level,), "a step"), ((level, -level), "steps")):
+            both = " and ".join(f"{c:.0%}" for c in ways)
+            words = (
+                f"a recording of {step} from rest at {both}, {longest:g} s each, with {longest:g} s of rest after each"
+            )
+            parts = [np.zeros(round(10.0 * longest))]
+            for c in ways:
+                parts += [np.full(round(10.0 * longest), c), np.zeros(round(10.0 * longest))]
+            expected[words] = np.concatenate(parts)
+    assert {*found} == {*expected}
+    for words, command in found.items():
+        assert command.tolist() == expected[words].tolist(), words
+
+
+@pytest.mark.parametrize(("mass", "hold"), [(1e-3, "5 s each"), (1e4, "60 s each")])
+def test_no_hold_is_shorter_than_5_s_or_longer_than_a_minute(
+    mass: float, hold: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert all(hold in words for words in offered(monkeypatch, rov=VIDEORAY.replaced({"m_rov": mass})))
+
+
+@pytest.mark.parametrize(
+    ("duration", "hold", "rest"),
+    [(24.0, 8, 8), (23.9, 4, 8), (20.0, 4, 8), (19.9, 4, 4), (12.0, 4, 4), (10.0, 2, 2), (5.9, 1, 1), (2.9, 0, 0)],
+)
+def test_holds_become_shorter_before_rests_do(
+    duration: float, hold: int, rest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At a time constant of 2 s a step of 8 s has rests of 8 s, unless a recording must be shorter."""
+    slow = VIDEORAY.replaced({"m_rov": VIDEORAY["m_rov"] * 2.0 / VIDEORAY.response(HEAVE, 1.0)[1]})
+    found = offered(monkeypatch, rov=slow, duration=duration)
+    of_full = [words for words in found if "a step from rest at 100%" in words]
+    words = f"a recording of a step from rest at 100%, {hold} s each, with {rest} s of rest after each"
+    assert of_full == [words] * (hold > 0)
+
+
+@pytest.mark.parametrize(("longer", "hold"), [(1.001, 5), (0.999, 2)])
+def test_the_tank_is_as_long_as_the_vehicle_goes(longer: float, hold: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The distance of a step at full command and a minute of coasting is that of the exact motion at 10 Hz."""
+    flown = run(VIDEORAY, HEAVE, [(0.0, 5.0), (1.0, 5.0), (0.0, 65.0)], 10.0)
+    covered = float(np.sum(flown.velocity)) / 10.0
+    found = offered(monkeypatch, tank_length=longer * covered)
+    (words,) = (words for words in found if "a step from rest at 100%" in words)
+    assert f"{hold} s each" in words
+
+
+def test_nothing_is_proposed_where_the_thrusters_do_not_push_both_ways() -> None:
+    dead = VIDEORAY.extended({"c_0_top": 1.0})
+    assert next_test(HEAVE, dead, estimate(HEAVE, 0.2), Sensor("velocity", 0.01)) is None
+    nothing = Estimate((), np.zeros(0), np.zeros((0, 0)), 1.0, 1.0)
+    assert next_test(HEAVE, VIDEORAY, nothing, Sensor("velocity", 0.01)) is None
+
+
+@pytest.mark.parametrize("present", [0.2, inf])
+def test_an_interval_after_a_recording_is_that_of_least_squares(present: float) -> None:
+    """The derivatives are differences of the exact motion; the unknown velocity at the start is fitted too.
+
+    A coefficient that is not identifiable yet is taken as uncertain by a factor of a thousand.
+    """
+    value, noise, name = VIDEORAY["beta_w"], 0.02, "beta_w"
+    found = next_test(
+        HEAVE,
+        VIDEORAY,
+        Estimate((name,), np.array([value]), np.array([[(present * value) ** 2]]), 1000.0, 1.0),
+        Sensor("velocity", noise),
+        TankLimits(duration=30.0),
+    )
+    assert found
+    moved = [run(VIDEORAY.replaced({name: value * f}), HEAVE, plan(found), 10.0).velocity for f in (1.001, 0.999)]
+    by_log = (moved[0] - moved[1]) / 0.002 / noise
+    n = round(10.0 * plan(found)[0][1])
+    w = VIDEORAY["b_d_w"] * value / VIDEORAY["m_rov"]  # while it rests, a small velocity falls by linear drag alone
+    by_start = np.exp(-w * np.arange(len(by_log)) / 10.0) / noise
+    by_start[n:] = 0.0
+    gained = float(by_log @ by_log)
+    before = min(present, 1000.0) ** -2.0
+    assert found.narrowed == pytest.approx(np.sqrt(before / (before + gained)), rel=0.02)
+    assert found.width == (inf if present == inf else pytest.approx(1.962 * present, rel=1e-3))
+    assert (found.interval is None) == (present == inf)
+
+
+@pytest.mark.parametrize(("narrowed", "is_useful"), [(0.9, True), (0.91, False)])
+def test_a_test_is_useful_that_narrows_by_a_tenth(narrowed: float, is_useful: bool) -> None:
+    test = replace(proposed(HEAVE), narrowed=narrowed)
+    assert test.is_useful == is_useful
+    assert replace(test, interval=(1.0, 2.0), width=0.05).is_known
+    assert not replace(test, interval=(1.0, 2.0), width=0.051).is_known
 
 
 # ---- In a folder -----------------------------------------------------------------------------------------------------

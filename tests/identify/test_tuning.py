@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from rov_fmu.cli import main
 from rov_fmu.identify.points.drag_forms import Point
-from rov_fmu.identify.tuning import TuningError, tune, tune_over
+from rov_fmu.identify.tuning import Tuning, TuningError, _each_median, implausible, tune, tune_over, tuned_values
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.console_results import print_tuning
@@ -116,6 +116,57 @@ def test_what_no_tuning_gives(
         tune(k, HEAVE, command, V_ss, Tau)
     options = [f"--command={command}", f"--v-ss={V_ss}", f"--tau={Tau}"]
     check_refused(["tune", str(VIDEORAY), "--axis", "heave", *options], named, capsys)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "beta", "kinds"),
+    [
+        (0.5, 0.05, []),
+        (2.0, 1.2, []),
+        (0.49, 0.6, ["implausible tuned alpha"]),
+        (2.01, 0.6, ["implausible tuned alpha"]),
+        (1.0, 0.049, ["implausible tuned beta"]),
+        (1.0, 1.21, ["implausible tuned beta"]),
+    ],
+)
+def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, kinds: list[str], k: Rov) -> None:
+    points = (Point("V_ss", 0.3, 0.2, 1.0, ""), Point("Tau", 0.3, 2.0, 1.0, ""))
+    rov = k.replaced({"alpha_w": alpha, "beta_w": beta})
+    found = [*implausible(Tuning(HEAVE, rov, points))]
+    assert [finding.kind for finding in found] == kinds
+    for finding in found:
+        of_alpha = finding.kind == "implausible tuned alpha"
+        value, low, high = (alpha, 0.5, 2.0) if of_alpha else (beta, 0.05, 1.2)
+        assert finding.numbers == {"value": value, "low": low, "high": high}
+    assert len([*implausible(Tuning(HEAVE, rov, points[:1]))]) == (alpha not in (0.5, 1.0, 2.0)), "beta was not tuned"
+
+
+def test_the_median_of_the_alphas_and_of_the_betas_is_where_the_fit_starts(k: Rov) -> None:
+    """Of three points with a common command, α is that of the middle V_ss, and β that of the middle Tau."""
+    points = [Point("V_ss", 0.3, V, 1.0, "") for V in (0.1, 0.2, 0.9)]
+    points += [Point("Tau", 0.3, Tau, 1.0, "") for Tau in (1.0, 2.0, 9.0)]
+    start = _each_median(k, HEAVE, points)
+    assert start.response(HEAVE, 0.3) == pytest.approx((0.2, 2.0), rel=1e-12)
+
+
+@pytest.mark.parametrize(("count", "more"), [(2, ""), (3, ", ...")])
+def test_the_source_names_the_first_two_points(count: int, more: str, k: Rov) -> None:
+    points = tuple(Point("V_ss", c, V, 1.0, "") for c, V in ((0.3, 0.2), (0.4, 0.25), (0.5, 0.31)))
+    values, reason = tuned_values(Tuning(HEAVE, k, points[:count]))
+    assert reason == f"Tuned to V_ss = 0.2 at 30%, V_ss = 0.25 at 40%{more}"
+    assert values == {"alpha_w": k["alpha_w"], "beta_w": k["beta_w"]}
+
+
+@pytest.mark.parametrize("command", [1.0, -1.0])
+def test_full_command_is_allowed_and_more_is_not(command: float, k: Rov) -> None:
+    assert tune(k, HEAVE, command, command * 0.5).rov.response(HEAVE, command)[0] == pytest.approx(command * 0.5)
+    with pytest.raises(TuningError, match="a fraction of the full command"):
+        tune(k, HEAVE, 1.01 * command, command * 0.5)
+
+
+def test_thrust_that_falls_with_the_speed_cannot_be_tuned(k: Rov) -> None:
+    with pytest.raises(TuningError, match="heave: its thrust falls with the speed of advance"):
+        tune(k.extended({"d_top": 1.0}), HEAVE, 0.3, 0.2)
 
 
 # ---- Of another vehicle, by direction --------------------------------------------------------------------------------
