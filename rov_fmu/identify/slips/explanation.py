@@ -13,7 +13,7 @@ factor of about 3, or 2.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, log10, pi, sqrt
+from math import isfinite, log10, pi, sqrt
 
 from rov_fmu.identify.slips.single_recording import Alone
 from rov_fmu.model.layout import Axis
@@ -126,12 +126,10 @@ def proportions(axis: Axis, base: Rov, vehicle: Alone) -> tuple[float, float]:
 def contradict(explanations: Sequence[Explanation]) -> Explanation | None:
     """Return another explanation about as good as the first, with other files, or None."""
     first = explanations[0]
-    others = (e for e in explanations[1:] if e.files and not e.files & first.files)
+    others = (e for e in explanations if e.files and not e.files & first.files)
     return next((e for e in others if e.cost < first.cost + LIKELY), None)
 
 
 def _ratio(one: float, other: float) -> float:
-    """Return the ratio in decades."""
-    if one <= 0.0 or other <= 0.0:
-        return inf if (one > 0.0) != (other > 0.0) else 0.0
-    return log10(one / other)
+    """Return the ratio in decades; 0 where one of the numbers is 0, which tells no scale."""
+    return 0.0 if one <= 0.0 or other <= 0.0 else log10(one / other)
