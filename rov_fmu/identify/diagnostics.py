@@ -137,7 +137,8 @@ def _on_drag(result: AxisResult, estimate: Estimate) -> Iterator[Finding]:
     for name in estimate.names:
         if estimate[name] == 0.0 and name not in result.assumed:
             by_forces = result.drag if not result.recordings else None
-            numbers = {"unbounded": by_forces.unbounded[name == b_d]} if by_forces else {}
+            unbounded = by_forces.unbounded[name == b_d] if by_forces else 0.0
+            numbers = {"unbounded": unbounded} if unbounded < 0.0 else {}
             yield finding("drag at zero", names={"coefficient": name}, numbers=numbers)
 
 

@@ -9,16 +9,22 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
+from rov_fmu.identify import identify as module
 from rov_fmu.identify.identification import AxisResult, Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.points.drag_forms import Point
 from rov_fmu.identify.points.quadratic_fit import fit_quadratic
 from rov_fmu.identify.points.response_fit import fit_response
+from rov_fmu.identify.points.step_responses import StepResponse
+from rov_fmu.identify.recordings.held_out import HeldOut
+from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.report.report import report_page
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.recording import Recording
 from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import PAPER, VIDEORAY
@@ -511,3 +517,107 @@ def test_estimate_without_freedom_has_no_interval() -> None:
     low, high = estimate.interval("beta_u") or (0.0, 0.0)
     assert low * high == pytest.approx(4.0), "a factor's interval is symmetric in its logarithm"
     assert np.isnan(estimate.correlation[0, 0])
+
+
+# ---- Parts of an identification --------------------------------------------------------------------------------------
+
+
+def test_progress_is_told_by_the_share_of_the_work(tmp_path: Path) -> None:
+    """Units are checked in a tenth, recordings fitted up to nine tenths, and the next tests found in the rest."""
+    rows = {
+        "steady_surge": [(c, 1.1 * c) for c in (0.3, 0.5, 0.7)],
+        "steady_heave": [(c, 0.5 * c) for c in (0.3, 0.5, 0.7)],
+    }
+    told: list[tuple[str, float]] = []
+    for name, values in rows.items():
+        write_csv(tmp_path / f"{name}.csv", "command [1],velocity [m/s]", values)
+    for curve, a in (("rear", 40.0), ("top", 6.0)):
+        write_csv(
+            tmp_path / f"thrust_{curve}.csv", "command [1],force [N]", [(c, a * c * c) for c in (0.3, 0.5, 0.7, 0.9)]
+        )
+    write_rov(tmp_path)
+    identify(load_tank_tests(tmp_path), lambda words, share: told.append((words, share)))
+    words, shares = zip(*told, strict=True)
+    assert words == (
+        "thrust curves",
+        "units and signs of surge",
+        "units and signs of heave",
+        "recordings of surge",
+        "recordings of heave",
+        "what to measure next of surge",
+        "what to measure next of heave",
+    )
+    assert shares == pytest.approx((0.0, 0.0, 0.05, 0.1, 0.1, 0.9, 0.95))
+
+
+@pytest.mark.parametrize(
+    ("points", "dead_band", "expected"),
+    [
+        ([(0.3, 1.0), (-0.7, 1.0), (0.1, 0.0), (0.9, 0.0)], 0.0, (0.3, 0.7)),
+        ([(0.05, 1.0), (0.3, 1.0), (0.6, 1.0)], 0.05, (0.3, 0.6)),
+        ([(0.3, 1.0), (-0.3, 1.0)], 0.0, (0.25, 0.35)),
+        ([(0.02, 1.0)], 0.0, (0.0, 0.07)),
+        ([(1.0, 1.0)], 0.0, (0.95, 1.0)),
+        ([], 0.0, (0.0, 1.0)),
+    ],
+)
+def test_the_range_of_commands_is_that_of_the_points_beyond_the_dead_band(
+    points: list[tuple[float, float]], dead_band: float, expected: tuple[float, float], k: Rov
+) -> None:
+    rov = k.extended({"c_0_top": dead_band, "c_0_rear": 0.01}) if dead_band else k
+    result = AxisResult(
+        HEAVE, tuple(Point("V_ss", c, c, weight, "") for c, weight in points), (), None, None, None, {}, ()
+    )
+    assert module._command_range([result], rov) == pytest.approx(expected)
+
+
+def test_points_within_the_window_count_and_those_of_steps_have_their_time(tmp_path: Path) -> None:
+    write_csv(tmp_path / "steady_heave.csv", "command [1],velocity [m/s]", [(0.2, 0.1), (0.5, 0.3), (0.8, 0.4)])
+    write_csv(tmp_path / "thrust_top.csv", "command [1],force [N]", [(0.3, 0.6), (0.6, 2.4), (0.9, 5.4)])
+    write_rov(tmp_path, heave=(0.5, 0.7))
+    tests = load_tank_tests(tmp_path)
+    steps = [
+        StepResponse("log.csv", 3.04, 20.0, 0.0, 0.7, V_ss=0.35, V_ss_error=0.01, Tau=1.5, Tau_error=0.1),
+        StepResponse("log.csv", 20.0, 40.0, 0.7, 0.71, V_ss=0.36, V_ss_error=0.02),
+    ]
+    assert module._points(tests, HEAVE, steps) == (
+        Point("V_ss", 0.2, 0.1, 0.0, "steady_heave.csv, line 2"),
+        Point("V_ss", 0.5, 0.3, 1.0, "steady_heave.csv, line 3"),
+        Point("V_ss", 0.8, 0.4, 0.0, "steady_heave.csv, line 4"),
+        Point("V_ss", 0.7, 0.35, 1.0, "log.csv, 3.0 s", 0.01),
+        Point("Tau", 0.7, 1.5, 1.0, "log.csv, 3.0 s", 0.1),
+        Point("V_ss", 0.71, 0.36, 0.0, "log.csv, 20.0 s", 0.02),
+    )
+    assert [module._weight(tests, "surge", c) for c in (-1.0, 1.0)] == [1.0, 1.0], "without a window all count"
+
+
+@pytest.mark.parametrize(("delay", "Tau"), [(0.4, 1.1), (-0.2, 1.7), (1.5, 1.5), (2.0, 1.5)])
+def test_the_delay_is_no_part_of_a_time_constant(delay: float, Tau: float, k: Rov) -> None:
+    """A delay as long as the time constant explains nothing."""
+    nothing = Estimate((), np.zeros(0), np.zeros((0, 0)), 1.0, 1.0)
+    effects = [
+        FittedEffect("delay", of, "s", value, None, kept)
+        for of, value, kept in (("heave", delay, True), ("surge", 9.0, True), ("heave", 9.0, False))
+    ]
+    fit = RecordingsFit(HEAVE, k, nothing, nothing, (), tuple(effects), lambda: HeldOut((), by_halves=False))
+    step = StepResponse("log.csv", 0.0, 20.0, 0.0, 0.5, V_ss=0.3, V_ss_error=0.01, Tau=1.5, Tau_error=0.1)
+    assert module._in_time(step, fit).Tau == pytest.approx(Tau)
+    assert module._in_time(step, None) == step
+    assert module._in_time(replace(step, Tau=None), fit).Tau is None
+
+
+def test_forces_at_one_command_are_no_curve(tmp_path: Path) -> None:
+    write_csv(tmp_path / "steady_heave.csv", "command [1],velocity [m/s]", [(0.2, 0.1), (0.5, 0.3), (0.8, 0.4)])
+    write_csv(tmp_path / "thrust_top.csv", "command [1],force [N]", [(0.3, 0.6), (-0.3, -0.6), (0.0, 0.0)])
+    write_rov(tmp_path)
+    with pytest.raises(DataFileError, match=r"thrust_top\*.csv: two commands at least must count"):
+        identify(load_tank_tests(tmp_path))
+
+
+@pytest.mark.parametrize(("full", "at_full"), [(0.19, False), (0.21, True)])
+def test_saturation_is_the_likely_cause_from_a_fifth_of_the_time_on(full: float, at_full: bool, k: Rov) -> None:
+    command = np.where(np.arange(100) < round(100 * full), -0.999, 0.3)
+    recording = Recording("log.csv", HEAVE, "depth", np.arange(100.0), command, np.zeros(100))
+    still = replace(recording, command=np.full(100, 0.998))
+    cause = module._likely_cause([still, recording], k)
+    assert cause.startswith(f"Thrusters are at full command for {full:.0%}") == at_full

@@ -128,7 +128,7 @@ def test_drag_at_zero_is_told_with_the_fit_to_the_forces_of_the_same_coefficient
         of_points = replace(response, estimate=estimate(values, [0.1, 0.1]))
         (finding,) = found_in(result_of(response=of_points, drag=drag), "drag at zero")
         assert finding.names == {"coefficient": DRAG[n]}
-        assert finding.numbers["unbounded"] == pytest.approx([20.0, -0.5][n])
+        assert finding.numbers == ({"unbounded": pytest.approx(-0.5)} if n else {}), "20 is not negative"
         (finding,) = found_in(
             result_of(recordings=fit_of(found=estimate(values, [0.1, 0.1])), drag=drag), "drag at zero"
         )
