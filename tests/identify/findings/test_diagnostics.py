@@ -172,6 +172,20 @@ def test_tables_that_the_recordings_contradict_are_told(off: float, is_told: boo
     assert found_in(result_of(others, recordings=fit_of()), "tables against recordings") == []
 
 
+def test_the_scatter_of_a_table_does_not_contradict_the_recordings() -> None:
+    """Differences of ±10 % about zero are scatter; all on one side, or growing with the command, they are not."""
+    commands = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+    kinds = {
+        "scatter": (0.1, -0.1, 0.08, -0.12, 0.11, -0.07),
+        "offset": (0.1, 0.11, 0.12, 0.09, 0.1, 0.08),
+        "trend": (-0.15, -0.09, -0.04, 0.03, 0.08, 0.14),
+    }
+    for kind, errors in kinds.items():
+        points = [steady(c, 1.0 / (1.0 + error)) for c, error in zip(commands, errors, strict=True)]
+        found = found_in(result_of(points, recordings=fit_of()), "tables against recordings")
+        assert bool(found) == (kind != "scatter"), kind
+
+
 def thrust_fit(factor: float = 1.0, b_t: float = 0.0513, noise: float = 0.1, degrees: float = 8.0) -> ThrustFit:
     """Return a fit to forces at ±20, ±40, ±60 %, with a factor in reverse, and at 90 % without weight."""
     curve = VIDEORAY.layout.curves_by_name["top"]
