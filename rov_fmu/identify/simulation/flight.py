@@ -188,17 +188,22 @@ class Flight:
         return given
 
     def _lagging(self, rov: Rov, values: Values, count: int, begin: float, switches: Array) -> dict[str, Array]:
-        """Return the lagging forces at the start, by their commands before."""
+        """Return the lagging forces at the start, by their commands before.
+
+        They depend on the coefficients of thrust alone, so sets that agree in these are simulated once.
+        """
         names = [*self.layout.lagging]
         if not names:
             return {}
-        T = [c.coefficient("T") for c in self.layout.curves if c.has_lag]
-        longest = max(float(np.max(values.get(name, rov[name]))) for name in T)
+        keys = [c.coefficient(key) for c in self.layout.curves for key in c.keys]
+        sets = np.column_stack([np.broadcast_to(values.get(key, rov[key]), count) for key in keys])
+        sets, which = np.unique(sets, axis=0, return_inverse=True)
+        given = {key: numbers[:, None] for key, numbers in zip(keys, sets.T, strict=True)}
+        longest = max(float(given[c.coefficient("T")].max()) for c in self.layout.curves if c.has_lag)
         early = begin - _SETTLED * longest
         nodes = np.array([early, *switches[(switches > early) & (switches < begin)], begin])
-        given = {name: numbers[:, None] for name, numbers in values.items() if name in self.layout.coefficients}
-        found = _simulate(rov, nodes, given | self._commands(switches, nodes), names, count)
-        return dict(zip(names, found[:, :, -1:], strict=True))
+        found = _simulate(rov, nodes, given | self._commands(switches, nodes), names, len(sets))
+        return dict(zip(names, found[:, which.reshape(-1), -1:], strict=True))
 
     def _commands(self, switches: Array, nodes: Array) -> dict[str, Array]:
         """Return the commands from each time to the next."""
