@@ -16,7 +16,7 @@ from rov_fmu.identify.effects.load import Load
 from rov_fmu.identify.effects.voltage import Voltage
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings.held_out import HeldOut, _half, _lead, _windows, of_velocity
-from rov_fmu.identify.recordings.output_error import _at_least, _counting, _without_shifts
+from rov_fmu.identify.recordings.output_error import _at_least, _counting
 from rov_fmu.identify.recordings.prediction_errors import Errors, errors_of, joined
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit, count
 from rov_fmu.identify.recordings.selection import earn_their_place, likely
@@ -231,11 +231,3 @@ def test_the_noise_is_at_least_a_millionth_of_the_range() -> None:
     assert _at_least(0.0, data) == pytest.approx(4e-6)
     assert _at_least(0.1, data) == 0.1
     assert _at_least(0.0, replace(data, values=np.ones(20))) == 1e-12
-
-
-def test_what_late_switches_explain_is_no_noise() -> None:
-    data = prepared(HEAVE, "depth", np.arange(20.0), np.arange(20.0))
-    residuals = np.sin(np.arange(20.0))
-    assert _without_shifts(residuals, data) is residuals
-    shifts = np.ones((20, 1))
-    assert _without_shifts(residuals, replace(data, shifts=shifts)) == pytest.approx(residuals - residuals.mean())

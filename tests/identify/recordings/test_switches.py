@@ -70,6 +70,7 @@ def test_unknown_times_are_allowed_for_where_they_are_unknown(k: Rov, where: str
     for name in ("a_d_w", "b_d_w", "beta_w"):
         assert abs(fit.estimate[name] - k[name]) < 4.0 * fit.estimate.errors[name]
         assert fit.estimate.errors[name] < 0.02 * k[name]
+    assert [s.noise for s in fit.simulations] == pytest.approx([NOISE] * 3, rel=0.2)
     assert all(effect.kind == "delay" and abs(effect.value) < 0.02 for effect in fit.effects if effect.kept)
 
 
