@@ -105,6 +105,10 @@ SENTENCES: dict[str, SentenceForm] = {
     ),
     "constant motion": "{files}: no recording of {axes}: the {quantity} never changes",
     "constant push": "{files}: no recording of {axes}: what the thrusters do along it never changes",
+    "scales differ": (
+        "{files}: the {quantity} changes by {factor:.3g} times what the velocity in {axes} says: one of the two "
+        "sensors has a wrong scale. The {quantity} is used"
+    ),
     "gaps": "{files}: {count:#gap} in {axes}: {gaps}",
     # Logs of autopilots and bags
     "source of commands": "{files}: the commands of the thrusters are those of {source}",

@@ -24,6 +24,10 @@ _LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
 _ROUNDING = 0.01
 _TURN = 2.0 * pi + 2.0 * _ROUNDING
 """What rounding may add to the bounds of a wrapped angle, and the width of these bounds, rad."""
+_APART = 2.0
+"""The time over which changes of a position are compared with a velocity, s."""
+_SAME_SCALE, _CLEAR = 0.01, 4.0
+"""Scales of two sensors differ if they do by more than this share, and by so many standard errors."""
 _WRAPPING = (YAW.position, ROLL.position)
 _CONTEXT = {ROLL.position: "roll", PITCH.position: "pitch"}
 """The names of positions in the context, where they differ."""
@@ -79,13 +83,15 @@ def recordings_of(
             else:
                 recordings.append(recording)
                 findings += gaps_of(recording)
+                if recording.is_position:
+                    findings += _on_scales(file, signal, axis, signals)
     return tuple(recordings), tuple(findings)
 
 
 def main_signals(signals: Iterable[Signal], axis: Axis) -> list[Signal]:
     """Return the signal of an axis, if there is one: the position, unless only the velocity has enough samples."""
     found = sorted((s for s in signals if s.axis == axis), key=lambda signal: signal.quantity == "velocity")
-    return [s for s in found if np.isfinite(s.values).sum() >= LEAST_SAMPLES][:1] or found[-1:]
+    return [s for s in found if _count(s) >= LEAST_SAMPLES][:1] or found[-1:]
 
 
 def why_useless(recording: Recording, layout: Layout) -> Finding | None:
@@ -99,6 +105,40 @@ def why_useless(recording: Recording, layout: Layout) -> Finding | None:
     if not _is_driven(layout, recording.axis, recording.thrusters):
         return replace(found, kind="constant push", names={})
     return None
+
+
+def _on_scales(file: str, position: Signal, axis: Axis, signals: Iterable[Signal]) -> list[Finding]:
+    """Return a finding if a position changes by another factor than 1 of what the velocity in the same log says.
+
+    The changes of the position over short times are compared with the integral of the velocity; a constant current is
+    allowed for. Logs with roll or pitch are left out, because there the velocity has another direction.
+    """
+    quantities = {_CONTEXT.get(signal.quantity, signal.quantity) for signal in signals}
+    velocities = [s for s in signals if s.axis == axis and s.quantity == "velocity" and _count(s) >= LEAST_SAMPLES]
+    if not velocities or {"roll", "pitch"} & quantities:
+        return []
+    there, measured = np.isfinite(position.values), np.isfinite(velocities[0].values)
+    time, values = position.time[there], position.unwrapped()[there]
+    at, v = velocities[0].time[measured], velocities[0].values[measured]
+    ends = np.arange(max(time[0], at[0]), min(time[-1], at[-1]), _APART)
+    rows = np.unique(np.searchsorted(time, ends))
+    if len(rows) <= LEAST_SAMPLES:
+        return []
+    travelled = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(at) * (v[1:] + v[:-1]))])
+    A = np.column_stack([np.diff(np.interp(time[rows], at, travelled)), np.diff(time[rows])])
+    (scale, _), squares, rank, _ = np.linalg.lstsq(A, np.diff(values[rows]), rcond=None)
+    if rank < A.shape[1]:
+        return []
+    error = np.sqrt(np.linalg.inv(A.T @ A)[0, 0] * squares[0] / (len(A) - 2))
+    if abs(scale - 1.0) < max(_SAME_SCALE, _CLEAR * error):
+        return []
+    names, numbers = {"quantity": position.quantity}, {"factor": float(scale)}
+    return [Finding("scales differ", axis.name, file=file, names=names, numbers=numbers)]
+
+
+def _count(signal: Signal) -> int:
+    """Return the number of samples with a measurement."""
+    return int(np.isfinite(signal.values).sum())
 
 
 def _recording(

@@ -72,3 +72,21 @@ def test_a_continuous_heading_stays_as_it_is_over_a_gap(turns: float) -> None:
     heading = turns * pi * np.where(STEPS < 8.0, 0.0, 1.0) + np.where(STEPS < 8.0, 0.0, 3.2) + 0.001 * STEPS
     there = (STEPS < 8.0) | (STEPS > 12.0)
     assert (unwrapped(STEPS[there], heading[there]) == heading[there]).all()
+
+
+@pytest.mark.parametrize(("scale", "is_told"), [(1.0, False), (1.008, False), (1.02, True), (0.97, True)])
+def test_sensors_of_other_scales_are_told(scale: float, is_told: bool) -> None:
+    """A noisy depth, and the velocity of the same motion at other times, with a current of 0.05 m/s between them."""
+    random = np.random.default_rng(0)
+    time, at = np.arange(0.0, 120.0, 0.1), np.arange(0.03, 120.0, 0.05)
+    depth = scale * (2.0 * np.sin(0.3 * time) + 0.05 * time) + 0.005 * random.standard_normal(len(time))
+    speed = 0.6 * np.cos(0.3 * at) + 0.01 * random.standard_normal(len(at))
+    signals = [Signal(HEAVE, "depth", time, depth), Signal(HEAVE, "velocity", at, speed)]
+    commands = Commands(time, {"l": 0.0 * time, "r": 0.0 * time, "t": 0.5 * np.sign(np.sin(0.3 * time))})
+    recordings, findings = recordings_of("a.csv", PAPER, commands, signals)
+    assert [recording.quantity for recording in recordings] == ["depth"]
+    assert [f.kind for f in findings] == ["scales differ"] * is_told
+    for finding in findings:
+        assert finding.numbers["factor"] == pytest.approx(scale, abs=0.003)
+    _, tilted = recordings_of("a.csv", PAPER, commands, [*signals, Signal(PITCH, "pitch angle", time, 0.1 * time)])
+    assert not tilted

@@ -23,8 +23,8 @@ from verification.references.pool import Array, Commands, Conditions
 Random = np.random.Generator
 Motion = Mapping[str, Array]
 
-ALARMS = frozenset({"unexplained", "poor prediction"})
-"""The kinds of findings that say that the model does not explain the data."""
+ALARMS = frozenset({"unexplained", "poor prediction", "scales differ"})
+"""The kinds of findings that say that the model does not explain the data, or that the data contradict each other."""
 EFFECTS = frozenset(effects.EFFECTS)
 """The kinds of findings that report an effect in the model or taken out of the data."""
 
