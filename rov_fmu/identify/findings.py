@@ -105,13 +105,12 @@ def _wrong_scale(values: Mapping[str, Any]) -> str:
     """Explain that the numbers of a file are a multiple of what was measured."""
     factor = float(values["factor"])
     causes = _ANGLE_CAUSES if values["unit"].startswith("rad") else _LENGTH_CAUSES
-    cause = causes[min(causes, key=lambda other: abs(other / factor - 1.0))]
     others = f" If not, check {values['others']}." if values["others"] else ""
     if values["unit"].startswith("rad"):
         others += " Also check the positions and directions of the thrusters in rov.toml."
     return (
         f"{values['files']}: {values['quantity']} is about {factor:.4g} times what the thrust, the size and the other "
-        f"files predict: {cause}?{others}"
+        f"files predict: {causes[factor]}?{others}"
     )
 
 

@@ -66,7 +66,7 @@ def alone(data: PreparedRecording, base: Rov) -> Alone | None:
     time = np.linspace(data.time[0], data.time[-1], count)
     v = np.interp(time, data.time, data.velocity)
     force = base[data.axis.coefficient("alpha")] * thrust_along(base, data.axis, data.commands)
-    strongest = float(np.abs(force).max(initial=0.0))
+    strongest = float(np.abs(force).max())
     if strongest == 0.0 or speed == 0.0 or count < 20 or np.ptp(data.values) == 0.0:
         return None
     steady = [

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from rov_fmu.identify.points.quadratic_fit import fit_quadratic
 from rov_fmu.identify.points.response_fit import ResponseFit, fit_response
 from rov_fmu.identify.points.thrust_fit import ThrustFit
 from rov_fmu.identify.recordings.held_out import HeldOut
+from rov_fmu.identify.recordings.prediction_errors import Errors
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
 from rov_fmu.model.layout import HEAVE
@@ -297,6 +299,22 @@ def test_outliers_and_slow_noise_are_told(one: Simulation, kinds: list[str], mon
     found = [*on_axis(result_of(recordings=fit_of(simulations=(one,))), VIDEORAY, {})]
     assert [(finding.kind, finding.file) for finding in found] == [(kind, "log.csv") for kind in kinds]
     assert all({*finding.numbers.values()} <= {one.outliers / 100.0, one.correlation_time} for finding in found)
+
+
+@pytest.mark.parametrize(("off", "is_told"), [(5.02, True), (4.98, False)])
+@pytest.mark.parametrize(("by_halves", "others"), [(True, "the other half"), (False, "the others")])
+def test_a_model_that_predicts_less_than_half_of_the_change_is_poor(
+    off: float, is_told: bool, by_halves: bool, others: str
+) -> None:
+    """With a noise of 1 and a change of 7, the mean squares beyond the noise are off² - 1 of 48."""
+    rms = [np.full(9, value) for value in (off, 7.0, 1.0)]
+    prediction: Any = SimpleNamespace(errors={("whole recording", "velocity"): Errors(*rms)})
+    held_out = HeldOut((prediction,), by_halves)
+    fit = replace(fit_of(), hold_out=lambda: held_out)
+    found = found_in(result_of(recordings=fit), "poor prediction")
+    assert [finding.names for finding in found] == [{"others": others, "unit": "m/s"}] * is_told
+    for finding in found:
+        assert finding.numbers == pytest.approx({"predicted": off, "unchanged": 7.0, "noise": 1.0})
 
 
 def test_a_disagreement_has_the_range_of_its_factors() -> None:

@@ -1,10 +1,12 @@
 """The sentences of findings: the causes that they name, and their numbers."""
 
+import re
 from math import pi
 
 import pytest
 
 from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.slips.explanation import _ANGLES, _LENGTHS
 from rov_fmu.tank.findings import Finding
 
 
@@ -39,6 +41,13 @@ def test_a_wrong_scale_has_a_likely_cause(factor: float, unit: str, cause: str) 
     said = wrong_scale(factor, unit)
     assert cause in said
     assert ("positions and directions of the thrusters" in said) == unit.startswith("rad")
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [*(("m", factor) for factor in _LENGTHS), *(("rad", factor) for factor in _ANGLES)]
+)
+def test_every_scale_that_is_tried_has_a_cause(unit: str, factor: float) -> None:
+    assert re.search(r": (is|are) [^:]+\?", wrong_scale(factor, unit))
 
 
 def test_other_files_that_may_have_the_wrong_scale_are_named() -> None:

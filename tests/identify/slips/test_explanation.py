@@ -241,6 +241,16 @@ def test_a_recording_by_itself_shows_the_vehicle_roughly(of: Axis) -> None:
     assert (late.inertia, late.a, late.b) == pytest.approx((found.inertia, found.a, found.b), rel=1e-6)
 
 
+@pytest.mark.parametrize(("samples", "is_enough"), [(20, True), (19, False)])
+def test_twenty_samples_of_a_motion_with_commands_are_needed(samples: int, is_enough: bool) -> None:
+    moved = clean(VIDEORAY, HEAVE, ((0.5, 10.0),), 2.0)
+    part = slice(samples)
+    recording = Recording("a.csv", HEAVE, "depth", moved.time[part], moved.command[part], moved.position[part])
+    assert (alone(prepare(recording, VIDEORAY), VIDEORAY) is not None) == is_enough
+    for still in (replace(recording, command=np.zeros(samples)), replace(recording, values=np.ones(samples))):
+        assert alone(prepare(still, VIDEORAY), VIDEORAY) is None
+
+
 def test_the_velocity_of_a_force_balances_the_drag() -> None:
     one = Alone(False, 1.0, 30.0, 5.0, 1.0, (0.0, 0.19), 0.51)
     assert one.drag(one.steady(12.0)) == pytest.approx(12.0)
