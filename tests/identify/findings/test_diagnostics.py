@@ -84,6 +84,14 @@ def test_the_largest_difference_is_told_beside_that_of_the_model() -> None:
     assert finding.numbers == pytest.approx(expected)
 
 
+def test_directions_are_compared_with_the_fit_and_not_with_the_vehicle_before_it() -> None:
+    rov = VIDEORAY.extended({"a_d_w_reverse": 2.0 * VIDEORAY["a_d_w"], "b_d_w_reverse": VIDEORAY["b_d_w"]})
+    points = [steady(c, rov=rov) for c in (0.4, -0.4)]
+    assert found_in(result_of(points), "asymmetry")
+    for fitted in ({"recordings": fit_of(rov)}, {"response": replace(response_fit(0.0, 0.0, "V_ss"), rov=rov)}):
+        assert found_in(result_of(points, **fitted), "asymmetry") == []
+
+
 @pytest.mark.parametrize(("scatter", "is_told"), [(0.0143, True), (0.0146, False)])
 def test_a_difference_within_four_standard_errors_is_chance(scatter: float, is_told: bool) -> None:
     """Two values that deviate by e have a standard deviation of sqrt(2) e, and the ratio an error of sqrt(3) e."""
@@ -258,6 +266,9 @@ def test_recordings_that_change_a_curve_beyond_the_scatter_of_its_forces_are_tol
         expected = {"command": 0.6, "joint": 6.994 * 0.36 + 0.0513 * 0.6, "alone": 6.494 * 0.36 + 0.0513 * 0.6}
         assert finding.numbers == pytest.approx(expected)
     assert [*on_forces(replace(fit, estimate=NOTHING), forces)] == [], "the curve was not fitted"
+    assert found_in(result_of(recordings=fit), "recordings against forces", {"top": forces}) == found
+    for unknown in (0.0, np.nan):
+        assert [*on_forces(fit, replace(forces, estimate=replace(forces.estimate, noise=unknown)))] == []
 
 
 def test_the_voltage_of_the_thrust_is_asked_for_where_it_is_not_given() -> None:

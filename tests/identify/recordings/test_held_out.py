@@ -113,6 +113,26 @@ def test_a_prediction_that_cannot_be_computed_is_left_out(monkeypatch: pytest.Mo
     assert found.failed == ("log_1.csv",)
 
 
+def test_a_single_recording_is_predicted_in_halves_with_as_many_samples() -> None:
+    found = predicted(recorded(HEAVE)[:1])
+    assert found.by_halves
+    assert not predicted(recorded(HEAVE)).by_halves
+    early, late = (prediction.time for prediction in found.predictions)
+    whole = recorded(HEAVE)[0].time
+    assert np.concatenate([early, late]).tolist() == whole.tolist()
+    assert len(early) == len(late)
+
+
+def test_the_error_of_a_prediction_is_relative_to_that_without_change() -> None:
+    """It is the mean square over 10 s; nothing moves in a log of rest, where it is 0."""
+    prediction = predicted(recorded(HEAVE)).predictions[0]
+    error, unchanged, _ = prediction.errors["10 s", "velocity"].rms
+    assert prediction.error == pytest.approx((error / unchanged) ** 2)
+    nothing = Errors(np.ones(3), np.zeros(3), np.ones(3))
+    prediction.__dict__["errors"] = {("whole recording", "velocity"): nothing}
+    assert prediction.error == 0.0
+
+
 def test_what_is_explained_is_the_change_beyond_the_noise() -> None:
     change, noise = np.full(100, 5.0), np.full(100, 3.0)
     assert Errors(noise, change, noise).explained == 1.0
