@@ -44,7 +44,7 @@ def test_a_choice_says_by_how_much(kept: bool, gain: float, said: str) -> None:
 
 
 def test_levels_are_the_sizes_of_commands_in_a_direction() -> None:
-    points = steady(0.3, -0.3, -0.5, 0.30000001)
+    points = steady(0.3, -0.3, -0.5, 0.3000004)
     assert (levels(points), levels(points, 1.0), levels(points, -1.0)) == ({0.3, 0.5}, {0.3}, {0.3, 0.5})
 
 
@@ -84,6 +84,13 @@ def test_more_forms_of_drag_need_two_commands_in_both_directions(axis: Axis, poi
     every += ["linear drag alone, by direction", "a constant load (net weight)"]
     every += ["quadratic drag alone with a constant load", "linear drag alone with a constant load"]
     assert whats == every[:count]
+    assert all(form.base.coefficients.get("F_0_w", 0.0) == 0.0 for form in forms)
+    assert [form.is_open for form in forms] == [bool(what) for what in whats]
+
+
+def test_only_points_with_an_error_are_read_off_a_recording() -> None:
+    assert replace(steady(0.3)[0], error=0.01).is_read_off
+    assert not steady(0.3)[0].is_read_off
 
 
 @pytest.mark.parametrize(
