@@ -267,6 +267,10 @@ def test_recordings_that_change_a_curve_beyond_the_scatter_of_its_forces_are_tol
         assert finding.numbers == pytest.approx(expected)
     assert [*on_forces(replace(fit, estimate=NOTHING), forces)] == [], "the curve was not fitted"
     assert found_in(result_of(recordings=fit), "recordings against forces", {"top": forces}) == found
+    steeper = fit_of(VIDEORAY.replaced({"a_t_top": 7.294, "b_t_top": -0.4487}), forces.estimate)
+    below = {c: 0.8 * c * c - 0.5 * c for c in (0.2, 0.4, 0.6)}
+    (most,) = on_forces(steeper, thrust_fit(noise=1e-3))
+    assert abs(most.numbers["command"]) == max(below, key=lambda c: abs(below[c])), "where the curves differ most"
     for unknown in (0.0, np.nan):
         assert [*on_forces(fit, replace(forces, estimate=replace(forces.estimate, noise=unknown)))] == []
 

@@ -68,12 +68,12 @@ def test_a_recording_without_content_is_refused(recording: Recording, kind: str,
     assert error.value.recordings == [recording]
 
 
-TABLES = {"thrust_top.csv": f"{FORCE}\n0.3,0.6\n0.5,1.65\n", "steady_heave.csv": f"{SPEED}\n0.3,0.163\n0.5,0.28\n"}
+STEADY = ("steady_heave_1.csv", "steady_heave_2.csv")
+TABLES = {"thrust_top.csv": f"{FORCE}\n0.3,0.6\n0.5,1.65\n", **dict.fromkeys(STEADY, f"{SPEED}\n0.3,0.163\n0.5,0.28\n")}
 
 
 @pytest.mark.parametrize(
-    ("wrong", "others"),
-    [(("steady_heave.csv",), "thrust_top.csv"), (("log.csv",), ""), (("steady_heave.csv", "log.csv"), "")],
+    ("wrong", "others"), [(STEADY, "thrust_top.csv"), (STEADY[:1], ""), ((*STEADY, "log.csv"), "")]
 )
 def test_forces_are_doubtful_where_all_files_of_an_axis_seem_wrong(
     wrong: tuple[str, ...], others: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -77,6 +77,8 @@ def test_files_of_one_vehicle_may_differ_by_loads_and_by_their_errors() -> None:
     assert one._apart(more, TYPICAL) == pytest.approx(log10(2.0) ** 2 / (0.15**2 + 0.1**2))
     assert one._apart(replace(TYPICAL, inertia=1e4 * TYPICAL.inertia), TYPICAL) == 25.0
     assert one._apart(replace(TYPICAL, inertia=1e4 * TYPICAL.inertia, a=1e9), TYPICAL) == 50.0
+    square, linear = replace(TYPICAL, a=40.0, b=0.0, speed=0.5), replace(TYPICAL, a=0.0, b=20.0, speed=2.0)
+    assert one._apart(square, linear) == pytest.approx((log10(2.0) / 0.15) ** 2), "at the geometric mean, 1 m/s"
     assert one._apart(replace(TYPICAL, a=0.0), TYPICAL) == 0.0, "a ratio of nothing to something tells no scale"
 
 
