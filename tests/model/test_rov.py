@@ -1,15 +1,26 @@
 """The mathematics of rov_fmu/model/rov.py: thrust, signs, rates."""
 
 import random
-from math import copysign, cos, pi, sin
+from math import copysign, cos, inf, pi, sin
 
 import pytest
 from mpmath import mp
 
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.layout import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.vehicles import HEAVY, VEHICLES, State, Values, at_rest, random_case, random_inputs, random_vehicle, still
+from tests.vehicles import (
+    HEAVY,
+    SIX,
+    VEHICLES,
+    State,
+    Values,
+    at_rest,
+    random_case,
+    random_inputs,
+    random_vehicle,
+    still,
+)
 from verification.references.equations import equations, steady_forces
 
 COMMANDS = [-1.0, -0.7, -0.2, 0.0, 0.1, 0.27, 0.5, 1.0]
@@ -173,3 +184,58 @@ def test_a_step_does_not_change_its_arguments() -> None:
     copies = dict(inputs), dict(before)
     assert HEAVY.step(inputs, before, 0.1).keys() == before.keys()
     assert (inputs, before) == copies
+
+
+# ---- One axis alone ----
+
+
+def test_an_axis_alone_has_the_numbers_of_18() -> None:
+    rov = VEHICLES["drag by direction, coupled, late"].replaced({"alpha_u": 0.5, "beta_u": 0.8})
+    form = rov.layout.kinds["surge"]
+    m, gain = 13.5 + 6.3567, 0.8 / (13.5 + 6.3567)
+    assert (rov.inertia(form), rov.gain(form), rov.effective_inertia(form)) == pytest.approx((m, gain, m / 0.8))
+    assert rov.replaced({"beta_u": 0.0}).effective_inertia(form) == inf
+    motion = rov.acceleration_of(form, 20.0, load=3.0, loss=4.0)
+    assert pytest.approx((gain * 141.0, gain * (13.7 + 0.5 * 4.0))) == (motion.A, motion.B)
+    assert motion.reverse == pytest.approx((gain * 190.0, gain * (4.0 + 0.5 * 4.0)))
+    assert pytest.approx(gain * (0.5 * 20.0 + 3.0 + 0.1)) == motion.C
+    inputs = held(rov, X_ext=2.0)
+    assert [axis.C for axis in rov.axes(inputs)][:1] == pytest.approx([gain * (2.0 + 0.1)])
+
+
+def test_the_net_weight_is_a_load_in_heave_alone() -> None:
+    loads = {name: SIX.load(form) for name, form in SIX.layout.kinds.items()}
+    assert loads == pytest.approx(
+        {"surge": 0.1, "sway": 0.3, "heave": -1.5 + 132.6 - 131.6, "roll": 0.02, "pitch": -0.03, "yaw": 0.01}
+    )
+    assert VEHICLES["VideoRay"].load(VEHICLES["VideoRay"].layout.kinds["heave"]) == 0.0
+
+
+def test_the_loss_of_thrust_is_that_of_the_thrusters_parts_along_the_axis() -> None:
+    inputs = held(SIX, u_a=0.5, u_b=-1.0)
+    expected: dict[Axis, float] = {
+        SURGE: 0.6**2 * 2.5,
+        SWAY: 3.0,
+        HEAVE: 0.8**2 * 2.5,
+        ROLL: (0.1 * 0.8) ** 2 * 2.5 + 0.1**2 * 3.0,
+        PITCH: (-0.05 * 0.6 - 0.2 * 0.8) ** 2 * 2.5,
+        YAW: (-0.1 * 0.6) ** 2 * 2.5 + 0.3**2 * 3.0,
+    }
+    assert {axis: SIX.loss(axis, inputs) for axis in expected} == pytest.approx(expected, rel=1e-14)
+    assert HEAVY.loss(SURGE, held(HEAVY, u_1=1.0)) == 0
+
+
+def test_an_arm_turns_the_force_of_a_thruster_by_4(k: Rov) -> None:
+    assert [k.effect(t, YAW) for t in k.layout.thrusters] == pytest.approx([0.22 * sin(0.423), -0.22 * sin(0.423), 0.0])
+    assert [k.effect(t, SURGE) for t in k.layout.thrusters] == [1.0, 1.0, 0.0]
+    both = 0.22 * sin(0.423) * (42.9 * 0.25 + 2.711 * 0.5)
+    assert (k.force(YAW, 0.5), k.strongest(YAW)) == pytest.approx((both, 0.22 * sin(0.423) * (42.9 + 2.711)))
+    assert pytest.approx(k["alpha_r"] * k["beta_r"] / k["I_r"] * both) == k.held(YAW, 0.5).C
+    assert k.response(YAW, -0.5) == (-k.response(YAW, 0.5)[0], k.response(YAW, 0.5)[1])
+
+
+@pytest.mark.parametrize("turns", [0.0, 1.0, -3.0])
+def test_the_heading_counts_turns_from_the_one_before(turns: float) -> None:
+    state = at_rest(SIX) | {"eta": cos(0.25), "epsilon_3": sin(0.25)}
+    assert SIX.thrust(still(SIX), state | {"psi": 2.0 * pi * turns})["psi"] == pytest.approx(0.5 + 2.0 * pi * turns)
+    assert SIX.thrust(still(SIX), state)["psi"] == pytest.approx(0.5)
