@@ -11,7 +11,7 @@ import pytest
 from rov_fmu.model import step as module
 from rov_fmu.model.equation import Directed, Equation, Term
 from rov_fmu.model.rov import Rov
-from rov_fmu.model.step import Table
+from rov_fmu.model.step import ORDER, Table, usable_time
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.model.steps import in_python, worst
@@ -202,3 +202,60 @@ def test_once_all_has_settled_a_step_of_any_length_takes_no_longer(h: float) -> 
     found = rov.step(inputs, state, h)
     assert process_time() - start < 1.0
     assert all(map(isfinite, found.values()))
+
+
+# ---- Numbers of a series ----
+
+SHARE = 2.0 ** (-57 / 21)
+"""The part of its radius of convergence up to which a series of order 20 is used."""
+
+
+@pytest.mark.parametrize(
+    ("c", "expected"),
+    [
+        ([1.0] * 21, SHARE),
+        ([3.0 * 4.0**n for n in range(21)], SHARE / 4.0),
+        ([0.0] * 5 + [1.0] * 16, SHARE),
+        ([float(n % 2 == 0) for n in range(21)], SHARE),
+        ([1.0, 100.0, *[1.0] * 19], SHARE * 100.0 ** (1 / 19)),
+        ([1.0, 1.0, 100.0, *[1.0] * 18], SHARE * 100.0 ** (1 / 18)),
+        ([1.0, 1.0, 1.0, 100.0, *[1.0] * 17], SHARE),
+        ([1.0] * 20 + [1e6], SHARE * 1e-6 ** (1 / 20)),
+        ([1.0] * 18 + [1e6, 1.0, 1.0], SHARE * 1e-6 ** (1 / 18)),
+        ([1.0] * 17 + [1e6, 1.0, 1.0, 1.0], SHARE),
+        ([0.0] * 19 + [1.0, 4.0], SHARE / 4.0),
+        ([0.0] * 20 + [1.0], float("inf")),
+        ([5.0] + [0.0] * 20, float("inf")),
+        ([0.0] * 21, float("inf")),
+    ],
+)
+def test_a_series_is_used_up_to_a_share_of_where_its_last_terms_equal_its_first(
+    c: list[float], expected: float
+) -> None:
+    assert len(c) == ORDER + 1
+    assert usable_time(c) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("c", "length", "expected"),
+    [
+        ([1.0, 0.5, 0.0], 1.0, (1.0, False)),
+        ([1.0, -1.0, 0.0], 1.0, (1.0, False)),  # the largest coefficient still bounds it
+        ([1.0, -2.0, 0.0], 1.0, (0.5, True)),
+        ([-1.0, 2.0, 0.0], 1.0, (0.5, True)),
+        ([1.0, -4.0, 0.25], 1.0, (8.0 - 60.0**0.5, True)),
+        ([1.0, 2.0, 0.1], 1.0, (1.0, False)),
+        ([1.0, -2.0, 1.0], 2.0, (0.25, False)),  # it touches 0 at 1, so only a part is certain
+        ([0.0, 1.0, -2.0], 1.0, (0.5, False)),
+        ([0.0, 0.0, 0.0], 3.0, (3.0, False)),
+    ],
+)
+def test_a_velocity_keeps_its_sign_up_to_its_root_or_as_long_as_is_certain(
+    c: list[float], length: float, expected: tuple[float, bool]
+) -> None:
+    assert module._sign_kept(c, length) == (pytest.approx(expected[0], rel=1e-14), expected[1])
+
+
+def test_a_series_changes_by_its_terms_without_the_first() -> None:
+    assert module._change([7.0, 2.0, 3.0, -1.0], 2.0) == 2.0 * 2.0 + 3.0 * 4.0 - 8.0
+    assert module._root([-1.0, 1.0, 0.1]) == pytest.approx(5.0 * (1.4**0.5 - 1.0), rel=1e-15)

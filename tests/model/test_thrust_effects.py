@@ -2,6 +2,7 @@
 
 import csv
 import random
+import re
 from dataclasses import replace
 from math import isfinite
 
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 
+from rov_fmu.engine.compile import C_SOURCES
 from rov_fmu.engine.simulation import simulate
 from rov_fmu.model.delay import MOST_WAITING, DelayLine
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Fin
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Curve, Fin, ThrustTable
 from rov_fmu.model.rov import Rov
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -171,6 +173,32 @@ def test_c_agrees_with_python(rov: Rov) -> None:
         assert found.tolist() == pytest.approx([expected[name] for name in rov.layout.state], rel=1e-13, abs=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("voltage", "force"),
+    [(10.0, 10.0), (12.0, 10.0), (13.0, 12.0), (14.0, 14.0), (15.0, 17.0), (16.0, 20.0), (18.0, 20.0)],
+)
+def test_thrust_is_linear_between_the_voltages_of_the_tables_and_constant_beyond(voltage: float, force: float) -> None:
+    rows = ((12.0, 10.0), (14.0, 14.0), (16.0, 20.0))
+    tables = tuple(ThrustTable(f"t_{V:g}", (-1.0, 1.0), (-F, F), (F, F), V) for V, F in rows)
+    curve = Curve("c", ("k_t",), 2, tables=tables)
+    layout = replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage)
+    for command in (1.0, -0.5, 0.0, 2.0):
+        share = max(-1.0, min(1.0, command)) * 1.5 / 2.0
+        assert Rov(layout, {"k_t_c": 1.5}).curve_force(curve, command) == pytest.approx(share * force, rel=1e-15)
+
+
+def test_thrust_rises_with_a_power_of_the_voltage_and_a_dead_band_comes_first() -> None:
+    curve = Curve("c", ("V_0", "n_V", "a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse"), 4)
+    numbers = {"V_0_c": 10.0, "n_V_c": 2.0, "a_t_c": 40.0, "b_t_c": 8.0, "a_t_c_reverse": 20.0, "b_t_c_reverse": 4.0}
+    numbers |= {"c_0_c": 0.25, "c_0_c_reverse": 0.5}
+    for voltage, factor in ((10.0, 1.0), (15.0, 2.25), (0.0, 0.0), (-5.0, 0.0)):
+        rov = Rov(replace(NOW.layout, curves=(curve,), thrusters=(), voltage=voltage), numbers)
+        forces = {1.0: (40.0 * 0.75 + 8.0) * 0.75 / 4.0, 0.5: (40.0 * 0.25 + 8.0) * 0.25 / 4.0, 0.25: 0.0, 0.1: 0.0}
+        forces |= {-1.0: -(20.0 * 0.5 + 4.0) * 0.5 / 4.0, -0.5: 0.0, -0.3: 0.0}
+        found = {command: rov.curve_force(curve, command) for command in forces}
+        assert found == pytest.approx({command: factor * force for command, force in forces.items()}, rel=1e-15)
+
+
 # ---- Dead time ----
 
 
@@ -234,6 +262,28 @@ def test_a_change_back_at_the_same_time_replaces_the_first_one() -> None:
     line.step(ROV, usual | {"u_l": 1.0}, state, 0.0, 1e-12)
     line.step(ROV, usual | {"u_l": 0.5}, state, 0.0, 1e-12)
     assert [commands["u_l"] for _, commands in line.waiting] == [0.5]
+
+
+@pytest.mark.parametrize(("units", "waits"), [(-1, False), (0, False), (16, False), (17, True)])
+def test_a_change_acts_at_its_time_to_within_sixteen_units_of_the_last_place(units: int, waits: bool) -> None:
+    inputs = ROV.layout.usual_inputs | {"u_l": 0.5}
+    line = DelayLine(ROV.layout)
+    line.waiting = [(1.0 + units * 2.0**-52, {name: inputs[name] for name in ROV.layout.commands})]
+    line.step(ROV, inputs, at_rest(ROV), 0.5, 0.5)
+    assert (bool(line.waiting), line.acting["u_l"]) == (waits, 0.0 if waits else 0.5)
+
+
+def test_changes_move_with_the_time_of_an_importer() -> None:
+    line = DelayLine(ROV.layout)
+    line.step(ROV, ROV.layout.usual_inputs | {"u_l": 0.5}, at_rest(ROV), 2.0, 0.01)
+    line.move(-1.5)
+    assert [arrival for arrival, _ in line.waiting] == [pytest.approx(0.5 + ROV["T_d"])]
+    assert not DelayLine(NOW.layout).delayed
+
+
+def test_as_many_changes_may_wait_as_in_c() -> None:
+    (in_c,) = re.findall(r"MOST_WAITING = (\d+)", (C_SOURCES / "delay.c").read_text(encoding="utf-8"))
+    assert int(in_c) == MOST_WAITING == 1024
 
 
 def test_too_many_changes_are_refused() -> None:
