@@ -98,6 +98,22 @@ def check_experiments_of_axes(vehicle: Vehicle, files: Mapping[str, bytes]) -> N
     assert moved.keys() - {"time"} == vehicle.layout.state.keys() - set(QUATERNION)
 
 
+def test_a_step_response_is_eight_time_constants_and_a_manoeuvre_four_phases_in_tenths() -> None:
+    """Tau is that of the closed form, to three digits, but at most 10 s."""
+    vehicle, files = _shipped("videoray")
+    slow = load_tables(vehicle)[0].rows
+    times = {}
+    for experiment in etree.fromstring(files[f"{FOLDER}/experiments.exp"]).iter("Experiment"):
+        name, stop, step = (experiment.get(key) for key in ("name", "stopTime", "stepSize"))
+        times[name] = float(stop), float(step)
+    for name, (stop, step) in times.items():
+        assert stop / step == pytest.approx(40.0 if name == "manoeuvre" else 80.0)
+    for row in slow:
+        for model, response in (("tuned", row.scaled), ("untuned", row.non_linear)):
+            Tau = min(float(f"{response.Tau.computed:.3g}"), 10.0)
+            assert times[f"heave_{row.command:g}_{model}"][0] == pytest.approx(8.0 * Tau, rel=1e-10)
+
+
 def test_the_tables_of_the_paper_are_experiments() -> None:
     vehicle, files = _shipped("videoray")
     experiments, printed = _experiments(files), 0

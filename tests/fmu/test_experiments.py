@@ -1,0 +1,140 @@
+"""Reading the experiments in an FMU: defaults, limits and mistakes (rov_fmu/fmu/experiments.py)."""
+
+import zipfile
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rov_fmu.fmu.experiments import FOLDER, MANIFEST, Experiment, ReferenceResults
+from rov_fmu.fmu.proof import Finding, _deviation, _signals
+from rov_fmu.io.messages import FileError
+
+_ROWS = "time,y\n0,0\n1,1\n"
+_MANIFEST = """<fmiReferences><Related source="a.exp" role="experiment"/>
+<Related source="b.exp" role="experiment/uncertainty-analysis"/>
+<Related source="c.txt" role="document"/></fmiReferences>"""
+_REFERENCES = '<References source="y.csv"/>'
+
+
+def read(
+    tmp_path: Path, attributes: str = "", inside: str = _REFERENCES, y: bytes = _ROWS.encode(), **default: Any
+) -> list[Experiment]:
+    """Read an FMU with one experiment. `default` is the default experiment of its model description."""
+    path = tmp_path / "one.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(MANIFEST, _MANIFEST)
+        archive.writestr(
+            f"{FOLDER}/a.exp", f'<Experiments><Experiment name="a" {attributes}>{inside}</Experiment></Experiments>'
+        )
+        archive.writestr(f"{FOLDER}/y.csv", y)
+        for unit, value in (("m", "2"), ("kg", "2"), ("", "many")):
+            text = f'<ParameterSet><Parameter name="k"><Real value="{value}" unit="{unit}"/></Parameter></ParameterSet>'
+            archive.writestr(f"{FOLDER}/{unit or 'word'}.ssv", text.replace(' unit=""', ""))
+    kinds = {"y": "Real", "k": "Real", "text": "String", "clock": "Clock", "vector": "Real"}
+    variables = [
+        SimpleNamespace(name=name, type=kind, unit="m", dimensions=[3] if name == "vector" else [])
+        for name, kind in kinds.items()
+    ]
+    description = SimpleNamespace(
+        modelVariables=variables, defaultExperiment=SimpleNamespace(**default) if default else None
+    )
+    return ReferenceResults(path).experiments(description)
+
+
+def times(of: list[Experiment]) -> tuple[float, float, float, float]:
+    (one,) = of
+    return one.start, one.stop, one.step, one.tolerance
+
+
+def test_an_experiment_without_times_takes_a_second_in_500_steps(tmp_path: Path) -> None:
+    assert times(read(tmp_path)) == (0.0, 1.0, 0.002, 1e-3)
+    assert times(read(tmp_path, 'startTime="3"')) == (3.0, 4.0, 0.002, 1e-3)
+
+
+def test_the_times_of_the_fmu_come_before_the_defaults_and_after_those_of_the_experiment(tmp_path: Path) -> None:
+    default: dict[str, Any] = {"startTime": "1", "stopTime": "5", "stepSize": "0.5", "tolerance": "1e-5"}
+    assert times(read(tmp_path, **default)) == (1.0, 5.0, 0.5, 1e-5)
+    own = 'startTime="2" stopTime="3" stepSize="0.25" tolerance="1e-6"'
+    assert times(read(tmp_path, own, **default)) == (2.0, 3.0, 0.25, 1e-6)
+    child = f'<TransientSimulation stopTime="9"/>{_REFERENCES}'
+    assert times(read(tmp_path, own, child, **default)) == (2.0, 9.0, 0.25, 1e-6)
+
+
+def test_a_million_steps_are_run_and_one_more_is_not(tmp_path: Path) -> None:
+    assert times(read(tmp_path, 'stopTime="1000000" stepSize="1"'))[1] == 1e6
+    with pytest.raises(FileError, match=r"takes 1e\+06 steps from 0 to 1e\+06 s; at most 1000000 are run"):
+        read(tmp_path, 'stopTime="1000001" stepSize="1"')
+
+
+def test_parameters_and_references_are_read(tmp_path: Path) -> None:
+    (one,) = read(tmp_path, inside=f'<!-- a word --><Parameters source="m.ssv"/>{_REFERENCES}<Annotations/>')
+    assert (one.name, one.parameters, one.stimuli) == ("a", {"k": "2"}, None)
+    assert one.references is not None
+    assert {name: [*values] for name, values in one.references.items()} == {"time": [0.0, 1.0], "y": [0.0, 1.0]}
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        (
+            {"attributes": 'stopTime="0"'},
+            "a.exp: experiment 'a': must go on from its start, in steps, with a tolerance",
+        ),
+        ({"attributes": 'stepSize="0"'}, "a.exp: experiment 'a': must go on from its start"),
+        ({"attributes": 'tolerance="0"'}, "a.exp: experiment 'a': must go on from its start"),
+        ({"inside": f"{_REFERENCES}<Zeal/><Other/>"}, "a.exp: experiment 'a': Other, Zeal cannot be run"),
+        ({"inside": '<Parameters source="kg.ssv"/>'}, "kg.ssv: parameter 'k': is in kg, and not in m"),
+        ({"inside": '<Parameters source="word.ssv"/>'}, "word.ssv: parameter 'k' = 'many': must be a number"),
+        ({"inside": '<Parameters source="a.exp"/>'}, "a.exp: must begin with <ParameterSet>, and not with <Experim"),
+        ({"inside": '<References source="gone.csv"/>'}, "gone.csv: there is no such file in the FMU"),
+        ({"inside": '<References source="/y.csv"/>'}, "a.exp: source = '/y.csv' does not lead to a file in the FMU"),
+        ({"inside": '<References source="http:y.csv"/>'}, "a.exp: source = 'http:y.csv' does not lead to a file"),
+        ({"inside": "<References/>"}, "a.exp: source = None does not lead to a file"),
+        ({"inside": '<References source="//[y"/>'}, "a.exp: source = '//[y' does not lead to a file"),
+        ({"inside": ""}, "fmi-ls-manifest.xml: names no experiment with expected results"),
+        ({"y": b"time,y\n0,\xff\n"}, "y.csv: not UTF-8 text, at byte 9"),
+        ({"y": b"time,text\n0,1\n"}, "y.csv: column 'text': the variable is no single number"),
+        ({"y": b"time,clock\n0,1\n"}, "y.csv: column 'clock': the variable is no single number"),
+        ({"y": b"time,vector\n0,1\n"}, "y.csv: column 'vector': the variable is no single number"),
+        ({"y": b"time,z\n0,1\n"}, "y.csv: the FMU has no variable 'z'"),
+        ({"y": b"<no/>", "inside": '<Parameters source="y.csv"/>'}, "y.csv: must begin with <ParameterSet>"),
+    ],
+)
+def test_a_mistake_is_one_line(given: dict[str, Any], reason: str, tmp_path: Path) -> None:
+    with pytest.raises(FileError) as caught:
+        read(tmp_path, **given)
+    path = "extra/org.fmi-standard.fmi-ls-ref/"
+    assert str(caught.value).startswith(f"{tmp_path / 'one.fmu'}: {path}{reason}")
+
+
+# ---- Comparison ----
+
+
+@pytest.mark.parametrize(
+    ("at", "expected", "deviation"),
+    [
+        ((0.0, 1.0, 3.0), (0.0, 10.0, 30.0), 0.0),
+        ((0.5,), (5.25,), 0.25),  # between two times
+        ((2.0,), (21.0,), 1.0),  # the nearer of the two values at an event
+        ((2.0,), (-6.0,), 1.0),
+        ((1.0 + 0.9e-9,), (10.0,), 0.0),
+        ((3.0, 3.1), (30.0, 30.0), np.inf),
+        ((-0.1,), (0.0,), np.inf),
+        ((4.0,), (0.0,), np.inf),
+        ((3.0, 1.0), (32.0, 11.0), 2.0),
+    ],
+)
+def test_the_deviation_is_the_largest(at: tuple[float, ...], expected: tuple[float, ...], deviation: float) -> None:
+    run, values = np.array([0.0, 1.0, 2.0, 2.0, 3.0]), [0.0, 10.0, 20.0, -5.0, 30.0]
+    assert _deviation(run, values, at, expected) == pytest.approx(deviation, abs=1e-12)
+    assert _deviation(run, [*values[:4], np.nan], (3.0,), (30.0,)) == np.inf
+
+
+def test_stimuli_become_rows_and_a_deviation_equal_to_the_tolerance_passes() -> None:
+    signals = _signals({"t": [0.0, 1.0], "u": [2.0, 3.0], "v": [4.0, 5.0]})
+    assert (signals.dtype.names, signals.tolist()) == (("time", "u", "v"), [(0.0, 2.0, 4.0), (1.0, 3.0, 5.0)])
+    assert _signals(None) is None
+    assert [Finding("a", "y", x, 1e-3).passed for x in (1e-3, 1.1e-3, np.inf)] == [True, False, False]
