@@ -253,7 +253,9 @@ def test_a_series_is_used_up_to_a_share_of_where_its_last_terms_equal_its_first(
 def test_a_velocity_keeps_its_sign_up_to_its_root_or_as_long_as_is_certain(
     c: list[float], length: float, expected: tuple[float, bool]
 ) -> None:
-    assert module._sign_kept(c, length) == (pytest.approx(expected[0], rel=1e-14), expected[1])
+    end, is_zero = module._sign_kept(c, length)
+    assert end == pytest.approx(expected[0], rel=1e-14)
+    assert is_zero == expected[1]
 
 
 def test_a_series_changes_by_its_terms_without_the_first() -> None:
