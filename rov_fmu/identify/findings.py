@@ -9,7 +9,7 @@ from rov_fmu.identify.effects.catalogue import EFFECTS
 from rov_fmu.io.csv_table import FORCE_UNITS
 from rov_fmu.tank import findings
 from rov_fmu.tank.findings import Finding, SentenceForm
-from rov_fmu.vehicle.uncertainty import with_interval
+from rov_fmu.vehicle.uncertainty import in_interval
 
 
 def sentences(found: Iterable[Finding]) -> tuple[str, ...]:
@@ -27,9 +27,11 @@ def _inseparable_drag(values: Mapping[str, Any]) -> str:
     coefficients = []
     for key in ("a_d", "b_d"):
         if key in values:
-            reason = "may lie anywhere from {low:.3g} to {high:.3g}" if f"{key} low" in values else ""
-            interval = {end: values.get(f"{key} {end}") for end in ("low", "high")}
-            coefficients.append(f"{values[key]} {reason.format(**interval) or 'is not identifiable at all'}")
+            reason = "is not identifiable at all"
+            if f"{key} low" in values:
+                around = values[f"{key} low"].low, values[f"{key} high"].high
+                reason = "may lie anywhere from {} to {}".format(*in_interval(around, around)[2:])
+            coefficients.append(f"{values[key]} {reason}")
     together = f" (correlation {values['correlation']:.2f})" if "correlation" in values else ""
     return (
         f"{values['axes']}: quadratic and linear drag are hardly identifiable apart: {', '.join(coefficients)}"
@@ -74,9 +76,8 @@ def _effect(form: str, form_of_file: str = "") -> Callable[[Mapping[str, Any]], 
         value, interval = values["value"], ""
         ends = [f"{value.low:.4g}", f"{value.high:.4g}"]
         if "low" in values:
-            around = values["low"].low, values["high"].high
-            (least, low, high), (most, *_) = (with_interval(number, around) for number in (value.low, value.high))
-            ends, interval = [least, most], f" ({low} to {high})"
+            *ends, low, high = in_interval((value.low, value.high), (values["low"].low, values["high"].high))
+            interval = f" ({low} to {high})"
         written = {"value": " ... ".join(dict.fromkeys(ends)), "interval": interval}
         chosen = form if "of" in values else form_of_file or form
         return chosen.format(**{"of": values["files"], **values, **written})
@@ -280,10 +281,10 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
         "inertia were {inertia}. A wrong unit or scale (of the motion, the commands, the thrust, {mass}) may cause it, "
         "a wrong position or direction of a thruster, or a delay or a lag that the fit does not have"
     ),
-    "inertia below mass": (
-        "{axes}: {beta} = {value:.3g} ({low:.3g} to {high:.3g}) is above 1, so the vehicle moves as if its inertia "
-        "with the added mass were less than {mass} alone. Check {mass}, the positions and directions of the thrusters, "
-        "and the measured forces"
+    "inertia below mass": _effect(
+        "{axes}: {beta} = {value}{interval} is above 1, so the vehicle moves as if its inertia with the added mass "
+        "were less than {mass} alone. Check {mass}, the positions and directions of the thrusters, and the measured "
+        "forces"
     ),
     "implausible tuned alpha": (
         "{alpha} = {value:.3g} is not within the usual {low:g} ... {high:g}: the {push} would be {value:.3g} times "

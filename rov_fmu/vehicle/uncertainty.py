@@ -191,19 +191,23 @@ def with_interval(value: float, interval: tuple[float, float] | None, digits: in
     are empty where there is no interval.
     """
     if interval is None:
-        return _significant(value, digits), "", ""
-    width = interval[1] - interval[0]
-    if interval[0] <= 0.0 <= interval[1] and abs(value) < _NEAR_ZERO * width:
-        value = 0.0
-    numbers = value, *interval
-    if width > _EXACT * abs(value) and all(map(isfinite, numbers)):
-        place = floor(log10(width / _WIDTH_IN_UNITS))
-        if abs(value) >= 10.0 ** (place + 1):
-            value_text, low, high = (_rounded(number, place) for number in numbers)
-            return value_text, low, high
-        digits = 2
-    value_text, low, high = (_significant(number, digits) for number in numbers)
+        return significant(value, digits), "", ""
+    value_text, low, high = in_interval((value,), interval, digits)
     return value_text, low, high
+
+
+def in_interval(values: Sequence[float], interval: tuple[float, float], digits: int = 4) -> list[str]:
+    """Return values that share an interval, and its ends, as text. All have the digits of the least value."""
+    width = interval[1] - interval[0]
+    around_zero = interval[0] <= 0.0 <= interval[1]
+    values = [0.0 if around_zero and abs(value) < _NEAR_ZERO * width else value for value in values]
+    numbers, least = [*values, *interval], min(map(abs, values))
+    if width > _EXACT * least and all(map(isfinite, numbers)):
+        place = floor(log10(width / _WIDTH_IN_UNITS))
+        if least >= 10.0 ** (place + 1):
+            return [_rounded(number, place) for number in numbers]
+        digits = 2
+    return [significant(number, digits) for number in numbers]
 
 
 def _rounded(number: float, place: int) -> str:
@@ -211,7 +215,7 @@ def _rounded(number: float, place: int) -> str:
     return _plain(+Decimal(number).quantize(Decimal(1).scaleb(place)))  # the sign makes 0 of -0
 
 
-def _significant(number: float, digits: int) -> str:
+def significant(number: float, digits: int) -> str:
     """Return a number with a number of significant digits: 0.30, 420."""
     return _plain(Decimal(f"{number:.{digits - 1}e}")) if number and isfinite(number) else f"{number:g}"
 
