@@ -25,6 +25,10 @@ class DataFileError(FileError):
     """A data file that cannot be used. Each mistake is a line with the place in the file, the value and a reason."""
 
 
+class UnknownColumnError(ValueError):
+    """A header that no column has. The message is only the reason."""
+
+
 @dataclass(frozen=True)
 class Column:
     """A column that a file may have, and the numbers that it may contain."""
@@ -102,13 +106,14 @@ def read_columns(
     others: bool = False,
     loose: bool = False,
     renamed: Mapping[str, str] = {},
+    hint: str = "",
     check_header: Callable[[Mapping[str, str], Iterable[str]], Iterable[str]] = lambda _, __: (),
 ) -> Columns:
     """Read the columns, in any order, with headers such as `command [%]`. Raises DataFileError with all mistakes.
 
     With `others`, the file may have other columns, which are not read. `loose` is for logs: a cell that is missing or
     not a number becomes NaN, and a row with too many cells is left out. `renamed` has other headers for some of those
-    of the file. `check_header` is called before the rows are
+    of the file. `hint` ends the messages about unknown headers. `check_header` is called before the rows are
     read, with the headers that are read, by column, and with all other headers; it returns the mistakes in them.
     """
     open_stream = read_lines(path, DataFileError, most=LARGEST)
@@ -118,7 +123,7 @@ def read_columns(
     if not header:
         raise DataFileError(f"{path}: the file is empty")
     titles, header = header, [renamed.get(title, title) for title in header]
-    found = _find_columns(path, line, header, columns, others)
+    found = _find_columns(path, line, header, columns, others, hint)
     names = [column.name for column in found.values()]
     headers = {column.name: header[place] for place, column in found.items()}
     if reasons := [*check_header(headers, [title for n, title in enumerate(header) if n not in found])]:
@@ -273,12 +278,14 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
 
 
 def _find_columns(
-    path: Path, line: int, header: list[str], columns: Mapping[str, Column], others: bool
+    path: Path, line: int, header: list[str], columns: Mapping[str, Column], others: bool, hint: str
 ) -> dict[int, FileColumn]:
     """Return the columns that are read, by their index in the header. Raises DataFileError."""
     if not any(_may_be_header(title, columns) for title in header):
         needed = ", ".join(_title(name, column) for name, column in columns.items() if not column.optional)
         reason = f"the first line must be a header that names the columns, such as {needed}"
+        if all(any(map(str.isalpha, title)) for title in header):
+            reason = f"none of these headers is known; the first line must have the headers {needed}{hint}"
         raise DataFileError(f"{path}, line {line} = {shown(', '.join(header))}: {reason}")
     found: dict[int, FileColumn] = {}
     wrong = []
@@ -289,7 +296,9 @@ def _find_columns(
                     raise ValueError("there is such a column before")
                 found[place] = column
         except ValueError as error:
-            wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}")
+            is_unknown = isinstance(error, UnknownColumnError) and not str(error).endswith("?")
+            end = hint if is_unknown else ""
+            wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}{end}")
     names = {column.name for column in found.values()}
     missing = {name: column for name, column in columns.items() if name not in names and not column.optional}
     if missing and not wrong:
@@ -318,7 +327,7 @@ def find_column(title: str, columns: Mapping[str, Column], others: bool) -> File
         return None
     titles = {key: _title(key, column) for key, column in columns.items()}
     known = ", ".join(titles.values())
-    raise ValueError(f"there is no such column, but {known}{did_you_mean(name, (), also=titles)}")
+    raise UnknownColumnError(f"there is no such column, but {known}{did_you_mean(name, (), also=titles)}")
 
 
 def _name_and_unit(title: str) -> tuple[str, str]:

@@ -1,14 +1,17 @@
 """Read tables (CSV) of the force, the steady velocity or the time constant at held commands."""
 
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from rov_fmu.io.csv_table import DataFileError, read_columns
+from rov_fmu.io.csv_table import Column, DataFileError, find_column, read_columns
 from rov_fmu.model.layout import Axis
 from rov_fmu.tank.columns import FORCE, HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
 
 TABLES = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}
 """The words that the name of a table begins with, each with the measured quantity."""
+_HINT = "; rename the header in this file, or write into [columns] of rov.toml what it stands for"
 _MOST_LINES = 10
 """The number of wrong rows in a file that get a line of their own."""
 
@@ -23,13 +26,20 @@ class Row:
     value: float
 
 
-def read_rows(path: Path, kind: str, axis: Axis | None = None) -> list[Row]:
-    """Read rows of a command and a force (`thrust`), velocity (`steady`) or time constant. Raises DataFileError."""
+def read_rows(
+    path: Path, kind: str, axis: Axis | None = None, names: Mapping[str, str] = {}
+) -> tuple[list[Row], frozenset[str]]:
+    """Read rows of a command and a force (`thrust`), velocity (`steady`) or time constant. Raises DataFileError.
+
+    `names` is the table [columns]. Returns those of its keys that the file has, too.
+    """
     name = TABLES[kind]
     column = FORCE if kind == "thrust" else time_constant_column()
     if axis and kind == "steady":
         column = velocity_column(axis)
-    table = read_columns(path, {"command": HELD_COMMAND, name: column})
+    columns = {"command": HELD_COMMAND, name: column}
+    renamed = dict(_renamed(names, columns))
+    table = read_columns(path, columns, renamed=renamed, hint=_HINT)
     refuse_slips(table, ["command"])
     noise = 0.05 * max(map(abs, table.values[name]))
     numbers = [*zip(table.lines, table.values["command"], table.values[name], strict=True)]
@@ -43,7 +53,15 @@ def read_rows(path: Path, kind: str, axis: Axis | None = None) -> list[Row]:
         more = len(mistakes) - _MOST_LINES
         counted = [f"{path}: {more} more rows like these"] if more > 0 else []
         raise DataFileError(*map(str, mistakes[:_MOST_LINES]), *counted)
-    return [Row(path.name, *row) for row in numbers]
+    return [Row(path.name, *row) for row in numbers], frozenset(renamed).intersection(table.header)
+
+
+def _renamed(names: Mapping[str, str], columns: Mapping[str, Column]) -> Iterator[tuple[str, str]]:
+    """Yield the entries of the table [columns] that stand for columns of the table; others are for logs."""
+    for title, meant in names.items():
+        with suppress(ValueError):  # such as a unit that only a log may have
+            if find_column(meant, columns, others=True):
+                yield title, meant
 
 
 def _impossible(kind: str, command: float, value: float, noise: float) -> str | None:

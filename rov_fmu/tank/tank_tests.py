@@ -192,7 +192,9 @@ class _Reader:
             if kind == "log":
                 self._read_log(path, AXES.get(subject))
             else:
-                self.rows.setdefault((kind, subject), []).extend(read_rows(path, kind, AXES.get(subject)))
+                rows, known = read_rows(path, kind, AXES.get(subject), self.names.columns)
+                self.rows.setdefault((kind, subject), []).extend(rows)
+                self.known |= known
         except FileError as error:
             self.mistakes += str(error).splitlines()
 
@@ -222,7 +224,8 @@ class _Reader:
         for table, names in (("columns", description.columns), ("topics", description.topics)):
             for name, value in names.items():
                 if name not in self.known:
-                    what = "no log has such a column" if table == "columns" else "no log has such a topic and field"
+                    is_header = table == "columns"
+                    what = "no CSV file has such a column" if is_header else "no log has such a topic and field"
                     yield key_line(f"{table}.{name}", f"{what}{did_you_mean(name, self.known)}", value)
 
     def missing_columns(self, requests: Requests) -> Iterator[str]:

@@ -125,7 +125,7 @@ def test_unknown_columns_are_named(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("names", "line"),
     [
-        ('[columns]\nDepthh = "depth [m]"', "rov.toml: columns.Depthh = 'depth [m]': no log has such a column"),
+        ('[columns]\nDepthh = "depth [m]"', "rov.toml: columns.Depthh = 'depth [m]': no CSV file has such a column"),
         ('[columns]\nx = "dpeth [m]"', "rov.toml: columns.x = 'dpeth [m]': there is no such column, but"),
         ('[topics]\n"/d.data" = "depth [m]"', "rov.toml: topics./d.data = 'depth [m]': no log has such a topic"),
         ('[columns]\nx = "-depth [m]"', "rov.toml: columns.x = '-depth [m]': there is no such column, but"),

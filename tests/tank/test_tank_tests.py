@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tables import Row
 from rov_fmu.tank.tank_tests import TankTests, load_tank_tests
@@ -53,6 +54,52 @@ def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table
         for path in TESTS.iterdir()
         if path.suffix == ".csv" or path.name == "rov.toml"
     }
+
+
+def test_the_table_columns_of_rov_toml_serves_tables_too(folder: Path) -> None:
+    """An entry about logs leaves the headers of tables as they are."""
+    before = load_tank_tests(folder)
+    (folder / "thrust_top_a.csv").write_text("Throttle (%),Pull (kgf)\n50,2\n", encoding="utf-8")
+    (folder / "steady_yaw_a.csv").write_text("Throttle (%),Rate\n50,60\n", encoding="utf-8")
+    (folder / "time_constant_yaw.csv").write_text("command [%],Tau\n50,300\n", encoding="utf-8")
+    (folder / "log_dive.csv").write_text(
+        "time [s],Throttle (%),command [%],depth [m]\n" + "".join(f"{n},{n},{n},{n}\n" for n in range(30)),
+        encoding="utf-8",
+    )
+    names = {
+        "Throttle (%)": "command [%]",
+        "Pull (kgf)": "force [kgf]",
+        "Rate": "velocity [deg/s]",
+        "Tau": "time constant [ms]",
+        "command [%]": "u_t [%]",
+    }
+    rov = folder / "rov.toml"
+    columns = "".join(f'"{title}" = "{meant}"\n' for title, meant in names.items())
+    given = re.sub(r"[ab]_t_top = .*\n", "", rov.read_text(encoding="utf-8"))
+    rov.write_text(f"{given}\n[columns]\n{columns}", encoding="utf-8")
+    found = load_tank_tests(folder)
+    assert found.thrust["top"] == (Row("thrust_top_a.csv", 2, 0.5, 2.0 * 9.80665),)
+    assert found.steady["yaw"][-1] == Row("steady_yaw_a.csv", 2, 0.5, radians(60.0))
+    assert found.time_constants["yaw"] == (Row("time_constant_yaw.csv", 2, 0.5, 0.3),)
+    assert found.steady["surge"] == before.steady["surge"]
+    rov.write_text(f'{rov.read_text(encoding="utf-8")}"Pul" = "force [kgf]"\n', encoding="utf-8")
+    with pytest.raises(VehicleFileError, match=r"columns.Pul = 'force \[kgf\]': no CSV file has such a column"):
+        load_tank_tests(folder)
+
+
+def test_unknown_headers_of_a_table_are_named_beside_the_expected_ones(folder: Path) -> None:
+    (folder / "thrust_top_a.csv").write_text("Throttle (%),Pull (kgf)\n50,2\n", encoding="utf-8")
+    (folder / "thrust_top_b.csv").write_text("command [%],Pull (kgf)\n50,2\n", encoding="utf-8")
+    with pytest.raises(DataFileError) as error:
+        load_tank_tests(folder)
+    hint = "; rename the header in this file, or write into [columns] of rov.toml what it stands for"
+    one, other, *_ = str(error.value).splitlines()
+    assert one == (
+        f"{folder / 'thrust_top_a.csv'}, line 1 = 'Throttle (%), Pull (kgf)': none of these headers is known; "
+        f"the first line must have the headers command [%], force [N]{hint}"
+    )
+    place = f"{folder / 'thrust_top_b.csv'}, line 1, column 2 = 'Pull (kgf)'"
+    assert other == f"{place}: there is no such column, but command [%], force [N]{hint}"
 
 
 def test_columns_in_any_order_and_unit(folder: Path) -> None:

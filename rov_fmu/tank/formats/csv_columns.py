@@ -6,8 +6,16 @@ from functools import partial
 
 from rov_fmu.io.csv_table import Column, Conversion, find_column
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, YAW, Axis, Layout
-from rov_fmu.tank.columns import LOGGED_COMMAND, TIME, VOLTAGE, position_column, velocity_column
+from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis, Layout
+from rov_fmu.tank.columns import (
+    FORCE,
+    LOGGED_COMMAND,
+    TIME,
+    VOLTAGE,
+    position_column,
+    time_constant_column,
+    velocity_column,
+)
 from rov_fmu.tank.formats.content import Entry
 
 COMMAND = "command"
@@ -15,6 +23,13 @@ COMMAND = "command"
 _POSITION_NAMES = {HEAVE: ("z",), ROLL: ("phi", "roll"), PITCH: ("theta", "pitch"), YAW: ("psi",)}
 """Other names of positions that need no axis: those in the FMU, and that of the axis."""
 LOGGED = replace(LOGGED_COMMAND, optional=True)
+_VELOCITY = velocity_column(SURGE)
+_OF_TABLES = {
+    "force": FORCE,
+    "velocity": replace(_VELOCITY, units={**_VELOCITY.units, **velocity_column(YAW).units}),
+    "time constant": time_constant_column(),
+}
+"""The columns that only tables have, and logs of one axis, whose velocities need not name it."""
 
 
 @dataclass(frozen=True)
@@ -73,14 +88,14 @@ def thrusters_of(layout: Layout) -> dict[str, Column]:
 
 
 def names_of(layout: Layout, columns: Mapping[str, str], topics: Mapping[str, str]) -> tuple[Names, list[str]]:
-    """Return the names of rov.toml, and a line for every value that is no column of a log.
+    """Return the names of rov.toml, and a line for every value that is no column of a log, or of a table in a CSV file.
 
     A log may also measure the motion along axes that the vehicle does not have.
     """
     sensors = sensors_of(AXES.values(), of_one=False) | CONDITIONS
     commands = inputs_of(layout) | thrusters_of(layout)
     known = commands | {name: sensor.column for name, sensor in sensors.items()}
-    of_csv = {"time": TIME, COMMAND: LOGGED, **known}
+    of_csv = {"time": TIME, COMMAND: LOGGED, **known, **_OF_TABLES}
     thrusters = {f"{prefix}{t.name}": t.name for t in layout.thrusters for prefix in ("u_", "thruster ")}
     entries, mistakes = {}, []
     for table, titles, targets in (("columns", of_csv, columns), ("topics", known, topics)):
