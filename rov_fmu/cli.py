@@ -102,6 +102,19 @@ def _number(allowed: str, low: float = -inf, high: float = inf, kind: type[float
     return number
 
 
+def _seconds(least: str) -> Callable[[str], float]:
+    """Return the type of an option that takes a time, s."""
+    number = _number(f"a number of at least {least} s")
+
+    def seconds(text: str) -> float:
+        value = number(text)
+        if value < float(least):
+            raise click.BadParameter(f"{shown(text)} must be at least {least} s")
+        return value
+
+    return seconds
+
+
 def _refuse_vehicle(path: Path, reason: str) -> None:
     """Raise FileError if a path that does not exist is the name of a vehicle that ships."""
     if str(path) in SHIPPED and not path.exists():
@@ -239,12 +252,12 @@ def _print_built(built: "Built", seconds: float) -> None:
 )
 @click.option(
     "--stop",
-    type=_number("a number from 1e-6 (s)", 1e-6),
+    type=_seconds("1e-6"),
     help="Time at the end, s. The default is the last time of COMMANDS.csv, or 10.",
 )
 @click.option(
     "--step",
-    type=_number("a number from 1e-6 (s)", 1e-6),
+    type=_seconds("1e-6"),
     help="Time between two results, s. The default is 0.01. It does not change the motion.",
 )
 @click.option("-o", "--output", type=_FILE, metavar="RESULT.csv", help="Table of results to write, .csv or .parquet.")
@@ -390,7 +403,7 @@ def _open(path: Path, option: str) -> None:
 )
 @click.option(
     "--duration",
-    type=_number("a number from 0.001 (s)", 1e-3),
+    type=_seconds("0.001"),
     help="End after this time of the simulation, s. Without it, end with Ctrl-C.",
 )
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all of them.")

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from rov_fmu.io.messages import InputError, did_you_mean
+from rov_fmu.io.messages import InputError, only
 from rov_fmu.model.layout import FAINT, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Layout, Thruster
 
 _AXES = (ROLL, PITCH, YAW, HEAVE, SURGE, SWAY)
@@ -48,8 +48,7 @@ def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Se
         key = f"u_{name.removeprefix('-')}"
         if key not in layout.commands:
             names = [command.removeprefix("u_") for command in layout.commands]
-            hint = did_you_mean(name.removeprefix("-"), names)
-            raise InputError(f"--servo {servo}={name}: there is no such input, only {', '.join(names)}{hint}")
+            raise InputError(f"--servo {servo}={name}: there is no such input{only(name.removeprefix('-'), names)}")
         if any(key == f"u_{other.removeprefix('-')}" for number, other in table.items() if number < servo):
             raise InputError(f"--servo {servo}={name}: another servo drives this input")
         found = {other: motor for other, motor in found.items() if motor[0] != servo}

@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 from lxml import etree
 
-from rov_fmu.io.messages import FileError, shown
+from rov_fmu.io.messages import NO_FILE, FileError, shown
 from rov_fmu.io.time_series import Series, number, series
 
 NAME = "org.fmi-standard.fmi-ls-ref"
@@ -69,6 +69,8 @@ class ReferenceResults:
         self._description = _Place(fmu, "modelDescription.xml")
         try:
             self._archive = zipfile.ZipFile(fmu)
+        except FileNotFoundError as error:
+            raise FileError(f"{fmu}: {NO_FILE}") from error
         except zipfile.BadZipFile as error:
             raise FileError(f"{fmu}: is no FMU, or a damaged one: {error}") from error
         if MANIFEST not in self._archive.namelist():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rov_fmu.io.messages import InputError, brief, did_you_mean, shown
+from rov_fmu.io.messages import InputError, brief, did_you_mean, only, shown
 from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.layout import Declaration, Layout
 from rov_fmu.vehicle.quantity import within
@@ -141,8 +141,8 @@ def _check_name(what: str, name: str, metas: Mapping[str, Declaration]) -> None:
     """Raise InputError if no variable of this kind has the name."""
     if name not in metas:
         kind = {"inputs": "input", "start": "state", "coefficients": "coefficient"}[what]
-        only = f", only {', '.join(metas)}" if len(metas) < 20 else ""
-        raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{only}{did_you_mean(str(name), metas)}")
+        known = only(str(name), metas) if len(metas) < 20 else did_you_mean(str(name), metas)
+        raise InputError(f"{what}[{name!r}]: the vehicle has no such {kind}{known}")
 
 
 def _check_shape(key: str, values: Array, times: int, many: bool) -> None:

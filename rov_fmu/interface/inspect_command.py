@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
-from rov_fmu.io.messages import brief
+from rov_fmu.io.messages import NO_FILE, brief
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.model.layout import AXES, BODY, PITCH, ROLL
 from rov_fmu.tank.description import ROV_FILE, read_description
@@ -26,7 +26,7 @@ def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
     Raises DataFileError, and VehicleFileError if rov.toml is not TOML.
     """
     if not path.exists():
-        raise DataFileError(f"{path}: there is no such file")
+        raise DataFileError(f"{path}: {NO_FILE}")
     vehicles = {name: load_vehicle(file) for name, file in SHIPPED.items()}
     layouts = [vehicle.layout for vehicle in vehicles.values()]
     folder = path if path.is_dir() else path.parent

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.io.messages import InputError, UnknownNameError, did_you_mean
+from rov_fmu.io.messages import InputError, UnknownNameError, only
 from rov_fmu.model.attitude import QUATERNION
 
 if TYPE_CHECKING:
@@ -38,8 +38,7 @@ class Result(Mapping[str, Array]):
     def __getitem__(self, name: str) -> Array:
         """Return the values of a variable. Raises UnknownNameError, a KeyError, if it was not recorded."""
         if name not in self.arrays:
-            hint = did_you_mean(str(name), self.arrays)
-            raise UnknownNameError(f"{name}: this variable was not recorded, only {', '.join(self.arrays)}{hint}")
+            raise UnknownNameError(f"{name}: this variable was not recorded{only(str(name), self.arrays)}")
         return self.arrays[name]
 
     def __iter__(self) -> Iterator[str]:

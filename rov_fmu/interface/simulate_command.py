@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
-from math import isfinite, nan
+from math import ceil, floor, isfinite, log10, nan
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from rov_fmu.interface.arguments import TIME, Array
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
-from rov_fmu.io.messages import FileError, InputError, did_you_mean, shown
+from rov_fmu.io.messages import FileError, InputError, did_you_mean, only, shown
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.time_series import Series, series
@@ -58,6 +58,9 @@ def run(
     for name in given.inputs:
         if name in inputs:
             raise InputError(f"--set {name}: {commands} has this input, too")
+    if stop is not None and step is None and stop / _STEP > _MOST_RESULTS:
+        ends = f"--stop {stop:g}" if commands is None or stop != inputs[TIME][-1] else f"{commands}, up to {stop:g} s,"
+        raise InputError(f"{ends} needs a longer --step than {_STEP:g} s: at least {_least_step(stop):g} s")
     time = _result_times(_STOP if stop is None else stop, _STEP if step is None else step)
     return vehicle.with_(**given.coefficients).simulate(time, inputs | given.inputs, start=given.start)
 
@@ -68,6 +71,13 @@ def _result_times(stop: float, step: float) -> Array:
         raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
     time = np.round(step * np.arange(int(stop / step) + 2), 12)  # 0.3, and not 3 * 0.1 = 0.30000000000000004
     return np.append(time[time < stop - 1e-9], stop)
+
+
+def _least_step(stop: float) -> float:
+    """Return the least step with not too many results up to a time, s, rounded up to three digits."""
+    least = stop / _MOST_RESULTS
+    digit = 10.0 ** (floor(log10(least)) - 2)
+    return ceil(round(least / digit, 6)) * digit
 
 
 @dataclass(frozen=True)
@@ -82,8 +92,7 @@ class Settings:
 def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     """Return the values of the options --set: inputs, what the vehicle begins with, coefficients. Raises InputError."""
     at_start = {*layout.state, *layout.initial}
-    names = [*layout.inputs, *layout.state, *layout.initial, *layout.coefficients]
-    found = _read_values(settings, names)
+    found = _read_values(settings, layout)
     return Settings(
         {name: value for name, value in found.items() if name in layout.inputs},
         {name: value for name, value in found.items() if name in at_start},
@@ -91,11 +100,14 @@ def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     )
 
 
-def _read_values(settings: Sequence[str], names: Sequence[str]) -> dict[str, float]:
+def _read_values(settings: Sequence[str], layout: Layout) -> dict[str, float]:
     """Return the values of the options --set by name. Raises InputError."""
+    names = {**layout.inputs, **layout.state, **layout.initial, **layout.coefficients}
     found: dict[str, float] = {}
     for text in settings:
         name, _, value = (part.strip() for part in text.partition("="))
+        if name not in names and name in layout.thrust:
+            raise InputError(f"--set {text}: {name} is an output, which cannot be set")
         if name not in names:
             hint = did_you_mean(name, names)
             raise InputError(f"--set {text}: the vehicle has no such input, state or coefficient{hint}")
@@ -106,8 +118,18 @@ def _read_values(settings: Sequence[str], names: Sequence[str]) -> dict[str, flo
         except ValueError:
             found[name] = nan
         if not isfinite(found[name]):
-            raise InputError(f"--set {text}: {shown(value)} must be a finite number")
+            percent = _percent(value) if names[name].unit == "1" else ""
+            raise InputError(f"--set {text}: {shown(value)} must be a finite number{percent}")
     return found
+
+
+def _percent(text: str) -> str:
+    """Return what to write instead of a value in percent, or an empty text for another value."""
+    try:
+        number = float(text.removesuffix("%")) if text.endswith("%") else nan
+    except ValueError:
+        number = nan
+    return f": {number:.6g} % is {number / 100.0:.6g}" if isfinite(number) else ""
 
 
 def _read_commands(path: Path, vehicle: VehicleModel) -> Series:
@@ -119,9 +141,7 @@ def _read_commands(path: Path, vehicle: VehicleModel) -> Series:
 
     def check_column(name: str) -> None:
         if name not in inputs:
-            raise error(
-                f"column {shown(name)}: there is no such input, only {', '.join(inputs)}{did_you_mean(name, inputs)}"
-            )
+            raise error(f"column {shown(name)}: there is no such input{only(name, inputs)}")
 
     return series(read_text(path), error, check_column)
 

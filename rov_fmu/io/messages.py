@@ -4,7 +4,7 @@ import os
 import reprlib
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from textwrap import wrap
@@ -12,6 +12,9 @@ from textwrap import wrap
 MOST = 10
 """The number of mistakes in a file that are printed; the others are counted."""
 
+
+NO_FILE = "there is no such file"
+"""The reason if a file is missing."""
 
 Progress = Callable[[str, float], None]
 """A function that is called with the name of the next step and the share of the work that is done, from 0 to 1."""
@@ -101,6 +104,15 @@ def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
         by_folded.setdefault(known.casefold(), []).append(known)
     close = get_close_matches(name.casefold(), by_folded, most)
     return [known for folded in close for known in by_folded[folded]][:most]
+
+
+def only(name: str, names: Collection[str], listed: str = "") -> str:
+    """Return the end of a message about a name that is not one of a few: the names that exist, and what was meant.
+
+    `listed` is the list of the names, by default with commas. A single name is not suggested as well.
+    """
+    hint = did_you_mean(name, names) if len(names) > 1 else ""
+    return f", only {listed or ', '.join(names)}{hint}"
 
 
 def did_you_mean(name: str, names: Iterable[str], most: int = 1, also: Mapping[str, str] | None = None) -> str:

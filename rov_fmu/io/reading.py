@@ -5,7 +5,7 @@ from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import TextIO
 
-from rov_fmu.io.messages import FileError
+from rov_fmu.io.messages import NO_FILE, FileError
 
 
 def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> bytes:
@@ -14,6 +14,8 @@ def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int | Non
         if most is not None and (size := path.stat().st_size) > most:
             raise kind(f"{path}: is too large, with {size / 1e6:.0f} MB: at most {most / 1e6:.0f} MB are read")
         return path.read_bytes()
+    except FileNotFoundError as error:
+        raise kind(f"{path}: {NO_FILE}") from error
     except OSError as error:
         raise kind(f"{path}: cannot be read: {error.strerror or error}") from error
 

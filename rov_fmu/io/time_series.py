@@ -3,7 +3,7 @@
 import csv
 import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite, nan
 
 from rov_fmu.io.messages import FileError, shown
@@ -12,8 +12,12 @@ _NUMBER = re.compile(r"[-+0-9.][-+0-9.eE]*")
 _UNIT = re.compile(r"\s\[[^\[\]]*\]$")
 _WORDS = {"true": 1.0, "false": 0.0}
 
-Series = Mapping[str, Sequence[float]]
-"""The columns of a CSV file by name; the first is the time."""
+
+class Series(dict[str, Sequence[float]]):
+    """The columns of a CSV file by name; the first is the time."""
+
+    lines: Sequence[int] = ()
+    """The line of the file on which each row is."""
 
 
 def series(text: str, error: Callable[[str], FileError], check_column: Callable[[str], None]) -> Series:
@@ -22,15 +26,15 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
     A mistake raises the exception that `error` returns for its reason. `check_column` may raise one about a name.
     """
     try:
-        lines = list(csv.reader(io.StringIO(text, newline=""), strict=True))
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        lines = [(reader.line_num, line) for line in reader if any(map(str.strip, line))]
     except csv.Error as wrong:
         raise error(f"not CSV: {wrong}") from wrong
-    lines = [line for line in lines if any(map(str.strip, line))]
     if not lines:
         raise error("is empty")
     if len(lines) < 2:
         raise error("has no rows below a header")
-    header = [name.strip() for name in lines[0]]
+    header = [name.strip() for name in lines[0][1]]
     if all(_NUMBER.fullmatch(name) for name in header):
         raise error("the first line must be a header that names the columns: the time, and then variables")
     if len(header) == 1 and (mark := next((mark for mark in ";\t" if mark in header[0]), None)):
@@ -43,15 +47,17 @@ def series(text: str, error: Callable[[str], FileError], check_column: Callable[
             raise error(f"column {shown(name)}: must be {plain} without a unit; a command of 30 % is 0.3 here")
         check_column(name)
     rows: list[list[float]] = []
-    for n, line in enumerate(lines[1:], 1):
+    for n, line in lines[1:]:
         if len(line) != len(header):
-            raise error(f"row {n}: {len(line)} cells below {len(header)} columns")
+            raise error(f"line {n}: {len(line)} cells below {len(header)} columns")
         rows.append(
-            [number(cell, f"row {n}, column {shown(name)}", error) for name, cell in zip(header, line, strict=True)]
+            [number(cell, f"line {n}, column {shown(name)}", error) for name, cell in zip(header, line, strict=True)]
         )
-        if n > 1 and rows[-1][0] < rows[-2][0]:
-            raise error(f"row {n}: the time goes back")
-    return dict(zip(header, zip(*rows, strict=True), strict=True))
+        if len(rows) > 1 and rows[-1][0] < rows[-2][0]:
+            raise error(f"line {n}: the time goes back")
+    found = Series(zip(header, zip(*rows, strict=True), strict=True))
+    found.lines = [n for n, _ in lines[1:]]
+    return found
 
 
 def number(text: str, where: str, error: Callable[[str], FileError]) -> float:
@@ -61,5 +67,5 @@ def number(text: str, where: str, error: Callable[[str], FileError]) -> float:
     except ValueError:
         found = nan
     if not isfinite(found):
-        raise error(f"{where} = {shown(text)}: must be a number")
+        raise error(f"{where} = {shown(text)}: must be a finite number")
     return found

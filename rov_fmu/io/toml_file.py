@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, cre
 from pydantic_core import ErrorDetails
 
 from rov_fmu.io.file_kinds import check_keys
-from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, lines_on, shown, similar
+from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.reading import read_text
 
 if sys.version_info >= (3, 11):
@@ -240,8 +240,8 @@ def _problem_line(problem: ErrorDetails, data: Toml, schema: _Schema, hint_of: C
             return f"{key}: there is no such key{hint}"
         allowed = schema.keys(place[:-1])
         hint = did_you_mean(str(place[-1]), allowed)
-        only = "" if hint and len(allowed) > _LISTED else f", only {join_names(allowed)}"
-        return f"{key}: there is no such key{only}{hint}"
+        known = hint if hint and len(allowed) > _LISTED else only(str(place[-1]), allowed, join_names(allowed))
+        return f"{key}: there is no such key{known}"
     reason = _reason(problem, schema)
     *above, last = place
     if isinstance(last, int) and not is_table and schema.at(place).get("type") != "object":  # show the whole list

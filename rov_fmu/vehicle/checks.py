@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from pydantic_core import ErrorDetails
 
-from rov_fmu.io.messages import did_you_mean, shown
+from rov_fmu.io.messages import did_you_mean, only, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line, validate
 from rov_fmu.model.layout import (
     ARM,
@@ -117,7 +117,7 @@ def _check_names(parts: Hardware, lost: set[str], data: Toml) -> Iterator[str]:
     yield from _check_distinct([(f"inputs.{name}", name) for name in parts.inputs])
     for n, entry in thrusters:
         if curves and isinstance(curve := entry.get("curve"), str) and curve not in curves:
-            reason = f"there is no such curve, only {join_names(curves)}{did_you_mean(curve, curves)}"
+            reason = f"there is no such curve{only(curve, curves, join_names(curves))}"
             yield key_line(f"{entry_label('thruster', entries, n)}.curve", reason, curve)
     if "thruster" in lost:
         return
@@ -145,7 +145,7 @@ def _check_gains(inputs: Mapping[str, Mapping[str, float]], names: Sequence[str]
     for name, gains in inputs.items():
         for driven in gains:
             if driven not in names:
-                reason = f"there is no such thruster, only {join_names(names)}{did_you_mean(driven, names)}"
+                reason = f"there is no such thruster{only(driven, names, join_names(names))}"
                 yield key_line(f"inputs.{name}.{driven}", reason)
                 wrong = True
         if not any(gains.values()):

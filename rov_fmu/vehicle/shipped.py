@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_suffix
-from rov_fmu.io.messages import FileError, did_you_mean
+from rov_fmu.io.messages import NO_FILE, FileError, did_you_mean
 from rov_fmu.io.paths import MODELS
 from rov_fmu.model.layout import HEAVE, SURGE, YAW, Curve, Layout, Thruster, VehicleAxis
 
@@ -43,5 +43,5 @@ def find_vehicle(given: str | Path) -> Path:
         is_bare_name = not path.suffix and path.parent == Path()
         ships = f", and no vehicle of this name ships, only {', '.join(SHIPPED)}" if is_bare_name else ""
         beside = [str(file) for file in sorted(path.parent.glob("*.toml"))]
-        raise FileError(f"{name}: there is no such file{ships}{did_you_mean(name, [*SHIPPED, *beside])}")
+        raise FileError(f"{name}: {NO_FILE}{ships}{did_you_mean(name, [*SHIPPED, *beside])}")
     return path

@@ -12,7 +12,7 @@ import pytest
 from rov_fmu.build import chosen_platforms
 from rov_fmu.cli import main
 from rov_fmu.engine.compile import BuildError
-from rov_fmu.io.messages import did_you_mean, similar
+from rov_fmu.io.messages import did_you_mean, only, similar
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import ALONE, BARE, TESTS
 
@@ -43,6 +43,11 @@ def test_other_words_stand_for_names() -> None:
     assert did_you_mean("MacOS", ["win64"], also=also) == "; did you mean darwin64 or aarch64-darwin?"
     assert did_you_mean("win65", ["win64"], also=also) == "; did you mean win64?"
     assert did_you_mean("amiga", ["win64"], also=also) == ""
+
+
+def test_a_single_name_is_said_once() -> None:
+    assert only("porp", ["prop"]) == ", only prop"
+    assert only("porp", ["prop", "bow"]) == ", only prop, bow; did you mean prop?"
 
 
 # ---- The command line ------------------------------------------------------------------------------------------------

@@ -287,11 +287,11 @@ BAD: dict[str, tuple[Files, str]] = {
     "no expected results": ({_Y: None}, f"{_Y}: there is no such file in the FMU"),
     "an unknown variable": ({_Y: "time,q\n0,1\n"}, f"{_Y}: the FMU has no variable 'q'"),
     "an unknown input": ({_U: "time,q\n0,1\n"}, f"{_U}: the FMU has no variable 'q'"),
-    "no number": ({_Y: "time,y\n0,a\n"}, f"{_Y}: row 1, column 'y' = 'a': must be a number"),
-    "NaN": ({_Y: "time,y\n0,nan\n"}, f"{_Y}: row 1, column 'y' = 'nan': must be a number"),
+    "no number": ({_Y: "time,y\n0,a\n"}, f"{_Y}: line 2, column 'y' = 'a': must be a finite number"),
+    "NaN": ({_Y: "time,y\n0,nan\n"}, f"{_Y}: line 2, column 'y' = 'nan': must be a finite number"),
     "semicolons": ({_Y: "time;y\n0,0;0,5\n"}, f"{_Y}: columns are parted by commas, and not by ';'"),
-    "a torn row": ({_Y: "time,y\n0\n"}, f"{_Y}: row 1: 1 cells below 2 columns"),
-    "time that goes back": ({_Y: "time,y\n1,0\n0,0\n"}, f"{_Y}: row 2: the time goes back"),
+    "a torn row": ({_Y: "time,y\n0\n"}, f"{_Y}: line 2: 1 cells below 2 columns"),
+    "time that goes back": ({_Y: "time,y\n1,0\n0,0\n"}, f"{_Y}: line 3: the time goes back"),
     "a column twice": ({_Y: "time,y,y\n0,0,0\n"}, f"{_Y}: column 'y': there is such a column before"),
     "no rows": ({_Y: "time,y\n"}, f"{_Y}: has no rows below a header"),
     "an open quote": ({_Y: 'time,"y\n0,1\n'}, f"{_Y}: not CSV: "),
@@ -337,7 +337,7 @@ def test_bad_input_is_one_line_that_names_the_file(case: str, foreign: Path, tmp
     ("step", "expected"),
     {
         "1e-9": f"{_EXP}: experiment 'a': stepSize = 1e-09 s takes 1e+10 steps from 0 to 10 s; at most 1000000 are run",
-        "soon": "modelDescription.xml: DefaultExperiment: stepSize = 'soon': must be a number",
+        "soon": "modelDescription.xml: DefaultExperiment: stepSize = 'soon': must be a finite number",
     }.items(),
 )
 def test_a_default_experiment_is_checked_as_the_others(
@@ -366,7 +366,7 @@ def _flipped(fmu: Path, path: Path) -> None:
 DAMAGE: dict[str, tuple[Callable[[Path, Path], None], str]] = {
     "cut off": (_cut, "is no FMU, or a damaged one: "),
     "a byte changed": (_flipped, f"is no FMU, or a damaged one: Bad CRC-32 for file '{MANIFEST}'"),
-    "not there": (lambda _, __: None, "No such file or directory"),
+    "not there": (lambda _, __: None, "there is no such file\n"),
     "a folder": (lambda _, path: path.mkdir(), "Is a directory"),
 }
 

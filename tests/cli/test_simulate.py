@@ -100,18 +100,33 @@ def test_a_command_beyond_full_is_a_warning(capsys: Capsys) -> None:
 WRONG = {
     "unknown vehicle": (["videorey"], "videorey: there is no such file, "),
     "unknown name": (["--set", "ul=1"], "--set ul=1: the vehicle has no such input, state or coefficient; did you"),
+    "an output": (["--set", "F_l=3"], "--set F_l=3: F_l is an output, which cannot be set\n"),
+    "percent": (["--set", "u_l=30%"], "--set u_l=30%: '30%' must be a finite number: 30 % is 0.3\n"),
+    "percent of a length": (["--set", "z=30%"], "--set z=30%: '30%' must be a finite number\n"),
     "no value": (["--set", "u_l"], "'--set': 'u_l' must be NAME=VALUE, such as u_l=0.3"),
     "a word": (["--set", "u_l=a"], "--set u_l=a: 'a' must be a finite number"),
     "NaN": (["--set", "u_l=nan"], "--set u_l=nan: 'nan' must be a finite number"),
     "twice": (["--set", "u_l=1", "--set", "u_l=2"], "--set u_l=2: u_l is set before"),
     "out of bounds": (["--set", "a_d_u=-1"], "a_d_u = -1.0: must be within 0 ... 1000000 N.s2/m2"),
-    "no table": (["--input", "none.csv"], "none.csv: cannot be read: No such file or directory"),
+    "no table": (["--input", "none.csv"], "none.csv: there is no such file\n"),
     "a column of no input": (["--input", "wrong.csv"], "wrong.csv: column 'ul': there is no such input, only u_l"),
-    "a cell that is no number": (["--input", "cell.csv"], "cell.csv: row 2, column 'u_l' = 'x': must be a number"),
+    "a cell that is no number": (
+        ["--input", "cell.csv"],
+        "cell.csv: line 3, column 'u_l' = 'x': must be a finite number\n",
+    ),
     "an input twice": (["--input", "commands.csv", "--set", "u_l=1"], "--set u_l: commands.csv has this input, too"),
     "no time": (["--input", "short.csv"], "short.csv: the last time is 0 s, and must be at least 1e-06"),
-    "no duration": (["--stop", "0"], "'--stop': '0' must be a number from 1e-6 (s)"),
+    "no duration": (["--stop", "0"], "'--stop': '0' must be at least 1e-6 s\n"),
+    "a time in words": (["--step", "x"], "'--step': 'x' must be a number of at least 1e-6 s\n"),
     "too many results": (["--step", "1e-6"], "--step 1e-06: gives more than 1000000 results up to 10 s"),
+    "a late end": (["--stop", "1e9"], "--stop 1e+09 needs a longer --step than 0.01 s: at least 1000 s\n"),
+    "an end that is later still": (["--stop", "1234567"], " at least 1.24 s\n"),
+    "a long table": (
+        ["--input", "long.csv"],
+        "long.csv, up to 20000 s, needs a longer --step than 0.01 s: at least 0",
+    ),
+    "a time that goes back": (["--input", "back.csv"], "back.csv: line 5: the time goes back\n"),
+    "a cell that is not finite": (["--input", "nan.csv"], "nan.csv: line 3, column 'u_l' = 'nan': must be a finite nu"),
     "another table": (["-o", "result.txt"], "--output result.txt: the name must end with .csv or .parquet"),
     "another picture": (["--plot", "a.gif"], "--plot a.gif: the name must end with .png, .svg or .pdf\n"),
     "a plot before the vehicle": (["--plot", "videoray"], ".png, .svg or .pdf; without a file, --plot comes after VEH"),
@@ -130,6 +145,9 @@ WRONG = {
 def test_a_mistake_is_one_line_and_writes_nothing(case: str, here: Path, capsys: Capsys) -> None:
     (here / "wrong.csv").write_text("time,ul\n0,1\n1,1\n", encoding="utf-8")
     (here / "cell.csv").write_text("time,u_l\n0,1\n1,x\n", encoding="utf-8")
+    (here / "back.csv").write_text("time,u_l\n0,1\n\n2,1\n1,1\n", encoding="utf-8")
+    (here / "nan.csv").write_text("time,u_l\n0,1\n1,nan\n", encoding="utf-8")
+    (here / "long.csv").write_text("time,u_l\n0,1\n20000,1\n", encoding="utf-8")
     (here / "unit.csv").write_text("time [s],u_l [%]\n0,30\n1,30\n", encoding="utf-8")
     (here / "short.csv").write_text("time,u_l\n0,1\n", encoding="utf-8")
     before = {path.name: path.read_bytes() for path in here.iterdir()}

@@ -320,7 +320,7 @@ def test_bad_points(content: str, named: str, tmp_path: Path, capsys: pytest.Cap
         (["--command", "0.3"], "--v-ss"),
         (["--points", "a.csv", "--tau", "3"], "instead"),
         (["--axis", "sway", *HEAVE_AT_30[2:]], "sway: the vehicle has only surge, heave, yaw"),
-        (["--points", "nowhere.csv"], "nowhere.csv: cannot be read: No such file"),
+        (["--points", "nowhere.csv"], "nowhere.csv: there is no such file"),
         ([*HEAVE_AT_30[2:], "-o", "nowhere/tuned.toml"], "no folder"),
     ],
 )

@@ -173,7 +173,7 @@ def test_mistakes_of_all_kinds_are_reported_at_once_and_nothing_is_written(
     (tmp_path / "plan.toml").write_text(head + VARY + "[inputs]\nu_l = 1.5\n" + '[figures]\nend = "q[-1]"\n')
     assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results")]) == 2
     keys = [line.split(":")[2].split()[0] for line in capsys.readouterr().err.splitlines()]
-    assert keys == ["stop_time", "runs", "inputs.u_l", "figures.end", "row"]
+    assert keys == ["stop_time", "runs", "inputs.u_l", "figures.end", "line"]
     assert not (tmp_path / "results").exists()
 
 
@@ -186,14 +186,14 @@ def test_what_is_no_fmu_for_co_simulation_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "message"),
     {
-        "time,u_l\n0,0\n\n0.1,1.5\n": "row 2, column 'u_l' = 1.5 at 0.1 s: must be within -1 ... 1",
-        "time,u_l\n0.03,0.5\n0.1,0.5\n": "row 1, column 'u_l' = 0.5 at 0.03 s: a jump, as from 0 here, must be at a ",
-        "time,u_l\n0,0\n0.5,full\n": "row 2, column 'u_l' = 'full': must be a number",
+        "time,u_l\n0,0\n\n0.1,1.5\n": "line 4, column 'u_l' = 1.5 at 0.1 s: must be within -1 ... 1",
+        "time,u_l\n0.03,0.5\n0.1,0.5\n": "line 2, column 'u_l' = 0.5 at 0.03 s: a jump, as from 0 here, must be at a ",
+        "time,u_l\n0,0\n0.5,full\n": "line 3, column 'u_l' = 'full': must be a finite number",
         "time,u\n0,0\n": "column 'u': is no input of the FMU; its causality is output",
         "time,u_r\n0,0\n": "column 'u_r': is given in [inputs] too",
     }.items(),
 )
-def test_a_mistake_in_a_file_of_inputs_is_reported_with_its_row(
+def test_a_mistake_in_a_file_of_inputs_is_reported_with_its_line(
     rows: str, message: str, tmp_path: Path, model: Model
 ) -> None:
     (tmp_path / "u.csv").write_text(rows)

@@ -367,7 +367,7 @@ def test_bad_file(content: bytes, named: tuple[str, ...], tmp_path: Path, capsys
 def test_missing_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     vehicle_file, table = tables_with(tmp_path, SURGE_STEADY, str.encode)
     table.unlink()
-    check_refused(vehicle_file, (str(table), "No such file"), capsys)
+    check_refused(vehicle_file, (str(table), "there is no such file"), capsys)
 
 
 def test_tables_as_spreadsheets_save_them(tmp_path: Path, vehicle: Vehicle) -> None:

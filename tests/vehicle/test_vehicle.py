@@ -297,7 +297,7 @@ def test_commands_refuse_a_bad_file(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
-    check_line(refusal(tmp_path / "nowhere.toml"), tmp_path / "nowhere.toml", ("No such file",))
+    check_line(refusal(tmp_path / "nowhere.toml"), tmp_path / "nowhere.toml", ("there is no such file",))
     check_line(refusal(tmp_path), tmp_path, ())
     path = tmp_path / "latin.toml"
     path.write_bytes(TEXT.split("[body]")[0].replace("VideoRay Pro 4", "Röv", 1).replace("β", "b").encode("latin-1"))

@@ -44,9 +44,11 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     """Check that a plan, read from `path`, fits an FMU. Raises PlanError with every reason."""
     vehicle = load_vehicle(vehicle_file("vary_from", plan.vary_from, path)) if plan.vary_from else None
     estimates = Estimates(plan, vehicle, model.variables)
-    own, from_file, unread = [*check_plan(plan)], {}, []
+    own, unread = [*check_plan(plan)], []
+    from_file: Mapping[str, Signal] = {}
+    lines: Sequence[int] = ()
     try:
-        from_file = _file_inputs(plan, path, model)
+        from_file, lines = _file_inputs(plan, path, model)
     except FileError as error:
         unread = [str(error)]
     times = np.zeros(0) if own else plan.start_time + plan.step * np.arange(plan.steps + 1, dtype=np.float64)
@@ -54,7 +56,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     wrong = lines_on(path, words) + unread
     if plan.input_file:
         file = path.parent / plan.input_file.path
-        wrong += [f"{file}: {line}" for line in _check_rows(plan, model.variables, from_file)]
+        wrong += [f"{file}: {line}" for line in _check_rows(plan, model.variables, from_file, lines)]
     if wrong:
         raise PlanError(*wrong)
     design = Design(plan, model.variables, estimates.known)
@@ -93,10 +95,10 @@ def vehicle_file(key: str, given: str, path: Path) -> Path:
     return SHIPPED[given]
 
 
-def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
-    """Read the inputs in the CSV file of the plan. Raises FileError."""
+def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, Signal], Sequence[int]]:
+    """Read the inputs in the CSV file of the plan, and the line of each row. Raises FileError."""
     if not plan.input_file:
-        return {}
+        return {}, ()
     file = path.parent / plan.input_file.path
 
     def error(reason: str) -> FileError:
@@ -106,13 +108,14 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> dict[str, Signal]:
         if name not in model.variables:
             raise error(unknown(name, model.variables))
 
-    (_, times), *columns = series(read_text(file), error, check_column).items()
+    table = series(read_text(file), error, check_column)
+    (_, times), *columns = table.items()
     found = {}
     for name, values in columns:
         points = tuple(zip(times, values, strict=True))
         held = plan.input_file.between == "steps" or not model.variables[name].is_continuous
         found[name] = Signal(steps=points) if held else Signal(ramps=points)
-    return found
+    return found, table.lines
 
 
 # ---- Checks ----------------------------------------------------------------------------------------------------------
@@ -174,15 +177,17 @@ def _check_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
                 yield key_line(key, reason, [*signal.points[n]])
 
 
-def _check_rows(plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal]) -> Iterator[str]:
-    """Yield a line for each input in a file that does not fit, with its column and row."""
+def _check_rows(
+    plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal], lines: Sequence[int]
+) -> Iterator[str]:
+    """Yield a line for each input in a file that does not fit, with its column and the line of its row."""
     for name, signal in from_file.items():
         column, points = f"column {shown(name)}", signal.points
         if reason := "is given in [inputs] too" if name in plan.inputs else _no_input(name, plan, has):
             yield f"{column}: {reason}"
         else:
             for n, reason in (*_out_of_bounds(signal, has[name]), *_misplaced_jumps(signal, plan, has[name].start)):
-                yield f"row {n + 1}, {column} = {points[n][1]:g} at {points[n][0]:g} s: {reason}"
+                yield f"line {lines[n]}, {column} = {points[n][1]:g} at {points[n][0]:g} s: {reason}"
 
 
 def _no_input(name: str, plan: Plan, has: Mapping[str, Variable]) -> str:
