@@ -1,6 +1,7 @@
 """Build the FMU of a vehicle: make its content, compile, write, validate and run it."""
 
-from collections.abc import Callable, Mapping, Sequence
+import zipfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -13,7 +14,7 @@ from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.io.file_kinds import FMU, check_written
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import InputError, did_you_mean, shown
+from rov_fmu.io.messages import FileError, InputError, did_you_mean, shown
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
@@ -32,13 +33,15 @@ class Built:
     binaries: Mapping[str, int]
     """The size of each binary in bytes by platform; none in pure Python."""
     seconds: Mapping[str, float]
-    """The time until each platform was compiled."""
+    """The time until each platform was compiled, from the start of all compilers, which run in parallel."""
     note: str
     """The result of validating and running the FMU."""
     was_run: bool
     """True when the FMU was run, and so has a binary for this machine."""
     beside: Sequence[Path]
     """The other files that were written."""
+    lost: Sequence[str] = ()
+    """The folders of binaries/ that the FMU had which this one replaced, and that this one does not have."""
 
 
 def build(
@@ -50,6 +53,7 @@ def build(
     fmi: int = 2,
     osp: bool = False,
     inputs: Sequence[Path] = (),
+    on_content: Callable[[], None] = lambda: None,
     on_compiled: Callable[[str], None] = lambda _: None,
 ) -> Built:
     """Build the FMU of a vehicle, validate it and run it. After a failure no file is written.
@@ -59,11 +63,12 @@ def build(
     `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms. `fmi` is the version
     of FMI, 2 or 3. `osp` also writes <identifier>_OspModelDescription.xml to the folder of the FMU. `pythonfmu` and
     `osp` need FMI 2.0. `inputs` are further files that must not be overwritten, like those that the vehicle names.
-    `on_compiled` is called with the name of each platform that has been compiled.
+    `on_content` is called once the content is made and the compilers begin, and `on_compiled` with the name of each
+    platform that has been compiled.
 
     Raises InputError if `vehicle` is not a vehicle or its coefficients are invalid; OptionError if another argument
-    is; BuildError if the build fails; VehicleFileError if a file of the vehicle cannot be read; WriteError, an
-    OSError, if a path cannot be written.
+    is; BuildError if the build fails; FileError if a file of the vehicle cannot be read, or if `output` does not end
+    with .fmu; WriteError, an OSError, if a path cannot be written.
     """
     if not isinstance(vehicle, Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, as rov_fmu.load({str(vehicle)!r}) returns it")
@@ -84,11 +89,14 @@ def build(
         beside = [Output(osp_path(output, vehicle.identifier), description)]
     check_targets([output, *(other.path for other in beside)], [*inputs, *vehicle.files])
     check_written(output, FMU)
+    if output.suffix.lower() != ".fmu":
+        raise FileError(f"{output}: the name must end with .fmu")
     chosen = chosen_platforms(platforms, fmi) if native else []
     results = reference_results(vehicle)
     flown = module(vehicle.rov)
     pages = {**documentation(vehicle, native=native, fmi=fmi, module=flown), **results}
     content = native_content(vehicle, pages, fmi) if native else python_content(vehicle, pages)
+    on_content()
     start = perf_counter()
     seconds: dict[str, float] = {}
 
@@ -101,14 +109,15 @@ def build(
         f"binaries/{_folder(name, fmi)}/{content.identifier}{PLATFORMS[name].suffix}": library
         for name, library in binaries.items()
     }
-    packed = archive({**content.files, **libraries})
+    files = {**content.files, **libraries}
+    packed, lost = archive(files), sorted(_platforms_in(output) - _folders(files))
     checked: list[tuple[str, bool]] = []
     draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen if native else None, fmi)))
     write_whole(draft, *beside)
     sizes = {name: len(library) for name, library in binaries.items()}
     written = [other.path for other in beside]
     note, was_run = checked[0]
-    return Built(output, len(packed), content.guid, sizes, seconds, note, was_run, written)
+    return Built(output, len(packed), content.guid, sizes, seconds, note, was_run, written, lost)
 
 
 def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[str]:
@@ -124,6 +133,20 @@ def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[st
     if "host" in names and host is None:
         raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")
     return list(dict.fromkeys(host if name == "host" and host else name for name in names))
+
+
+def _platforms_in(fmu: Path) -> set[str]:
+    """Return the platforms that an FMU has binaries for; none if there is no FMU at the path."""
+    try:
+        with zipfile.ZipFile(fmu) as old:
+            return _folders(old.namelist())
+    except Exception:  # zipfile raises many kinds on damaged archives
+        return set()
+
+
+def _folders(names: Iterable[str]) -> set[str]:
+    """Return the folders of binaries/ in the names of an FMU's files."""
+    return {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
 
 
 def _folder(name: str, fmi: int) -> str:

@@ -208,20 +208,32 @@ def _build(vehicle: Path, output: Path | None, backend: str, fmi: int, platforms
     started = perf_counter()
     loaded = load_vehicle(vehicle)
     chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
-    with compiling(chosen) as done:
+    with compiling(chosen) as (begin, done):
         built = build(
-            loaded, output, platforms=chosen, backend=backend, fmi=fmi, osp=osp, inputs=[vehicle], on_compiled=done
+            loaded,
+            output,
+            platforms=chosen,
+            backend=backend,
+            fmi=fmi,
+            osp=osp,
+            inputs=[vehicle],
+            on_content=begin,
+            on_compiled=done,
         )
     _print_built(built, perf_counter() - started)
 
 
 def _print_built(built: "Built", seconds: float) -> None:
     """Print the size of the FMU and of its binaries, the times, what it did when it was run, and what to do next."""
-    from rov_fmu.report.console import console, paragraph, print_end, shell_words
+    from rov_fmu.report.console import console, listed, paragraph, print_end, shell_words
 
     out = console()
+    if built.lost:
+        paragraph(out, f"Replaced {shell_words(built.path)}, which also had {listed(built.lost)}.")
     size = f"{built.size / 1000:.0f} kB, built in {seconds:.1f} s, GUID {built.guid}"
     paragraph(out, f"{shell_words(built.path)}: {size}")
+    if len(built.binaries) > 1:
+        paragraph(out, "The compilers ran in parallel. Each time is that from their start to the end of one:")
     for name, size_of_binary in built.binaries.items():
         out.print(f"  {name:<14}{size_of_binary / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
     paragraph(out, built.note)

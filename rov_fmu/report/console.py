@@ -114,11 +114,14 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
 def print_proof(findings: "Sequence[Finding]") -> None:
     """Print how many results are as expected, then the largest deviation of each experiment and each failed result."""
     out = console()
+    experiments = [*dict.fromkeys(f.experiment for f in findings)]
+    number = f"{len(experiments)} experiment{'s' if len(experiments) > 1 else ''}"
     passed = f"{sum(f.passed for f in findings)} of {len(findings)} pass"
-    paragraph(out, f"{passed}. A deviation is the largest one, relative to the largest expected value.")
+    counted = f"{number}, {len(findings)} results: {passed}."
+    paragraph(out, f"{counted} A deviation is the largest one, relative to the largest expected value.")
     out.print()
     found = table("", "experiment", ("deviation", "tolerance"), ("result", "of"))
-    for experiment in dict.fromkeys(f.experiment for f in findings):
+    for experiment in experiments:
         own = [f for f in findings if f.experiment == experiment]
         if good := [f for f in own if f.passed]:
             worst = max(good, key=lambda f: f.deviation)

@@ -94,19 +94,25 @@ def parts() -> Iterator[Parts]:
 
 
 @contextmanager
-def compiling(platforms: Sequence[str]) -> Iterator[Callable[[str], None]]:
-    """Show a part for each platform that is compiled. Yields the function to call with a platform that is done."""
+def compiling(platforms: Sequence[str]) -> Iterator[tuple[Callable[[], None], Callable[[str], None]]]:
+    """Show a part for the content of an FMU, and then one for each platform; these are compiled in parallel.
+
+    Yields the function to call when the compilers begin, and the one to call with each platform that is done. A pipe
+    gets a line for each of several platforms.
+    """
     with parts() as shown:
-        remaining = [f"compiling {name}" for name in platforms]
-        if remaining:
-            shown.begin(*remaining)
+        if shown.is_shown:
+            shown.begin("making the content")
+
+        def begin() -> None:
+            if platforms:
+                shown.begin(*(f"compiling {name}" for name in platforms))
 
         def done(name: str) -> None:
-            remaining.remove(f"compiling {name}")
-            if remaining or shown.is_shown:
+            if shown.is_shown or len(platforms) > 1:
                 shown.end(f"compiling {name}")
 
-        yield done
+        yield begin, done
 
 
 class StudyProgress(Protocol):

@@ -163,6 +163,8 @@ TYPED: dict[str, tuple[list[str], str]] = {
         ["build", "-o", "mine.toml"],
         "mine.toml: would be an FMU, but .toml is the suffix of a TOML file",
     ),
+    "an FMU with the name of an archive": (["build", "-o", "x.zip"], "x.zip: the name must end with .fmu"),
+    "an FMU without a suffix": (["build", "-o", "x"], "x: the name must end with .fmu"),
     "a vehicle written to an FMU": (
         ["identify", str(TESTS), "-o", "x.fmu"],
         "x.fmu: would be a vehicle file (TOML), but .fmu is the suffix of an FMU",

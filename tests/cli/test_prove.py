@@ -48,7 +48,7 @@ def test_the_videoray_proves_itself(interface: str | None, videoray_fmu: Path, c
     out, err = capsys.readouterr()
     assert err == ""
     assert "FAIL" not in out
-    assert f"{28 * 2 + 7} of {28 * 2 + 7} pass" in out
+    assert out.startswith(f"{28 + 1} experiments, {28 * 2 + 7} results: {28 * 2 + 7} of {28 * 2 + 7} pass. ")
     found = prove(videoray_fmu, interface)
     assert max(f.deviation for f in found) < (1e-9 if interface == "model-exchange" else 1e-10)
     assert {f.tolerance for f in found} == {1e-7 if interface == "model-exchange" else 1e-9}

@@ -2,6 +2,7 @@
 
 import re
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import fmpy
@@ -15,7 +16,7 @@ from rov_fmu.engine import compile as fmu_compile
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.commands import ALONE
+from tests.commands import ALONE, BARE
 
 _LAYERS = {2: {"fmi2_host.h"}, 3: {"fmi3_host.h", "buildDescription.xml"}}
 """The files that only one version of FMI has, besides its C files."""
@@ -108,6 +109,29 @@ def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> Non
         element = description.find(interface)
         assert element is not None
         assert [element.get(flag) for flag in flags] == ["false"] * len(flags)
+
+
+@pytest.mark.parametrize(
+    ("before", "said"),
+    [
+        (("win64", "linux64", "darwin64"), "Replaced {}, which also had darwin64 and win64."),
+        (("linux64",), ""),
+        (None, ""),
+    ],
+)
+def test_platforms_that_are_lost_are_named(
+    before: Sequence[str] | None, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "x.fmu"
+    path.write_bytes(b"no archive")
+    if before:
+        with zipfile.ZipFile(path, "w") as archive:
+            for name in ("modelDescription.xml", "binaries/", *(f"binaries/{folder}/x.so" for folder in before)):
+                archive.writestr(name, "")
+    assert main(["build", str(BARE), "--platform", "linux64", "-o", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == said.format(path) if said else lines[0].startswith(f"{path}: ")
+    assert sum(line.startswith("Replaced") for line in lines) == bool(said)
 
 
 @pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.long)], indirect=True)

@@ -20,14 +20,28 @@ def test_the_time_left_counts_down_from_the_last_known_share() -> None:
     assert shown == ["", *(f"about {left} left" for left in ("1:30", "1:00", "0:00", "0:40", "0:10"))]
 
 
-def test_a_pipe_gets_a_line_for_each_platform_but_the_last(capsys: pytest.CaptureFixture[str]) -> None:
-    with compiling(["linux64", "win64", "darwin64"]) as done:
+def test_a_pipe_gets_a_line_for_each_platform(capsys: pytest.CaptureFixture[str]) -> None:
+    with compiling(["linux64", "win64", "darwin64"]) as (begin, done):
+        begin()
         for name in ("win64", "linux64", "darwin64"):
             done(name)
     lines = capsys.readouterr().err.splitlines()
     assert [re.sub(r"\d\.\d", "0", line) for line in lines] == [
-        f"rov-fmu: compiling {name}: done in 0 s" for name in ("win64", "linux64")
+        f"rov-fmu: compiling {name}: done in 0 s" for name in ("win64", "linux64", "darwin64")
     ]
+
+
+def test_the_times_of_the_compilers_begin_with_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The content of the FMU takes longer than the first of them."""
+    clock = iter((7.0, 7.0, 8.0, 9.0))
+    monkeypatch.setattr("rov_fmu.report.progress.perf_counter", lambda: next(clock))
+    with compiling(["linux64", "win64"]) as (begin, done):
+        begin()
+        done("linux64")
+        done("win64")
+    assert re.findall(r"done in (\S+) s", capsys.readouterr().err) == ["1.0", "2.0"]
 
 
 @dataclass
