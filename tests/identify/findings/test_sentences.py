@@ -74,7 +74,7 @@ def test_a_weak_thrust_has_the_cause_that_leads_to_a_usual_beta(factor: float, t
 def test_drag_that_is_not_separable_has_a_reason_for_each_coefficient() -> None:
     numbers = {"a_d low": 1.0, "a_d high": 20.0, "correlation": -0.987}
     both = Finding("inseparable drag", "heave", names={"a_d": "a_d_w", "b_d": "b_d_w"}, numbers=numbers)
-    said = "a_d_w may lie anywhere from 1 to 20, b_d_w is not identifiable at all (correlation -0.99);"
+    said = "a_d_w may lie anywhere from 1.0 to 20, b_d_w is not identifiable at all (correlation -0.99);"
     assert said in sentence(both)
     one = Finding("inseparable drag", "heave", names={"b_d": "b_d_w"})
     assert "apart: b_d_w is not identifiable at all; identifiable is their sum" in sentence(one)

@@ -87,7 +87,7 @@ def test_parameters_and_references_are_read(tmp_path: Path) -> None:
         ({"attributes": 'tolerance="0"'}, "a.exp: experiment 'a': must go on from its start"),
         ({"inside": f"{_REFERENCES}<Zeal/><Other/>"}, "a.exp: experiment 'a': Other, Zeal cannot be run"),
         ({"inside": '<Parameters source="kg.ssv"/>'}, "kg.ssv: parameter 'k': is in kg, and not in m"),
-        ({"inside": '<Parameters source="word.ssv"/>'}, "word.ssv: parameter 'k' = 'many': must be a number"),
+        ({"inside": '<Parameters source="word.ssv"/>'}, "word.ssv: parameter 'k' = 'many': must be a finite number"),
         ({"inside": '<Parameters source="a.exp"/>'}, "a.exp: must begin with <ParameterSet>, and not with <Experim"),
         ({"inside": '<References source="gone.csv"/>'}, "gone.csv: there is no such file in the FMU"),
         ({"inside": '<References source="/y.csv"/>'}, "a.exp: source = '/y.csv' does not lead to a file in the FMU"),
