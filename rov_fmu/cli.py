@@ -295,7 +295,7 @@ def _simulate(
     Inputs and states that are not set are 0. Without -o and --plot the values at the end are printed.
     """
     from rov_fmu.interface.model import load
-    from rov_fmu.interface.simulate_command import check_outputs, print_final, run, write_results
+    from rov_fmu.interface.simulate_command import check_outputs, moves, print_final, run, title, write_results
     from rov_fmu.report.console import print_end
 
     opens = plot == Path()
@@ -303,12 +303,16 @@ def _simulate(
     loaded = load(vehicle)
     result = run(loaded, settings, commands, stop, step)
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
-    write_results(result, output, picture)
+    write_results(result, output, picture, title(loaded, settings, commands))
     if opens and picture:
         _open(picture, "--plot FILE.svg")
-    print_end([path for path in (output, plot) if path and path != Path()])
-    if not (output or picture):
-        print_final(loaded, result)
+    following = "open the plot" if plot and not opens else "add --plot to see the curves" if not opens else ""
+    if output or picture:
+        print_end([path for path in (output, plot) if path and path != Path()], following)
+    else:
+        print_final(
+            loaded, result, has_no_input=not commands and not any(moves(text, loaded.layout) for text in settings)
+        )
 
 
 @contextmanager
@@ -709,12 +713,15 @@ def _tables(vehicle: Path) -> None:
 def _figures(folder: Path, form: str, column: str) -> None:
     """Draw those figures of the paper whose data it prints into FOLDER, each with its caption.
 
-    FOLDER is created if it does not exist. The figures are the paper's, and so of the VideoRay.
+    FOLDER is created if it does not exist. All figures are of the VideoRay. Two of them are not in the paper:
+    surge_steps has steps of the command in surge, and steady_velocity compares the refit with the paper's model.
     """
     _refuse_vehicle(folder, "is the name of a vehicle, and must be the folder to write the figures to")
     from rov_fmu.report.console import console, paragraph, shell_words
     from rov_fmu.report.plots.paper_figures import write_figures
 
-    figures = len(write_figures(folder, form, column)) // 2
+    first, *others = write_figures(folder, form, column)
+    figures = len([first, *others]) // 2
     words = f"Wrote {figures} figures to {shell_words(folder)}, each with its caption in a text file beside it."
+    words += f" Next: open {shell_words(first)} and the others"
     paragraph(console(), words)

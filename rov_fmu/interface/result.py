@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+_DASH = 4.0
+"""The length of a dash, in widths of a line."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -105,12 +107,41 @@ class Result(Mapping[str, Array]):
         figure.set_size_inches(7.0, 1.0 + 1.6 * len(by_unit))
         panels = figure.subplots(len(by_unit), sharex=True, squeeze=False)[:, 0]
         for panel, (unit, variables) in zip(panels, by_unit.items(), strict=True):
+            dashes = _dashes([*variables.values()])
             for n, (name, values) in enumerate(variables.items()):
                 lines = panel.plot(
-                    self.time, values.T, color=f"C{n % 10}", linewidth=1.0, alpha=1.0 if values.ndim == 1 else 0.3
+                    self.time,
+                    values.T,
+                    color=f"C{n % 10}",
+                    linestyle=dashes[n],
+                    linewidth=1.0,
+                    alpha=1.0 if values.ndim == 1 else 0.3,
                 )
                 lines[0].set_label(name)
+            low, high = panel.dataLim.intervaly
+            if max(abs(low), abs(high)) > 0.0 and high - low < 1e-3 * max(abs(low), abs(high)):  # constant
+                panel.set_ylim(min(0.0, 1.1 * low), max(0.0, 1.1 * high))
             panel.set_ylabel("" if unit == "1" else unit)
             panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         panels[-1].set_xlabel("time (s)")
         return figure
+
+
+def _dashes(curves: Sequence[Array]) -> list[Any]:
+    """Return the line style of each curve of a panel.
+
+    Of curves that lie on each other, the first is solid. The others are dashed on top of it, so that all are seen.
+    """
+    scale = max((float(np.nanmax(np.abs(values), initial=0.0)) for values in curves), default=0.0)
+    groups: list[list[int]] = []
+    for n, values in enumerate(curves):
+        same = (group for group in groups if np.allclose(values, curves[group[0]], 0.0, 5e-3 * scale, equal_nan=True))
+        if (group := next(same, None)) is not None:
+            group.append(n)
+        else:
+            groups.append([n])
+    found: list[Any] = ["-"] * len(curves)
+    for group in groups:
+        for place, n in enumerate(group[1:], 1):
+            found[n] = (-_DASH * place, (_DASH, _DASH * (len(group) - 1)))
+    return found

@@ -1,5 +1,6 @@
 """The command `rov-fmu simulate`: the meaning of its options, the files that it writes, and what it prints."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
@@ -12,12 +13,12 @@ import numpy as np
 from rov_fmu.interface.arguments import TIME, Array
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
-from rov_fmu.io.messages import FileError, InputError, did_you_mean, only, shown
+from rov_fmu.io.messages import FileError, InputError, did_you_mean, one_line, only, shown, wrapped
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.time_series import Series, series
 from rov_fmu.model.layout import Layout
-from rov_fmu.report.console import print_table, table
+from rov_fmu.report.console import console, paragraph, print_table, shell_words, table
 
 _STOP, _STEP = 10.0, 0.01
 """The default end of a simulation and the default time between two results, s, as in the FMU's default experiment."""
@@ -146,13 +147,24 @@ def _read_commands(path: Path, vehicle: VehicleModel) -> Series:
     return series(read_text(path), error, check_column)
 
 
-def write_results(result: Result, table: Path | None, plot: Path | None) -> None:
+def moves(setting: str, layout: Layout) -> bool:
+    """Return True if an option --set has an input or a state, so that the vehicle may move, and not a coefficient."""
+    return setting.partition("=")[0].strip() not in layout.coefficients
+
+
+def title(vehicle: VehicleModel, settings: Sequence[str], commands: Path | None) -> str:
+    """Return the title of a plot: the vehicle, and what the options set."""
+    given = [*([f"commands of {shell_words(commands.name)}"] if commands else []), *map(one_line, settings)]
+    return f"{vehicle.name}: {', '.join(given) or 'no commands'}"
+
+
+def write_results(result: Result, table: Path | None, plot: Path | None, title: str) -> None:
     """Write a result as a table and as a plot, if there are paths for them. Raises InputError, WriteError."""
     outputs = []
     if table:
         outputs.append(_table_output(result, table))
     if plot:
-        outputs.append(_plot_output(result, plot))
+        outputs.append(_plot_output(result, plot, title))
     write_whole(*outputs)
 
 
@@ -175,18 +187,25 @@ def _table_output(result: Result, path: Path) -> Output:
     return Output(path, text.getvalue().encode())
 
 
-def _plot_output(result: Result, path: Path) -> Output:
+def _plot_output(result: Result, path: Path, title: str) -> Output:
     """Return the plot of a result, in the format of the path's suffix."""
     from matplotlib.figure import Figure
 
+    figure = result.plot(figure=Figure(layout="constrained"))
+    figure.suptitle(wrapped(title, 90), fontsize="medium", parse_math=False)
     picture = BytesIO()
-    result.plot(figure=Figure(layout="constrained")).savefig(picture, format=path.suffix[1:].lower())
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)  # in the name of the vehicle
+        figure.savefig(picture, format=path.suffix[1:].lower())
     return Output(path, picture.getvalue())
 
 
-def print_final(vehicle: VehicleModel, result: Result) -> None:
-    """Print the values at the end as a table."""
+def print_final(vehicle: VehicleModel, result: Result, *, has_no_input: bool) -> None:
+    """Print the values at the end as a table, and how to set a command if the simulation has no input at all."""
     found = table(f"{vehicle.name} after {result.time[-1] - result.time[0]:g} s", "variable", ["value"], ["unit"])
     for name, values in result.items():
-        found.add_row(name, f"{values[-1]:.6g}", "" if result.units[name] == "1" else result.units[name])
+        found.add_row(name, f"{values[-1] + 0.0:.6g}", result.units[name])  # -0 becomes 0
     print_table(found)
+    if has_no_input:
+        name = next(iter(vehicle.layout.commands))
+        paragraph(console(), f"No command is set: try --set {name}={vehicle.layout.command_of(0.3):g}")

@@ -84,8 +84,11 @@ def print_table(found: Table, out: Console | None = None) -> None:
     least = Measurement.get(out, out.options.update(max_width=10_000), found).minimum
     if not out.is_terminal:
         out.width = max(out.width, least)
-    if least <= out.width:
+    if least <= out.width and out.is_terminal:
         out.print(found)
+    elif least <= out.width:
+        for line in out.render_lines(found, pad=False):
+            out.print("".join(segment.text for segment in line).rstrip(), soft_wrap=True)
     else:
         headers = [" ".join(str(column.header).split()) for column in found.columns[1:]]
         for first, *cells in zip(*(map(str, column.cells) for column in found.columns), strict=True):

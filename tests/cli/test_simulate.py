@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 import rov_fmu
 from rov_fmu.cli import main
@@ -71,8 +72,54 @@ def test_results_have_round_times_and_the_end_is_one_of_them(here: Path) -> None
 @pytest.mark.parametrize(("name", "begins"), [("plot.png", b"\x89PNG"), ("plot.svg", b"<?xml"), ("plot.pdf", b"%PDF")])
 def test_a_plot_is_written(name: str, begins: bytes, here: Path, capsys: Capsys) -> None:
     assert main(["simulate", str(BARE), "--plot", name]) == 0
-    assert capsys.readouterr() == (f"Wrote {name}.\n", "")
+    assert capsys.readouterr() == (f"Wrote {name}. Next: open the plot\n", "")
     assert (here / name).read_bytes().startswith(begins)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_table_alone_is_followed_by_a_plot(capsys: Capsys) -> None:
+    assert main(["simulate", str(BARE), "-o", "a.csv"]) == 0
+    assert capsys.readouterr().out == "Wrote a.csv. Next: add --plot to see the curves\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "says_so"),
+    [([], True), (["--set", "a_d_w=10"], True), (["--set", "u_t=0.3"], False), (["--set", "w=0.3"], False)],
+)
+def test_a_simulation_without_commands_says_how_to_set_one(options: list[str], says_so: bool, capsys: Capsys) -> None:
+    assert main(["simulate", str(BARE), *options]) == 0
+    out = capsys.readouterr().out
+    assert out.endswith("\nNo command is set: try --set u_t=0.3\n") == says_so
+    assert ("No command" in out) == says_so
+
+
+def test_a_table_in_a_pipe_has_every_unit_and_no_trailing_spaces(capsys: Capsys) -> None:
+    assert main(["simulate", "bluerov2_heavy", "--stop", "1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines == [line.rstrip() for line in lines]
+    assert {"eta 1 1", "theta 0 rad"} <= {" ".join(line.split()) for line in lines}
+
+
+@pytest.mark.usefixtures("here")
+def test_a_plot_has_a_title_and_hides_no_curve(monkeypatch: pytest.MonkeyPatch) -> None:
+    figures: list[Figure] = []
+    kept = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda self, *a, **how: figures.append(self) or kept(self, *a, **how))  # type: ignore[func-returns-value]
+    options = ["--set", "u_l=0.3", "--set", "u_r = 0.3", "--set", "u_t=0.9", "--plot", "a.svg"]
+    assert main(["simulate", "videoray", *options]) == 0
+    assert main(["simulate", "videoray", "--input", "commands.csv", "--plot", "a.svg"]) == 0
+    constant, changing = figures
+    assert constant.get_suptitle() == "VideoRay Pro 4: u_l=0.3, u_r = 0.3, u_t=0.9"
+    assert changing.get_suptitle() == "VideoRay Pro 4: commands of commands.csv"
+    (forces,) = (ax for ax in constant.axes if ax.get_ylabel() == "N")
+    assert [line.get_linestyle() for line in forces.lines] == ["-", "--", "-"], "F_r is that of F_l"
+    assert {line.get_linestyle() for ax in changing.axes for line in ax.lines} == {"-"}
+
+
+def test_a_constant_has_an_axis_from_zero() -> None:
+    result = rov_fmu.load("videoray").simulate([0.0, 1.0], {"u_t": 0.2}, record=["F_t"])
+    (panel,) = result.plot(figure=Figure()).axes
+    assert panel.get_ylim() == pytest.approx((0.0, 1.1 * result["F_t"][0]))
 
 
 def test_a_plot_opens_in_a_browser(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys) -> None:

@@ -162,7 +162,10 @@ def test_a_limit_on_the_size_of_files_leaves_the_old_files(tmp_path: Path) -> No
 def test_two_files_are_written_both_or_neither(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
-    first, second = tmp_path / ("rov.fmu" if command == "build" else "rov.toml"), tmp_path / "bare_OspModelDescription.xml"
+    first, second = (
+        tmp_path / ("rov.fmu" if command == "build" else "rov.toml"),
+        tmp_path / "bare_OspModelDescription.xml",
+    )
     second.write_bytes(OLD)
     calls = 0
 

@@ -126,8 +126,8 @@ def paper_figures() -> Iterator[PaperFigure]:
         yield PaperFigure(
             name,
             f"Velocity in {axis} after steps of the command to {_listed(_STEPS)} %: the non-linear model "
-            f"(dashed) and the scaled model (solid) of {_PAPER}{source}. Dotted: measured V_ss. Points: measured Tau, "
-            "at 63 % of the measured V_ss. The paper does not print the recordings.",
+            f"(dashed) and the scaled model (solid) of {_PAPER}{source}. Dotted: measured V_ss. "
+            f"{_measured_taus(tables[axis])} The paper does not print the recordings.",
             (partial(_steps, k=k, table=tables[axis]),),
         )
     axes = [form.axis.name for form in vehicle.layout.axes]
@@ -139,10 +139,19 @@ def paper_figures() -> Iterator[PaperFigure]:
     )
 
 
+def _measured_taus(table: ResponseTable) -> str:
+    """Return the part of a caption about the measured time constants, of which the paper has some or none."""
+    without = [command for command in _STEPS if not measured_step(table, Decimal(command)).Tau]
+    if len(without) == len(_STEPS):
+        return "The paper has no measured Tau."
+    missing = f"; there is none at {_listed(without)} %" if without else ""
+    return f"Points: measured Tau, at 63 % of the measured V_ss{missing}."
+
+
 def _listed(words: Sequence[object]) -> str:
     """Return words in running text: 30, 50 and 70."""
     *first, last = map(str, words)
-    return f"{', '.join(first)} and {last}"
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _steady(ax: Axes, k: Rov, refit: Rov, table: ResponseTable, *, has_legend: bool) -> None:
@@ -187,11 +196,16 @@ def _drag(ax: Axes, k: Rov, table: ResponseTable) -> None:
 
 def _steps(ax: Axes, k: Rov, table: ResponseTable) -> None:
     axis = table.axis
-    draw_steps(ax, axis, [measured_step(table, Decimal(command)) for command in _STEPS], [(untuned(k), "--"), (k, "-")])
-    if axis is not SURGE:  # in the plot of surge the legend would hide the curves
-        for look, label in (("--", "non-linear"), ("-", "scaled"), (":", "measured $V_{ss}$"), ("o", "measured $Tau$")):
-            ax.plot([], [], look, color=LIGHT["muted"], markersize=5.0, label=label)
+    steps = [measured_step(table, Decimal(command)) for command in _STEPS]
+    draw_steps(ax, axis, steps, [(untuned(k), "--"), (k, "-")])
+    looks = {"--": "non-linear", "-": "scaled", ":": "measured $V_{ss}$"}
+    if any(step.Tau for step in steps):
+        looks["o"] = "measured $Tau$"
+    for look, label in looks.items():
+        ax.plot([], [], look, color=LIGHT["muted"], markersize=5.0, label=label)
     finish(ax, "", "time (s)", f"${axis.velocity}$ ({axis.unit})", where="lower right")
+    if axis is SURGE:  # inside the plot the legend would hide the curves
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(looks), columnspacing=1.0)
 
 
 def _curve(ax: Axes, scale: float, end: float, curve: tuple[float, float], dashes: str, color: str, label: str) -> None:

@@ -73,7 +73,9 @@ def test_every_figure_has_its_caption_beside_it_and_the_folder_is_created(
 ) -> None:
     folder = tmp_path / "for the" / "paper"
     assert main(["figures", str(folder), "--format", "pdf"]) == 0
-    assert "Wrote 9 figures to" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "Wrote 9 figures to" in out
+    assert f"Next: open '{folder / 'figure_5.pdf'}' and the others\n" in out
     wanted = {f"{name}.{suffix}" for name in FIGURES for suffix in ("pdf", "txt")}
     assert {path.name for path in folder.iterdir()} == wanted
     for name, figure in FIGURES.items():
@@ -113,6 +115,28 @@ def test_the_documentation_shows_every_figure_that_is_drawn_with_its_caption() -
         shown, shipped = figure.content("svg", "double"), (SHIPPED / f"{name}.svg").read_bytes()
         assert size_of(shipped, "svg") == size_of(shown, "svg")
         assert texts(shipped) == texts(shown) != [], "`rov-fmu figures docs/figures --column double` draws them"
+
+
+@pytest.mark.parametrize("name", [name for name in FIGURES if re.search("11|steps", name)])
+def test_a_caption_and_the_legend_tell_of_the_points_that_are_drawn(name: str) -> None:
+    ax, caption = drawn(FIGURES[name]), FIGURES[name].caption
+    drawn_points = sum(line.get_marker() == "o" and len(points(line)) > 0 for line in ax.lines)
+    assert drawn_points == {"figure_11a": 3, "figure_11b": 2, "surge_steps": 0}[name]
+    assert ("Points: measured Tau" in caption) == (drawn_points > 0)
+    assert ("none at 70 %" in caption) == (drawn_points == 2)
+    legend = ax.get_legend()
+    assert legend
+    labels = [text.get_text() for text in legend.get_texts()]
+    assert labels == ["non-linear", "scaled", "measured $V_{ss}$", "measured $Tau$"][: 4 if drawn_points else 3]
+
+
+def test_the_help_tells_which_figures_are_not_the_papers(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["figures", "--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    own = [name for name in FIGURES if not name.startswith("figure_")]
+    assert "Two of them are not in the paper: " in said
+    assert len(own) == 2
+    assert all(name in said for name in own)
 
 
 def points(line: Line2D) -> list[tuple[float, float]]:
