@@ -11,6 +11,7 @@ import pytest
 from rov_fmu.fmu.experiments import FOLDER, MANIFEST, Experiment, ReferenceResults
 from rov_fmu.fmu.proof import Finding, _deviation, _signals
 from rov_fmu.io.messages import FileError
+from rov_fmu.io.time_series import Series
 
 _ROWS = "time,y\n0,0\n1,1\n"
 _MANIFEST = """<fmiReferences><Related source="a.exp" role="experiment"/>
@@ -134,7 +135,9 @@ def test_the_deviation_is_the_largest(at: tuple[float, ...], expected: tuple[flo
 
 
 def test_stimuli_become_rows_and_a_deviation_equal_to_the_tolerance_passes() -> None:
-    signals = _signals({"t": [0.0, 1.0], "u": [2.0, 3.0], "v": [4.0, 5.0]})
+    columns = Series({"t": [0.0, 1.0], "u": [2.0, 3.0], "v": [4.0, 5.0]})
+    signals = _signals(columns)
+    assert signals is not None
     assert (signals.dtype.names, signals.tolist()) == (("time", "u", "v"), [(0.0, 2.0, 4.0), (1.0, 3.0, 5.0)])
     assert _signals(None) is None
     assert [Finding("a", "y", x, 1e-3).passed for x in (1e-3, 1.1e-3, np.inf)] == [True, False, False]
