@@ -16,7 +16,7 @@ from rov_fmu.model.layout import AXES
 from rov_fmu.report.console import DEVIATION, console, listed, paragraph, print_table, table, text
 from rov_fmu.report.findings import Unseen, acting, by_heading, effects, heading, unseen
 from rov_fmu.report.overview import main_errors
-from rov_fmu.vehicle.uncertainty import with_interval
+from rov_fmu.vehicle.uncertainty import significant, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SCREEN = 24
@@ -161,7 +161,7 @@ def _of_recordings(found: Sequence[Unseen]) -> Table:
         if not row.errors:
             result.add_row(row.axis.name, *("-" for _ in numbers), f"{row.what}: {row.by}")
     for row, e in main_errors(found):
-        values = (f"{float(f'{value:.2g}'):g} {e.unit}" for value in (e.predicted, e.unchanged, e.noise))
+        values = (f"{significant(value, 2)} {e.unit}" for value in (e.predicted, e.unchanged, e.noise))
         result.add_row(f"{row.axis.name} {e.of}, {e.span.removesuffix(' recording')}", *values, row.what)
     return result
 

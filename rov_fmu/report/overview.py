@@ -165,6 +165,23 @@ def main_coefficients(results: Identification, found: Sequence[Known]) -> tuple[
     return tuple(k for k in some if k in widest)
 
 
+_MEANINGS = {
+    "a_d": "quadratic drag",
+    "b_d": "linear drag",
+    "F_0": "constant load",
+    "beta": "own inertia divided by the inertia with added mass",
+}
+"""What coefficients of axes are, in words, by the part of their names before the axis."""
+
+
+def legend(results: Identification, shown: Sequence[Known]) -> str:
+    """Return what the names of the shown coefficients of axes stand for, in words."""
+    words = [f"{key}: {meaning}" for key, meaning in _MEANINGS.items() if any(k.name.startswith(key) for k in shown)]
+    ends = {form.coefficient("beta").removeprefix("beta"): form.axis.name for form in results.vehicle.layout.axes}
+    words += [f"{end}: {axis}" for end, axis in ends.items() if any(k.name.endswith(end) for k in shown)]
+    return ", ".join(words)
+
+
 def _width(known: Known) -> float:
     """Return the width of an interval relative to the value, infinite where there is none."""
     return known.relative[1] - known.relative[0] if known.relative else np.inf

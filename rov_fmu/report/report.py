@@ -32,6 +32,7 @@ from rov_fmu.report.overview import (
     ShownPrediction,
     amount_of_data,
     kind_of_data,
+    legend,
     main_coefficients,
     main_errors,
     shown_prediction,
@@ -66,6 +67,7 @@ def _today() -> date:
 def report_page(results: Identification, on_progress: Progress = silent, *, made: date | None = None) -> str:
     """Return the report as HTML. The same identification and date (today by default) always give the same text."""
     comparisons, found, shown = compare(results), known(results), shown_prediction(results)
+    main_known = main_coefficients(results, found)
     predicted = tuple(unseen(results, comparisons))
     fits = [result.recordings for result in results.axes if result.recordings]
     closeups = {fit.axis.name: step for fit in fits if (step := clearest_step(fit))}
@@ -87,7 +89,8 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         shown=shown,
         overview=[label for label, _, _ in overview],
         main_errors=[*main_errors(predicted)],
-        main_known=main_coefficients(results, found),
+        main_known=main_known,
+        legend=legend(results, main_known),
         findings=by_heading(results.findings),
         explained=EXPLAINED,
         comparisons=comparisons,

@@ -55,8 +55,8 @@ def _with_signs(text: str) -> str:
 
 
 def two_digits(value: float) -> str:
-    """Return a number for readers with two significant digits: 420, not 4.2·10²."""
-    return number(float(f"{value:.2g}"))
+    """Return a number for readers with two significant digits: 420 and 0.010."""
+    return _with_signs(uncertainty.significant(value, 2)) if isfinite(value) else number(None)
 
 
 def text(value: float | None, form: str) -> str:

@@ -232,6 +232,8 @@ def test_the_opening_screen_shows_an_unseen_recording_with_its_band(
     assert labels[:2] == ["Prediction of an unseen recording", "Error of this prediction"]
     assert "Correlation: surge" in labels
     assert "Identification from tank tests · 2026-11-23" in text_of(page)
+    assert "a_d: quadratic drag, b_d: linear drag" in text_of(page)
+    assert "_u: surge, _w: heave" in text_of(page)
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -267,6 +269,15 @@ def test_a_log_of_several_axes_is_a_dive_log(of_recordings: Identification) -> N
 
 
 # ---- Without plots ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_captions_speak_of_points_only_where_there_are_some(of_recordings: Identification) -> None:
+    assert "measured points (bars" in text_of(report_page(of_recordings))
+    axes = tuple(replace(result, points=()) for result in of_recordings.axes)
+    page = text_of(report_page(replace(of_recordings, axes=axes)))
+    assert "measured points" not in page
+    assert "Steady velocity and time constant" in page
 
 
 @pytest.mark.usefixtures("without_plots")

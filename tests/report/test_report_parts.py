@@ -17,9 +17,10 @@ from rov_fmu.model.rov import Rov
 from rov_fmu.report.console_results import acting_words
 from rov_fmu.report.findings import Known, acting, effects, verdict
 from rov_fmu.report.plots.fits import plot_known
+from rov_fmu.report.plots.overview import plot_correlation
 from rov_fmu.report.plots.recordings import clearest_step, modelled, plot_recording, plot_step
 from rov_fmu.report.report import scatter
-from rov_fmu.report.templates import number
+from rov_fmu.report.templates import number, two_digits
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -182,3 +183,18 @@ def test_the_printout_tells_more_or_less_of_a_recording() -> None:
     assert "more" not in whole
     assert more == "a.csv 0.050 s more"
     assert less == "b.csv 0.050 s less)"
+
+
+def test_errors_keep_two_digits() -> None:
+    """0.010 m beside a noise of 0.0099 m does not look like a coarser number."""
+    assert [two_digits(value) for value in (0.0099, 0.01, 0.4, 1.0, 417.0, -0.5)] == [
+        *("0.0099", "0.010", "0.40", "1.0", "420", "−0.50")
+    ]
+    assert two_digits(np.inf) == "–"
+
+
+def test_correlations_have_the_same_decimals_unless_they_are_near_1() -> None:
+    figure = Figure()
+    correlation = np.array([[1.0, -0.9, 0.9994], [-0.9, 1.0, 0.046], [0.9994, 0.046, 1.0]])
+    plot_correlation(figure, ("a_d_u", "b_d_u", "beta_u"), correlation)
+    assert [text.get_text() for text in figure.axes[0].texts] == ["−0.90", "0.9994", "0.05"]

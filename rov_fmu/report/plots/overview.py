@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.report.overview import ShownPrediction
 from rov_fmu.report.plots.svg import LIGHT
-from rov_fmu.report.templates import number, pretty_unit
+from rov_fmu.report.templates import pretty_unit, text
 from rov_fmu.tank.arrays import Array
 
 _MOST_SAMPLES = 400
@@ -78,8 +78,8 @@ def plot_correlation(figure: Figure, names: Sequence[str], correlation: Array) -
             square = Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, facecolor=color, alpha=0.6 * abs(value))
             ax.add_patch(square)
             if len(names) <= _MOST_NUMBERS:
-                text = "0" if abs(value) < 0.005 else number(value, 2 if abs(value) < 0.995 else 3)
-                ax.text(column, row, text, ha="center", va="center")
+                digits = 2 if abs(value) < 0.995 else 4  # a correlation near 1 tells by how much it differs from 1
+                ax.text(column, row, text(value, f".{digits}f"), ha="center", va="center")
     ax.set(xlim=(-0.5, len(names) - 1.5), ylim=(len(names) - 0.5, 0.5))
     ax.set_xticks(range(len(names) - 1), names[:-1], rotation=90 if len(names) > 3 else 0)
     ax.set_yticks(range(1, len(names)), names[1:])
