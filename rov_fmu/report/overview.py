@@ -169,7 +169,7 @@ _MEANINGS = {
     "a_d": "quadratic drag",
     "b_d": "linear drag",
     "F_0": "constant load",
-    "beta": "own inertia divided by the inertia with added mass",
+    "beta": "given inertia divided by the identified inertia",
 }
 """What coefficients of axes are, in words, by the part of their names before the axis."""
 
