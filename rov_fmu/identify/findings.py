@@ -318,3 +318,68 @@ _OWN_SENTENCES: dict[str, SentenceForm] = {
     ),
 }
 _SENTENCES = findings.SENTENCES | _OWN_SENTENCES
+
+# ---- Facts, doubts and warnings --------------------------------------------------------------------------------------
+
+FACTS = frozenset(EFFECTS) | {
+    "rows sorted",
+    "time stamps merged",
+    "rows without time",
+    "rows without command",
+    "torn rows",
+    "unread cells",
+    "no pulse",
+    "no servo pulse",
+    "pulse beyond full thrust",
+    "constant motion",
+    "constant push",
+    "gaps",
+    "source of commands",
+    "dropouts",
+    "damaged pieces",
+    "messages without time",
+    "several vehicles",
+    "reversed motors",
+    "axis left out",
+    "not coupled",
+    "unused curve",
+    "outliers",
+    "switches between rows",
+    "delay not modelled",
+}
+"""The kinds of findings that say what was found or done, and ask for nothing."""
+DOUBTS = frozenset(
+    {
+        "missing column",
+        "too few samples",
+        "time of arrival",
+        "arrival time",
+        "other clock",
+        "aligned clock",
+        "unknown direction",
+        "unknown velocity",
+        "depth by pressure",
+        "thrust without freedom",
+        "drag without freedom",
+        "assumed beta",
+        "untested thrust",
+        "inseparable drag",
+        "drag at zero",
+        "leave-one-out error",
+        "correlated residuals",
+    }
+)
+"""The kinds of findings that say what the data leave open. All other kinds contradict the model or the data."""
+
+
+def heading(finding: Finding) -> str:
+    """Return the heading that a finding belongs to."""
+    return "Facts" if finding.kind in FACTS else "Doubts" if finding.kind in DOUBTS else "Warnings"
+
+
+def by_heading(found: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
+    """Return the sentences of findings by their headings."""
+    groups: dict[str, list[Finding]] = {name: [] for name in ("Warnings", "Doubts", "Facts")}
+    for finding in found:
+        groups[heading(finding)].append(finding)
+    return {name: sentences(some) for name, some in groups.items()}

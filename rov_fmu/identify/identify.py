@@ -13,7 +13,7 @@ import numpy as np
 from rov_fmu import __version__
 from rov_fmu.identify import diagnostics
 from rov_fmu.identify.driving import connected, curves_of
-from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.findings import FACTS, sentences
 from rov_fmu.identify.identification import AxisResult, Identification
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import NOISE, NextTest, Sensor, next_test
@@ -36,7 +36,7 @@ from rov_fmu.model.layout import REVERSE, Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import Recording
-from rov_fmu.tank.tank_tests import TankTests
+from rov_fmu.tank.tank_tests import TankTests, kind_of_data
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.schema import NOT_GIVEN, Estimated
 from rov_fmu.vehicle.vehicle import Provenance, Vehicle, load_vehicle
@@ -203,7 +203,14 @@ class _Found:
         """Return the vehicle with its provenance."""
         given, names = self.tests.given, self.rov.layout.coefficients
         method = "; ".join(f"{result.axis.name}: {result.method}" for result in results)
-        made = Provenance(f"rov-fmu {__version__} identify", method, self.tests.inputs, sentences(findings))
+        made = Provenance(
+            f"rov-fmu {__version__} identify",
+            method,
+            self.tests.inputs,
+            warnings=sentences(finding for finding in findings if finding.kind not in FACTS),
+            facts=sentences(finding for finding in findings if finding.kind in FACTS),
+            data=kind_of_data(self.tests),
+        )
         fits = [result.recordings for result in results if result.recordings]
         delays = sentences(finding for fit in fits for finding in diagnostics.on_delay(fit))
         return Vehicle(

@@ -7,14 +7,14 @@ from rich.console import Console
 from rich.table import Table
 
 from rov_fmu.identify.effects.catalogue import EFFECTS
-from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.findings import by_heading, heading, sentences
 from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.next_test import REPEATED, NextTest
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, count
 from rov_fmu.identify.tuning import Tuning
 from rov_fmu.model.layout import AXES
 from rov_fmu.report.console import DEVIATION, console, listed, paragraph, print_table, table, text
-from rov_fmu.report.findings import Unseen, acting, by_heading, effects, heading, unseen
+from rov_fmu.report.findings import Unseen, acting, effects, unseen
 from rov_fmu.report.overview import main_errors
 from rov_fmu.vehicle.uncertainty import significant, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle

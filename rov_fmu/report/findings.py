@@ -1,85 +1,21 @@
 """The main findings of an identification: prediction errors, known coefficients, and other effects on the motion."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rov_fmu.identify.effects.catalogue import EFFECTS
-from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.recordings.prediction_errors import Errors, Key, Quantity, Span, shown_in
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, count
 from rov_fmu.model.layout import Axis
-from rov_fmu.tank.findings import Finding
 
-FACTS = frozenset(EFFECTS) | {
-    "rows sorted",
-    "time stamps merged",
-    "rows without time",
-    "rows without command",
-    "torn rows",
-    "unread cells",
-    "no pulse",
-    "no servo pulse",
-    "pulse beyond full thrust",
-    "constant motion",
-    "constant push",
-    "gaps",
-    "source of commands",
-    "dropouts",
-    "damaged pieces",
-    "messages without time",
-    "several vehicles",
-    "reversed motors",
-    "axis left out",
-    "not coupled",
-    "unused curve",
-    "outliers",
-    "switches between rows",
-    "delay not modelled",
-}
-"""The kinds of findings that say what was found or done, and ask for nothing."""
-DOUBTS = frozenset(
-    {
-        "missing column",
-        "too few samples",
-        "time of arrival",
-        "arrival time",
-        "other clock",
-        "aligned clock",
-        "unknown direction",
-        "unknown velocity",
-        "depth by pressure",
-        "thrust without freedom",
-        "drag without freedom",
-        "assumed beta",
-        "untested thrust",
-        "inseparable drag",
-        "drag at zero",
-        "leave-one-out error",
-        "correlated residuals",
-    }
-)
-"""The kinds of findings that say what the data leave open. All other kinds contradict the model or the data."""
 EXPLAINED = {
     "Warnings": "Something contradicts the model or other data. Check each of these before you use the model.",
     "Doubts": "The data leave these questions open. More or other tests would answer them.",
     "Facts": "What was found, and what was done with the data. No action is needed.",
 }
-"""What each group of findings says, by its heading."""
-
-
-def heading(finding: Finding) -> str:
-    """Return the heading of EXPLAINED that a finding belongs to."""
-    return "Facts" if finding.kind in FACTS else "Doubts" if finding.kind in DOUBTS else "Warnings"
-
-
-def by_heading(found: Iterable[Finding]) -> dict[str, tuple[str, ...]]:
-    """Return the sentences of findings by the headings of EXPLAINED."""
-    groups: dict[str, list[Finding]] = {name: [] for name in EXPLAINED}
-    for finding in found:
-        groups[heading(finding)].append(finding)
-    return {name: sentences(some) for name, some in groups.items()}
+"""What each group of findings says, by its heading (rov_fmu/identify/findings.py)."""
 
 
 @dataclass(frozen=True)

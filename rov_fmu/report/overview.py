@@ -117,25 +117,6 @@ def band(prediction: Prediction, fit: RecordingsFit, parts: int) -> Array | None
     return np.asarray(found) if np.isfinite(found).all() else None
 
 
-def kind_of_data(tests: TankTests) -> str:
-    """Return what a vehicle was identified from: tank tests, a dive log, or both."""
-    dives = len(_dives(tests))
-    parts = ["a dive log" if dives == 1 else f"{dives} dive logs"] if dives else []
-    recordings = {r.file for r in chain(*tests.recordings.values())}
-    if any((tests.thrust, tests.steady, tests.time_constants, len(recordings) > dives)):
-        parts.insert(0, "tank tests")
-    return " and ".join(parts) or "given values"
-
-
-def _dives(tests: TankTests) -> set[str]:
-    """Return the recordings of dives: those of several axes, or with a command for each thruster."""
-    axes: dict[str, set[str]] = {}
-    for r in chain(*tests.recordings.values()):
-        axes.setdefault(r.file, set()).add(r.axis.name)
-    by_thrusters = {r.file for r in chain(*tests.recordings.values()) if r.thrusters}
-    return {file for file, names in axes.items() if len(names) > 1} | by_thrusters
-
-
 def amount_of_data(tests: TankTests) -> str:
     """Return how much data a vehicle was identified from, in words."""
     lengths: dict[str, float] = {}

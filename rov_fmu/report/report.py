@@ -8,6 +8,7 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identification import AxisResult, Comparison, Identification, compare
 from rov_fmu.identify.next_test import REPEATED
 from rov_fmu.identify.recordings.prediction_errors import shown_in
@@ -20,7 +21,6 @@ from rov_fmu.report.findings import (
     EXPLAINED,
     Known,
     acting,
-    by_heading,
     effects,
     inertias,
     known,
@@ -31,7 +31,6 @@ from rov_fmu.report.findings import (
 from rov_fmu.report.overview import (
     ShownPrediction,
     amount_of_data,
-    kind_of_data,
     legend,
     main_coefficients,
     main_errors,
@@ -44,7 +43,7 @@ from rov_fmu.report.plots.svg import Draw, inline_svg, with_even_text
 from rov_fmu.report.templates import number, page
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.recording import Recording, signal_name
-from rov_fmu.tank.tank_tests import TankTests
+from rov_fmu.tank.tank_tests import TankTests, kind_of_data
 
 _WIDTH = 3.7
 """The width of every plot, inches. All plots of a page are as wide, so that their text has the same size."""

@@ -18,6 +18,7 @@ A command is that of an axis, or, in a test of a thrust curve, that of all thrus
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 
 from rov_fmu.io.csv_table import DataFileError, find_column, read_header
@@ -94,6 +95,25 @@ class TankTests:
                     findings=(*self.findings, *findings, *(f for f in vehicle.findings if f not in self.findings)),
                 )
         return None
+
+
+def kind_of_data(tests: TankTests) -> str:
+    """Return what a vehicle was identified from: tank tests, a dive log, or both."""
+    dives = len(_dives(tests))
+    parts = ["a dive log" if dives == 1 else f"{dives} dive logs"] if dives else []
+    recordings = {r.file for r in chain(*tests.recordings.values())}
+    if any((tests.thrust, tests.steady, tests.time_constants, len(recordings) > dives)):
+        parts.insert(0, "tank tests")
+    return " and ".join(parts) or "given values"
+
+
+def _dives(tests: TankTests) -> set[str]:
+    """Return the recordings of dives: those of several axes, or with a command for each thruster."""
+    axes: dict[str, set[str]] = {}
+    for r in chain(*tests.recordings.values()):
+        axes.setdefault(r.file, set()).add(r.axis.name)
+    by_thrusters = {r.file for r in chain(*tests.recordings.values()) if r.thrusters}
+    return {file for file, names in axes.items() if len(names) > 1} | by_thrusters
 
 
 def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None) -> TankTests:

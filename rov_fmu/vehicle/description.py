@@ -132,6 +132,8 @@ class Made(Strict):
     """The SHA-256 of every input file, by file name."""
     warnings: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
     """What the data do not determine, and what speaks against the model, in sentences."""
+    facts: Annotated[tuple[Text, ...], BeforeValidator(as_tuple)] = ()
+    """What was found, and what was done with the data, in sentences."""
     report: Annotated[Text, AfterValidator(_report)] | None = None
     """The name of the report, a file beside this one. A build puts it into the FMU."""
 

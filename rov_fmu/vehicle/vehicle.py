@@ -43,8 +43,12 @@ class Provenance:
     """The SHA-256 of every input file, by file name."""
     warnings: tuple[str, ...] = ()
     """What the data do not determine, and what speaks against the model, in sentences."""
+    facts: tuple[str, ...] = ()
+    """What was found, and what was done with the data, in sentences."""
     report: Path | None = None
     """The report on the identification."""
+    data: str = field(default="measurements", compare=False)
+    """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
 
 
 @dataclass(frozen=True)
@@ -226,7 +230,9 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         warnings.warn(one_line(f"{path}: {doubt}"), UserWarning, stacklevel=2)
     provenance = None
     if made:
-        provenance = Provenance(made.tool, made.method, made.inputs, made.warnings, made.report_in(path.parent))
+        provenance = Provenance(
+            made.tool, made.method, made.inputs, made.warnings, made.facts, made.report_in(path.parent)
+        )
     return Vehicle(
         name=head.name,
         identifier=head.identifier,

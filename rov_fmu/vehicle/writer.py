@@ -29,8 +29,8 @@ _DIGITS = 6
 def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     """Return the text of a vehicle file in a folder. Raises ValueError if it cannot name a folder or a report."""
     document = tomlkit.document()
-    if vehicle.provenance:
-        comment = "Made from tank tests: [provenance] tells how, and `interval` is 95 % confidence."
+    if made := vehicle.provenance:
+        comment = f"Made from {made.data}: [provenance] tells how, and `interval` is 95 % confidence."
         document.add(tomlkit.comment(comment)).add(tomlkit.nl())
     low, high = map(_rounded, vehicle.command_range)
     paths = {"data": vehicle.data, "pictures": vehicle.pictures}
@@ -45,12 +45,13 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
         document["alternatives"] = {name: _alternative(vehicle, one) for name, one in vehicle.alternatives.items()}
     if vehicle.estimates:
         document["estimates"] = {name: _estimated(row) for name, row in vehicle.estimates.items()}
-    if made := vehicle.provenance:
+    if made:
         report = {"report": name_of(made.report, folder)} if made.report else {}
-        head = {"tool": made.tool, "method": made.method} | report | _texts("warnings", made.warnings)
+        told = _texts("warnings", made.warnings) | _texts("facts", made.facts)
+        head = {"tool": made.tool, "method": made.method} | report | told
         document["provenance"] = {**head, "inputs": dict(made.inputs)}
     text: str = tomlkit.dumps(document)
-    return sealed(text, "# {}") if vehicle.provenance else text
+    return sealed(text, "# {}") if made else text
 
 
 def _hardware(vehicle: Vehicle, quantities: Mapping[str, Item], folder: Path) -> dict[str, Any]:

@@ -369,7 +369,8 @@ def test_findings(case: int, tmp_path: Path) -> None:
         assert {name: found.names[name] for name in expected.names} == expected.names
         assert {name: found.numbers[name] for name in expected.numbers} == pytest.approx(expected.numbers, abs=0.005)
     assert results.vehicle.provenance
-    assert results.vehicle.provenance.warnings == results.warnings
+    made = results.vehicle.provenance
+    assert {*made.warnings, *made.facts} == {*results.warnings}
 
 
 def test_enough_good_data_raise_no_finding(tmp_path: Path, k: Rov) -> None:

@@ -14,7 +14,7 @@ from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content, python_content
-from rov_fmu.identify.findings import _SENTENCES
+from rov_fmu.identify.findings import _SENTENCES, DOUBTS, FACTS, by_heading
 from rov_fmu.identify.identification import Identification, compare
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.next_test import NextTest
@@ -23,12 +23,11 @@ from rov_fmu.model.layout import HEAVE, SURGE, YAW
 from rov_fmu.model.rov import Rov
 from rov_fmu.report import report
 from rov_fmu.report.console_results import print_identification
-from rov_fmu.report.findings import DOUBTS, FACTS, by_heading
-from rov_fmu.report.overview import kind_of_data, shown_prediction
+from rov_fmu.report.overview import shown_prediction
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.templates import number, sentence, with_interval
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.tank_tests import load_tank_tests
+from rov_fmu.tank.tank_tests import kind_of_data, load_tank_tests
 from rov_fmu.vehicle.shipped import PAPER, SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import TESTS

@@ -20,6 +20,7 @@ HASH = "0123456789abcdef" * 4
 
 
 def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
+    inputs = {"log heave.csv": HASH, "ä.csv": HASH}
     made = replace(
         vehicle,
         name='ROV "Döv" \\ 1',
@@ -27,13 +28,30 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
         pictures=None,
         alternatives={},
         intervals={"m_rov": (6.5, 6.6), "b_d_w": (0.0, 1.25)},
-        provenance=Provenance("tool", "heave: a\nyaw: b", {"log heave.csv": HASH, "ä.csv": HASH}, ("a warning", "b")),
+        provenance=Provenance("tool", "heave: a\nyaw: b", inputs, ("a warning", "b"), ("a fact", "c")),
     )
     path = tmp_path / "made.toml"
     write_vehicle(made, path)
     assert load_vehicle(path) == made
     assert vehicle_text(made) == path.read_text(encoding="utf-8")
     assert [p.name for p in tmp_path.iterdir()] == ["made.toml"]
+
+
+def test_the_first_words_of_a_file_say_what_it_was_made_from(vehicle: Vehicle) -> None:
+    made = Provenance("tool", "by thought", {}, data="tank tests and 2 dive logs")
+    text = vehicle_text(replace(vehicle, data=None, pictures=None, provenance=made))
+    assert "\n# Made from tank tests and 2 dive logs: [provenance] tells how" in text
+    assert "warnings" not in text
+    assert "facts" not in text
+
+
+def test_a_file_of_before_with_warnings_alone_is_read() -> None:
+    """The shipped file has no key for facts."""
+    assert "\nfacts" not in TEXT
+    made = load_vehicle(REFIT).provenance
+    assert made
+    assert len(made.warnings) == 7
+    assert made.facts == ()
 
 
 def test_a_vehicle_with_everything_reads_back(tmp_path: Path) -> None:
