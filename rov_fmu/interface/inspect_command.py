@@ -11,7 +11,7 @@ from rov_fmu.io.messages import NO_FILE, brief
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.model.layout import AXES, BODY, PITCH, ROLL
 from rov_fmu.tank.description import ROV_FILE, read_description
-from rov_fmu.tank.inspection import Inspection, fitting, inspect, logs_of, possible_column
+from rov_fmu.tank.inspection import Inspection, fitting, inspect, logs_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -36,13 +36,12 @@ def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
     if not found:
         raise DataFileError(f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it")
     most = max(found, key=lambda one: (len(one.commands), _changing(one)))
-    count = len(most.commands)
-    fits = fitting(count, layouts)
+    thrusters = [row.name.removeprefix("thruster ") for row in most.commands]
+    fits = fitting(thrusters, layouts)
     if not fits and most.path.suffix.lower() in LOG_SUFFIXES:
-        count = _changing(most)
-        fits = fitting(count, layouts)
+        thrusters = thrusters[: _changing(most)]
+        fits = fitting(thrusters, layouts)
     base = next((name for name, vehicle in vehicles.items() if vehicle.layout == fits), "")
-    thrusters = [row.name.removeprefix("thruster ") for row in most.commands[:count]]
     return found, folder / ROV_FILE, "\n".join(_draft(found, thrusters, base, vehicles.get(base))) + "\n"
 
 
@@ -62,7 +61,7 @@ def write_draft(path: Path, text: str) -> None:
 
 
 def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, vehicle: Vehicle | None) -> Iterator[str]:
-    """Yield the lines of a draft, which is a complete rov.toml if a vehicle that ships has so many thrusters."""
+    """Yield the lines of a draft, which is a complete rov.toml if a vehicle that ships has such thrusters."""
     first = found[0].path
     names = brief(", ".join(one.path.name for one in found))
     word = re.sub(r"[^a-z0-9]+", "_", first.stem.lower()).strip("_")
@@ -70,8 +69,10 @@ def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, veh
     signals = {row.name for one in found for row in one.signals}
     is_own = not base and len(thrusters) > 1
     if is_own:
-        yield f'# No vehicle that ships has {len(thrusters)} thrusters, so the draft describes them. Replace each "?".'
+        those = f"{len(thrusters)} thrusters of these names"
+        yield f'# No vehicle that ships has {those}, so the draft describes them. Replace each "?".'
         yield '# For a vehicle file that you have, write base = "its path" here, and remove the tables from [body] on.'
+        yield f"# A vehicle that ships has its name instead of the path: {', '.join(SHIPPED)}."
     else:
         first_fitting = f"The first vehicle that ships with {len(thrusters)} thrusters"
         why = first_fitting if base else "These logs do not tell how many thrusters the vehicle has"
@@ -95,24 +96,30 @@ def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, veh
     if fitted := [key for key, names in effects.items() if names <= signals]:
         yield from ("", "[fit]  # what every log has the columns for: remove # to fit it")
         yield from (f"# {key} = true" for key in fitted)
-    columns = {title: meant for one in found for title, meant in one.columns.items()}
     is_csv = {one.path: one.path.suffix.lower() not in LOG_SUFFIXES for one in found}
-    others = {name for one in found if is_csv[one.path] for name in one.unread}
-    if columns or others:
-        yield from ("", "[columns]  # what headers of the CSV files stand for: check their units and signs")
-        yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
-        if others:
-            yield "# These headers are not known. Remove the # of a header, and write what it stands for, such as:"
-        yield from (f"# {_quoted(title)} = {_quoted(possible_column(title))}" for title in sorted(others))
+    yield from _columns([one for one in found if is_csv[one.path]])
     topics = {name: what for one in found if not is_csv[one.path] for name, what in one.unread.items()}
     mappable = [f"{name}.{what.rpartition(': ')[2].split(', ')[0]}" for name, what in topics.items() if ": " in what]
     if mappable:
-        yield from ("", "[topics]  # what other fields of topics stand for, such as:")
-        yield from (f'# {_quoted(field)} = "depth [m]"' for field in mappable)
+        yield from ("", '[topics]  # what other fields of topics stand for, such as "depth [m]"')
+        yield from (f'# {_quoted(field)} = "?"' for field in mappable)
     if len([one for one in found if one.commands]) == 1 and len(found) > 1:
         files = ", ".join(_quoted(one.path.name) for one in found)
         yield from ("", f"[dives.{word or 'dive'}]", f"files = [{files}]")
         yield "# other_clock = [...]  # those of the files whose clock is not that of the commands"
+
+
+def _columns(found: Sequence[Inspection]) -> Iterator[str]:
+    """Yield the table of the headers of CSV files, with those that are not known in comments."""
+    columns = {title: meant for one in found for title, meant in one.columns.items()}
+    others = {name: what for one in found for name, what in one.unread.items() if name not in columns}
+    if columns or others:
+        yield from ("", "[columns]  # what headers of the CSV files stand for: check their units and signs")
+        yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
+    if others:
+        yield "# These headers are not known. A comment tells their values. Remove the first # of a header that you"
+        yield '# need, and write what it stands for, such as "depth [m]" or "surge velocity [m/s]".'
+    yield from (f'# {_quoted(title)} = "?"{what and f"   # {what}"}' for title, what in sorted(others.items()))
 
 
 def _hardware(thrusters: Sequence[str], signals: Collection[str]) -> Iterator[str]:

@@ -3,13 +3,12 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 from math import inf, pi
 from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.io.csv_table import PULSES, Column, read_columns, read_header
+from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, Column, read_columns, read_header
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.arrays import Array
@@ -25,8 +24,26 @@ from rov_fmu.tank.signals import gaps
 from rov_fmu.tank.tables import TABLES
 
 _HEADER = re.compile(r"(?P<name>[^\[(]*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*")
-_COMMAND = re.compile(r"\b(?:thruster|motor|propeller|pwm|servo|esc|cmd|command|u)[ _]*(\d+)\b|^(?:u_|thruster )\S+$")
-_NAME = re.compile(r"[a-z][a-z0-9_]*", re.IGNORECASE)
+_COMMAND = re.compile(
+    r"(?<![a-z])(?:thr|thrusters?|motors?|propellers?|pwm|esc)(?![a-z])"
+    r"|(?<![a-z])(?:servo|cmd|command|u)[ _]*\d+(?![a-z0-9])|^u_\S+$"
+)
+_GENERAL = re.compile(
+    r"^(?:(?:thr|thrusters?|motors?|propellers?|pwm|esc|servo|cmd|command|u)(?=\d|$)|(?:raw|out|output)$)",
+    re.IGNORECASE,
+)
+"""What a word of the header of a command begins with or is, and what does not tell its thruster from the others."""
+_UNITS_OF_COMMANDS = {"", "1", "-", "%", "pwm"}
+_NO_COMMAND = {
+    *("current", "voltage", "battery", "power", "temp", "temperature", "humidity", "rpm", "speed", "rate", "load"),
+    *("status", "state", "fault", "error", "mode", "id", "enabled", "armed", "cpu", "gain", "light", "lights"),
+    *("rc", "stick", "joystick"),
+}
+"""The words of headers of what thrusters measure, and of what is no command of a thruster."""
+_USUAL_PULSES = 1000.0, 2000.0
+_REST = 20.0
+"""The largest distance of the usual pulse of a thruster from the neutral one, µs."""
+_NAME = re.compile(r"[a-z][a-z0-9_]*|[1-9][0-9]?", re.IGNORECASE)
 """A name of a thruster that a vehicle file may have."""
 _LIKELY = {
     "depth": {"m": 100.0, "cm": 1e4, "mm": inf},
@@ -40,9 +57,9 @@ _WORDS = {name: name for name in _LIKELY} | {"yaw": "heading", "battery": "volta
 _WANTED = {"set", "target", "desired"}
 _NOT_MEASURED = {"rate", "speed", *_WANTED}
 _DIRECTIONS = {
-    "surge": ("surge", "forward", "ahead"),
-    "sway": ("sway", "side", "sideways", "lateral"),
-    "heave": ("heave", "vertical"),
+    "surge": ("surge", "forward", "ahead", "vx"),
+    "sway": ("sway", "side", "sideways", "lateral", "vy"),
+    "heave": ("heave", "vertical", "vz"),
     "yaw": ("yaw", "turn", "heading"),
     "roll": ("roll",),
     "pitch": ("pitch",),
@@ -75,7 +92,7 @@ class Inspection:
     """The commands of the thrusters, in order; or the command of an axis alone."""
     signals: tuple[Row, ...]
     unread: Mapping[str, str]
-    """What is not recognised: a description by name."""
+    """What is not recognised: a description by name, of a column its range."""
     findings: tuple[Finding, ...]
     columns: Mapping[str, str] = field(default_factory=dict)
     """Headers of columns of logs that seem to be meant, by the headers of the file."""
@@ -85,7 +102,7 @@ def inspect(path: Path, layouts: Iterable[Layout], described: Description | None
     """Return what a log contains.
 
     The thrusters and columns of a CSV log have the names of the described vehicle. Without one, the thrusters have the
-    names of the first layout with as many. Raises DataFileError.
+    names of the first layout that fits, or else names that follow from the headers. Raises DataFileError.
     """
     columns: Mapping[str, str] = {}
     if read := READERS.get(path.suffix.lower()):
@@ -93,14 +110,15 @@ def inspect(path: Path, layouts: Iterable[Layout], described: Description | None
         command = None
     else:
         titles = read_header(path)
+        numbers, ranges = _numbers(path, titles)
         axis = next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
         if described:
             layout, columns = _with_all_axes(described.layout), described.columns
         else:
-            layout, columns = _guessed(path, titles, axis, layouts)
+            layout, columns = _guessed(titles, numbers, axis, layouts)
         content, command = read_csv(path, layout, axis, Names(columns), is_part=True)
         unread = [title for title in titles if not is_column(columns.get(title, title), layout, axis)]
-        content.unread = dict.fromkeys(unread, "")
+        content.unread = {title: ranges[title] for title in unread}
     rows = [_row("command", "1", *command)] if command else [*_commands(content)]
     return Inspection(path, tuple(rows), tuple(_signals(content)), content.unread, tuple(content.findings), columns)
 
@@ -114,18 +132,11 @@ def logs_of(path: Path) -> list[Path]:
     return sorted(file for file in logs if not file.name.lower().startswith(tables))
 
 
-def possible_column(title: str) -> str:
-    """Return a column that a header may stand for, as its unit says."""
-    _, unit = _parts(title)
-    columns = (f"{axis.name} velocity" for axis in (AXES["surge"], AXES["yaw"]) if unit in velocity_column(axis).units)
-    columns_with_unit = (name for name, units in _LIKELY.items() if unit in units)
-    name = next(chain(columns, columns_with_unit), "")
-    return f"{name} [{unit}]" if name else "depth [m]"
-
-
-def fitting(count: int, layouts: Iterable[Layout]) -> Layout | None:
-    """Return the first layout with this number of thrusters."""
-    return next((layout for layout in layouts if len(layout.thrusters) == count), None)
+def fitting(names: Sequence[str], layouts: Iterable[Layout]) -> Layout | None:
+    """Return the first layout with as many thrusters, if the names are those of its thrusters, or numbers."""
+    found = next((layout for layout in layouts if len(layout.thrusters) == len(names)), None)
+    fits = found and ({*names} == {thruster.name for thruster in found.thrusters} or all(map(str.isdigit, names)))
+    return found if fits else None
 
 
 def _with_all_axes(layout: Layout) -> Layout:
@@ -138,10 +149,24 @@ def _layout(names: Iterable[str]) -> Layout:
 
 
 def _names(titles: Sequence[str]) -> list[str]:
-    """Return names of thrusters for columns of commands: those of the columns, or else numbers."""
-    names = [_parts(title)[0] for title in titles]
-    are_names = all(_NAME.fullmatch(name) for name in names) and len({name.casefold() for name in names}) == len(names)
-    return [name.removeprefix("u_") for name in names] if are_names else [str(n + 1) for n in range(len(names))]
+    """Return names of thrusters for columns of commands: what is particular in those of the columns, or else numbers.
+
+    The particular part of `thr_FS_pwm` is `FS`. Where it is a letter and a number in all columns, it is the number.
+    """
+    parts = [_parts(title)[0] for title in titles]
+    particular = ["_".join(filter(None, map(_particular, re.split(r"[\W_]+", part)))) for part in parts]
+    numbered = [re.fullmatch(r"([a-z]?)(\d+)", name.casefold()) for name in particular]
+    if len({match and match[1] for match in numbered}) == 1:
+        particular = [match[2] if match else name for match, name in zip(numbered, particular, strict=True)]
+    for names in (particular, parts):
+        if all(_NAME.fullmatch(name) for name in names) and len({name.casefold() for name in names}) == len(names):
+            return names
+    return [str(n + 1) for n in range(len(titles))]
+
+
+def _particular(word: str) -> str:
+    """Return what a word of a header says beyond that it is about the command of a thruster."""
+    return _GENERAL.sub("", word)
 
 
 def _row(name: str, unit: str, time: Array, values: Array) -> Row:
@@ -177,46 +202,71 @@ def _parts(title: str) -> tuple[str, str]:
     return (match["name"], match["unit"]) if match else (title, "")
 
 
-def _numbers(path: Path, titles: Sequence[str]) -> dict[str, Array]:
-    """Return the numbers of every column as they stand in the file."""
-    names = {title: f"{n} [1]" for n, title in enumerate(titles)}
+def _numbers(path: Path, titles: Sequence[str]) -> tuple[dict[str, Array], dict[str, str]]:
+    """Return the numbers of every column as they stand in the file, and their range in words.
+
+    A header that several columns have gets no numbers, because it does not tell which of them is meant.
+    """
+    names = {title: f"{n} [1]" for n, title in enumerate(titles) if titles.count(title) == 1}
     columns = {str(n): Column({"1": 1.0}, True, True) for n in range(len(titles))}
     table = read_columns(path, columns, others=True, loose=True, renamed=names)
-    found = {title: np.frombuffer(table.values[str(n)]) for n, title in enumerate(titles)}
-    return {title: values[np.isfinite(values)] for title, values in found.items()}
+    numbers, ranges = dict.fromkeys(titles, np.empty(0)), dict.fromkeys(titles, "")
+    for title, name in names.items():
+        values = np.frombuffer(table.values[name.removesuffix(" [1]")])
+        numbers[title] = found = values[np.isfinite(values)]
+        if table.unread[name.removesuffix(" [1]")] > len(found):
+            ranges[title] = "text"
+        elif len(found):
+            ends = [f"{end:g}" for end in (found.min(), found.max())]
+            ranges[title] = " to ".join(ends) if ends[0] != ends[1] else f"always {ends[0]}"
+        else:
+            ranges[title] = "empty"
+    return numbers, ranges
 
 
 def _guessed(
-    path: Path, titles: Sequence[str], axis: Axis | None, layouts: Iterable[Layout]
+    titles: Sequence[str], numbers: Mapping[str, Array], axis: Axis | None, layouts: Iterable[Layout]
 ) -> tuple[Layout, dict[str, str]]:
-    """Return the first layout with as many thrusters as a CSV file seems to have, and what its headers seem to mean."""
-    numbers = _numbers(path, titles)
+    """Return a layout with the thrusters that a CSV file seems to have, and what its headers seem to mean."""
     commanding = [title for title in titles if _is_command(title, numbers[title])]
-    layout = _with_all_axes(fitting(len(commanding), layouts) or _layout(_names(commanding)))
-    return layout, dict(_renamed(titles, numbers, commanding, layout, axis))
+    names = _names(commanding)
+    shipped = fitting(names, layouts)
+    layout = _with_all_axes(shipped or _layout(names))
+    known = [thruster.name for thruster in layout.thrusters]
+    meant = dict(zip(commanding, names if {*names} == {*known} else known, strict=True))
+    return layout, dict(_renamed(titles, numbers, meant, layout, axis))
 
 
 def _is_command(title: str, numbers: Array) -> bool:
-    """Return True for the command of a thruster, by its name, unit and size."""
+    """Return True for the command of a thruster, by its name, unit and size, or for pulses that rest at 1500 us."""
     name, unit = _parts(title)
-    is_share = unit == "%" and not {*_WORDS, "humidity"} & {*re.findall("[a-z]+", name.casefold())}
-    is_named = is_share or bool(_COMMAND.search(name.casefold()))
-    return is_named and bool(len(numbers)) and np.abs(numbers).max() <= PULSE_RANGE[1]
+    words = {*re.findall("[a-z]+", name.casefold())}
+    is_possible = unit.casefold() in _UNITS_OF_COMMANDS or unit.startswith(PULSES)
+    if not is_possible or not len(numbers) or _NO_COMMAND & words:
+        return False
+    given = numbers[~np.isin(numbers, NO_OUTPUT)]
+    if _COMMAND.search(name.casefold()) or (unit == "%" and not {*_WORDS} & words):
+        return bool((np.abs(given) <= 100.0).all()) or _within(given, PULSE_RANGE)
+    values, counts = np.unique(given, return_counts=True)
+    return _within(given, _USUAL_PULSES) and abs(values[counts.argmax()] - NEUTRAL) <= _REST
+
+
+def _within(numbers: Array, ends: tuple[float, float]) -> bool:
+    return bool(len(numbers) and (ends[0] <= numbers).all() and (numbers <= ends[1]).all())
 
 
 def _renamed(
-    titles: Sequence[str], numbers: Mapping[str, Array], commanding: Sequence[str], layout: Layout, axis: Axis | None
+    titles: Sequence[str], numbers: Mapping[str, Array], commands: Mapping[str, str], layout: Layout, axis: Axis | None
 ) -> Iterator[tuple[str, str]]:
-    """Yield what unknown headers seem to mean."""
-    thrusters = [thruster.name for thruster in layout.thrusters]
-    if not all(is_column(title, layout, axis) for title in commanding):
-        for title, name in zip(commanding, thrusters, strict=False):
+    """Yield what unknown headers seem to mean; the headers of commands have the names of thrusters."""
+    if not all(is_column(title, layout, axis) for title in commands):
+        for title, name in commands.items():
             yield title, f"u_{name} [{_unit_of_command(title, numbers)}]"
     taken: set[str] = set()
     for title in titles:
         (name, unit), most = _parts(title), float(np.abs(numbers[title]).max(initial=0.0))
         words = re.findall("[a-z]+", name.casefold())
-        if title in commanding or is_column(title, layout, axis):
+        if title in commands or is_column(title, layout, axis):
             continue
         meant = next((name for word, name in _WORDS.items() if word in words), "")
         if {"time", "t", "timestamp"} & {*words} and "time" not in taken:

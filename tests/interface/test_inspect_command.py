@@ -1,5 +1,6 @@
 """`rov-fmu identify --inspect`: what logs contain, and a draft of rov.toml with which they are read."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -99,8 +100,8 @@ def test_samples_rates_ranges_gaps_and_what_is_not_recognised(
     draft = (tmp_path / "rov.toml").read_text(encoding="utf-8")
     assert "\n# voltage = true\n" in draft
     assert "attitude" not in draft, "there is no roll or pitch"
-    assert "- Lux" in rows
-    assert '# "Lux" = "depth [m]"' in (tmp_path / "rov.toml").read_text(encoding="utf-8").splitlines()
+    assert "- Lux: 0 to 9.9" in rows
+    assert '# "Lux" = "?"   # 0 to 9.9' in draft.splitlines(), "nothing suggests what it stands for"
 
 
 def test_a_rov_toml_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -123,7 +124,7 @@ def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(
     assert main(["identify", "--inspect", str(tmp_path)]) == 0
     draft = tmp_path / "rov.toml"
     assert 'name = "fore"' in draft.read_text(encoding="utf-8"), "a column in percent is a command"
-    assert "- battery [%]" not in capsys.readouterr().out.split("Not recognised")[0]
+    assert "- battery [%]: 0 to 9.9" not in capsys.readouterr().out.split("Not recognised")[0]
     thrusters = "".join(
         f'[[thruster]]\nname = "{name}"\ncurve = "t"\ndirection = {{ value = [0, 0, 1], source = "CAD" }}\n'
         for name in ("fore", "aft")
@@ -133,7 +134,7 @@ def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(
     )
     assert main(["identify", "--inspect", str(tmp_path)]) == 0
     rows = [line.split("  ")[0] for line in capsys.readouterr().out.splitlines()]
-    assert {"thruster fore", "thruster aft", "depth", "- battery [%]"} <= {*rows}
+    assert {"thruster fore", "thruster aft", "depth", "- battery [%]: 0 to 9.9"} <= {*rows}
     assert "- sonde [m]" not in rows
 
 
@@ -149,8 +150,8 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = draft.read_text(encoding="utf-8")
     assert '"vertical speed [cm/s]" = "heave velocity [cm/s]"' in text
     assert '"turn rate [deg/s]" = "yaw velocity [deg/s]"' in text
-    assert '# "sonar range [m/s]" = "surge velocity [m/s]"' in text
-    assert '# "set heading [deg]" = "heading [deg]"' in text
+    assert '# "sonar range [m/s]" = "?"' in text
+    assert '# "set heading [deg]" = "?"' in text
     assert main(["identify", str(tmp_path)]) == 2
     told = capsys.readouterr().err
     assert "body.m_rov.value = '?': must be a number" in told
@@ -162,6 +163,52 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     thrust = "".join(f'{key}_all = {{ value = 10.0, unit = "N", source = "Guessed" }}\n' for key in ("a_t", "b_t"))
     draft.write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
     assert {*load_tank_tests(tmp_path).recordings} == {"heave"}
+
+
+def test_a_dive_with_the_headers_of_its_owner(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = ["FS", "FP", "RS", "RP", "VP", "VS"]
+    titles = ["t_ms", *(f"thr_{name}_pwm" for name in names), "Depth (m)", "DVL_vx (m/s)", "DVL_vy (m/s)"]
+    titles += ["Battery (V)", "motor_temp", "thr_rpm", "Gripper", "comment"]
+    pulses = [np.where(TIME < 2.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS]
+    ones = np.ones_like(TIME)
+    columns = [1000.0 * TIME, *pulses, DEPTH, 0.1 * TIME, 0.2 * TIME, 16.0 * ones, 30.0 * ones, TIME, 3.0 * ones]
+    rows = zip(*columns, strict=True)
+    text = "".join(f"{','.join(f'{value:.6g}' for value in row)},{'on' * (n % 9 == 0)}\n" for n, row in enumerate(rows))
+    (tmp_path / "dive.csv").write_text(f"{','.join(titles)}\n{text}", encoding="utf-8")
+    assert main(["identify", "--inspect", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    lines = (tmp_path / "rov.toml").read_text(encoding="utf-8").splitlines()
+    commands = {f'"thr_{name}_pwm" = "u_{name} [us]"' for name in names}
+    velocities = {f'"DVL_v{v} (m/s)" = "{axis} velocity [m/s]"' for v, axis in (("x", "surge"), ("y", "sway"))}
+    assert {*lines} >= commands | velocities
+    assert [line for line in lines if line.startswith("name = ")][1:] == [f'name = "{name}"' for name in names]
+    assert not any(line.startswith("base") for line in lines), "the BlueROV2 has six thrusters of other names"
+    unknown = {"Gripper": "always 3", "comment": "text", "motor_temp": "always 30", "thr_rpm": "0 to 9.9"}
+    assert lines[-4:] == [f'# "{title}" = "?"   # {what}' for title, what in unknown.items()]
+    assert all(f"- {title}: {what}\n" in out for title, what in unknown.items())
+
+
+@pytest.mark.parametrize(
+    ("titles", "base"),
+    [
+        ([f"T{n}" for n in range(1, 7)], "bluerov2"),
+        ([f"servo{n}_raw" for n in range(1, 7)], "bluerov2"),
+        ([f"motor_{n} [us]" for n in range(6, 0, -1)], "bluerov2"),
+        (["H1", "H2", "H3", "H4", "V1", "V2"], ""),
+        ([f"Leg{n} (mbar)" for n in range(1, 7)], "videoray"),
+        ([f"RC{n}" for n in range(1, 7)], "videoray"),
+    ],
+)
+def test_pulses_that_rest_at_1500_are_commands(titles: list[str], base: str, tmp_path: Path) -> None:
+    """A vehicle that ships is the base where the names are numbers; each number is that of its thruster."""
+    pulses = [np.where(TIME < 6.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS]
+    table(tmp_path / "dive.csv", ",".join(["time [s]", *titles, "depth [m]"]), TIME, *pulses, DEPTH)
+    assert main(["identify", "--inspect", str(tmp_path)]) == 0
+    text = (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    assert [*re.findall(r'^base = "(.*)"', text, re.M)] == [base] * bool(base)
+    assert ("These logs do not tell how many thrusters" in text) == (base == "videoray")
+    if base == "bluerov2":
+        assert all(f'"{title}" = "u_{re.sub("[^0-9]", "", title)} [us]"' in text for title in titles)
 
 
 def test_tables_beside_the_logs_are_no_logs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
