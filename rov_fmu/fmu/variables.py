@@ -15,7 +15,7 @@ from typing import Any
 from rov_fmu.io.templates import render
 from rov_fmu.model.attitude import QUATERNION
 from rov_fmu.model.dependencies import dependencies_of
-from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Declaration, Layout
+from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW, Declaration, Layout, cited
 from rov_fmu.model.rov import Rov
 
 
@@ -121,7 +121,7 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
     found: dict[str, Declaration] = {}
     for axis in (form.axis for form in layout.axes):
         found[axis.velocity] = Declaration(
-            f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {axis.equations[1]}"
+            f"{axis.unit}2", f"{axis.name.capitalize()} acceleration, {cited(axis.equations[1])}"
         )
     if layout.has_attitude:
         for name, direction in (("x", "northward"), ("y", "eastward"), ("z", "downward")):

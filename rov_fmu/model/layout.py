@@ -104,6 +104,14 @@ COUPLED_AXES = (SURGE, SWAY, YAW)
 """The axes that the Coriolis and Munk terms couple in a vehicle without roll and pitch."""
 
 
+_PAPER = "Enevoldsen et al. 2018"
+
+
+def cited(reference: str) -> str:
+    """Return a reference with its source: a bare number in brackets, such as (9), is an equation of the paper."""
+    return f"equation {reference} of {_PAPER}" if re.fullmatch(r"\(\d+[a-z]?\)", reference) else reference
+
+
 # ---- Kinds of coefficients -------------------------------------------------------------------------------------------
 
 REVERSE = "_reverse"
@@ -187,10 +195,10 @@ class CoefficientKind:
 
 
 BODY = {
-    "m_rov": CoefficientKind("kg", "Mass m_rov, (3a), (3b)", 1e-3, 1e6),
+    "m_rov": CoefficientKind("kg", f"Mass m_rov, equations (3a) and (3b) of {_PAPER}", 1e-3, 1e6),
     "I_p": CoefficientKind("kg.m2", "Moment of inertia about the longitudinal axis I_p", 1e-6, 1e6),
     "I_q": CoefficientKind("kg.m2", "Moment of inertia about the transverse axis I_q", 1e-6, 1e6),
-    "I_r": CoefficientKind("kg.m2", "Moment of inertia about the vertical axis I_r, (3c)", 1e-6, 1e6),
+    "I_r": CoefficientKind("kg.m2", f"Moment of inertia about the vertical axis I_r, {cited('(3c)')}", 1e-6, 1e6),
 }
 RESTORING = {
     "W": CoefficientKind("N", "Weight W", 0.0, 1e8),
@@ -215,9 +223,9 @@ COMMANDS = {"T_d": CoefficientKind("s", "Dead time T_d from a command to its eff
 _QUARTER = 1.5708
 """A quarter of a turn, rad, rounded up as people write it."""
 ARM = {
-    "R": CoefficientKind("m", "Distance from the centre of mass to a rear thruster R, (4)", 0.0, 100.0),
+    "R": CoefficientKind("m", f"Distance from the centre of mass to a rear thruster R, {cited('(4)')}", 0.0, 100.0),
     "gamma": CoefficientKind(
-        "rad", "Angle of the rear thrusters' force about the centre of mass γ, (4)", 0.0, _QUARTER
+        "rad", f"Angle of the rear thrusters' force about the centre of mass γ, {cited('(4)')}", 0.0, _QUARTER
     ),
 }
 FIN = {
@@ -266,9 +274,13 @@ AXIS = {
     ),
     "F_0": CoefficientKind("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
 }
+_AT_ZERO = "; at 0 the velocity never changes"
+"""What the description of β says where β may be 0."""
 TUNING = {
     "alpha": CoefficientKind("1", "Tuning α_{velocity}: scales {push} in {axis}, {motion}", 0.0, 1e3, False, True),
-    "beta": CoefficientKind("1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}", 0.0, 1e3, False, True),
+    "beta": CoefficientKind(
+        "1", "Tuning β_{velocity}: scales acceleration in {axis}, {motion}" + _AT_ZERO, 0.0, 1e3, False, True
+    ),
 }
 """The tuning factors of every axis; each is 1 unless the file gives it."""
 LEAST_BETA = 1e-3
@@ -321,7 +333,7 @@ class Curve:
     together: int = 1
     description: str = ""
     equation: str = "(2)"
-    """The number of the paper's equation."""
+    """The number of the paper's equation, or another source."""
     tables: tuple[ThrustTable, ...] = ()
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
 
@@ -536,7 +548,7 @@ class Layout:
         if self.has_dead_time:
             found |= {key: kind.meta() for key, kind in COMMANDS.items()}
         for curve in self.curves:
-            words = {"curve": curve.description or f"curve {curve.name}", "equation": curve.equation}
+            words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
             found |= {curve.coefficient(key): kind.meta(**words) for key, kind in CURVE.items() if key in curve.keys}
         for fin in self.fins:
             fins = {"fin": fin.description or f"fin {fin.name}"}
@@ -553,7 +565,8 @@ class Layout:
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
             for axis in (form.axis for form in self.axes if self.has_attitude or form.axis is not HEAVE):
                 beta = axis.coefficient("beta")
-                found[beta] = replace(found[beta], minimum=LEAST_BETA)
+                description = found[beta].description.removesuffix(_AT_ZERO)
+                found[beta] = replace(found[beta], description=description, minimum=LEAST_BETA)
         return found
 
     @cached_property
@@ -683,8 +696,8 @@ class Layout:
         for curve in self.turning_curves:
             of = f"of the {curve.description}" if curve.description else curve.name
             by_arm = any(t.curve == curve.name and t.position is None for t in self.drivers(YAW))
-            words = f"Torque τ_{curve.name} of the thrusters with the curve {of}{', (4)' if by_arm else ''}"
-            found[f"tau_{curve.name}"] = Declaration("N.m", f"{words}, positive bow to starboard")
+            words = f"Torque τ_{curve.name} of the thrusters with the curve {of}, positive bow to starboard"
+            found[f"tau_{curve.name}"] = Declaration("N.m", f"{words}, {cited('(4)')}" if by_arm else words)
         return found | self.angles
 
     @cached_property
@@ -729,7 +742,7 @@ class Layout:
 
 def metas_of(axis: Axis) -> dict[str, Declaration]:
     """Return the declarations of all coefficients that an axis can have, by their keys."""
-    drag, motion = axis.equations
+    drag, motion = map(cited, axis.equations)
     words = {
         "axis": axis.name,
         "velocity": axis.velocity,
@@ -771,7 +784,7 @@ def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
     words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
     share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
     rest = ", in water at rest" if "d" in curve.keys else ""
-    return Declaration("N", f"{words}, {curve.equation}{share}{rest}, positive {_pushes(thruster.direction)}")
+    return Declaration("N", f"{words}{share}{rest}, positive {_pushes(thruster.direction)}, {cited(curve.equation)}")
 
 
 def arm(R: float, gamma: float) -> float:

@@ -153,7 +153,7 @@ class Arm(_coefficients("Arm", {key: kind.meta() for key, kind in ARM.items()}, 
     """The arm R sin γ, (4), of the thrusters that have the key `arm`."""
 
 
-_CURVE = {key: kind.meta(curve="curve", equation="(2)") for key, kind in CURVE.items()}
+_CURVE = {key: kind.meta(curve="curve", equation=layout.cited("(2)")) for key, kind in CURVE.items()}
 
 
 _Read = TypeVar("_Read", ThrustFile, CurrentTable)
@@ -217,7 +217,7 @@ class Curve(_coefficients("Curve", _CURVE)):  # type: ignore[misc]
     description: Name | None = None
     """A short description of the thrusters with this curve, for example "rear pair"."""
     equation: Name = "(2)"
-    """The equation or table in which the curve is published."""
+    """The equation or table in which the curve is published. A bare number, (9), is of Enevoldsen et al. 2018."""
     together: Annotated[int, Field(ge=1, le=MOST)] = 1
     """The number of thrusters that gave the force together when the curve was measured."""
     table: _Thrust | None = None

@@ -263,7 +263,9 @@ def test_command_prints_the_tables_side_by_side(
     assert err == ""
     assert max(map(len, out.splitlines()[4:-4])) <= 80, "the tables; paragraphs are not wrapped in a pipe"
     for table in tables.values():
-        block = re.search(rf"^Table {table.number}\. {table.axis.name.capitalize()}.*?^$", out, re.M | re.S)
+        block = re.search(
+            rf"^Table {table.number}\. {table.axis.name.capitalize()}.*?(?=^Table |^non-linear:)", out, re.M | re.S
+        )
         assert block
         lines = iter(line.split() for line in block[0].splitlines() if re.match(r"\d+ %", line))
         for quantity, row in product(("V_ss", "Tau"), table.rows):

@@ -1,11 +1,13 @@
 """The declarations of a vehicle's variables (rov_fmu/model/layout.py)."""
 
+import re
 from dataclasses import replace
 from math import inf, sin
 
 import pytest
 
 import rov_fmu
+from rov_fmu.fmu.variables import variables
 from rov_fmu.model.layout import (
     AXES,
     HEAVE,
@@ -21,6 +23,7 @@ from rov_fmu.model.layout import (
     ThrustTable,
     VehicleAxis,
     arm,
+    cited,
     cross_declaration,
     cross_name,
     cross_of,
@@ -35,15 +38,21 @@ WORDS = {
         "Z_ext": "Load from outside in heave (tether, ballast), positive down",
         "u": "Surge velocity u through the water, positive forward",
         "r": "Yaw velocity r, positive bow to starboard",
-        "F_l": "Thrust F_l: left thruster, (9), half of the pair's, positive forward",
-        "m_rov": "Mass m_rov, (3a), (3b)",
-        "a_d_u": "Quadratic drag coefficient a_d of surge, (14)",
-        "alpha_r": "Tuning α_r: scales torque in yaw, (18c)",
+        "F_l": "Thrust F_l: left thruster, half of the pair's, positive forward, "
+        "equation (9) of Enevoldsen et al. 2018",
+        "m_rov": "Mass m_rov, equations (3a) and (3b) of Enevoldsen et al. 2018",
+        "a_d_u": "Quadratic drag coefficient a_d of surge, equation (14) of Enevoldsen et al. 2018",
+        "alpha_r": "Tuning α_r: scales torque in yaw, equation (18c) of Enevoldsen et al. 2018",
+        "beta_u": "Tuning β_u: scales acceleration in surge, equation (18a) of Enevoldsen et al. 2018; at 0 the "
+        "velocity never changes",
+        "tau_rear": "Torque τ_rear of the thrusters with the curve of the rear pair, positive bow to starboard, "
+        "equation (4) of Enevoldsen et al. 2018",
     },
     "bluerov2_heavy": {
         "u_1": "Command u_1: thruster 1 (front starboard), positive astern and to starboard; saturates at ±1",
         "Y_ext": "Load from outside in sway (tether, contact), positive to starboard",
         "V_E": "Velocity of a steady horizontal current, eastward",
+        "beta_u": "Tuning β_u: scales acceleration in surge, equation (18a) of Enevoldsen et al. 2018",
         "m_a_w": "Added mass m_a of heave",
         "m_a_r": "Added moment of inertia m_a of yaw",
         "T_t200": "Time constant T of the lag of the T200 at 16 V, T dF/dt = F(c) - F",
@@ -57,6 +66,30 @@ def test_variables_are_described_in_the_terms_of_the_vehicle(name: str) -> None:
     layout = rov_fmu.load(SHIPPED[name]).layout
     declared = layout.inputs | layout.state | layout.thrust | layout.coefficients
     assert {key: declared[key].description for key in WORDS[name]} == WORDS[name]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_no_description_has_a_number_without_its_source(name: str) -> None:
+    described = [v.description for v in variables(rov_fmu.load(name).rov)]
+    assert all(re.findall(r"(?<=, )\(\d+\w?\)", text) == [] for text in described)
+    with_number = [text for text in described if re.search(r"equations? \(\d", text)]
+    assert with_number
+    assert all("of Enevoldsen et al. 2018" in text for text in with_number)
+
+
+def test_another_source_of_a_curve_is_kept() -> None:
+    assert [cited("(9)"), cited("(18a)"), cited("the maker's table")] == [
+        "equation (9) of Enevoldsen et al. 2018",
+        "equation (18a) of Enevoldsen et al. 2018",
+        "the maker's table",
+    ]
+
+
+def test_beta_at_zero_keeps_the_velocity_as_its_description_says() -> None:
+    inputs = {"u_l": 1.0, "u_r": 1.0, "u_t": 1.0}
+    result = rov_fmu.load("videoray").with_(beta_u=0.0).simulate([0.0, 1.0, 5.0], inputs, start={"u": 0.25})
+    assert result["u"].tolist() == [0.25, 0.25, 0.25]
+    assert result["w"][-1] > 0.1
 
 
 def test_loads_and_velocities_have_the_units_and_sizes_of_their_axes() -> None:
