@@ -113,6 +113,8 @@ class Live {
     );
     this.follow(location.hash);
     this.show();
+    // The page has no other use than to fly, so keys act at once. A page embedded in another one takes no focus.
+    if (document.body.matches(".flown:not(.compact)")) part("stage").focus({ preventScroll: true });
     requestAnimationFrame((now) => this.frame(now));
   }
 

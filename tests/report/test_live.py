@@ -345,6 +345,18 @@ def test_it_is_flown_by_keys_alone(pages: Callable[[str], str], quiet: Visitor) 
     until(page, "live.flight.pilot.model.get('u_5') > 0")
 
 
+def test_keys_act_at_once_on_a_page_that_is_only_flown(tmp_path: Path, quiet: Visitor, vehicle: Vehicle) -> None:
+    """A compact page is embedded in another one, whose focus it leaves alone."""
+    for compact in (False, True):
+        target = tmp_path / f"{compact}.html"
+        target.write_text(fly_page([Flown(vehicle, module(vehicle.rov))], compact=compact), encoding="utf-8")
+        page = flying(quiet, target.as_uri()).page
+        assert (page.evaluate("document.activeElement.id") == "live-stage") != compact
+        if not compact:
+            page.keyboard.down("KeyW")
+            until(page, "live.flight.pilot.model.get('x') > 0.1")
+
+
 def test_a_gamepad_steers_and_lets_go(pages: Callable[[str], str], quiet: Visitor, heavy: Vehicle) -> None:
     page = flying(quiet, pages("heavy")).page
     sticks = {"yaw": 0.5, "heave": -0.25, "sway": 0.05, "surge": 0.75}  # sway is within the dead zone
@@ -705,6 +717,8 @@ def test_the_ghost_is_lightly_filled_and_each_line_has_its_own_dash(page: Any) -
         page.locator(chart + name).evaluate(style, "strokeDasharray") for name in (".steady", ".measured", ".ghostly")
     ]
     assert len({*dashes}) == 3
+    assert dashes[0].count(",") == 3, "the legend says: dashes and dots"
+    assert page.inner_text(".legend").startswith("Dashes and dots: V")
     assert dashes[2] == "none"
 
 
