@@ -113,7 +113,7 @@ SENTENCES: dict[str, SentenceForm] = {
     # Logs of autopilots and bags
     "source of commands": "{files}: the commands of the thrusters are those of {source}",
     "time of arrival": (
-        "{files}: {count:#message} of {topics} have no time in a header: that of their arrival stands for it"
+        "{files}: {count:#message} of {topics} have no time in a header, so the time of their arrival is used"
     ),
     "other clock": (
         "{files}: its clock is not that of the commands: how far it is off is to be fitted, within {most:g} s"
@@ -127,13 +127,13 @@ SENTENCES: dict[str, SentenceForm] = {
     "damaged pieces": "{files}: {count:#damaged piece} left out",
     "messages without time": "{files}: {count:#message} without a time left out",
     "arrival time": (
-        "{files}: {count:#message} VFR_HUD have no time of the vehicle: that of their arrival stands for it"
+        "{files}: {count:#message} VFR_HUD have no time of the vehicle, so the time of their arrival is used"
     ),
     "several vehicles": "{files}: several vehicles in it: that of system {system} is taken",
     "no servo pulse": "{files}: {count:#pulse} of 0 or 65535 us taken as no command",
     "reversed motors": "{files}: MOT_n_DIRECTION turns the thrusters {thrusters}",
     "unknown direction": (
-        "{files}: no parameters MOT_n_DIRECTION in it: every thruster is taken to push ahead above 1500 us"
+        "{files}: the log has no parameters MOT_n_DIRECTION, so every thruster is taken to push ahead above 1500 us"
     ),
     "unknown velocity": "{files}: {count:#velocity} left out, which the filter says it does not know",
     "depth by pressure": ("{files}: depth by the pressure of fresh water, 1000 kg/m3; in the sea it is 2.5 % less"),

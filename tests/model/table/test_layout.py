@@ -184,7 +184,8 @@ def test_a_pulse_width_stands_for_a_fraction_on_each_side_of_neutral(pulse: floa
 def test_the_thrust_of_a_thruster_is_described_as_its_share_of_the_curve(together: int, share: str) -> None:
     thrusters = (Thruster("a", "c", (-0.6, 0.8, 1e-9)),)
     layout = replace(_layout(*thrusters), curves=(Curve("c", ("a_t", "b_t", "d"), together),))
-    words = f"Thrust F_a: thruster a, (2){share}, in water at rest, positive astern and to starboard"
+    place = f"Thrust F_a: thruster a{share}, in water at rest, positive astern and to starboard"
+    words = f"{place}, equation (2) of Enevoldsen et al. 2018"
     assert layout.thrust["F_a"].description == words
 
 

@@ -142,8 +142,9 @@ def test_commands_without_a_header_have_the_time_of_their_arrival(tmp_path: Path
     ros = Ros(2)
     path = ros.write(tmp_path, dive(ros, commands=array))
     log = read_log(path, BLUEROV2)
-    assert f"{path.name}: 100 messages of /thrusters have no time in a header: that of their arrival stands for it" in (
-        told(log)
+    assert (
+        f"{path.name}: 100 messages of /thrusters have no time in a header, so the time of their arrival is used"
+        in (told(log))
     )
     (heave,) = (recording for recording in log.recordings if recording.axis.name == "heave")
     (step,) = np.flatnonzero(np.diff(heave.thrusters["5"]))
