@@ -27,6 +27,9 @@ _SHARES = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 1.0])
 _LARGEST = 5.0
 """The largest loss of log-likelihood of one piece, so that a few pieces with another misfit do not decide."""
 
+_CLEAR = 3.0
+"""The gain of log-likelihood by which a scatter must be better than none. Without any, chance rarely reaches it."""
+
 
 def allow_for_switches(model: Simulator, x: Array) -> tuple[PreparedRecording, ...]:
     """Return the recordings, with switches at uncertain times if this explains the residuals better.
@@ -48,8 +51,8 @@ def allow_for_switches(model: Simulator, x: Array) -> tuple[PreparedRecording, .
 
 def _share(gains: Sequence[Array]) -> float:
     """Return the most likely scatter of the switches, by the gains of all pieces."""
-    losses = [np.minimum(each.max() - each, _LARGEST) for each in gains]
-    return float(_SHARES[np.argmin(np.sum(losses, axis=0))])
+    losses = np.sum([np.minimum(each.max() - each, _LARGEST) for each in gains], axis=0)
+    return float(_SHARES[np.argmin(losses)]) if losses[0] - losses.min() > _CLEAR else 0.0
 
 
 def _near_rows(data: PreparedRecording, response: LinearResponse, share: float) -> PreparedRecording:
