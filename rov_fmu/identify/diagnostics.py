@@ -8,9 +8,8 @@ import numpy as np
 from scipy.special import fdtrc
 
 from rov_fmu.identify.identification import AxisResult
-from rov_fmu.identify.least_squares import Estimate
-from rov_fmu.identify.points.drag_forms import Point
-from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_rms
+from rov_fmu.identify.least_squares import Estimate, rms
+from rov_fmu.identify.points.response_fit import ResponseFit, predict, relative_errors
 from rov_fmu.identify.points.thrust_fit import ThrustFit, forces
 from rov_fmu.identify.recordings.held_out import of_velocity
 from rov_fmu.identify.recordings.prediction_errors import shown_in
@@ -179,25 +178,23 @@ def _on_recordings(result: AxisResult, fit: RecordingsFit) -> Iterator[Finding]:
         if effect.kept:
             yield _on_effect(fit, effect)
     tables = [p for p in result.points if not p.is_read_off and p.weight > 0.0]
+    predicted = predict(axis, fit.rov, tables)
     for quantity in ("V_ss", "Tau"):
-        predicted = predict(axis, fit.rov, tables)
-        error = relative_rms(tables, predicted, quantity)
-        if error > 0.05 and not _is_scatter(tables, predicted, quantity):
+        commands, relative = relative_errors(tables, predicted, quantity)
+        error = rms(relative)
+        if error > 0.05 and not _is_scatter(commands, relative):
             yield finding("tables against recordings", names={"quantity": quantity}, numbers={"error": error})
 
 
-def _is_scatter(points: Sequence[Point], predicted: Array, quantity: str) -> bool:
-    """Return True when the differences of one quantity from its predictions may be scatter about zero.
+def _is_scatter(commands: Array, errors: Array) -> bool:
+    """Return True when the errors of predictions at n commands may be scatter about zero.
 
-    Scatter has neither a mean nor a trend with the command (an F-test). Fewer than five points do not tell.
+    Scatter has neither a mean nor a trend with the size of the command (an F-test). Fewer than five errors do not tell.
     """
-    pairs = [(abs(p.command), m / p.value - 1.0) for p, m in zip(points, predicted, strict=True)]
-    of = [p.quantity == quantity and np.isfinite(m) for p, m in zip(points, predicted, strict=True)]
-    command, errors = np.array(pairs)[of].T
     n = len(errors)
     if n < 5:
         return False
-    A = np.column_stack([np.ones(n), command])
+    A = np.column_stack([np.ones(n), np.abs(commands)])
     trend = A @ np.linalg.lstsq(A, errors, rcond=None)[0]
     within = float(np.sum((errors - trend) ** 2)) / (n - 2)
     return bool(fdtrc(2, n - 2, float(trend @ trend) / 2.0 / max(within, 1e-12)) > _CHANCE)

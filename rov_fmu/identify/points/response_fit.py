@@ -189,12 +189,18 @@ def holding_force(rov: Rov, axis: Axis, V: float) -> float:
 
 def relative_rms(points: Sequence[Point], model: Array, quantity: str) -> float:
     """Return the RMS relative error over the points of one quantity that count; NaN without any."""
-    errors = [
-        m / p.value - 1.0
+    return rms(relative_errors(points, model, quantity)[1])
+
+
+def relative_errors(points: Sequence[Point], model: Array, quantity: str) -> tuple[Array, Array]:
+    """Return the commands and the relative errors of the n points of one quantity that count."""
+    found = [
+        (p.command, m / p.value - 1.0)
         for p, m in zip(points, model.tolist(), strict=True)
         if p.quantity == quantity and p.weight > 0.0 and isfinite(m)
     ]
-    return rms(np.array(errors))
+    commands, errors = np.array(found).reshape(-1, 2).T
+    return commands, errors
 
 
 def response_band(axis: Axis, rov: Rov, found: Estimate, commands: Array) -> tuple[Array, Array, Array, Array]:

@@ -52,9 +52,9 @@ def _variances(residuals: Array, rates: Array) -> Array:
     """
     squares = residuals * residuals
     regressors = np.column_stack([np.ones(len(rates)), rates * rates])
-    scale = np.maximum(regressors.max(axis=0), 1e-300)
-    found, _ = nnls(regressors / scale, squares)
-    return np.asarray(regressors / scale @ found)
+    regressors /= np.maximum(regressors.max(axis=0), 1e-300)
+    found, _ = nnls(regressors, squares)
+    return np.asarray(regressors @ found)
 
 
 class ResidualAnalysis:

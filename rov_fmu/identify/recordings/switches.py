@@ -37,16 +37,20 @@ def allow_for_switches(model: Simulator, x: Array) -> tuple[PreparedRecording, .
     `x` has the parameters of a fit without this allowance. Raises MotionError.
     """
     rov, extras, J = model.rov(x), model.extra_values(x), model.jacobian(x)
-    gains, responses = [], []
+    gains, responses, shifts = [], [], []
     for d, output, rows in zip(model.data, model.run(x), model.rows, strict=True):
         response = LinearResponse(rov, d.recording, d.time, output.velocity, d.delay + delay_of(extras, d.recording))
+        S = response.by_switches()
         responses.append(response)
-        gains.append(_gains(without_spikes(d.values - output.values), response.by_switches(), J[rows]))
+        shifts.append(S)
+        gains.append(_gains(without_spikes(d.values - output.values), S, J[rows]))
     share = _share(gains)
     if share == 0.0:
         return model.data
-    allow = _between_rows if share == _SHARES[-1] else _near_rows
-    return tuple(allow(d, response, share) for d, response in zip(model.data, responses, strict=True))
+    if share == _SHARES[-1]:
+        return tuple(_between_rows(d, response) for d, response in zip(model.data, responses, strict=True))
+    found = zip(model.data, shifts, strict=True)
+    return tuple(replace(d, shifts=share * S if S.shape[1] else None) for d, S in found)
 
 
 def _share(gains: Sequence[Array]) -> float:
@@ -55,13 +59,7 @@ def _share(gains: Sequence[Array]) -> float:
     return float(_SHARES[np.argmin(losses)]) if losses[0] - losses.min() > _CLEAR else 0.0
 
 
-def _near_rows(data: PreparedRecording, response: LinearResponse, share: float) -> PreparedRecording:
-    """Return a recording whose switches scatter about the rows."""
-    S = share * response.by_switches()
-    return replace(data, shifts=S if S.shape[1] else None)
-
-
-def _between_rows(data: PreparedRecording, response: LinearResponse, share: float) -> PreparedRecording:
+def _between_rows(data: PreparedRecording, response: LinearResponse) -> PreparedRecording:
     """Return a recording whose switches lie midway between rows, but the first at its row."""
     time = data.recording.time
     switched = switched_rows(data.recording.reaching(response.rov.layout))
@@ -69,7 +67,7 @@ def _between_rows(data: PreparedRecording, response: LinearResponse, share: floa
     middles = time[switched] - early
     if len(switched) < 2:
         return replace(data, switches=middles, between_rows=True)
-    S = share * response.by_switches(middles[1:] + early[1:].mean())  # the delay was fitted to switches at rows
+    S = response.by_switches(middles[1:] + early[1:].mean())  # the delay was fitted to switches at rows
     return replace(data, switches=middles, shifts=S if S.shape[1] else None, between_rows=True)
 
 
