@@ -8,6 +8,9 @@ enum { N_VELOCITIES = N_MONITORED };
 
 static const double TURN = 6.283185307179586;
 
+/* Velocities (m/s, rad/s) below this have fewer digits, because squares underflow where the step tests convergence. */
+static const double TINY = 1e-150;
+
 /* Return the place of a state or an input between two places by its name; NONE when the vehicle lacks it. */
 static int named(const char *name, int first, int end)
 {
@@ -170,8 +173,7 @@ static void check_velocity(const fmu *start, int a, double v)
         PROPERTY(v == v0 || drag[a] > 0.0, "%s without drag: from %a to %a", name, v0, v);
     }
     if (isfinite(limit)) {
-        /* at velocities below 1e-150 m/s, squares of coefficients underflow where the step tests convergence */
-        const double rounding = 16.0 * DBL_EPSILON * fmax(fabs(v0), fabs(limit)) + 1e-150;
+        const double rounding = 16.0 * DBL_EPSILON * fmax(fabs(v0), fabs(limit)) + TINY;
         PROPERTY(v >= fmin(v0, limit) - rounding && v <= fmax(v0, limit) + rounding,
                  "%s: from %a to %a, beyond its equilibrium %a", name, v0, v, limit);
     }
@@ -180,7 +182,7 @@ static void check_velocity(const fmu *start, int a, double v)
 /* Bound the rounding error of a distance that is covered with the velocity v. */
 static double rounding_of_way(double v, double h, double from, double to)
 {
-    return 64.0 * DBL_EPSILON * (fabs(v) * h + fabs(from) + fabs(to)) + DBL_MIN * (1.0 + h);
+    return 64.0 * DBL_EPSILON * (fabs(v) * h + fabs(from) + fabs(to)) + TINY * (1.0 + h);
 }
 
 /* Check that a distance lies between those of the lowest and the highest velocity. */
