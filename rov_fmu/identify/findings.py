@@ -17,6 +17,16 @@ def sentences(found: Iterable[Finding]) -> tuple[str, ...]:
     return findings.sentences(found, _SENTENCES)
 
 
+def warnings(found: Iterable[Finding]) -> tuple[str, ...]:
+    """Return the sentences of the findings that ask for something, as warnings and doubts do."""
+    return sentences(finding for finding in found if finding.kind not in FACTS)
+
+
+def facts(found: Iterable[Finding]) -> tuple[str, ...]:
+    """Return the sentences of the findings that only say what was found or done."""
+    return sentences(finding for finding in found if finding.kind in FACTS)
+
+
 def refusals(found: Iterable[Finding], folder: Path) -> list[str]:
     """Return a sentence for each finding, with the whole path of its file."""
     return findings.refusals(found, folder, _SENTENCES)

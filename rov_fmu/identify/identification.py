@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.findings import facts, warnings
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import NextTest
 from rov_fmu.identify.points.drag_forms import Point
@@ -94,8 +94,13 @@ class Identification:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The sentences of the findings."""
-        return sentences(self.findings)
+        """The sentences of the findings that ask for something, as warnings and doubts do."""
+        return warnings(self.findings)
+
+    @property
+    def facts(self) -> tuple[str, ...]:
+        """The sentences of the findings that only say what was found or done."""
+        return facts(self.findings)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import numpy as np
 from rov_fmu import __version__
 from rov_fmu.identify import diagnostics
 from rov_fmu.identify.driving import connected, curves_of
-from rov_fmu.identify.findings import FACTS, sentences
+from rov_fmu.identify.findings import facts, sentences, warnings
 from rov_fmu.identify.identification import AxisResult, Identification
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import NOISE, NextTest, Sensor, next_test
@@ -207,8 +207,8 @@ class _Found:
             f"rov-fmu {__version__} identify",
             method,
             self.tests.inputs,
-            warnings=sentences(finding for finding in findings if finding.kind not in FACTS),
-            facts=sentences(finding for finding in findings if finding.kind in FACTS),
+            warnings=warnings(findings),
+            facts=facts(findings),
             data=kind_of_data(self.tests),
         )
         fits = [result.recordings for result in results if result.recordings]

@@ -75,9 +75,9 @@ def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, veh
         yield f"# A vehicle that ships has its name instead of the path: {', '.join(SHIPPED)}."
     else:
         first_fitting = f"The first vehicle that ships with {len(thrusters)} thrusters"
-        why = first_fitting if base else "These logs do not tell how many thrusters the vehicle has"
+        why = first_fitting if base else "These logs do not tell which thrusters the vehicle has"
         yield f"# {why}. Write the path of your vehicle file, or {', '.join(SHIPPED)}."
-        yield f"base = {_quoted(base or 'videoray')}"
+        yield f"base = {_quoted(base or '?')}"
     yield from ("", "[vehicle]", f"name = {_quoted(first.stem)}")
     yield f"identifier = {_quoted(word if word[:1].isalpha() else f'rov_{word}')}"
     yield from ('version = "1.0"', f'description = "A vehicle identified from {_quoted(names)[1:-1]}"')

@@ -22,6 +22,7 @@ def page(template: str, **content: object) -> str:
         two_digits=two_digits,
         unit=pretty_unit,
         with_interval=with_interval,
+        with_error=with_error,
         sentence=sentence,
         readable=readable,
         palette=PALETTE,
@@ -52,6 +53,13 @@ def _with_signs(text: str) -> str:
         mantissa = {"1": "", "-1": "-"}.get(mantissa, f"{mantissa}·")
         text = f"{mantissa}10{str(int(exponent)).translate(RAISED)}"
     return text.replace("-", "−")
+
+
+def with_error(value: float | None, error: float | None) -> tuple[str, str]:
+    """Return a value and its standard error for readers; the digits of the value suit the error."""
+    if value is None or error is None:
+        return number(value, 4), number(error, 2)
+    return with_interval(value, (value - error, value + error))[0], two_digits(error)
 
 
 def two_digits(value: float) -> str:

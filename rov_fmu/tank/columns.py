@@ -19,6 +19,9 @@ VELOCITIES = 1e-5, 1e3
 """The smallest and the largest velocity, m/s or rad/s."""
 _MOST_POSITION = 1e7
 
+RENAMING = "; rename the header in this file, or write into [columns] of rov.toml what it stands for"
+"""The end of a message about a header that is not known."""
+
 COMMAND = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
 HELD_COMMAND = replace(COMMAND, least=1e-4)
 LOGGED_COMMAND = replace(COMMAND, conversions=dict.fromkeys(PULSES, pulses))

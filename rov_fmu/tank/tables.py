@@ -7,11 +7,10 @@ from pathlib import Path
 
 from rov_fmu.io.csv_table import Column, DataFileError, find_column, read_columns
 from rov_fmu.model.layout import Axis
-from rov_fmu.tank.columns import FORCE, HELD_COMMAND, refuse_slips, time_constant_column, velocity_column
+from rov_fmu.tank.columns import FORCE, HELD_COMMAND, RENAMING, refuse_slips, time_constant_column, velocity_column
 
 TABLES = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}
 """The words that the name of a table begins with, each with the measured quantity."""
-_HINT = "; rename the header in this file, or write into [columns] of rov.toml what it stands for"
 _MOST_LINES = 10
 """The number of wrong rows in a file that get a line of their own."""
 
@@ -39,7 +38,7 @@ def read_rows(
         column = velocity_column(axis)
     columns = {"command": HELD_COMMAND, name: column}
     renamed = dict(_renamed(names, columns))
-    table = read_columns(path, columns, renamed=renamed, hint=_HINT)
+    table = read_columns(path, columns, renamed=renamed, hint=RENAMING)
     refuse_slips(table, ["command"])
     noise = 0.05 * max(map(abs, table.values[name]))
     numbers = [*zip(table.lines, table.values["command"], table.values[name], strict=True)]

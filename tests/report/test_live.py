@@ -904,3 +904,11 @@ def test_without_scripts_and_on_paper_the_page_of_the_fmu_is_as_it_was(
     assert page.locator("#live-link").is_visible()
     page.emulate_media(media="print")
     assert not page.locator("#live-section").is_visible()
+
+
+def test_on_paper_the_flight_page_has_its_picture_and_charts_without_controls(page: Any) -> None:
+    page.emulate_media(media="print")
+    for place in ("#live-picture", "#live-readings", "#live-chart-surge"):
+        assert page.locator(place).is_visible()
+    for place in ("#live-controls", "#live-pause", "#live-keys"):
+        assert not page.locator(place).is_visible()

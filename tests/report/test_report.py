@@ -151,7 +151,7 @@ def test_warnings_points_and_predictions_of_tables(of_tables: Identification, pa
     page = pages[id(of_tables)]
     items = [item.text_content().strip() for item in html.fromstring(page).iter("li")]
     assert of_tables.warnings
-    assert {sentence(f"{warning}.") for warning in of_tables.warnings} <= set(items)
+    assert {sentence(f"{warning}.") for warning in of_tables.warnings + of_tables.facts} <= set(items)
     table = rows(page)
     for comparison in compare(of_tables):
         for n, p in enumerate(comparison.points):

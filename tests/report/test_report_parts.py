@@ -20,7 +20,7 @@ from rov_fmu.report.plots.fits import plot_known
 from rov_fmu.report.plots.overview import plot_correlation
 from rov_fmu.report.plots.recordings import clearest_step, modelled, plot_recording, plot_step
 from rov_fmu.report.report import scatter
-from rov_fmu.report.templates import number, two_digits
+from rov_fmu.report.templates import number, two_digits, with_error
 from rov_fmu.tank.recording import Recording
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -191,6 +191,13 @@ def test_errors_keep_two_digits() -> None:
         *("0.0099", "0.010", "0.40", "1.0", "420", "−0.50")
     ]
     assert two_digits(np.inf) == "–"
+
+
+def test_a_value_has_the_digits_that_suit_its_error() -> None:
+    assert with_error(0.24512345, 0.00042) == ("0.2451", "0.00042")
+    assert with_error(1.5, 0.31) == ("1.5", "0.31")
+    assert with_error(-0.3, None) == ("−0.3", "–")
+    assert with_error(None, None) == ("–", "–")
 
 
 def test_correlations_have_the_same_decimals_unless_they_are_near_1() -> None:

@@ -73,9 +73,18 @@ def modelled(simulation: Simulation, window: float = 0.5) -> tuple[Array, Array]
 
 
 def _write_at_top(ax: Axes, x: float, words: str, align: Literal["center", "right"]) -> None:
-    """Write a few words at the upper edge of a plot."""
-    place = ax.get_xaxis_transform()
-    ax.text(x, 1.0, words, fontsize=8.5, transform=place, ha=align, va="top", color=LIGHT["muted"])
+    """Write a few words at the upper edge of a plot; to the right they end a little before x."""
+    ax.annotate(
+        words,
+        (x, 1.0),
+        (-4.0 if align == "right" else 0.0, 0.0),  # points
+        xycoords=ax.get_xaxis_transform(),
+        textcoords="offset points",
+        fontsize=8.5,
+        ha=align,
+        va="top",
+        color=LIGHT["muted"],
+    )
 
 
 def _legend(ax: Axes) -> None:
@@ -143,7 +152,7 @@ def plot_step(figure: Figure, result: AxisResult, step: CommandStep) -> None:
     low, high = -_BEFORE, max(3.0 * step.Tau, _BEFORE) + max(delay, 0.0)
     ax: Axes = figure.subplots()
     ax.axvline(0.0, color=LIGHT["muted"], linewidth=1.2)
-    _write_at_top(ax, 0.0, f"{step.words}  ", "right")
+    _write_at_top(ax, 0.0, step.words, "right")
     if delay:
         label = f"delay {text(delay, '.2f')} s"
         ax.axvspan(0.0, delay, facecolor=LIGHT["violet"], edgecolor="none", alpha=0.25, zorder=0, label=label)

@@ -17,7 +17,7 @@ from rov_fmu.io.csv_table import NO_OUTPUT, PULSES, Column, Columns, DataFileErr
 from rov_fmu.io.messages import did_you_mean, shown, similar
 from rov_fmu.model.layout import Axis, Layout
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.columns import TIME, refuse_slips
+from rov_fmu.tank.columns import RENAMING, TIME, refuse_slips
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.content import Content
 from rov_fmu.tank.formats.csv_columns import (
@@ -54,7 +54,9 @@ def read_csv(
     columns |= {name: sensor.column for name, sensor in (sensors | conditions).items()}
     check = _wrong_columns_of_part if is_part else _wrong_columns
     check_header = partial(check, path=path, layout=layout, kinds=kinds, sensors=sensors)
-    table = read_columns(path, columns, others=True, loose=True, renamed=names.columns, check_header=check_header)
+    table = read_columns(
+        path, columns, others=True, loose=True, renamed=names.columns, hint=RENAMING, check_header=check_header
+    )
     kind, commanding = next(iter(_commanding(table.values, kinds).items()), ("", []))
     refuse_slips(table, commanding)
     time, values, findings = _cleaned(table, commanding)
@@ -92,6 +94,7 @@ def _wrong_columns(
     """Yield a line for every mistake in the columns of a log, from the headers that are read and the others."""
     found = _commanding(headers, kinds)
     unread = {title.replace("(", "[").partition("[")[0].strip(): shown(title) for title in others}
+    renaming = RENAMING if unread else ""
     command = next((title for name, title in unread.items() if name.casefold() == COMMAND), None)
     if not found and command and not kinds["axis"]:
         yield f"column {command} is the command of one axis, but {_no_axis_in_name(path, layout)}"
@@ -103,13 +106,13 @@ def _wrong_columns(
         near |= dict.fromkeys(shown(title) for title in others if title.endswith(_IN_PULSES))
         hint = f"; is it the column {' or '.join(near)}?" if near else ""
         hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
-        yield f"no column of commands: {wanted}, each in [%], [1] or [us]{hint}"
+        yield f"no column of commands: {wanted}, each in [%], [1] or [us]{hint or renaming}"
     if len(found) > 1:
         titles = ", ".join(shown(headers[names[0]]) for names in found.values())
         yield f"columns {titles}: the commands of the axis, of the inputs or of the thrusters, not several"
     if not any(name in headers for name in sensors):
         titles = " or ".join(f"'{name} [{next(iter(s.column.units))}]'" for name, s in sensors.items())
-        yield f"column {titles} is missing"
+        yield f"column {titles} is missing{renaming}"
 
 
 def _wrong_columns_of_part(

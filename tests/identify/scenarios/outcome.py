@@ -9,6 +9,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from rov_fmu.identify.effects import catalogue as effects
+from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.io.messages import FileError
 from rov_fmu.model.rov import Rov
@@ -274,4 +275,4 @@ def outcome(scenario: Scenario, seed: int, folder: Path) -> Outcome:
     }
     wrong = [name for name, (low, high) in vehicle.intervals.items() if not low <= vehicle.rov[name] <= high]
     excluded = f"intervals exclude their values: {', '.join(wrong)}" if wrong else ""
-    return Outcome(coefficients, vehicle.rov, found.findings, found.warnings, excluded, seconds)
+    return Outcome(coefficients, vehicle.rov, found.findings, sentences(found.findings), excluded, seconds)
