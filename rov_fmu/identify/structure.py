@@ -16,6 +16,7 @@ from scipy.special import fdtrc
 from threadpoolctl import threadpool_limits
 
 from rov_fmu.identify.driving import curves_of
+from rov_fmu.identify.effects.current import is_in_flow
 from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
@@ -90,11 +91,11 @@ class _Case:
 
     @cached_property
     def own(self) -> Array:
-        """The response to the start, load, delay and current of this recording, n x 5."""
+        """The response to the start, load, delay and current of this recording, n x 5 or n x 6."""
         s, response = self.simulation, self.response
         one = np.ones(len(response.time))
         starts = response.by_force(0.0 * one, first=1.0), one * s.recording.is_position
-        current = response.by_velocity(one[:, None] * (s.recording.axis in (SURGE, SWAY)))
+        current = response.by_velocity(self._current)
         return np.column_stack([*starts, response.by_force(one), np.gradient(s.modelled, s.time), current])
 
     @cached_property
@@ -106,7 +107,7 @@ class _Case:
         found = {
             "drift": response.by_force(F * t, t),
             "recording": response.by_force(F, v, v * np.abs(v)),
-            "tether": response.by_force(response.integral(v[:, None])),
+            "tether": response.by_force(self._displacement),
             "saturation": response.by_force(*beyond),
             "scale": (s.modelled - s.modelled[0])[:, None] * s.recording.is_position,
             "unknown": response.by_force(*(np.cos(np.pi * k * t) for k in range(1, _SLOW + 1))),
@@ -117,12 +118,43 @@ class _Case:
             x = self._sampled(values)
             found[name] = response.by_force(F * (x - x.mean()), x - x.mean())
             if name in ("roll", "pitch"):  # they turn the velocities of other axes into that of this one
-                still = np.zeros(len(s.recording.time))
-                across = np.column_stack([self._sampled(s.recording.beside.get(key, still)) for key in "uv"])
+                across = np.column_stack([self._beside("u"), self._beside("v")])
                 turning = across * np.gradient(x, s.time)[:, None]
                 turned = response.by_velocity(across * x[:, None]), response.by_force(turning)
                 found[name] = np.hstack([found[name], *turned])
         return found
+
+    @cached_property
+    def _directions(self) -> dict[str, Array]:
+        """The unit vectors along u and v by the logged heading, with components north and east, n x 2 each."""
+        psi = self._sampled(self.simulation.recording.beside["psi"])
+        north, east = np.cos(psi), np.sin(psi)
+        return {"u": np.column_stack([north, east]), "v": np.column_stack([-east, north])}
+
+    @cached_property
+    def _current(self) -> Array:
+        """The velocity along the axis of currents of 1 m/s: north and east, or along the axis without a heading."""
+        axis = self.simulation.recording.axis
+        if is_in_flow(self.simulation.recording):
+            return self._directions[axis.velocity]
+        return np.full((len(self.simulation.time), 1), float(axis in (SURGE, SWAY)))
+
+    @cached_property
+    def _displacement(self) -> Array:
+        """The displacement from the start along the axis, n. A vehicle that turns sees it from another side."""
+        s, axis = self.simulation, self.simulation.recording.axis
+        if not is_in_flow(s.recording):
+            return self.response.integral(s.velocity[:, None])[:, 0]
+        place = np.zeros((len(s.time), 2))
+        for name, direction in self._directions.items():
+            speed = s.velocity if name == axis.velocity else self._beside(name)
+            place += self.response.integral(speed[:, None] * direction)
+        return np.asarray((place * self._directions[axis.velocity]).sum(axis=1))
+
+    def _beside(self, velocity: str) -> Array:
+        """Return a velocity that the log has beside the recording at the n samples; 0 where there is none."""
+        recording = self.simulation.recording
+        return self._sampled(recording.beside.get(velocity, np.full(len(recording.time), np.nan)))
 
     def _sampled(self, values: Array) -> Array:
         """Return values beside the recording at the n samples; 0 where there are none."""

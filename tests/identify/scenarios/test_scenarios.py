@@ -22,27 +22,21 @@ from verification.references.pool import Array, Commands, Conditions
 
 BY_DEFAULT = ("load of 0.1 N in heave", "pilot")
 """The quick scenarios of the default tests."""
-OFTEN = ("clean", "delay and lag", "gaps while turning", "switches between rows at 5 Hz")
+OFTEN = ("clean", "delay and lag", "gaps while turning", "switches between rows at 5 Hz", "tether")
 """The scenarios that the long tests run with 20 seeds. All of them are run with 200 seeds once a week."""
 FEW = 10
 """The number of seeds of the Heavy once a week, because one of them takes minutes."""
 FAMILY = sum(len(scenario.coefficients) for scenario in COMPLETE.values())
 """The number of coverages that are judged at most."""
 
-NOT_YET: dict[str, str] = {
-    "tether": "load, current and drag by direction explain most of the pull, so it raises an alarm in half of the seeds"
-}
-"""The scenarios that identification does not handle yet, with the reason."""
-
-assert SCENARIOS.keys() >= {*BY_DEFAULT, *OFTEN, *NOT_YET}
+assert SCENARIOS.keys() >= {*BY_DEFAULT, *OFTEN}
 
 
 def judged() -> Iterator[object]:
-    """Yield each scenario with each number of seeds, and how it is marked."""
+    """Yield each scenario with each number of seeds."""
     for name in SCENARIOS:
-        fails = [pytest.mark.xfail(strict=True, reason=NOT_YET[name])] if name in NOT_YET else []
         seeds = FEW if SCENARIOS[name].vehicle == "bluerov2_heavy" else 200
-        yield pytest.param(name, seeds, marks=[pytest.mark.weekly, *fails], id=f"{name}-{seeds}")
+        yield pytest.param(name, seeds, marks=pytest.mark.weekly, id=f"{name}-{seeds}")
         if name in OFTEN:
             yield pytest.param(name, 20, marks=pytest.mark.long, id=f"{name}-20")
         if name in BY_DEFAULT:
