@@ -284,9 +284,8 @@ def test_the_printout_says_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_a_step_is_repeated_where_something_drifts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for axis, repeat in (("surge", False), ("heave", True)):
-        drift = Finding("unexplained", axis=axis, names={"cause": "drift"})
+        drift = Finding("unexplained", axis=axis, file="log.csv", names={"cause": "drift"}, numbers={"start": 0.0})
         monkeypatch.setattr("rov_fmu.identify.identify.check_slips", lambda *_, drift=drift: [drift])
-        monkeypatch.setattr("rov_fmu.identify.identify.sentences", lambda *_: ())
         (result,) = identify(read(tmp_path / axis, f"{HEAD}[known]\n{MASS}", TESTS)).axes
         assert result.next_test
         assert result.next_test.repeat == repeat
