@@ -161,7 +161,7 @@ _CAUSES = {
     "saturation": "the thrust differs from its curve at the highest commands, as when thrusters saturate",
     "drift": "the thrust or the load changes with time, as when the voltage falls",
     "recording": "thrust or drag differ between the recordings. Did the battery, the ballast, the tether or the place "
-    "of a sensor change between them?",
+    "of a sensor change between them, or are columns of a log swapped or missing?",
     "scale": "the sensors of position and velocity disagree, so one of them has a wrong scale",
     "unknown": "a force that changes slowly remains, and none of the causes that are tested explains it",
 }
@@ -343,6 +343,7 @@ FACTS = frozenset(EFFECTS) | {
     "pulse beyond full thrust",
     "constant motion",
     "constant push",
+    "cancelling thrusters",
     "gaps",
     "source of commands",
     "dropouts",
@@ -358,9 +359,10 @@ FACTS = frozenset(EFFECTS) | {
     "delay not modelled",
 }
 """The kinds of findings that say what was found or done, and ask for nothing."""
+FIRST = frozenset({"missing column", "axis not pushed", "no fit", "poor prediction"})
+"""The kinds of warnings that stand first: wrong or missing data, and axes that must not be trusted."""
 DOUBTS = frozenset(
     {
-        "missing column",
         "too few samples",
         "time of arrival",
         "arrival time",

@@ -13,7 +13,7 @@ import numpy as np
 from rov_fmu import __version__
 from rov_fmu.identify import diagnostics
 from rov_fmu.identify.driving import connected, curves_of
-from rov_fmu.identify.findings import facts, sentences, warnings
+from rov_fmu.identify.findings import FIRST, facts, sentences, warnings
 from rov_fmu.identify.identification import AxisResult, Identification
 from rov_fmu.identify.least_squares import Estimate
 from rov_fmu.identify.next_test import NOISE, NextTest, Sensor, next_test
@@ -119,6 +119,7 @@ def _identify(tests: TankTests, on_progress: Progress) -> Identification:
         on_progress(f"what to measure next of {result.axis.name}", _FITTED + (1.0 - _FITTED) * n / len(results))
         test = _next_test(tests, result, found.rov, thrust, repeat=result.axis.name in drifting)
         results[n] = replace(result, next_test=test)
+    findings.sort(key=lambda finding: finding.kind not in FIRST)
     vehicle = found.vehicle(results, Together(thrust.values(), results), findings)
     return Identification(tests, vehicle, thrust, tuple(results), against, tuple(findings))
 
@@ -340,7 +341,7 @@ def _likely_cause(recordings: Sequence[Recording], base: Rov) -> str:
     full = max(float(np.mean(np.abs(r.reaching(base.layout)).max(axis=1) >= 0.999)) for r in recordings)
     if full > _SATURATED:
         return f"Thrusters are at full command for {full:.0%} of the time, where they may be limited by the current"
-    return "Check units and signs, the order of the thrusters, their dead band, and whether a tether was taut"
+    return "Check units and signs, the order and directions of the thrusters, their dead band, and for a taut tether"
 
 
 # ---- One axis --------------------------------------------------------------------------------------------------------

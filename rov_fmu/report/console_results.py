@@ -147,7 +147,8 @@ def acting_words(kept: Iterable[FittedEffect]) -> str:
         amount = f"{value}{unit}"
         if EFFECTS[effect.kind].sentence_of_file and effect.of not in AXES:  # it adds to the value of the axis
             amount = f"{value.lstrip('-')}{unit} {'less' if effect.value < 0.0 else 'more'}"
-        values.setdefault(acting(effect), []).append(f"{effect.of} {amount}")
+        of = f"{effect.axis} in {effect.of}" if effect.axis else effect.of
+        values.setdefault(acting(effect), []).append(f"{of} {amount}")
     return "; ".join(f"{words} ({', '.join(some)})" for words, some in values.items())
 
 

@@ -98,13 +98,20 @@ SENTENCES: dict[str, SentenceForm] = {
     "unread cells": "{files}: {count:#cell} of {column} without a number taken as blank",
     "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",
     "pulse beyond full thrust": "{files}: {count:#pulse} of {column} beyond full thrust taken as full thrust",
-    "missing column": "{files}: no column of {column}, which is taken as 0",
+    "missing column": (
+        "{files}: no column of {column}, whose command is taken as 0 all the time: add the column unless that is right"
+    ),
     # Recordings
     "too few samples": (
         "{files}: no recording of {axes}: {count:#sample} of {quantity}, at least {least:g} are needed"
     ),
     "constant motion": "{files}: no recording of {axes}: the {quantity} never changes",
     "constant push": "{files}: no recording of {axes}: what the thrusters do along it never changes",
+    "cancelling thrusters": "{files}: no recording of {axes}: the thrusters along it cancel each other at all times",
+    "axis not pushed": (
+        "{axes}: the logs have its motion, but in all of them its thrusters cancel each other, so the vehicle has no "
+        "{axes}. If it was driven that way, check the directions of the thrusters and the signs of their commands"
+    ),
     "scales differ": (
         "{files}: the {quantity} changes by {factor:.3g} times what the velocity in {axes} says: one of the two "
         "sensors has a wrong scale. The {quantity} is used"

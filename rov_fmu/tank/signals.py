@@ -103,7 +103,8 @@ def why_useless(recording: Recording, layout: Layout) -> Finding | None:
     if np.ptp(values) == 0.0:
         return replace(found, kind="constant motion")
     if not _is_driven(layout, recording.axis, recording.thrusters):
-        return replace(found, kind="constant push", names={})
+        moved = any(np.ptp(recording.thrusters[t.name]) > _LEAST_CHANGE for t in layout.drivers(recording.axis))
+        return replace(found, kind="cancelling thrusters" if moved else "constant push", names={})
     return None
 
 

@@ -332,6 +332,12 @@ class _Reader:
         for (kind, subject), found in self.rows.items():
             if kind != "thrust" or subject in curves:
                 rows[kind][subject] = tuple(found)
+        cancelling = {finding.axis for finding in self.findings if finding.kind == "cancelling thrusters"}
+        wanted = () if given.description.base else cancelling  # a base may have more axes than the logs are about
+        about = (
+            Finding("axis not pushed", f.axis) if f.kind == "axis left out" and f.axis in wanted else f
+            for f in findings
+        )
         inputs = {ROV_FILE: _hash(self.folder / ROV_FILE)}
         if given.description.base:
             inputs[given.description.base_name] = _hash(given.description.base)
@@ -344,7 +350,7 @@ class _Reader:
             recordings={name: tuple(found) for name, found in self.recordings.items()},
             inputs=inputs | self.inputs,
             tested=tested,
-            findings=(*findings, *self.findings),
+            findings=(*about, *self.findings),
         )
 
 

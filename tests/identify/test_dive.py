@@ -12,7 +12,7 @@ from rov_fmu.identify.effects.effect import Effect
 from rov_fmu.identify.effects.load import Load
 from rov_fmu.identify.recordings.output_error import fit_recordings
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
-from rov_fmu.identify.simulation.limits import NoFitError, check_limits, limits
+from rov_fmu.identify.simulation.limits import NoFitError, check_limits, check_thrust, limits
 from rov_fmu.identify.simulation.prepared import prepare
 from rov_fmu.identify.simulation.simulator import Simulator
 from rov_fmu.identify.simulation.solver import settled, solve
@@ -112,6 +112,26 @@ def test_a_fit_at_a_limit_is_refused_with_one_line() -> None:
     x[len(NAMES)] = high[len(NAMES)]
     with pytest.raises(NoFitError, match=r"^dive\.tlog: no surge of a vehicle .* a load of [0-9.]+ N would do it best"):
         check_limits(TRUTH, model.data, NAMES, extras, x)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"a_t_t200": -60.0}, r"-?[0-9.]+ N at 100%"),
+        ({"a_t_t200_reverse": -60.0}, r"[0-9.]+ N at -100%"),
+        ({"c_0_t200": -0.056}, r"c_0_t200 = -0\.056"),
+    ],
+)
+def test_a_fitted_thrust_that_is_impossible_is_a_misfit_of_the_recordings(
+    changed: dict[str, float], words: str
+) -> None:
+    """The tables of forces are right, so the line names the recordings and the thrusters."""
+    model, _ = simulator(dived(20.0).recorded())
+    check_thrust(TRUTH, model.data)
+    with pytest.raises(
+        NoFitError, match=rf"^dive\.tlog: no t200 thrust .* in surge, sway, yaw: {words} would do it best"
+    ):
+        check_thrust(TRUTH.replaced(changed), model.data)
 
 
 def unknown() -> Rov:

@@ -176,13 +176,13 @@ def test_residuals_are_noise_only_where_they_are_white() -> None:
 
 def test_the_printout_tells_more_or_less_of_a_recording() -> None:
     effects = [
-        FittedEffect("delay", of, "s", value, (value - 0.01, value + 0.01), kept=True)
-        for of, value in (("surge", 0.2), ("a.csv", 0.05), ("b.csv", -0.05))
+        FittedEffect("delay", of, "s", value, (value - 0.01, value + 0.01), kept=True, axis=axis)
+        for of, value, axis in (("surge", 0.2, ""), ("a.csv", 0.05, "surge"), ("b.csv", -0.05, "yaw"))
     ]
     whole, more, less = acting_words(effects).split(", ")
     assert "more" not in whole
-    assert more == "a.csv 0.050 s more"
-    assert less == "b.csv 0.050 s less)"
+    assert more == "surge in a.csv 0.050 s more"
+    assert less == "yaw in b.csv 0.050 s less)"
 
 
 def test_errors_keep_two_digits() -> None:

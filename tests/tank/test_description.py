@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu.identify.findings import DOUBTS, FACTS
 from rov_fmu.identify.identification import Identification
 from rov_fmu.identify.identify import identify
 from rov_fmu.model.layout import HEAVE, SURGE, SWAY, YAW
@@ -157,6 +158,27 @@ def test_inputs_are_narrowed_too(tmp_path: Path) -> None:
     assert [*tests.given.rov.layout.mix] == ["ahead"]
     assert len(tests.given.rov.layout.thrusters) == 4
     assert tests.findings == (Finding("axis left out", axis="sway", names={"drag": "a_d_v, b_d_v"}),)
+
+
+@pytest.mark.parametrize("commands", ["0.3,0.3", "0.3,-0.3"])
+def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(commands: str, tmp_path: Path) -> None:
+    """The directions of two thrusters are opposite, so with equal commands they do not push along the axis."""
+    rov = VECTORED + "".join(
+        f'[[thruster]]\nname = "{name}"\ncurve = "t200"\ndirection = {{ value = [0, 0, {z}], source = "drawn" }}\n'
+        f'position = {{ value = [{x}, 0, 0], unit = "m", source = "drawn" }}\n'
+        for name, x, z in (("front", 0.1, 1), ("rear", -0.1, -1))
+    )
+    names = ["time [s]", *(f"u_{name} [1]" for name in "1234"), "u_front [1]", "u_rear [1]"]
+    rows = (
+        f"{0.1 * n:.1f},{f'-0.2,-0.2,0.2,0.2,{commands}' if n > 20 else '0,0,0,0,0,0'},{0.01 * n:.2f},{0.02 * n:.2f}"
+        for n in range(100)
+    )
+    header = ",".join([*names, "surge distance [m]", "depth [m]"])
+    tables = {"dive.csv": "\n".join([header, *rows]) + "\n", "thrust_t200.csv": pulled(30.0, 20.0)}
+    found = {(f.kind, f.axis) for f in read(tmp_path, f"{rov}[axes.heave]\n", tables).findings}
+    assert (("axis not pushed", "heave") in found) is (commands == "0.3,0.3")
+    assert ("axis left out", "heave") not in found
+    assert "axis not pushed" not in FACTS | DOUBTS
 
 
 def test_what_is_coupled_needs_all_three_axes(tmp_path: Path) -> None:

@@ -152,7 +152,7 @@ def test_axes_that_the_thrusters_do_nothing_along_are_told(tmp_path: Path) -> No
     assert log.findings == (
         Finding("missing column", file="log.csv", names={"column": "u_t"}),
         Finding("constant motion", axis="heave", file="log.csv", names={"quantity": "depth"}),
-        Finding("constant push", axis="yaw", file="log.csv"),
+        Finding("cancelling thrusters", axis="yaw", file="log.csv"),
     )
 
 

@@ -12,8 +12,8 @@ class Delay(Effect):
     kind = "delay"
     words = "delay from the commands to the motion"
     sentence = (
-        "the motion of {of} follows the commands {value} s late{interval}; the delay is not in the model but told "
-        "with it"
+        "the motion of {of} follows the commands {value} s late{interval}. The vehicle file has no delay; `T_d` in "
+        "its [commands] adds one to the FMU, the same for all axes"
     )
     sentence_of_file = (
         "the motion in {of} follows the commands {value} s later{interval} than in the other recordings; this is not "

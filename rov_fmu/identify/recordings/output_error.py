@@ -32,7 +32,7 @@ from rov_fmu.identify.recordings.residual_analysis import ResidualAnalysis
 from rov_fmu.identify.recordings.selection import candidates, earn_their_place, likely
 from rov_fmu.identify.recordings.switches import allow_for_switches
 from rov_fmu.identify.simulation.first_guess import DELAYS, first_guess
-from rov_fmu.identify.simulation.limits import check_limits
+from rov_fmu.identify.simulation.limits import check_limits, check_thrust
 from rov_fmu.identify.simulation.prepared import PreparedRecording, axes_of, divided, prepare, some_pieces
 from rov_fmu.identify.simulation.simulator import Simulator
 from rov_fmu.identify.simulation.solver import settled, solve
@@ -151,6 +151,7 @@ class _Fit:
             x = chosen.x[chosen.model.places_of(better)]
             kept, chosen = better, self.analysed(self.model(better, noise), x)
         check_limits(self.base, self.data, chosen.model.names, kept, chosen.x)
+        check_thrust(chosen.model.rov(chosen.x), self.data)
         effects = effects_of(whole, kept) | effects_of(chosen, kept)
         held_out = cache(lambda: self.held_out(chosen, kept))
         return tuple(self._result(axis, chosen, effects, held_out) for axis in self.axes)

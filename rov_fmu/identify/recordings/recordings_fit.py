@@ -35,6 +35,8 @@ class FittedEffect:
     """The 95 % interval; None where it is not finite, or is beyond both limits of the search."""
     kept: bool
     """True when the data justify the effect; otherwise the fit is without it."""
+    axis: str = ""
+    """The axis of the recording, for an effect of one recording along one axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +152,9 @@ def effects_of(analysis: ResidualAnalysis, kept: Collection[Effect]) -> dict[Eff
         low, high = extra.limits
         is_known = np.isfinite(half) and not (value - half < low and high < value + half)
         interval = (value - half, value + half) if is_known else None
-        effects[extra] = FittedEffect(extra.kind, extra.of, extra.unit(axis), value, interval, extra in kept)
+        effects[extra] = FittedEffect(
+            extra.kind, extra.of, extra.unit(axis), value, interval, extra in kept, extra.axis
+        )
     return effects
 
 

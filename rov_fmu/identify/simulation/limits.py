@@ -5,12 +5,14 @@ from math import exp, log
 
 import numpy as np
 
+from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.effects.dead_band import DeadBand
 from rov_fmu.identify.effects.effect import Effect, Setting
 from rov_fmu.identify.effects.load import Load
 from rov_fmu.identify.least_squares import bounds
 from rov_fmu.identify.simulation.prepared import PreparedRecording, axes_of
-from rov_fmu.model.layout import REVERSE, Axis
+from rov_fmu.io.toml_file import join_names
+from rov_fmu.model.layout import REVERSE, Axis, Curve
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.recording import Recording
@@ -62,8 +64,36 @@ def check_limits(
             files = ", ".join(dict.fromkeys(r.file for r in own))
             raise NoFitError(
                 f"{files}: no {axis.name} of a vehicle with this thrust and mass moves so: {what} would do it best. "
-                f"Check units, signs and the order of the thrusters"
+                f"Check units, signs, and the order and directions of the thrusters"
             )
+
+
+def check_thrust(rov: Rov, data: Sequence[PreparedRecording]) -> None:
+    """Check that each thrust curve that drives a recorded axis is possible, as fitted curves may not be.
+
+    Raises NoFitError.
+    """
+    for curve in rov.layout.curves:
+        own = [d.recording for d in data if curve in curves_of(rov.layout, d.axis)]
+        if own and (what := next(_impossible_thrust(rov, curve), None)):
+            files = join_names(dict.fromkeys(recording.file for recording in own))
+            axes = join_names(dict.fromkeys(recording.axis.name for recording in own))
+            raise NoFitError(
+                f"{files}: no {curve.name} thrust moves a vehicle so in {axes}: {what} would do it best. "
+                f"Check units, signs, and the order and directions of the thrusters"
+            )
+
+
+def _impossible_thrust(rov: Rov, curve: Curve) -> Iterator[str]:
+    """Yield a phrase for each coefficient beyond its bounds, and each direction in which full command does not push."""
+    for name in map(curve.coefficient, curve.keys):
+        declared = rov.layout.coefficients[name]
+        if not declared.minimum <= rov[name] <= declared.maximum:
+            yield f"{name} = {rov[name]:.3g}"
+    for command in (1.0, -1.0):
+        force = rov.curve_force(curve, command)
+        if force * command <= 0.0:
+            yield f"{force:.3g} N at {command:.0%}"
 
 
 def _at_limit(

@@ -16,7 +16,7 @@ from rov_fmu.identify.slips.single_recording import Alone, alone
 from rov_fmu.model.layout import Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.recording import Recording
+from rov_fmu.tank.recording import Recording, signal_name
 
 Tables = Mapping[str, Sequence[tuple[float, float]]]
 """Rows of a command and a number, by file."""
@@ -129,7 +129,7 @@ def _examine_each(
         if (found := alone(data, base)) is not None:
             evidence.append(Evidence(recording.file, recording.quantity, found))
             if found.turned:
-                names = {"quantity": recording.quantity, "positive": axis.positive.capitalize()}
+                names = {"quantity": signal_name(axis, recording.quantity), "positive": axis.positive.capitalize()}
                 yield Finding("wrong sign", axis.name, file=recording.file, names=names, certain=found.is_clear)
 
 
@@ -143,7 +143,7 @@ def _wrong_scales(axis: Axis, evidence: Sequence[Evidence], explanations: Sequen
     for one in evidence:
         if one.file in best.files:
             names = {
-                "quantity": one.quantity,
+                "quantity": signal_name(axis, one.quantity),
                 "unit": _unit(one.quantity, axis),
                 "factor": repr(best.factor),
                 "others": ", ".join(sorted(other.files)) if other else "",
@@ -178,7 +178,7 @@ def _unit(quantity: str, axis: Axis) -> str:
 
 
 def _too_fast(file: str, quantity: str, axis: Axis, speed: float) -> Finding:
-    names = {"quantity": quantity, "unit": _unit(quantity, axis), "speed_unit": axis.unit}
+    names = {"quantity": signal_name(axis, quantity), "unit": _unit(quantity, axis), "speed_unit": axis.unit}
     return Finding("too fast", axis.name, file=file, names=names, numbers={"speed": speed}, certain=True)
 
 

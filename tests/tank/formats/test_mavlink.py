@@ -164,7 +164,7 @@ def test_velocities_are_turned_into_the_body(bluerov2: Layout, tmp_path: Path) -
     assert surge.command is not None
     assert surge.command[-1] == pytest.approx(0.4)
     assert {recording.axis.name for recording in log.recordings} == {"surge"}
-    assert Finding("constant push", axis="sway", file="dive.tlog") in log.findings
+    assert Finding("cancelling thrusters", axis="sway", file="dive.tlog") in log.findings
     assert Finding("unknown velocity", file="dive.tlog", numbers={"count": 10}) in log.findings
 
 
