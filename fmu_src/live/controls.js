@@ -424,17 +424,25 @@ class Live {
       return;
     }
     this.reset();
+    /** @type {string[]} */
+    const unused = [];
     for (const slider of this.sliders) {
-      if (slider.dataset.start === undefined) continue;
-      const value = Number(given.get(slider.name) ?? slider.dataset.start);
-      if (!Number.isFinite(value)) continue;
-      given.delete(slider.name);
-      if (value === Number(slider.value)) continue;
-      slider.value = String(value);
+      const { name, min, max, dataset } = slider;
+      if (dataset.start === undefined) continue;
+      const words = given.get(name) ?? dataset.start;
+      given.delete(name);
+      const value = words.trim() === "" ? Number.NaN : Number(words);
+      const isAllowed = value >= Number(min) && value <= Number(max);
+      if (!isAllowed) unused.push(`${name}=${words.slice(0, 20)} (must be a number from ${min} to ${max})`);
+      const used = isAllowed ? value : Number(dataset.start);
+      if (used === Number(slider.value)) continue;
+      slider.value = String(used);
       this.slid(slider);
     }
-    const unused = [...given.keys()].join(", ").slice(0, 80);
-    if (unused) this.say(`The link has values that this page cannot use: ${unused}.`);
+    for (const name of given.keys()) unused.push(`${name.slice(0, 40)} (not a value of this vehicle)`);
+    const more = unused.splice(4).length;
+    if (more) unused.push(`${more} more`);
+    if (unused.length) this.say(`The link has values that this page cannot use: ${unused.join(", ")}.`);
   }
 
   /** @param {KeyboardEvent} event */

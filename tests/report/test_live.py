@@ -694,14 +694,36 @@ def test_a_link_contains_vehicle_commands_and_tuning(page: Any, pages: Callable[
     assert there.evaluate("['u_t', 'alpha_w', 'u_l'].map(name => live.flight.pilot.model.get(name))") == [-0.4, 1.5, 0]
     for hash, message in (
         ("vehicle=heavy&u_1=1", "The link is for the vehicle “heavy”, and this page flies “videoray”."),
-        ("vehicle=videoray&u_t=fast&u_x=1", "The link has values that this page cannot use: u_t, u_x."),
+        (
+            "vehicle=videoray&u_t=fast&u_x=1",
+            "The link has values that this page cannot use: u_t=fast (must be a number from -1 to 1), "
+            "u_x (not a value of this vehicle).",
+        ),
     ):
         there.evaluate("hash => { location.hash = hash; }", hash)
         until(there, "!document.getElementById('live-message').textContent.startsWith('Time')")
         there.wait_for_timeout(100)
         assert there.inner_text("#live-message") == message
-    there.evaluate("() => { location.hash = 'vehicle=videoray&u_t=7'; }")
-    until(there, "live.flight.pilot.model.get('u_t') === 1")
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ("u_t=7", "u_t=7 (must be a number from -1 to 1)"),
+        ("u_t=", "u_t= (must be a number from -1 to 1)"),
+        ("alpha_u=-3", "alpha_u=-3 (must be a number from 0.1 to 3.0)"),
+        ("&".join(f"x{n}=1" for n in range(6)), "x3 (not a value of this vehicle), 2 more"),
+    ],
+)
+def test_a_link_with_values_that_are_not_allowed_says_so_and_leaves_them_out(
+    page: Any, given: str, reason: str
+) -> None:
+    page.evaluate("hash => { location.hash = hash; }", f"vehicle=videoray&u_l=0.25&{given}")
+    until(page, "document.getElementById('live-message').textContent.startsWith('The link')")
+    assert page.inner_text("#live-message").endswith(f"{reason}.")
+    set_to = page.evaluate("['u_l', 'u_t', 'alpha_u'].map(name => live.flight.pilot.model.get(name))")
+    start = page.evaluate("Number(document.querySelector('input[name=alpha_u]').dataset.start)")
+    assert set_to == [0.25, 0.0, start]
 
 
 def test_the_ghost_is_lightly_filled_and_each_line_has_its_own_dash(page: Any) -> None:
