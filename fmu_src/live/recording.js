@@ -13,6 +13,9 @@ const FACTORS = {
   rad: { rad: 1, deg: Math.PI / 180 },
 };
 
+/** The end of a message about a missing column. */
+const RENAMING = "if another header stands for it, rename that one: this page does not read [columns] of rov.toml";
+
 /** The error of a file that is not a recording of this vehicle. Its text says why. */
 class Unreadable extends Error {}
 
@@ -43,10 +46,10 @@ function readRecording(text, name, vehicle) {
   };
   const columns = headers.map((header) => columnOf(header, name, vehicle));
   const time = columns.findIndex((column) => column?.what === "time");
-  if (time < 0) throw new Unreadable("it has no column “time [s]”");
+  if (time < 0) throw new Unreadable(`it has no column “time [s]”; ${RENAMING}`);
   const commanding = columns.flatMap((column, n) => (column?.what === "command" ? [n] : []));
   if (commanding.length === 0) {
-    throw new Unreadable(`it has no column of a command, such as “${vehicle.commands[0]} [%]”`);
+    throw new Unreadable(`it has no column of a command, such as “${vehicle.commands[0]} [%]”; ${RENAMING}`);
   }
   const measuring = columns.flatMap((column, n) => (column?.what === "signal" ? [n] : []));
   const rows = lines
@@ -89,7 +92,11 @@ function readRecording(text, name, vehicle) {
     ({ axis, isPosition, values }) =>
       values.some(Number.isFinite) && (isPosition || !signals.some((other) => other.axis === axis && other.isPosition)),
   );
-  if (used.length === 0) throw new Unreadable("it has no motion of an axis of this vehicle");
+  if (used.length === 0) {
+    throw new Unreadable(
+      `it has no motion of an axis of this vehicle, such as “${vehicle.axes[0].name} velocity [${vehicle.axes[0].unit}]”; ${RENAMING}`,
+    );
+  }
   const twice = used.find(({ axis }, n) => used.findIndex((other) => other.axis === axis) < n);
   if (twice) throw new Unreadable(`two of its columns tell the same of ${vehicle.axes[twice.axis].name}`);
   const none = Object.fromEntries(vehicle.commands.map((command) => [command, 0]));

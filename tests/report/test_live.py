@@ -832,8 +832,18 @@ BAD = {
     "empty": (b"", "less than two rows"),
     "bytes": (bytes(range(256)) * 40, "no column"),
     "other columns": (b"a,b\n1,2\n3,4\n", "no column \N{LEFT DOUBLE QUOTATION MARK}time"),
-    "no command": (b"time [s],depth [m]\n0,1\n1,2\n", "no column of a command"),
-    "no motion": (b"time [s],u_l [%]\n0,1\n1,2\n", "no motion"),
+    "header of another logger": (
+        b"t [s],u_l [%],depth [m]\n0,9,0\n1,9,1\n",
+        "; if another header stands for it, rename that one: this page does not read [columns] of rov.toml.",
+    ),
+    "no command": (
+        b"time [s],depth [m]\n0,1\n1,2\n",
+        "no column of a command, such as \N{LEFT DOUBLE QUOTATION MARK}u_l [%]",
+    ),
+    "no motion": (
+        b"time [s],u_l [%],Depth (m)\n0,1,0\n1,2,0\n",
+        "such as \N{LEFT DOUBLE QUOTATION MARK}surge velocity [m/s]\N{RIGHT DOUBLE QUOTATION MARK}; if another header",
+    ),
     "no axis": (b"time [s],command [%],depth [m]\n0,1,0\n1,2,0\n", "call it log_surge.csv"),
     "unit": (b"time [s],u_l [kg],depth [m]\n0,1,0\n1,2,0\n", "u_l [kg]\N{RIGHT DOUBLE QUOTATION MARK} has no unit"),
     "length": (b"time [s],u_l [%],depth [deg]\n0,1,0\n1,2,0\n", "has no unit that this column can have"),
