@@ -481,6 +481,20 @@ def test_another_vehicle_flies_the_same_commands_as_a_ghost(tmp_path: Path, quie
     assert page.is_checked("#live-ghost")
 
 
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+def test_the_ring_around_the_chosen_picture_leaves_the_title_free(
+    pages: Callable[[str], str], quiet: Visitor, width: int, height: int
+) -> None:
+    page = flying(quiet, pages("videoray"), width=width, height=height).page
+    style = page.locator("#live-stage").evaluate(
+        "stage => (({ outlineStyle, outlineWidth, outlineOffset }) => "
+        "[outlineStyle, parseFloat(outlineWidth), parseFloat(outlineOffset)])(getComputedStyle(stage))"
+    )
+    assert style[0] == "solid", "the picture has the focus on load"
+    title, stage = page.locator("h1").evaluate(BOX), page.locator("#live-stage").evaluate(BOX)
+    assert title["bottom"] <= stage["top"] - style[1] - style[2]
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
 @pytest.mark.parametrize("kind", ["videoray", "heavy", "six"])
