@@ -530,6 +530,7 @@ class Live {
     this.horizon?.draw(flight, ghost);
     this.depth?.draw(flight, ghost);
     for (const chart of this.charts) chart.draw(flight, this.span, ghost, this.pointed);
+    part("measured").hidden = !flight.playback && this.vehicle.tests.every(({ V }) => V === null);
     const [roll, pitch, heading] = attitudeOf(model);
     const readings = [`${shown(flight.time, 1)} s`];
     if (model.has("x")) readings.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);

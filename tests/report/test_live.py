@@ -755,6 +755,24 @@ def test_the_ghost_is_lightly_filled_and_each_line_has_its_own_dash(page: Any) -
     assert dashes[2] == "none"
 
 
+def test_the_legend_tells_what_was_measured_only_where_something_was(
+    pages: Callable[[str], str], quiet: Visitor
+) -> None:
+    """The VideoRay has published step tests; a vehicle without them has measurements during a recording only."""
+    legend = "#live-measured"
+    assert flying(quiet, pages("videoray")).page.locator(legend).is_visible()
+    page = flying(quiet, pages("everything")).page
+    assert not page.locator(legend).is_visible()
+    command, axis = page.evaluate("[live.vehicle.commands[0], live.vehicle.axes[0]]")
+    header = f"time [s],{command} [%],{axis['name']} velocity [{axis['unit']}]"
+    drop(page, "pool.csv", f"{header}\n0,0,0\n1,9,0\n2,9,0.1\n".encode())
+    until(page, "live.flight.playback !== null && !live.changed || live.paused")
+    assert page.locator(legend).is_visible()
+    page.click("#live-reset")
+    until(page, "live.flight.playback === null && !live.changed")
+    assert not page.locator(legend).is_visible()
+
+
 def test_a_compact_page_shows_the_picture_and_the_charts_in_a_small_frame(tmp_path: Path, quiet: Visitor) -> None:
     target, vehicle = tmp_path / "compact.html", load_vehicle(SHIPPED["videoray"])
     target.write_text(fly_page([Flown(vehicle, module(vehicle.rov))], compact=True), encoding="utf-8")
