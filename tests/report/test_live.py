@@ -613,6 +613,21 @@ def test_a_step_test_stops_at_its_end_and_keeps_its_curve(page: Any, vehicle: Ve
     until(page, f"live.flight.time > {ceil(6.0 * Tau)}")
 
 
+def test_commands_that_are_set_while_time_stands_still_have_their_tau(page: Any) -> None:
+    """Tau holds from rest: a command that is changed in motion shows V_ss only."""
+    page.evaluate("live.pause(true)")
+    for name in ("u_l", "u_r"):
+        page.locator(f"input[name={name}]").fill("0.5")
+    page.evaluate("live.pause(false)")
+    until(page, "live.flight.time > 0.5 && live.flight.pilot.model.get('u') > 0.05")
+    assert "Tau" in page.text_content("#live-chart-surge .marks")
+    page.locator("input[name=u_r]").fill("0.4")
+    until(page, "live.flight.pilot.model.get('u_r') === 0.4 && !live.changed")
+    marks = page.text_content("#live-chart-surge .marks")
+    assert "V_ss" in marks
+    assert "Tau" not in marks
+
+
 def test_sliders_show_the_command_that_acts_and_fill_from_the_middle(page: Any) -> None:
     slider = page.locator("input[name=u_l]")
     filled = "slider => ['--from', '--to'].map(name => Number(slider.style.getPropertyValue(name)))"
