@@ -525,6 +525,23 @@ def test_the_picture_and_an_even_grid_of_charts_fit_one_screen(
     assert len({*in_rows.values()}) == 1, "each row has as many charts"
 
 
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+def test_nothing_moves_when_a_message_comes_or_goes(
+    pages: Callable[[str], str], quiet: Visitor, width: int, height: int
+) -> None:
+    page = flying(quiet, pages("videoray"), width=width, height=height).page
+    assert page.inner_text("#live-message").startswith("Time starts")
+
+    def places() -> list[Any]:
+        return [page.locator(part).evaluate(BOX) for part in ("#live-stage", "#live-charts", "#live-controls")]
+
+    before = places()
+    page.evaluate("live.say('')")
+    assert places() == before
+    page.evaluate("live.say('short')")
+    assert places() == before
+
+
 def test_each_thruster_has_its_label_and_throws_its_jet_against_its_force(
     pages: Callable[[str], str], quiet: Visitor, heavy: Vehicle
 ) -> None:
