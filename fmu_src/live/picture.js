@@ -7,6 +7,10 @@
 
 /** The width of a letter of a label and the height of its line, in pixels. */
 const [LETTER, LINE] = [6.6, 13];
+/** The directions in which a label may lie beside its thruster. */
+const SIDES = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [Math.cos((n * Math.PI) / 4), Math.sin((n * Math.PI) / 4)]);
+/** The area in square pixels that a label may cover before it lies beside its thruster instead of away from the vehicle. */
+const TURN_COST = 60;
 
 /** @param {Vector} a @param {Vector} b */
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -33,6 +37,12 @@ function ring(at, along, r) {
 /** @param {Vector} a @param {Vector} b @returns {Vector} */
 function cross([a, b, c], [x, y, z]) {
   return [b * z - c * y, c * x - a * z, a * y - b * x];
+}
+
+/** Returns the area that two rectangles share. @param {DOMRect} one @param {DOMRect} other */
+function shared(one, other) {
+  const wide = Math.min(one.right, other.right) - Math.max(one.left, other.left);
+  return Math.max(0, wide) * Math.max(0, Math.min(one.bottom, other.bottom) - Math.max(one.top, other.top));
 }
 
 /** Returns the closed path around points. @param {number[][]} points */
@@ -123,12 +133,13 @@ class Figure {
     /** @type {SVGElement[]} */
     this.paths = [];
     this.labels = drawn(this.group, "g");
-    if (hasLabels) for (const { label } of vehicle.thrusters) drawn(this.labels, "text").textContent = label;
+    if (hasLabels)
+      for (const { label } of vehicle.thrusters) drawn(this.labels, "text", { class: "centred" }).textContent = label;
   }
 
   /** @param {Model} model @param {(p: Vector) => number[]} see From the earth frame, from the vehicle, to px.
-   * @param {number} scale px per m */
-  draw(model, see, scale) {
+   * @param {number} scale px per m @param {DOMRect[]} taken Where no label should lie. */
+  draw(model, see, scale, taken) {
     const frame = rotationOf(model);
     const look = (/** @type {Vector} */ p) =>
       see(plus([0, 0, 0], [p[0], frame[0]], [p[1], frame[1]], [p[2], frame[2]]));
@@ -148,32 +159,32 @@ class Figure {
     this.paths.forEach((path, n) => {
       place(path, n < parts.length ? { class: parts[n].kind, d: parts[n].path } : { d: "" });
     });
-    this.label(look, scale);
+    this.label(look, scale, taken);
   }
 
-  /** Puts the labels of the thrusters around the vehicle. @param {(p: Vector) => number[]} look @param {number} scale */
-  label(look, scale) {
+  /** Puts each label beside its thruster: away from the vehicle's middle, or where it covers less.
+   * @param {(p: Vector) => number[]} look @param {number} scale @param {DOMRect[]} taken */
+  label(look, scale, taken) {
     const [x, y] = look([0, 0, 0]);
     const isLegible = scale * this.vehicle.size > (this.labels.children.length > 4 ? 45 : 24);
     place(this.labels, { visibility: isLegible ? "inherit" : "hidden" });
-    /** @type {{left: number, right: number, y: number}[]} */
-    const taken = [];
+    const r = this.shape.radius * scale;
+    const tubes = this.shape.tubes.map(({ at }) => look(at));
+    const covered = [...taken, ...tubes.map(([u, v]) => new DOMRect(u - r, v - r, 2 * r, 2 * r))];
     [...this.labels.children].forEach((text, n) => {
-      const [u, v] = look(this.shape.tubes[n].at);
+      const [u, v] = tubes[n];
       const far = Math.hypot(u - x, v - y);
-      const [dx, dy] =
-        Math.abs(u - x) < 0.3 * far || far < 2 ? [u < x - 1 ? -1 : 1, 0] : [(u - x) / far, (v - y) / far];
-      const out = 1.6 * this.shape.radius * scale;
-      const at = u + out * dx;
+      const away = far < 2 ? [1, 0] : [(u - x) / far, (v - y) / far];
       const width = LETTER * (text.textContent ?? "").length;
-      const own = { left: dx < 0 ? at - width : at, right: dx < 0 ? at : at + width, y: v + out * dy + 4 };
-      for (const other of taken) {
-        const gap = own.y - other.y;
-        if (own.left < other.right && other.left < own.right && Math.abs(gap) < LINE)
-          own.y = other.y + (gap < 0 ? -LINE : LINE);
-      }
-      taken.push(own);
-      place(text, { x: at.toFixed(1), y: own.y.toFixed(1), class: dx < 0 ? "right" : "" });
+      const places = [away, ...SIDES].map(([dx, dy]) => {
+        const left = u + 1.6 * r * dx - (width / 2) * (Math.abs(dx) < 0.3 ? 1 : 1 - Math.sign(dx));
+        const box = new DOMRect(left, v + (1.6 * r + 6) * dy - 6, width, LINE);
+        const turned = TURN_COST * (1 - dx * away[0] - dy * away[1]);
+        return { box, cost: covered.reduce((sum, other) => sum + shared(box, other), turned) };
+      });
+      const { box } = places.reduce((one, other) => (other.cost < one.cost ? other : one));
+      covered.push(box);
+      place(text, { x: box.x + width / 2, y: box.y + 10 });
     });
   }
 }
@@ -256,6 +267,8 @@ class Picture {
     this.svg = svg;
     this.size = flight.pilot.model.vehicle.size;
     [this.width, this.height] = [640, 400];
+    /** Where no label should lie: at the arrow to north, beyond the sides, under the sticks. @type {DOMRect[]} */
+    this.taken = [];
     this.grid = drawn(svg, "path", { class: "grid" });
     this.shadow = drawn(svg, "path", { class: "shadow" });
     this.tracks = [drawn(svg, "path", { class: "line ghostly" }), drawn(svg, "path", { class: "line" })];
@@ -306,6 +319,14 @@ class Picture {
     this.width = this.svg.clientWidth || this.width;
     this.height = this.svg.clientHeight || this.height;
     place(this.svg, { viewBox: `0 0 ${this.width} ${this.height}` });
+    const { left, top } = this.svg.getBoundingClientRect();
+    const sticks = [...document.querySelectorAll(".stick")].map((stick) => stick.getBoundingClientRect());
+    this.taken = [
+      new DOMRect(0, 0, 62, 112),
+      new DOMRect(-1e4, 0, 1e4, this.height),
+      new DOMRect(this.width, 0, 1e4, this.height),
+      ...sticks.map((s) => new DOMRect(s.x - left, s.y - top, s.width, s.height)),
+    ];
   }
 
   /** @param {Flight} flight */
@@ -345,8 +366,8 @@ class Picture {
     this.tracks[1].setAttribute("d", pathOf(pilot, from));
     this.ghost.group.setAttribute("visibility", ghostIsThere ? "visible" : "hidden");
     const away = plus(positionOf(ghost.model), [-1, here]);
-    if (ghostIsThere) this.ghost.draw(ghost.model, (p) => see(plus(p, [1, away])), scale);
-    this.pilot.draw(pilot.model, see, scale);
+    if (ghostIsThere) this.ghost.draw(ghost.model, (p) => see(plus(p, [1, away])), scale, []);
+    this.pilot.draw(pilot.model, see, scale, this.taken);
   }
 
   /** Draws the grid below the vehicle, its scale, and the direction of north.

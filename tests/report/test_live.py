@@ -14,7 +14,8 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.fmu.module import module
 from rov_fmu.fmu.variables import variables
-from rov_fmu.model.layout import HEAVE
+from rov_fmu.model.layout import HEAVE, Thruster
+from rov_fmu.model.rov import Rov
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -523,6 +524,60 @@ def test_the_picture_and_an_even_grid_of_charts_fit_one_screen(
     assert min(boxes[0]["width"], 2 * boxes[0]["height"]) > 150
     in_rows = Counter(round(box["y"]) for box in boxes)
     assert len({*in_rows.values()}) == 1, "each row has as many charts"
+
+
+_FOUR = (
+    ("PS", "rear", (1.0, 0.0, 0.0), (-0.2, -0.19, 0.0)),
+    ("SB", "rear", (1.0, 0.0, 0.0), (-0.2, 0.19, 0.0)),
+    ("VF", "top", (0.0, 0.0, -1.0), (0.15, 0.0, 0.0)),
+    ("VA", "top", (0.0, 0.0, -1.0), (-0.15, 0.0, 0.0)),
+)
+"""Two thrusters at the stern, and two that push vertically: name, curve, direction and position."""
+
+
+@pytest.fixture(scope="module")
+def four_thrusters(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The address of the page of a vehicle whose thrusters have long labels and are close together."""
+    vehicle = load_vehicle(SHIPPED["videoray"])
+    layout = replace(vehicle.layout, thrusters=tuple(Thruster(*one) for one in _FOUR))
+    rov = Rov(layout, {name: vehicle.rov.coefficients[name] for name in layout.coefficients})
+    target = tmp_path_factory.mktemp("four") / "four.html"
+    target.write_text(fly_page([Flown(a_vehicle(rov), module(rov))]), encoding="utf-8")
+    return target.as_uri()
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7, 2.0, 3.5, 5.0])
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+def test_labels_cover_no_thruster_no_other_label_and_neither_north_nor_a_stick(
+    four_thrusters: str, quiet: Visitor, width: int, height: int, heading: float
+) -> None:
+    page = flying(quiet, four_thrusters, width=width, height=height).page
+    for _ in range(2):  # from an angle, and from above
+        found = page.evaluate(
+            """heading => {
+                live.pause(true);
+                live.flight.pilot.model.set("psi", heading);
+                live.look();
+                live.draw();
+                return ["text", ".tube"].map(kind =>
+                    [...document.querySelectorAll(`#live-picture .craft:not(.ghostly) ${kind}`)])
+                    .concat([[...document.querySelectorAll("#live-picture > .needle, .stick")]])
+                    .map(list => list.map(one => one.getBoundingClientRect().toJSON()));
+            }""",
+            heading,
+        )
+        labels, tubes, others = found
+        assert (len(labels), len(tubes), len(others)) == (4, 4, 3)
+        for n, label in enumerate(labels):
+            for other in (*labels[:n], *tubes, *others):
+                assert shared(label, other) < 0.15 * label["width"] * label["height"], (label, other)
+
+
+def shared(one: dict[str, float], other: dict[str, float]) -> float:
+    """Return the area that two rectangles share."""
+    wide = min(one["right"], other["right"]) - max(one["left"], other["left"])
+    high = min(one["bottom"], other["bottom"]) - max(one["top"], other["top"])
+    return max(0.0, wide) * max(0.0, high)
 
 
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
