@@ -499,7 +499,7 @@ class Live {
     this.last = now;
     if (!this.isSeen) return;
     this.command();
-    if (!this.paused && !this.flight.isAtRest()) this.fly(passed * this.speed);
+    if (!this.paused && !this.flight.isAtRest()) this.fly(Math.round(passed * this.speed * 1e6) / 1e6);
     if (this.changed) this.draw();
   }
 

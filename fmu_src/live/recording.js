@@ -197,7 +197,8 @@ function unwrapped(angles) {
   });
 }
 
-/** Returns the flight as a table: what flew it and how it moved. As a recording it can be flown again. @param {Flight} flight */
+/** Returns the flight as a table: what flew it and how it moved. As a recording it can be flown again. Times are whole microseconds, as
+ * the steps of the page are. @param {Flight} flight */
 function tableOf({ times, commands, pilot }) {
   const { axes, commands: names } = pilot.model.vehicle;
   const columns = axes.flatMap(({ velocity, unit, position, positionUnit }, a) => [
@@ -206,7 +207,7 @@ function tableOf({ times, commands, pilot }) {
   ]);
   const head = ["time [s]", ...names.map((name) => `${name} [%]`), ...columns.map(({ title }) => title)];
   const rows = times.map((time, n) => [
-    time,
+    Number(time.toFixed(6)),
     ...commands[n].map((x) => 100 * x),
     ...columns.map(({ values }) => values[n]),
   ]);

@@ -770,15 +770,46 @@ def test_an_exported_flight_can_be_flown_and_inspected(page: Any, tmp_path: Path
     assert download.value.suggested_filename == "videoray.csv"
     log = tmp_path / "videoray.csv"
     download.value.save_as(log)
+    check_replay(page, log)
+    assert main(["identify", "--inspect", str(log)]) == 0
+
+
+def check_replay(page: Any, log: Path) -> None:
+    """Check that the page moves as in this flight, of which it has written the file."""
     drop(page, log.name, log.read_bytes())
     until(page, "live.flight.playback !== null")
-    page.evaluate("live.speed = 50")
+    page.evaluate("live.pause(false); live.speed = 50")
     until(page, "live.paused && live.flight.playback?.next() === null")
     line = page.inner_text("#live-message")
     deviations = [float(number) for number in re.findall(r"(?:surge|heave|yaw) (\S+) ", line)]
     assert len(deviations) == 3
     assert max(deviations) < 1e-12, line
-    assert main(["identify", "--inspect", str(log)]) == 0
+
+
+@pytest.mark.parametrize("speed", [0.1, 1, 5])
+def test_an_exported_flight_has_times_of_whole_microseconds(page: Any, tmp_path: Path, speed: float) -> None:
+    """Frames of any length are flown again as they were, although their times are rounded."""
+    page.evaluate(
+        """speed => {
+            live.speed = speed;
+            const { frame } = live;
+            live.frame = now => frame.call(live, now + Math.random());
+        }""",
+        speed,
+    )
+    page.locator("input[name=u_l]").fill("0.5")
+    until(page, "live.flight.times.length > 20")
+    page.locator("input[name=u_t]").fill("0.3")
+    until(page, "live.flight.times.length > 40")
+    page.evaluate("live.pause(true)")
+    log = tmp_path / "videoray.csv"
+    with page.expect_download() as download:
+        page.click("#live-export")
+    download.value.save_as(log)
+    times = [line.split(",")[0] for line in log.read_text(encoding="utf-8").splitlines()[1:]]
+    assert len(times) > 40
+    assert all(re.fullmatch(r"\d+(\.\d{1,6})?", time) for time in times), times
+    check_replay(page, log)
 
 
 def test_a_link_contains_vehicle_commands_and_tuning(page: Any, pages: Callable[[str], str], visit: Visitor) -> None:
