@@ -359,13 +359,21 @@ def _fly(vehicle: Path, against: Path | None, output: Path | None) -> None:
     if output:
         check_targets([output], [*paths, *(file for one in loaded for file in one.files)])
         check_written(output, PAGE)
-    page = fly_page([Flown(one, module(one.rov)) for one in loaded]).encode()
+    page = fly_page(
+        [Flown(one, module(one.rov), name) for one, name in zip(loaded, _short_names(paths), strict=True)]
+    ).encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
     write_whole(Output(path, page))
     if output:
         print_end([path], "open it in a browser")
     else:
         _open(path, "-o PAGE.html")
+
+
+def _short_names(paths: Sequence[Path]) -> list[str]:
+    """Return the names of files, with their folders if the names are the same."""
+    names = [path.name for path in paths]
+    return names if len({*names}) == len(names) else [str(path) for path in paths]
 
 
 def _open(path: Path, option: str) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from lxml import html
 
+from rov_fmu.cli import main
 from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.module import module
 from rov_fmu.fmu.variables import variables
@@ -22,6 +23,7 @@ from rov_fmu.report.templates import number
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import BARE
 from tests.report.pages import check_is_whole, check_refers_to_itself_alone, row_of, rows, text_of
 from tests.vehicles import SIX, VEHICLES, a_vehicle, pulsed
 
@@ -311,6 +313,33 @@ def test_the_page_of_six_axes_tells_of_attitude_and_weight() -> None:
         assert claim in text, claim
     for claim in ("Pitch and roll.", "loss of thrust", "diagonal mass", "Neutral buoyancy", "heavy by 1 N"):
         assert claim not in text, claim
+
+
+@pytest.mark.parametrize(
+    ("changes", "title"),
+    [
+        ({"name": "Other"}, "VideoRay Pro 4 beside Other"),
+        ({"version": "2"}, "VideoRay Pro 4 {version} beside VideoRay Pro 4 2"),
+        ({}, "VideoRay Pro 4 (old.toml) beside VideoRay Pro 4 (new.toml)"),
+    ],
+)
+def test_vehicles_of_the_same_name_are_told_apart(vehicle: Vehicle, changes: dict[str, Any], title: str) -> None:
+    flown = [Flown(vehicle, b"", "old.toml"), Flown(replace(vehicle, **changes), b"", "new.toml")]
+    root = html.fromstring(fly_page(flown))
+    title = title.format(version=vehicle.version)
+    assert [element.text for element in root.iter("title", "h1")] == [f"{title} \N{EN DASH} fly it", title]
+    assert f"The ghost is {title.split(' beside ')[1]}, under" in " ".join(root.text_content().split())
+
+
+def test_the_files_of_two_vehicles_have_their_folders_if_their_names_are_the_same(tmp_path: Path) -> None:
+    files = [tmp_path / folder / "bare.toml" for folder in ("old", "new")]
+    for file in files:
+        file.parent.mkdir()
+        file.write_bytes(BARE.read_bytes())
+    target = tmp_path / "page.html"
+    assert main(["fly", str(files[0]), "--against", str(files[1]), "-o", str(target)]) == 0
+    (heading,) = html.fromstring(target.read_text(encoding="utf-8")).iter("h1")
+    assert all(f"({file})" in heading.text for file in files)
 
 
 def test_keys_leave_the_other_axes_at_rest() -> None:

@@ -38,6 +38,8 @@ class Flown:
 
     vehicle: Vehicle
     module: bytes
+    file: str = ""
+    """The name of the vehicle file, which tells vehicles of the same name and version apart."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class Live:
     """The inputs that are not commands: name, end of the slider, unit."""
     tunable: Sequence[tuple[str, str, float, float, float]]
     """The tunable coefficients: name, label, both ends of the slider, value in the vehicle file."""
+    title: str
+    """The name of the vehicle, or the names of both."""
     other: str | None
     """The name of the ghost, if there is one."""
 
@@ -74,6 +78,7 @@ def live(flown: Sequence[Flown]) -> Live:
     script = _COMMENT.sub("", "".join((MODULE_SOURCES / name).read_text(encoding="utf-8") for name in _SCRIPTS))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     tests, start = data[0]["tests"], dict(data[0]["variables"])
+    names = _names(flown)
     return Live(
         data=Markup(text),
         script=Markup(script),
@@ -84,8 +89,17 @@ def live(flown: Sequence[Flown]) -> Live:
         start=start,
         loads=list(_loads(pilot.rov, start)),
         tunable=list(_tunable(pilot.rov)),
-        other=flown[1].vehicle.name if len(flown) > 1 else None,
+        title=" beside ".join(names),
+        other=names[1] if len(flown) > 1 else None,
     )
+
+
+def _names(flown: Sequence[Flown]) -> list[str]:
+    """Return the names of the vehicles, if they are the same with what tells them apart: the version or the file."""
+    plain = [one.vehicle.name for one in flown]
+    versions = [f"{one.vehicle.name} {one.vehicle.version}" for one in flown]
+    files = [f"{one.vehicle.name} ({one.file})" if one.file else one.vehicle.name for one in flown]
+    return next((names for names in (plain, versions) if len({*names}) == len(names)), files)
 
 
 def fly_page(flown: Sequence[Flown], *, compact: bool = False) -> str:
