@@ -28,8 +28,8 @@ _SPARE_KEYS = ("LJ", "IK")
 _VERTICAL = 0.9
 """The least vertical part of a thruster's direction for which its label says that it is vertical."""
 _SCRIPTS = ("model.js", "flight.js", "recording.js", "view.js", "picture.js", "controls.js")
-# The comments and types are for readers of the source. They are a quarter of it, and are left out of the page.
-_COMMENT = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ ")
+# The comments, types and indents are for readers of the source. They are a third of it, and are left out of the page.
+_FOR_READERS = re.compile(r"(?m)^ *(//.*|/\*\*([^*]|\*(?!/))*\*/)\n|/\*\* [^*\n]* \*/ |^ +|^\n")
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def live(flown: Sequence[Flown]) -> Live:
     pilot = flown[0].vehicle
     data = [_data(one) for one in flown]
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
-    script = _COMMENT.sub("", "".join((MODULE_SOURCES / name).read_text(encoding="utf-8") for name in _SCRIPTS))
+    script = _FOR_READERS.sub("", "".join((MODULE_SOURCES / name).read_text(encoding="utf-8") for name in _SCRIPTS))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     tests, start = data[0]["tests"], dict(data[0]["variables"])
     names = _names(flown)
