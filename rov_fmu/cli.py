@@ -168,7 +168,7 @@ def _commands(context: click.Context) -> None:
     "--output",
     type=_FILE,
     metavar="FILE.fmu",
-    help="File to write. The default is <identifier>.fmu, or <identifier>.fmi3.fmu for FMI 3.0.",
+    help="File to write. The default is <identifier>.fmu, or <identifier>.fmi3.fmu for FMI 3.0, in the current folder.",
 )
 @click.option(
     "--backend",

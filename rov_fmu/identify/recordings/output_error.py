@@ -138,6 +138,9 @@ class _Fit:
     def chosen(self, extras: tuple[Effect, ...], x: Array) -> tuple[RecordingsFit, ...]:
         """Fit all extras from x on, and leave out those that the data do not justify."""
         noise = self.noise(extras, x)
+        if any(d.shifts is not None for d in self.data):  # x was fitted without the allowance for switches
+            x = solve(self.model(extras, noise, with_prior=True), x, self.loss, 1e-4, self.on_step).x
+            noise = self.noise(extras, x)
         everything = self.model(extras, noise, with_prior=True)
         whole = self.analysed(everything, x, 1e-4)  # effects that are not identifiable settle slowly
         kept, x = earn_their_place(whole)

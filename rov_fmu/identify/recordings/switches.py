@@ -6,7 +6,7 @@ log itself, the command changes at the row, or near it if the time stamps have e
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,8 @@ _LARGEST = 5.0
 
 _CLEAR = 3.0
 """The gain of log-likelihood by which a scatter must be better than none. Without any, chance rarely reaches it."""
+_RANK = 1e-6
+"""The least singular value of columns that are independent of the others."""
 
 
 def allow_for_switches(model: Simulator, x: Array) -> tuple[PreparedRecording, ...]:
@@ -37,14 +39,14 @@ def allow_for_switches(model: Simulator, x: Array) -> tuple[PreparedRecording, .
     `x` has the parameters of a fit without this allowance. Raises MotionError.
     """
     rov, extras, J = model.rov(x), model.extra_values(x), model.jacobian(x)
-    gains, responses, shifts = [], [], []
+    pieces, responses, shifts = [], [], []
     for d, output, rows in zip(model.data, model.run(x), model.rows, strict=True):
         response = LinearResponse(rov, d.recording, d.time, output.velocity, d.delay + delay_of(extras, d.recording))
         S = response.by_switches()
         responses.append(response)
         shifts.append(S)
-        gains.append(_gains(without_spikes(d.values - output.values), S, J[rows]))
-    share = _share(gains)
+        pieces.append(_whitened(without_spikes(d.values - output.values), S, J[rows], model.shared))
+    share = _share([_gains(piece) for piece in _without_fit([piece for piece in pieces if piece])])
     if share == 0.0:
         return model.data
     if share == _SHARES[-1]:
@@ -55,7 +57,7 @@ def allow_for_switches(model: Simulator, x: Array) -> tuple[PreparedRecording, .
 
 def _share(gains: Sequence[Array]) -> float:
     """Return the most likely scatter of the switches, by the gains of all pieces."""
-    losses = np.sum([np.minimum(each.max() - each, _LARGEST) for each in gains], axis=0)
+    losses = np.sum([np.minimum(each.max() - each, _LARGEST) for each in gains] or np.zeros((1, len(_SHARES))), axis=0)
     return float(_SHARES[np.argmin(losses)]) if losses[0] - losses.min() > _CLEAR else 0.0
 
 
@@ -67,18 +69,65 @@ def _between_rows(data: PreparedRecording, response: LinearResponse) -> Prepared
     middles = time[switched] - early
     if len(switched) < 2:
         return replace(data, switches=middles, between_rows=True)
-    S = response.by_switches(middles[1:] + early[1:].mean())  # the delay was fitted to switches at rows
+    at = middles[1:] + early[1:].mean()  # the delay was fitted to switches at rows
+    S = np.hstack([response.by_switches(at), response.by_switches(at, squared=True)])
     return replace(data, switches=middles, shifts=S if S.shape[1] else None, between_rows=True)
 
 
-def _gains(residuals: Array, S: Array, jacobian: Array) -> Array:
-    """Return how much larger the logarithm of the likelihood is with a scatter of the switches, for each share."""
+@dataclass(frozen=True)
+class _Piece:
+    """The slow coefficients of the transform of one piece of a recording, in standard deviations of the noise."""
+
+    residuals: Array
+    shifts: Array
+    """The response to a late switch, n x switches."""
+    fit: Array
+    """The response to the parameters that all pieces share, n x p."""
+
+
+def _whitened(residuals: Array, S: Array, jacobian: Array, shared: int) -> _Piece | None:
+    """Return a piece without what its own parameters, the values at its start, explain. The others are the first ones.
+
+    None for a piece without switches, or with too few samples.
+    """
     S = S[:, :_TESTED]
     spectrum = noise_spectrum(residuals, np.hstack([S, jacobian])) if S.shape[1] else None
     if spectrum is None:
-        return np.zeros(len(_SHARES))
-    noise = np.sqrt(spectrum[:_COEFFICIENTS])
-    r, A = cosines(residuals)[:_COEFFICIENTS] / noise, cosines(S)[:_COEFFICIENTS] / noise[:, None]
-    U, s, _ = np.linalg.svd(A, full_matrices=False)
-    explained, scatter = (U.T @ r) ** 2, np.outer(_SHARES, s) ** 2  # the covariance is I + share^2 A A'
+        return None
+    noise = np.sqrt(spectrum[:_COEFFICIENTS, None])
+    columns = np.column_stack([residuals, S, jacobian])
+    white = cosines(columns)[:_COEFFICIENTS] / noise
+    fit = white[:, 1 + S.shape[1] :]
+    own = _basis(fit[:, shared:])
+    white -= own @ (own.T @ white)
+    return _Piece(white[:, 0], white[:, 1 : 1 + S.shape[1]], white[:, 1 + S.shape[1] :][:, :shared])
+
+
+def _without_fit(pieces: Sequence[_Piece]) -> list[_Piece]:
+    """Return the pieces without what the shared parameters explain.
+
+    The fit has followed the largest errors of the switches, so its residuals show less of them than there is.
+    """
+    if not pieces:
+        return []
+    ends = np.cumsum([len(piece.residuals) for piece in pieces])[:-1]
+    parts = np.split(_basis(np.concatenate([piece.fit for piece in pieces])), ends)
+    explained = np.sum([Q.T @ piece.residuals for Q, piece in zip(parts, pieces, strict=True)], axis=0)
+    return [
+        _Piece(piece.residuals - Q @ explained, piece.shifts - Q @ (Q.T @ piece.shifts), piece.fit)
+        for Q, piece in zip(parts, pieces, strict=True)
+    ]
+
+
+def _basis(columns: Array) -> Array:
+    """Return an orthonormal basis of the space of the columns."""
+    size = np.linalg.norm(columns, axis=0)
+    U, s, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+    return np.asarray(U[:, s > _RANK])
+
+
+def _gains(piece: _Piece) -> Array:
+    """Return how much larger the logarithm of the likelihood is with a scatter of the switches, for each share."""
+    U, s, _ = np.linalg.svd(piece.shifts, full_matrices=False)
+    explained, scatter = (U.T @ piece.residuals) ** 2, np.outer(_SHARES, s) ** 2  # the covariance is I + share^2 A A'
     return np.asarray(0.5 * np.sum(explained * scatter / (1.0 + scatter) - np.log1p(scatter), axis=1))

@@ -92,8 +92,11 @@ class LinearResponse:
         steps = 0.5 * (values[1:] + values[:-1]) * np.diff(self.time)[:, None]
         return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(steps, axis=0)])
 
-    def by_switches(self, between: Array | None = None) -> Array:
+    def by_switches(self, between: Array | None = None, *, squared: bool = False) -> Array:
         """Return the response to each strong switch when it comes later by one standard deviation, n x switches.
+
+        With `squared`, the response is that in proportion to the square of the time by which it comes later or earlier,
+        at the root of the mean square.
 
         A command that changes between two rows of a log changes at an unknown time between them, whose standard
         deviation is the time between the rows divided by √12. `between` has the times about which the switches of the
@@ -107,9 +110,14 @@ class LinearResponse:
         if not len(switched):
             return np.zeros((len(self.at), 0))
         jumps = self._steady(reaching[switched]).sum(axis=1) - self._steady(reaching[switched - 1]).sum(axis=1)
-        impulses = -jumps * np.minimum(rows[switched] - rows[switched - 1], LONGEST) / np.sqrt(12.0)
+        width = np.minimum(rows[switched] - rows[switched - 1], LONGEST)
+        impulses = -jumps * width / np.sqrt(12.0)
         last = np.argsort(-np.abs(impulses))[:_MOST]
-        return self.by_force(self._pulses(at[last]) * impulses[last])
+        if not squared:
+            return self.by_force(self._pulses(at[last]) * impulses[last])
+        step = 0.5 * float(np.median(np.diff(self.at)))
+        slopes = (self._pulses(at[last] + step) - self._pulses(at[last] - step)) / (2.0 * step)
+        return self.by_force(slopes * (0.5 * jumps * width**2 / np.sqrt(80.0))[last])
 
     def _pulses(self, times: Array) -> Array:
         """Return forces, held from each sample to the next, that equal unit impulses at some times, n x times.
