@@ -31,7 +31,7 @@ def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
     layouts = [vehicle.layout for vehicle in vehicles.values()]
     folder = path if path.is_dir() else path.parent
     folder = folder.parent if (folder / _BAG).is_file() else folder
-    described = read_description(folder / ROV_FILE)[0] if (folder / ROV_FILE).is_file() else None
+    described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else None
     found = [inspect(log, layouts, described) for log in logs_of(path)]
     if not found:
         raise DataFileError(f"{path}: there is no log (*.csv, {', '.join(f'*{s}' for s in LOG_SUFFIXES)}) in it")

@@ -6,7 +6,7 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 
 import os
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
-from rov_fmu.io.messages import MOST, did_you_mean, lines_on
+from rov_fmu.io.messages import MOST, did_you_mean, lines_on, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
     Strict,
@@ -49,6 +49,8 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 ROV_FILE = "rov.toml"
 _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
 """The tables that must not stand beside `base`, because the base has its own."""
+_FILE_TABLES = ("columns", "topics", "dives")
+"""The tables that explain the files of tests."""
 
 
 # ---- The keys of the file --------------------------------------------------------------------------------------------
@@ -229,12 +231,6 @@ class Description:
     tank_limits: TankLimits
     """The most that a proposed test may take."""
     command_range: tuple[float, float] | None
-    columns: Mapping[str, str]
-    """What the headers of CSV logs stand for: other headers."""
-    topics: Mapping[str, str]
-    """What the topics and fields of bags and ULogs stand for, as headers."""
-    dives: Mapping[str, Dive] | None
-    """The dives of several files, by name; None where the table has a mistake."""
     limits: tuple[str, ...]
     """Sentences about what the model leaves out."""
     base: Path | None
@@ -259,27 +255,50 @@ class Description:
         return replace(self.layout, axes=tuple(forms))
 
 
-def read_description(path: Path) -> tuple[Description | None, list[str]]:
-    """Read rov.toml. Return the description and a line for every mistake.
+@dataclass(frozen=True)
+class RovFile:
+    """What could be read of rov.toml."""
 
-    The description is None where a mistake leaves the hardware unknown. Raises VehicleFileError where there is no such
-    file, or where it is not TOML.
-    """
+    description: Description | None
+    """None where a mistake leaves the hardware unknown."""
+    mistakes: Sequence[str]
+    """A line for every mistake."""
+    columns: Mapping[str, str]
+    """What the headers of CSV files stand for: other headers."""
+    topics: Mapping[str, str]
+    """What the topics and fields of bags and ULogs stand for, as headers."""
+    dives: Mapping[str, Dive]
+    """The dives of several files, by name."""
+    explains_files: bool
+    """False where a mistake in [columns], [topics] or [dives] leaves unknown what the files contain."""
+
+
+def read_description(path: Path) -> RovFile:
+    """Read rov.toml. Raises VehicleFileError where there is no such file, or where it is not TOML."""
     data, context = read_toml(path, VehicleFileError), {"folder": path.parent}
     _, problems = validate(data, _RovFile, **context)
     file, lost = readable_parts(data, problems, context, _ReadableFile)
     base, base_mistakes = _load_base(file, path.parent)
     hardware_mistakes = [*_hardware_mistakes(file, lost, data)]
-    if base_mistakes or hardware_mistakes or lost & {"base", "axes", *_HARDWARE_TABLES}:
+    explains_files = not (lost & {*_FILE_TABLES} or _misspelt(lost, _FILE_TABLES))
+    found = RovFile(None, (), file.columns, file.topics, file.dives, explains_files)
+    of_hardware = "base", "axes", *_HARDWARE_TABLES
+    if base_mistakes or hardware_mistakes or lost & {*of_hardware} or _misspelt(lost, _HARDWARE_TABLES):
         lines = lines_on(path, (*problem_lines(problems, data, _RovFile), *hardware_mistakes))
-        return None, lines + base_mistakes
-    description = _describe(path, file, lost, data, base)
+        return replace(found, mistakes=lines + base_mistakes)
+    description = _describe(path, file, data, base)
     possible = _possible_coefficients(description.layout)
     # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
     unknown = {("known", name) for name in description.named if name not in possible}
     problems = [problem for problem in problems if problem["loc"][:2] not in unknown]
     mistakes = _mistakes(file, lost, description)
-    return description, lines_on(path, (*problem_lines(problems, data, _RovFile), *mistakes))
+    lines = lines_on(path, (*problem_lines(problems, data, _RovFile), *mistakes))
+    return replace(found, description=description, mistakes=lines)
+
+
+def _misspelt(lost: Iterable[str], tables: Collection[str]) -> bool:
+    """Return True if an unknown table seems to be meant for one of these: [boddy] for [body]."""
+    return any(similar(name, tables) for name in lost if name not in _RovFile.model_fields)
 
 
 def _load_base(file: _ReadableFile, folder: Path) -> tuple[Vehicle | None, list[str]]:
@@ -312,7 +331,7 @@ def _hardware_mistakes(file: _ReadableFile, lost: set[str], data: Toml) -> Itera
         yield from check_names_and_keys(file, lost, data)
 
 
-def _describe(path: Path, file: _ReadableFile, lost: set[str], data: Toml, base: Vehicle | None) -> Description:
+def _describe(path: Path, file: _ReadableFile, data: Toml, base: Vehicle | None) -> Description:
     """Put together the description from the parts of the file and the base."""
     own_layout, folder = file.layout, path.parent
     if base:
@@ -348,9 +367,6 @@ def _describe(path: Path, file: _ReadableFile, lost: set[str], data: Toml, base:
         ),
         tank_limits=file.limits,
         command_range=file.validity.command_range if file.validity else None,
-        columns=file.columns,
-        topics=file.topics,
-        dives=None if "dives" in lost else file.dives,
         limits=file.validity.limits if file.validity else limits,
         base=_vehicle_file(file.base, folder / file.base) if file.base else None,
         base_name=file.base or "",

@@ -13,7 +13,7 @@ from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.model.layout import AXES, Axis, Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import velocity_column
-from rov_fmu.tank.description import Description
+from rov_fmu.tank.description import RovFile
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
 from rov_fmu.tank.formats.csv_columns import Names, is_column
@@ -98,7 +98,7 @@ class Inspection:
     """Headers of columns of logs that seem to be meant, by the headers of the file."""
 
 
-def inspect(path: Path, layouts: Iterable[Layout], described: Description | None = None) -> Inspection:
+def inspect(path: Path, layouts: Iterable[Layout], described: RovFile | None = None) -> Inspection:
     """Return what a log contains.
 
     The thrusters and columns of a CSV log have the names of the described vehicle. Without one, the thrusters have the
@@ -112,8 +112,8 @@ def inspect(path: Path, layouts: Iterable[Layout], described: Description | None
         titles = read_header(path)
         numbers, ranges = _numbers(path, titles)
         axis = next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
-        if described:
-            layout, columns = _with_all_axes(described.layout), described.columns
+        if described and described.description:
+            layout, columns = _with_all_axes(described.description.layout), described.columns
         else:
             layout, columns = _guessed(titles, numbers, axis, layouts)
         content, command = read_csv(path, layout, axis, Names(columns), is_part=True)

@@ -27,7 +27,7 @@ from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.model.layout import AXES, Axis, Layout
 from rov_fmu.tank.columns import TIME
-from rov_fmu.tank.description import ROV_FILE, Description, Dive, Requests, read_description
+from rov_fmu.tank.description import ROV_FILE, Description, Dive, Requests, RovFile, read_description
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.csv_columns import Names, names_of
 from rov_fmu.tank.logs import Log, read_dive, read_log
@@ -124,10 +124,11 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
     if not folder.is_dir():
         what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
         raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
-    description, description_mistakes = _read_description(folder / ROV_FILE)
-    if description and description.dives is None:
-        raise VehicleFileError(*description_mistakes)
-    dives = (description.dives if description else None) or {}
+    rov_file = _read_description(folder / ROV_FILE)
+    description, description_mistakes, dives = rov_file.description, [*rov_file.mistakes], rov_file.dives
+    names, wrong_names = names_of(description.layout if description else None, rov_file.columns, rov_file.topics)
+    if wrong_names or not rov_file.explains_files:  # each file would be refused for what rov.toml should explain
+        raise VehicleFileError(*description_mistakes, *lines_on(folder / ROV_FILE, wrong_names))
     parts = {name for dive in dives.values() for name in dive.files}
     in_folders = (path for bag in folder.glob("*/metadata.yaml") for path in bag.parent.iterdir())
     paths = sorted(
@@ -140,17 +141,15 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
         raise VehicleFileError(*description_mistakes, f"{folder}: there are no tests ({patterns}) in this folder")
     named_vehicles = (description.against, description.base) if description else ()
     check_inputs([folder / ROV_FILE, *paths, *(folder / part for part in parts), *filter(None, named_vehicles)])
-    reader = _Reader(folder, description.layout if description else None)
+    reader = _Reader(folder, description.layout if description else None, names=names)
     if description:
         reader.logged = description.logged
-        reader.names, mistakes = names_of(description.layout, description.columns, description.topics)
-        description_mistakes += lines_on(description.path, mistakes)
     for path in paths:
         reader.read(path)
     for name, dive in dives.items():
         reader.read_dive(name, dive)
     if description and not (description_mistakes or reader.mistakes):
-        description_mistakes += lines_on(description.path, reader.unknown_names(description))
+        description_mistakes += lines_on(description.path, reader.unknown_names(rov_file))
         description_mistakes += lines_on(description.path, reader.missing_columns(description.requests))
     vehicle = Narrowed(None)
     tested = reader.tested(description)
@@ -164,17 +163,15 @@ def load_tank_tests(folder: Path, check_inputs: Callable[[Sequence[Path]], None]
     return reader.tests(vehicle.given, tested, vehicle.findings)
 
 
-def _read_description(path: Path) -> tuple[Description | None, list[str]]:
+def _read_description(path: Path) -> RovFile:
     """Read rov.toml, and explain its purpose where there is none."""
     try:
         return read_description(path)
-    except VehicleFileError as error:
-        if not path.exists():
-            words = "No such file: it must tell the vehicle's name and what no test does, such as its mass"
-            raise VehicleFileError(f"{path}: {words}") from None
-        if not path.is_file():
+    except VehicleFileError:
+        if path.exists():
             raise
-        return None, str(error).splitlines()
+        words = "No such file: it must tell the vehicle's name and what no test does, such as its mass"
+        raise VehicleFileError(f"{path}: {words}") from None
 
 
 # ---- Files -----------------------------------------------------------------------------------------------------------
@@ -239,9 +236,9 @@ class _Reader:
     def _in_rov_file(self, key: str, reason: str, value: str) -> list[str]:
         return lines_on(self.folder / ROV_FILE, [key_line(key, reason, value)])
 
-    def unknown_names(self, description: Description) -> Iterator[str]:
+    def unknown_names(self, rov_file: RovFile) -> Iterator[str]:
         """Yield a line for each entry of [columns] and [topics] that no file has."""
-        for table, names in (("columns", description.columns), ("topics", description.topics)):
+        for table, names in (("columns", rov_file.columns), ("topics", rov_file.topics)):
             for name, value in names.items():
                 if name not in self.known:
                     is_header = table == "columns"

@@ -221,7 +221,8 @@ def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
 
 
 def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "tests", "base =", {"thrust_any.csv": f"{FORCE}\n0.3,x\n", "steady_twist.csv": ""})
+    rov = f'base = "nowhere"\n{HEAD}'
+    folder = folder_of(tmp_path / "tests", rov, {"thrust_any.csv": f"{FORCE}\n0.3,x\n", "steady_twist.csv": ""})
     with pytest.raises(FileError) as caught:
         load_tank_tests(folder)
     told = str(caught.value).splitlines()
@@ -231,6 +232,51 @@ def test_files_are_read_where_the_vehicle_is_not_told(tmp_path: Path) -> None:
         "/thrust_any.csv, line 2, column 'force [N]' = 'x'",
     ]
     assert "twist is not an axis of any vehicle, only surge, sway, heave, roll, pitch and yaw" in told[1]
+
+
+HEADERS = """[columns]
+"Time (s)" = "time [s]"
+"Pull (N)" = "force [N]"
+"Command (%)" = "command [%]"
+"Depth (m)" = "depth [m]"
+thr_pwm = "u_v [us]"
+"""
+"""What the headers of FILES stand for."""
+FILES = {"pool.csv": "Time (s),thr_pwm,Depth (m)\n0,1500,0.5\n", "thrust_t200.csv": "Command (%),Pull (N)\n50,9\n"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ('curve = "t200"', 'curv = "t200"', "thruster.v.curv: there is no such key"),
+        ("m_rov =", "m_rof =", "body.m_rof: there is no such key; did you mean m_rov?"),
+        ("value = 6.57", 'value = "?"', "body.m_rov.value = '?': must be a number"),
+        ('"kg"', '"lb"', "body.m_rov.unit = 'lb': must be 'kg'"),
+        ("[body]", "[boddy]", "boddy: there is no such key; did you mean body?"),
+        ('name = "Mine"', "name = Mine", "not TOML"),
+        ('"force [N]"', '"force [lb]"', "columns.Pull (N) = 'force [lb]': must be 'force [N]' or 'force [kgf]' or"),
+        ('"force [N]"', "5", "columns.Pull (N) = 5: must be text in quotes"),
+        ("[columns]", "[column]", "column: there is no such key; did you mean columns?"),
+    ],
+)
+def test_a_mistake_in_rov_toml_is_no_mistake_of_the_files(old: str, new: str, line: str, tmp_path: Path) -> None:
+    """The headers are those that [columns] explains, although the vehicle cannot be used."""
+    rov = DOWN.replace("[known]", "[body]") + HEADERS
+    folder = folder_of(tmp_path / "tests", rov.replace(old, new), FILES)
+    with pytest.raises(FileError) as caught:
+        load_tank_tests(folder)
+    (told,) = str(caught.value).splitlines()
+    assert told.startswith(f"{folder}/rov.toml: {line}")
+
+
+def test_mistakes_of_the_vehicle_and_of_the_columns_are_told_together(tmp_path: Path) -> None:
+    rov = DOWN.replace('"kg"', '"lb"').replace("[known]", "[body]") + HEADERS.replace("depth [m]", "depth [ft]")
+    folder = folder_of(tmp_path / "tests", rov, FILES)
+    with pytest.raises(FileError) as caught:
+        load_tank_tests(folder)
+    unit, column = str(caught.value).splitlines()
+    assert "body.m_rov.unit = 'lb'" in unit
+    assert "columns.Depth (m) = 'depth [ft]': must be 'depth [m]' or" in column
 
 
 def check_lines(text: str, folder: Path) -> None:

@@ -87,11 +87,13 @@ def thrusters_of(layout: Layout) -> dict[str, Column]:
     return {f"thruster {t.name}": replace(LOGGED, also=(t.name,)) for t in layout.thrusters} if layout.mix else {}
 
 
-def names_of(layout: Layout, columns: Mapping[str, str], topics: Mapping[str, str]) -> tuple[Names, list[str]]:
+def names_of(layout: Layout | None, columns: Mapping[str, str], topics: Mapping[str, str]) -> tuple[Names, list[str]]:
     """Return the names of rov.toml, and a line for every value that is no column of a log, or of a table in a CSV file.
 
-    A log may also measure the motion along axes that the vehicle does not have.
+    A log may also measure the motion along axes that the vehicle does not have. Without a layout, a value that is not
+    known may be the command of a thruster.
     """
+    thrusters_known, layout = layout is not None, layout or Layout((), (), ())
     sensors = sensors_of(AXES.values(), of_one=False) | CONDITIONS
     commands = inputs_of(layout) | thrusters_of(layout)
     known = commands | {name: sensor.column for name, sensor in sensors.items()}
@@ -102,10 +104,11 @@ def names_of(layout: Layout, columns: Mapping[str, str], topics: Mapping[str, st
         for source, title in targets.items():
             opposite = table == "topics" and title.startswith("-")
             try:
-                found = find_column(title[opposite:], titles, others=False)
-                assert found
+                found = find_column(title[opposite:], titles, others=not thrusters_known)
             except ValueError as error:
                 mistakes.append(key_line(f"{table}.{source}", str(error), title))
+                continue
+            if not found:
                 continue
             sensor, sign = sensors.get(found.name), -1.0 if opposite else 1.0
             name = found.name if layout.mix and found.name in layout.commands else thrusters.get(found.name, found.name)
