@@ -74,8 +74,40 @@ def test_a_log_without_fault_has_no_findings(tmp_path: Path) -> None:
 
 def test_two_logs_in_one_file_are_refused(tmp_path: Path) -> None:
     rows = [f"{n % 30},30,{n}" for n in range(60)]
-    with pytest.raises(DataFileError, match=r"line 32, column 'time \[s\]' = 0: the time goes back, and stays back"):
+    with pytest.raises(DataFileError, match=r"line 32, column 'time \[s\]' = 0: the clock goes back by 29 s"):
         read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+    with pytest.raises(DataFileError, match=r"line 3, column 'time \[s\]' = 58: the time goes back, and stays back"):
+        read(tmp_path, "time [s],command [%],depth [cm]", [f"{59 - n},30,{n}" for n in range(60)], HEAVE)
+
+
+def test_a_clock_that_is_set_back_is_refused(tmp_path: Path) -> None:
+    """After 30 s the clock is set back by 5 s, so the times of a twelfth of the rows come again."""
+    times = [*np.arange(0.0, 30.0, 0.05), *np.arange(25.0, 55.0, 0.05)]
+    rows = [f"{time:.2f},{30 * (n > 9)},{n}" for n, time in enumerate(times)]
+    with pytest.raises(DataFileError) as error:
+        read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+    assert str(error.value) == (
+        f"{tmp_path / 'log.csv'}, line 602, column 'time [s]' = 25.00: the clock goes back by 4.95 s, and on from "
+        "there over times that were logged before: split the log before this line into two files"
+    )
+
+
+def test_a_few_rows_over_times_that_were_logged_before_are_sorted(tmp_path: Path) -> None:
+    times = [*np.arange(0.0, 30.0, 0.1), *np.arange(20.05, 20.9, 0.1), *np.arange(30.0, 40.0, 0.1)]
+    rows = [f"{time},{30 * (n > 9)},{n}" for n, time in enumerate(times)]
+    log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+    assert [(found.kind, found.numbers["count"]) for found in log.findings] == [("rows sorted", 9)]
+
+
+@pytest.mark.parametrize("late", [slice(20, 21), slice(20, 28), slice(20, 60)])
+def test_rows_that_arrive_late_are_sorted(late: slice, tmp_path: Path) -> None:
+    """They fill a hole in the rows before them."""
+    times: list[float] = [n / 10 for n in range(300)]
+    moved = times[late]
+    del times[late]
+    rows = [f"{time},{30 * (time > 1)},{10 * time}" for time in [*times[:100], *moved, *times[100:]]]
+    log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
+    assert [(found.kind, found.numbers["count"]) for found in log.findings] == [("rows sorted", len(moved))]
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,10 @@ from rov_fmu.tank.signals import Commands, Signal
 
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order; with more, the file holds two logs."""
+_LEAST_AFTER_CLOCK = 10
+"""The number of consecutive rows that go on from an earlier time after a clock was set back; fewer are misplaced."""
+_AGAIN = 0.5
+"""The least number of earlier rows in the time of these rows, as a share of their number."""
 _IN_PULSES = tuple(f"{left}{unit}{right}" for unit in PULSES for left, right in ("[]", "()"))
 """The ends of headers, such as "PWM (us)", that columns of commands may have under another name."""
 _Command = tuple[Array, Array]
@@ -145,6 +149,10 @@ def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Ar
         raise DataFileError(f"{table.path}: no row has {'both a time and a command' if commanding else 'a time'}")
     time = columns["time"][rows]
     unordered = np.flatnonzero(time < np.maximum.accumulate(time))
+    if set_back := _clock_set_back(time):
+        row, seconds = set_back
+        reason = f"the clock goes back by {seconds:.3g} s, and on from there over times that were logged before: "
+        raise table.error(int(rows[row]), "time", f"{reason}split the log before this line into two files")
     if unordered.size > _MOST_UNORDERED * rows.size:
         raise table.error(int(rows[unordered[0]]), "time", "the time goes back, and stays back: two logs in one file?")
     rows = rows[np.argsort(time, kind="stable")]
@@ -165,6 +173,21 @@ def _cleaned(table: Columns, commanding: list[str]) -> tuple[Array, dict[str, Ar
             findings.append(Finding("unread cells", file=file, names={"column": name}, numbers={"count": n}))
     findings += _pulse_findings(table, commanding)
     return time[first], columns, findings
+
+
+def _clock_set_back(time: Array) -> tuple[int, float] | None:
+    """Return the row from which a log goes on at an earlier time and by how much (s), or None.
+
+    Rows that only arrived late fill a hole in the rows before them, but after a clock was set back, times come again.
+    """
+    latest = np.maximum.accumulate(time)
+    goes_on = np.concatenate([[False], (time[1:] < latest[1:]) & (np.diff(time) >= 0.0)])
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], goes_on, [False]]).astype(int)))
+    for start, end in zip(edges[::2] - 1, edges[1::2], strict=True):  # the first row goes back, the others go on
+        again = (time[:start] >= time[start]) & (time[:start] <= time[end - 1])
+        if end - start >= _LEAST_AFTER_CLOCK and again.sum() >= _AGAIN * (end - start):
+            return int(start), float(latest[start] - time[start])
+    return None
 
 
 def _merged(values: Array, first: Array, *, commanded: bool) -> Array:
