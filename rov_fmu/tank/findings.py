@@ -89,6 +89,8 @@ class _Range:
 
 
 SENTENCES: dict[str, SentenceForm] = {
+    # Files
+    "copy": "{files}: left out as a copy of {original}, because the same data must not count twice",
     # Rows of a log
     "rows sorted": "{files}: {count:#row} out of order sorted",
     "time stamps merged": "{files}: {count:#repeated time stamp} merged",

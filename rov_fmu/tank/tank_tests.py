@@ -194,6 +194,8 @@ class _Reader:
     findings: list[Finding] = field(default_factory=list)
     inputs: dict[str, str] = field(default_factory=dict)
     """The hash of each file by its name."""
+    originals: dict[tuple[str, ...], str] = field(default_factory=dict)
+    """The name of the first file, or of the files of the first dive, by the kind and the hash of its content."""
     logged: Layout | None = None
     """The layout with the axes that a log of several axes may have recordings of."""
     names: Names = field(default_factory=Names)
@@ -203,8 +205,12 @@ class _Reader:
     def read(self, path: Path) -> None:
         """Read one file."""
         try:
-            self.inputs[path.name] = _hash(path)
+            digest = _hash(path)
             kind, subject = self._kind_and_subject(path)
+            # Two curves or axes may have equal tables: a vehicle may be as fast in surge as in sway.
+            if self._is_copy(path.name, ("log", digest) if kind == "log" else (kind, subject, digest)):
+                return
+            self.inputs[path.name] = digest
             self.files.setdefault((kind, subject), []).append(path.name)
             if kind == "log":
                 self._read_log(path, AXES.get(subject))
@@ -227,11 +233,22 @@ class _Reader:
                 if path.name != part or not path.is_file():
                     reason = "there is no such file in this folder"
                     raise DataFileError(*self._in_rov_file(f"{key}.files", reason, part))
-                self.inputs[part] = _hash(path)
+            digests = dict(zip(dive.files, map(_hash, paths), strict=True))
+            if self._is_copy(join_names(dive.files), ("dive", *sorted(digests.values()))):
+                return
+            self.inputs |= digests
             if self.logged:
                 self._add(read_dive(paths, dive.other_clock, self.logged, self.names))
         except FileError as error:
             self.mistakes += str(error).splitlines()
+
+    def _is_copy(self, name: str, content: tuple[str, ...]) -> bool:
+        """Return True, with a finding, if a file before has the same content, which must not count twice."""
+        if content not in self.originals:
+            self.originals[content] = name
+            return False
+        self.findings.append(Finding("copy", file=name, names={"original": self.originals[content]}))
+        return True
 
     def _in_rov_file(self, key: str, reason: str, value: str) -> list[str]:
         return lines_on(self.folder / ROV_FILE, [key_line(key, reason, value)])

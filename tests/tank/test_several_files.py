@@ -1,5 +1,6 @@
 """A dive in several CSV files, each with its own times, and names of columns and topics that rov.toml explains."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,16 @@ def test_files_of_one_clock_are_joined_by_their_times(folder: Path) -> None:
     assert heave.thrusters["5"] == pytest.approx(np.where(heave.time > 0.999, 0.5, 0.0))
     assert recordings["yaw"].context["voltage"][50] == pytest.approx(16.0 - recordings["yaw"].time[50], abs=1e-6)
     assert tests.inputs.keys() == {"rov.toml", "bluerov2", "commands.csv", "depth.csv", "heading.csv"}
+
+
+def test_a_dive_of_the_same_files_counts_once(folder: Path) -> None:
+    for name in ("commands", "depth", "heading"):
+        shutil.copy(folder / f"{name}.csv", folder / f"{name}_2.csv")
+    again = FILES.replace(".csv", "_2.csv")
+    (folder / "rov.toml").write_text(f"{ROV}[dives.june]\n{again}\n[dives.may]\n{FILES}\n", encoding="utf-8")
+    tests, _ = read(folder)
+    (line,) = (line for line in sentences(tests.findings, SENTENCES) if "copy" in line)
+    assert line.startswith("commands.csv, depth.csv, heading.csv: left out as a copy of commands_2.csv, depth_2.csv, h")
 
 
 @pytest.mark.parametrize("declared", [False, True])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.identify.findings import heading, sentences
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.tables import Row
@@ -197,6 +198,26 @@ def test_a_vehicle_to_compare_with_is_a_file_in_the_folder(folder: Path, capsys:
     against = load_tank_tests(folder).given.description.against
     assert against
     assert against.samefile(folder / "mine.toml")
+
+
+def test_a_copy_of_a_file_is_left_out(folder: Path) -> None:
+    """The same data would count twice; equal tables of two axes are no copies."""
+    log = LOG + "".join(f"{n / 10},{30 * (n > 9)},{0.01 * n * n}\n" for n in range(50))
+    for name in ("log_heave_1.csv", "log_heave_2.csv"):
+        (folder / name).write_text(log, encoding="utf-8")
+    shutil.copy(folder / "steady_surge.csv", folder / "steady_surge_copy.csv")
+    shutil.copy(folder / "steady_surge.csv", folder / "steady_heave.csv")
+    found = load_tank_tests(folder)
+    assert [recording.file for recording in found.recordings["heave"]] == ["log_heave_1.csv"]
+    assert {row.file for row in found.steady["surge"]} == {"steady_surge.csv"}
+    assert "steady_heave.csv" in {row.file for row in found.steady["heave"]}
+    assert not {"log_heave_2.csv", "steady_surge_copy.csv"} & found.inputs.keys()
+    copies = [finding for finding in found.findings if finding.kind == "copy"]
+    assert {heading(finding) for finding in copies} == {"Warnings"}
+    assert sentences(copies) == (
+        "log_heave_2.csv: left out as a copy of log_heave_1.csv, because the same data must not count twice",
+        "steady_surge_copy.csv: left out as a copy of steady_surge.csv, because the same data must not count twice",
+    )
 
 
 # ---- What is refused -------------------------------------------------------------------------------------------------

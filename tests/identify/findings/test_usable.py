@@ -69,7 +69,10 @@ def test_a_recording_without_content_is_refused(recording: Recording, kind: str,
 
 
 STEADY = ("steady_heave_1.csv", "steady_heave_2.csv")
-TABLES = {"thrust_top.csv": f"{FORCE}\n0.3,0.6\n0.5,1.65\n", **dict.fromkeys(STEADY, f"{SPEED}\n0.3,0.163\n0.5,0.28\n")}
+TABLES = {
+    "thrust_top.csv": f"{FORCE}\n0.3,0.6\n0.5,1.65\n",
+    **{name: f"{SPEED}\n0.3,{V}\n0.5,0.28\n" for name, V in zip(STEADY, (0.163, 0.164), strict=True)},
+}
 
 
 @pytest.mark.parametrize(
