@@ -103,6 +103,10 @@ SENTENCES: dict[str, SentenceForm] = {
     "missing column": (
         "{files}: no column of {column}, whose command is taken as 0 all the time: add the column unless that is right"
     ),
+    "frozen sensors": (
+        "{files}: {sensors} do not change from {start:.4g} s on (to the end at {end:.4g} s): was the log or the sensor "
+        "cut off? What they say from then on is left out"
+    ),
     # Recordings
     "too few samples": (
         "{files}: no recording of {axes}: {count:#sample} of {quantity}, at least {least:g} are needed"

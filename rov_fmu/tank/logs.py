@@ -18,6 +18,7 @@ from rov_fmu.tank.formats.csv_columns import Names
 from rov_fmu.tank.formats.csv_log import mixed_inputs, read_csv
 from rov_fmu.tank.formats.mavlink import read_mavlink
 from rov_fmu.tank.formats.ulog import read_ulog
+from rov_fmu.tank.frozen import without_frozen
 from rov_fmu.tank.recording import CLOCK_ERROR, Recording
 from rov_fmu.tank.signals import LEAST_SAMPLES, Commands, Signal, context_at, gaps_of, main_signals, recordings_of
 
@@ -48,7 +49,7 @@ def read_content(path: Path, layout: Layout, names: Names) -> Content:
     read = READERS.get(path.suffix.lower())
     if not read:
         content, _ = read_csv(path, layout, None, names, is_part=True)
-        return content
+        return _without_frozen(content)
     content = read(path, Wanted([t.name for t in layout.thrusters], names.topics))
     if content.commands:
         logged, named = content.commands, {"time": content.commands.time, **content.commands.thrusters}
@@ -60,6 +61,13 @@ def read_content(path: Path, layout: Layout, names: Names) -> Content:
             missing = (name for name in thrusters if name not in named)
             content.findings += [Finding("missing column", file=path.name, names={"column": name}) for name in missing]
         content.commands = Commands(logged.time, thrusters)
+    return _without_frozen(content)
+
+
+def _without_frozen(content: Content) -> Content:
+    """Leave out what sensors say after they froze together, with a finding."""
+    content.signals, frozen = without_frozen(content.file, content.signals)
+    content.findings += frozen
     return content
 
 
@@ -69,6 +77,7 @@ def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names 
         content = read_content(path, layout, names)
     else:
         content, command = read_csv(path, layout, axis, names)
+        content = _without_frozen(content)
         if axis and command is not None:
             recording = _recording_of_axis(path, axis, content.signals, command[1])
             return Log((recording,), (*content.findings, *gaps_of(recording)), frozenset(content.known))

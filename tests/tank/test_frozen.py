@@ -1,0 +1,90 @@
+"""Sensors that stop changing before a log ends: they are told, and the rest of the recording is used."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rov_fmu.identify.findings import heading, sentences
+from rov_fmu.model.layout import HEAVE, YAW
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.frozen import without_frozen
+from rov_fmu.tank.logs import read_log
+from rov_fmu.tank.signals import Signal
+from rov_fmu.vehicle.shipped import PAPER
+
+TIME: Array = np.arange(0.0, 60.0, 0.1)
+MOVING: Array = np.minimum(TIME, 20.0)
+"""A motion that ends after 20 s."""
+
+
+def noisy(seed: int, noise: float, step: float) -> Array:
+    """Return a motion as a sensor with noise and a resolution tells it."""
+    values = 0.05 * MOVING + noise * np.random.default_rng(seed).standard_normal(len(TIME))
+    return np.asarray(np.round(values / step) * step)
+
+
+def frozen(values: Array, at: float, value: float | None = None) -> Array:
+    """Return values that stay the same from a time on."""
+    last = values[at > TIME][-1] if value is None else value
+    return np.where(at > TIME, values, last)
+
+
+@pytest.mark.parametrize("value", [None, 0.0])
+def test_what_frozen_sensors_say_is_left_out(value: float | None, tmp_path: Path) -> None:
+    """They keep their last value, or say 0, while the commands go on; the voltage goes on too."""
+    depth, turn = (frozen(noisy(seed, 0.01, 0.001), 30.0, value) for seed in (1, 2))
+    command = np.where(TIME % 8.0 < 4.0, 0.4, -0.2)
+    rows = zip(TIME, command, depth, turn, 16.0 - 0.01 * TIME, strict=True)
+    text = "time [s],u_t [1],u_l [1],u_r [1],depth [m],heading [rad],voltage [V]\n"
+    text += "".join(f"{t:.1f},{c},{c},{-c},{d:.3f},{h:.3f},{V:.2f}\n" for t, c, d, h, V in rows)
+    path = tmp_path / "pool.csv"
+    path.write_text(text, encoding="utf-8")
+    log = read_log(path, PAPER)
+    start = "29.9" if value is None else "30"
+    assert sentences(log.findings) == (
+        f"pool.csv: depth and heading do not change from {start} s on (to the end at 59.9 s): was the log or the "
+        "sensor cut off? What they say from then on is left out",
+    )
+    assert {heading(finding) for finding in log.findings} == {"Warnings"}
+    assert [recording.axis.name for recording in log.recordings] == ["heave", "yaw"]
+    for recording in log.recordings:
+        assert recording.time[np.isfinite(recording.values)][-1] == pytest.approx(float(start) - 0.1)
+        assert recording.time[-1] == pytest.approx(59.9)
+        assert recording.context["voltage"][-1] == pytest.approx(15.4, abs=0.01)
+
+
+def signals(*values: Array) -> list[Signal]:
+    axes = ((HEAVE, "depth"), (YAW, "heading"), (YAW, "velocity"))
+    return [Signal(axis, name, TIME, some) for (axis, name), some in zip(axes, values, strict=False)]
+
+
+@pytest.mark.parametrize(
+    "measured",
+    [
+        signals(noisy(1, 0.01, 0.001), noisy(2, 0.01, 0.001)),
+        signals(frozen(noisy(1, 0.01, 0.001), 30.0), noisy(2, 0.01, 0.001)),
+        signals(frozen(noisy(1, 0.01, 0.001), 50.0), frozen(noisy(2, 0.01, 0.001), 50.0)),
+        signals(frozen(noisy(1, 0.01, 0.001), 30.0), frozen(noisy(2, 0.01, 0.001), 35.0)),
+        signals(0.05 * MOVING, -0.03 * MOVING, np.round(0.05 * MOVING, 2)),
+        signals(noisy(1, 0.001, 0.01), noisy(2, 0.001, 0.01)),
+        signals(frozen(noisy(1, 0.006, 0.01), 30.0), frozen(noisy(2, 0.006, 0.01), 30.0)),
+        signals(np.zeros_like(TIME), np.full_like(TIME, np.nan)),
+        [],
+    ],
+    ids=[
+        "with noise",
+        "one sensor",
+        "for a short time",
+        "at different times",
+        "without noise",
+        "at rest",
+        "steps of the resolution",
+        "never changing",
+        "none",
+    ],
+)
+def test_sensors_that_may_be_right_are_used(measured: list[Signal]) -> None:
+    kept, findings = without_frozen("pool.csv", measured)
+    assert kept == measured
+    assert findings == []
