@@ -291,13 +291,18 @@ class _Reader:
             kind, subject = "log", subject if kind == "log" else ""
         axes = [*(self.layout.kinds if self.layout else AXES)]
         known = (curves or []) if kind == "thrust" else axes
-        if not kind and path.name.isprintable() and self._has_times(path):
-            return "log", ""
+        if not kind and path.name.isprintable():
+            header = read_header(path)
+            if not header:
+                raise DataFileError(f"{path}: the file is empty")
+            if self._has_times(header):
+                return "log", ""
         if not (kind and path.name.isprintable()) or not (subject or known):
             hint = did_you_mean(path.stem.lower().partition("_")[0], _KINDS, also={"time": "time_constant"})
+            listed = [*(curves or []), *(self.logged.kinds if self.logged else axes)]
             raise DataFileError(
                 f"{path}: neither a log, which has a column 'time [s]', nor a table, whose name begins with "
-                f"thrust_<curve>, steady_<axis> or time_constant_<axis>, of {_either([*(curves or []), *axes])}{hint}"
+                f"thrust_<curve>, steady_<axis> or time_constant_<axis>, of {_either(listed)}{hint}"
             )
         if not subject and kind != "log":
             word = path.stem.lower().removeprefix(f"{kind}_").partition("_")[0]
@@ -311,9 +316,9 @@ class _Reader:
             raise DataFileError(f"{path}: no thruster of the vehicle drives {subject}")
         return kind, subject
 
-    def _has_times(self, path: Path) -> bool:
+    def _has_times(self, header: Iterable[str]) -> bool:
         """Return True if the header of a CSV file has the column of times that a log has."""
-        for title in read_header(path):
+        for title in header:
             try:
                 if find_column(self.names.columns.get(title, title), {"time": TIME}, others=True):
                     return True

@@ -391,7 +391,12 @@ TABLES: dict[str, tuple[str, str, str]] = {
         "",
         "raer is not a thrust curve of this vehicle, only rear and top; did you mean rear?",
     ),
-    "a kind of test misspelt": ("stedy_surge.csv", "", "of rear, top, surge, heave or yaw; did you mean steady?"),
+    "a kind of test misspelt": (
+        "stedy_surge.csv",
+        "command [%]\n",
+        "of rear, top, surge, heave or yaw; did you mean steady?",
+    ),
+    "an empty file": ("pool.csv", "", "pool.csv: the file is empty"),
 }
 
 

@@ -119,6 +119,12 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     ),
     (DOWN, {"steadyheave.csv": f"{SPEED}\n0.3,0.2\n"}, "/steadyheave.csv: neither a log, which has"),
     (
+        DOWN + PLACE.format(0.1, 0.0),
+        {"a.csv": "day\nMonday\n"},
+        "/a.csv: neither a log, which has a column 'time [s]', nor a table, whose name begins with thrust_<curve>, "
+        "steady_<axis> or time_constant_<axis>, of t200 or heave",
+    ),
+    (
         f"{BLUEROV2}[known]\nmass = 11.5\n",
         HEAVE_ALONE,
         "/rov.toml: known.mass: there is no such coefficient of this vehicle",
