@@ -256,11 +256,12 @@ class _Reader:
     def unknown_names(self, rov_file: RovFile) -> Iterator[str]:
         """Yield a line for each entry of [columns] and [topics] that no file has."""
         for table, names in (("columns", rov_file.columns), ("topics", rov_file.topics)):
+            free = self.known - names.keys()
             for name, value in names.items():
                 if name not in self.known:
                     is_header = table == "columns"
                     what = "no CSV file has such a column" if is_header else "no log has such a topic and field"
-                    yield key_line(f"{table}.{name}", f"{what}{did_you_mean(name, self.known)}", value)
+                    yield key_line(f"{table}.{name}", f"{what}{did_you_mean(name, free)}", value)
 
     def missing_columns(self, requests: Requests) -> Iterator[str]:
         """Yield a line for each key of [fit] that needs a column which a log does not have."""

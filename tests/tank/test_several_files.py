@@ -148,3 +148,11 @@ def test_an_unknown_name_is_one_line(folder: Path, names: str, line: str) -> Non
     found = mistakes(folder)
     assert len(found) == 1
     assert found[0].startswith(line)
+
+
+def test_a_header_that_stands_for_another_column_is_not_suggested(folder: Path) -> None:
+    titles = ",".join(["time [s]", *(f"thr_{name}_pwm" for name in motion.THRUSTERS if name != "2")])
+    table(folder / "commands.csv", titles, TIME, *[1500.0 + 400.0 * c for c in motion.THRUSTERS.values()][1:])
+    names = "".join(f'thr_{name}_pwm = "u_{name} [us]"\n' for name in motion.THRUSTERS)
+    (folder / "rov.toml").write_text(f"{ROV}[columns]\n{names}[dives.may]\n{FILES}\n", encoding="utf-8")
+    assert mistakes(folder) == ["rov.toml: columns.thr_2_pwm = 'u_2 [us]': no CSV file has such a column"]
