@@ -12,6 +12,7 @@ from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.model.layout import AXES, BODY, PITCH, ROLL
 from rov_fmu.tank.description import ROV_FILE, read_description
 from rov_fmu.tank.inspection import Inspection, fitting, inspect, logs_of
+from rov_fmu.tank.table_headers import TableHeaders, headers_of_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -42,7 +43,8 @@ def inspect_logs(path: Path) -> tuple[list[Inspection], Path, str]:
         thrusters = thrusters[: _changing(most)]
         fits = fitting(thrusters, layouts)
     base = next((name for name, vehicle in vehicles.items() if vehicle.layout == fits), "")
-    return found, folder / ROV_FILE, "\n".join(_draft(found, thrusters, base, vehicles.get(base))) + "\n"
+    lines = _draft(found, headers_of_tables(folder), thrusters, base, vehicles.get(base))
+    return found, folder / ROV_FILE, "\n".join(lines) + "\n"
 
 
 def _changing(inspection: Inspection) -> int:
@@ -60,7 +62,9 @@ def write_draft(path: Path, text: str) -> None:
 # ---- The draft -------------------------------------------------------------------------------------------------------
 
 
-def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, vehicle: Vehicle | None) -> Iterator[str]:
+def _draft(
+    found: Sequence[Inspection], tables: TableHeaders, thrusters: Sequence[str], base: str, vehicle: Vehicle | None
+) -> Iterator[str]:
     """Yield the lines of a draft, which is a complete rov.toml if a vehicle that ships has such thrusters."""
     first = found[0].path
     names = brief(", ".join(one.path.name for one in found))
@@ -83,7 +87,7 @@ def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, veh
     yield from ('version = "1.0"', f'description = "A vehicle identified from {_quoted(names)[1:-1]}"')
     yield f"source = {_quoted(names)}"
     if is_own:
-        yield from _hardware(thrusters, signals)
+        yield from _hardware(thrusters, tables.curves, signals)
     else:
         yield from ("", "[known]  # what no log tells: write the values of your vehicle instead of those of the base")
     for key in BODY:
@@ -97,7 +101,7 @@ def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, veh
         yield from ("", "[fit]  # what every log has the columns for: remove # to fit it")
         yield from (f"# {key} = true" for key in fitted)
     is_csv = {one.path: one.path.suffix.lower() not in LOG_SUFFIXES for one in found}
-    yield from _columns([one for one in found if is_csv[one.path]])
+    yield from _columns([one for one in found if is_csv[one.path]], tables)
     topics = {name: what for one in found if not is_csv[one.path] for name, what in one.unread.items()}
     mappable = [f"{name}.{what.rpartition(': ')[2].split(', ')[0]}" for name, what in topics.items() if ": " in what]
     if mappable:
@@ -109,10 +113,11 @@ def _draft(found: Sequence[Inspection], thrusters: Sequence[str], base: str, veh
         yield "# other_clock = [...]  # those of the files whose clock is not that of the commands"
 
 
-def _columns(found: Sequence[Inspection]) -> Iterator[str]:
+def _columns(found: Sequence[Inspection], tables: TableHeaders) -> Iterator[str]:
     """Yield the table of the headers of CSV files, with those that are not known in comments."""
-    columns = {title: meant for one in found for title, meant in one.columns.items()}
-    others = {name: what for one in found for name, what in one.unread.items() if name not in columns}
+    columns = {**tables.columns, **{title: meant for one in found for title, meant in one.columns.items()}}
+    unknown = dict.fromkeys(tables.unknown, "") | {name: what for one in found for name, what in one.unread.items()}
+    others = {name: what for name, what in unknown.items() if name not in columns}
     if columns or others:
         yield from ("", "[columns]  # what headers of the CSV files stand for: check their units and signs")
         yield from (f"{_quoted(title)} = {_quoted(meant)}" for title, meant in columns.items())
@@ -122,14 +127,17 @@ def _columns(found: Sequence[Inspection]) -> Iterator[str]:
     yield from (f'# {_quoted(title)} = "?"{what and f"   # {what}"}' for title, what in sorted(others.items()))
 
 
-def _hardware(thrusters: Sequence[str], signals: Collection[str]) -> Iterator[str]:
+def _hardware(thrusters: Sequence[str], curves: Sequence[str], signals: Collection[str]) -> Iterator[str]:
     """Yield tables for the hardware of a vehicle; the values that must be given are question marks."""
+    curves = curves or ["all"]
     yield from ("", "[body]", 'm_rov = { value = "?", unit = "kg", source = "Weighed" }')
     yield 'I_r = { value = "?", unit = "kg.m2", source = "CAD" }   # moment of inertia about the vertical axis'
     yield "# coupling = true   # if the vehicle turns while it moves in surge or sway"
-    yield from ("", "[curves.all]   # a curve for each kind of thruster; thrust_all.csv has the forces of one thruster")
+    yield from ("", "# a curve for each kind of thruster")
+    yield from (f"[curves.{name}]   # thrust_{name}.csv has the forces of one thruster" for name in curves)
+    curve = f'curve = "{curves[0]}"' if len(curves) == 1 else f'curve = "?"   # {" or ".join(curves)}'
     for name in thrusters:
-        yield from ("", "[[thruster]]", f"name = {_quoted(name)}", 'curve = "all"')
+        yield from ("", "[[thruster]]", f"name = {_quoted(name)}", curve)
         yield 'direction = { value = ["?", "?", "?"], source = "CAD" }   # of its thrust: forward, starboard, down'
         yield 'position = { value = ["?", "?", "?"], unit = "m", source = "CAD" }   # from the centre of mass'
     measured = [axis for axis in AXES.values() if {axis.position, f"{axis.name} velocity"} & {*signals}]

@@ -10,7 +10,7 @@ from math import pi
 
 from rov_fmu.io.csv_table import FORCE_UNITS, PULSES, Column, Columns, DataFileError, pulses
 from rov_fmu.io.messages import shown
-from rov_fmu.model.layout import Axis
+from rov_fmu.model.layout import SURGE, YAW, Axis
 
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 ANGLES = {"rad": 1.0, "deg": 180.0 / pi}
@@ -41,6 +41,12 @@ def velocity_column(axis: Axis, *, optional: bool = False, least: float = VELOCI
     lengths = ANGLES if axis.unit == "rad/s" else LENGTHS
     units = {f"{unit}/s": per for unit, per in lengths.items()}
     return Column(units, optional, optional, -VELOCITIES[1], VELOCITIES[1], least)
+
+
+VELOCITY_OF_ANY_AXIS = replace(
+    velocity_column(SURGE), units={**velocity_column(SURGE).units, **velocity_column(YAW).units}
+)
+"""A column of velocities whose header does not tell whether the axis turns."""
 
 
 def position_column(axis: Axis) -> Column:

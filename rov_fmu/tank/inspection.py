@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from math import inf, pi
 from pathlib import Path
 
@@ -21,9 +22,9 @@ from rov_fmu.tank.formats.csv_log import read_csv
 from rov_fmu.tank.logs import READERS
 from rov_fmu.tank.recording import CONTEXT, signal_name
 from rov_fmu.tank.signals import gaps
+from rov_fmu.tank.table_headers import header_parts
 from rov_fmu.tank.tables import TABLES
 
-_HEADER = re.compile(r"(?P<name>[^\[(]*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*")
 _COMMAND = re.compile(
     r"(?<![a-z])(?:thr|thrusters?|motors?|propellers?|pwm|esc)(?![a-z])"
     r"|(?<![a-z])(?:servo|cmd|command|u)[ _]*\d+(?![a-z0-9])|^u_\S+$"
@@ -53,18 +54,18 @@ _LIKELY = {
     "voltage": {"V": 1000.0, "mV": inf},
 }
 """The columns that are recognised by a word, and their units, each with the largest number that it is likely for."""
-_WORDS = {name: name for name in _LIKELY} | {"yaw": "heading", "battery": "voltage"}
+_WORDS = {name: name for name in _LIKELY} | dict.fromkeys(("yaw", "compass", "hdg"), "heading") | {"battery": "voltage"}
 _WANTED = {"set", "target", "desired"}
 _NOT_MEASURED = {"rate", "speed", *_WANTED}
 _DIRECTIONS = {
     "surge": ("surge", "forward", "ahead", "vx"),
     "sway": ("sway", "side", "sideways", "lateral", "vy"),
     "heave": ("heave", "vertical", "vz"),
-    "yaw": ("yaw", "turn", "heading"),
-    "roll": ("roll",),
-    "pitch": ("pitch",),
+    "yaw": ("yaw", "turn", "heading", "gyroz"),
+    "roll": ("roll", "gyrox"),
+    "pitch": ("pitch", "gyroy"),
 }
-"""The words by which the axis of a column of velocities is recognised."""
+"""The words by which the axis of a column of velocities is recognised; Gyro_Z has the word gyroz too."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ def _names(titles: Sequence[str]) -> list[str]:
 
     The particular part of `thr_FS_pwm` is `FS`. Where it is a letter and a number in all columns, it is the number.
     """
-    parts = [_parts(title)[0] for title in titles]
+    parts = [header_parts(title)[0] for title in titles]
     particular = ["_".join(filter(None, map(_particular, re.split(r"[\W_]+", part)))) for part in parts]
     numbered = [re.fullmatch(r"([a-z]?)(\d+)", name.casefold()) for name in particular]
     if len({match and match[1] for match in numbered}) == 1:
@@ -196,12 +197,6 @@ def _signals(content: Content) -> Iterator[Row]:
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------
 
 
-def _parts(title: str) -> tuple[str, str]:
-    """Return the name and the unit in a header with brackets of any kind."""
-    match = _HEADER.fullmatch(title)
-    return (match["name"], match["unit"]) if match else (title, "")
-
-
 def _numbers(path: Path, titles: Sequence[str]) -> tuple[dict[str, Array], dict[str, str]]:
     """Return the numbers of every column as they stand in the file, and their range in words.
 
@@ -239,7 +234,7 @@ def _guessed(
 
 def _is_command(title: str, numbers: Array) -> bool:
     """Return True for the command of a thruster, by its name, unit and size, or for pulses that rest at 1500 us."""
-    name, unit = _parts(title)
+    name, unit = header_parts(title)
     words = {*re.findall("[a-z]+", name.casefold())}
     is_possible = unit.casefold() in _UNITS_OF_COMMANDS or unit.startswith(PULSES)
     if not is_possible or not len(numbers) or _NO_COMMAND & words:
@@ -264,7 +259,7 @@ def _renamed(
             yield title, f"u_{name} [{_unit_of_command(title, numbers)}]"
     taken: set[str] = set()
     for title in titles:
-        (name, unit), most = _parts(title), float(np.abs(numbers[title]).max(initial=0.0))
+        (name, unit), most = header_parts(title), float(np.abs(numbers[title]).max(initial=0.0))
         words = re.findall("[a-z]+", name.casefold())
         if title in commands or is_column(title, layout, axis):
             continue
@@ -285,15 +280,16 @@ def _renamed(
 def _velocity(words: Sequence[str], unit: str) -> str:
     """Return the column of velocities that the words and the unit of a header mean, or an empty text."""
     if not _WANTED & {*words}:
+        known = {*words, *map("".join, pairwise(words))}
         for name, directions in _DIRECTIONS.items():
-            if {*directions} & {*words} and unit in velocity_column(AXES[name]).units:
+            if {*directions} & known and unit in velocity_column(AXES[name]).units:
                 return f"{name} velocity"
     return ""
 
 
 def _unit_of_command(title: str, numbers: Mapping[str, Array]) -> str:
     """Return the unit of a command: that of its header, or by its size."""
-    _, unit = _parts(title)
+    _, unit = header_parts(title)
     most = float(np.abs(numbers[title]).max())
     known = unit in ("%", "1", *PULSES) or unit.startswith(PULSES)
     return unit if known else "1" if most <= 1.0 else "%" if most <= 100.0 else "us"

@@ -7,7 +7,15 @@ from pathlib import Path
 
 from rov_fmu.io.csv_table import Column, DataFileError, find_column, read_columns
 from rov_fmu.model.layout import Axis
-from rov_fmu.tank.columns import FORCE, HELD_COMMAND, RENAMING, refuse_slips, time_constant_column, velocity_column
+from rov_fmu.tank.columns import (
+    FORCE,
+    HELD_COMMAND,
+    RENAMING,
+    VELOCITY_OF_ANY_AXIS,
+    refuse_slips,
+    time_constant_column,
+    velocity_column,
+)
 
 TABLES = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}
 """The words that the name of a table begins with, each with the measured quantity."""
@@ -25,6 +33,14 @@ class Row:
     value: float
 
 
+def columns_of(kind: str, axis: Axis | None = None) -> dict[str, Column]:
+    """Return the columns of a table; velocities without an axis are those of any axis."""
+    column = FORCE if kind == "thrust" else time_constant_column()
+    if kind == "steady":
+        column = velocity_column(axis) if axis else VELOCITY_OF_ANY_AXIS
+    return {"command": HELD_COMMAND, TABLES[kind]: column}
+
+
 def read_rows(
     path: Path, kind: str, axis: Axis | None = None, names: Mapping[str, str] = {}
 ) -> tuple[list[Row], frozenset[str]]:
@@ -32,11 +48,7 @@ def read_rows(
 
     `names` is the table [columns]. Returns those of its keys that the file has, too.
     """
-    name = TABLES[kind]
-    column = FORCE if kind == "thrust" else time_constant_column()
-    if axis and kind == "steady":
-        column = velocity_column(axis)
-    columns = {"command": HELD_COMMAND, name: column}
+    name, columns = TABLES[kind], columns_of(kind, axis)
     renamed = dict(_renamed(names, columns))
     table = read_columns(path, columns, renamed=renamed, hint=RENAMING)
     refuse_slips(table, ["command"])

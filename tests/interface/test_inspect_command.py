@@ -1,7 +1,7 @@
 """`rov-fmu identify --inspect`: what logs contain, and a draft of rov.toml with which they are read."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -219,6 +219,64 @@ def test_tables_beside_the_logs_are_no_logs(tmp_path: Path, capsys: pytest.Captu
     out = capsys.readouterr().out
     assert "thrust_rear" not in out
     assert "steady_surge" not in out
+
+
+OWN: dict[str, str | bytes] = {
+    "thrust_main_1.csv": "Command (%),Pull (N)\n50,9\n",
+    "thrust_main_2.csv": "Command (%),Pull (N)\n50,8\n",
+    "thrust_vert.csv": "Throttle (1),force [N],Battery\n0.5,9,16\n",
+    "thrust_side.csv": b"\xff\xfe\xb5",
+    "Steady_yaw.csv": "command [%],turning speed (deg/s)\n50,30\n",
+    "time_constant_yaw.csv": "command [%],Tau (s),Pull (kg)\n50,1,2\n",
+}
+"""Tables with the headers of their owner."""
+
+
+def pool_run(folder: Path, tables: Mapping[str, str | bytes]) -> list[str]:
+    """Write tables and a log of two thrusters; return the lines of the draft."""
+    for name, text in tables.items():
+        (folder / name).write_bytes(text.encode() if isinstance(text, str) else text)
+    pulses = [np.where(TIME < 2.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS[:2]]
+    titles = "time [s],thr_FS_pwm,thr_FP_pwm,Compass (deg),Gyro_Z (deg/s)"
+    table(folder / "pool.csv", titles, TIME, *pulses, TIME, TIME)
+    assert main(["identify", "--inspect", str(folder)]) == 0
+    return (folder / "rov.toml").read_text(encoding="utf-8").splitlines()
+
+
+def test_the_draft_has_the_curves_and_headers_of_the_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = pool_run(tmp_path, OWN)
+    assert [line.split("   ")[0] for line in lines if line.startswith("[curves")] == [
+        "[curves.main]",
+        "[curves.side]",
+        "[curves.vert]",
+    ]
+    assert lines.count('curve = "?"   # main or side or vert') == 2
+    columns = lines[lines.index("[columns]  # what headers of the CSV files stand for: check their units and signs") :]
+    assert [line for line in columns if line.startswith('"')] == [
+        '"turning speed (deg/s)" = "velocity [deg/s]"',
+        '"Command (%)" = "command [%]"',
+        '"Pull (N)" = "force [N]"',
+        '"Throttle (1)" = "command [1]"',
+        '"Tau (s)" = "time constant [s]"',
+        '"thr_FS_pwm" = "u_FS [us]"',
+        '"thr_FP_pwm" = "u_FP [us]"',
+        '"Compass (deg)" = "heading [deg]"',
+        '"Gyro_Z (deg/s)" = "yaw velocity [deg/s]"',
+    ]
+    assert [line for line in columns if '= "?"' in line] == ['# "Battery" = "?"', '# "Pull (kg)" = "?"']
+    assert "[axes.yaw]" in lines
+    for name in ("thrust_side.csv", "thrust_vert.csv", "time_constant_yaw.csv"):
+        (tmp_path / name).unlink()
+    assert main(["identify", str(tmp_path)]) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert all(f"{tmp_path / 'rov.toml'}: " in line for line in told), "its tables are read with the draft as it is"
+
+
+@pytest.mark.parametrize(("tables", "curve"), [({"thrust_main.csv": OWN["thrust_main_1.csv"]}, "main"), ({}, "all")])
+def test_thrusters_of_one_kind_have_its_curve(tables: Mapping[str, str | bytes], curve: str, tmp_path: Path) -> None:
+    lines = pool_run(tmp_path, tables)
+    assert f"[curves.{curve}]   # thrust_{curve}.csv has the forces of one thruster" in lines
+    assert lines.count(f'curve = "{curve}"') == 2
 
 
 def test_angles_are_in_degrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

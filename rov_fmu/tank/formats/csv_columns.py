@@ -6,11 +6,12 @@ from functools import partial
 
 from rov_fmu.io.csv_table import Column, Conversion, find_column
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, SURGE, YAW, Axis, Layout
+from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, YAW, Axis, Layout
 from rov_fmu.tank.columns import (
     FORCE,
     LOGGED_COMMAND,
     TIME,
+    VELOCITY_OF_ANY_AXIS,
     VOLTAGE,
     position_column,
     time_constant_column,
@@ -23,10 +24,9 @@ COMMAND = "command"
 _POSITION_NAMES = {HEAVE: ("z",), ROLL: ("phi", "roll"), PITCH: ("theta", "pitch"), YAW: ("psi",)}
 """Other names of positions that need no axis: those in the FMU, and that of the axis."""
 LOGGED = replace(LOGGED_COMMAND, optional=True)
-_VELOCITY = velocity_column(SURGE)
 _OF_TABLES = {
     "force": FORCE,
-    "velocity": replace(_VELOCITY, units={**_VELOCITY.units, **velocity_column(YAW).units}),
+    "velocity": VELOCITY_OF_ANY_AXIS,
     "time constant": time_constant_column(),
 }
 """The columns that only tables have, and logs of one axis, whose velocities need not name it."""
