@@ -359,7 +359,7 @@ FACTS = frozenset(EFFECTS) | {
     "delay not modelled",
 }
 """The kinds of findings that say what was found or done, and ask for nothing."""
-FIRST = frozenset({"missing column", "axis not pushed", "no fit", "poor prediction"})
+FIRST = frozenset({"missing column", "copy", "frozen sensors", "axis not pushed", "no fit", "poor prediction"})
 """The kinds of warnings that stand first: wrong or missing data, and axes that must not be trusted."""
 DOUBTS = frozenset(
     {

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import block_diag
 
 from rov_fmu.identify.recordings.output_error import fit_recordings
-from rov_fmu.identify.recordings.switches import _LARGEST, _gains, _share
+from rov_fmu.identify.recordings.switches import _LARGEST, _gains, _share, _whitened, _without_fit
 from rov_fmu.identify.simulation.linear_response import LinearResponse
 from rov_fmu.model.layout import HEAVE
 from rov_fmu.model.rov import Rov
@@ -81,10 +82,30 @@ def test_a_few_pieces_with_another_misfit_do_not_decide() -> None:
         S[40 * (n + 1) :, n] = 5.0
     pieces = [random.standard_normal(200) for _ in range(10)]
     pieces[3] = pieces[3] + S @ np.array([1.0, -1.0, 1.0, -1.0])
-    gains = [_gains(piece, S, np.ones((200, 1))) for piece in pieces]
+    gains = [_gains(white) for piece in pieces if (white := _whitened(piece, S, np.ones((200, 1)), 1))]
     assert gains[3][-1] > 5.0 * _LARGEST
     assert _share(gains) == 0.0
     assert _share(gains[3:4]) >= 0.4
+
+
+def test_what_a_fit_has_followed_does_not_hide_the_scatter() -> None:
+    """Ten parameters follow the errors of twelve switches, so the residuals show less than there is."""
+    random, S = np.random.default_rng(0), np.zeros((400, 6))
+    for n in range(6):
+        S[50 * (n + 1) :, n] = 20.0
+    hidden, shown = [], []
+    for _ in range(20):
+        J = np.hstack([block_diag(S, S) @ random.standard_normal((12, 10)), random.standard_normal((800, 1))])
+        residuals = np.concatenate([S @ random.standard_normal(6) for _ in range(2)]) + random.standard_normal(800)
+        residuals -= J @ np.linalg.lstsq(J, residuals)[0]
+        parts = [_whitened(residuals[part], S, J[part], 10) for part in (slice(400), slice(400, 800))]
+        pieces = [part for part in parts if part]
+        assert len(pieces) == 2
+        hidden += [_gains(piece) for piece in pieces]
+        shown += [_gains(piece) for piece in _without_fit(pieces)]
+    assert np.sum(hidden, axis=0).argmax() < len(hidden[0]) - 1
+    assert np.sum(shown, axis=0).argmax() == len(shown[0]) - 1
+    assert _without_fit([]) == []
 
 
 @pytest.mark.parametrize("early", [0.0, 0.05, 0.1, 0.17])
@@ -99,6 +120,22 @@ def test_the_response_to_a_late_switch_is_that_of_the_equations(k: Rov, early: f
     late = np.array([depth(k, replace_one(exact, n, 0.01 * shift), time)[0] - base for n in range(1, len(exact))])
     for expected, response in zip(sorted(100.0 * late, key=onset), sorted(found.T, key=onset), strict=True):
         assert np.abs(expected - response).max() < 0.06 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("early", [0.05, 0.1])
+def test_the_response_to_the_square_of_a_time_is_that_of_the_equations(k: Rov, early: float) -> None:
+    """The root of the mean square of the square of a time within 0.2 s is that of a fourth power, 0.2^4 / 80."""
+    exact, time, h = switches(0, "at rows"), np.arange(0.0, 60.0, 0.2), 0.02
+    exact[1:] -= early
+    base, velocity = depth(k, exact, time)
+    fine = LinearResponse(k, recording(k, exact, 0), time, velocity, 0.0).by_switches(exact[1:], squared=True)
+    found = sorted(np.abs(fine).max(axis=0))
+    late, soon = (
+        np.array([depth(k, replace_one(exact, n, change), time)[0] - base for n in range(1, len(exact))])
+        for change in (h, -h)
+    )
+    expected = sorted(np.abs(late + soon).max(axis=1) / h**2 * 0.5 * 0.2**2 / np.sqrt(80.0))
+    assert found == pytest.approx(expected, rel=0.35)  # the rows are coarse
 
 
 def onset(change: Array) -> int:
