@@ -11,8 +11,8 @@ from rov_fmu.io.messages import NO_FILE, brief
 from rov_fmu.io.output import Output, WriteError, write_whole
 from rov_fmu.model.layout import AXES, BODY, PITCH, ROLL
 from rov_fmu.tank.description import ROV_FILE, read_description
-from rov_fmu.tank.inspection import Inspection, fitting, inspect, logs_of
-from rov_fmu.tank.table_headers import TableHeaders, headers_of_tables
+from rov_fmu.tank.inspection.inspection import Inspection, fitting, inspect, logs_of
+from rov_fmu.tank.inspection.table_headers import TableHeaders, headers_of_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 

@@ -7,7 +7,7 @@ from rich.table import Table
 from rov_fmu.report.console import console, paragraph, print_table, table, text
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import SENTENCES, sentences
-from rov_fmu.tank.inspection import Inspection, Row
+from rov_fmu.tank.inspection.inspection import Inspection, Row
 
 _MOST_GAPS = 3
 """The largest number of gaps of a signal that are listed."""

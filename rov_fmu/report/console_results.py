@@ -126,7 +126,8 @@ def _next_tests(tests: Sequence[NextTest], warned: Container[str]) -> Iterator[s
         if useful := next((test for test in unknown if test.is_useful), None):
             narrows = f"narrows {useful.coefficient} by {min(1.0 - useful.narrowed, 0.99):.0%}"
             why = narrows if useful.interval else f"tells {useful.coefficient}"
-            yield f"To measure next: {useful.axis.name}: {useful.words} ({why})."
+            once = ", once the warnings are settled" if useful.axis.name in warned else ""
+            yield f"To measure next{once}: {useful.axis.name}: {useful.words} ({why})."
         else:
             yield "To measure next: no step within the limits would narrow an interval by a tenth; the widest"
             yield f"is that of {widest.coefficient}."

@@ -280,6 +280,9 @@ def test_the_printout_says_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixt
     ):
         print_identification(replace(found, axes=(replace(result, next_test=shown),)))
         assert f"\n{expected}\n" in capsys.readouterr().out
+    warned = (Finding("unexplained", axis="heave", file="a.csv", names={"cause": "drift"}, numbers={"start": 0.0}),)
+    print_identification(replace(found, axes=(replace(result, next_test=useful),), findings=warned))
+    assert "\nTo measure next, once the warnings are settled: heave: a dive" in capsys.readouterr().out
 
 
 def test_a_step_is_repeated_where_something_drifts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,10 +19,10 @@ from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.formats.content import PULSE_RANGE, Content, Wanted
 from rov_fmu.tank.formats.csv_columns import Names, is_column
 from rov_fmu.tank.formats.csv_log import read_csv
+from rov_fmu.tank.inspection.table_headers import header_parts
 from rov_fmu.tank.logs import READERS
 from rov_fmu.tank.recording import CONTEXT, signal_name
 from rov_fmu.tank.signals import gaps
-from rov_fmu.tank.table_headers import header_parts
 from rov_fmu.tank.tables import TABLES
 
 _COMMAND = re.compile(

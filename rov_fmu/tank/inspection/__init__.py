@@ -1,0 +1,1 @@
+"""What logs and tables contain before a vehicle is known."""
