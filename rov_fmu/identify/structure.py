@@ -38,6 +38,8 @@ _SLOW = 12
 """The number of cosines over time that stand for an unknown slow force."""
 _BY_RECORDING = ("drift", "recording", "unknown")
 """The causes whose size may differ between recordings."""
+_LEAST_RECORDINGS = 3
+"""The least number of recordings of which one can be told to be unlike the others."""
 _LOGGED = 1.2
 """The factor by which the score of a cause with a column of its own in the logs is raised above that of the others."""
 
@@ -48,6 +50,7 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
         all_cases = (_case(fit, s) for s in fit.simulations)
         cases = [case for case in all_cases if case.spectrum is not None]
         misfits = _misfits(cases) if cases else {}
+        odd = _odd_one(cases) if misfits else None
     if not misfits:
         return
     logged = {name for case in cases for name in case.simulation.recording.context}
@@ -57,13 +60,23 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
         cause = max(scores.keys() - {"lag", "unknown"} or {"unknown"}, key=lambda name: scores[name])
     parts = np.split(misfits[cause].explained, np.cumsum([len(case.spread) for case in cases[:-1]]))
     worst = max(range(len(cases)), key=lambda n: float(parts[n] @ parts[n]))
+    if odd is not None and cause in _BY_RECORDING:
+        cause, worst = "odd one", odd
     for n, (case, part) in enumerate(zip(cases, parts, strict=True)):
         start = case.visible_from(part)
-        if start is not None or n == worst:
+        if n == worst or (start is not None and cause != "odd one"):
             found = Finding("unexplained", fit.axis.name, file=case.simulation.recording.file, names={"cause": cause})
             if cause == "lag":
                 found = replace(found, kind="lag suggested", names={})
             yield replace(found, numbers={"start": start or 0.0})
+
+
+def _odd_one(cases: Sequence["_Case"]) -> int | None:
+    """Return the place of the only recording without which the model explains all others, or None."""
+    if len(cases) < _LEAST_RECORDINGS:
+        return None
+    odd = [n for n in range(len(cases)) if not _misfits([*cases[:n], *cases[n + 1 :]])]
+    return odd[0] if len(odd) == 1 else None
 
 
 def _case(fit: RecordingsFit, s: Simulation) -> "_Case":

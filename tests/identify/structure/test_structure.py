@@ -168,3 +168,19 @@ def test_a_short_recording_beside_others_is_no_obstacle(sensors: Sequence[str]) 
     (fit,) = fit_recordings([*long, short], UNKNOWN)
     assert {finding.file for finding in on_structure(fit)} <= {*FILES}
     assert [*on_structure(fit)]
+
+
+@pytest.mark.parametrize("sagging", [(1,), (0, 1)])
+def test_the_only_recording_that_is_unlike_the_others_is_named(sagging: Sequence[int]) -> None:
+    """The voltage falls in one of three dives; where it falls in two, none of them is the odd one."""
+    random = np.random.default_rng(0)
+    files = ("log_1.csv", "log_2.csv", "log_3.csv")
+    dives = [_dive(HEAVE, n, Disturbance(sag=0.2 if n in sagging else 0.0)) for n in range(3)]
+    found = [r for file, flown in zip(files, dives, strict=True) for r in flown.recorded(random, file, ("z",))]
+    (fit,) = fit_recordings(found, UNKNOWN)
+    told = {(finding.file, finding.names["cause"]) for finding in on_structure(fit)}
+    if len(sagging) == 1:
+        assert told == {("log_2.csv", "odd one")}
+    else:
+        assert told
+        assert "odd one" not in {cause for _, cause in told}
