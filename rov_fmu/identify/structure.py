@@ -38,6 +38,8 @@ _SLOW = 12
 """The number of cosines over time that stand for an unknown slow force."""
 _BY_RECORDING = ("drift", "recording", "unknown")
 """The causes whose size may differ between recordings."""
+_NEGLIGIBLE = 1e-6
+"""Residuals within this share of the change of the measured values need no explanation: they are those of rounding."""
 _LEAST_RECORDINGS = 3
 """The least number of recordings of which one can be told to be unlike the others."""
 _LOGGED = 1.2
@@ -47,7 +49,7 @@ _LOGGED = 1.2
 def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
     """Yield a finding for each recording that the model does not explain: the most likely cause, and since when."""
     with threadpool_limits(1, user_api="blas"):  # threads make such small systems slower
-        all_cases = (_case(fit, s) for s in fit.simulations)
+        all_cases = (_case(fit, s) for s in fit.simulations if np.ptp(s.residuals) > _NEGLIGIBLE * np.ptp(s.measured))
         cases = [case for case in all_cases if case.spectrum is not None]
         misfits = _misfits(cases) if cases else {}
         odd = _odd_one(cases) if misfits else None

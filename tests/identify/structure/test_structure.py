@@ -184,3 +184,20 @@ def test_the_only_recording_that_is_unlike_the_others_is_named(sagging: Sequence
     else:
         assert told
         assert "odd one" not in {cause for _, cause in told}
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.5e-6, False), (2e-6, True)])
+def test_residuals_of_rounding_need_no_explanation(share: float, told: bool) -> None:
+    (fit,) = fit_recordings(
+        [
+            r
+            for n, flown in enumerate(DISTURBED["sag"].dives(0))
+            for r in flown.recorded(np.random.default_rng(n), FILES[n], ("z",))
+        ],
+        UNKNOWN,
+    )
+    simulations = [
+        replace(s, measured=s.modelled + s.residuals * share * np.ptp(s.modelled) / np.ptp(s.residuals))
+        for s in fit.simulations
+    ]
+    assert bool([*on_structure(replace(fit, simulations=tuple(simulations)))]) is told
