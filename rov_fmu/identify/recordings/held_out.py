@@ -7,7 +7,7 @@ from math import inf
 
 import numpy as np
 
-from rov_fmu.identify.effects.effect import Effect, delay_of
+from rov_fmu.identify.effects.effect import Effect, Setting, delay_of
 from rov_fmu.identify.least_squares import covariance, estimate
 from rov_fmu.identify.recordings.prediction_errors import Errors, Key, errors_of, joined
 from rov_fmu.identify.simulation.limits import MotionError
@@ -161,7 +161,8 @@ def _predictions(
 ) -> Iterator[Prediction]:
     """Yield the predictions of recordings that were made together by a fit to the pieces that are seen.
 
-    Their own pieces tell their current, which is independent of the vehicle. Raises MotionError.
+    Their own pieces tell their current, which is independent of the vehicle. An effect that the others do not show is
+    that of the fit to all, such as the thrust in reverse where only this recording goes astern. Raises MotionError.
     """
     sigma = {id(d.recording): float(s) for d, s in zip(model.data, model.sigma, strict=True)}
 
@@ -172,14 +173,16 @@ def _predictions(
         return
     seen = [d.thinned() for d in seen]
     extras = tuple(e for e in model.extras if not e.is_of_file or any(e.concerns(d.recording) for d in seen))
-    others = of(seen, replace(model, extras=extras))
-    first = others.start(model.rov(x).coefficients, model.extra_values(x), model.starts(x))
+    setting = Setting([d.recording for d in seen], model.base)
+    values = model.extra_values(x)
+    usual = np.array([extra.prior(setting) for extra in extras])
+    others = of(seen, replace(model, extras=extras, likely=usual, expected=values))
+    first = others.start(model.rov(x).coefficients, values, model.starts(x))
     solution = solve(others, first, "linear", 1e-4, on_step)
     fitted = others.extra_values(solution.x)
     late = [_delayed(d, fitted) for d in unseen]
     flow = tuple(e for e in model.extras if e.is_current and any(e.concerns(d.recording) for d in late))
     alone = of(late, Simulator(tuple(late), others.rov(solution.x), (), flow, np.ones(len(late))))
-    values = model.extra_values(x)
     if flow:
         currents = of([_delayed(d, fitted).thinned() for d in own], alone)
         values = currents.extra_values(solve(currents, currents.start({}, values), "linear", 1e-4, on_step).x)

@@ -23,6 +23,7 @@ from rov_fmu.identify.effects.delay import Delay
 from rov_fmu.identify.effects.effect import Effect, Setting
 from rov_fmu.identify.effects.lag import Lag
 from rov_fmu.identify.effects.load import Load
+from rov_fmu.identify.effects.reverse import ReverseDrag, ReverseThrust
 from rov_fmu.identify.least_squares import Loss
 from rov_fmu.identify.points.tables import Table, TableForces, TablePoints
 from rov_fmu.identify.recordings.dead_bands import with_secants
@@ -38,7 +39,7 @@ from rov_fmu.identify.simulation.simulator import Simulator
 from rov_fmu.identify.simulation.solver import settled, solve
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.toml_file import join_names
-from rov_fmu.model.layout import Axis
+from rov_fmu.model.layout import AXES, Axis
 from rov_fmu.model.rov import Rov
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import NO_REQUESTS, Requests
@@ -148,7 +149,7 @@ class _Fit:
         while (fewer := earn_their_place(chosen))[0] != kept:  # extras were dropped to first order only
             kept, x = fewer
             chosen = self.analysed(self.model(kept, noise), x)
-        chosen = self.simplest(chosen, noise)
+        chosen = self.exchanged(self.simplest(chosen, noise), extras, noise)
         kept = chosen.model.extras
         if (better := self.voted(chosen)) != kept:
             x = chosen.x[chosen.model.places_of(better)]
@@ -193,6 +194,26 @@ class _Fit:
                 other = self.analysed(self.model(without, noise), start, 1e-4)
                 if analysis.gain(other) < each * len(dropped):
                     return self.analysed(other.model, other.x)
+        return analysis
+
+    def exchanged(self, analysis: ResidualAnalysis, extras: tuple[Effect, ...], noise: Array) -> ResidualAnalysis:
+        """Exchange drag in reverse for thrust in reverse where this explains the recordings better.
+
+        Both change the steady velocity alike, so noise may have led to the wrong one.
+        """
+        kept = analysis.model.extras
+        for drag in (e for e in kept if isinstance(e, ReverseDrag)):
+            own = self._own(AXES[drag.of])
+            for thrust in (e for e in extras if isinstance(e, ReverseThrust) and e.of in own and e not in kept):
+                others = tuple(thrust if e == drag else e for e in kept)
+                values = {**analysis.model.extra_values(analysis.x), thrust: thrust.begin}
+                model = self.model(others, noise)
+                start = model.start(
+                    analysis.model.rov(analysis.x).coefficients, values, analysis.model.starts(analysis.x)
+                )
+                if (other := self.analysed(model, start)).cost.sum() < analysis.cost.sum():
+                    analysis, kept = other, others
+                    break
         return analysis
 
     def voted(self, analysis: ResidualAnalysis) -> tuple[Effect, ...]:

@@ -1,7 +1,7 @@
 """Simulate recordings as a function of the fitted parameters, with derivatives."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
@@ -67,6 +67,8 @@ class Simulator:
     likely: Array | None = None
     """The prior standard deviation of each extra, infinite for one without; None if none has a prior."""
     tables: tuple[Table, ...] = ()
+    expected: Mapping[Effect, float] = field(default_factory=dict)
+    """The most likely values of extras with a prior, where they are not those of the effects themselves."""
 
     # ---- Parameters ----
 
@@ -315,7 +317,7 @@ class Simulator:
         if self.likely is not None:
             for n, extra in enumerate(self.extras):
                 if np.isfinite(self.likely[n]):
-                    yield len(self.names) + n, extra.likely, float(self.likely[n])
+                    yield len(self.names) + n, self.expected.get(extra, extra.likely), float(self.likely[n])
         for place in self.flights:
             for n, name in enumerate(place.flight.start, place.own.start):
                 if name in place.flight.start_prior:

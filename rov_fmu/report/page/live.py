@@ -99,7 +99,7 @@ def _names(flown: Sequence[Flown]) -> list[str]:
     plain = [one.vehicle.name for one in flown]
     versions = [f"{one.vehicle.name} {one.vehicle.version}" for one in flown]
     files = [f"{one.vehicle.name} ({one.file})" if one.file else one.vehicle.name for one in flown]
-    return next((names for names in (plain, versions) if len({*names}) == len(names)), files)
+    return next((names for names in (plain, versions, files) if len({*names}) == len(names)), plain)
 
 
 def fly_page(flown: Sequence[Flown], *, compact: bool = False) -> str:

@@ -22,7 +22,14 @@ from verification.references.pool import Array, Commands, Conditions
 
 BY_DEFAULT = ("load of 0.1 N in heave", "pilot")
 """The quick scenarios of the default tests."""
-OFTEN = ("clean", "delay and lag", "gaps while turning", "switches between rows at 5 Hz", "tether")
+OFTEN = (
+    "clean",
+    "delay and lag",
+    "gaps while turning",
+    "switches between rows at 5 Hz",
+    "tether",
+    "load, delay, reverse, correlated noise",
+)
 """The scenarios that the long tests run with 20 seeds. All of them are run with 200 seeds once a week."""
 FEW = 10
 """The number of seeds of the Heavy once a week, because one of them takes minutes."""
