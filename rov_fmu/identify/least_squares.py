@@ -236,6 +236,18 @@ def estimate_alike(
     return estimate(names, solution.x, of_x, degrees, noise)
 
 
+def scaled(columns: Array) -> Array:
+    """Return the columns that are not zero, with a length of 1."""
+    size = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns[:, size > 0.0] / size[size > 0.0])
+
+
+def basis(columns: Array, least: float) -> Array:
+    """Return an orthonormal basis of the space of the columns, without directions that are smaller than `least`."""
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(U[:, s > least])
+
+
 def leave_one_out(groups: Array, predict: Callable[[Flags], Array | None]) -> Array:
     """Predict the numbers of every group by a fit without it; NaN where too few remain (None)."""
     found = np.full(len(groups), np.nan)

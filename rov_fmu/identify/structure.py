@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from rov_fmu.identify.driving import curves_of
 from rov_fmu.identify.effects.current import is_in_flow
+from rov_fmu.identify.least_squares import basis, scaled
 from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
 from rov_fmu.identify.recordings.recordings_fit import RecordingsFit
 from rov_fmu.identify.recordings.residual_analysis import Simulation
@@ -239,7 +240,7 @@ class _Misfit:
 def _misfits(cases: Sequence[_Case]) -> dict[str, _Misfit]:
     """Return the causes that explain more of the residuals than chance does."""
     shared = np.concatenate([case.white(case.shared) for case in cases])
-    free = _basis(_scaled(np.hstack([shared, block_diag(*(case.white(case.own) for case in cases))])), 1e-6)
+    free = basis(scaled(np.hstack([shared, block_diag(*(case.white(case.own) for case in cases))])), 1e-6)
     residuals = np.concatenate([case.white(case.residuals) for case in cases])
     residuals -= free @ (free.T @ residuals)
     names = dict.fromkeys(name for case in cases for name in case.causes)
@@ -251,21 +252,9 @@ def _misfits(cases: Sequence[_Case]) -> dict[str, _Misfit]:
     for name in names:
         size = max(case.causes[name].shape[1] for case in cases if name in case.causes)
         parts = [case.white(case.causes.get(name, np.zeros((len(case.response.time), size)))) for case in cases]
-        columns = _scaled(block_diag(*parts) if name in _BY_RECORDING else np.concatenate(parts))
-        basis = _basis(columns - free @ (free.T @ columns), 1e-3)
-        misfit = _Misfit(basis @ (basis.T @ residuals), basis.shape[1])
+        columns = scaled(block_diag(*parts) if name in _BY_RECORDING else np.concatenate(parts))
+        own = basis(columns - free @ (free.T @ columns), 1e-3)
+        misfit = _Misfit(own @ (own.T @ residuals), own.shape[1])
         if misfit.count and misfit.chance < _CHANCE:
             found[name] = misfit
     return found
-
-
-def _scaled(columns: Array) -> Array:
-    """Return the columns that are not zero, with a length of 1."""
-    size = np.linalg.norm(columns, axis=0)
-    return np.asarray(columns[:, size > 0.0] / size[size > 0.0])
-
-
-def _basis(columns: Array, least: float) -> Array:
-    """Return an orthonormal basis of the space of the columns, without directions that are smaller than `least`."""
-    U, s, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(U[:, s > least])

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rov_fmu.identify.effects.effect import delay_of
+from rov_fmu.identify.least_squares import basis, scaled
 from rov_fmu.identify.noise_spectrum import cosines, noise_spectrum
 from rov_fmu.identify.simulation.linear_response import LONGEST, LinearResponse
 from rov_fmu.identify.simulation.prepared import PreparedRecording, switched_rows
@@ -86,9 +87,10 @@ class _Piece:
 
 
 def _whitened(residuals: Array, S: Array, jacobian: Array, shared: int) -> _Piece | None:
-    """Return a piece without what its own parameters, the values at its start, explain. The others are the first ones.
+    """Return a piece without what its own parameters, the values at its start, explain.
 
-    None for a piece without switches, or with too few samples.
+    The first columns of the Jacobian are those of the shared parameters. Returns None for a piece without switches, or
+    with too few samples.
     """
     S = S[:, :_TESTED]
     spectrum = noise_spectrum(residuals, np.hstack([S, jacobian])) if S.shape[1] else None
@@ -98,7 +100,7 @@ def _whitened(residuals: Array, S: Array, jacobian: Array, shared: int) -> _Piec
     columns = np.column_stack([residuals, S, jacobian])
     white = cosines(columns)[:_COEFFICIENTS] / noise
     fit = white[:, 1 + S.shape[1] :]
-    own = _basis(fit[:, shared:])
+    own = basis(scaled(fit[:, shared:]), _RANK)
     white -= own @ (own.T @ white)
     return _Piece(white[:, 0], white[:, 1 : 1 + S.shape[1]], white[:, 1 + S.shape[1] :][:, :shared])
 
@@ -111,19 +113,12 @@ def _without_fit(pieces: Sequence[_Piece]) -> list[_Piece]:
     if not pieces:
         return []
     ends = np.cumsum([len(piece.residuals) for piece in pieces])[:-1]
-    parts = np.split(_basis(np.concatenate([piece.fit for piece in pieces])), ends)
+    parts = np.split(basis(scaled(np.concatenate([piece.fit for piece in pieces])), _RANK), ends)
     explained = np.sum([Q.T @ piece.residuals for Q, piece in zip(parts, pieces, strict=True)], axis=0)
     return [
         _Piece(piece.residuals - Q @ explained, piece.shifts - Q @ (Q.T @ piece.shifts), piece.fit)
         for Q, piece in zip(parts, pieces, strict=True)
     ]
-
-
-def _basis(columns: Array) -> Array:
-    """Return an orthonormal basis of the space of the columns."""
-    size = np.linalg.norm(columns, axis=0)
-    U, s, _ = np.linalg.svd(columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
-    return np.asarray(U[:, s > _RANK])
 
 
 def _gains(piece: _Piece) -> Array:
