@@ -153,7 +153,7 @@ COMMANDS = [
 ]
 
 
-@pytest.mark.parametrize("columns", [80, 120])
+@pytest.mark.parametrize("columns", [80, pytest.param(120, marks=pytest.mark.long)])
 @pytest.mark.parametrize("arguments", COMMANDS, ids=" ".join)
 def test_no_line_is_too_long_no_word_is_broken_and_no_progress_is_left(
     arguments: tuple[str, ...], columns: int, folder: Path
@@ -168,7 +168,7 @@ def test_no_line_is_too_long_no_word_is_broken_and_no_progress_is_left(
         assert words - words_in_a_pipe(arguments, folder) <= {"the", "widest", "of", *at_the_end.split("…")[1:]}
 
 
-@pytest.mark.parametrize("columns", [80, 120])
+@pytest.mark.parametrize("columns", [80, pytest.param(120, marks=pytest.mark.long)])
 def test_parts_that_are_done_have_a_tick_and_disappear(columns: int, folder: Path) -> None:
     shown = on_a_terminal(["identify", "tests", "--report", "found.html"], columns, folder)
     assert shown.code == 0

@@ -471,6 +471,7 @@ def test_tables_are_checked_against_recordings(full_folder: Path, tmp_path: Path
     assert ("tables against recordings", "surge") in [(finding.kind, finding.axis) for finding in found.findings]
 
 
+@pytest.mark.long
 def test_tables_join_the_fit_to_recordings(full_folder: Path, tmp_path: Path) -> None:
     """With a lag of the thrusters Tau takes no part; the row at a command outside the window does not count."""
     k = load_vehicle(VIDEORAY).rov.replaced({"alpha_w": 1.0})

@@ -148,7 +148,7 @@ def test_a_step_is_exact(rov: Rov) -> None:
             assert abs(x - y) <= 1e-13 * (1.0 + abs(y)), h
 
 
-@pytest.mark.parametrize("rov", [NOW, FINNED], ids=["four axes", "six axes"])
+@pytest.mark.parametrize("rov", [NOW, pytest.param(FINNED, marks=pytest.mark.long)], ids=["four axes", "six axes"])
 def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(rov: Rov) -> None:
     rng = random.Random(3)
     state = random_state(rng, rov)
