@@ -162,8 +162,8 @@ _CAUSES = {
     "drift": "the thrust or the load changes with time, as when the voltage falls",
     "recording": "thrust or drag differ between the recordings. Did the battery, the ballast, the tether or the place "
     "of a sensor change between them, or are columns of a log swapped or missing?",
-    "odd one": "it explains the other recordings. Check the columns, units and signs of this log, and whether the "
-    "battery, the ballast, the tether or a sensor was another one",
+    "odd one": "it explains all other recordings. Check the columns, units and signs of this log, and whether the "
+    "battery, the ballast, the tether or a sensor differed",
     "scale": "the sensors of position and velocity disagree, so one of them has a wrong scale",
     "unknown": "a force that changes slowly remains, and none of the causes that are tested explains it",
 }

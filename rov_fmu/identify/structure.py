@@ -53,7 +53,6 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
         all_cases = (_case(fit, s) for s in fit.simulations if np.ptp(s.residuals) > _NEGLIGIBLE * np.ptp(s.measured))
         cases = [case for case in all_cases if case.spectrum is not None]
         misfits = _misfits(cases) if cases else {}
-        odd = _odd_one(cases) if misfits else None
     if not misfits:
         return
     logged = {name for case in cases for name in case.simulation.recording.context}
@@ -63,7 +62,7 @@ def on_structure(fit: RecordingsFit) -> Iterator[Finding]:
         cause = max(scores.keys() - {"lag", "unknown"} or {"unknown"}, key=lambda name: scores[name])
     parts = np.split(misfits[cause].explained, np.cumsum([len(case.spread) for case in cases[:-1]]))
     worst = max(range(len(cases)), key=lambda n: float(parts[n] @ parts[n]))
-    if odd is not None and cause in _BY_RECORDING:
+    if cause in _BY_RECORDING and (odd := _odd_one(cases)) is not None:
         cause, worst = "odd one", odd
     for n, (case, part) in enumerate(zip(cases, parts, strict=True)):
         start = case.visible_from(part)
@@ -78,7 +77,8 @@ def _odd_one(cases: Sequence["_Case"]) -> int | None:
     """Return the place of the only recording without which the model explains all others, or None."""
     if len(cases) < _LEAST_RECORDINGS:
         return None
-    odd = [n for n in range(len(cases)) if not _misfits([*cases[:n], *cases[n + 1 :]])]
+    with threadpool_limits(1, user_api="blas"):
+        odd = [n for n in range(len(cases)) if not _misfits([*cases[:n], *cases[n + 1 :]])]
     return odd[0] if len(odd) == 1 else None
 
 
@@ -205,6 +205,26 @@ class _Case:
         """Return the slow coefficients of the transform of n or n x k values, in standard deviations of the noise."""
         return np.asarray(solve_triangular(self.spread, cosines(values)[:_COEFFICIENTS], lower=True))
 
+    @cached_property
+    def white_shared(self) -> Array:
+        """The whitened response to errors that all recordings share."""
+        return self.white(self.shared)
+
+    @cached_property
+    def white_own(self) -> Array:
+        """The whitened response to errors of this recording."""
+        return self.white(self.own)
+
+    @cached_property
+    def white_residuals(self) -> Array:
+        """The whitened residuals."""
+        return self.white(self.residuals)
+
+    @cached_property
+    def white_causes(self) -> dict[str, Array]:
+        """The whitened response to each cause."""
+        return {name: self.white(response) for name, response in self.causes.items()}
+
     def visible_from(self, misfit: Array) -> float | None:
         """Return the time from which a whitened misfit exceeds the sensor's noise, s; None where it never does."""
         assert self.spectrum is not None
@@ -239,9 +259,9 @@ class _Misfit:
 
 def _misfits(cases: Sequence[_Case]) -> dict[str, _Misfit]:
     """Return the causes that explain more of the residuals than chance does."""
-    shared = np.concatenate([case.white(case.shared) for case in cases])
-    free = basis(scaled(np.hstack([shared, block_diag(*(case.white(case.own) for case in cases))])), 1e-6)
-    residuals = np.concatenate([case.white(case.residuals) for case in cases])
+    shared = np.concatenate([case.white_shared for case in cases])
+    free = basis(scaled(np.hstack([shared, block_diag(*(case.white_own for case in cases))])), 1e-6)
+    residuals = np.concatenate([case.white_residuals for case in cases])
     residuals -= free @ (free.T @ residuals)
     names = dict.fromkeys(name for case in cases for name in case.causes)
     if len(cases) == 1:
@@ -251,7 +271,7 @@ def _misfits(cases: Sequence[_Case]) -> dict[str, _Misfit]:
     found = {}
     for name in names:
         size = max(case.causes[name].shape[1] for case in cases if name in case.causes)
-        parts = [case.white(case.causes.get(name, np.zeros((len(case.response.time), size)))) for case in cases]
+        parts = [case.white_causes.get(name, np.zeros((len(case.spread), size))) for case in cases]
         columns = scaled(block_diag(*parts) if name in _BY_RECORDING else np.concatenate(parts))
         own = basis(columns - free @ (free.T @ columns), 1e-3)
         misfit = _Misfit(own @ (own.T @ residuals), own.shape[1])

@@ -56,8 +56,8 @@ def refusals(findings: Iterable[Finding], folder: Path, forms: Mapping[str, Sent
 def _sentence(group: Sequence[Finding], forms: Mapping[str, SentenceForm]) -> str:
     first, form = group[0], forms[group[0].kind]
     values = {
-        "axes": _listed(finding.axis for finding in group),
-        "files": _listed(finding.file for finding in group),
+        "axes": listed(finding.axis for finding in group),
+        "files": listed(finding.file for finding in group),
         "curve": first.curve,
         **first.names,
         **{name: _Range([finding.numbers[name] for finding in group]) for name in first.numbers},
@@ -65,7 +65,7 @@ def _sentence(group: Sequence[Finding], forms: Mapping[str, SentenceForm]) -> st
     return form.format(**values) if isinstance(form, str) else form(values)
 
 
-def _listed(words: Iterable[str]) -> str:
+def listed(words: Iterable[str]) -> str:
     """Join different words as in "a, b and c"."""
     *others, last = dict.fromkeys(words)
     return f"{', '.join(others)} and {last}" if others else last

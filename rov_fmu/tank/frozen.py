@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, listed
 from rov_fmu.tank.recording import signal_name
 from rov_fmu.tank.signals import LEAST_SAMPLES, Signal
 
@@ -30,10 +30,9 @@ def without_frozen(file: str, signals: Sequence[Signal]) -> tuple[list[Signal], 
         return [*signals], []
     kept = [_until(signal, frozen[n]) if n in together else signal for n, signal in enumerate(signals)]
     first, last = _ends(signals)
-    names = [_name(signals[n]) for n in together]
-    listed = f"{', '.join(names[:-1])} and {names[-1]}"
+    sensors = listed(_name(signals[n]) for n in together)
     numbers = {"start": min(frozen[n] for n in together) - first, "end": last - first}
-    return kept, [Finding("frozen sensors", file=file, names={"sensors": listed}, numbers=numbers)]
+    return kept, [Finding("frozen sensors", file=file, names={"sensors": sensors}, numbers=numbers)]
 
 
 def _frozen_from(signal: Signal, signals: Iterable[Signal]) -> float | None:

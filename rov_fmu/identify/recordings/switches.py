@@ -97,12 +97,11 @@ def _whitened(residuals: Array, S: Array, jacobian: Array, shared: int) -> _Piec
     if spectrum is None:
         return None
     noise = np.sqrt(spectrum[:_COEFFICIENTS, None])
-    columns = np.column_stack([residuals, S, jacobian])
-    white = cosines(columns)[:_COEFFICIENTS] / noise
-    fit = white[:, 1 + S.shape[1] :]
-    own = basis(scaled(fit[:, shared:]), _RANK)
+    fit, start = np.split(jacobian, [shared], axis=1)
+    own = basis(scaled(cosines(start)[:_COEFFICIENTS] / noise), _RANK)
+    white = cosines(np.column_stack([residuals, S, fit]))[:_COEFFICIENTS] / noise
     white -= own @ (own.T @ white)
-    return _Piece(white[:, 0], white[:, 1 : 1 + S.shape[1]], white[:, 1 + S.shape[1] :][:, :shared])
+    return _Piece(white[:, 0], *np.split(white[:, 1:], [S.shape[1]], axis=1))
 
 
 def _without_fit(pieces: Sequence[_Piece]) -> list[_Piece]:

@@ -95,8 +95,8 @@ class LinearResponse:
     def by_switches(self, between: Array | None = None, *, squared: bool = False) -> Array:
         """Return the response to each strong switch when it comes later by one standard deviation, n x switches.
 
-        With `squared`, the response is that in proportion to the square of the time by which it comes later or earlier,
-        at the root of the mean square.
+        With `squared`, it is the second-order term of this response, which grows with the square of the time by which
+        the switch is off. The square has its root mean square value then.
 
         A command that changes between two rows of a log changes at an unknown time between them, whose standard
         deviation is the time between the rows divided by √12. `between` has the times about which the switches of the

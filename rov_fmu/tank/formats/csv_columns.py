@@ -7,28 +7,16 @@ from functools import partial
 from rov_fmu.io.csv_table import Column, Conversion, find_column
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.model.layout import AXES, HEAVE, PITCH, ROLL, YAW, Axis, Layout
-from rov_fmu.tank.columns import (
-    FORCE,
-    LOGGED_COMMAND,
-    TIME,
-    VELOCITY_OF_ANY_AXIS,
-    VOLTAGE,
-    position_column,
-    time_constant_column,
-    velocity_column,
-)
+from rov_fmu.tank.columns import LOGGED_COMMAND, TIME, VOLTAGE, position_column, velocity_column
 from rov_fmu.tank.formats.content import Entry
+from rov_fmu.tank.tables import TABLES, columns_of
 
 COMMAND = "command"
 """The column with the command of a log of one axis."""
 _POSITION_NAMES = {HEAVE: ("z",), ROLL: ("phi", "roll"), PITCH: ("theta", "pitch"), YAW: ("psi",)}
 """Other names of positions that need no axis: those in the FMU, and that of the axis."""
 LOGGED = replace(LOGGED_COMMAND, optional=True)
-_OF_TABLES = {
-    "force": FORCE,
-    "velocity": VELOCITY_OF_ANY_AXIS,
-    "time constant": time_constant_column(),
-}
+_OF_TABLES = {name: column for kind in TABLES for name, column in columns_of(kind).items() if name != COMMAND}
 """The columns that only tables have, and logs of one axis, whose velocities need not name it."""
 
 
