@@ -20,7 +20,7 @@ from click.shell_completion import CompletionItem
 from rov_fmu import __version__
 from rov_fmu.engine.compile import OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.io.file_kinds import PAGE, check_written
-from rov_fmu.io.messages import FileError, InputError, ProofError, StudyError, did_you_mean, on_terminal, shown
+from rov_fmu.io.messages import FileError, InputError, ProofError, StudyError, did_you_mean, listed, on_terminal, shown
 from rov_fmu.io.output import check_targets, write_whole
 from rov_fmu.model.layout import AXES
 from rov_fmu.process import exit_code
@@ -225,7 +225,7 @@ def _build(vehicle: Path, output: Path | None, backend: str, fmi: int, platforms
 
 def _print_built(built: "Built", seconds: float) -> None:
     """Print the size of the FMU and of its binaries, the times, what it did when it was run, and what to do next."""
-    from rov_fmu.report.console import console, listed, paragraph, print_end, shell_words
+    from rov_fmu.report.console import console, paragraph, print_end, shell_words
 
     out = console()
     if built.lost:

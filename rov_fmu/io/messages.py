@@ -97,6 +97,12 @@ def brief(text: str, most: int = 80) -> str:
     return clean if len(clean) <= most else f"{clean[: most - 3]}..."
 
 
+def listed(words: Iterable[str]) -> str:
+    """Return words as in a sentence: a, b and c."""
+    *some, last = [*words] or [""]
+    return f"{', '.join(some)} and {last}" if some else last
+
+
 def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
     """Return the names that are most similar to an unknown one, without regard to case; the most similar is first."""
     by_folded: dict[str, list[str]] = {}

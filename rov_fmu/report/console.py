@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-from rov_fmu.io.messages import one_line, wrapped
+from rov_fmu.io.messages import listed, one_line, wrapped
 from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -48,12 +48,6 @@ def shell_words(*words: str | Path) -> str:
     """Return the words of a command line for people, quoted for a shell."""
     clean = [one_line(str(word)) for word in words]
     return subprocess.list2cmdline(clean) if os.name == "nt" else shlex.join(clean)
-
-
-def listed(words: Sequence[str]) -> str:
-    """Return words as in a sentence: a, b and c."""
-    *some, last = words or [""]
-    return f"{', '.join(some)} and {last}" if some else last
 
 
 def print_end(written: Sequence[Path], following: str = "") -> None:

@@ -12,8 +12,9 @@ from rov_fmu.identify.identification import Comparison, Identification, compare
 from rov_fmu.identify.next_test import REPEATED, NextTest
 from rov_fmu.identify.recordings.recordings_fit import FittedEffect, count
 from rov_fmu.identify.tuning import Tuning
+from rov_fmu.io.messages import listed
 from rov_fmu.model.layout import AXES
-from rov_fmu.report.console import DEVIATION, console, listed, paragraph, print_table, table, text
+from rov_fmu.report.console import DEVIATION, console, paragraph, print_table, table, text
 from rov_fmu.report.findings import Unseen, acting, effects, unseen
 from rov_fmu.report.overview import main_errors
 from rov_fmu.vehicle.uncertainty import significant, with_interval

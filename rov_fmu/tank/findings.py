@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from rov_fmu.io.messages import listed
+
 SentenceForm = str | Callable[[Mapping[str, Any]], str]
 """A format string, or a function that makes the sentence. Both get {axes}, {files}, {curve}, the names and the numbers
 of the finding. The format `{count:#row}` gives "1 row" or "2 rows"."""
@@ -56,19 +58,13 @@ def refusals(findings: Iterable[Finding], folder: Path, forms: Mapping[str, Sent
 def _sentence(group: Sequence[Finding], forms: Mapping[str, SentenceForm]) -> str:
     first, form = group[0], forms[group[0].kind]
     values = {
-        "axes": listed(finding.axis for finding in group),
-        "files": listed(finding.file for finding in group),
+        "axes": listed(dict.fromkeys(finding.axis for finding in group)),
+        "files": listed(dict.fromkeys(finding.file for finding in group)),
         "curve": first.curve,
         **first.names,
         **{name: _Range([finding.numbers[name] for finding in group]) for name in first.numbers},
     }
     return form.format(**values) if isinstance(form, str) else form(values)
-
-
-def listed(words: Iterable[str]) -> str:
-    """Join different words as in "a, b and c"."""
-    *others, last = dict.fromkeys(words)
-    return f"{', '.join(others)} and {last}" if others else last
 
 
 class _Range:

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from rov_fmu.io.messages import listed
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.findings import Finding, listed
+from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.recording import signal_name
 from rov_fmu.tank.signals import LEAST_SAMPLES, Signal
 
@@ -30,7 +31,7 @@ def without_frozen(file: str, signals: Sequence[Signal]) -> tuple[list[Signal], 
         return [*signals], []
     kept = [_until(signal, frozen[n]) if n in together else signal for n, signal in enumerate(signals)]
     first, last = _ends(signals)
-    sensors = listed(_name(signals[n]) for n in together)
+    sensors = listed([_name(signals[n]) for n in together])
     numbers = {"start": min(frozen[n] for n in together) - first, "end": last - first}
     return kept, [Finding("frozen sensors", file=file, names={"sensors": sensors}, numbers=numbers)]
 
