@@ -68,19 +68,22 @@ def simulate(
     record = list(layout.state) if record is None else record
     times = np.require(time, np.float64, ["C", "A"])
     shape = vehicles, len(times)
-    places = layout.places | {f"der({name})": layout.places[name] + len(layout.state) for name in layout.state}
-    numbers = np.zeros(len(places))
-    tables = np.zeros(len(places), TABLE)
-    tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(places))
+    places = layout.places
+    rates = {f"der({name})": places[name] + len(layout.state) for name in layout.state}
+    usual = {**layout.usual_inputs, **rov.coefficients}
+    numbers = np.zeros(len(places) + len(rates))
+    numbers[[*places.values()]] = [usual.get(name, 0.0) for name in places]
+    tables = np.zeros(len(numbers), TABLE)
+    tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(numbers))
     arrays = []  # keeps the arrays alive while C uses their addresses
-    for name, value in {**rov.coefficients, **layout.usual_inputs, **values}.items():
+    for name, value in values.items():
         array = np.require(value, np.float64, ["C", "A"])
         if array.ndim == 0:
             numbers[places[name]] = array
         else:
             arrays.append(table := np.broadcast_to(array, shape))
             tables[places[name]] = table.ctypes.data, *(stride // table.itemsize for stride in table.strides)
-    recorded = np.array([places[name] for name in record], np.intc)
+    recorded = np.array([rates[name] if name in rates else places[name] for name in record], np.intc)
     result = np.empty((len(record), *shape))
     failed = np.empty(vehicles, np.intp)
     run = load_library(rov).simulate

@@ -190,7 +190,6 @@ class Simulator:
         for n, name in enumerate(place.flight.start, place.own.start):
             values[name] = X[:, n]
         delays = np.tile([d.delay for d in place.flight.members], (len(X), 1))
-        with_coefficients = {**{k: np.full(len(X), v) for k, v in self._vehicle.coefficients.items()}, **values}
         for n in place.shared:
             if n < len(self.names):
                 continue
@@ -201,7 +200,7 @@ class Simulator:
             elif extra.input:
                 values[extra.input] = values.get(extra.input, 0.0) + numbers
             else:
-                values |= extra.coefficients(with_coefficients, numbers)
+                values |= extra.coefficients({**self._vehicle.coefficients, **values}, numbers)
         times = [tuple(row) for row in delays.tolist()]
         return place.flight.outputs(self._vehicle, values, times)
 

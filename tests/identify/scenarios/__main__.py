@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 from tests.identify.scenarios.catalogue import SCENARIOS, Scenario
-from tests.identify.scenarios.judge import biases, coverages, invented, problems
+from tests.identify.scenarios.judge import FAMILY, biases, coverages, invented, problems
 from tests.identify.scenarios.outcome import Outcome, outcome
 
 _HEADER = (
@@ -38,7 +38,7 @@ def main(names: tuple[str, ...], seeds: int, verbose: bool) -> None:
         with TemporaryDirectory() as folder:
             outcomes = [outcome(scenario, seed, Path(folder) / str(seed)) for seed in range(seeds)]
         click.echo(row(name, scenario, outcomes))
-        for line in problems(outcomes, scenario):
+        for line in problems(outcomes, scenario, FAMILY):
             click.echo(f"    {line[:160]}")
         if verbose:
             click.echo("\n".join(f"        {line}" for line in details(scenario, outcomes)))

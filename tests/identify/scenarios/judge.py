@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 from scipy.stats import binom, norm
 
-from tests.identify.scenarios.catalogue import Scenario
+from tests.identify.scenarios.catalogue import COMPLETE, Scenario
 from tests.identify.scenarios.outcome import EFFECTS, Estimate, Outcome
 
 LEVEL = 0.95
@@ -18,6 +18,10 @@ _BIAS, _BIAS_IN_ERRORS = 0.02, 0.2
 """The allowed bias of β, relative and in standard errors; the larger one counts."""
 _MOST_INVENTED = 0.05
 """The share of axes that may have an effect which is not there."""
+_MANY = 200
+"""With so many seeds each coefficient is judged by itself, with fewer all of them together."""
+FAMILY = sum(len(scenario.coefficients) for scenario in COMPLETE.values())
+"""The number of coverages that are judged at most."""
 _MOST_ALARMS, _LEAST_ALARMS = 0.02, 0.95
 """The largest share of seeds with an alarm on a complete model, and the smallest on an incomplete one."""
 
@@ -116,14 +120,12 @@ def invented(outcome: Outcome, scenario: Scenario) -> set[str]:
     return {f.axis for f in outcome.findings if f.kind in EFFECTS and f.kind not in scenario.effects}
 
 
-def problems(
-    outcomes: Sequence[Outcome], scenario: Scenario, *, by_coefficient: bool = False, family: int = 0
-) -> list[str]:
+def problems(outcomes: Sequence[Outcome], scenario: Scenario, family: int = 0) -> list[str]:
     """Return what is wrong with the outcomes of a scenario, a line each.
 
     On a complete model intervals cover, β is unbiased, and alarms and invented effects are rare. On an incomplete one
-    nearly every seed raises an alarm about one of its unexplained axes. Nothing is ever refused. `family` is the number
-    of coverages that are judged in all scenarios.
+    nearly every seed raises an alarm about one of its unexplained axes. Nothing is ever refused. `family` is the
+    number of coverages that are judged in all scenarios.
     """
     n = len(outcomes)
     wrong = [f"seed {seed}: refused: {o.error}" for seed, o in enumerate(outcomes) if o.error]
@@ -133,7 +135,7 @@ def problems(
             wrong.append(f"only {alarmed} of {n} seeds report that {', '.join(scenario.unexplained)} is unexplained")
         return wrong
     found = coverages(outcomes, scenario)
-    judged = {each.name: each for each in (found if by_coefficient else pooled(found))}
+    judged = {each.name: each for each in (found if n >= _MANY else pooled(found))}
     failed = rejected({name: each.p_value for name, each in judged.items()}, family)
     wrong += [f"{name}: {judged[name].covered} of {judged[name].total} intervals cover" for name in failed]
     betas = (bias for bias in biases(outcomes, scenario) if bias.name.startswith("beta"))

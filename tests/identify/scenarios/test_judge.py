@@ -39,25 +39,24 @@ def seeds(
     return found
 
 
-@pytest.mark.parametrize("by_coefficient", [False, True])
 @pytest.mark.parametrize("n", [2, 20, 200])
-def test_right_outcomes_pass(n: int, by_coefficient: bool) -> None:
-    assert problems(seeds(n), SCENARIO, by_coefficient=by_coefficient, family=40) == []
+def test_right_outcomes_pass(n: int) -> None:
+    assert problems(seeds(n), SCENARIO, 40) == []
 
 
-@pytest.mark.parametrize(("by_coefficient", "n"), [(False, 20), (True, 200)])
+@pytest.mark.parametrize("n", [20, 200])
 @pytest.mark.parametrize("share", [0.0, 0.25])
-def test_wrong_coverages_fail(by_coefficient: bool, n: int, share: float) -> None:
+def test_wrong_coverages_fail(n: int, share: float) -> None:
     """20 seeds of three coefficients are too few to tell 100 % from 95 %; 200 seeds of each are enough."""
     outcomes = seeds(n, misses=lambda _, seed: seed % 20 < round(20 * share))
-    found = problems(outcomes, SCENARIO, by_coefficient=by_coefficient, family=3)
+    found = problems(outcomes, SCENARIO, 3)
     assert bool(found) == (share > 0.0 or n == 200), found
     assert all("intervals cover" in line for line in found)
 
 
 def test_one_wrong_coefficient_fails() -> None:
     outcomes = seeds(200, misses=lambda name, seed: seed % 20 < (4 if name == "b_d_w" else 1))
-    (line,) = problems(outcomes, SCENARIO, by_coefficient=True, family=300)
+    (line,) = problems(outcomes, SCENARIO, 300)
     assert line.startswith("b_d_w: 160 of 200")
 
 

@@ -15,7 +15,7 @@ from rov_fmu.tank.tank_tests import load_tank_tests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.identify.scenarios.catalogue import COMPLETE, DEPTH, HEADING, INCOMPLETE, SCENARIOS, Logs, Scenario, Sensor
-from tests.identify.scenarios.judge import problems
+from tests.identify.scenarios.judge import FAMILY, problems
 from tests.identify.scenarios.outcome import flights, moved, outcome, true_values, write
 from verification.references import pool
 from verification.references.pool import Array, Commands, Conditions
@@ -33,8 +33,6 @@ OFTEN = (
 """The scenarios that the long tests run with 20 seeds. All of them are run with 200 seeds once a week."""
 FEW = 10
 """The number of seeds of the Heavy once a week, because one of them takes minutes."""
-FAMILY = sum(len(scenario.coefficients) for scenario in COMPLETE.values())
-"""The number of coverages that are judged at most."""
 
 assert SCENARIOS.keys() >= {*BY_DEFAULT, *OFTEN}
 
@@ -52,13 +50,10 @@ def judged() -> Iterator[object]:
 
 @pytest.mark.parametrize(("name", "seeds"), [*judged()])
 def test_a_scenario_is_identified(name: str, seeds: int, tmp_path: Path) -> None:
-    """Intervals cover, β is unbiased, and alarms are raised where they should be, and only there.
-
-    With 200 seeds each coefficient is judged by itself, with fewer all of them together.
-    """
+    """Intervals cover, β is unbiased, and alarms are raised where they should be, and only there."""
     scenario = SCENARIOS[name]
     outcomes = [outcome(scenario, seed, tmp_path / str(seed)) for seed in range(seeds)]
-    assert not problems(outcomes, scenario, by_coefficient=seeds >= 200, family=FAMILY)
+    assert not problems(outcomes, scenario, FAMILY)
 
 
 # ---- What is found, and what follows from it -------------------------------------------------------------------------
