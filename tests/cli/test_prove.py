@@ -54,6 +54,7 @@ def test_the_videoray_proves_itself(interface: str | None, videoray_fmu: Path, c
     assert {f.tolerance for f in found} == {1e-7 if interface == "model-exchange" else 1e-9}
 
 
+@pytest.mark.long
 def test_a_vehicle_with_lag_and_coupling_proves_itself(
     heavy: Vehicle, heavy_dir: Path, tmp_path: Path, capsys: Capsys
 ) -> None:

@@ -126,11 +126,11 @@ COMMANDS = [
     (),
     ("tables",),
     (*_TUNE, "-o", "tuned.toml"),
-    ("build", "bare.toml", "--platform", "host", "--osp"),
-    ("build", "videorey"),
     ("build", "mistake.toml"),
-    ("simulate", "bare.toml", "--set", "u_t=1.5"),
-    ("identify", "tests", "-o", "found.toml", "--force"),
+    _long("build", "videorey"),
+    _long("build", "bare.toml", "--platform", "host", "--osp"),
+    _long("simulate", "bare.toml", "--set", "u_t=1.5"),
+    _long("identify", "tests", "-o", "found.toml", "--force"),
     _long("build", "--platform", "amiga"),
     _long("simulate", "videoray", "-o", "result.csv", "--plot", "result.png"),
     _long("simulate", "bare.toml", "--set", "u_x=1"),
@@ -190,6 +190,7 @@ def test_colours_are_left_out_where_they_are_not_wanted(folder: Path) -> None:
     assert without.lines[-1] == "Wrote bare.fmu. Next: rov-fmu prove bare.fmu"
 
 
+@pytest.mark.long
 def test_a_pipe_gets_a_plain_line_for_each_part_but_the_last(folder: Path) -> None:
     with start(["identify", str(folder / "tests"), "--report", str(folder / "found.html")], stdout=-1) as process:
         out, err = process.communicate(timeout=300)

@@ -247,6 +247,7 @@ def in_another_unit(folder: Path, newton: float) -> None:
     path.write_text("\n".join([header, *weak]) + "\n", encoding="utf-8")
 
 
+@pytest.mark.long
 def test_forces_in_lbf_are_named_and_not_the_recordings(tmp_path: Path) -> None:
     """Surge and yaw share the forces of the rear thrusters and no recording."""
     in_another_unit(tmp_path, 4.4482)

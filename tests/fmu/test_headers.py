@@ -150,15 +150,16 @@ def _builds() -> Iterator[Any]:
     for i, release in enumerate(RELEASES):
         for name, standard in product(COMPILERS, _STANDARDS):
             is_chosen = (name, standard) == (_NAMES[i % len(_NAMES)], _STANDARDS[i % 2])
-            by_default = release in ("2.0.1", "3.0")
+            by_default = release == "3.0"
             marks = pytest.mark.weekly if not is_chosen else () if by_default else pytest.mark.long
             yield pytest.param(release, name, (f"-std={standard}", "-O2"), marks=marks)
     yield pytest.param("3.0", "zig", _CPP, marks=pytest.mark.long)
     yield pytest.param("2.0.0", "zig", _CPP, marks=pytest.mark.weekly)
     fused = (("-O2", "-march=haswell"), ("-O3", "-mfma", "-std=c99"), ("-O1", "-mfma", "-std=gnu11"))
     for name, flags in product(COMPILERS, fused):
-        by_default = (name, flags) == ("gcc", fused[0])
-        yield pytest.param("2.0.0", name, flags, marks=[_needs_fma] if by_default else [_needs_fma, pytest.mark.weekly])
+        is_chosen = (name, flags) == ("gcc", fused[0])
+        marks = pytest.mark.long if is_chosen else pytest.mark.weekly
+        yield pytest.param("2.0.0", name, flags, marks=[_needs_fma, marks])
 
 
 @pytest.mark.parametrize(("release", "name", "flags"), list(_builds()))

@@ -460,8 +460,13 @@ def test_a_report_outside_the_folder_of_the_vehicle_file_is_refused_before_the_f
 # ---- In a browser ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("width", [390, 1440])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("scheme", "width"),
+    [
+        ("light", 390),
+        *(pytest.param(*case, marks=pytest.mark.long) for case in (("dark", 390), ("light", 1440), ("dark", 1440))),
+    ],
+)
 def test_the_page_is_accessible_and_as_wide_as_the_screen(
     page: str, visit: Callable[..., Visit], tmp_path: Path, width: int, scheme: str
 ) -> None:

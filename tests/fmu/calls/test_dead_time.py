@@ -22,7 +22,7 @@ ALL_ON = dict.fromkeys(ROV.layout.commands, 0.5)
 DELAYED = {f"delayed_{name}": value for name, value in ALL_ON.items()}
 
 
-@pytest.fixture(scope="module", params=WRAPPERS, ids="FMI {}.0".format)
+@pytest.fixture(scope="module", params=[pytest.param(2, marks=pytest.mark.long), 3], ids="FMI {}.0".format)
 def fmu(request: pytest.FixtureRequest) -> Fmu:
     version: int = request.param
     return WRAPPERS[version](request.getfixturevalue({2: "thrust_dir", 3: "thrust3_dir"}[version]))

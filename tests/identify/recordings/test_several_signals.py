@@ -37,7 +37,9 @@ def fitted(m: Axis, *recordings: Recording) -> RecordingsFit:
     return fit
 
 
-@pytest.mark.parametrize("m", [HEAVE, SURGE, YAW], ids=lambda m: m.name)
+@pytest.mark.parametrize(
+    "m", [HEAVE, *(pytest.param(m, marks=pytest.mark.long) for m in (SURGE, YAW))], ids=lambda m: m.name
+)
 def test_a_position_and_a_velocity_of_one_axis_add_their_information(m: Axis) -> None:
     covered = []
     for seed in range(4):

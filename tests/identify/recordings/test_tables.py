@@ -119,6 +119,7 @@ def test_a_table_without_freedom_takes_no_part() -> None:
     assert TablePoints.of(fit_response(HEAVE, points, UNKNOWN)) is None
 
 
+@pytest.mark.long
 def test_points_scatter_more_than_few_of_them_show() -> None:
     """The median of the errors over many small tables is at least the true one."""
     errors = []
@@ -170,7 +171,7 @@ def with_forces(b_t: float, seed: int, held: float | None = None) -> tuple[Recor
     return fit, float(np.sum((simulation.residuals / noise) ** 2) + np.sum(forces.residuals(fit.rov) ** 2))
 
 
-@pytest.mark.parametrize("b_t", [0.0, pytest.param(0.3, marks=pytest.mark.long), 3.0])
+@pytest.mark.parametrize("b_t", [*(pytest.param(b_t, marks=pytest.mark.long) for b_t in (0.0, 0.3)), 3.0])
 def test_intervals_beside_a_dead_band(b_t: float) -> None:
     """The cost with b_t held at an end of its interval is higher by about that of 1.96 standard errors, 3.8.
 

@@ -173,6 +173,7 @@ def test_values_are_as_a_scenario_measures_them(tmp_path: Path) -> None:
     assert late[10::2] == pytest.approx(heading[:-10:2], abs=1e-4)
 
 
+@pytest.mark.long
 def test_a_curve_that_recordings_change_does_not_keep_the_interval_of_its_forces(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

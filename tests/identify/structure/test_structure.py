@@ -1,8 +1,9 @@
 """Tests of the model's structure: what the model lacks is reported with its recording, and a complete one is not."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import product
 from math import radians
 
 import numpy as np
@@ -81,21 +82,23 @@ TILTED = {
     "logged tilt": Case(None, ("z",), Disturbance(tilt=TILT), logged=True, cause="pitch"),
 }
 """A fit to these takes long."""
-SEEDS = [
-    0,
-    pytest.param(1, marks=pytest.mark.long),
-    *(pytest.param(seed, marks=pytest.mark.weekly) for seed in range(2, 20)),
-]
+BY_DEFAULT = ("load, delay, reverse, colour", "two sensors", "logged sag", "tether")
+"""The cases of the default tests, which run one seed."""
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("name", COMPLETE)
+def seeds(names: Iterable[str]) -> Iterator[object]:
+    """Yield each name with 20 seeds: two of them for the long tests, the others once a week."""
+    for name, seed in product(names, range(20)):
+        is_default = seed == 0 and name in BY_DEFAULT
+        yield pytest.param(name, seed, marks=() if is_default else pytest.mark.long if seed < 2 else pytest.mark.weekly)
+
+
+@pytest.mark.parametrize(("name", "seed"), seeds(COMPLETE))
 def test_a_complete_model_raises_no_alarm(name: str, seed: int) -> None:
     assert COMPLETE[name].findings(seed) == []
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("name", DISTURBED)
+@pytest.mark.parametrize(("name", "seed"), seeds(DISTURBED))
 def test_a_disturbance_is_reported(name: str, seed: int) -> None:
     check(DISTURBED[name], seed)
 
@@ -129,7 +132,7 @@ def test_a_disturbance_changes_the_prediction(name: str) -> None:
     assert max(changes) > 3.0
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.weekly) for n in range(1, 20))])
 def test_a_lag_is_suggested_where_a_delay_took_its_place(seed: int) -> None:
     found = Case(YAW, ("psi",), Disturbance(lag=0.25)).findings(seed)
     assert {finding.kind for finding in found} == {"lag suggested"}
@@ -148,7 +151,8 @@ def test_the_sentence_names_recordings_time_and_remedy() -> None:
     assert "`voltage = true`" in sentence
 
 
-@pytest.mark.parametrize("sensors", [("z",), pytest.param(("w", "z"), marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("sensors", [("z",), ("w", "z")])
 def test_a_short_recording_beside_others_is_no_obstacle(sensors: Sequence[str]) -> None:
     """It has too few samples for a spectrum of its noise, and is left out of the tests."""
     case = replace(DISTURBED["sag"], sensors=tuple(sensors))
@@ -170,7 +174,7 @@ def test_a_short_recording_beside_others_is_no_obstacle(sensors: Sequence[str]) 
     assert [*on_structure(fit)]
 
 
-@pytest.mark.parametrize("sagging", [(1,), (0, 1)])
+@pytest.mark.parametrize("sagging", [(1,), pytest.param((0, 1), marks=pytest.mark.long)])
 def test_the_only_recording_that_is_unlike_the_others_is_named(sagging: Sequence[int]) -> None:
     """The voltage falls in one of three dives; where it falls in two, none of them is the odd one."""
     random = np.random.default_rng(0)

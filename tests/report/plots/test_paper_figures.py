@@ -41,7 +41,7 @@ def drawn(figure: PaperFigure, plot: int = 0) -> Axes:
     return ax
 
 
-@pytest.mark.parametrize("name", ["figure_5", "steady_velocity"])
+@pytest.mark.parametrize("name", ["figure_5", pytest.param("steady_velocity", marks=pytest.mark.long)])
 @pytest.mark.parametrize("column", COLUMNS)
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_figure_is_as_wide_as_the_column_and_has_the_same_bytes_again(name: str, form: str, column: str) -> None:
