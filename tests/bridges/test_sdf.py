@@ -387,7 +387,9 @@ MOVING: dict[str, tuple[Vehicle, dict[str, float]]] = {
 """Vehicles, and the velocities with which they start."""
 
 
-@pytest.mark.parametrize("case", MOVING)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=() if case == "drag by direction" else pytest.mark.long) for case in MOVING]
+)
 def test_gazebo_moves_as_the_fmu(case: str) -> None:
     vehicle, velocities = MOVING[case]
     true, found = fly(vehicle, vehicle.layout.at_rest | velocities, 6, seed=5)

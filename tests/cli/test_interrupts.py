@@ -139,14 +139,16 @@ figures = {{ V = "u[-1]" }}
 
 _MOMENTS = (None, 0.0, 0.02, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
 """Seconds after the first worker of a study has started; None is when the first runs are written."""
-_DEFAULT = [(Command.press_ctrl_c, 0.0)]
-_LONG = [(Command.press_ctrl_c, None), (Command.press_ctrl_c, 0.3), (Command.press_ctrl_c, 1.0)]
+_LONG = [
+    (Command.press_ctrl_c, 0.0),
+    (Command.press_ctrl_c, None),
+    (Command.press_ctrl_c, 0.3),
+    (Command.press_ctrl_c, 1.0),
+]
 _LONG += [(Command.terminate, None), (Command.terminate, 0.0), (Command.terminate, 0.6)]
 
 
 def _marks(case: tuple[Any, float | None]) -> Any:
-    if case in _DEFAULT:
-        return ()
     return pytest.mark.long if case in _LONG else pytest.mark.weekly
 
 

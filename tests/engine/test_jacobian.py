@@ -44,7 +44,9 @@ def _variational(rov: Rov, inputs: dict[str, float], state: dict[str, float]) ->
     return end[:n], derivatives
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if n % 2 else pytest.mark.long) for n, name in enumerate(ALL)]
+)
 def test_the_derivatives_solve_the_variational_equation(name: str) -> None:
     rov = ALL[name]
     rng = random.Random(name)

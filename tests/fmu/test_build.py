@@ -115,8 +115,8 @@ def test_the_description_writes_out_what_it_cannot_do(videoray_dir: Path) -> Non
     ("before", "said"),
     [
         (("win64", "linux64", "darwin64"), "Replaced {}, which also had darwin64 and win64."),
-        (("linux64",), ""),
-        (None, ""),
+        pytest.param(("linux64",), "", marks=pytest.mark.long),
+        pytest.param(None, "", marks=pytest.mark.long),
     ],
 )
 def test_platforms_that_are_lost_are_named(

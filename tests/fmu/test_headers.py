@@ -144,14 +144,13 @@ _needs_fma = pytest.mark.skipif(
 def _builds() -> Iterator[Any]:
     """Yield header, compiler and flags of each library.
 
-    The default tests have one library of each version and one with fused multiplication. The long ones have every
-    header, compiler and C standard, and C++. The weekly ones have all combinations.
+    The long tests have every header, compiler and C standard, fused multiplication, and C++. The weekly ones have all
+    combinations.
     """
     for i, release in enumerate(RELEASES):
         for name, standard in product(COMPILERS, _STANDARDS):
             is_chosen = (name, standard) == (_NAMES[i % len(_NAMES)], _STANDARDS[i % 2])
-            by_default = release == "3.0"
-            marks = pytest.mark.weekly if not is_chosen else () if by_default else pytest.mark.long
+            marks = pytest.mark.long if is_chosen else pytest.mark.weekly
             yield pytest.param(release, name, (f"-std={standard}", "-O2"), marks=marks)
     yield pytest.param("3.0", "zig", _CPP, marks=pytest.mark.long)
     yield pytest.param("2.0.0", "zig", _CPP, marks=pytest.mark.weekly)

@@ -66,6 +66,7 @@ def test_what_a_pool_does_is_what_the_simulator_does(quantity: str) -> None:
     assert np.abs(model.residuals(still)).max() > 1.0
 
 
+@pytest.mark.long
 def test_a_short_dive_is_solved_from_afar() -> None:
     model, _ = simulator(dived(60.0).recorded())
     thin = replace(model, data=tuple(d.thinned(300) for d in model.data))

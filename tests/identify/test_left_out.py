@@ -52,7 +52,12 @@ def left_out(found: Identification) -> dict[str, str]:
     ("text", "kind", "words"),
     [
         (STILL, "constant motion", "no recording of heave: the depth never changes"),
-        (SLOW, "impossible velocity", "no recording of heave: depth tells of a velocity of"),
+        pytest.param(
+            SLOW,
+            "impossible velocity",
+            "no recording of heave: depth tells of a velocity of",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_recording_that_teaches_nothing_is_left_out(text: str, kind: str, words: str, tmp_path: Path) -> None:
@@ -109,7 +114,11 @@ def failing(fit: Fit, fails: Callable[[Sequence[Recording]], bool], error: Excep
     ("error", "reason"),
     [
         (NoFitError("log_heave_1.csv: no vehicle moves so: a_d = 9 would do it best. Check units"), "no vehicle moves"),
-        (MotionError("the motion cannot be computed"), "the motion cannot be computed. Check units and signs"),
+        pytest.param(
+            MotionError("the motion cannot be computed"),
+            "the motion cannot be computed. Check units and signs",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_recording_that_no_vehicle_fits_is_left_out(

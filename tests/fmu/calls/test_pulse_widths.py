@@ -36,9 +36,10 @@ COMMANDS = [*FRACTIONS.layout.commands]
 STATES = [*FRACTIONS.layout.state]
 
 Pair = tuple[Fmu, Fmu]
+pytestmark = pytest.mark.long
 
 
-@pytest.fixture(scope="module", params=[pytest.param(2, marks=pytest.mark.long), 3], ids="FMI {}.0".format)
+@pytest.fixture(scope="module", params=WRAPPERS, ids="FMI {}.0".format)
 def fmus(request: pytest.FixtureRequest, made_once: Made) -> Pair:
     """Return the FMU with pulse widths of a version of FMI, and one of FMI 2.0 with fractions."""
 

@@ -33,7 +33,7 @@ def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls
     ("fmi", "sanitizers", "calls"),
     [
         pytest.param(2, "thread", 40_000, marks=pytest.mark.long),
-        (3, "thread", 10_000),
+        pytest.param(3, "thread", 20_000, marks=pytest.mark.long),
         pytest.param(3, "address,undefined", 40_000, marks=pytest.mark.long),  # the corpus test has it, too
         *(
             pytest.param(fmi, sanitizers, 2_000_000, marks=pytest.mark.weekly)

@@ -208,6 +208,7 @@ def test_expected_values_of_a_vehicle_that_spins_fast_are_right(spinner: Vehicle
 # ---- Roll and pitch --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_expected_values_with_roll_and_pitch_are_those_of_the_rigid_body() -> None:
     """Steps, the manoeuvre, and a tilted start of a vehicle with six axes."""
     vehicle = a_vehicle(SIX)

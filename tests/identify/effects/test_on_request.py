@@ -39,7 +39,7 @@ def advancing(loss: float, seed: int) -> Recording:
     return Recording(f"{seed}.csv", SURGE, "velocity", TIME, command, u + 0.005 * random.standard_normal(len(TIME)))
 
 
-@pytest.mark.parametrize("loss", [0.0, LOSS])
+@pytest.mark.parametrize("loss", [pytest.param(0.0, marks=pytest.mark.long), LOSS])
 def test_the_loss_by_advance_is_fitted_where_there_is_one(loss: float) -> None:
     (fit,) = fit_recordings([advancing(loss, n) for n in range(2)], VIDEORAY, requests=Requests(advance=("rear",)))
     (found,) = (effect for effect in fit.effects if effect.kind == "advance")
@@ -52,6 +52,7 @@ def test_the_loss_by_advance_is_fitted_where_there_is_one(loss: float) -> None:
         assert "d_rear" not in fit.rov.coefficients
 
 
+@pytest.mark.long
 def test_a_vehicle_of_logs_with_voltage_has_the_battery_and_the_exponent(tmp_path: Path) -> None:
     scenario = SCENARIOS["sag with voltage"]
     found = identify(load_tank_tests(write(scenario, 0, tmp_path / "tests")))

@@ -62,7 +62,9 @@ def switches(seed: int, where: str) -> Array:
     return np.asarray(np.maximum(rows - early, 0.0))
 
 
-@pytest.mark.parametrize("where", SCATTER)
+@pytest.mark.parametrize(
+    "where", ["between rows", *(pytest.param(w, marks=pytest.mark.long) for w in ("at rows", "near rows"))]
+)
 def test_unknown_times_are_allowed_for_where_they_are_unknown(k: Rov, where: str) -> None:
     recordings = [recording(k, switches(seed, where), seed) for seed in range(3)]
     base = k.replaced({"a_d_w": 1.0, "b_d_w": 1.0, "beta_w": 1.0})

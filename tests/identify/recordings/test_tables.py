@@ -99,7 +99,7 @@ def test_intervals_cover_and_are_narrower_with_the_table() -> None:
     assert sum(covered) >= len(covered) - 2
 
 
-@pytest.mark.parametrize("scale", [1.02, 1.05, 1.1, 1.3])
+@pytest.mark.parametrize("scale", [*(pytest.param(x, marks=pytest.mark.long) for x in (1.02, 1.05, 1.1)), 1.3])
 def test_a_wrong_table_does_not_spoil_the_fit(scale: float) -> None:
     """A velocity that is far off, as with a wrong unit, counts linearly and not by its square."""
     fit = fitted(0, tables=True, scale=scale)

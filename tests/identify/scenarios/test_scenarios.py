@@ -20,12 +20,13 @@ from tests.identify.scenarios.outcome import flights, moved, outcome, true_value
 from verification.references import pool
 from verification.references.pool import Array, Commands, Conditions
 
-BY_DEFAULT = ("load of 0.1 N in heave", "pilot")
-"""The quick scenarios of the default tests."""
+BY_DEFAULT = ("load of 0.1 N in heave",)
+"""The quick scenario of the default tests."""
 OFTEN = (
     "clean",
     "delay and lag",
     "gaps while turning",
+    "pilot",
     "switches between rows at 5 Hz",
     "tether",
     "load, delay, reverse, correlated noise",

@@ -93,12 +93,12 @@ def seeds(names: Iterable[str]) -> Iterator[object]:
         yield pytest.param(name, seed, marks=() if is_default else pytest.mark.long if seed < 2 else pytest.mark.weekly)
 
 
-@pytest.mark.parametrize(("name", "seed"), seeds(COMPLETE))
+@pytest.mark.parametrize(("name", "seed"), [*seeds(COMPLETE)])
 def test_a_complete_model_raises_no_alarm(name: str, seed: int) -> None:
     assert COMPLETE[name].findings(seed) == []
 
 
-@pytest.mark.parametrize(("name", "seed"), seeds(DISTURBED))
+@pytest.mark.parametrize(("name", "seed"), [*seeds(DISTURBED)])
 def test_a_disturbance_is_reported(name: str, seed: int) -> None:
     check(DISTURBED[name], seed)
 
